@@ -1,0 +1,45 @@
+//! Standard output and standard error.
+//!
+//! Output goes through `write!` and not `println!`: a reader that has gone away (`| head`) is no error and
+//! no panic.
+
+use crate::failure::Failure;
+use serde::Serialize;
+use std::io::{self, ErrorKind, Write};
+
+/// Where results and complaints go.
+pub(crate) struct Console {
+    json: bool,
+}
+
+impl Console {
+    /// Results as JSON, or as text for people.
+    pub(crate) fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// Prints the result of a command, in the form asked for.
+    pub(crate) fn report(&self, report: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), Failure> {
+        let mut output = if self.json { to_json(report)? } else { text() };
+        if !output.ends_with('\n') {
+            output.push('\n');
+        }
+        match io::stdout().lock().write_all(output.as_bytes()) {
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+                Err(Failure::other(format!("cannot write to standard output: {error}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Tells the user on standard error. If nobody listens there, nobody can be told.
+    pub(crate) fn complain(&self, message: &str) {
+        let _nobody_listens = writeln!(io::stderr().lock(), "{message}");
+    }
+}
+
+/// A report as the JSON that `--json` prints.
+pub(crate) fn to_json(report: &impl Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(report)
+        .map_err(|error| Failure::other(format!("the report cannot be written as JSON: {error}")))
+}

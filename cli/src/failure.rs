@@ -1,0 +1,108 @@
+//! What went wrong, for people: file, place, clause, cause, and what to do about it.
+
+use serde::Serialize;
+use splatstream_format::{Class, Error};
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a command did not do what it was asked.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The arguments do not make sense together.
+    Usage(String),
+    /// A stream is at fault.
+    Stream {
+        /// The file.
+        path: PathBuf,
+        /// Its first error.
+        error: Error,
+    },
+    /// Files and settings.
+    Other(String),
+}
+
+impl Failure {
+    /// A failure of files or settings.
+    pub(crate) fn other(message: impl Into<String>) -> Self {
+        Self::Other(message.into())
+    }
+
+    /// The file system refused; `what` is "read" or the like.
+    pub(crate) fn file(what: &str, path: &Path, error: &io::Error) -> Self {
+        let advice = match error.kind() {
+            io::ErrorKind::NotFound => "check the path",
+            io::ErrorKind::PermissionDenied => "check the permissions",
+            io::ErrorKind::StorageFull => "make room, or choose another place",
+            _ => "check the path and the disk",
+        };
+        Self::Other(format!("{}: cannot {what}: {error}\n  {advice}", path.display()))
+    }
+
+    /// A stream that breaks the specification.
+    pub(crate) fn stream(path: &Path, error: Error) -> Self {
+        Self::Stream { path: path.to_path_buf(), error }
+    }
+
+    /// 2 usage, 1 files and settings, 10 to 14 by the class of a stream's error.
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Other(_) => 1,
+            Self::Stream { error, .. } => error.class().exit_code(),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(message) => write!(f, "{message}\n  splatstream COMMAND --help shows an example"),
+            Self::Other(message) => f.write_str(message),
+            Self::Stream { path, error } => {
+                let path = path.display();
+                write!(f, "{path}: {error}\n  {}", advice(error.class()).replace("FILE", &path.to_string()))
+            }
+        }
+    }
+}
+
+/// What to do about an error of a class; FILE stands for the stream.
+fn advice(class: Class) -> &'static str {
+    match class {
+        Class::Malformed => {
+            "the file is damaged or no stream: copy it again; `splatstream inspect FILE` shows where it breaks"
+        }
+        Class::Invalid => {
+            "the file breaks that clause of the specification: tell whoever made it; \
+             `splatstream inspect FILE` shows the elements up to there"
+        }
+        Class::Unsupported => "the file needs a later version or another profile: look for a newer splatstream",
+        Class::OverLimit => "if you trust the file, raise the limit with --max-gaussians",
+        Class::Truncated => {
+            "the file is cut short: copy it again; `splatstream decode FILE -o DIR` writes what is there"
+        }
+    }
+}
+
+/// An error of a stream, as reports give it.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct StreamFault {
+    class: &'static str,
+    code: &'static str,
+    clause: &'static str,
+    byte: u64,
+    message: String,
+}
+
+impl From<Error> for StreamFault {
+    fn from(error: Error) -> Self {
+        Self {
+            class: error.class().name(),
+            code: error.kind.code(),
+            clause: error.clause,
+            byte: error.at,
+            message: error.kind.to_string(),
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! The `splatstream` command. The only crate of the workspace that prints, exits or opens files by name.
+//!
+//! One file a subcommand; `console` speaks to the user, `failure` says what went wrong and what to do.
+
+mod compare;
+mod console;
+mod decode;
+mod demo;
+mod encode;
+mod extract;
+mod failure;
+mod frame_files;
+mod inspect;
+mod numbers;
+mod output_file;
+mod progress;
+mod stream_file;
+mod table;
+mod validate;
+
+use clap::{Parser, Subcommand};
+use console::Console;
+use failure::Failure;
+use std::process::ExitCode;
+
+/// SplatStream: scalable, exact bitstreams of dynamic 3D Gaussian splatting.
+#[derive(Parser)]
+#[command(
+    version,
+    about,
+    after_help = "Example:\n  splatstream demo\n\n\
+        Exit codes: 0 done, 1 files or settings, 2 usage; of streams: 10 malformed, 11 invalid,\n\
+        12 unsupported, 13 over a limit, 14 truncated.\n\
+        The keys that --json prints are described in cli/json.md."
+)]
+struct Cli {
+    /// Threads to use; default is one a processor. The result is the same with any number.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print the result as JSON on standard output.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Demo(demo::Demo),
+    Encode(encode::Encode),
+    Decode(decode::Decode),
+    Inspect(inspect::Inspect),
+    Validate(validate::Validate),
+    Extract(extract::Extract),
+    Compare(compare::Compare),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let console = Console::new(cli.json);
+    match in_threads(cli.threads, || cli.command.run(&console)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            console.complain(&failure.to_string());
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+/// Runs `work` with so many threads.
+fn in_threads(
+    threads: Option<u16>,
+    work: impl FnOnce() -> Result<(), Failure> + Send,
+) -> Result<(), Failure> {
+    let Some(threads) = threads else { return work() };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build();
+    pool.map_err(|error| Failure::other(format!("cannot start {threads} threads: {error}")))?.install(work)
+}
+
+impl Command {
+    fn run(&self, console: &Console) -> Result<(), Failure> {
+        match self {
+            Self::Demo(command) => command.run(console),
+            Self::Encode(command) => command.run(console),
+            Self::Decode(command) => command.run(console),
+            Self::Inspect(command) => command.run(console),
+            Self::Validate(command) => command.run(console),
+            Self::Extract(command) => command.run(console),
+            Self::Compare(command) => command.run(console),
+        }
+    }
+}

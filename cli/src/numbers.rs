@@ -1,0 +1,113 @@
+//! Numbers in words: for tables, and the arguments that hold numbers.
+
+use std::num::ParseIntError;
+
+/// A count with its thousands apart: 1,234,567.
+pub(crate) fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A digest as reports write it.
+pub(crate) fn hex_digest(digest: u64) -> String {
+    format!("{digest:016x}")
+}
+
+/// Bits a Gaussian.
+pub(crate) fn bits_per_gaussian(bytes: u64, gaussians: u64) -> f64 {
+    bytes as f64 * 8.0 / gaussians.max(1) as f64
+}
+
+/// `part` of `whole` in percent.
+pub(crate) fn percent(part: u64, whole: u64) -> f64 {
+    part as f64 * 100.0 / whole.max(1) as f64
+}
+
+/// A span of frames, `A..B`: from A up to and without B.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct FrameRange {
+    /// The first frame.
+    pub(crate) first: u32,
+    /// The frame after the last; none is to the end.
+    pub(crate) end: Option<u32>,
+}
+
+impl FrameRange {
+    /// Every frame.
+    pub(crate) const ALL: Self = Self { first: 0, end: None };
+
+    /// Whether a frame belongs to it.
+    pub(crate) fn contains(&self, frame: u32) -> bool {
+        frame >= self.first && !self.is_over(frame)
+    }
+
+    /// Whether `frame` and all after it lie behind it.
+    pub(crate) fn is_over(&self, frame: u32) -> bool {
+        self.end.is_some_and(|end| frame >= end)
+    }
+
+    /// Frames of it in a stream of `frames` frames.
+    pub(crate) fn count_in(&self, frames: u32) -> u32 {
+        self.end.map_or(frames, |end| end.min(frames)).saturating_sub(self.first)
+    }
+
+    /// `A..B`, `A..` or `..B`.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        let wrong = || format!("'{text}' is not a span of frames; write 10..20, 10.. or ..20");
+        let (first, end) = text.split_once("..").ok_or_else(wrong)?;
+        let number = |part: &str| (!part.is_empty()).then(|| part.parse::<u32>()).transpose();
+        let bounds = || -> Result<_, ParseIntError> { Ok((number(first)?.unwrap_or(0), number(end)?)) };
+        match bounds().map_err(|_| wrong())? {
+            (first, Some(end)) if first >= end => {
+                Err(format!("'{text}' holds no frame: the end is the frame after the last"))
+            }
+            (first, end) => Ok(Self { first, end }),
+        }
+    }
+}
+
+/// Frames a second as ticks a second and ticks a frame: `30`, `29.97` or `30000/1001`.
+pub(crate) fn parse_frame_rate(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || format!("'{text}' is not a frame rate; write 30, 29.97 or 30000/1001");
+    let positive = |part: &str| part.parse::<u32>().ok().filter(|&number| number > 0).ok_or_else(wrong);
+    if let Some((ticks, per_frame)) = text.split_once('/') {
+        return Ok((positive(ticks)?, positive(per_frame)?));
+    }
+    let Some((whole, fraction)) = text.split_once('.') else { return Ok((positive(text)?, 1)) };
+    let scale = 10_u32.checked_pow(fraction.len() as u32).ok_or_else(wrong)?;
+    Ok((positive(&format!("{whole}{fraction}"))?, scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_are_apart() {
+        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
+    }
+
+    #[test]
+    fn a_span_of_frames_ends_before_its_end() {
+        let span = FrameRange::parse("2..4").unwrap();
+        assert_eq!((0..6).filter(|&frame| span.contains(frame)).collect::<Vec<_>>(), [2, 3]);
+        assert_eq!(FrameRange::parse(".."), Ok(FrameRange::ALL));
+        assert_eq!((span.count_in(3), FrameRange::ALL.count_in(3)), (1, 3));
+        assert!(["", "3", "4..4", "a..b", "1..2..3"].iter().all(|text| FrameRange::parse(text).is_err()));
+    }
+
+    #[test]
+    fn frame_rates_are_exact_fractions() {
+        assert_eq!(parse_frame_rate("30"), Ok((30, 1)));
+        assert_eq!(parse_frame_rate("29.97"), Ok((2997, 100)));
+        assert_eq!(parse_frame_rate("30000/1001"), Ok((30000, 1001)));
+        assert!(["0", "-1", "1/0", "x", "1e9"].iter().all(|text| parse_frame_rate(text).is_err()));
+    }
+}

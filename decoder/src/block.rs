@@ -1,0 +1,223 @@
+//! A block: coded planes in, integer attributes out. Blocks are independent, so all cores decode one frame.
+
+use crate::attribute::{self, ATTRIBUTE_LIMIT};
+use crate::colour::{COMPONENT_LIMIT, Colour};
+use crate::context::{DeltaNeighbours, Neighbours, axis_contexts, combine, is_serial};
+use crate::frame::QuantizedFrame;
+use crate::layout::{Attribute, Layout, PlaneInfo};
+use crate::position;
+use splatstream_format::Result;
+use splatstream_format::entropy::model::Source;
+use splatstream_format::entropy::reader::{BlockReader, PlaneDecoder};
+use splatstream_format::entropy::token::Alphabet;
+
+/// The values of a block as they are coded, and what contexts need of the reconstruction.
+///
+/// The decoder fills it plane by plane, the encoder before it chooses models.
+#[derive(Debug, Clone, Default)]
+pub struct CodedBlock {
+    /// Morton deltas, the first from 0.
+    pub deltas: Vec<u64>,
+    /// Coded values (bias not added) by plane; the position plane is empty.
+    pub coded: Vec<Vec<i32>>,
+    /// Reconstructed log-scales, largest first if the axes are canonical.
+    pub log_scale: [Vec<i32>; 3],
+    /// Reconstructed opacity.
+    pub opacity: Vec<i32>,
+}
+
+impl CodedBlock {
+    /// Gaussians in the block.
+    pub fn len(&self) -> usize {
+        self.deltas.len()
+    }
+
+    /// True if there is no Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.deltas.is_empty()
+    }
+}
+
+/// What the elements of the sequence and of the unit say about every block of the unit.
+#[derive(Debug, Clone, Copy)]
+pub struct UnitParameters<'a> {
+    /// Bits an axis.
+    pub position_bits: u8,
+    /// Bits an axis that the unit leaves out.
+    pub position_shift: u8,
+    /// Whether the axes are sorted.
+    pub canonical_axes: bool,
+    /// rotation_threshold of the sequence.
+    pub rotation_thresholds: [u8; 3],
+    /// log2 of the number of rANS states.
+    pub lanes_log2: u8,
+    /// The coded planes.
+    pub layout: &'a Layout,
+    /// How colour components become colour.
+    pub colour: Colour<'a>,
+}
+
+/// Clause 7.3 to 7.8 for one block of `count` Gaussians at absolute offset `at`.
+///
+/// # Errors
+/// Malformed or invalid as the clauses say.
+pub fn decode_block(
+    bytes: &[u8],
+    at: u64,
+    count: usize,
+    unit: &UnitParameters<'_>,
+    decoders: &[PlaneDecoder],
+) -> Result<QuantizedFrame> {
+    let block = decode_coded(bytes, at, count, unit, decoders)?;
+    let biases: Vec<i32> = decoders.iter().map(PlaneDecoder::bias).collect();
+    reconstruct(block, unit, &biases, at)
+}
+
+/// Clause 8.4: the coded values of a block, its entropy state checked.
+///
+/// # Errors
+/// Malformed, or invalid log-scales or opacity.
+pub fn decode_coded(
+    bytes: &[u8],
+    at: u64,
+    count: usize,
+    unit: &UnitParameters<'_>,
+    decoders: &[PlaneDecoder],
+) -> Result<CodedBlock> {
+    let mut reader = BlockReader::open(bytes, at, unit.lanes_log2)?;
+    let mut block = CodedBlock { deltas: vec![0; count], ..CodedBlock::default() };
+    for (plane, (&info, decoder)) in unit.layout.planes().iter().zip(decoders).enumerate() {
+        let coded = read_plane(&mut reader, decoder, plane, info, &mut block);
+        block.coded.push(coded);
+        keep_for_contexts(&mut block, info, decoder.bias(), unit.canonical_axes, at)?;
+    }
+    reader.finish()?;
+    Ok(block)
+}
+
+fn read_plane(
+    reader: &mut BlockReader<'_>,
+    decoder: &PlaneDecoder,
+    plane: usize,
+    info: PlaneInfo,
+    block: &mut CodedBlock,
+) -> Vec<i32> {
+    let [first, second] = decoder.axes();
+    if info.attribute == Attribute::Position {
+        read_deltas(reader, decoder, &mut block.deltas);
+        return Vec::new();
+    }
+    let mut out = vec![0; block.len()];
+    let on_first = axis_contexts(first, plane, info, block);
+    let on_second = axis_contexts(second, plane, info, block);
+    if info.alphabet == Alphabet::Index {
+        reader.indices(decoder, &combine(&on_first, &on_second, second.contexts()), &mut out);
+    } else if is_serial(first.source) || is_serial(second.source) {
+        let mut neighbours = Neighbours::default();
+        let on_axis = |axis: usize, known: &[u8], place: usize, neighbours: &Neighbours, source: Source| {
+            if is_serial(source) {
+                decoder.axis_context(axis, neighbours.value(source))
+            } else {
+                known.get(place).copied().unwrap_or(0)
+            }
+        };
+        let context = |place: usize, previous: i32| {
+            if place > 0 {
+                neighbours.push(previous);
+            }
+            let a = on_axis(0, &on_first, place, &neighbours, first.source);
+            let b = on_axis(1, &on_second, place, &neighbours, second.source);
+            decoder.context(a, b)
+        };
+        reader.signed_serial(decoder, context, &mut out);
+    } else {
+        reader.signed(decoder, &combine(&on_first, &on_second, second.contexts()), &mut out);
+    }
+    out
+}
+
+fn read_deltas(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, deltas: &mut [u64]) {
+    let [first, _] = decoder.axes();
+    let has_source = first.source != Source::None;
+    let mut neighbours = DeltaNeighbours::default();
+    let context = |place: usize, previous: u64| {
+        if !has_source {
+            return 0;
+        }
+        if place > 0 {
+            neighbours.push(previous);
+        }
+        decoder.axis_context(0, neighbours.value())
+    };
+    reader.deltas(decoder, context, deltas);
+}
+
+/// Reconstructs what later planes take contexts from, as soon as its plane is there.
+///
+/// # Errors
+/// Invalid if a value is out of range.
+fn keep_for_contexts(
+    block: &mut CodedBlock,
+    info: PlaneInfo,
+    bias: i32,
+    canonical_axes: bool,
+    at: u64,
+) -> Result<()> {
+    let Some(coded) = block.coded.last() else { return Ok(()) };
+    let [largest, middle, smallest] = &mut block.log_scale;
+    match (info.attribute, info.place) {
+        (Attribute::LogScale, 0) => {
+            *largest = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "log_scale", at)?;
+        }
+        (Attribute::LogScale, 1) => {
+            let difference = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "log_scale", at)?;
+            *middle = attribute::smaller(largest, &difference, canonical_axes, at)?;
+        }
+        (Attribute::LogScale, _) => {
+            let difference = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "log_scale", at)?;
+            *smallest = attribute::smaller(middle, &difference, canonical_axes, at)?;
+        }
+        (Attribute::Opacity, _) => {
+            block.opacity = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "opacity", at)?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Coded planes, all there, to the integer attributes of the block. The encoder calls this too.
+///
+/// `biases` are those of the plane models, by plane.
+///
+/// # Errors
+/// Invalid if a value is out of range.
+pub fn reconstruct(
+    block: CodedBlock,
+    unit: &UnitParameters<'_>,
+    biases: &[i32],
+    at: u64,
+) -> Result<QuantizedFrame> {
+    let position = position::positions(&block.deltas, unit.position_bits, unit.position_shift, at)?;
+    let mut rotation = [(); 3].map(|()| Vec::new());
+    let mut dc_components = Vec::new();
+    let mut sh_components = Vec::new();
+    let [largest, _, smallest] = &block.log_scale;
+    for ((info, coded), &bias) in unit.layout.planes().iter().zip(&block.coded).zip(biases) {
+        match info.attribute {
+            Attribute::Rotation => {
+                let values = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "rotation", at)?;
+                if let Some(plane) = rotation.get_mut(usize::from(info.place)) {
+                    let thresholds = unit.rotation_thresholds;
+                    *plane = attribute::rotations(&values, largest, smallest, thresholds, at)?;
+                }
+            }
+            Attribute::Dc => {
+                dc_components.push(attribute::unbias(coded, bias, COMPONENT_LIMIT, "dc", at)?);
+            }
+            Attribute::Sh => sh_components.push(attribute::unbias(coded, bias, 65_535, "sh", at)?),
+            Attribute::Position | Attribute::LogScale | Attribute::Opacity => {}
+        }
+    }
+    let (dc, sh) = unit.colour.reconstruct(&dc_components, &sh_components, block.deltas.len(), at)?;
+    Ok(QuantizedFrame { position, log_scale: block.log_scale, opacity: block.opacity, rotation, dc, sh })
+}

@@ -1,0 +1,149 @@
+//! What a GOP header starts: transforms and codebooks until the next one (clause 7.1).
+
+use crate::colour::Colour;
+use crate::layout::ShCoding;
+use splatstream_format::payload::{Codebook, Refinement, Transform};
+use splatstream_format::syntax::{
+    FrameHeader, GopHeader, NO_TRANSFORM, SequenceParameters, ShMode, TransformKind, UnitType,
+};
+use splatstream_format::unit::Unit;
+use splatstream_format::{Error, ErrorKind, Limits, Result};
+
+/// The state of a GOP.
+#[derive(Debug, Clone)]
+pub struct Gop {
+    /// Its header.
+    pub header: GopHeader,
+    /// Display index of its first frame.
+    pub first_frame: u32,
+    dc: [Option<Transform>; 16],
+    sh: [Option<Transform>; 16],
+    codebooks: [Option<Codebook>; 16],
+    codebook_values: u64,
+}
+
+/// The transforms of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Transforms<'a> {
+    /// Of the dc components.
+    pub dc: &'a Transform,
+    /// Of the SH components; none at SH degree 0.
+    pub sh: Option<&'a Transform>,
+}
+
+impl Gop {
+    /// A GOP without transforms or codebooks.
+    pub fn new(header: GopHeader, first_frame: u32) -> Self {
+        Self {
+            header,
+            first_frame,
+            dc: [const { None }; 16],
+            sh: [const { None }; 16],
+            codebooks: [const { None }; 16],
+            codebook_values: 0,
+        }
+    }
+
+    /// Takes a transform or codebook unit.
+    ///
+    /// # Errors
+    /// What clauses 6.7 and 6.8 refuse, an identifier defined twice, more codebook values than the limits.
+    pub fn tool(&mut self, unit: &Unit<'_>, sequence: &SequenceParameters, limits: &Limits) -> Result<()> {
+        if unit.header.unit_type() == UnitType::Transform {
+            let transform = Transform::parse(unit.payload, unit.payload_at, sequence)?;
+            let slots = match transform.header.kind() {
+                Some(TransformKind::Sh) => &mut self.sh,
+                _ => &mut self.dc,
+            };
+            return define(slots, transform.header.transform_id, transform, unit, "6.7");
+        }
+        let codebook = Codebook::parse(unit.payload, unit.payload_at, limits)?;
+        let values = u64::try_from(codebook.entries.len()).unwrap_or(u64::MAX);
+        self.codebook_values = self.codebook_values.saturating_add(values);
+        let most = u64::from(limits.max_codebook_values);
+        Limits::check(unit.payload_at, "max_codebook_values", self.codebook_values, most)?;
+        define(&mut self.codebooks, codebook.header.codebook_id, codebook, unit, "6.8")
+    }
+
+    /// The transforms that a frame header names.
+    ///
+    /// # Errors
+    /// Invalid if one is not defined, or an SH transform is named or missing against the SH degree.
+    pub fn transforms(
+        &self,
+        frame: &FrameHeader,
+        sequence: &SequenceParameters,
+        at: u64,
+    ) -> Result<Transforms<'_>> {
+        let find = |slots, id: u8, element| {
+            let undefined = ErrorKind::Undefined { element, id: u64::from(id) };
+            defined(slots, id).ok_or(Error::new(at, "6.6", undefined))
+        };
+        let dc = find(&self.dc, frame.dc_transform_id, "dc_transform_id")?;
+        let sh = if sequence.sh_degree == 0 && frame.sh_transform_id == NO_TRANSFORM {
+            None
+        } else {
+            Some(find(&self.sh, frame.sh_transform_id, "sh_transform_id")?)
+        };
+        Ok(Transforms { dc, sh })
+    }
+
+    /// What a unit needs to reconstruct colour.
+    ///
+    /// # Errors
+    /// Invalid if a codebook is not defined or has another number of components than the transform.
+    pub fn colour<'a>(
+        &'a self,
+        transforms: Transforms<'a>,
+        refinement: &Refinement<'_>,
+        sequence: &SequenceParameters,
+        at: u64,
+    ) -> Result<Colour<'a>> {
+        let header = &refinement.header;
+        let rank = transforms.sh.map_or(0, |transform| transform.header.rank);
+        let mode = match header.mode() {
+            Some(ShMode::Coefficients) => ShCoding::Coefficients { rank },
+            Some(ShMode::VectorQuantised) => ShCoding::VectorQuantised { stages: header.vq_stage_count },
+            _ => ShCoding::None,
+        };
+        let mut codebooks = [None; 4];
+        for (slot, id) in codebooks.iter_mut().zip(header.codebooks()) {
+            let undefined = ErrorKind::Undefined { element: "codebook_ids", id: u64::from(id) };
+            let codebook = defined(&self.codebooks, id).ok_or(Error::new(at, "6.9", undefined))?;
+            if codebook.header.component_count != rank {
+                let kind = ErrorKind::Mismatch {
+                    element: "component_count",
+                    value: u64::from(codebook.header.component_count),
+                    expected: u64::from(rank),
+                };
+                return Err(Error::new(at, "6.8", kind));
+            }
+            *slot = Some(codebook);
+        }
+        let sh_planes = usize::from(sequence.sh_dimension());
+        Ok(Colour { dc: transforms.dc, sh: transforms.sh, mode, codebooks, sh_planes })
+    }
+}
+
+fn defined<T>(slots: &[Option<T>; 16], id: u8) -> Option<&T> {
+    slots.get(usize::from(id)).and_then(Option::as_ref)
+}
+
+fn define<T>(
+    slots: &mut [Option<T>; 16],
+    id: u8,
+    value: T,
+    unit: &Unit<'_>,
+    clause: &'static str,
+) -> Result<()> {
+    match slots.get_mut(usize::from(id)) {
+        Some(slot) if slot.is_none() => {
+            *slot = Some(value);
+            Ok(())
+        }
+        _ => {
+            let rule = "an identifier is defined once in a GOP";
+            Err(Error::new(unit.payload_at, clause, ErrorKind::Constraint { rule }))
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Clause 7: the decoding process. Integers up to [`output`], so that every machine gives the same frame.
+//!
+//! | clause | module |
+//! |---|---|
+//! | 7.1 state, order of units, lost units | [`process`] |
+//! | 7.2 counts of a refinement | [`SequenceParameters`](splatstream_format::syntax::SequenceParameters) |
+//! | 7.3 positions | [`position`] |
+//! | 7.4 - 7.6 log-scales, opacity, rotation | [`attribute`] |
+//! | 7.7, 7.8 colour | [`colour`] |
+//! | 7.9 canonical planes and digest | [`frame`], [`digest`] |
+//! | 7.10 output | [`output`] |
+//! | 7.11 operating points | [`operating_point`] |
+//! | 8.5 contexts | [`context`], [`layout`] |
+//!
+//! The encoder calls the same functions: what it reconstructs is what a decoder reconstructs.
+#![deny(
+    clippy::arithmetic_side_effects,
+    clippy::expect_used,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used
+)]
+
+pub mod attribute;
+pub mod block;
+pub mod colour;
+pub mod context;
+pub mod digest;
+pub mod frame;
+pub mod gop;
+pub mod layout;
+pub mod operating_point;
+pub mod output;
+pub mod position;
+pub mod process;
+pub mod statistics;
+pub mod stream;
+pub mod unit;

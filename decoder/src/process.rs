@@ -1,0 +1,394 @@
+//! Clause 7.1: the state of a decoder and what each unit does to it.
+
+use crate::digest::{UnitDigest, frame_digest, unit_digest};
+use crate::frame::QuantizedFrame;
+use crate::gop::Gop;
+use crate::operating_point::OperatingPoint;
+use crate::unit::{CodedUnit, decode_units};
+use splatstream_format::payload::{Index, Refinement};
+use splatstream_format::syntax::{
+    EndOfStream, FileHeader, FrameHeader, GopHeader, SequenceParameters, UnitHeader, UnitType,
+};
+use splatstream_format::unit::Unit;
+use splatstream_format::{Error, ErrorKind, Limits, Result};
+
+/// How to decode.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// What is accepted at most.
+    pub limits: Limits,
+    /// Compare every frame with the digest in the stream.
+    pub verify: bool,
+    /// The units to take.
+    pub operating_point: OperatingPoint,
+    /// Show a frame of which a refinement unit is damaged at the refinement before, instead of giving up.
+    pub tolerant: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let operating_point = OperatingPoint::ALL;
+        Self { limits: Limits::default(), verify: true, operating_point, tolerant: false }
+    }
+}
+
+/// One frame as far as its units were there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DecodedFrame {
+    /// Display index.
+    pub number: u32,
+    /// The integer planes.
+    pub planes: QuantizedFrame,
+    /// Refinement units decoded.
+    pub refinements: u8,
+    /// Digest of the planes, clause 7.9; none if it was not asked for.
+    pub digest: Option<u64>,
+    /// Bytes of the frame's units that were decoded, headers included.
+    pub bytes: u64,
+    /// Why the refinement after the last decoded one was lost, if it was.
+    pub lost: Option<Error>,
+}
+
+/// A frame whose units are still arriving.
+struct PendingFrame<'a> {
+    number: u32,
+    header: FrameHeader,
+    units: Vec<PendingUnit<'a>>,
+    bytes: u64,
+    lost: Option<Error>,
+}
+
+struct PendingUnit<'a> {
+    refinement: Refinement<'a>,
+    payload_at: u64,
+    bytes: u64,
+}
+
+/// Decodes a stream unit by unit.
+pub struct Decoder<'a> {
+    options: Options,
+    level: u8,
+    sequence: Option<(SequenceParameters, &'a [u8])>,
+    gop: Option<Gop>,
+    frame: Option<PendingFrame<'a>>,
+    frames: u32,
+    units: u32,
+    index_offset: u64,
+    ended: bool,
+}
+
+impl<'a> Decoder<'a> {
+    /// A decoder for the stream with this file header.
+    pub fn new(file: &FileHeader, options: Options) -> Self {
+        Self {
+            options,
+            level: file.level,
+            sequence: None,
+            gop: None,
+            frame: None,
+            frames: 0,
+            units: 0,
+            index_offset: 0,
+            ended: false,
+        }
+    }
+
+    /// The sequence parameters, once they have arrived.
+    pub fn sequence(&self) -> Option<&SequenceParameters> {
+        self.sequence.as_ref().map(|(sequence, _)| sequence)
+    }
+
+    /// The transforms and codebooks of the current GOP.
+    pub fn gop(&self) -> Option<&Gop> {
+        self.gop.as_ref()
+    }
+
+    /// Takes the next unit; gives the frame that it completes, if it does.
+    ///
+    /// # Errors
+    /// What the clause of the unit says; the decoder is of no further use then, unless it is tolerant and the
+    /// unit was a refinement, which is not an error then.
+    pub fn unit(&mut self, unit: &Unit<'a>) -> Result<Option<DecodedFrame>> {
+        let header = &unit.header;
+        let unit_type = header.unit_type();
+        if !unit_type.is_known() {
+            self.units = self.units.wrapping_add(1);
+            return Ok(None);
+        }
+        if self.sequence.is_none() && unit_type != UnitType::SequenceParameters || self.ended {
+            return Err(unexpected(unit));
+        }
+        let done = match unit_type {
+            UnitType::SequenceParameters => self.sequence_parameters(unit).map(|()| None),
+            UnitType::GopHeader => self.closing(|decoder| decoder.gop_header(unit)),
+            UnitType::Transform | UnitType::Codebook => self.gop_tool(unit).map(|()| None),
+            UnitType::FrameHeader => self.closing(|decoder| decoder.frame_header(unit)),
+            UnitType::Refinement => self.refinement(unit).map(|()| None),
+            UnitType::Index => self.closing(|decoder| decoder.index(unit)),
+            UnitType::End => self.closing(|decoder| decoder.end(unit)),
+            UnitType::Reserved(_) | UnitType::User(_) => Ok(None),
+        };
+        self.units = self.units.wrapping_add(1);
+        done
+    }
+
+    /// Takes note of a unit whose payload is damaged.
+    ///
+    /// # Errors
+    /// The damage itself, unless the decoder is tolerant and the unit is a refinement.
+    pub fn damaged(&mut self, header: &UnitHeader, error: Error) -> Result<()> {
+        self.units = self.units.wrapping_add(1);
+        match &mut self.frame {
+            _ if !self.options.operating_point.takes(header) => Ok(()),
+            Some(frame) if self.options.tolerant && header.unit_type() == UnitType::Refinement => {
+                frame.lost = frame.lost.or(Some(error));
+                Ok(())
+            }
+            _ => Err(error),
+        }
+    }
+
+    /// The frame that was arriving when the stream broke off, as far as it is there.
+    ///
+    /// # Errors
+    /// As [`Decoder::unit`].
+    pub fn cut(&mut self) -> Result<Option<DecodedFrame>> {
+        self.close_frame()
+    }
+
+    /// Decodes the pending frame, then lets the unit that follows it act.
+    fn closing(&mut self, act: impl FnOnce(&mut Self) -> Result<()>) -> Result<Option<DecodedFrame>> {
+        let done = self.close_frame()?;
+        act(self)?;
+        Ok(done)
+    }
+
+    fn sequence_parameters(&mut self, unit: &Unit<'a>) -> Result<()> {
+        match &self.sequence {
+            None => {
+                let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at)?;
+                self.sequence = Some((sequence, unit.payload));
+                Ok(())
+            }
+            Some((_, first)) if *first == unit.payload => Ok(()),
+            Some(_) => {
+                let rule = "a stream has one set of sequence parameters";
+                Err(Error::new(unit.at, "6.4", ErrorKind::Constraint { rule }))
+            }
+        }
+    }
+
+    fn gop_header(&mut self, unit: &Unit<'a>) -> Result<()> {
+        let header = GopHeader::parse_payload(unit.payload, unit.payload_at)?;
+        self.close_gop(unit.at)?;
+        same(unit.at, "6.5", "frame", unit.header.frame, self.frames)?;
+        let expected = self.gop.as_ref().map_or(0, |gop| gop.header.gop_index.wrapping_add(1));
+        same(unit.payload_at, "6.5", "gop_index", header.gop_index, expected)?;
+        self.gop = Some(Gop::new(header, self.frames));
+        Ok(())
+    }
+
+    /// Checks that the GOP has the frames it announced.
+    fn close_gop(&self, at: u64) -> Result<()> {
+        let Some(gop) = &self.gop else { return Ok(()) };
+        let frames = self.frames.wrapping_sub(gop.first_frame);
+        same(at, "6.5", "gop_frame_count", gop.header.gop_frame_count, frames)
+    }
+
+    fn gop_tool(&mut self, unit: &Unit<'a>) -> Result<()> {
+        let (Some(gop), Some((sequence, _)), None) = (&mut self.gop, &self.sequence, &self.frame) else {
+            return Err(unexpected(unit));
+        };
+        same(unit.at, "6.3", "frame", unit.header.frame, gop.first_frame)?;
+        if self.frames != gop.first_frame {
+            return Err(unexpected(unit));
+        }
+        gop.tool(unit, sequence, &self.options.limits)
+    }
+
+    fn frame_header(&mut self, unit: &Unit<'a>) -> Result<()> {
+        let header = FrameHeader::parse_payload(unit.payload, unit.payload_at)?;
+        let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else {
+            return Err(unexpected(unit));
+        };
+        same(unit.at, "6.6", "frame", unit.header.frame, self.frames)?;
+        if self.frames.wrapping_sub(gop.first_frame) >= gop.header.gop_frame_count {
+            return Err(unexpected(unit));
+        }
+        let count = header.gaussian_count;
+        let level_most = Limits::gaussians_of_level(self.level);
+        if count > level_most {
+            return Err(Error::new(
+                unit.payload_at,
+                "A.3",
+                ErrorKind::OutOfRange {
+                    element: "gaussian_count",
+                    value: i64::from(count),
+                    min: 0,
+                    max: i64::from(level_most),
+                },
+            ));
+        }
+        header.within(unit.payload_at, &self.options.limits)?;
+        gop.transforms(&header, sequence, unit.payload_at)?;
+        let bytes = unit_bytes(unit);
+        let number = unit.header.frame;
+        self.frame = Some(PendingFrame { number, header, units: Vec::new(), bytes, lost: None });
+        self.frames = self.frames.wrapping_add(1);
+        Ok(())
+    }
+
+    fn refinement(&mut self, unit: &Unit<'a>) -> Result<()> {
+        let (Some(frame), Some((sequence, _))) = (&mut self.frame, &self.sequence) else {
+            return Err(unexpected(unit));
+        };
+        same(unit.at, "6.9", "frame", unit.header.frame, frame.number)?;
+        if !self.options.operating_point.takes(&unit.header) || frame.lost.is_some() {
+            return Ok(());
+        }
+        let expected = frame.units.len();
+        let parsed = if usize::from(unit.header.refinement) != expected
+            || unit.header.refinement >= sequence.refinement_count
+        {
+            Err(unexpected(unit))
+        } else {
+            parse_refinement(unit, sequence, frame.header.gaussian_count, &self.options.limits)
+        };
+        match parsed {
+            Ok(refinement) => {
+                let bytes = unit_bytes(unit);
+                frame.units.push(PendingUnit { refinement, payload_at: unit.payload_at, bytes });
+                Ok(())
+            }
+            Err(error) if self.options.tolerant => {
+                frame.lost = Some(error);
+                Ok(())
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn index(&mut self, unit: &Unit<'a>) -> Result<()> {
+        self.index_offset = unit.at;
+        Index::parse(unit.payload, unit.payload_at).map(|_| ())
+    }
+
+    fn end(&mut self, unit: &Unit<'a>) -> Result<()> {
+        self.close_gop(unit.at)?;
+        let end = EndOfStream::parse_payload(unit.payload, unit.payload_at)?;
+        let expected = EndOfStream {
+            frame_count: self.frames,
+            unit_count: self.units,
+            index_offset: self.index_offset,
+        };
+        end.validate_against(unit.payload_at, &expected)?;
+        let announced = self.sequence().map_or(0, |sequence| sequence.frame_count);
+        if announced != 0 {
+            same(unit.payload_at, "6.4", "frame_count", self.frames, announced)?;
+        }
+        self.ended = true;
+        Ok(())
+    }
+
+    fn close_frame(&mut self) -> Result<Option<DecodedFrame>> {
+        let Some(frame) = self.frame.take() else { return Ok(None) };
+        let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else { return Ok(None) };
+        let coded: Vec<CodedUnit<'_, '_>> = frame
+            .units
+            .iter()
+            .map(|unit| CodedUnit { refinement: &unit.refinement, payload_at: unit.payload_at })
+            .collect();
+        let tools = gop.transforms(&frame.header, sequence, 0)?;
+        let results = decode_units(&coded, gop, tools, sequence);
+        self.assemble(&frame, results, sequence).map(Some)
+    }
+
+    /// Puts the units of a frame together, up to the first that failed.
+    fn assemble(
+        &self,
+        frame: &PendingFrame<'a>,
+        results: Vec<Result<QuantizedFrame>>,
+        sequence: &SequenceParameters,
+    ) -> Result<DecodedFrame> {
+        let count = usize::try_from(frame.header.gaussian_count).unwrap_or(usize::MAX);
+        let mut decoded = DecodedFrame {
+            number: frame.number,
+            planes: QuantizedFrame::with_capacity(count, usize::from(sequence.sh_dimension())),
+            refinements: 0,
+            digest: None,
+            bytes: frame.bytes,
+            lost: frame.lost,
+        };
+        let mut digests: Vec<UnitDigest> = Vec::new();
+        for (unit, result) in frame.units.iter().zip(results) {
+            let start = decoded.planes.len();
+            let checked = result.and_then(|planes| {
+                decoded.planes.append(&planes);
+                self.check_digest(unit, &decoded.planes, start, &mut digests)
+            });
+            match checked {
+                Ok(digest) => {
+                    decoded.digest = digest;
+                    decoded.refinements = decoded.refinements.wrapping_add(1);
+                    decoded.bytes = decoded.bytes.wrapping_add(unit.bytes);
+                }
+                Err(error) if self.options.tolerant => {
+                    decoded.planes.truncate(start);
+                    decoded.lost = Some(error);
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(decoded)
+    }
+
+    fn check_digest(
+        &self,
+        unit: &PendingUnit<'_>,
+        planes: &QuantizedFrame,
+        start: usize,
+        digests: &mut Vec<UnitDigest>,
+    ) -> Result<Option<u64>> {
+        if !self.options.verify {
+            return Ok(None);
+        }
+        digests.push(unit_digest(planes, start..planes.len()));
+        let computed = frame_digest(digests);
+        let stored = unit.refinement.header.refinement_digest;
+        if computed != stored {
+            return Err(Error::new(unit.payload_at, "7.9", ErrorKind::Digest { stored, computed }));
+        }
+        Ok(Some(computed))
+    }
+}
+
+fn parse_refinement<'a>(
+    unit: &Unit<'a>,
+    sequence: &SequenceParameters,
+    frame_gaussians: u32,
+    limits: &Limits,
+) -> Result<Refinement<'a>> {
+    let refinement = Refinement::parse(unit.payload, unit.payload_at, sequence, limits)?;
+    let expected = sequence.refinement_length(unit.header.refinement, frame_gaussians);
+    same(unit.payload_at, "7.2", "gaussian_count", refinement.header.gaussian_count, expected)?;
+    Ok(refinement)
+}
+
+fn unexpected(unit: &Unit<'_>) -> Error {
+    let name = unit.header.unit_type().name();
+    Error::new(unit.at, "7.1", ErrorKind::UnexpectedUnit { unit: name })
+}
+
+fn same(at: u64, clause: &'static str, element: &'static str, value: u32, expected: u32) -> Result<()> {
+    if value == expected {
+        return Ok(());
+    }
+    let kind = ErrorKind::Mismatch { element, value: u64::from(value), expected: u64::from(expected) };
+    Err(Error::new(at, clause, kind))
+}
+
+fn unit_bytes(unit: &Unit<'_>) -> u64 {
+    let header = u64::try_from(UnitHeader::SIZE).unwrap_or(0);
+    u64::try_from(unit.payload.len()).unwrap_or(0).wrapping_add(header)
+}

@@ -1,0 +1,70 @@
+//! A whole stream through a [`Decoder`].
+
+use crate::process::{DecodedFrame, Decoder, Options};
+use core::ops::ControlFlow;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::unit::{Delivery, Stream};
+use splatstream_format::{Error, Result};
+
+/// How decoding a stream went.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Summary {
+    /// Frames handed out.
+    pub frames: u32,
+    /// Why decoding ended before the end of the stream, if it did.
+    pub end: Option<Error>,
+}
+
+/// Decodes a stream; hands out each frame as it is complete, until `on_frame` breaks off.
+///
+/// When the stream breaks off or turns out wrong, the frame that was arriving is handed out as far as it is
+/// there, provided the options are tolerant.
+pub fn decode_stream(
+    bytes: &[u8],
+    options: &Options,
+    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+) -> Summary {
+    let mut summary = Summary::default();
+    summary.end = run(bytes, options, &mut summary.frames, &mut on_frame).err();
+    summary
+}
+
+fn run(
+    bytes: &[u8],
+    options: &Options,
+    frames: &mut u32,
+    on_frame: &mut impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+) -> Result<()> {
+    let stream = Stream::open(bytes, &options.limits)?;
+    let mut decoder = Decoder::new(stream.header(), *options);
+    let mut units = stream.units();
+    let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame) {
+        (Some(sequence), Some(frame)) => {
+            *frames = frames.wrapping_add(1);
+            on_frame(sequence, frame)
+        }
+        _ => ControlFlow::Continue(()),
+    };
+    while let Some(delivery) = units.next_unit() {
+        let step = match delivery {
+            Ok(Delivery::Intact(unit)) => decoder.unit(&unit),
+            Ok(Delivery::Damaged(damaged)) => {
+                decoder.damaged(&damaged.header, damaged.error).map(|()| None)
+            }
+            Err(error) => Err(error),
+        };
+        let frame = match step {
+            Ok(frame) => frame,
+            Err(error) => {
+                if options.tolerant && let Ok(frame) = decoder.cut() {
+                    let _ = hand_out(&decoder, frame);
+                }
+                return Err(error);
+            }
+        };
+        if hand_out(&decoder, frame).is_break() {
+            return Ok(());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,151 @@
+//! The refinement units of a frame, all their blocks at once on all cores.
+
+use crate::block::{CodedBlock, UnitParameters, decode_block, decode_coded};
+use crate::frame::QuantizedFrame;
+use crate::gop::{Gop, Transforms};
+use crate::layout::Layout;
+use rayon::prelude::*;
+use splatstream_format::Result;
+use splatstream_format::entropy::model::{ModelTrace, PlaneModel, read_models};
+use splatstream_format::entropy::reader::PlaneDecoder;
+use splatstream_format::payload::Refinement;
+use splatstream_format::syntax::SequenceParameters;
+
+/// A refinement unit whose payload has been divided.
+#[derive(Debug, Clone, Copy)]
+pub struct CodedUnit<'r, 'a> {
+    /// The payload's parts.
+    pub refinement: &'r Refinement<'a>,
+    /// Absolute offset of the payload.
+    pub payload_at: u64,
+}
+
+/// A unit with its models read: blocks can be decoded in any order.
+pub struct PreparedUnit<'g, 'r, 'a> {
+    unit: CodedUnit<'r, 'a>,
+    /// The coded planes.
+    pub layout: Layout,
+    /// One model a plane; empty if the unit has no Gaussian.
+    pub models: Vec<PlaneModel>,
+    colour: crate::colour::Colour<'g>,
+    decoders: Vec<PlaneDecoder>,
+}
+
+impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
+    /// Reads the models of a unit; `previous` are those of the refinement before.
+    ///
+    /// # Errors
+    /// Malformed or invalid models, codebooks that are not defined.
+    pub fn new(
+        unit: CodedUnit<'r, 'a>,
+        gop: &'g Gop,
+        transforms: Transforms<'g>,
+        sequence: &SequenceParameters,
+        previous: Option<&[PlaneModel]>,
+        trace: &mut impl ModelTrace,
+    ) -> Result<Self> {
+        let refinement = unit.refinement;
+        let colour = gop.colour(transforms, refinement, sequence, unit.payload_at)?;
+        let layout = Layout::new(transforms.dc.header.rank, colour.mode);
+        let models = if refinement.header.gaussian_count == 0 {
+            Vec::new()
+        } else {
+            let alphabets = layout.alphabets();
+            read_models(refinement.model, refinement.model_at, &alphabets, previous, trace)?
+        };
+        layout.check(&models, refinement.model_at)?;
+        Ok(Self { unit, layout, models, colour, decoders: Vec::new() })
+    }
+
+    /// Expands the tables.
+    pub fn with_decoders(mut self) -> Self {
+        self.decoders = self.models.iter().map(PlaneDecoder::new).collect();
+        self
+    }
+
+    /// What the sequence and the unit say about a block.
+    pub fn parameters(&self, sequence: &SequenceParameters) -> UnitParameters<'_> {
+        let header = &self.unit.refinement.header;
+        UnitParameters {
+            position_bits: sequence.position_bits,
+            position_shift: header.position_shift,
+            canonical_axes: sequence.canonical_axes(),
+            rotation_thresholds: sequence.rotation_threshold,
+            lanes_log2: header.lanes_log2,
+            layout: &self.layout,
+            colour: self.colour,
+        }
+    }
+
+    /// Bytes, absolute offset and Gaussians of each block.
+    pub fn blocks(&self, sequence: &SequenceParameters) -> Vec<(&'a [u8], u64, usize)> {
+        let mut left = usize::try_from(self.unit.refinement.header.gaussian_count).unwrap_or(0);
+        let size = 1_usize.wrapping_shl(u32::from(sequence.block_log2));
+        let with_count = |&(bytes, at): &(&'a [u8], u64)| {
+            let count = left.min(size);
+            left = left.wrapping_sub(count);
+            (bytes, at, count)
+        };
+        self.unit.refinement.blocks.iter().map(with_count).collect()
+    }
+
+    /// The coded values of every block, for statistics.
+    ///
+    /// # Errors
+    /// As decoding.
+    pub fn coded_blocks(&self, sequence: &SequenceParameters) -> Result<Vec<CodedBlock>> {
+        let parameters = self.parameters(sequence);
+        self.blocks(sequence)
+            .into_iter()
+            .map(|(bytes, at, count)| decode_coded(bytes, at, count, &parameters, &self.decoders))
+            .collect()
+    }
+}
+
+/// Decodes the units of a frame, in order of refinement. A unit that fails fails alone, and with it those
+/// that reuse its models.
+pub fn decode_units(
+    units: &[CodedUnit<'_, '_>],
+    gop: &Gop,
+    transforms: Transforms<'_>,
+    sequence: &SequenceParameters,
+) -> Vec<Result<QuantizedFrame>> {
+    let mut prepared: Vec<PreparedUnit<'_, '_, '_>> = Vec::with_capacity(units.len());
+    let mut failure = None;
+    for &unit in units {
+        let previous = prepared.iter().rev().map(|unit| unit.models.as_slice()).find(|models| !models.is_empty());
+        match PreparedUnit::new(unit, gop, transforms, sequence, previous, &mut ()) {
+            Ok(unit) => prepared.push(unit),
+            Err(error) => {
+                failure = Some(error);
+                break;
+            }
+        }
+    }
+    let prepared: Vec<_> = prepared.into_par_iter().map(PreparedUnit::with_decoders).collect();
+    let tasks: Vec<_> = prepared
+        .iter()
+        .enumerate()
+        .flat_map(|(place, unit)| unit.blocks(sequence).into_iter().map(move |block| (place, unit, block)))
+        .collect();
+    let blocks: Vec<(usize, Result<QuantizedFrame>)> = tasks
+        .into_par_iter()
+        .map(|(place, unit, (bytes, at, count))| {
+            (place, decode_block(bytes, at, count, &unit.parameters(sequence), &unit.decoders))
+        })
+        .collect();
+    let mut frames: Vec<Result<QuantizedFrame>> = prepared
+        .iter()
+        .map(|_| Ok(QuantizedFrame::with_capacity(0, usize::from(sequence.sh_dimension()))))
+        .collect();
+    for (place, block) in blocks {
+        let Some(slot) = frames.get_mut(place) else { continue };
+        match (slot.as_mut(), block) {
+            (Ok(frame), Ok(block)) => frame.append(&block),
+            (Ok(_), Err(error)) => *slot = Err(error),
+            (Err(_), _) => {}
+        }
+    }
+    frames.extend(failure.map(Err));
+    frames
+}

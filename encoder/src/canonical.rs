@@ -1,0 +1,133 @@
+//! The canonical form: one of the many ways to write a Gaussian that render alike.
+//!
+//! Axes sorted from the largest, the quaternion with w largest and positive, a sphere without rotation,
+//! no Gaussian that can never reach an alpha of 1/255.
+
+use rayon::prelude::*;
+use splatstream_scene::{GaussianFrame, Planes};
+
+/// The logit below which opacity stays under 1/255: ln(1/254).
+pub const INVISIBLE_LOGIT: f32 = -5.537_334;
+
+/// The Gaussians that can be seen, in their order. All of them if `keep_invisible`.
+pub fn visible(frame: &GaussianFrame, keep_invisible: bool) -> Vec<u32> {
+    (0..)
+        .zip(frame.opacity_logit())
+        .filter(|&(_, &logit)| keep_invisible || logit >= INVISIBLE_LOGIT)
+        .map(|(index, _)| index)
+        .collect()
+}
+
+/// The quaternion that turns the axes 0, 1, 2 into `order`, up to the signs of axes.
+fn permutation(order: [usize; 3]) -> [f32; 4] {
+    const HALF: f32 = 0.5;
+    const ROOT_HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
+    match order {
+        [0, 1, 2] => [1.0, 0.0, 0.0, 0.0],
+        [1, 2, 0] => [HALF, HALF, HALF, HALF],
+        [2, 0, 1] => [HALF, -HALF, -HALF, -HALF],
+        [0, 2, 1] => [ROOT_HALF, ROOT_HALF, 0.0, 0.0],
+        [1, 0, 2] => [ROOT_HALF, 0.0, 0.0, ROOT_HALF],
+        _ => [ROOT_HALF, 0.0, ROOT_HALF, 0.0],
+    }
+}
+
+/// Hamilton product, w first.
+fn product(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+}
+
+/// Of the four rotations that differ by half turns about the axes, the one with the largest w, positive.
+fn smallest_turn(q: [f32; 4]) -> [f32; 4] {
+    let [w, x, y, z] = q;
+    let turned = match largest(q.map(f32::abs)) {
+        0 => [w, x, y, z],
+        1 => [-x, w, z, -y],
+        2 => [-y, -z, w, x],
+        _ => [-z, y, -x, w],
+    };
+    if turned[0] < 0.0 { turned.map(|component| -component) } else { turned }
+}
+
+fn largest(values: [f32; 4]) -> usize {
+    let mut best = 0;
+    for place in 1..4 {
+        if values[place] > values[best] {
+            best = place;
+        }
+    }
+    best
+}
+
+/// One Gaussian's axes and rotation in canonical form. `sort` is the sequence's canonical_axes.
+pub fn canonical(log_scale: [f32; 3], rotation: [f32; 4], sort: bool) -> ([f32; 3], [f32; 4]) {
+    let mut order = [0, 1, 2];
+    if sort {
+        order.sort_by(|&a, &b| log_scale[b].total_cmp(&log_scale[a]));
+    }
+    let sorted = order.map(|axis| log_scale[axis]);
+    let squares: f32 = rotation.iter().map(|component| component * component).sum();
+    let unit = rotation.map(|component| component / squares.sqrt());
+    (sorted, smallest_turn(product(unit, permutation(order))))
+}
+
+/// The Gaussians `indices` of a frame in canonical form.
+pub fn canonicalise(frame: &GaussianFrame, indices: &[u32], sort: bool) -> GaussianFrame {
+    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = frame.select(indices).into_planes();
+    let forms: Vec<([f32; 3], [f32; 4])> = (0..indices.len())
+        .into_par_iter()
+        .map(|row| {
+            let scales = [0, 1, 2].map(|axis: usize| log_scale[axis][row]);
+            let turn = [0, 1, 2, 3].map(|part: usize| rotation[part][row]);
+            canonical(scales, turn, sort)
+        })
+        .collect();
+    let log_scale = [0, 1, 2].map(|axis: usize| forms.iter().map(|(scales, _)| scales[axis]).collect());
+    let rotation = [0, 1, 2, 3].map(|part: usize| forms.iter().map(|(_, turn)| turn[part]).collect());
+    let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh };
+    GaussianFrame::from_planes(frame.sh_degree(), planes).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// R diag(exp 2s) R^T, what a renderer sees of scale and rotation.
+    fn covariance(log_scale: [f32; 3], q: [f32; 4]) -> [[f64; 3]; 3] {
+        let [w, x, y, z] = q.map(f64::from);
+        let r = [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ];
+        let squares = log_scale.map(|scale| libm::exp(2.0 * f64::from(scale)));
+        let entry = |i: usize, j: usize| (0..3).map(|k| r[i][k] * squares[k] * r[j][k]).sum();
+        [0, 1, 2].map(|i| [0, 1, 2].map(|j| entry(i, j)))
+    }
+
+    proptest! {
+        #[test]
+        fn the_canonical_form_has_the_same_covariance(
+            scales in prop::array::uniform3(-3.0_f32..1.0),
+            turn in prop::array::uniform4(-1.0_f32..1.0).prop_filter("zero", |q| q.iter().map(|c| c * c).sum::<f32>() > 0.01),
+            sort in any::<bool>(),
+        ) {
+            let norm = turn.iter().map(|c| c * c).sum::<f32>().sqrt();
+            let unit = turn.map(|c| c / norm);
+            let (sorted, canonical_turn) = canonical(scales, turn, sort);
+            let before = covariance(scales, unit);
+            let after = covariance(sorted, canonical_turn);
+            for (a, b) in before.iter().flatten().zip(after.iter().flatten()) {
+                prop_assert!((a - b).abs() < 1e-4, "{before:?} {after:?}");
+            }
+            prop_assert!(canonical_turn[0] >= 0.499);
+            prop_assert!(!sort || (sorted[0] >= sorted[1] && sorted[1] >= sorted[2]));
+        }
+    }
+}

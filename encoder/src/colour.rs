@@ -1,0 +1,149 @@
+//! Colour on its way in: transforms, components, and the choice between coefficients and codebooks.
+
+use crate::entropy_cost::entropy_of;
+use crate::pca::Components;
+use crate::settings::{Preset, ShChoice};
+use crate::vq;
+use rayon::prelude::*;
+use splatstream_decoder::colour::COMPONENT_LIMIT;
+use splatstream_format::payload::{Codebook, Transform};
+use splatstream_format::syntax::{TransformHeader, TransformKind};
+
+/// A basis entry of 1.
+const UNIT: f64 = 4096.0;
+/// Means are on a lattice this much finer than the step.
+const FRACTION: f64 = 64.0;
+/// The largest mean the syntax carries.
+const MEAN_LIMIT: f64 = 16_777_215.0;
+/// Gaussians on which coefficients and codebooks are compared.
+const TRIAL: usize = 1 << 13;
+
+/// The transform unit of the vectors in `planes`, for a step.
+pub(crate) fn transform(kind: TransformKind, planes: &[&[f32]], step: f32) -> Transform {
+    let dimension = planes.len();
+    let components = Components::of(planes);
+    let mean = components.mean.iter().map(|&mean| {
+        libm::round(mean / f64::from(step) * FRACTION).clamp(-MEAN_LIMIT, MEAN_LIMIT) as i32
+    });
+    let basis =
+        components.rows.iter().flatten().map(|&entry| libm::round(entry * UNIT) as i16).collect();
+    Transform {
+        header: TransformHeader {
+            transform_id: 0,
+            transform_kind: kind.code(),
+            dimension: dimension as u8,
+            rank: dimension as u8,
+        },
+        mean: mean.collect(),
+        basis,
+    }
+}
+
+/// Components in units of the step, not rounded; one plane a component.
+fn project(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<f32>> {
+    let means: Vec<f32> =
+        transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
+    let scale = 1.0 / step;
+    transform
+        .basis
+        .par_chunks(planes.len().max(1))
+        .map(|row| {
+            let mut sums = vec![0.0_f32; planes.first().map_or(0, |plane| plane.len())];
+            for ((&entry, plane), &mean) in row.iter().zip(planes).zip(&means) {
+                let weight = f32::from(entry) / UNIT as f32 * scale;
+                for (sum, &value) in sums.iter_mut().zip(plane.iter()) {
+                    *sum += weight * (value - mean);
+                }
+            }
+            sums
+        })
+        .collect()
+}
+
+/// Components rounded to the step.
+pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<i32>> {
+    let limit = COMPONENT_LIMIT as f32;
+    project(transform, planes, step)
+        .par_iter()
+        .map(|plane| plane.iter().map(|&value| libm::rintf(value).clamp(-limit, limit) as i32).collect())
+        .collect()
+}
+
+/// Drops the last components that are 0 for every Gaussian; at least one stays.
+pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<i32>>) {
+    let used = planes.iter().rposition(|plane| plane.iter().any(|&value| value != 0)).map_or(1, |last| last + 1);
+    planes.truncate(used);
+    transform.basis.truncate(used * usize::from(transform.header.dimension));
+    transform.header.rank = used as u8;
+}
+
+/// How SH of a GOP is coded, and the figures behind the choice.
+#[derive(Debug, Clone)]
+pub(crate) struct ShPlan {
+    /// The codebooks; none: coefficients.
+    pub(crate) codebooks: Vec<Codebook>,
+    /// Bits a Gaussian and mean squared error (in steps) of coefficients, then of vector quantisation, on the
+    /// sample; none if not compared.
+    pub(crate) trial: Option<[(f64, f64); 2]>,
+}
+
+/// Chooses between coefficients and codebooks.
+///
+/// The multiplier is that of a uniform quantiser at high rate: one bit more a component divides its error
+/// of step^2/12 by four, so a bit is worth 2 ln 2 / 12 squared steps.
+pub(crate) fn plan_sh(
+    transform: &Transform,
+    planes: &[&[f32]],
+    step: f32,
+    gaussians_of_gop: usize,
+    choice: ShChoice,
+    preset: Preset,
+) -> ShPlan {
+    let count = planes.first().map_or(0, |plane| plane.len());
+    let coefficients = ShPlan { codebooks: Vec::new(), trial: None };
+    let try_it = choice == ShChoice::VectorQuantised || choice == ShChoice::Auto && preset != Preset::Fast;
+    if !try_it || count < 2 {
+        return coefficients;
+    }
+    let projected = project(transform, planes, step);
+    let rank = projected.len();
+    let stride = (count / (2 * TRIAL)).max(1);
+    let rows = vq::rows(&projected, stride);
+    let (training, test) = vq::halves(&rows, rank);
+    let entries = vq::entry_count(gaussians_of_gop, choice == ShChoice::VectorQuantised);
+    let book = vq::train(&training, rank, entries.min(training.len() / rank / 4).max(1));
+    let (indices, error) = vq::assign(&book, &test, rank);
+    let tested = (test.len() / rank).max(1) as f64;
+    let carried = vq::bits_of(&book, rank) / gaussians_of_gop.max(1) as f64;
+    let by_vq = (entropy_of(&indices) / tested + carried, error / tested);
+    let by_coefficients = coefficient_cost(&test, rank);
+    const BIT: f64 = 2.0 * core::f64::consts::LN_2 / 12.0;
+    let cost = |(bits, error): (f64, f64)| error + BIT * bits;
+    let trial = Some([by_coefficients, by_vq]);
+    if choice == ShChoice::Auto && cost(by_coefficients) <= cost(by_vq) {
+        return ShPlan { trial, ..coefficients };
+    }
+    let all = vq::rows(&projected, (count / vq::MAX_TRAINING).max(1));
+    ShPlan { codebooks: vec![vq::train(&all, rank, entries.min(count))], trial }
+}
+
+/// Bits and squared error a Gaussian of rounding every component.
+fn coefficient_cost(rows: &[f32], rank: usize) -> (f64, f64) {
+    let gaussians = (rows.len() / rank).max(1) as f64;
+    let mut bits = 0.0;
+    let mut error = 0.0;
+    for component in 0..rank {
+        let values = rows.iter().skip(component).step_by(rank);
+        let rounded: Vec<i32> = values.clone().map(|&value| libm::rintf(value) as i32).collect();
+        bits += entropy_of(&rounded);
+        error += values.zip(&rounded).map(|(&v, &r)| f64::from(v - r as f32) * f64::from(v - r as f32)).sum::<f64>();
+    }
+    (bits / gaussians, error / gaussians)
+}
+
+/// The codebook index of every Gaussian.
+pub(crate) fn indices(transform: &Transform, planes: &[&[f32]], step: f32, codebook: &Codebook) -> Vec<i32> {
+    let projected = project(transform, planes, step);
+    let rank = projected.len();
+    vq::assign(codebook, &vq::rows(&projected, 1), rank).0
+}

@@ -1,0 +1,61 @@
+//! What an encoder can be given that it cannot encode.
+
+/// Errors of encoding. Those of reading a frame are the source's own.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is no frame.
+    #[error("there is no frame to encode")]
+    NoFrames,
+    /// The refinement percentages are not a list the bitstream can carry.
+    #[error("refinements {0:?}: give 1 to 10 increasing percentages, the last of them 100")]
+    Refinements(Vec<u8>),
+    /// A setting outside its range.
+    #[error("{name} is {value}; allowed is {allowed}")]
+    Setting {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// What would be allowed.
+        allowed: &'static str,
+    },
+    /// A frame has more Gaussians than a stream can carry.
+    #[error("frame {frame} has {count} Gaussians, a frame holds at most {max}")]
+    TooManyGaussians {
+        /// The frame.
+        frame: u32,
+        /// Its Gaussians.
+        count: usize,
+        /// The most that a frame holds.
+        max: u32,
+    },
+    /// An attribute cannot be put on its lattice.
+    #[error("frame {frame}: {attribute} of Gaussian {row} is {value}, too far out for a step of {step}")]
+    OutOfLattice {
+        /// The frame.
+        frame: u32,
+        /// The attribute.
+        attribute: &'static str,
+        /// The Gaussian, counted in the order of the source.
+        row: usize,
+        /// Its value.
+        value: f32,
+        /// The step of the lattice.
+        step: f32,
+    },
+    /// A frame could not be read.
+    #[error("frame {frame}: {source}")]
+    Source {
+        /// The frame.
+        frame: u32,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The stream could not be written.
+    #[error("the stream cannot be written: {0}")]
+    Output(#[from] std::io::Error),
+    /// The syntax refuses what the encoder wants to write.
+    #[error("the bitstream cannot carry this: {0}")]
+    Syntax(#[from] splatstream_format::Error),
+}

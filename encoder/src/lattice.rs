@@ -1,0 +1,171 @@
+//! Floats onto the lattices of the sequence.
+
+use crate::error::Error;
+use crate::settings::Steps;
+use rayon::prelude::*;
+use splatstream_decoder::attribute::{ATTRIBUTE_LIMIT, rotation_shift};
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_scene::GaussianFrame;
+
+/// The most bits of an axis that the syntax carries.
+const MAX_POSITION_BITS: u32 = 20;
+
+/// The integers of a frame that are coded as they are: all but colour. In the order of the source.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Geometry {
+    /// Lattice position.
+    pub(crate) position: [Vec<u32>; 3],
+    /// Log-scales.
+    pub(crate) log_scale: [Vec<i32>; 3],
+    /// Opacity logit.
+    pub(crate) opacity: Vec<i32>,
+    /// Quaternion x, y, z as coded: nearly round Gaussians on a coarser lattice.
+    pub(crate) rotation: [Vec<i32>; 3],
+}
+
+/// Smallest and largest position on each axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Extent {
+    /// Smallest.
+    pub(crate) low: [f32; 3],
+    /// Largest.
+    pub(crate) high: [f32; 3],
+}
+
+impl Extent {
+    /// Of no Gaussian at all.
+    pub(crate) const NONE: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+
+    /// Grown to hold a frame.
+    pub(crate) fn with(mut self, frame: &GaussianFrame) -> Self {
+        for (axis, plane) in frame.position().iter().enumerate() {
+            for &value in plane {
+                self.low[axis] = self.low[axis].min(value);
+                self.high[axis] = self.high[axis].max(value);
+            }
+        }
+        self
+    }
+
+    fn largest_side(&self) -> f32 {
+        let side = |axis: usize| (self.high[axis] - self.low[axis]).max(0.0);
+        side(0).max(side(1)).max(side(2))
+    }
+}
+
+/// The largest side of the box that holds the inner 98 % on each axis.
+pub(crate) fn inner_side(frame: &GaussianFrame) -> f32 {
+    let side = |plane: &Vec<f32>| {
+        let mut sorted = plane.clone();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let at = |percent: usize| sorted.get((sorted.len().max(1) - 1) * percent / 100).copied().unwrap_or(0.0);
+        at(99) - at(1)
+    };
+    frame.position().iter().map(side).fold(0.0, f32::max)
+}
+
+/// Offset, step and bits of the position lattice.
+///
+/// The step is what was asked for unless the extent then needs more than 20 bits an axis.
+pub(crate) fn position_lattice(extent: Extent, inner_side: f32, steps: &Steps) -> ([f32; 3], f32, u8) {
+    if extent.low[0] > extent.high[0] {
+        return ([0.0; 3], 1.0, 1);
+    }
+    let side = extent.largest_side();
+    let cells = ((1_u32 << MAX_POSITION_BITS) - 1) as f32;
+    let asked = inner_side / (1_u32 << steps.position_bits) as f32;
+    let least = (side / cells).max(f32::from_bits(88 << 23));
+    let step = asked.max(least).min(f32::from_bits(146 << 23));
+    let last = libm::rintf(side / step);
+    let bits = (1..=MAX_POSITION_BITS).find(|&bits| last < (1_u32 << bits) as f32).unwrap_or(MAX_POSITION_BITS);
+    (extent.low, step, bits as u8)
+}
+
+/// Rounds a canonical frame onto the lattices.
+///
+/// # Errors
+/// A value beyond the range of its integer.
+pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters, number: u32) -> Result<Geometry, Error> {
+    let last = ((1_u32 << sequence.position_bits) - 1) as f32;
+    let step = sequence.position_step();
+    let mut position = [const { Vec::new() }; 3];
+    for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
+        let offset = sequence.position_offset()[axis];
+        *plane =
+            values.par_iter().map(|&value| libm::rintf((value - offset) / step).clamp(0.0, last) as u32).collect();
+    }
+    let mut log_scale = [const { Vec::new() }; 3];
+    for (plane, values) in log_scale.iter_mut().zip(frame.log_scale()) {
+        let lattice = ("log_scale", sequence.log_scale_offset(), sequence.log_scale_step());
+        *plane = rounded(values, lattice, number)?;
+    }
+    let lattice = ("opacity", sequence.opacity_offset(), sequence.opacity_step());
+    let opacity = rounded(frame.opacity_logit(), lattice, number)?;
+    let [_, x, y, z] = frame.rotation();
+    let shifts = rotation_shifts(&log_scale, sequence);
+    let rotation = [x, y, z].map(|plane| rotation_plane(plane, &shifts, sequence.rotation_step()));
+    Ok(Geometry { position, log_scale, opacity, rotation })
+}
+
+fn rounded(values: &[f32], lattice: (&'static str, f32, f32), frame: u32) -> Result<Vec<i32>, Error> {
+    let (attribute, offset, step) = lattice;
+    let integers: Vec<f32> = values.iter().map(|&value| libm::rintf((value - offset) / step)).collect();
+    let limit = ATTRIBUTE_LIMIT as f32;
+    match integers.iter().position(|value| value.abs() > limit) {
+        Some(row) => Err(Error::OutOfLattice { frame, attribute, row, value: values[row], step }),
+        None => Ok(integers.iter().map(|&value| value as i32).collect()),
+    }
+}
+
+/// For each Gaussian the bits left out of its rotation; none for a sphere, which needs no rotation.
+fn rotation_shifts(log_scale: &[Vec<i32>; 3], sequence: &SequenceParameters) -> Vec<Option<u32>> {
+    let [largest, middle, smallest] = log_scale;
+    largest
+        .iter()
+        .zip(middle)
+        .zip(smallest)
+        .map(|((&a, &b), &c)| {
+            let round = a == b && b == c;
+            (!round).then(|| rotation_shift(a - c, sequence.rotation_threshold))
+        })
+        .collect()
+}
+
+fn rotation_plane(values: &[f32], shifts: &[Option<u32>], step: f32) -> Vec<i32> {
+    values
+        .iter()
+        .zip(shifts)
+        .map(|(&value, shift)| match shift {
+            Some(shift) => libm::rintf(value / (step * (1_u32 << shift) as f32)) as i32,
+            None => 0,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Quality;
+
+    #[test]
+    fn the_lattice_holds_the_extent_with_the_step_asked_for() {
+        let extent = Extent { low: [-1.0, 0.0, 2.0], high: [3.0, 1.0, 2.5] };
+        let (offset, step, bits) = position_lattice(extent, 2.0, &Quality::High.steps());
+        assert_eq!((offset, step, bits), ([-1.0, 0.0, 2.0], 2.0 / 16384.0, 16));
+    }
+
+    #[test]
+    fn a_far_outlier_makes_the_step_coarser_and_no_more_bits() {
+        let extent = Extent { low: [0.0; 3], high: [1.0e6, 1.0, 1.0] };
+        let (_, step, bits) = position_lattice(extent, 1.0, &Quality::High.steps());
+        assert_eq!(bits, 20);
+        assert!(step > 0.9 && 1.0e6 / step < (1 << 20) as f32);
+    }
+
+    #[test]
+    fn one_point_and_no_point_have_a_lattice() {
+        let point = Extent { low: [5.0; 3], high: [5.0; 3] };
+        assert_eq!(position_lattice(point, 0.0, &Quality::High.steps()).2, 1);
+        assert_eq!(position_lattice(Extent::NONE, 0.0, &Quality::High.steps()).2, 1);
+    }
+}

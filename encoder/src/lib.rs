@@ -1,0 +1,26 @@
+//! The SplatStream encoder (informative: any stream that the specification accepts is a stream).
+//!
+//! Two passes over the frames: [`sequence`] finds lattices and what the scene needs, then each GOP gets its
+//! [colour](mod@colour) transforms and codebooks and each [frame](mod@frame) its units. Prediction, contexts and
+//! reconstruction are the decoder's own functions. Same frames and settings, same bytes, on every machine
+//! and with any number of threads.
+
+pub mod canonical;
+mod clusters;
+mod colour;
+mod entropy_cost;
+mod error;
+mod frame;
+mod lattice;
+mod models;
+mod pca;
+mod sequence;
+mod settings;
+mod source;
+mod stream;
+mod vq;
+
+pub use error::Error;
+pub use settings::{Preset, Quality, Settings, ShChoice, Steps};
+pub use source::FrameSource;
+pub use stream::{Progress, Report, encode};

@@ -1,0 +1,247 @@
+//! Chooses the model of a plane: token split, contexts, tables. The decoder's functions give the contexts.
+
+use crate::clusters::{Clustering, cluster};
+use crate::entropy_cost::Histogram;
+use crate::settings::Preset;
+use rayon::prelude::*;
+use splatstream_decoder::block::CodedBlock;
+use splatstream_decoder::context::{self, DeltaNeighbours, Neighbours, is_serial};
+use splatstream_decoder::layout::{Attribute, PlaneInfo, is_available};
+use splatstream_format::entropy::frequencies::Frequencies;
+use splatstream_format::entropy::model::{ContextAxis, PlaneModel, Source};
+use splatstream_format::entropy::token::{Alphabet, split, zigzag};
+
+/// Gaussians after which only every other block is looked at.
+const SAMPLE: usize = 1 << 16;
+/// Thresholds of the first and of the second axis.
+const FIRST_THRESHOLDS: usize = 15;
+const SECOND_THRESHOLDS: usize = 3;
+
+/// The unsigned values of a plane of one block, as they are split in tokens.
+pub(crate) fn unsigned_values<'a>(
+    info: PlaneInfo,
+    plane: usize,
+    block: &'a CodedBlock,
+) -> Box<dyn ExactSizeIterator<Item = u64> + 'a> {
+    let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+    match info.alphabet {
+        Alphabet::Position => Box::new(block.deltas.iter().copied()),
+        Alphabet::Index => Box::new(coded.iter().map(|&index| u64::from(index.unsigned_abs()))),
+        Alphabet::Attribute => Box::new(coded.iter().map(|&value| u64::from(zigzag(value)))),
+    }
+}
+
+/// The contexts of a plane of one block under a model.
+pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u8> {
+    if info.attribute == Attribute::Position {
+        return context::delta_contexts(&model.axes, &block.deltas);
+    }
+    let values = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+    context::plane_contexts(&model.axes, plane, info, block, values)
+}
+
+/// The sources worth trying for a plane, the most promising first.
+fn candidates(info: PlaneInfo, preset: Preset) -> Vec<Source> {
+    use Source::{
+        Anisotropy, GroupMagnitude, LargestLogScale, LogVolume, MiddleLogScale, NeighbourMagnitude,
+        NeighbourSum, Opacity, PositionSpacing, PreviousPlane,
+    };
+    let listed: &[Source] = match (preset, info.attribute, info.place) {
+        (Preset::Small, _, _) => &Source::ALL[1..],
+        (_, Attribute::Position, _) => &[NeighbourSum],
+        (_, Attribute::LogScale, 0) => &[NeighbourSum, PositionSpacing],
+        (_, Attribute::LogScale, 1) => &[LargestLogScale, NeighbourSum],
+        (_, Attribute::LogScale, _) => &[MiddleLogScale, NeighbourSum, PreviousPlane],
+        (_, Attribute::Opacity, _) => &[LogVolume, NeighbourSum, LargestLogScale],
+        (_, Attribute::Rotation, _) => &[NeighbourSum, GroupMagnitude, PreviousPlane, Anisotropy],
+        (_, Attribute::Dc, _) => &[NeighbourSum, GroupMagnitude, Opacity],
+        (_, Attribute::Sh, 0) => &[NeighbourMagnitude, Opacity, LargestLogScale],
+        (_, Attribute::Sh, _) => &[GroupMagnitude, Opacity, LargestLogScale],
+    };
+    let few = if preset == Preset::Fast { 1 } else { listed.len() };
+    listed.iter().copied().filter(|&source| is_available(info, source)).take(few).collect()
+}
+
+/// The values of a source for one block, serial or not.
+fn source_values(source: Source, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<i32> {
+    if info.attribute == Attribute::Position {
+        let mut neighbours = DeltaNeighbours::default();
+        let step = |&delta: &u64| {
+            let value = neighbours.value();
+            neighbours.push(delta);
+            value
+        };
+        return block.deltas.iter().map(step).collect();
+    }
+    if is_serial(source) {
+        let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+        let mut neighbours = Neighbours::default();
+        let step = |&value: &i32| {
+            let before = neighbours.value(source);
+            neighbours.push(value);
+            before
+        };
+        return coded.iter().map(step).collect();
+    }
+    context::values(source, plane, info, block)
+}
+
+/// Thresholds that cut the values in parts of about equal size.
+fn quantile_thresholds(values: &[i32], parts: usize) -> Vec<i32> {
+    let mut sample: Vec<i32> = values.iter().step_by(values.len().div_ceil(4096).max(1)).copied().collect();
+    sample.sort_unstable();
+    let mut thresholds: Vec<i32> =
+        (1..=parts).filter_map(|part| sample.get(part * sample.len() / (parts + 1)).copied()).collect();
+    thresholds.dedup();
+    // A threshold not above the smallest value parts nothing.
+    thresholds.retain(|&threshold| sample.first().is_some_and(|&least| threshold > least));
+    thresholds
+}
+
+/// What a plane looks like to the chooser.
+struct PlaneView<'a> {
+    info: PlaneInfo,
+    plane: usize,
+    blocks: Vec<&'a CodedBlock>,
+    direct_log2: u8,
+    tokens: Vec<u8>,
+}
+
+/// Tables over contexts, and what they would cost.
+struct Candidate {
+    axes: [ContextAxis; 2],
+    clustering: Clustering,
+}
+
+impl PlaneView<'_> {
+    fn values(&self, source: Source) -> Vec<i32> {
+        self.blocks.iter().flat_map(|block| source_values(source, self.info, self.plane, block)).collect()
+    }
+
+    fn candidate(&self, axes: [ContextAxis; 2], contexts: &[u8]) -> Candidate {
+        let [first, second] = &axes;
+        let count = first.contexts() * second.contexts();
+        let mut histograms = vec![Histogram::default(); count];
+        for (place, &token) in self.tokens.iter().enumerate() {
+            histograms[usize::from(contexts.get(place).copied().unwrap_or(0))].add(token);
+        }
+        let clustering = cluster(histograms, second.contexts());
+        Candidate { axes, clustering }
+    }
+
+    /// The best pair of axes among the sources.
+    fn best(&self, sources: &[Source], two_axes: bool) -> Candidate {
+        let axis = |source, values: &[i32], parts| ContextAxis {
+            source,
+            thresholds: quantile_thresholds(values, parts),
+        };
+        let on_axis = |axis: &ContextAxis, values: &[i32]| -> Vec<u8> {
+            values.iter().map(|&value| axis.context(value)).collect()
+        };
+        let values: Vec<Vec<i32>> = sources.iter().map(|&source| self.values(source)).collect();
+        let mut best = self.candidate([ContextAxis::NONE, ContextAxis::NONE], &[]);
+        let mut first = None;
+        for (place, (&source, values)) in sources.iter().zip(&values).enumerate() {
+            let axis = axis(source, values, FIRST_THRESHOLDS);
+            if axis.thresholds.is_empty() {
+                continue;
+            }
+            let contexts = on_axis(&axis, values);
+            let candidate = self.candidate([axis.clone(), ContextAxis::NONE], &contexts);
+            if candidate.clustering.bits < best.clustering.bits {
+                best = candidate;
+                first = Some((place, axis, contexts));
+            }
+        }
+        let Some((taken, first, on_first)) = first.filter(|_| two_axes) else { return best };
+        for (place, (&source, values)) in sources.iter().zip(&values).enumerate() {
+            let second = axis(source, values, SECOND_THRESHOLDS);
+            if place == taken || second.thresholds.is_empty() {
+                continue;
+            }
+            let contexts = context::combine(&on_first, &on_axis(&second, values), second.contexts());
+            let candidate = self.candidate([first.clone(), second], &contexts);
+            if candidate.clustering.bits < best.clustering.bits {
+                best = candidate;
+            }
+        }
+        best
+    }
+}
+
+/// The number of values with tokens of their own: nearly all of them.
+fn direct_log2(info: PlaneInfo, values: &[u64]) -> u8 {
+    if info.alphabet == Alphabet::Position {
+        return 4;
+    }
+    let mut sample: Vec<u64> = values.iter().step_by(values.len().div_ceil(4096).max(1)).copied().collect();
+    sample.sort_unstable();
+    let most = sample.get(sample.len() * 97 / 100).copied().unwrap_or(0);
+    (3..=7).find(|&log2| 1 << log2 > most).unwrap_or(7)
+}
+
+/// The model of one plane of a unit. `bias` has been taken off the coded values already.
+pub(crate) fn choose(info: PlaneInfo, plane: usize, blocks: &[CodedBlock], bias: i32, preset: Preset) -> PlaneModel {
+    let total: usize = blocks.iter().map(CodedBlock::len).sum();
+    let stride = if total > SAMPLE && preset != Preset::Small { 2 } else { 1 };
+    let sample: Vec<&CodedBlock> = blocks.iter().step_by(stride).collect();
+    let values: Vec<u64> =
+        sample.iter().flat_map(|block| unsigned_values(info, plane, block)).collect();
+    let direct_log2 = direct_log2(info, &values);
+    let tokens = values.iter().map(|&value| split(value, direct_log2).token).collect();
+    let view = PlaneView { info, plane, blocks: sample, direct_log2, tokens };
+    let best = view.best(&candidates(info, preset), preset != Preset::Fast && total >= 1024);
+    let (axes, table_of_context) = best.clustering.simplified(best.axes);
+    let mut model =
+        PlaneModel { bias, direct_log2: view.direct_log2, axes, tables: Vec::new(), table_of_context };
+    model.tables = tables(&model, info, plane, blocks);
+    model
+}
+
+/// The tables that fit all of the unit's tokens, given the rest of the model.
+fn tables(model: &PlaneModel, info: PlaneInfo, plane: usize, blocks: &[CodedBlock]) -> Vec<Frequencies> {
+    let count = model.table_of_context.iter().max().map_or(0, |&last| usize::from(last) + 1);
+    let mut histograms = vec![Histogram::default(); count];
+    for block in blocks {
+        let contexts = contexts(model, info, plane, block);
+        for (place, value) in unsigned_values(info, plane, block).enumerate() {
+            let context = usize::from(contexts.get(place).copied().unwrap_or(0));
+            let table = usize::from(model.table_of_context[context]);
+            histograms[table].add(split(value, model.direct_log2).token);
+        }
+    }
+    histograms.iter().map(|histogram| Frequencies::from_counts(&histogram.counts())).collect()
+}
+
+/// Models for all planes of a unit.
+pub(crate) fn choose_all(
+    planes: &[PlaneInfo],
+    blocks: &[CodedBlock],
+    biases: &[i32],
+    preset: Preset,
+) -> Vec<PlaneModel> {
+    planes
+        .par_iter()
+        .enumerate()
+        .map(|(plane, &info)| choose(info, plane, blocks, biases[plane], preset))
+        .collect()
+}
+
+/// Bits of a plane's symbols under a model; none if a token cannot be coded.
+pub(crate) fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Option<f64> {
+    let contexts = contexts(model, info, plane, block);
+    let costs: Vec<Vec<f64>> = model.tables.iter().map(token_costs).collect();
+    let mut bits = 0.0;
+    for (place, value) in unsigned_values(info, plane, block).enumerate() {
+        let context = usize::from(contexts.get(place).copied().unwrap_or(0));
+        let token = split(value, model.direct_log2);
+        let costs = &costs[usize::from(model.table_of_context[context])];
+        let cost = costs.get(usize::from(token.token)).copied().filter(|cost| cost.is_finite())?;
+        bits += cost + f64::from(token.raw_bits);
+    }
+    Some(bits)
+}
+
+fn token_costs(table: &Frequencies) -> Vec<f64> {
+    table.of_token().iter().map(|&frequency| 12.0 - libm::log2(f64::from(frequency))).collect()
+}

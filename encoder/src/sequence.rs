@@ -1,0 +1,150 @@
+//! The first pass: what holds for all frames. Steps and lattices, SH degree, sorted axes or not.
+
+use crate::canonical::{canonicalise, visible};
+use crate::entropy_cost::entropy_of;
+use crate::error::Error;
+use crate::lattice::{Extent, inner_side, position_lattice};
+use crate::settings::Settings;
+use crate::source::FrameSource;
+use splatstream_format::Limits;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_scene::{GaussianFrame, sh_coefficients};
+
+/// Gaussians on which sorted and unsorted axes are compared.
+const TRIAL: usize = 1 << 14;
+
+/// What the first pass found out.
+pub(crate) struct Analysis {
+    /// The parameters of the sequence.
+    pub(crate) parameters: SequenceParameters,
+    /// The lowest level that holds every frame.
+    pub(crate) level: u8,
+    /// SH degree of the source.
+    pub(crate) source_sh_degree: u8,
+    /// Bits a Gaussian of scale and rotation with sorted axes, and as they come.
+    pub(crate) axes_trial: [f64; 2],
+}
+
+/// Looks at every frame once.
+///
+/// # Errors
+/// A source that cannot be read or has no frame, settings the bitstream cannot carry.
+pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Result<Analysis, Error> {
+    check(settings)?;
+    let frames = source.len();
+    if frames == 0 {
+        return Err(Error::NoFrames);
+    }
+    let mut extent = Extent::NONE;
+    let mut inner = 0.0_f32;
+    let mut level = 1;
+    let mut degree = 0;
+    let mut source_degree = 0;
+    let mut axes_trial = [0.0; 2];
+    for number in 0..frames {
+        let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
+        level = level.max(level_of(&frame, number)?);
+        extent = extent.with(&frame);
+        source_degree = source_degree.max(frame.sh_degree());
+        degree = degree.max(needed_degree(&frame, settings.steps.sh));
+        if number == 0 {
+            inner = inner_side(&frame);
+            axes_trial = try_axes(&frame, settings);
+        }
+    }
+    let degree = settings.sh_degree.unwrap_or(degree).min(source_degree);
+    let (offset, step, bits) = position_lattice(extent, inner, &settings.steps);
+    let [sorted, unsorted] = axes_trial;
+    let parameters = parameters(settings, frames, degree, sorted <= unsorted, (offset, step, bits));
+    Ok(Analysis { parameters, level, source_sh_degree: source_degree, axes_trial })
+}
+
+fn level_of(frame: &GaussianFrame, number: u32) -> Result<u8, Error> {
+    let level = u32::try_from(frame.len()).ok().and_then(Limits::level_of);
+    level.ok_or(Error::TooManyGaussians { frame: number, count: frame.len(), max: Limits::gaussians_of_level(4) })
+}
+
+fn check(settings: &Settings) -> Result<(), Error> {
+    let percents = &settings.refinements;
+    let increasing = percents.iter().zip(percents.iter().skip(1)).all(|(a, b)| a < b);
+    let first = percents.first().is_some_and(|&first| first > 0);
+    if !increasing || !first || percents.last() != Some(&100) || percents.len() > 10 {
+        return Err(Error::Refinements(percents.clone()));
+    }
+    let setting = |name, value: String, allowed| Err(Error::Setting { name, value, allowed });
+    if settings.gop == 0 {
+        return setting("gop", "0".into(), "1 or more");
+    }
+    if !(6..=16).contains(&settings.block_log2) {
+        return setting("block_log2", settings.block_log2.to_string(), "6 to 16");
+    }
+    if settings.sh_degree.is_some_and(|degree| degree > 3) {
+        return setting("sh_degree", format!("{:?}", settings.sh_degree), "0 to 3");
+    }
+    Ok(())
+}
+
+/// The highest band of which some coefficient does not round to 0.
+fn needed_degree(frame: &GaussianFrame, step: f32) -> u8 {
+    let needed = |degree: &u8| {
+        let planes = 3 * sh_coefficients(degree - 1)..3 * sh_coefficients(*degree);
+        let bands = frame.sh().get(planes).unwrap_or_default();
+        bands.iter().flatten().any(|value| value.abs() > 0.5 * step)
+    };
+    (1..=frame.sh_degree()).rev().find(needed).unwrap_or(0)
+}
+
+/// Zero-order bits of scale and rotation with sorted axes and as they come, on a sample.
+fn try_axes(frame: &GaussianFrame, settings: &Settings) -> [f64; 2] {
+    let shown = visible(frame, settings.keep_invisible);
+    let sample: Vec<u32> = shown.iter().step_by(shown.len().div_ceil(TRIAL).max(1)).copied().collect();
+    [true, false].map(|sort| {
+        let canonical = canonicalise(frame, &sample, sort);
+        let round = |plane: &Vec<f32>, step: f32| -> Vec<i32> {
+            plane.iter().map(|&value| libm::rintf(value / step) as i32).collect()
+        };
+        let scales = canonical.log_scale().each_ref().map(|plane| round(plane, settings.steps.log_scale));
+        let differences = |a: usize, b: usize| -> Vec<i32> {
+            scales[a].iter().zip(&scales[b]).map(|(a, b)| a - b).collect()
+        };
+        let [_, x, y, z] = canonical.rotation();
+        let rotation: f64 = [x, y, z].map(|plane| entropy_of(&round(plane, settings.steps.rotation))).iter().sum();
+        let scale = entropy_of(&scales[0]) + entropy_of(&differences(0, 1)) + entropy_of(&differences(1, 2));
+        (scale + rotation) / sample.len().max(1) as f64
+    })
+}
+
+fn parameters(
+    settings: &Settings,
+    frames: u32,
+    sh_degree: u8,
+    canonical_axes: bool,
+    (offset, step, position_bits): ([f32; 3], f32, u8),
+) -> SequenceParameters {
+    let mut refinement_percent = [0; 10];
+    refinement_percent[..settings.refinements.len()].copy_from_slice(&settings.refinements);
+    let steps = &settings.steps;
+    SequenceParameters {
+        sh_degree,
+        spatial_layer_count: 1,
+        temporal_layer_count: 1,
+        refinement_count: settings.refinements.len() as u8,
+        refinement_percent,
+        position_bits,
+        block_log2: settings.block_log2,
+        sequence_flags: SequenceParameters::flags(canonical_axes, false),
+        rotation_threshold: [0; 3],
+        frame_count: frames,
+        ticks_per_second: settings.ticks.0,
+        ticks_per_frame: settings.ticks.1,
+        position_offset: offset.map(f32::to_bits),
+        position_step: step.to_bits(),
+        log_scale_offset: 0.0_f32.to_bits(),
+        log_scale_step: steps.log_scale.to_bits(),
+        rotation_step: steps.rotation.to_bits(),
+        opacity_offset: 0.0_f32.to_bits(),
+        opacity_step: steps.opacity.to_bits(),
+        dc_step: steps.dc.to_bits(),
+        sh_step: steps.sh.to_bits(),
+    }
+}

@@ -1,0 +1,115 @@
+//! What a user asks for: quality, effort, layers.
+
+/// How much is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preset {
+    /// One context source a plane, no trial of vector quantisation.
+    Fast,
+    /// Two context sources a plane; vector quantisation is tried on a sample.
+    #[default]
+    Balanced,
+    /// As balanced, with every source tried for both axes on all Gaussians.
+    Small,
+}
+
+/// How close the decoded scene is to the source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quality {
+    /// Visible loss in still comparison.
+    Low,
+    /// Loss visible side by side.
+    Medium,
+    /// Loss hard to see.
+    #[default]
+    High,
+    /// No visible loss.
+    VisuallyLossless,
+}
+
+/// Quantiser steps. Attributes in PLY's domain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steps {
+    /// The position step is the largest side of the box of the inner 98 % divided by 2 to this.
+    pub position_bits: u8,
+    /// Step of the natural log of the semi-axes.
+    pub log_scale: f32,
+    /// Step of a quaternion component.
+    pub rotation: f32,
+    /// Step of the opacity logit.
+    pub opacity: f32,
+    /// Step of a dc component.
+    pub dc: f32,
+    /// Step of an SH component.
+    pub sh: f32,
+}
+
+impl Quality {
+    /// The steps of a quality.
+    pub fn steps(self) -> Steps {
+        let steps = |position_bits, log_scale, rotation, opacity, dc, sh| Steps {
+            position_bits,
+            log_scale,
+            rotation,
+            opacity,
+            dc,
+            sh,
+        };
+        match self {
+            Self::Low => steps(12, 0.25, 0.04, 0.8, 0.1, 0.4),
+            Self::Medium => steps(13, 0.18, 0.03, 0.6, 0.06, 0.22),
+            Self::High => steps(14, 0.12, 0.02, 0.4, 0.04, 0.12),
+            Self::VisuallyLossless => steps(16, 0.03, 0.006, 0.1, 0.012, 0.03),
+        }
+    }
+}
+
+/// How SH is coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ShChoice {
+    /// Whichever has the lower rate-distortion cost on a sample of the scene.
+    #[default]
+    Auto,
+    /// Transform coefficients.
+    Coefficients,
+    /// Vector quantisation of the transform coefficients.
+    VectorQuantised,
+}
+
+/// Everything a user may choose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// How much is searched.
+    pub preset: Preset,
+    /// Quantiser steps.
+    pub steps: Steps,
+    /// Frames in a GOP.
+    pub gop: u32,
+    /// Refinement percentages, increasing, the last 100; at most 10.
+    pub refinements: Vec<u8>,
+    /// Highest SH degree kept; none keeps what the scene needs.
+    pub sh_degree: Option<u8>,
+    /// How SH is coded.
+    pub sh: ShChoice,
+    /// Keep Gaussians whose opacity is below 1/255 everywhere.
+    pub keep_invisible: bool,
+    /// log2 of the Gaussians in an entropy block.
+    pub block_log2: u8,
+    /// Ticks in a second, and from one frame to the next.
+    pub ticks: (u32, u32),
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            preset: Preset::default(),
+            steps: Quality::default().steps(),
+            gop: 16,
+            refinements: vec![10, 20, 30, 50, 100],
+            sh_degree: None,
+            sh: ShChoice::default(),
+            keep_invisible: false,
+            block_log2: 14,
+            ticks: (30, 1),
+        }
+    }
+}

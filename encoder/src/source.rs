@@ -1,0 +1,42 @@
+//! Where frames come from.
+
+use splatstream_scene::GaussianFrame;
+
+/// A sequence of frames, each read when it is needed. The encoder asks for every frame twice.
+pub trait FrameSource {
+    /// Frames in the sequence.
+    fn len(&self) -> u32;
+
+    /// True if there is none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// One frame, counted from 0.
+    ///
+    /// # Errors
+    /// The frame cannot be had; the error says which file and why.
+    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>>;
+}
+
+/// Frames in memory.
+impl FrameSource for Vec<GaussianFrame> {
+    fn len(&self) -> u32 {
+        Self::len(self) as u32
+    }
+
+    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        self.get(number as usize).cloned().ok_or_else(|| format!("there is no frame {number}").into())
+    }
+}
+
+/// The built-in scenes are made frame by frame.
+impl FrameSource for splatstream_scene::builtin::BuiltinScene {
+    fn len(&self) -> u32 {
+        self.frames
+    }
+
+    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        Ok(splatstream_scene::builtin::BuiltinScene::frame(self, number))
+    }
+}

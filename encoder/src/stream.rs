@@ -1,0 +1,299 @@
+//! The second pass: units in their order, written as they are made.
+
+use crate::canonical::{canonicalise, visible};
+use crate::colour::{self, ShPlan};
+use crate::error::Error;
+use crate::frame::{CodedFrame, UnitPlan, code_frame};
+use crate::lattice::geometry;
+use crate::sequence::analyse;
+use crate::settings::Settings;
+use crate::source::FrameSource;
+use splatstream_decoder::block::UnitParameters;
+use splatstream_decoder::colour::Colour;
+use splatstream_decoder::layout::{Layout, ShCoding};
+use splatstream_format::payload::{Index, Transform};
+use splatstream_format::syntax::{
+    EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, RefinementHeader,
+    SequenceParameters, ShMode, TransformKind, UnitId, UnitType,
+};
+use splatstream_format::unit::{write_file_header, write_unit};
+use splatstream_scene::{GaussianFrame, importance};
+use std::io::Write;
+
+/// Called after every frame with frames done and frames in all.
+pub type Progress<'a> = &'a mut dyn FnMut(u32, u32);
+
+/// What was written, what was chosen, and why.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Report {
+    /// Bytes of the stream.
+    pub bytes: u64,
+    /// Frames.
+    pub frames: u32,
+    /// Gaussians coded, over all frames.
+    pub gaussians: u64,
+    /// Gaussians left out because they can never be seen.
+    pub invisible: u64,
+    /// SH degree of the source and of the stream.
+    pub sh_degree: (u8, u8),
+    /// Bits of a position on one axis.
+    pub position_bits: u8,
+    /// Size of a position cell, scene units.
+    pub position_step: f32,
+    /// Whether axes are sorted, and bits a Gaussian of scale and rotation if they are and if not.
+    pub canonical_axes: (bool, [f64; 2]),
+    /// Components of the sh transform in the first GOP.
+    pub sh_rank: u8,
+    /// Entries of the SH codebook in the first GOP; 0: coefficients.
+    pub sh_codebook_entries: u32,
+    /// Bits a Gaussian and mean squared error in steps, of coefficients and of codebooks, if compared.
+    pub sh_trial: Option<[(f64, f64); 2]>,
+    /// Reconstruction digest of each frame, all refinements.
+    pub digests: Vec<u64>,
+}
+
+/// Encodes all frames of `source` to `sink`.
+///
+/// # Errors
+/// Settings or frames that cannot be coded, a source that cannot be read, a sink that cannot be written.
+pub fn encode(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    sink: &mut dyn Write,
+    progress: Progress<'_>,
+) -> Result<Report, Error> {
+    let analysis = analyse(source, settings)?;
+    let sequence = analysis.parameters;
+    let mut report = Report {
+        frames: source.len(),
+        sh_degree: (analysis.source_sh_degree, sequence.sh_degree),
+        position_bits: sequence.position_bits,
+        position_step: sequence.position_step(),
+        canonical_axes: (sequence.canonical_axes(), analysis.axes_trial),
+        ..Report::default()
+    };
+    let mut writer = UnitWriter { sink, offset: 0, units: 0 };
+    writer.bytes(&write_file_header(analysis.level)?)?;
+    writer.unit(UnitId::stream(UnitType::SequenceParameters), &sequence.to_bytes()?)?;
+    let mut index = Vec::new();
+    for (gop_index, first) in (0..source.len()).step_by(settings.gop as usize).enumerate() {
+        let last = source.len().min(first + settings.gop);
+        index.push(IndexEntry { frame: first, reserved_zero: 0, offset: writer.offset });
+        let gop = GopHeader::intra(gop_index as u32, last - first);
+        writer.unit(UnitId::of_frame(UnitType::GopHeader, first), &gop.to_bytes()?)?;
+        let mut tools = None;
+        for number in first..last {
+            let prepared = prepare(source, settings, &sequence, number, &mut report)?;
+            if tools.is_none() {
+                let made = GopTools::new(&prepared, &sequence, settings, last - first);
+                made.write(&mut writer, &sequence, first, &mut report)?;
+                tools = Some(made);
+            }
+            if let Some(tools) = &tools {
+                write_frame(&mut writer, &prepared, &sequence, tools, settings, number, &mut report)?;
+            }
+            progress(number + 1, source.len());
+        }
+    }
+    finish(&mut writer, index, source.len())?;
+    report.bytes = writer.offset;
+    Ok(report)
+}
+
+/// A frame in canonical form, SH cut to the sequence's degree.
+fn prepare(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    sequence: &SequenceParameters,
+    number: u32,
+    report: &mut Report,
+) -> Result<GaussianFrame, Error> {
+    let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
+    let shown = visible(&frame, settings.keep_invisible);
+    report.invisible += (frame.len() - shown.len()) as u64;
+    report.gaussians += shown.len() as u64;
+    Ok(canonicalise(&frame, &shown, sequence.canonical_axes()))
+}
+
+/// What the frames of a GOP share.
+struct GopTools {
+    dc: Transform,
+    sh: Option<(Transform, ShPlan)>,
+}
+
+/// The SH planes that the sequence carries; a frame of a lower degree has fewer.
+fn sh_planes<'a>(frame: &'a GaussianFrame, sequence: &SequenceParameters, zeros: &'a [f32]) -> Vec<&'a [f32]> {
+    (0..usize::from(sequence.sh_dimension()))
+        .map(|plane| frame.sh().get(plane).map_or(zeros, Vec::as_slice))
+        .collect()
+}
+
+fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
+    frame.dc().iter().map(Vec::as_slice).collect()
+}
+
+impl GopTools {
+    fn new(frame: &GaussianFrame, sequence: &SequenceParameters, settings: &Settings, frames: u32) -> Self {
+        let dc = colour::transform(TransformKind::Dc, &dc_planes(frame), sequence.dc_step());
+        let zeros = vec![0.0; frame.len()];
+        let sh = (sequence.sh_degree > 0).then(|| {
+            let planes = sh_planes(frame, sequence, &zeros);
+            let step = sequence.sh_step();
+            let mut transform = colour::transform(TransformKind::Sh, &planes, step);
+            let mut components = colour::components(&transform, &planes, step);
+            colour::drop_unused(&mut transform, &mut components);
+            let gaussians = frame.len() * frames as usize;
+            let plan = colour::plan_sh(&transform, &planes, step, gaussians, settings.sh, settings.preset);
+            (transform, plan)
+        });
+        Self { dc, sh }
+    }
+
+    fn write(
+        &self,
+        writer: &mut UnitWriter<'_>,
+        sequence: &SequenceParameters,
+        frame: u32,
+        report: &mut Report,
+    ) -> Result<(), Error> {
+        let transform_id = UnitId::of_frame(UnitType::Transform, frame);
+        writer.unit(transform_id, &self.dc.to_bytes(sequence)?)?;
+        let Some((transform, plan)) = &self.sh else { return Ok(()) };
+        writer.unit(transform_id, &transform.to_bytes(sequence)?)?;
+        for codebook in &plan.codebooks {
+            writer.unit(UnitId::of_frame(UnitType::Codebook, frame), &codebook.to_bytes()?)?;
+        }
+        if frame == 0 {
+            report.sh_rank = transform.header.rank;
+            report.sh_trial = plan.trial;
+            report.sh_codebook_entries =
+                plan.codebooks.first().map_or(0, |book| u32::from(book.header.entry_count_minus1) + 1);
+        }
+        Ok(())
+    }
+
+    fn sh_coding(&self) -> ShCoding {
+        match &self.sh {
+            None => ShCoding::None,
+            Some((transform, plan)) if plan.codebooks.is_empty() => {
+                ShCoding::Coefficients { rank: transform.header.rank }
+            }
+            Some((_, plan)) => ShCoding::VectorQuantised { stages: plan.codebooks.len() as u8 },
+        }
+    }
+}
+
+fn write_frame(
+    writer: &mut UnitWriter<'_>,
+    frame: &GaussianFrame,
+    sequence: &SequenceParameters,
+    tools: &GopTools,
+    settings: &Settings,
+    number: u32,
+    report: &mut Report,
+) -> Result<(), Error> {
+    let coded = coded_frame(frame, sequence, tools, number)?;
+    let coding = tools.sh_coding();
+    let layout = Layout::new(tools.dc.header.rank, coding);
+    let codebooks = tools.sh.as_ref().map_or(&[][..], |(_, plan)| plan.codebooks.as_slice());
+    let plan = UnitPlan {
+        parameters: UnitParameters {
+            position_bits: sequence.position_bits,
+            position_shift: 0,
+            canonical_axes: sequence.canonical_axes(),
+            rotation_thresholds: sequence.rotation_threshold,
+            lanes_log2: 0,
+            layout: &layout,
+            colour: Colour {
+                dc: &tools.dc,
+                sh: tools.sh.as_ref().map(|(transform, _)| transform),
+                mode: coding,
+                codebooks: [codebooks.first(), codebooks.get(1), codebooks.get(2), codebooks.get(3)],
+                sh_planes: usize::from(sequence.sh_dimension()),
+            },
+        },
+        header: header_of(coding),
+        sequence,
+        preset: settings.preset,
+    };
+    let units = code_frame(&coded, &plan)?;
+    report.digests.push(units.digest);
+    let header = FrameHeader::intra(0, tools.sh.as_ref().map(|_| 0), frame.len() as u32);
+    writer.unit(UnitId::of_frame(UnitType::FrameHeader, number), &header.to_bytes()?)?;
+    for (refinement, payload) in (0..).zip(&units.payloads) {
+        writer.unit(UnitId::of_refinement(number, refinement), payload)?;
+    }
+    Ok(())
+}
+
+fn coded_frame(
+    frame: &GaussianFrame,
+    sequence: &SequenceParameters,
+    tools: &GopTools,
+    number: u32,
+) -> Result<CodedFrame, Error> {
+    let zeros = vec![0.0; frame.len()];
+    let sh = tools.sh.as_ref().map_or_else(Vec::new, |(transform, plan)| {
+        let planes = sh_planes(frame, sequence, &zeros);
+        match plan.codebooks.first() {
+            None => colour::components(transform, &planes, sequence.sh_step()),
+            Some(book) => vec![colour::indices(transform, &planes, sequence.sh_step(), book)],
+        }
+    });
+    Ok(CodedFrame {
+        geometry: geometry(frame, sequence, number)?,
+        dc: colour::components(&tools.dc, &dc_planes(frame), sequence.dc_step()),
+        sh,
+        order: importance::order(&importance::opacity_volume(frame)),
+    })
+}
+
+fn header_of(coding: ShCoding) -> RefinementHeader {
+    let (mode, stages) = match coding {
+        ShCoding::None => (ShMode::None, 0),
+        ShCoding::Coefficients { .. } => (ShMode::Coefficients, 0),
+        ShCoding::VectorQuantised { stages } => (ShMode::VectorQuantised, stages),
+    };
+    let mut codebook_ids = [NO_CODEBOOK; 4];
+    for (id, slot) in (0..stages).zip(&mut codebook_ids) {
+        *slot = id;
+    }
+    RefinementHeader {
+        refinement_digest: 0,
+        gaussian_count: 0,
+        position_shift: 0,
+        lanes_log2: 0,
+        sh_mode: mode.code(),
+        vq_stage_count: stages,
+        codebook_ids,
+    }
+}
+
+fn finish(writer: &mut UnitWriter<'_>, index: Vec<IndexEntry>, frames: u32) -> Result<(), Error> {
+    let index_offset = writer.offset;
+    writer.unit(UnitId::stream(UnitType::Index), &Index { entries: index }.to_bytes()?)?;
+    let end = EndOfStream { frame_count: frames, unit_count: writer.units, index_offset };
+    writer.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)
+}
+
+/// Counts bytes and units on their way out.
+struct UnitWriter<'a> {
+    sink: &'a mut dyn Write,
+    offset: u64,
+    units: u32,
+}
+
+impl UnitWriter<'_> {
+    fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.sink.write_all(bytes)?;
+        self.offset += bytes.len() as u64;
+        Ok(())
+    }
+
+    fn unit(&mut self, id: UnitId, payload: &[u8]) -> Result<(), Error> {
+        let mut unit = Vec::with_capacity(payload.len() + 20);
+        write_unit(&mut unit, id, payload)?;
+        self.units += 1;
+        self.bytes(&unit)
+    }
+}

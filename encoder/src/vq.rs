@@ -1,0 +1,184 @@
+//! Vector quantisation of SH components: k-means++ seeding, Lloyd iterations, empty cells seeded anew.
+
+use rayon::prelude::*;
+use splatstream_format::payload::Codebook;
+use splatstream_format::syntax::CodebookHeader;
+
+/// Vectors used for training, at most.
+pub(crate) const MAX_TRAINING: usize = 1 << 16;
+/// Lloyd iterations.
+const ITERATIONS: usize = 8;
+/// Vectors that seeds are drawn from.
+const SEEDING: usize = 1 << 12;
+/// Entries tried by the automatic choice, and the most that a forced choice takes.
+const TRIAL_ENTRIES: usize = 256;
+const MAX_ENTRIES: usize = 4096;
+
+/// Entries worth carrying for a GOP: about one for 64 Gaussians.
+pub(crate) fn entry_count(gaussians: usize, forced: bool) -> usize {
+    let most = if forced { MAX_ENTRIES } else { TRIAL_ENTRIES };
+    (gaussians / 64).clamp(1, most)
+}
+
+/// Every `stride`-th vector of component planes, as rows.
+pub(crate) fn rows(planes: &[Vec<f32>], stride: usize) -> Vec<f32> {
+    let count = planes.first().map_or(0, Vec::len);
+    (0..count).step_by(stride).flat_map(|place| planes.iter().map(move |plane| plane[place])).collect()
+}
+
+/// Rows of even and of odd place.
+pub(crate) fn halves(rows: &[f32], rank: usize) -> (Vec<f32>, Vec<f32>) {
+    let half = |odd: usize| rows.chunks(rank).skip(odd).step_by(2).flatten().copied().collect();
+    (half(0), half(1))
+}
+
+/// Bits of the codebook unit's entries.
+pub(crate) fn bits_of(codebook: &Codebook, rank: usize) -> f64 {
+    let entries = usize::from(codebook.header.entry_count_minus1) + 1;
+    (entries * rank * usize::from(codebook.header.value_bytes) * 8) as f64
+}
+
+/// The nearest entry of every row, ties to the first, and the sum of squared errors.
+pub(crate) fn assign(codebook: &Codebook, rows: &[f32], rank: usize) -> (Vec<i32>, f64) {
+    let entries: Vec<f32> = codebook.entries.iter().map(|&value| f32::from(value)).collect();
+    let found = nearest(&entries, rows, rank);
+    let error = found.iter().map(|&(_, error)| f64::from(error)).sum();
+    (found.into_iter().map(|(index, _)| index as i32).collect(), error)
+}
+
+fn nearest(entries: &[f32], rows: &[f32], rank: usize) -> Vec<(u32, f32)> {
+    let search = |row: &[f32]| {
+        let mut best = (0_u32, f32::INFINITY);
+        for (index, entry) in (0..).zip(entries.chunks_exact(rank)) {
+            let distance = squared_distance(row, entry);
+            if distance < best.1 {
+                best = (index, distance);
+            }
+        }
+        best
+    };
+    rows.par_chunks_exact(rank).with_min_len(64).map(search).collect()
+}
+
+/// In eight partial sums, added in order.
+fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.chunks(8).zip(b.chunks(8)) {
+        for (sum, (&a, &b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += (a - b) * (a - b);
+        }
+    }
+    sums.iter().sum()
+}
+
+/// A codebook of `entries` entries for the rows; the frequent entries first.
+pub(crate) fn train(rows: &[f32], rank: usize, entries: usize) -> Codebook {
+    let mut centres = seeds(rows, rank, entries.max(1));
+    let mut owners = nearest(&centres, rows, rank);
+    for _ in 0..ITERATIONS {
+        centres = moved(&centres, rows, rank, &owners);
+        owners = nearest(&centres, rows, rank);
+    }
+    let mut uses = vec![0_u32; centres.len() / rank];
+    owners.iter().for_each(|&(index, _)| uses[index as usize] += 1);
+    let mut order: Vec<usize> = (0..uses.len()).filter(|&place| uses[place] > 0).collect();
+    order.sort_by_key(|&place| (core::cmp::Reverse(uses[place]), place));
+    let sorted = order.iter().flat_map(|&place| &centres[place * rank..(place + 1) * rank]);
+    let entries: Vec<i16> = sorted.map(|&value| libm::rintf(value).clamp(-8191.0, 8191.0) as i16).collect();
+    let small = entries.iter().all(|&value| i8::try_from(value).is_ok());
+    let header = CodebookHeader {
+        codebook_id: 0,
+        component_count: rank as u8,
+        entry_count_minus1: (order.len().max(1) - 1) as u16,
+        value_bytes: if small { 1 } else { 2 },
+    };
+    Codebook { header, entries }
+}
+
+/// k-means++: each seed is drawn with a weight of its squared distance to the seeds before.
+fn seeds(rows: &[f32], rank: usize, entries: usize) -> Vec<f32> {
+    let count = rows.len() / rank;
+    let pool: Vec<&[f32]> = rows.chunks_exact(rank).step_by(count.div_ceil(SEEDING.max(entries * 2)).max(1)).collect();
+    let mut state = 0x5EED_u64;
+    let mut centres = pool[0].to_vec();
+    let mut distances = vec![f32::INFINITY; pool.len()];
+    for _ in 1..entries.min(pool.len()) {
+        let newest = centres[centres.len() - rank..].to_vec();
+        for (distance, row) in distances.iter_mut().zip(&pool) {
+            *distance = distance.min(squared_distance(row, &newest));
+        }
+        let total: f64 = distances.iter().map(|&distance| f64::from(distance)).sum();
+        if total <= 0.0 {
+            break;
+        }
+        let mut left = uniform(&mut state) * total;
+        let drawn = distances.iter().position(|&distance| {
+            left -= f64::from(distance);
+            left < 0.0
+        });
+        centres.extend_from_slice(pool[drawn.unwrap_or(pool.len() - 1)]);
+    }
+    centres
+}
+
+/// splitmix64, to [0, 1).
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut bits = *state;
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Centres at the means of their cells; an empty cell goes to the row that is worst off.
+fn moved(centres: &[f32], rows: &[f32], rank: usize, owners: &[(u32, f32)]) -> Vec<f32> {
+    let cells = centres.len() / rank;
+    let mut sums = vec![0.0_f64; centres.len()];
+    let mut counts = vec![0_u32; cells];
+    for (row, &(owner, _)) in rows.chunks_exact(rank).zip(owners) {
+        let owner = owner as usize;
+        counts[owner] += 1;
+        for (sum, &value) in sums[owner * rank..].iter_mut().zip(row) {
+            *sum += f64::from(value);
+        }
+    }
+    let mut worst: Vec<usize> = (0..owners.len()).collect();
+    let empty = counts.iter().filter(|&&count| count == 0).count();
+    if empty > 0 {
+        worst.sort_by(|&a, &b| owners[b].1.total_cmp(&owners[a].1).then(a.cmp(&b)));
+    }
+    let mut worst = worst.into_iter();
+    let mut centres = Vec::with_capacity(sums.len());
+    for (sums, &count) in sums.chunks_exact(rank).zip(&counts) {
+        let reseed = if count == 0 { worst.next() } else { None };
+        match reseed {
+            Some(row) => centres.extend_from_slice(&rows[row * rank..(row + 1) * rank]),
+            None => centres.extend(sums.iter().map(|&sum| (sum / f64::from(count.max(1))) as f32)),
+        }
+    }
+    centres
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clusters_far_apart_get_an_entry_each() {
+        let rows: Vec<f32> =
+            (0..400).flat_map(|i| [(i % 4) as f32 * 20.0, ((i / 4) % 3) as f32 * 0.1 - 0.1]).collect();
+        let codebook = train(&rows, 2, 4);
+        let mut first: Vec<i16> = codebook.entries.chunks(2).map(|entry| entry[0]).collect();
+        first.sort_unstable();
+        assert_eq!(first, [0, 20, 40, 60]);
+        let (indices, error) = assign(&codebook, &rows, 2);
+        assert!(error < 400.0 * 0.02 && indices.iter().all(|&index| (0..4).contains(&index)));
+    }
+
+    #[test]
+    fn more_entries_than_distinct_rows_are_not_carried() {
+        let rows = vec![3.0_f32; 64];
+        let codebook = train(&rows, 2, 16);
+        assert_eq!(codebook.entries, [3, 3]);
+    }
+}

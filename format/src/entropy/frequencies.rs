@@ -1,0 +1,191 @@
+//! Clause 8.3: a static frequency table and how it is carried.
+
+use super::FREQUENCY_SUM;
+use crate::bits::{BitReader, BitWriter};
+
+/// Frequencies of the tokens 0, 1, ...; they sum to [`FREQUENCY_SUM`], and the last is not zero.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Frequencies {
+    of_token: Vec<u16>,
+    /// The token whose frequency is implied by the others.
+    mode: u8,
+}
+
+impl Frequencies {
+    /// The table in which only `token` occurs; it codes that token in no bits.
+    pub fn single(token: u8) -> Self {
+        let mut of_token = vec![0; usize::from(token)];
+        of_token.push(4096);
+        Self { of_token, mode: token }
+    }
+
+    /// The frequency of each token.
+    pub fn of_token(&self) -> &[u16] {
+        &self.of_token
+    }
+
+    /// The only token, if there is just one.
+    pub fn single_token(&self) -> Option<u8> {
+        let (&last, others) = self.of_token.split_last()?;
+        if u32::from(last) == FREQUENCY_SUM { u8::try_from(others.len()).ok() } else { None }
+    }
+
+    /// The table nearest to `counts` that can be carried; no counts at all give the single token 0.
+    ///
+    /// The most frequent token takes what rounding leaves, so its frequency is the one not carried.
+    pub fn from_counts(counts: &[u64]) -> Self {
+        let total: u64 = counts.iter().copied().fold(0, u64::saturating_add);
+        let used = counts.iter().rposition(|&count| count > 0).map_or(0, |last| last.saturating_add(1));
+        let counts = counts.get(..used.min(256)).unwrap_or_default();
+        let mode = mode_of(counts);
+        let occurring = counts.iter().filter(|&&count| count > 0).count();
+        if occurring <= 1 {
+            return Self::single(u8::try_from(mode).unwrap_or(0));
+        }
+        let mut scale = u64::from(FREQUENCY_SUM);
+        loop {
+            let mut of_token: Vec<u16> =
+                counts.iter().map(|&count| carried_frequency(count, scale, total)).collect();
+            if let Some(frequency) = of_token.get_mut(mode) {
+                *frequency = 0;
+            }
+            let others: u32 = of_token.iter().map(|&frequency| u32::from(frequency)).sum();
+            match FREQUENCY_SUM.checked_sub(others).and_then(|rest| u16::try_from(rest).ok()) {
+                Some(rest) if rest > 0 => {
+                    if let Some(frequency) = of_token.get_mut(mode) {
+                        *frequency = rest;
+                    }
+                    return Self { of_token, mode: u8::try_from(mode).unwrap_or(0) };
+                }
+                // Rounding up small counts took it all: shrink the others a little and try again.
+                _ => scale = scale.saturating_sub(scale / 16),
+            }
+        }
+    }
+
+    /// Writes the explicit form, clause 5.12: last token, mode, then length and mantissa of the others.
+    pub fn write(&self, bits: &mut BitWriter) {
+        let mode = usize::from(self.mode);
+        let last = self.of_token.len().saturating_sub(1);
+        bits.bits(u64::try_from(last).unwrap_or(0), 8);
+        bits.bits(u64::from(self.mode), 8);
+        let mut previous = 0_i32;
+        for (token, &frequency) in self.of_token.iter().enumerate() {
+            if token == mode {
+                continue;
+            }
+            let frequency = u32::from(frequency);
+            let length = bit_length(frequency);
+            let signed = i32::try_from(length).unwrap_or(0);
+            bits.signed_exp_golomb(signed.wrapping_sub(previous));
+            previous = signed;
+            let (mantissa_bits, shift) = mantissa(length);
+            bits.bits(u64::from(frequency.wrapping_shr(shift)), mantissa_bits);
+        }
+    }
+
+    /// Reads what [`Frequencies::write`] writes; `None` if the elements break clause 6.12.
+    pub fn read(bits: &mut BitReader<'_>) -> Option<Self> {
+        let last = bits.small(8);
+        let mode = bits.small(8);
+        if mode > last {
+            return None;
+        }
+        let mut of_token = Vec::with_capacity(usize::from(last).saturating_add(1));
+        let mut left = i64::from(FREQUENCY_SUM);
+        let mut previous = 0_i32;
+        for token in 0..=last {
+            if token == mode {
+                of_token.push(0);
+                continue;
+            }
+            let length = previous.checked_add(bits.signed_exp_golomb()?)?;
+            if !(0..=12).contains(&length) {
+                return None;
+            }
+            previous = length;
+            let length = length.cast_unsigned();
+            let (mantissa_bits, shift) = mantissa(length);
+            let leading = if length == 0 { 0 } else { 1_u64.wrapping_shl(length.wrapping_sub(1)) };
+            let frequency = leading | bits.bits(mantissa_bits).wrapping_shl(shift);
+            left = left.checked_sub(i64::try_from(frequency).ok()?)?;
+            of_token.push(u16::try_from(frequency).ok()?);
+        }
+        let implied = u16::try_from(left).ok().filter(|&rest| rest > 0 && u32::from(rest) < FREQUENCY_SUM)?;
+        *of_token.get_mut(usize::from(mode))? = implied;
+        (of_token.last() != Some(&0)).then_some(Self { of_token, mode })
+    }
+}
+
+/// The first of the largest entries.
+fn mode_of<T: Ord + Copy>(values: &[T]) -> usize {
+    let mut best: Option<(usize, T)> = None;
+    for (index, &value) in values.iter().enumerate() {
+        if best.is_none_or(|(_, largest)| value > largest) {
+            best = Some((index, value));
+        }
+    }
+    best.map_or(0, |(index, _)| index)
+}
+
+/// Bit length: 0 for 0, else one more than the place of the leading one.
+const fn bit_length(value: u32) -> u32 {
+    u32::BITS.wrapping_sub(value.leading_zeros())
+}
+
+/// Mantissa bits carried below the leading one of a frequency of this length, and their place.
+const fn mantissa(length: u32) -> (u32, u32) {
+    let below = length.saturating_sub(1);
+    let carried = if below < 3 { below } else { 3 };
+    (carried, below.wrapping_sub(carried))
+}
+
+/// The frequency nearest to `count * scale / total` that has four significant bits, at least 1.
+fn carried_frequency(count: u64, scale: u64, total: u64) -> u16 {
+    if count == 0 {
+        return 0;
+    }
+    let exact = u128::from(count).saturating_mul(u128::from(scale));
+    let total = u128::from(total.max(1));
+    let rounded = exact.saturating_add(total / 2).checked_div(total).unwrap_or(0);
+    let frequency = u32::try_from(rounded).unwrap_or(FREQUENCY_SUM).clamp(1, FREQUENCY_SUM.wrapping_sub(1));
+    let (_, shift) = mantissa(bit_length(frequency));
+    let half = 1_u32.wrapping_shl(shift) >> 1;
+    let nearest = frequency.wrapping_add(half).wrapping_shr(shift).wrapping_shl(shift);
+    u16::try_from(nearest.min(3840)).unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_table_from_counts_sums_to_4096_keeps_every_token_and_reads_back(
+            counts in prop::collection::vec(prop_oneof![Just(0_u64), 1_u64..5, 0_u64..1_000_000], 1..256)
+        ) {
+            let table = Frequencies::from_counts(&counts);
+            prop_assert_eq!(table.of_token().iter().map(|&f| u32::from(f)).sum::<u32>(), FREQUENCY_SUM);
+            for (token, &count) in counts.iter().enumerate() {
+                if count > 0 {
+                    prop_assert!(table.of_token()[token] > 0);
+                }
+            }
+            if table.single_token().is_none() {
+                let mut bits = BitWriter::new();
+                table.write(&mut bits);
+                let bytes = bits.into_bytes();
+                let mut reader = BitReader::new(&bytes);
+                prop_assert_eq!(Frequencies::read(&mut reader), Some(table));
+            }
+        }
+
+        #[test]
+        fn any_accepted_table_sums_to_4096(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+            if let Some(table) = Frequencies::read(&mut BitReader::new(&bytes)) {
+                prop_assert_eq!(table.of_token().iter().map(|&f| u32::from(f)).sum::<u32>(), FREQUENCY_SUM);
+            }
+        }
+    }
+}

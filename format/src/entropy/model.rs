@@ -1,0 +1,341 @@
+//! Clauses 5.12 and 8.5: the model of a plane - bias, token split, contexts, frequency tables.
+
+use super::frequencies::Frequencies;
+use super::token::Alphabet;
+use crate::bits::{BitReader, BitWriter};
+use crate::{Error, ErrorKind, Result};
+
+/// What a context is computed from (table of clause 8.5). The decoder crate computes the values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Source {
+    /// No context.
+    None,
+    /// The sum of the four coded values before this one in the plane.
+    NeighbourSum,
+    /// The sum of the magnitudes of the four coded values before this one in the plane.
+    NeighbourMagnitude,
+    /// The coded value of the plane before.
+    PreviousPlane,
+    /// The sum of the magnitudes of the coded values of the attribute's planes before this one.
+    GroupMagnitude,
+    /// The largest log-scale.
+    LargestLogScale,
+    /// The middle log-scale.
+    MiddleLogScale,
+    /// The sum of the three log-scales.
+    LogVolume,
+    /// The largest log-scale less the smallest.
+    Anisotropy,
+    /// The opacity.
+    Opacity,
+    /// How far the neighbours in Morton order are.
+    PositionSpacing,
+}
+
+impl Source {
+    /// Every source, in the order of the codes.
+    pub const ALL: [Self; 11] = [
+        Self::None,
+        Self::NeighbourSum,
+        Self::NeighbourMagnitude,
+        Self::PreviousPlane,
+        Self::GroupMagnitude,
+        Self::LargestLogScale,
+        Self::MiddleLogScale,
+        Self::LogVolume,
+        Self::Anisotropy,
+        Self::Opacity,
+        Self::PositionSpacing,
+    ];
+
+    /// The code in the stream.
+    pub fn code(self) -> u8 {
+        Self::ALL.iter().position(|&source| source == self).and_then(|code| u8::try_from(code).ok()).unwrap_or(0)
+    }
+
+    /// The source of a code; codes above 10 are reserved.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(code)).copied()
+    }
+}
+
+/// Most thresholds of one source.
+pub const MAX_THRESHOLDS: usize = 16;
+/// Most contexts of one plane.
+pub const MAX_CONTEXTS: usize = 64;
+
+/// One source and the thresholds that cut its values into contexts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ContextAxis {
+    /// Where the value comes from.
+    pub source: Source,
+    /// Strictly increasing; empty only if the source is [`Source::None`].
+    pub thresholds: Vec<i32>,
+}
+
+impl ContextAxis {
+    /// The axis without contexts.
+    pub const NONE: Self = Self { source: Source::None, thresholds: Vec::new() };
+
+    /// How many contexts the axis distinguishes.
+    pub fn contexts(&self) -> usize {
+        self.thresholds.len().wrapping_add(1)
+    }
+
+    /// The number of thresholds that do not exceed `value`.
+    #[inline]
+    pub fn context(&self, value: i32) -> u8 {
+        self.thresholds.iter().map(|&threshold| u8::from(threshold <= value)).fold(0, u8::wrapping_add)
+    }
+}
+
+/// The model with which a plane of a refinement unit is coded.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlaneModel {
+    /// Added to every coded value; 0 for positions and codebook indices.
+    pub bias: i32,
+    /// Values below 2^direct_log2 have tokens of their own; 2 to 7.
+    pub direct_log2: u8,
+    /// The two context axes; the second has a source only if the first has.
+    pub axes: [ContextAxis; 2],
+    /// The distinct tables, in order of first use.
+    pub tables: Vec<Frequencies>,
+    /// For each context, `first * contexts of the second axis + second`, the place of its table.
+    pub table_of_context: Vec<u8>,
+}
+
+/// Receives every element of a model section as it is read; `()` ignores them.
+pub trait ModelTrace {
+    /// One element: name, first bit within the section, width, value.
+    fn element(&mut self, name: &'static str, bit: u64, bits: u64, value: i64);
+}
+
+impl ModelTrace for () {
+    fn element(&mut self, _: &'static str, _: u64, _: u64, _: i64) {}
+}
+
+/// Writes the models of a unit, clause 5.12. A plane whose model equals the previous unit's is one bit.
+pub fn write_models(models: &[PlaneModel], alphabets: &[Alphabet], previous: Option<&[PlaneModel]>) -> Vec<u8> {
+    let mut bits = BitWriter::new();
+    for (plane, (model, &alphabet)) in models.iter().zip(alphabets).enumerate() {
+        let reuse = previous.and_then(|models| models.get(plane)) == Some(model);
+        bits.bits(u64::from(reuse), 1);
+        if !reuse {
+            write_model(&mut bits, model, alphabet);
+        }
+    }
+    bits.into_bytes()
+}
+
+fn write_model(bits: &mut BitWriter, model: &PlaneModel, alphabet: Alphabet) {
+    if alphabet == Alphabet::Attribute {
+        bits.signed_exp_golomb(model.bias);
+    }
+    bits.bits(u64::from(model.direct_log2.wrapping_sub(2)), 3);
+    let [first, second] = &model.axes;
+    write_axis(bits, first);
+    if first.source != Source::None {
+        write_axis(bits, second);
+    }
+    let mut defined = 0_u8;
+    let mut previous = None;
+    for &place in &model.table_of_context {
+        if previous == Some(place) {
+            bits.bits(2, 2);
+            continue;
+        }
+        previous = Some(place);
+        if place < defined {
+            bits.bits(1, 2);
+            bits.bits(1, 1);
+            bits.bits(u64::from(place), 6);
+            continue;
+        }
+        defined = defined.wrapping_add(1);
+        let Some(table) = model.tables.get(usize::from(place)) else { continue };
+        match table.single_token() {
+            Some(0) => bits.bits(0, 2),
+            Some(token) => {
+                bits.bits(1, 2);
+                bits.bits(0, 1);
+                bits.bits(u64::from(token), 8);
+            }
+            None => {
+                bits.bits(3, 2);
+                table.write(bits);
+            }
+        }
+    }
+}
+
+fn write_axis(bits: &mut BitWriter, axis: &ContextAxis) {
+    bits.bits(u64::from(axis.source.code()), 4);
+    let mut previous: Option<i32> = None;
+    for &threshold in &axis.thresholds {
+        match previous {
+            None => {
+                bits.bits(u64::try_from(axis.thresholds.len().wrapping_sub(1)).unwrap_or(0), 4);
+                bits.signed_exp_golomb(threshold);
+            }
+            Some(before) => {
+                bits.exp_golomb(threshold.wrapping_sub(before).wrapping_sub(1).cast_unsigned());
+            }
+        }
+        previous = Some(threshold);
+    }
+}
+
+/// Reads the models of a unit, one for each of `alphabets`.
+///
+/// # Errors
+/// Malformed or invalid by clauses 5.12 and 6.12; offsets count from `at`, the section's first byte.
+pub fn read_models(
+    section: &[u8],
+    at: u64,
+    alphabets: &[Alphabet],
+    previous: Option<&[PlaneModel]>,
+    trace: &mut impl ModelTrace,
+) -> Result<Vec<PlaneModel>> {
+    let mut reader = ModelReader { bits: BitReader::new(section), at, trace };
+    let mut models = Vec::with_capacity(alphabets.len());
+    for (plane, &alphabet) in alphabets.iter().enumerate() {
+        if reader.element("reuse", 1)? == 1 {
+            let model = previous.and_then(|models| models.get(plane));
+            models.push(model.ok_or(reader.broken("reuse without a model to reuse"))?.clone());
+        } else {
+            models.push(reader.model(alphabet)?);
+        }
+    }
+    reader.bits.finish(at, "plane_model", "5.12")?;
+    Ok(models)
+}
+
+struct ModelReader<'a, 't, T> {
+    bits: BitReader<'a>,
+    at: u64,
+    trace: &'t mut T,
+}
+
+impl<T: ModelTrace> ModelReader<'_, '_, T> {
+    fn here(&self) -> u64 {
+        self.at.wrapping_add(self.bits.position() / 8)
+    }
+
+    fn broken(&self, rule: &'static str) -> Error {
+        Error::new(self.here(), "6.12", ErrorKind::Constraint { rule })
+    }
+
+    fn note(&mut self, name: &'static str, from: u64, value: i64) -> Result<()> {
+        self.trace.element(name, from, self.bits.position().wrapping_sub(from), value);
+        if self.bits.overran() {
+            return Err(Error::new(self.here(), "5.12", ErrorKind::ShortSection { element: name }));
+        }
+        Ok(())
+    }
+
+    fn element(&mut self, name: &'static str, width: u32) -> Result<u8> {
+        let from = self.bits.position();
+        let value = self.bits.small(width);
+        self.note(name, from, i64::from(value))?;
+        Ok(value)
+    }
+
+    fn signed(&mut self, name: &'static str) -> Result<i32> {
+        let from = self.bits.position();
+        let value = self.bits.signed_exp_golomb();
+        self.note(name, from, i64::from(value.unwrap_or(0)))?;
+        value.ok_or(Error::new(self.here(), "5.12", ErrorKind::Number { element: name }))
+    }
+
+    fn model(&mut self, alphabet: Alphabet) -> Result<PlaneModel> {
+        let bias = if alphabet == Alphabet::Attribute { self.signed("bias")? } else { 0 };
+        if i16::try_from(bias).is_err() {
+            return Err(self.broken("bias is a 16-bit value"));
+        }
+        let direct_log2 = self.element("direct_log2_minus2", 3)?.wrapping_add(2);
+        let last_token = match alphabet.last_token(direct_log2) {
+            Some(last) if direct_log2 <= 7 => last,
+            _ => return Err(self.broken("direct_log2 leaves no room for the longest values")),
+        };
+        let first = self.axis()?;
+        let second = if first.source == Source::None { ContextAxis::NONE } else { self.axis()? };
+        let contexts = first.contexts().wrapping_mul(second.contexts());
+        if contexts > MAX_CONTEXTS {
+            return Err(self.broken("a plane has at most 64 contexts"));
+        }
+        let (tables, table_of_context) = self.tables(contexts, last_token)?;
+        Ok(PlaneModel { bias, direct_log2, axes: [first, second], tables, table_of_context })
+    }
+
+    fn axis(&mut self) -> Result<ContextAxis> {
+        let code = self.element("source", 4)?;
+        let source = Source::from_code(code).ok_or(Error::new(
+            self.here(),
+            "6.12",
+            ErrorKind::Reserved { element: "source", value: u64::from(code) },
+        ))?;
+        if source == Source::None {
+            return Ok(ContextAxis::NONE);
+        }
+        let more = self.element("threshold_count_minus1", 4)?;
+        let mut thresholds = vec![self.signed("threshold")?];
+        for _ in 0..more {
+            let from = self.bits.position();
+            let step = self.bits.exp_golomb();
+            self.note("threshold_step_minus1", from, i64::from(step.unwrap_or(0)))?;
+            let next = step
+                .and_then(|step| i32::try_from(step).ok())
+                .and_then(|step| thresholds.last()?.checked_add(step)?.checked_add(1));
+            thresholds.push(next.ok_or(self.broken("thresholds are 32-bit values"))?);
+        }
+        Ok(ContextAxis { source, thresholds })
+    }
+
+    fn tables(&mut self, contexts: usize, last_token: u8) -> Result<(Vec<Frequencies>, Vec<u8>)> {
+        let mut tables: Vec<Frequencies> = Vec::new();
+        let mut table_of_context: Vec<u8> = Vec::with_capacity(contexts);
+        while table_of_context.len() < contexts {
+            let next = u8::try_from(tables.len()).unwrap_or(u8::MAX);
+            let place = match self.element("table_kind", 2)? {
+                0 => {
+                    tables.push(Frequencies::single(0));
+                    next
+                }
+                1 if self.element("is_reference", 1)? == 0 => {
+                    let token = self.element("token", 8)?;
+                    if token > last_token {
+                        return Err(self.broken("token beyond the largest value of the plane"));
+                    }
+                    tables.push(Frequencies::single(token));
+                    next
+                }
+                1 => {
+                    let place = self.element("table_place", 6)?;
+                    if place >= next {
+                        return Err(self.broken("table_place names a table not yet defined"));
+                    }
+                    place
+                }
+                2 => *table_of_context.last().ok_or(self.broken("no context before the first"))?,
+                _ => {
+                    tables.push(self.explicit_table(last_token)?);
+                    next
+                }
+            };
+            table_of_context.push(place);
+        }
+        Ok((tables, table_of_context))
+    }
+
+    fn explicit_table(&mut self, last_token: u8) -> Result<Frequencies> {
+        let from = self.bits.position();
+        let table = Frequencies::read(&mut self.bits);
+        let tokens = table.as_ref().map_or(0, |table| table.of_token().len());
+        self.note("frequencies", from, i64::try_from(tokens).unwrap_or(0))?;
+        match table {
+            Some(table) if tokens <= usize::from(last_token).wrapping_add(1) => Ok(table),
+            Some(_) => Err(self.broken("token beyond the largest value of the plane")),
+            None => Err(self.broken("frequencies do not sum to 4096")),
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! Clause 9: what is wrong with a stream, where, and which clause says so.
+
+/// The result of reading or writing syntax.
+pub type Result<T> = core::result::Result<T, Error>;
+
+/// What a caller can do about an error (clause 9.1); the number is the exit code of the tools.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Class {
+    /// The bytes do not parse: signature, check sum, length, entropy state.
+    Malformed,
+    /// The bytes parse, and break a constraint of the specification.
+    Invalid,
+    /// A reserved value or a feature of another profile or version.
+    Unsupported,
+    /// Above a limit that the caller or the level sets.
+    OverLimit,
+    /// The stream ends before its end unit.
+    Truncated,
+}
+
+impl Class {
+    /// The exit code of the tools, clause 9.1.
+    pub const fn exit_code(self) -> u8 {
+        match self {
+            Self::Malformed => 10,
+            Self::Invalid => 11,
+            Self::Unsupported => 12,
+            Self::OverLimit => 13,
+            Self::Truncated => 14,
+        }
+    }
+
+    /// The name used in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Malformed => "malformed",
+            Self::Invalid => "invalid",
+            Self::Unsupported => "unsupported",
+            Self::OverLimit => "over-limit",
+            Self::Truncated => "truncated",
+        }
+    }
+}
+
+/// One error: absolute byte offset, clause, cause. `Copy`, no strings made at run time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("byte {at:#x}: {kind} (clause {clause})")]
+pub struct Error {
+    /// Absolute offset in the stream of the first byte of the offending element.
+    pub at: u64,
+    /// The clause of the specification that is broken.
+    pub clause: &'static str,
+    /// The cause.
+    pub kind: ErrorKind,
+}
+
+/// The causes; [`ErrorKind::code`] is stable, the wording is not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The stream ends inside an element or before the end unit.
+    #[error("the stream ends in {element}")]
+    Truncated {
+        /// The syntax element that is cut.
+        element: &'static str,
+    },
+    /// The eight signature bytes are wrong.
+    #[error("not a SplatStream file: the signature is wrong")]
+    Signature,
+    /// A check sum does not fit the bytes it covers.
+    #[error("{element} is {stored:#x}, the bytes it covers give {computed:#x}")]
+    CheckSum {
+        /// The syntax element holding the check sum.
+        element: &'static str,
+        /// The value in the stream.
+        stored: u32,
+        /// The value of the bytes.
+        computed: u32,
+    },
+    /// A payload or section is shorter than the elements it must hold.
+    #[error("{element} does not fit in the bytes left for it")]
+    ShortSection {
+        /// The syntax element that does not fit.
+        element: &'static str,
+    },
+    /// Bytes are left over where none may be.
+    #[error("{bytes} byte(s) after the end of {element}")]
+    TrailingBytes {
+        /// The structure that should have ended.
+        element: &'static str,
+        /// How many bytes are left.
+        bytes: u64,
+    },
+    /// A number is not written in its shortest form, or is too long.
+    #[error("{element} is not a well-formed number")]
+    Number {
+        /// The syntax element.
+        element: &'static str,
+    },
+    /// Padding bits that are not zero.
+    #[error("padding after {element} is not zero")]
+    Padding {
+        /// The structure that is padded.
+        element: &'static str,
+    },
+    /// The entropy decoder did not end in its initial state with all words used.
+    #[error("the entropy decoder does not end where the block ends")]
+    EntropyFinalState,
+    /// Bits or bytes that shall be zero in this version.
+    #[error("reserved bits of {element} are set ({value:#x})")]
+    ReservedBits {
+        /// The syntax element.
+        element: &'static str,
+        /// Its value.
+        value: u64,
+    },
+    /// A value kept for a later version or another profile.
+    #[error("{element} has the reserved value {value}")]
+    Reserved {
+        /// The syntax element.
+        element: &'static str,
+        /// Its value.
+        value: u64,
+    },
+    /// A value outside the range its semantics allow.
+    #[error("{element} is {value}, allowed are {min} to {max}")]
+    OutOfRange {
+        /// The syntax element.
+        element: &'static str,
+        /// Its value.
+        value: i64,
+        /// Smallest allowed value.
+        min: i64,
+        /// Largest allowed value.
+        max: i64,
+    },
+    /// A value that contradicts another element.
+    #[error("{element} is {value}, {expected} follows from the elements before it")]
+    Mismatch {
+        /// The syntax element.
+        element: &'static str,
+        /// Its value.
+        value: u64,
+        /// The value that the rest of the stream implies.
+        expected: u64,
+    },
+    /// A constraint that has no single number: the element names it.
+    #[error("constraint broken: {rule}")]
+    Constraint {
+        /// The rule in a few words.
+        rule: &'static str,
+    },
+    /// A unit at a place where it may not stand.
+    #[error("a {unit} unit may not stand here")]
+    UnexpectedUnit {
+        /// The kind of unit.
+        unit: &'static str,
+    },
+    /// An identifier that no unit before has defined.
+    #[error("{element} {id} has not been defined")]
+    Undefined {
+        /// The syntax element that refers.
+        element: &'static str,
+        /// The identifier.
+        id: u64,
+    },
+    /// The reconstruction differs from the digest in the stream.
+    #[error("reconstruction digest is {computed:#018x}, the stream says {stored:#018x}")]
+    Digest {
+        /// The value in the stream.
+        stored: u64,
+        /// The value of the decoded planes.
+        computed: u64,
+    },
+    /// More than the caller's [`Limits`](crate::Limits) allow.
+    #[error("{limit} is {asked}, at most {allowed} is allowed here")]
+    OverLimit {
+        /// The name of the limit.
+        limit: &'static str,
+        /// What the stream asks for.
+        asked: u64,
+        /// What is allowed.
+        allowed: u64,
+    },
+}
+
+impl ErrorKind {
+    /// The class a caller acts on (clause 9.1).
+    pub const fn class(&self) -> Class {
+        match self {
+            Self::Truncated { .. } => Class::Truncated,
+            Self::Signature
+            | Self::CheckSum { .. }
+            | Self::ShortSection { .. }
+            | Self::TrailingBytes { .. }
+            | Self::Number { .. }
+            | Self::Padding { .. }
+            | Self::EntropyFinalState => Class::Malformed,
+            Self::ReservedBits { .. } | Self::Reserved { .. } => Class::Unsupported,
+            Self::OutOfRange { .. }
+            | Self::Mismatch { .. }
+            | Self::Constraint { .. }
+            | Self::UnexpectedUnit { .. }
+            | Self::Undefined { .. }
+            | Self::Digest { .. } => Class::Invalid,
+            Self::OverLimit { .. } => Class::OverLimit,
+        }
+    }
+
+    /// The stable code of the cause, as in the table of clause 9.2.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::Truncated { .. } => "TRUNCATED",
+            Self::Signature => "SIGNATURE",
+            Self::CheckSum { .. } => "CHECK_SUM",
+            Self::ShortSection { .. } => "SHORT_SECTION",
+            Self::TrailingBytes { .. } => "TRAILING_BYTES",
+            Self::Number { .. } => "NUMBER",
+            Self::Padding { .. } => "PADDING",
+            Self::EntropyFinalState => "ENTROPY_FINAL_STATE",
+            Self::ReservedBits { .. } => "RESERVED_BITS",
+            Self::Reserved { .. } => "RESERVED",
+            Self::OutOfRange { .. } => "OUT_OF_RANGE",
+            Self::Mismatch { .. } => "MISMATCH",
+            Self::Constraint { .. } => "CONSTRAINT",
+            Self::UnexpectedUnit { .. } => "UNEXPECTED_UNIT",
+            Self::Undefined { .. } => "UNDEFINED",
+            Self::Digest { .. } => "DIGEST",
+            Self::OverLimit { .. } => "OVER_LIMIT",
+        }
+    }
+}
+
+impl Error {
+    /// An error at an absolute byte offset.
+    pub const fn new(at: u64, clause: &'static str, kind: ErrorKind) -> Self {
+        Self { at, clause, kind }
+    }
+
+    /// The class a caller acts on.
+    pub const fn class(&self) -> Class {
+        self.kind.class()
+    }
+}

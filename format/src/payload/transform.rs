@@ -1,0 +1,108 @@
+//! 5.7 transform: header, mean, basis.
+
+use super::{element, whole};
+use crate::syntax::{SequenceParameters, TransformHeader, after, encode};
+use crate::{Error, ErrorKind, Result};
+use nom::multi::count;
+use nom::number::complete::{le_i16, le_i32};
+
+/// The largest magnitude of a mean, in units of step/64.
+const MAX_MEAN: i32 = 1 << 30;
+/// 1.0 in Q12, the largest magnitude of a basis weight.
+const MAX_BASIS: i16 = 1 << 12;
+
+/// A linear transform from `rank` coded components to `dimension` output integers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Transform {
+    /// The fixed part.
+    pub header: TransformHeader,
+    /// The output for components 0, in units of step/64; `dimension` places.
+    pub mean: Vec<i32>,
+    /// Q12; place `k * dimension + j` is the weight of component k in output j.
+    pub basis: Vec<i16>,
+}
+
+impl Transform {
+    /// Reads and checks a payload that stands at offset `at`.
+    pub fn parse(payload: &[u8], at: u64, sequence: &SequenceParameters) -> Result<Self> {
+        let (header, rest) = TransformHeader::parse(payload, at, sequence)?;
+        Self::parse_behind(header, rest, at)
+    }
+
+    /// Reads and checks `rest`, the bytes behind a header that has been accepted. `at` is the offset of the
+    /// payload, that is of the header.
+    pub fn parse_behind(header: TransformHeader, rest: &[u8], at: u64) -> Result<Self> {
+        let table = &TransformHeader::TABLE;
+        // At most 45 and 45 * 45.
+        let (means, weights) = Self::places(&header);
+        let sections = (
+            element("mean", count(le_i32, means)),
+            element("basis", count(le_i16, weights)),
+        );
+        let (mean, basis) = whole(table, rest, after(at, TransformHeader::SIZE), sections)?;
+        let transform = Self { header, mean, basis };
+        transform.validate_values(at)?;
+        Ok(transform)
+    }
+
+    /// The bytes of the payload; refused where [`Self::parse`] would refuse them. Offsets of errors count from
+    /// the start of the payload.
+    pub fn to_bytes(&self, sequence: &SequenceParameters) -> Result<Vec<u8>> {
+        self.header.validate(0, sequence)?;
+        self.validate_values(0)?;
+        let mut bytes = encode(&TransformHeader::TABLE, &self.header)?;
+        bytes.extend(self.mean.iter().flat_map(|value| value.to_le_bytes()));
+        bytes.extend(self.basis.iter().flat_map(|value| value.to_le_bytes()));
+        Ok(bytes)
+    }
+
+    /// The weights of each component in turn, `dimension` of them.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &[i16]> {
+        self.basis.chunks_exact(usize::from(self.header.dimension).max(1))
+    }
+
+    /// Places of the mean and of the basis.
+    fn places(header: &TransformHeader) -> (usize, usize) {
+        let dimension = usize::from(header.dimension);
+        (dimension, dimension.saturating_mul(header.rank.into()))
+    }
+
+    /// 6.7, the ranges of `mean` and `basis`.
+    fn validate_values(&self, at: u64) -> Result<()> {
+        let refuse = |at, kind| Err(Error::new(at, TransformHeader::TABLE.semantics, kind));
+        let (means, weights) = Self::places(&self.header);
+        if (self.mean.len(), self.basis.len()) != (means, weights) {
+            // Only a transform made by hand: the parser counts.
+            return refuse(
+                at,
+                ErrorKind::Constraint {
+                    rule: "mean and basis have the places of the header",
+                },
+            );
+        }
+        let mut at = after(at, TransformHeader::SIZE);
+        for &mean in &self.mean {
+            if !(-MAX_MEAN..=MAX_MEAN).contains(&mean) {
+                return refuse(at, out_of_range("mean", mean.into(), MAX_MEAN.into()));
+            }
+            at = after(at, size_of::<i32>());
+        }
+        for &weight in &self.basis {
+            if !(-MAX_BASIS..=MAX_BASIS).contains(&weight) {
+                return refuse(at, out_of_range("basis", weight.into(), MAX_BASIS.into()));
+            }
+            at = after(at, size_of::<i16>());
+        }
+        Ok(())
+    }
+}
+
+/// Outside `-max..=max`.
+const fn out_of_range(element: &'static str, value: i64, max: i64) -> ErrorKind {
+    ErrorKind::OutOfRange {
+        element,
+        value,
+        min: max.saturating_neg(),
+        max,
+    }
+}

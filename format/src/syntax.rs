@@ -1,0 +1,369 @@
+//! Clause 5: the fixed records, each written once.
+//!
+//! A record is declared with `table!`, which yields the struct, both directions (deku) and the rows that the
+//! inspector prints and that a test compares with the tables of `spec/05-syntax.md`. A record that is refused
+//! when read is refused when written: both sides call the record's `validate`, clause 6.
+
+use crate::{Error, ErrorKind, Result};
+use deku::{DekuContainerRead, DekuContainerWrite};
+
+mod codebook;
+mod end;
+mod file_header;
+mod frame_header;
+mod gop_header;
+mod index;
+mod refinement;
+mod sequence_parameters;
+mod transform;
+mod unit_header;
+
+pub use codebook::CodebookHeader;
+pub use end::EndOfStream;
+pub use file_header::{FileHeader, SIGNATURE};
+pub use frame_header::{FrameHeader, NO_TRANSFORM};
+pub use gop_header::GopHeader;
+pub use index::{IndexEntry, IndexHeader};
+pub use refinement::{NO_CODEBOOK, RefinementHeader, ShMode};
+pub use sequence_parameters::{MAX_REFINEMENTS, SequenceParameters};
+pub use transform::{TransformHeader, TransformKind};
+pub use unit_header::{UnitHeader, UnitId, UnitType};
+
+/// Largest identifier of a transform or a codebook.
+pub const MAX_ID: u8 = 15;
+
+/// One row of a syntax table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row {
+    /// The syntax element, as the specification spells it.
+    pub name: &'static str,
+    /// Its type as the specification spells it: `u8`, `u32`, `f32[3]`.
+    pub type_name: &'static str,
+    /// Bytes of the element, all places of an array together.
+    pub bytes: usize,
+    /// Places of an array; 1 for a single number.
+    pub places: usize,
+    /// What it is, in a line.
+    pub meaning: &'static str,
+    /// The clause of its syntax table.
+    pub clause: &'static str,
+}
+
+/// A syntax table: the fixed rows of one record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Table {
+    /// The record, as the specification spells it.
+    pub name: &'static str,
+    /// Clause of the syntax; cited when the bytes do not parse.
+    pub syntax: &'static str,
+    /// Clause of the semantics; cited when a constraint is broken.
+    pub semantics: &'static str,
+    /// The elements in order.
+    pub rows: &'static [Row],
+}
+
+/// Every fixed record, in the order of clause 5.
+pub const TABLES: [Table; 11] = [
+    FileHeader::TABLE,
+    UnitHeader::TABLE,
+    SequenceParameters::TABLE,
+    GopHeader::TABLE,
+    FrameHeader::TABLE,
+    TransformHeader::TABLE,
+    CodebookHeader::TABLE,
+    RefinementHeader::TABLE,
+    IndexHeader::TABLE,
+    IndexEntry::TABLE,
+    EndOfStream::TABLE,
+];
+
+/// Declares a record as its specification table: clauses, names, types, meaning.
+///
+/// `f32` elements are held as their bit pattern (`u32`): this crate does no floating-point arithmetic, and
+/// the pattern is what is written back.
+macro_rules! table {
+    (
+        $(#[doc = $doc:literal])+
+        $syntax:literal $semantics:literal $name:ident $Record:ident {
+            $( #[doc = $meaning:literal] $field:ident : $ty:ident $([$places:literal])?, )+
+        }
+    ) => {
+        $(#[doc = $doc])+
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, deku::DekuRead, deku::DekuWrite)]
+        #[deku(endian = "little")]
+        pub struct $Record {
+            $( #[doc = $meaning] pub $field: $crate::syntax::table!(@type $ty $($places)?), )+
+        }
+
+        impl $Record {
+            /// The rows of the syntax table.
+            pub const ROWS: &'static [$crate::syntax::Row] = &[ $( $crate::syntax::Row {
+                name: stringify!($field),
+                type_name: concat!(stringify!($ty) $(, "[", $places, "]")?),
+                bytes: size_of::<$crate::syntax::table!(@type $ty $($places)?)>(),
+                places: $crate::syntax::table!(@places $($places)?),
+                meaning: $meaning.trim_ascii(),
+                clause: $syntax,
+            }, )+ ];
+
+            /// Bytes of the record.
+            pub const SIZE: usize = 0 $( + size_of::<$crate::syntax::table!(@type $ty $($places)?)>() )+;
+
+            /// The syntax table.
+            pub const TABLE: $crate::syntax::Table = $crate::syntax::Table {
+                name: stringify!($name),
+                syntax: $syntax,
+                semantics: $semantics,
+                rows: Self::ROWS,
+            };
+        }
+    };
+    (@type f32) => { u32 };
+    (@type f32 $places:literal) => { [u32; $places] };
+    (@type $ty:ident) => { $ty };
+    (@type $ty:ident $places:literal) => { [$ty; $places] };
+    (@places) => { 1 };
+    (@places $places:literal) => { $places };
+}
+pub(crate) use table;
+
+/// Declares `parse` and `to_bytes` of a record whose `validate` needs nothing but the record.
+macro_rules! record_io {
+    ($Record:ident) => {
+        impl $Record {
+            /// Reads and checks the record at the start of `bytes`, which stand at offset `at` of the
+            /// stream; gives the bytes after it.
+            pub fn parse(bytes: &[u8], at: u64) -> $crate::Result<(Self, &[u8])> {
+                let (record, rest): (Self, _) = $crate::syntax::decode(&Self::TABLE, bytes, at)?;
+                record.validate(at)?;
+                Ok((record, rest))
+            }
+
+            /// Reads and checks a payload that is this record and nothing more.
+            pub fn parse_payload(payload: &[u8], at: u64) -> $crate::Result<Self> {
+                let (record, rest) = Self::parse(payload, at)?;
+                $crate::syntax::nothing_after(&Self::TABLE, rest, $crate::syntax::after(at, Self::SIZE))?;
+                Ok(record)
+            }
+
+            /// The bytes of the record; refused where [`Self::parse`] would refuse them. Offsets of errors
+            /// count from the start of the record.
+            pub fn to_bytes(&self) -> $crate::Result<Vec<u8>> {
+                self.validate(0)?;
+                $crate::syntax::encode(&Self::TABLE, self)
+            }
+        }
+    };
+}
+pub(crate) use record_io;
+
+/// The bytes of a record without any check of its values, and the bytes after it.
+pub(crate) fn decode<'a, T: DekuContainerRead<'a>>(
+    table: &Table,
+    bytes: &'a [u8],
+    at: u64,
+) -> Result<(T, &'a [u8])> {
+    let cut = || table.cut(bytes.len(), at);
+    let (raw, rest) = bytes.split_at_checked(table.size()).ok_or_else(cut)?;
+    let (_, record) = T::from_bytes((raw, 0)).map_err(|_| cut())?;
+    Ok((record, rest))
+}
+
+/// The bytes of a record without any check of its values.
+pub(crate) fn encode<T: DekuContainerWrite>(table: &Table, record: &T) -> Result<Vec<u8>> {
+    // Records have no conditions, so deku has nothing to refuse; the error only keeps this total.
+    record
+        .to_bytes()
+        .map_err(|_| Error::new(0, table.syntax, ErrorKind::ShortSection { element: table.name }))
+}
+
+/// 6.1: a payload ends with its last element.
+pub(crate) fn nothing_after(table: &Table, rest: &[u8], at: u64) -> Result<()> {
+    if rest.is_empty() {
+        return Ok(());
+    }
+    let kind = ErrorKind::TrailingBytes {
+        element: table.name,
+        bytes: after(0, rest.len()),
+    };
+    Err(Error::new(at, table.syntax, kind))
+}
+
+/// The offset `bytes` after `at`. Saturates: no stream is near 2^64 bytes.
+pub(crate) fn after(at: u64, bytes: usize) -> u64 {
+    at.saturating_add(u64::try_from(bytes).unwrap_or(u64::MAX))
+}
+
+impl Table {
+    /// Bytes of the record.
+    pub fn size(&self) -> usize {
+        self.rows.iter().map(|row| row.bytes).sum()
+    }
+
+    /// Bytes before an element of the record.
+    pub fn offset(&self, element: &str) -> usize {
+        self.rows
+            .iter()
+            .take_while(|row| row.name != element)
+            .map(|row| row.bytes)
+            .sum()
+    }
+
+    /// The checks of one record at a place in the stream.
+    pub(crate) const fn check(&'static self, at: u64) -> Check {
+        Check { table: self, at }
+    }
+
+    /// The error of a record of which only `present` bytes are there.
+    fn cut(&self, present: usize, at: u64) -> Error {
+        let mut start: usize = 0;
+        for row in self.rows {
+            let end = start.saturating_add(row.bytes);
+            if end > present {
+                return Error::new(
+                    after(at, start),
+                    self.syntax,
+                    ErrorKind::ShortSection { element: row.name },
+                );
+            }
+            start = end;
+        }
+        Error::new(at, self.syntax, ErrorKind::ShortSection { element: self.name })
+    }
+}
+
+/// The checks of clause 6 on one record: each names an element and finds its offset in the rows.
+#[derive(Clone, Copy)]
+pub(crate) struct Check {
+    table: &'static Table,
+    at: u64,
+}
+
+impl Check {
+    /// `value` shall be within `min..=max`.
+    pub(crate) fn range(
+        self,
+        element: &'static str,
+        value: impl Into<i64>,
+        min: impl Into<i64>,
+        max: impl Into<i64>,
+    ) -> Result<()> {
+        self.range_in(element, 0, value, min, max)
+    }
+
+    /// The place `place` of an array shall be within `min..=max`.
+    pub(crate) fn range_in(
+        self,
+        element: &'static str,
+        place: usize,
+        value: impl Into<i64>,
+        min: impl Into<i64>,
+        max: impl Into<i64>,
+    ) -> Result<()> {
+        let (value, min, max) = (value.into(), min.into(), max.into());
+        let kind = ErrorKind::OutOfRange {
+            element,
+            value,
+            min,
+            max,
+        };
+        self.holds((min..=max).contains(&value), element, place, kind)
+    }
+
+    /// `value` shall be zero in this version.
+    pub(crate) fn reserved_bits(
+        self,
+        element: &'static str,
+        place: usize,
+        value: impl Into<u64>,
+    ) -> Result<()> {
+        let value = value.into();
+        let kind = ErrorKind::ReservedBits { element, value };
+        self.holds(value == 0, element, place, kind)
+    }
+
+    /// `value` is kept for a later version unless `known`.
+    pub(crate) fn known(self, known: bool, element: &'static str, value: u8) -> Result<()> {
+        self.holds(
+            known,
+            element,
+            0,
+            ErrorKind::Reserved {
+                element,
+                value: value.into(),
+            },
+        )
+    }
+
+    /// `value` shall be what the elements before it imply.
+    pub(crate) fn equal(self, element: &'static str, value: u64, expected: u64) -> Result<()> {
+        self.holds(
+            value == expected,
+            element,
+            0,
+            ErrorKind::Mismatch {
+                element,
+                value,
+                expected,
+            },
+        )
+    }
+
+    /// A rule without a single number.
+    pub(crate) fn rule(
+        self,
+        holds: bool,
+        element: &'static str,
+        place: usize,
+        rule: &'static str,
+    ) -> Result<()> {
+        self.holds(holds, element, place, ErrorKind::Constraint { rule })
+    }
+
+    /// The check sum `stored` in the record shall be that of the bytes it covers.
+    pub(crate) fn check_sum(self, element: &'static str, stored: u32, computed: u32) -> Result<()> {
+        // Fuzzing must reach what lies behind the check sums.
+        if stored == computed || cfg!(fuzzing) {
+            return Ok(());
+        }
+        let kind = ErrorKind::CheckSum {
+            element,
+            stored,
+            computed,
+        };
+        Err(Error::new(self.offset(element, 0), self.table.syntax, kind))
+    }
+
+    /// Malformed, unless `holds`: cites the clause of the syntax.
+    pub(crate) fn well_formed(self, holds: bool, element: &'static str, kind: ErrorKind) -> Result<()> {
+        if holds {
+            Ok(())
+        } else {
+            Err(Error::new(self.offset(element, 0), self.table.syntax, kind))
+        }
+    }
+
+    fn holds(self, holds: bool, element: &'static str, place: usize, kind: ErrorKind) -> Result<()> {
+        if holds {
+            Ok(())
+        } else {
+            Err(Error::new(
+                self.offset(element, place),
+                self.table.semantics,
+                kind,
+            ))
+        }
+    }
+
+    /// Absolute offset of a place of an element.
+    pub(crate) fn offset(self, element: &str, place: usize) -> u64 {
+        let row = self.table.rows.iter().find(|row| row.name == element);
+        let one = row.and_then(|row| row.bytes.checked_div(row.places)).unwrap_or(0);
+        after(
+            self.at,
+            self.table
+                .offset(element)
+                .saturating_add(one.saturating_mul(place)),
+        )
+    }
+}

@@ -1,0 +1,100 @@
+//! 5.2 file_header: the first bytes of a stream.
+
+use super::{decode, encode, table};
+use crate::{ErrorKind, Result};
+
+/// The first eight bytes: line ends and the eighth bit show a transfer that took the file for text.
+pub const SIGNATURE: [u8; 8] = [0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A];
+
+/// The version that this crate writes.
+const VERSION: (u8, u8) = (1, 0);
+/// The profile of version 1.0.
+const PROFILE_INTRA: u8 = 0;
+/// Levels of annex A.
+const LEVELS: core::ops::RangeInclusive<u8> = 1..=4;
+/// `header_crc` itself, which it does not cover.
+const CRC_SIZE: usize = 4;
+
+table! {
+    /// 5.2 — signature, version, profile and level.
+    "5.2" "6.2" file_header FileHeader {
+        /// the eight bytes 89 47 53 53 0D 0A 1A 0A
+        signature: u8[8],
+        /// 1; another major version cannot be read
+        version_major: u8,
+        /// 0; a greater minor version adds only units that can be skipped
+        version_minor: u8,
+        /// 0 is Intra
+        profile: u8,
+        /// 1 to 4, annex A
+        level: u8,
+        /// CRC-32 of the 12 bytes before
+        header_crc: u32,
+    }
+}
+
+impl FileHeader {
+    /// The header of a stream of this version, profile Intra.
+    pub fn new(level: u8) -> Result<Self> {
+        let (version_major, version_minor) = VERSION;
+        let header = Self {
+            signature: SIGNATURE,
+            version_major,
+            version_minor,
+            profile: PROFILE_INTRA,
+            level,
+            header_crc: 0,
+        };
+        let header = Self {
+            header_crc: header.covered_crc()?,
+            ..header
+        };
+        header.validate(0)?;
+        Ok(header)
+    }
+
+    /// Reads and checks the header of a stream that starts with `bytes`; gives the bytes after it.
+    pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8])> {
+        // First of all, and on as many bytes as there are: another file format is not a truncated stream.
+        Self::TABLE.check(0).well_formed(
+            bytes
+                .iter()
+                .zip(SIGNATURE)
+                .all(|(found, expected)| *found == expected),
+            "signature",
+            ErrorKind::Signature,
+        )?;
+        let (header, rest): (Self, _) =
+            decode(&Self::TABLE, bytes, 0).map_err(crate::unit::cut_is_truncated)?;
+        header.validate(0)?;
+        Ok((header, rest))
+    }
+
+    /// The bytes of the header; refused where [`Self::parse`] would refuse them.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        self.validate(0)?;
+        encode(&Self::TABLE, self)
+    }
+
+    /// 6.2: signature, check sum, version, profile, level, in this order.
+    pub fn validate(&self, at: u64) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        check.well_formed(self.signature == SIGNATURE, "signature", ErrorKind::Signature)?;
+        check.check_sum("header_crc", self.header_crc, self.covered_crc()?)?;
+        check.known(
+            self.version_major == VERSION.0,
+            "version_major",
+            self.version_major,
+        )?;
+        check.known(self.profile == PROFILE_INTRA, "profile", self.profile)?;
+        check.known(LEVELS.contains(&self.level), "level", self.level)
+    }
+
+    /// What `header_crc` shall be.
+    fn covered_crc(&self) -> Result<u32> {
+        let bytes = encode(&Self::TABLE, self)?;
+        Ok(bytes
+            .split_last_chunk::<CRC_SIZE>()
+            .map_or(0, |(covered, _)| crc32fast::hash(covered)))
+    }
+}

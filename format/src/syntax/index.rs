@@ -1,0 +1,44 @@
+//! 5.10 index: where the groups of pictures start. For seeking; a decoder needs it not.
+
+use super::{record_io, table};
+use crate::Result;
+
+table! {
+    /// 5.10 — the fixed part of an index; the entries follow.
+    "5.10" "6.10" index IndexHeader {
+        /// entries, one for each group
+        entry_count: u32,
+    }
+}
+
+record_io!(IndexHeader);
+
+table! {
+    /// 5.10.1 — one entry of the index.
+    "5.10.1" "6.10" index_entry IndexEntry {
+        /// display index of the first frame of the group
+        frame: u32,
+        /// zero
+        reserved_zero: u32,
+        /// offset in the stream of the group's header unit
+        offset: u64,
+    }
+}
+
+record_io!(IndexEntry);
+
+impl IndexHeader {
+    /// 6.10: any number of entries.
+    pub fn validate(&self, _at: u64) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl IndexEntry {
+    /// 6.10.
+    pub fn validate(&self, at: u64) -> Result<()> {
+        Self::TABLE
+            .check(at)
+            .reserved_bits("reserved_zero", 0, self.reserved_zero)
+    }
+}

@@ -1,0 +1,234 @@
+//! 5.4 sequence_parameters: what holds for every frame of a stream.
+
+use super::{record_io, table};
+use crate::Result;
+
+/// The most refinements of a frame.
+pub const MAX_REFINEMENTS: u8 = 10;
+
+/// Bits of `sequence_flags`.
+const CANONICAL_AXES: u8 = 1;
+const ANTIALIASED: u8 = 2;
+
+/// 2^-40, the smallest step.
+const MIN_STEP: f32 = f32::from_bits((127 - 40) << 23);
+/// 2^20, the largest step.
+const MAX_STEP: f32 = f32::from_bits((127 + 20) << 23);
+/// 2^40, the largest magnitude of an offset.
+const MAX_OFFSET: f32 = f32::from_bits((127 + 40) << 23);
+/// -2^40.
+const MIN_OFFSET: f32 = f32::from_bits(1 << 31 | (127 + 40) << 23);
+
+table! {
+    /// 5.4 — layers, refinements, and the lattices of the attributes.
+    "5.4" "6.4" sequence_parameters SequenceParameters {
+        /// degree of the spherical harmonics, 0 to 3
+        sh_degree: u8,
+        /// 1 in profile Intra
+        spatial_layer_count: u8,
+        /// 1 in profile Intra
+        temporal_layer_count: u8,
+        /// refinements of a frame, 1 to 10
+        refinement_count: u8,
+        /// share of the Gaussians up to each refinement, percent; increasing to 100, then 0
+        refinement_percent: u8[10],
+        /// bits of a position on one axis, 1 to 20
+        position_bits: u8,
+        /// log2 of the Gaussians in an entropy block, 6 to 16
+        block_log2: u8,
+        /// bit 0 canonical_axes, bit 1 antialiased; the others are zero
+        sequence_flags: u8,
+        /// anisotropy from which the rotation is finer, not increasing; 0 disables
+        rotation_threshold: u8[3],
+        /// frames in the stream; 0 is not known in advance
+        frame_count: u32,
+        /// ticks in a second, 1 or more
+        ticks_per_second: u32,
+        /// ticks from a frame to the next
+        ticks_per_frame: u32,
+        /// position of lattice point 0, scene units
+        position_offset: f32[3],
+        /// distance of lattice points, scene units
+        position_step: f32,
+        /// natural log of the semi-axis at 0
+        log_scale_offset: f32,
+        /// step of the natural log of the semi-axes
+        log_scale_step: f32,
+        /// step of the quaternion components, at most 1
+        rotation_step: f32,
+        /// opacity before the sigmoid at 0
+        opacity_offset: f32,
+        /// step of the opacity before the sigmoid
+        opacity_step: f32,
+        /// step of the components of the degree 0 colour
+        dc_step: f32,
+        /// step of the components of the higher degrees
+        sh_step: f32,
+    }
+}
+
+record_io!(SequenceParameters);
+
+impl SequenceParameters {
+    /// 6.4.
+    pub fn validate(&self, at: u64) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        check.range("sh_degree", self.sh_degree, 0, 3)?;
+        check.range("spatial_layer_count", self.spatial_layer_count, 1, 1)?;
+        check.range("temporal_layer_count", self.temporal_layer_count, 1, 1)?;
+        check.range("refinement_count", self.refinement_count, 1, MAX_REFINEMENTS)?;
+        self.validate_percents(at)?;
+        check.range("position_bits", self.position_bits, 1, 20)?;
+        check.range("block_log2", self.block_log2, 6, 16)?;
+        check.reserved_bits(
+            "sequence_flags",
+            0,
+            self.sequence_flags & !(CANONICAL_AXES | ANTIALIASED),
+        )?;
+        let thresholds = self.rotation_threshold;
+        for (place, (before, this)) in (1..).zip(thresholds.iter().zip(thresholds.iter().skip(1))) {
+            check.range_in("rotation_threshold", place, *this, 0, *before)?;
+        }
+        check.range("ticks_per_second", self.ticks_per_second, 1, u32::MAX)?;
+        self.validate_lattices(at)
+    }
+
+    /// Bit 0 of `sequence_flags`: axes are sorted by falling scale.
+    pub const fn canonical_axes(&self) -> bool {
+        self.sequence_flags & CANONICAL_AXES != 0
+    }
+
+    /// Bit 1 of `sequence_flags`: opacities were fitted for an antialiasing renderer.
+    pub const fn antialiased(&self) -> bool {
+        self.sequence_flags & ANTIALIASED != 0
+    }
+
+    /// `sequence_flags` of these two properties.
+    pub const fn flags(canonical_axes: bool, antialiased: bool) -> u8 {
+        (if canonical_axes { CANONICAL_AXES } else { 0 }) | (if antialiased { ANTIALIASED } else { 0 })
+    }
+
+    /// Spherical-harmonics planes of a frame: 0, 9, 24 or 45.
+    pub const fn sh_dimension(&self) -> u8 {
+        match self.sh_degree {
+            0 => 0,
+            1 => 9,
+            2 => 24,
+            _ => 45,
+        }
+    }
+
+    /// P(r): how many of a frame's `gaussian_count` Gaussians are there after refinement `refinement`.
+    /// Beyond the last refinement, all.
+    pub fn prefix_length(&self, refinement: u8, gaussian_count: u32) -> u32 {
+        let percent = match self.refinement_percent.get(usize::from(refinement)) {
+            Some(percent) if refinement < self.refinement_count => u64::from(*percent),
+            _ => 100,
+        };
+        // At most 255 * 2^32: no overflow; at most `gaussian_count` for percentages that `validate` accepts.
+        let prefix = percent.saturating_mul(gaussian_count.into()).div_ceil(100);
+        u32::try_from(prefix).unwrap_or(u32::MAX)
+    }
+
+    /// P(r) - P(r-1): how many Gaussians refinement `refinement` adds to a frame of `gaussian_count`.
+    pub fn refinement_length(&self, refinement: u8, gaussian_count: u32) -> u32 {
+        let before = refinement
+            .checked_sub(1)
+            .map_or(0, |before| self.prefix_length(before, gaussian_count));
+        self.prefix_length(refinement, gaussian_count)
+            .saturating_sub(before)
+    }
+
+    /// Strictly increasing to 100 over the refinements in use, then zero.
+    fn validate_percents(&self, at: u64) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        let element = "refinement_percent";
+        let used = usize::from(self.refinement_count);
+        let mut min = 1_u8;
+        for (place, percent) in self.refinement_percent.into_iter().enumerate() {
+            if place >= used {
+                check.range_in(element, place, percent, 0, 0)?;
+            } else if place.saturating_add(1) == used {
+                check.range_in(element, place, percent, 100, 100)?;
+            } else {
+                // 99: the last one in use is 100 and greater than this one.
+                check.range_in(element, place, percent, min, 99)?;
+                min = percent.saturating_add(1);
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_lattices(&self, at: u64) -> Result<()> {
+        const OFFSET: &str = "an offset is finite and between -2^40 and 2^40";
+        const STEP: &str = "a step is between 2^-40 and 2^20";
+        const ROTATION_STEP: &str = "the rotation step is between 2^-40 and 1";
+        let check = Self::TABLE.check(at);
+        // A NaN is in no range.
+        let offset = |element, place, value: f32| {
+            check.rule((MIN_OFFSET..=MAX_OFFSET).contains(&value), element, place, OFFSET)
+        };
+        let step = |element, value: f32| check.rule((MIN_STEP..=MAX_STEP).contains(&value), element, 0, STEP);
+        for (place, value) in self.position_offset().into_iter().enumerate() {
+            offset("position_offset", place, value)?;
+        }
+        step("position_step", self.position_step())?;
+        offset("log_scale_offset", 0, self.log_scale_offset())?;
+        step("log_scale_step", self.log_scale_step())?;
+        check.rule(
+            (MIN_STEP..=1.0).contains(&self.rotation_step()),
+            "rotation_step",
+            0,
+            ROTATION_STEP,
+        )?;
+        offset("opacity_offset", 0, self.opacity_offset())?;
+        step("opacity_step", self.opacity_step())?;
+        step("dc_step", self.dc_step())?;
+        step("sh_step", self.sh_step())
+    }
+
+    /// The position of lattice point 0, scene units.
+    pub fn position_offset(&self) -> [f32; 3] {
+        self.position_offset.map(f32::from_bits)
+    }
+
+    /// The distance of lattice points, scene units.
+    pub const fn position_step(&self) -> f32 {
+        f32::from_bits(self.position_step)
+    }
+
+    /// The natural log of the semi-axis at 0.
+    pub const fn log_scale_offset(&self) -> f32 {
+        f32::from_bits(self.log_scale_offset)
+    }
+
+    /// The step of the natural log of the semi-axes.
+    pub const fn log_scale_step(&self) -> f32 {
+        f32::from_bits(self.log_scale_step)
+    }
+
+    /// The step of the quaternion components.
+    pub const fn rotation_step(&self) -> f32 {
+        f32::from_bits(self.rotation_step)
+    }
+
+    /// Opacity before the sigmoid at 0.
+    pub const fn opacity_offset(&self) -> f32 {
+        f32::from_bits(self.opacity_offset)
+    }
+
+    /// The step of the opacity before the sigmoid.
+    pub const fn opacity_step(&self) -> f32 {
+        f32::from_bits(self.opacity_step)
+    }
+
+    /// The step of the components of the degree 0 colour.
+    pub const fn dc_step(&self) -> f32 {
+        f32::from_bits(self.dc_step)
+    }
+
+    /// The step of the components of the higher degrees.
+    pub const fn sh_step(&self) -> f32 {
+        f32::from_bits(self.sh_step)
+    }
+}

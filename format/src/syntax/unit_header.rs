@@ -1,0 +1,313 @@
+//! 5.3 unit_header: what a unit is, how long, and whether it arrived whole.
+
+use super::{decode, encode, table};
+use crate::{Error, ErrorKind, Limits, Result};
+
+/// Bit 0 of `unit_flags`: a decoder that does not know the unit cannot go on without it.
+const CRITICAL: u8 = 1;
+
+table! {
+    /// 5.3 — the header of a unit.
+    "5.3" "6.3" unit_header UnitHeader {
+        /// what the payload is
+        unit_type: u8,
+        /// bit 0 critical; the others are zero
+        unit_flags: u8,
+        /// 0 is the base layer
+        spatial_layer: u8,
+        /// 0 is the base layer
+        temporal_layer: u8,
+        /// 0 is the smallest prefix of the frame
+        refinement: u8,
+        /// zero
+        reserved_zero: u8,
+        /// low 16 bits of the CRC-32 of the other 18 bytes
+        header_check: u16,
+        /// display index of the frame, or of the first frame of the group
+        frame: u32,
+        /// bytes after this header
+        payload_length: u32,
+        /// CRC-32 of the payload
+        payload_crc: u32,
+    }
+}
+
+/// The kind of a unit (Table of 6.3). A code becomes this type where it is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum UnitType {
+    /// 1: what holds for the whole sequence.
+    SequenceParameters,
+    /// 2: starts a group of pictures; forgets transforms and codebooks.
+    GopHeader,
+    /// 3: starts a frame.
+    FrameHeader,
+    /// 4: a linear transform of colour components.
+    Transform,
+    /// 5: entries of vector-quantised colour.
+    Codebook,
+    /// 6: the Gaussians that one refinement adds.
+    Refinement,
+    /// 7: where the groups start.
+    Index,
+    /// 8: the last unit.
+    End,
+    /// 0 (forbidden) and 9 to 127: later versions.
+    Reserved(u8),
+    /// 128 to 255: private data.
+    User(u8),
+}
+
+impl UnitType {
+    /// The type with a code.
+    pub const fn from_code(code: u8) -> Self {
+        match code {
+            1 => Self::SequenceParameters,
+            2 => Self::GopHeader,
+            3 => Self::FrameHeader,
+            4 => Self::Transform,
+            5 => Self::Codebook,
+            6 => Self::Refinement,
+            7 => Self::Index,
+            8 => Self::End,
+            128.. => Self::User(code),
+            0 | 9..=127 => Self::Reserved(code),
+        }
+    }
+
+    /// The code of the type.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::SequenceParameters => 1,
+            Self::GopHeader => 2,
+            Self::FrameHeader => 3,
+            Self::Transform => 4,
+            Self::Codebook => 5,
+            Self::Refinement => 6,
+            Self::Index => 7,
+            Self::End => 8,
+            Self::Reserved(code) | Self::User(code) => code,
+        }
+    }
+
+    /// The name used in reports and in errors.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SequenceParameters => "sequence_parameters",
+            Self::GopHeader => "gop_header",
+            Self::FrameHeader => "frame_header",
+            Self::Transform => "transform",
+            Self::Codebook => "codebook",
+            Self::Refinement => "refinement",
+            Self::Index => "index",
+            Self::End => "end",
+            Self::Reserved(0) => "forbidden",
+            Self::Reserved(_) => "reserved",
+            Self::User(_) => "user",
+        }
+    }
+
+    /// Whether this version of the text defines the payload.
+    pub const fn is_known(self) -> bool {
+        !matches!(self, Self::Reserved(_) | Self::User(_))
+    }
+
+    /// Whether a writer marks the unit critical.
+    pub const fn is_critical(self) -> bool {
+        self.is_known() && !matches!(self, Self::Index)
+    }
+
+    /// Whether the unit belongs to one group, so that `frame` has a meaning.
+    const fn has_frame(self) -> bool {
+        !matches!(self, Self::SequenceParameters | Self::Index | Self::End)
+    }
+}
+
+/// A unit's kind and its place on the axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct UnitId {
+    /// The kind of unit.
+    pub unit_type: UnitType,
+    /// 0 is the base layer.
+    pub spatial_layer: u8,
+    /// 0 is the base layer.
+    pub temporal_layer: u8,
+    /// 0 is the smallest prefix of the frame.
+    pub refinement: u8,
+    /// Display index of the frame, or of the first frame of the group; 0 for units of the whole stream.
+    pub frame: u32,
+}
+
+impl UnitId {
+    /// A unit of the whole stream: all axes 0.
+    pub const fn stream(unit_type: UnitType) -> Self {
+        Self {
+            unit_type,
+            spatial_layer: 0,
+            temporal_layer: 0,
+            refinement: 0,
+            frame: 0,
+        }
+    }
+
+    /// A unit of a frame, or of the group that starts with the frame.
+    pub const fn of_frame(unit_type: UnitType, frame: u32) -> Self {
+        Self {
+            frame,
+            ..Self::stream(unit_type)
+        }
+    }
+
+    /// A refinement unit.
+    pub const fn of_refinement(frame: u32, refinement: u8) -> Self {
+        Self {
+            refinement,
+            ..Self::of_frame(UnitType::Refinement, frame)
+        }
+    }
+}
+
+impl UnitHeader {
+    /// The header of a unit with this payload.
+    pub fn new(id: UnitId, payload: &[u8]) -> Result<Self> {
+        let header = Self {
+            unit_type: id.unit_type.code(),
+            unit_flags: if id.unit_type.is_critical() { CRITICAL } else { 0 },
+            spatial_layer: id.spatial_layer,
+            temporal_layer: id.temporal_layer,
+            refinement: id.refinement,
+            reserved_zero: 0,
+            header_check: 0,
+            frame: id.frame,
+            payload_length: payload_length(payload)?,
+            payload_crc: crc32fast::hash(payload),
+        };
+        let header = Self {
+            header_check: header.covered_check()?,
+            ..header
+        };
+        // A `Reserved(3)` made by hand would come back as a frame header.
+        Self::TABLE.check(0).known(
+            UnitType::from_code(header.unit_type) == id.unit_type,
+            "unit_type",
+            header.unit_type,
+        )?;
+        header.validate(0)?;
+        Ok(header)
+    }
+
+    /// Reads and checks the header at the start of `bytes`; gives the bytes after it.
+    pub fn parse(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
+        let (header, rest): (Self, _) =
+            decode(&Self::TABLE, bytes, at).map_err(crate::unit::cut_is_truncated)?;
+        header.validate(at)?;
+        Ok((header, rest))
+    }
+
+    /// The bytes of the header; refused where [`Self::parse`] would refuse them.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        self.validate(0)?;
+        encode(&Self::TABLE, self)
+    }
+
+    /// The kind of unit.
+    pub const fn unit_type(&self) -> UnitType {
+        UnitType::from_code(self.unit_type)
+    }
+
+    /// Whether a decoder that does not know the unit must give up.
+    pub const fn is_critical(&self) -> bool {
+        self.unit_flags & CRITICAL != 0
+    }
+
+    /// The kind of unit and its place on the axes.
+    pub const fn id(&self) -> UnitId {
+        UnitId {
+            unit_type: self.unit_type(),
+            spatial_layer: self.spatial_layer,
+            temporal_layer: self.temporal_layer,
+            refinement: self.refinement,
+            frame: self.frame,
+        }
+    }
+
+    /// 6.3. The check sum comes first: behind a wrong one no element can be trusted.
+    pub fn validate(&self, at: u64) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        check.check_sum(
+            "header_check",
+            self.header_check.into(),
+            self.covered_check()?.into(),
+        )?;
+        check.well_formed(
+            self.unit_type != 0,
+            "unit_type",
+            ErrorKind::Number { element: "unit_type" },
+        )?;
+        check.reserved_bits("unit_flags", 0, self.unit_flags & !CRITICAL)?;
+        check.reserved_bits("reserved_zero", 0, self.reserved_zero)?;
+        let unit_type = self.unit_type();
+        if !unit_type.is_known() {
+            return check.known(!self.is_critical(), "unit_type", self.unit_type);
+        }
+        let refinements = if unit_type == UnitType::Refinement {
+            super::MAX_REFINEMENTS
+        } else {
+            1
+        };
+        check.range("spatial_layer", self.spatial_layer, 0, 0)?;
+        check.range("temporal_layer", self.temporal_layer, 0, 0)?;
+        check.range("refinement", self.refinement, 0, refinements.saturating_sub(1))?;
+        check.range(
+            "frame",
+            self.frame,
+            0,
+            if unit_type.has_frame() { u32::MAX } else { 0 },
+        )
+    }
+
+    /// A.2: the payload is not longer than agreed.
+    pub(crate) fn within(&self, at: u64, limits: &Limits) -> Result<()> {
+        let at = Self::TABLE.check(at).offset("payload_length", 0);
+        Limits::check(
+            at,
+            "max_payload",
+            self.payload_length.into(),
+            limits.max_payload.into(),
+        )
+    }
+
+    /// 6.3: a payload that is read has the check sum of the header; that of an unknown unit is not read.
+    pub(crate) fn check_payload(&self, at: u64, payload: &[u8]) -> Result<()> {
+        if !self.unit_type().is_known() {
+            return Ok(());
+        }
+        Self::TABLE
+            .check(at)
+            .check_sum("payload_crc", self.payload_crc, crc32fast::hash(payload))
+    }
+
+    /// What `header_check` shall be.
+    fn covered_check(&self) -> Result<u16> {
+        let bytes = encode(&Self::TABLE, self)?;
+        let start = Self::TABLE.offset("header_check");
+        let end = start.saturating_add(size_of::<u16>());
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(bytes.get(..start).unwrap_or_default());
+        crc.update(bytes.get(end..).unwrap_or_default());
+        let [low, high, ..] = crc.finalize().to_le_bytes();
+        Ok(u16::from_le_bytes([low, high]))
+    }
+}
+
+/// `payload_length`, where the element has room for it.
+fn payload_length(payload: &[u8]) -> Result<u32> {
+    u32::try_from(payload.len()).map_err(|_| {
+        let (asked, allowed) = (super::after(0, payload.len()), u32::MAX.into());
+        let kind = ErrorKind::OverLimit {
+            limit: "max_payload",
+            asked,
+            allowed,
+        };
+        Error::new(0, UnitHeader::TABLE.semantics, kind)
+    })
+}
