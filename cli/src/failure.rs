@@ -106,3 +106,9 @@ impl From<Error> for StreamFault {
         }
     }
 }
+
+impl fmt::Display for StreamFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "byte {:#x}: {} (clause {})", self.byte, self.message, self.clause)
+    }
+}

@@ -1,62 +1,66 @@
 //! Clauses 7.4 to 7.6: coded values to log-scales, opacity and rotation.
 
+use core::ops::RangeInclusive;
 use splatstream_format::{Error, ErrorKind, Result};
 
+/// The values of log-scales, opacity and rotation before its shift.
+pub const ATTRIBUTE_RANGE: RangeInclusive<i32> = -32_768..=32_767;
+/// The values of rotation after its shift.
+pub const ROTATION_RANGE: RangeInclusive<i32> = -32_767..=32_767;
+
 /// Adds the bias of a plane to its coded values.
-///
-/// # Errors
-/// Invalid if a value leaves -limit..=limit; `at` and `element` go into the error.
-pub fn unbias(coded: &[i32], bias: i32, limit: i32, element: &'static str, at: u64) -> Result<Vec<i32>> {
-    let values: Vec<i32> = coded.iter().map(|&value| value.wrapping_add(bias)).collect();
-    in_range(&values, limit, element, at)?;
-    Ok(values)
+pub fn unbias(coded: &[i32], bias: i32) -> Vec<i32> {
+    coded.iter().map(|&value| value.wrapping_add(bias)).collect()
 }
 
-/// Refuses values outside -limit..=limit.
+/// Refuses values outside a range; `at`, `clause` and `element` go into the error.
 ///
 /// # Errors
 /// Invalid, naming the first such value.
-pub fn in_range(values: &[i32], limit: i32, element: &'static str, at: u64) -> Result<()> {
-    let low = limit.wrapping_neg();
-    let outside = values.iter().fold(false, |any, &value| any | (value < low) | (value > limit));
+pub fn in_range(
+    values: &[i32],
+    range: &RangeInclusive<i32>,
+    element: &'static str,
+    clause: &'static str,
+    at: u64,
+) -> Result<()> {
+    let (low, high) = (*range.start(), *range.end());
+    let outside = values.iter().fold(false, |any, &value| any | (value < low) | (value > high));
     if outside {
-        let value = values.iter().find(|&&value| value < low || value > limit).copied().unwrap_or(0);
-        return Err(Error::new(
-            at,
-            "7.4",
-            ErrorKind::OutOfRange {
-                element,
-                value: i64::from(value),
-                min: i64::from(low),
-                max: i64::from(limit),
-            },
-        ));
+        let value = values.iter().find(|&value| !range.contains(value)).copied().unwrap_or(0);
+        let (value, min, max) = (i64::from(value), i64::from(low), i64::from(high));
+        return Err(Error::new(at, clause, ErrorKind::OutOfRange { element, value, min, max }));
     }
     Ok(())
 }
 
-/// The largest magnitude of a log-scale, opacity or rotation integer.
-pub const ATTRIBUTE_LIMIT: i32 = 32_767;
+/// Clause 7.4. The next log-scale: the one before less the difference.
+pub fn next_log_scale(before: &[i32], differences: &[i32]) -> Vec<i32> {
+    before.iter().zip(differences).map(|(&before, &difference)| before.wrapping_sub(difference)).collect()
+}
 
-/// Clause 7.4. The next smaller log-scale: the one before less the difference.
+/// Clause 7.4. Checks the three log-scales of a block.
 ///
 /// # Errors
-/// Invalid if a difference is negative while the axes are canonical, or a log-scale out of range.
-pub fn smaller(larger: &[i32], differences: &[i32], canonical: bool, at: u64) -> Result<Vec<i32>> {
-    if canonical && differences.iter().any(|&difference| difference < 0) {
+/// Invalid if one is out of range, or the axes are canonical and not sorted from the largest.
+pub fn check_log_scales(planes: &[Vec<i32>; 3], canonical: bool, at: u64) -> Result<()> {
+    let [largest, middle, smallest] = planes;
+    for plane in planes {
+        in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.4", at)?;
+    }
+    let sorted = |larger: &[i32], smaller: &[i32]| larger.iter().zip(smaller).all(|(a, b)| a >= b);
+    if canonical && !(sorted(largest, middle) && sorted(middle, smallest)) {
         let rule = "canonical axes are sorted from largest to smallest";
         return Err(Error::new(at, "7.4", ErrorKind::Constraint { rule }));
     }
-    let values: Vec<i32> =
-        larger.iter().zip(differences).map(|(&larger, &difference)| larger.wrapping_sub(difference)).collect();
-    in_range(&values, ATTRIBUTE_LIMIT, "log_scale", at)?;
-    Ok(values)
+    Ok(())
 }
 
 /// Clause 7.6. How many bits coarser the rotation of a nearly round Gaussian is coded.
 #[inline]
 pub fn rotation_shift(anisotropy: i32, thresholds: [u8; 3]) -> u32 {
-    thresholds.iter().map(|&threshold| u32::from(anisotropy < i32::from(threshold))).fold(0, u32::wrapping_add)
+    let counts = |&threshold: &u8| u32::from(threshold > 0 && anisotropy < i32::from(threshold));
+    thresholds.iter().map(counts).fold(0, u32::wrapping_add)
 }
 
 /// Clause 7.6. Rotation integers on the fine lattice.
@@ -70,9 +74,7 @@ pub fn rotations(
     thresholds: [u8; 3],
     at: u64,
 ) -> Result<Vec<i32>> {
-    if thresholds == [0; 3] {
-        return Ok(values.to_vec());
-    }
+    in_range(values, &ATTRIBUTE_RANGE, "rotation", "7.6", at)?;
     let shifted: Vec<i32> = values
         .iter()
         .zip(largest.iter().zip(smallest))
@@ -80,6 +82,6 @@ pub fn rotations(
             value.wrapping_shl(rotation_shift(largest.wrapping_sub(smallest), thresholds))
         })
         .collect();
-    in_range(&shifted, ATTRIBUTE_LIMIT, "rotation", at)?;
+    in_range(&shifted, &ROTATION_RANGE, "rotation", "7.6", at)?;
     Ok(shifted)
 }

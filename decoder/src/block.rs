@@ -1,7 +1,7 @@
 //! A block: coded planes in, integer attributes out. Blocks are independent, so all cores decode one frame.
 
-use crate::attribute::{self, ATTRIBUTE_LIMIT};
-use crate::colour::{COMPONENT_LIMIT, Colour};
+use crate::attribute::{self, ATTRIBUTE_RANGE, in_range};
+use crate::colour::Colour;
 use crate::context::{DeltaNeighbours, Neighbours, axis_contexts, combine, is_serial};
 use crate::frame::QuantizedFrame;
 use crate::layout::{Attribute, Layout, PlaneInfo};
@@ -76,7 +76,7 @@ pub fn decode_block(
 /// Clause 8.4: the coded values of a block, its entropy state checked.
 ///
 /// # Errors
-/// Malformed, or invalid log-scales or opacity.
+/// Malformed. No range is checked: [`reconstruct`] does that.
 pub fn decode_coded(
     bytes: &[u8],
     at: u64,
@@ -89,7 +89,7 @@ pub fn decode_coded(
     for (plane, (&info, decoder)) in unit.layout.planes().iter().zip(decoders).enumerate() {
         let coded = read_plane(&mut reader, decoder, plane, info, &mut block);
         block.coded.push(coded);
-        keep_for_contexts(&mut block, info, decoder.bias(), unit.canonical_axes, at)?;
+        keep_for_contexts(&mut block, info, decoder.bias());
     }
     reader.finish()?;
     Ok(block)
@@ -137,52 +137,32 @@ fn read_plane(
 }
 
 fn read_deltas(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, deltas: &mut [u64]) {
-    let [first, _] = decoder.axes();
-    let has_source = first.source != Source::None;
+    let [has_first, has_second] = decoder.axes().each_ref().map(|axis| axis.source != Source::None);
     let mut neighbours = DeltaNeighbours::default();
     let context = |place: usize, previous: u64| {
-        if !has_source {
-            return 0;
-        }
         if place > 0 {
             neighbours.push(previous);
         }
-        decoder.axis_context(0, neighbours.value())
+        let on_axis = |axis: usize, has_source: bool| {
+            if has_source { decoder.axis_context(axis, neighbours.value()) } else { 0 }
+        };
+        decoder.context(on_axis(0, has_first), on_axis(1, has_second))
     };
     reader.deltas(decoder, context, deltas);
 }
 
-/// Reconstructs what later planes take contexts from, as soon as its plane is there.
-///
-/// # Errors
-/// Invalid if a value is out of range.
-fn keep_for_contexts(
-    block: &mut CodedBlock,
-    info: PlaneInfo,
-    bias: i32,
-    canonical_axes: bool,
-    at: u64,
-) -> Result<()> {
-    let Some(coded) = block.coded.last() else { return Ok(()) };
+/// Reconstructs what later planes take contexts from, as soon as its plane is there; ranges are checked later.
+fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, bias: i32) {
+    let Some(coded) = block.coded.last() else { return };
     let [largest, middle, smallest] = &mut block.log_scale;
+    let values = || attribute::unbias(coded, bias);
     match (info.attribute, info.place) {
-        (Attribute::LogScale, 0) => {
-            *largest = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "log_scale", at)?;
-        }
-        (Attribute::LogScale, 1) => {
-            let difference = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "log_scale", at)?;
-            *middle = attribute::smaller(largest, &difference, canonical_axes, at)?;
-        }
-        (Attribute::LogScale, _) => {
-            let difference = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "log_scale", at)?;
-            *smallest = attribute::smaller(middle, &difference, canonical_axes, at)?;
-        }
-        (Attribute::Opacity, _) => {
-            block.opacity = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "opacity", at)?;
-        }
+        (Attribute::LogScale, 0) => *largest = values(),
+        (Attribute::LogScale, 1) => *middle = attribute::next_log_scale(largest, &values()),
+        (Attribute::LogScale, _) => *smallest = attribute::next_log_scale(middle, &values()),
+        (Attribute::Opacity, _) => block.opacity = values(),
         _ => {}
     }
-    Ok(())
 }
 
 /// Coded planes, all there, to the integer attributes of the block. The encoder calls this too.
@@ -198,6 +178,8 @@ pub fn reconstruct(
     at: u64,
 ) -> Result<QuantizedFrame> {
     let position = position::positions(&block.deltas, unit.position_bits, unit.position_shift, at)?;
+    attribute::check_log_scales(&block.log_scale, unit.canonical_axes, at)?;
+    in_range(&block.opacity, &ATTRIBUTE_RANGE, "opacity", "7.5", at)?;
     let mut rotation = [(); 3].map(|()| Vec::new());
     let mut dc_components = Vec::new();
     let mut sh_components = Vec::new();
@@ -205,16 +187,14 @@ pub fn reconstruct(
     for ((info, coded), &bias) in unit.layout.planes().iter().zip(&block.coded).zip(biases) {
         match info.attribute {
             Attribute::Rotation => {
-                let values = attribute::unbias(coded, bias, ATTRIBUTE_LIMIT, "rotation", at)?;
+                let values = attribute::unbias(coded, bias);
                 if let Some(plane) = rotation.get_mut(usize::from(info.place)) {
                     let thresholds = unit.rotation_thresholds;
                     *plane = attribute::rotations(&values, largest, smallest, thresholds, at)?;
                 }
             }
-            Attribute::Dc => {
-                dc_components.push(attribute::unbias(coded, bias, COMPONENT_LIMIT, "dc", at)?);
-            }
-            Attribute::Sh => sh_components.push(attribute::unbias(coded, bias, 65_535, "sh", at)?),
+            Attribute::Dc => dc_components.push(attribute::unbias(coded, bias)),
+            Attribute::Sh => sh_components.push(attribute::unbias(coded, bias)),
             Attribute::Position | Attribute::LogScale | Attribute::Opacity => {}
         }
     }

@@ -2,11 +2,12 @@
 
 use crate::attribute::in_range;
 use crate::layout::ShCoding;
+use core::ops::RangeInclusive;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::{Error, ErrorKind, Result};
 
-/// The largest magnitude of a component.
-pub const COMPONENT_LIMIT: i32 = 8191;
+/// The values of a component.
+pub const COMPONENT_RANGE: RangeInclusive<i32> = -8191..=8191;
 
 /// Gaussians transformed at a time: their components stay in the first-level cache.
 const TILE: usize = 64;
@@ -70,7 +71,7 @@ impl Colour<'_> {
             }
         }
         for value in components.iter_mut().flatten() {
-            *value = (*value).clamp(COMPONENT_LIMIT.wrapping_neg(), COMPONENT_LIMIT);
+            *value = (*value).clamp(*COMPONENT_RANGE.start(), *COMPONENT_RANGE.end());
         }
         Ok(components)
     }
@@ -101,7 +102,7 @@ pub fn inverse(
 ) -> Result<Vec<Vec<i32>>> {
     let dimension = usize::from(transform.header.dimension);
     for plane in components {
-        in_range(plane, COMPONENT_LIMIT, "component", at)?;
+        in_range(plane, &COMPONENT_RANGE, "component", "7.7", at)?;
     }
     let mut planes: Vec<Vec<i32>> = (0..dimension).map(|_| Vec::with_capacity(count)).collect();
     let mut tile = vec![[0_i16; TILE]; components.len()];

@@ -142,19 +142,17 @@ pub fn plane_contexts(
 
 /// The contexts of the deltas of a block.
 pub fn delta_contexts(axes: &[ContextAxis; 2], deltas: &[u64]) -> Vec<u8> {
-    let [first, _] = axes;
+    let [first, second] = axes;
     if first.source == Source::None {
         return Vec::new();
     }
     let mut neighbours = DeltaNeighbours::default();
-    deltas
-        .iter()
-        .map(|&delta| {
-            let context = first.context(neighbours.value());
-            neighbours.push(delta);
-            context
-        })
-        .collect()
+    let context = |&delta: &u64| {
+        let [a, b] = [first, second].map(|axis| usize::from(axis.context(neighbours.value())));
+        neighbours.push(delta);
+        u8::try_from(a.wrapping_mul(second.contexts()).wrapping_add(b)).unwrap_or(0)
+    };
+    deltas.iter().map(context).collect()
 }
 
 fn serial_contexts(axis: &ContextAxis, values: &[i32]) -> Vec<u8> {

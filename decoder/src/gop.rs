@@ -4,7 +4,7 @@ use crate::colour::Colour;
 use crate::layout::ShCoding;
 use splatstream_format::payload::{Codebook, Refinement, Transform};
 use splatstream_format::syntax::{
-    FrameHeader, GopHeader, NO_TRANSFORM, SequenceParameters, ShMode, TransformKind, UnitType,
+    FrameHeader, GopHeader, SequenceParameters, ShMode, TransformKind, UnitType,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
@@ -68,22 +68,16 @@ impl Gop {
     /// The transforms that a frame header names.
     ///
     /// # Errors
-    /// Invalid if one is not defined, or an SH transform is named or missing against the SH degree.
-    pub fn transforms(
-        &self,
-        frame: &FrameHeader,
-        sequence: &SequenceParameters,
-        at: u64,
-    ) -> Result<Transforms<'_>> {
+    /// Invalid if one is not defined.
+    pub fn transforms(&self, frame: &FrameHeader, at: u64) -> Result<Transforms<'_>> {
         let find = |slots, id: u8, element| {
             let undefined = ErrorKind::Undefined { element, id: u64::from(id) };
             defined(slots, id).ok_or(Error::new(at, "6.6", undefined))
         };
         let dc = find(&self.dc, frame.dc_transform_id, "dc_transform_id")?;
-        let sh = if sequence.sh_degree == 0 && frame.sh_transform_id == NO_TRANSFORM {
-            None
-        } else {
-            Some(find(&self.sh, frame.sh_transform_id, "sh_transform_id")?)
+        let sh = match frame.sh_transform() {
+            None => None,
+            Some(id) => Some(find(&self.sh, id, "sh_transform_id")?),
         };
         Ok(Transforms { dc, sh })
     }
@@ -101,6 +95,11 @@ impl Gop {
     ) -> Result<Colour<'a>> {
         let header = &refinement.header;
         let rank = transforms.sh.map_or(0, |transform| transform.header.rank);
+        if transforms.sh.is_none() && header.sh_mode != 0 {
+            let value = i64::from(header.sh_mode);
+            let kind = ErrorKind::OutOfRange { element: "sh_mode", value, min: 0, max: 0 };
+            return Err(Error::new(at, "6.9", kind));
+        }
         let mode = match header.mode() {
             Some(ShMode::Coefficients) => ShCoding::Coefficients { rank },
             Some(ShMode::VectorQuantised) => ShCoding::VectorQuantised { stages: header.vq_stage_count },

@@ -103,6 +103,16 @@ impl Layout {
         self.planes.iter().map(|plane| plane.alphabet).collect()
     }
 
+    /// For each plane the model of the same plane in the unit before, if there is one (6.12).
+    pub fn reusable<'m>(&self, before: Option<(&Self, &'m [PlaneModel])>) -> Vec<Option<&'m PlaneModel>> {
+        let find = |plane: &PlaneInfo| {
+            let (layout, models) = before?;
+            let place = layout.planes.iter().position(|known| known == plane)?;
+            models.get(place)
+        };
+        self.planes.iter().map(find).collect()
+    }
+
     /// Checks that every model uses only sources that its plane may use.
     ///
     /// # Errors

@@ -71,9 +71,13 @@ pub struct Decoder<'a> {
     sequence: Option<(SequenceParameters, &'a [u8])>,
     gop: Option<Gop>,
     frame: Option<PendingFrame<'a>>,
+    /// A frame that was complete when the unit after it turned out wrong.
+    finished: Option<DecodedFrame>,
     frames: u32,
     units: u32,
-    index_offset: u64,
+    /// First frame and offset of every GOP header so far: what an index shall hold.
+    gops: Vec<(u32, u64)>,
+    index_offset: Option<u64>,
     ended: bool,
 }
 
@@ -86,9 +90,11 @@ impl<'a> Decoder<'a> {
             sequence: None,
             gop: None,
             frame: None,
+            finished: None,
             frames: 0,
             units: 0,
-            index_offset: 0,
+            gops: Vec::new(),
+            index_offset: None,
             ended: false,
         }
     }
@@ -115,17 +121,19 @@ impl<'a> Decoder<'a> {
             self.units = self.units.wrapping_add(1);
             return Ok(None);
         }
-        if self.sequence.is_none() && unit_type != UnitType::SequenceParameters || self.ended {
+        let repeatable = unit_type == UnitType::SequenceParameters;
+        let indexed = self.index_offset.is_some() && unit_type != UnitType::End;
+        if self.ended || !repeatable && (self.sequence.is_none() || indexed) {
             return Err(unexpected(unit));
         }
         let done = match unit_type {
             UnitType::SequenceParameters => self.sequence_parameters(unit).map(|()| None),
-            UnitType::GopHeader => self.closing(|decoder| decoder.gop_header(unit)),
+            UnitType::GopHeader => self.closing(unit, Self::gop_header),
             UnitType::Transform | UnitType::Codebook => self.gop_tool(unit).map(|()| None),
-            UnitType::FrameHeader => self.closing(|decoder| decoder.frame_header(unit)),
+            UnitType::FrameHeader => self.closing(unit, Self::frame_header),
             UnitType::Refinement => self.refinement(unit).map(|()| None),
-            UnitType::Index => self.closing(|decoder| decoder.index(unit)),
-            UnitType::End => self.closing(|decoder| decoder.end(unit)),
+            UnitType::Index => self.closing(unit, Self::index),
+            UnitType::End => self.closing(unit, Self::end),
             UnitType::Reserved(_) | UnitType::User(_) => Ok(None),
         };
         self.units = self.units.wrapping_add(1);
@@ -153,14 +161,26 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// As [`Decoder::unit`].
     pub fn cut(&mut self) -> Result<Option<DecodedFrame>> {
-        self.close_frame()
+        match self.finished.take() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.close_frame(None),
+        }
     }
 
     /// Decodes the pending frame, then lets the unit that follows it act.
-    fn closing(&mut self, act: impl FnOnce(&mut Self) -> Result<()>) -> Result<Option<DecodedFrame>> {
-        let done = self.close_frame()?;
-        act(self)?;
-        Ok(done)
+    fn closing(
+        &mut self,
+        unit: &Unit<'a>,
+        act: impl FnOnce(&mut Self, &Unit<'a>) -> Result<()>,
+    ) -> Result<Option<DecodedFrame>> {
+        let done = self.close_frame(Some(unit.at))?;
+        match act(self, unit) {
+            Ok(()) => Ok(done),
+            Err(error) => {
+                self.finished = done;
+                Err(error)
+            }
+        }
     }
 
     fn sequence_parameters(&mut self, unit: &Unit<'a>) -> Result<()> {
@@ -179,9 +199,10 @@ impl<'a> Decoder<'a> {
     }
 
     fn gop_header(&mut self, unit: &Unit<'a>) -> Result<()> {
-        let header = GopHeader::parse_payload(unit.payload, unit.payload_at)?;
         self.close_gop(unit.at)?;
         same(unit.at, "6.5", "frame", unit.header.frame, self.frames)?;
+        let header = GopHeader::parse_payload(unit.payload, unit.payload_at)?;
+        self.gops.push((self.frames, unit.at));
         let expected = self.gop.as_ref().map_or(0, |gop| gop.header.gop_index.wrapping_add(1));
         same(unit.payload_at, "6.5", "gop_index", header.gop_index, expected)?;
         self.gop = Some(Gop::new(header, self.frames));
@@ -207,30 +228,15 @@ impl<'a> Decoder<'a> {
     }
 
     fn frame_header(&mut self, unit: &Unit<'a>) -> Result<()> {
-        let header = FrameHeader::parse_payload(unit.payload, unit.payload_at)?;
-        let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else {
-            return Err(unexpected(unit));
-        };
-        same(unit.at, "6.6", "frame", unit.header.frame, self.frames)?;
+        let Some(gop) = &self.gop else { return Err(unexpected(unit)) };
         if self.frames.wrapping_sub(gop.first_frame) >= gop.header.gop_frame_count {
             return Err(unexpected(unit));
         }
-        let count = header.gaussian_count;
-        let level_most = Limits::gaussians_of_level(self.level);
-        if count > level_most {
-            return Err(Error::new(
-                unit.payload_at,
-                "A.3",
-                ErrorKind::OutOfRange {
-                    element: "gaussian_count",
-                    value: i64::from(count),
-                    min: 0,
-                    max: i64::from(level_most),
-                },
-            ));
-        }
-        header.within(unit.payload_at, &self.options.limits)?;
-        gop.transforms(&header, sequence, unit.payload_at)?;
+        same(unit.at, "6.6", "frame", unit.header.frame, self.frames)?;
+        let header = FrameHeader::parse_payload(unit.payload, unit.payload_at)?;
+        gop.transforms(&header, unit.payload_at)?;
+        let most = self.options.limits.max_gaussians.min(Limits::gaussians_of_level(self.level));
+        header.within(unit.payload_at, &Limits { max_gaussians: most, ..self.options.limits })?;
         let bytes = unit_bytes(unit);
         let number = unit.header.frame;
         self.frame = Some(PendingFrame { number, header, units: Vec::new(), bytes, lost: None });
@@ -269,8 +275,17 @@ impl<'a> Decoder<'a> {
     }
 
     fn index(&mut self, unit: &Unit<'a>) -> Result<()> {
-        self.index_offset = unit.at;
-        Index::parse(unit.payload, unit.payload_at).map(|_| ())
+        self.close_gop(unit.at)?;
+        let index = Index::parse(unit.payload, unit.payload_at)?;
+        let found = index.entries.iter().map(|entry| (entry.frame, entry.offset));
+        if !found.eq(self.gops.iter().copied()) {
+            let (value, expected) = (index.entries.len(), self.gops.len());
+            let [value, expected] = [value, expected].map(|count| u64::try_from(count).unwrap_or(u64::MAX));
+            let kind = ErrorKind::Mismatch { element: "entries", value, expected };
+            return Err(Error::new(unit.payload_at, "6.10", kind));
+        }
+        self.index_offset = Some(unit.at);
+        Ok(())
     }
 
     fn end(&mut self, unit: &Unit<'a>) -> Result<()> {
@@ -279,7 +294,7 @@ impl<'a> Decoder<'a> {
         let expected = EndOfStream {
             frame_count: self.frames,
             unit_count: self.units,
-            index_offset: self.index_offset,
+            index_offset: self.index_offset.unwrap_or(0),
         };
         end.validate_against(unit.payload_at, &expected)?;
         let announced = self.sequence().map_or(0, |sequence| sequence.frame_count);
@@ -290,15 +305,24 @@ impl<'a> Decoder<'a> {
         Ok(())
     }
 
-    fn close_frame(&mut self) -> Result<Option<DecodedFrame>> {
-        let Some(frame) = self.frame.take() else { return Ok(None) };
+    /// Ends the pending frame; `at` is the offset of the unit that ends it, if a unit does.
+    fn close_frame(&mut self, at: Option<u64>) -> Result<Option<DecodedFrame>> {
+        let Some(mut frame) = self.frame.take() else { return Ok(None) };
+        if let (Some(at), true, None) = (at, frame.units.is_empty(), frame.lost) {
+            let rule = "a frame has a refinement unit";
+            let error = Error::new(at, "7.1", ErrorKind::Constraint { rule });
+            if !self.options.tolerant {
+                return Err(error);
+            }
+            frame.lost = Some(error);
+        }
         let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else { return Ok(None) };
         let coded: Vec<CodedUnit<'_, '_>> = frame
             .units
             .iter()
             .map(|unit| CodedUnit { refinement: &unit.refinement, payload_at: unit.payload_at })
             .collect();
-        let tools = gop.transforms(&frame.header, sequence, 0)?;
+        let tools = gop.transforms(&frame.header, 0)?;
         let results = decode_units(&coded, gop, tools, sequence);
         self.assemble(&frame, results, sequence).map(Some)
     }

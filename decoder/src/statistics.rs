@@ -4,7 +4,7 @@
 use crate::block::CodedBlock;
 use crate::context::{delta_contexts, plane_contexts};
 use crate::gop::Gop;
-use crate::layout::{Attribute, PlaneInfo};
+use crate::layout::{Attribute, Layout, PlaneInfo};
 use crate::unit::{CodedUnit, PreparedUnit};
 use splatstream_format::entropy::model::{ModelTrace, PlaneModel};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
@@ -74,7 +74,7 @@ pub fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
             }
             UnitType::FrameHeader => {
                 state.frame = Some(FrameHeader::parse_payload(unit.payload, unit.payload_at)?);
-                state.models.clear();
+                state.models = None;
             }
             UnitType::Transform | UnitType::Codebook => {
                 if let (Some(gop), Some(sequence)) = (&mut state.gop, &state.sequence) {
@@ -93,7 +93,7 @@ struct State {
     sequence: Option<SequenceParameters>,
     gop: Option<Gop>,
     frame: Option<FrameHeader>,
-    models: Vec<PlaneModel>,
+    models: Option<(Layout, Vec<PlaneModel>)>,
 }
 
 impl State {
@@ -107,11 +107,11 @@ impl State {
             return Ok(());
         };
         let refinement = Refinement::parse(unit.payload, unit.payload_at, sequence, limits)?;
-        let transforms = gop.transforms(frame, sequence, unit.payload_at)?;
+        let transforms = gop.transforms(frame, unit.payload_at)?;
         let coded = CodedUnit { refinement: &refinement, payload_at: unit.payload_at };
         let mut trace = BitsOfPlanes::default();
-        let previous = (!self.models.is_empty()).then_some(self.models.as_slice());
-        let prepared = PreparedUnit::new(coded, gop, transforms, sequence, previous, &mut trace)?.with_decoders();
+        let before = self.models.as_ref().map(|(layout, models)| (layout, models.as_slice()));
+        let prepared = PreparedUnit::new(coded, gop, transforms, sequence, before, &mut trace)?.with_decoders();
         let gaussians = u64::from(refinement.header.gaussian_count);
         statistics.gaussians = statistics.gaussians.saturating_add(gaussians);
         let blocks = prepared.coded_blocks(sequence)?;
@@ -124,7 +124,7 @@ impl State {
             }
         }
         if !prepared.models.is_empty() {
-            self.models.clone_from(&prepared.models);
+            self.models = Some((prepared.layout.clone(), prepared.models.clone()));
         }
         Ok(())
     }

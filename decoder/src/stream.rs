@@ -18,7 +18,7 @@ pub struct Summary {
 /// Decodes a stream; hands out each frame as it is complete, until `on_frame` breaks off.
 ///
 /// When the stream breaks off or turns out wrong, the frame that was arriving is handed out as far as it is
-/// there, provided the options are tolerant.
+/// there.
 pub fn decode_stream(
     bytes: &[u8],
     options: &Options,
@@ -55,10 +55,10 @@ fn run(
         };
         let frame = match step {
             Ok(frame) => frame,
+            // An error in the frame that was arriving stands before this one in the stream.
             Err(error) => {
-                if options.tolerant && let Ok(frame) = decoder.cut() {
-                    let _ = hand_out(&decoder, frame);
-                }
+                let frame = decoder.cut()?;
+                let _ = hand_out(&decoder, frame);
                 return Err(error);
             }
         };

@@ -32,7 +32,7 @@ pub struct PreparedUnit<'g, 'r, 'a> {
 }
 
 impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
-    /// Reads the models of a unit; `previous` are those of the refinement before.
+    /// Reads the models of a unit; `before` are planes and models of the last unit that had some.
     ///
     /// # Errors
     /// Malformed or invalid models, codebooks that are not defined.
@@ -41,7 +41,7 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
         gop: &'g Gop,
         transforms: Transforms<'g>,
         sequence: &SequenceParameters,
-        previous: Option<&[PlaneModel]>,
+        before: Option<(&Layout, &[PlaneModel])>,
         trace: &mut impl ModelTrace,
     ) -> Result<Self> {
         let refinement = unit.refinement;
@@ -51,7 +51,8 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
             Vec::new()
         } else {
             let alphabets = layout.alphabets();
-            read_models(refinement.model, refinement.model_at, &alphabets, previous, trace)?
+            let reusable = layout.reusable(before);
+            read_models(refinement.model, refinement.model_at, &alphabets, &reusable, trace)?
         };
         layout.check(&models, refinement.model_at)?;
         Ok(Self { unit, layout, models, colour, decoders: Vec::new() })
@@ -113,8 +114,9 @@ pub fn decode_units(
     let mut prepared: Vec<PreparedUnit<'_, '_, '_>> = Vec::with_capacity(units.len());
     let mut failure = None;
     for &unit in units {
-        let previous = prepared.iter().rev().map(|unit| unit.models.as_slice()).find(|models| !models.is_empty());
-        match PreparedUnit::new(unit, gop, transforms, sequence, previous, &mut ()) {
+        let before = prepared.iter().rev().find(|unit| !unit.models.is_empty());
+        let before = before.map(|unit| (&unit.layout, unit.models.as_slice()));
+        match PreparedUnit::new(unit, gop, transforms, sequence, before, &mut ()) {
             Ok(unit) => prepared.push(unit),
             Err(error) => {
                 failure = Some(error);

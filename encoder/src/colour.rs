@@ -5,7 +5,7 @@ use crate::pca::Components;
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
 use rayon::prelude::*;
-use splatstream_decoder::colour::COMPONENT_LIMIT;
+use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{TransformHeader, TransformKind};
 
@@ -62,7 +62,7 @@ fn project(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<f32>>
 
 /// Components rounded to the step.
 pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<i32>> {
-    let limit = COMPONENT_LIMIT as f32;
+    let limit = *COMPONENT_RANGE.end() as f32;
     project(transform, planes, step)
         .par_iter()
         .map(|plane| plane.iter().map(|&value| libm::rintf(value).clamp(-limit, limit) as i32).collect())

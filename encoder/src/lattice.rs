@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::settings::Steps;
 use rayon::prelude::*;
-use splatstream_decoder::attribute::{ATTRIBUTE_LIMIT, rotation_shift};
+use splatstream_decoder::attribute::{ATTRIBUTE_RANGE, rotation_shift};
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::GaussianFrame;
 
@@ -110,7 +110,7 @@ pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters, num
 fn rounded(values: &[f32], lattice: (&'static str, f32, f32), frame: u32) -> Result<Vec<i32>, Error> {
     let (attribute, offset, step) = lattice;
     let integers: Vec<f32> = values.iter().map(|&value| libm::rintf((value - offset) / step)).collect();
-    let limit = ATTRIBUTE_LIMIT as f32;
+    let limit = *ATTRIBUTE_RANGE.end() as f32;
     match integers.iter().position(|value| value.abs() > limit) {
         Some(row) => Err(Error::OutOfLattice { frame, attribute, row, value: values[row], step }),
         None => Ok(integers.iter().map(|&value| value as i32).collect()),

@@ -1,6 +1,6 @@
 //! Clauses 5.12 and 8.5: the model of a plane - bias, token split, contexts, frequency tables.
 
-use super::frequencies::Frequencies;
+use super::frequencies::{Frequencies, mantissa};
 use super::token::Alphabet;
 use crate::bits::{BitReader, BitWriter};
 use crate::{Error, ErrorKind, Result};
@@ -185,7 +185,7 @@ fn write_axis(bits: &mut BitWriter, axis: &ContextAxis) {
     }
 }
 
-/// Reads the models of a unit, one for each of `alphabets`.
+/// Reads the models of a unit, one for each of `alphabets`; `reusable` are the models that reuse refers to.
 ///
 /// # Errors
 /// Malformed or invalid by clauses 5.12 and 6.12; offsets count from `at`, the section's first byte.
@@ -193,14 +193,14 @@ pub fn read_models(
     section: &[u8],
     at: u64,
     alphabets: &[Alphabet],
-    previous: Option<&[PlaneModel]>,
+    reusable: &[Option<&PlaneModel>],
     trace: &mut impl ModelTrace,
 ) -> Result<Vec<PlaneModel>> {
     let mut reader = ModelReader { bits: BitReader::new(section), at, trace };
     let mut models = Vec::with_capacity(alphabets.len());
     for (plane, &alphabet) in alphabets.iter().enumerate() {
         if reader.element("reuse", 1)? == 1 {
-            let model = previous.and_then(|models| models.get(plane));
+            let model = reusable.get(plane).copied().flatten();
             models.push(model.ok_or(reader.broken("reuse without a model to reuse"))?.clone());
         } else {
             models.push(reader.model(alphabet)?);
@@ -209,6 +209,27 @@ pub fn read_models(
     reader.bits.finish(at, "plane_model", "5.12")?;
     Ok(models)
 }
+
+/// The names of an axis's elements in clause 5.12.
+struct AxisNames {
+    source: &'static str,
+    count: &'static str,
+    first: &'static str,
+    step: &'static str,
+}
+
+const AXIS_A: AxisNames = AxisNames {
+    source: "source_a",
+    count: "threshold_a_count_minus1",
+    first: "threshold_a_first",
+    step: "threshold_a_step_minus1",
+};
+const AXIS_B: AxisNames = AxisNames {
+    source: "source_b",
+    count: "threshold_b_count_minus1",
+    first: "threshold_b_first",
+    step: "threshold_b_step_minus1",
+};
 
 struct ModelReader<'a, 't, T> {
     bits: BitReader<'a>,
@@ -247,6 +268,13 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
         value.ok_or(Error::new(self.here(), "5.12", ErrorKind::Number { element: name }))
     }
 
+    fn unsigned(&mut self, name: &'static str) -> Result<u32> {
+        let from = self.bits.position();
+        let value = self.bits.exp_golomb();
+        self.note(name, from, i64::from(value.unwrap_or(0)))?;
+        value.ok_or(Error::new(self.here(), "5.12", ErrorKind::Number { element: name }))
+    }
+
     fn model(&mut self, alphabet: Alphabet) -> Result<PlaneModel> {
         let bias = if alphabet == Alphabet::Attribute { self.signed("bias")? } else { 0 };
         if i16::try_from(bias).is_err() {
@@ -257,8 +285,8 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
             Some(last) if direct_log2 <= 7 => last,
             _ => return Err(self.broken("direct_log2 leaves no room for the longest values")),
         };
-        let first = self.axis()?;
-        let second = if first.source == Source::None { ContextAxis::NONE } else { self.axis()? };
+        let first = self.axis(&AXIS_A)?;
+        let second = if first.source == Source::None { ContextAxis::NONE } else { self.axis(&AXIS_B)? };
         let contexts = first.contexts().wrapping_mul(second.contexts());
         if contexts > MAX_CONTEXTS {
             return Err(self.broken("a plane has at most 64 contexts"));
@@ -267,25 +295,22 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
         Ok(PlaneModel { bias, direct_log2, axes: [first, second], tables, table_of_context })
     }
 
-    fn axis(&mut self) -> Result<ContextAxis> {
-        let code = self.element("source", 4)?;
+    fn axis(&mut self, names: &AxisNames) -> Result<ContextAxis> {
+        let code = self.element(names.source, 4)?;
         let source = Source::from_code(code).ok_or(Error::new(
             self.here(),
             "6.12",
-            ErrorKind::Reserved { element: "source", value: u64::from(code) },
+            ErrorKind::Reserved { element: names.source, value: u64::from(code) },
         ))?;
         if source == Source::None {
             return Ok(ContextAxis::NONE);
         }
-        let more = self.element("threshold_count_minus1", 4)?;
-        let mut thresholds = vec![self.signed("threshold")?];
+        let more = self.element(names.count, 4)?;
+        let mut thresholds = vec![self.signed(names.first)?];
         for _ in 0..more {
-            let from = self.bits.position();
-            let step = self.bits.exp_golomb();
-            self.note("threshold_step_minus1", from, i64::from(step.unwrap_or(0)))?;
-            let next = step
-                .and_then(|step| i32::try_from(step).ok())
-                .and_then(|step| thresholds.last()?.checked_add(step)?.checked_add(1));
+            let step = self.unsigned(names.step)?;
+            let above = |before: &i32| i64::from(*before).wrapping_add(i64::from(step)).wrapping_add(1);
+            let next = thresholds.last().map(above).and_then(|next| i32::try_from(next).ok());
             thresholds.push(next.ok_or(self.broken("thresholds are 32-bit values"))?);
         }
         Ok(ContextAxis { source, thresholds })
@@ -327,15 +352,37 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
         Ok((tables, table_of_context))
     }
 
+    /// Clause 8.3, the explicit form.
     fn explicit_table(&mut self, last_token: u8) -> Result<Frequencies> {
-        let from = self.bits.position();
-        let table = Frequencies::read(&mut self.bits);
-        let tokens = table.as_ref().map_or(0, |table| table.of_token().len());
-        self.note("frequencies", from, i64::try_from(tokens).unwrap_or(0))?;
-        match table {
-            Some(table) if tokens <= usize::from(last_token).wrapping_add(1) => Ok(table),
-            Some(_) => Err(self.broken("token beyond the largest value of the plane")),
-            None => Err(self.broken("frequencies do not sum to 4096")),
+        let last = self.element("last", 8)?;
+        if last > last_token {
+            return Err(self.broken("token beyond the largest value of the plane"));
         }
+        let mode = self.element("mode", 8)?;
+        if mode > last {
+            return Err(self.broken("mode is not above last"));
+        }
+        let mut of_token = Vec::with_capacity(usize::from(last).wrapping_add(1));
+        let mut length = 0_i32;
+        for token in 0..=last {
+            if token == mode {
+                of_token.push(0);
+                continue;
+            }
+            length = length.saturating_add(self.signed("length_delta")?);
+            let Some(length) = u32::try_from(length).ok().filter(|&length| length <= 12) else {
+                return Err(self.broken("a frequency has 0 to 12 bits"));
+            };
+            of_token.push(self.frequency(length)?);
+        }
+        Frequencies::with_implied(of_token, mode).ok_or(self.broken("frequencies do not sum to 4096"))
+    }
+
+    /// A frequency of `length` bits: leading one, carried mantissa, zeros.
+    fn frequency(&mut self, length: u32) -> Result<u16> {
+        let Some(leading) = length.checked_sub(1) else { return Ok(0) };
+        let (carried, shift) = mantissa(length);
+        let below = u16::from(self.element("mantissa", carried)?).wrapping_shl(shift);
+        Ok(1_u16.wrapping_shl(leading) | below)
     }
 }

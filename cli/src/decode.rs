@@ -1,0 +1,224 @@
+//! `splatstream decode`: a stream to frames in files.
+
+mod target;
+
+use crate::console::Console;
+use crate::failure::{Failure, StreamFault};
+use crate::numbers::{FrameRange, grouped, hex_digest};
+use crate::progress::Progress;
+use crate::stream_file::{LimitArgs, StreamFile};
+use clap::Args;
+use serde::Serialize;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::{DecodedFrame, Options};
+use splatstream_decoder::stream::decode_stream;
+use splatstream_format::Error;
+use splatstream_format::syntax::SequenceParameters;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use target::{Format, Target};
+
+/// Decode a stream to files of Gaussians.
+///
+/// Every frame is compared with the digest in the stream. Of a frame with a damaged refinement, the
+/// refinements before it are written; the report says so, and the exit code is that of the first error.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  splatstream decode talk.gss -o frames/\n  \
+    splatstream decode talk.gss -o poster.ply --op s0,t0,r2 --frames 0..1\n  \
+    splatstream decode talk.gss --dry-run --json")]
+pub(crate) struct Decode {
+    /// The stream.
+    #[arg(value_name = "IN.gss")]
+    input: PathBuf,
+    /// A directory for frame_0000.ply and so on, or a .ply, .spz or .splat file for one frame.
+    #[arg(short, long = "out", value_name = "DIR_OR_FILE", required_unless_present = "dry_run")]
+    out: Option<PathBuf>,
+    /// The operating point: highest spatial layer, temporal layer and refinement; default is everything.
+    #[arg(long, value_name = "sS,tT,rR")]
+    op: Option<OperatingPoint>,
+    /// Frames to write, A..B: from A up to and without B.
+    #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
+    frames: Option<FrameRange>,
+    /// Format of the files; default is that of the file's name, or ply.
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    /// Do not compare frames with the digests in the stream.
+    #[arg(long)]
+    no_verify: bool,
+    /// Stop at the first damaged unit.
+    #[arg(long)]
+    strict: bool,
+    /// Decode and verify only; write nothing.
+    #[arg(long, conflicts_with = "out")]
+    dry_run: bool,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    output: Option<PathBuf>,
+    frames: u32,
+    gaussians: u64,
+    bytes: u64,
+    seconds: f64,
+    seconds_total: f64,
+    gaussians_per_second: f64,
+    verified: bool,
+    digests: Vec<Option<String>>,
+    lost: Vec<Lost>,
+    error: Option<StreamFault>,
+}
+
+/// A frame that is not all there.
+#[derive(Serialize)]
+struct Lost {
+    frame: u32,
+    /// Refinements that are there.
+    refinements: u8,
+    #[serde(flatten)]
+    fault: StreamFault,
+}
+
+/// What has come out of the stream so far.
+struct Decoding<'a> {
+    frames: FrameRange,
+    target: Option<&'a Target>,
+    progress: Progress,
+    gaussians: u64,
+    bytes: u64,
+    digests: Vec<Option<String>>,
+    lost: Vec<Lost>,
+    first_error: Option<Error>,
+    failed: Option<Failure>,
+    /// Time in which files were made and written.
+    writing: Duration,
+}
+
+impl Decode {
+    /// Decodes, writes, and reports; an error of the stream comes after what could be written.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        let stream = StreamFile::read(&self.input)?;
+        let options = self.options();
+        stream.check_point(options.operating_point, &options.limits)?;
+        let frames = self.frames.unwrap_or(FrameRange::ALL);
+        let announced = stream.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
+        let target = self.target(frames.count_in(announced))?;
+        let mut decoding = Decoding::new(frames, target.as_ref(), announced);
+        let start = Instant::now();
+        let summary = decode_stream(&stream.bytes, &options, |sequence, frame| decoding.take(sequence, &frame));
+        let total = start.elapsed();
+        if let Some(failure) = decoding.failed.take() {
+            return Err(failure);
+        }
+        let first_error = decoding.first_error.or(summary.end);
+        let report = self.report(decoding, summary.end, total);
+        if announced > 0 && frames.count_in(announced) == 0 {
+            let path = stream.path.display();
+            return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));
+        }
+        console.report(&report, || report.text())?;
+        first_error.map_or(Ok(()), |error| Err(stream.fault(error)))
+    }
+
+    fn options(&self) -> Options {
+        Options {
+            limits: self.limits.limits(),
+            verify: !self.no_verify,
+            operating_point: self.op.unwrap_or(OperatingPoint::ALL),
+            tolerant: !self.strict,
+        }
+    }
+
+    /// Where `frames` frames go; none for a dry run.
+    fn target(&self, frames: u32) -> Result<Option<Target>, Failure> {
+        self.out.as_deref().map(|path| Target::new(path, self.format, frames)).transpose()
+    }
+
+    fn report(&self, decoding: Decoding<'_>, end: Option<Error>, total: Duration) -> Report {
+        let seconds = total.saturating_sub(decoding.writing).as_secs_f64();
+        Report {
+            output: self.out.clone(),
+            frames: decoding.digests.len() as u32,
+            gaussians: decoding.gaussians,
+            bytes: decoding.bytes,
+            seconds,
+            seconds_total: total.as_secs_f64(),
+            gaussians_per_second: decoding.gaussians as f64 / seconds.max(f64::MIN_POSITIVE),
+            verified: !self.no_verify,
+            digests: decoding.digests,
+            lost: decoding.lost,
+            error: end.map(StreamFault::from),
+        }
+    }
+}
+
+impl<'a> Decoding<'a> {
+    fn new(frames: FrameRange, target: Option<&'a Target>, announced: u32) -> Self {
+        Self {
+            frames,
+            target,
+            progress: Progress::frames("decoding", frames.end.map_or(announced, |end| end.min(announced))),
+            gaussians: 0,
+            bytes: 0,
+            digests: Vec::new(),
+            lost: Vec::new(),
+            first_error: None,
+            failed: None,
+            writing: Duration::ZERO,
+        }
+    }
+
+    /// Takes a frame out of the decoder; breaks off after the last frame asked for and when a file fails.
+    fn take(&mut self, sequence: &SequenceParameters, frame: &DecodedFrame) -> ControlFlow<()> {
+        if self.frames.contains(frame.number) {
+            self.count(frame);
+            let gaussians = to_gaussians(&frame.planes, sequence);
+            let start = Instant::now();
+            self.failed = self.target.and_then(|target| target.write(frame.number, &gaussians).err());
+            self.writing += start.elapsed();
+        }
+        self.progress.at(frame.number.saturating_add(1));
+        if self.failed.is_some() || self.frames.is_over(frame.number.saturating_add(1)) {
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn count(&mut self, frame: &DecodedFrame) {
+        self.gaussians += frame.planes.len() as u64;
+        self.bytes += frame.bytes;
+        self.digests.push(frame.digest.map(hex_digest));
+        if let Some(error) = frame.lost {
+            self.first_error = self.first_error.or(Some(error));
+            let fault = StreamFault::from(error);
+            self.lost.push(Lost { frame: frame.number, refinements: frame.refinements, fault });
+        }
+    }
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let place = match &self.output {
+            Some(path) => path.display().to_string(),
+            None => "nothing written (--dry-run)".to_owned(),
+        };
+        let digests = if self.verified { "agree with the frames shown" } else { "not compared (--no-verify)" };
+        let mut text = format!(
+            "{place}\n  frames       {}\n  Gaussians    {}\n  decoding     {:.3} s, {} Gaussians a second\n  \
+             in all       {:.3} s\n  digests      {digests}\n",
+            grouped(self.frames.into()),
+            grouped(self.gaussians),
+            self.seconds,
+            grouped(self.gaussians_per_second as u64),
+            self.seconds_total,
+        );
+        for lost in &self.lost {
+            text += &format!("  frame {} stops after {} refinements\n", lost.frame, lost.refinements);
+        }
+        text
+    }
+}

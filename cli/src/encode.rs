@@ -1,0 +1,224 @@
+//! `splatstream encode`: frames in files to a stream.
+
+mod choices;
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::frame_files::FrameFiles;
+use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
+use crate::output_file::OutputFile;
+use crate::progress::Progress;
+use choices::{Choice, choices};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use splatstream_encoder::{FrameSource, Preset, Quality, Report, Settings, ShChoice, encode};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Encode frames of Gaussians to a stream.
+///
+/// Frames are .ply, .compressed.ply, .spz, .sog or .splat files, or SOG directories (those with a meta.json).
+/// They are taken in the natural order of their names: frame_9 before frame_10.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  splatstream encode frames/ -o talk.gss --fps 30\n  \
+    splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small")]
+pub(crate) struct Encode {
+    /// Files, or one directory of frames.
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// The stream to write.
+    #[arg(short, long = "out", value_name = "OUT.gss")]
+    out: PathBuf,
+    /// How much to search: smaller files take longer.
+    #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
+    preset: PresetName,
+    /// How close the decoded scene is to the source.
+    #[arg(long, value_enum, default_value_t = QualityName::High)]
+    quality: QualityName,
+    /// Frames in a group; decoding can start at each.
+    #[arg(long, value_name = "N", default_value_t = Settings::default().gop)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    gop: u32,
+    /// Spatial layers by height in lines; this version has one.
+    #[arg(long, value_name = "HEIGHTS", default_value = "1080", value_parser = parse_layers)]
+    layers: String,
+    /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100.
+    #[arg(long, value_name = "PERCENTS", value_delimiter = ',', default_value = "10,20,30,50,100")]
+    refinements: Vec<u8>,
+    /// Highest degree of spherical harmonics kept; default is what the scene needs.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=3))]
+    sh_degree: Option<u8>,
+    /// How spherical harmonics are coded.
+    #[arg(long, value_enum, default_value_t = ShName::Auto)]
+    sh: ShName,
+    /// Frames a second: 30, 29.97 or 30000/1001.
+    #[arg(long, value_name = "RATE", default_value = "30", value_parser = parse_frame_rate)]
+    fps: (u32, u32),
+    /// Keep Gaussians whose opacity is below 1/255 everywhere.
+    #[arg(long)]
+    keep_invisible: bool,
+    /// What puts Gaussians into the first refinements.
+    #[arg(long, value_enum, default_value_t = Importance::Volume)]
+    importance: Importance,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PresetName {
+    Fast,
+    Balanced,
+    Small,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum QualityName {
+    Low,
+    Medium,
+    High,
+    VisuallyLossless,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ShName {
+    /// Whichever costs less on the scene.
+    Auto,
+    /// Transform coefficients.
+    Coefficients,
+    /// Vector quantisation.
+    Vq,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Importance {
+    /// Opacity times volume.
+    Volume,
+}
+
+fn parse_layers(text: &str) -> Result<String, String> {
+    if text == "1080" {
+        return Ok(text.to_owned());
+    }
+    Err("this version writes one layer, 1080; more layers come with a later version".to_owned())
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Encoded {
+    output: PathBuf,
+    bytes: u64,
+    frames: u32,
+    gaussians: u64,
+    bpg: f64,
+    seconds: f64,
+    invisible: u64,
+    chosen: Vec<Choice>,
+    digests: Vec<String>,
+}
+
+impl Encode {
+    /// Encodes to a file that appears when it is whole.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        let mut source = FrameFiles::find(&self.inputs)?;
+        let settings = self.settings();
+        let mut file = OutputFile::create(&self.out)?;
+        let start = Instant::now();
+        let progress = Progress::frames("encoding", source.len());
+        let report = encode(&mut source, &settings, &mut file, &mut |done, _| progress.at(done))
+            .map_err(|error| self.failed(&source, &error))?;
+        drop(progress);
+        file.finish()?;
+        let encoded = self.encoded(&report, &settings, start.elapsed().as_secs_f64());
+        console.report(&encoded, || encoded.text())
+    }
+
+    fn settings(&self) -> Settings {
+        // One value: it is here so that the default can be written down.
+        let Importance::Volume = self.importance;
+        Settings {
+            preset: self.preset.into(),
+            steps: Quality::from(self.quality).steps(),
+            gop: self.gop,
+            refinements: self.refinements.clone(),
+            sh_degree: self.sh_degree,
+            sh: self.sh.into(),
+            keep_invisible: self.keep_invisible,
+            ticks: self.fps,
+            ..Settings::default()
+        }
+    }
+
+    /// The encoder counts frames; a user has files.
+    fn failed(&self, source: &FrameFiles, error: &splatstream_encoder::Error) -> Failure {
+        use splatstream_encoder::Error;
+        match error {
+            // Errors of reading name the file.
+            Error::Source { source, .. } => Failure::other(source.to_string()),
+            Error::TooManyGaussians { frame, .. } | Error::OutOfLattice { frame, .. } => {
+                let path = source.paths().get(*frame as usize).unwrap_or(&self.out);
+                Failure::other(format!("{}: {error}", path.display()))
+            }
+            Error::Output(cause) => Failure::file("write", &self.out, cause),
+            _ => Failure::other(format!("{}: {error}", self.out.display())),
+        }
+    }
+
+    fn encoded(&self, report: &Report, settings: &Settings, seconds: f64) -> Encoded {
+        Encoded {
+            output: self.out.clone(),
+            bytes: report.bytes,
+            frames: report.frames,
+            gaussians: report.gaussians,
+            bpg: bits_per_gaussian(report.bytes, report.gaussians),
+            seconds,
+            invisible: report.invisible,
+            chosen: choices(report, settings),
+            digests: report.digests.iter().copied().map(hex_digest).collect(),
+        }
+    }
+}
+
+impl Encoded {
+    fn text(&self) -> String {
+        let chosen: String = self.chosen.iter().map(Choice::text).collect();
+        format!(
+            "{}\n  frames             {}\n  Gaussians          {}\n  bytes              {}\n  \
+             bits a Gaussian    {:.2}\n  seconds            {:.2}\nchosen\n{chosen}",
+            self.output.display(),
+            grouped(self.frames.into()),
+            grouped(self.gaussians),
+            grouped(self.bytes),
+            self.bpg,
+            self.seconds,
+        )
+    }
+}
+
+impl From<PresetName> for Preset {
+    fn from(name: PresetName) -> Self {
+        match name {
+            PresetName::Fast => Self::Fast,
+            PresetName::Balanced => Self::Balanced,
+            PresetName::Small => Self::Small,
+        }
+    }
+}
+
+impl From<QualityName> for Quality {
+    fn from(name: QualityName) -> Self {
+        match name {
+            QualityName::Low => Self::Low,
+            QualityName::Medium => Self::Medium,
+            QualityName::High => Self::High,
+            QualityName::VisuallyLossless => Self::VisuallyLossless,
+        }
+    }
+}
+
+impl From<ShName> for ShChoice {
+    fn from(name: ShName) -> Self {
+        match name {
+            ShName::Auto => Self::Auto,
+            ShName::Coefficients => Self::Coefficients,
+            ShName::Vq => Self::VectorQuantised,
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! What the encoder chose, and why.
+
+use crate::numbers::{grouped, percent};
+use serde::Serialize;
+use splatstream_encoder::{Report, Settings, ShChoice};
+
+/// One decision of the encoder.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Choice {
+    tool: &'static str,
+    choice: String,
+    why: String,
+}
+
+impl Choice {
+    fn new(tool: &'static str, choice: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { tool, choice: choice.into(), why: why.into() }
+    }
+
+    /// A line for people.
+    pub(crate) fn text(&self) -> String {
+        format!("  {:<18} {}: {}\n", self.tool, self.choice, self.why)
+    }
+}
+
+/// Every decision that the report tells of.
+pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
+    let mut choices = vec![positions(report, settings), axes(report), degree(report, settings)];
+    if report.sh_degree.1 > 0 {
+        choices.push(harmonics(report, settings));
+    }
+    choices.push(invisible(report, settings));
+    choices
+}
+
+fn positions(report: &Report, settings: &Settings) -> Choice {
+    let bits = report.position_bits;
+    let choice = format!("{bits} bits an axis, cells of {}", report.position_step);
+    let inner = settings.steps.position_bits;
+    let why = format!("the inner 98 % span 2^{inner} cells at this quality; the rest is for what lies outside");
+    Choice::new("position", choice, why)
+}
+
+fn axes(report: &Report) -> Choice {
+    let (sorted, [bits_sorted, bits_unsorted]) = report.canonical_axes;
+    let why = format!(
+        "scale and rotation take {bits_sorted:.2} bits a Gaussian sorted, {bits_unsorted:.2} as they come"
+    );
+    Choice::new("axes", if sorted { "sorted by size" } else { "as they come" }, why)
+}
+
+fn degree(report: &Report, settings: &Settings) -> Choice {
+    let (source, stream) = report.sh_degree;
+    let why = match settings.sh_degree {
+        Some(asked) => format!("--sh-degree {asked}, the source has {source}"),
+        None if stream < source => {
+            format!("the source has {source}; no coefficient above {stream} reaches half a step")
+        }
+        None => format!("the source has {source}, and every band rises above half a step"),
+    };
+    Choice::new("sh degree", stream.to_string(), why)
+}
+
+fn harmonics(report: &Report, settings: &Settings) -> Choice {
+    let rank = report.sh_rank;
+    let choice = match report.sh_codebook_entries {
+        0 => format!("{rank} coefficients"),
+        entries => format!("codebook of {} entries, {rank} components", grouped(entries.into())),
+    };
+    let asked = match settings.sh {
+        ShChoice::Auto => "not tried with this preset or scene",
+        ShChoice::Coefficients => "--sh coefficients",
+        ShChoice::VectorQuantised => "--sh vq",
+    };
+    let why = report.sh_trial.map_or_else(
+        || asked.to_owned(),
+        |[(bits, error), (book_bits, book_error)]| {
+            format!(
+                "coefficients take {bits:.2} bits a Gaussian (squared error {error:.3} steps), \
+                 a codebook {book_bits:.2} ({book_error:.3})"
+            )
+        },
+    );
+    Choice::new("sh coding", choice, why)
+}
+
+fn invisible(report: &Report, settings: &Settings) -> Choice {
+    if settings.keep_invisible {
+        return Choice::new("invisible", "kept", "--keep-invisible");
+    }
+    let share = percent(report.invisible, report.invisible + report.gaussians);
+    let choice = format!("{} left out ({share:.2} %)", grouped(report.invisible));
+    Choice::new("invisible", choice, "opacity below 1/255 everywhere; --keep-invisible keeps them")
+}

@@ -1,0 +1,75 @@
+//! `splatstream inspect`: what is in a stream, where, and which clause says so.
+
+mod costs;
+mod hex;
+mod points;
+mod tree;
+mod units;
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::stream_file::{LimitArgs, StreamFile};
+use clap::Args;
+use splatstream_format::Error;
+use std::path::PathBuf;
+
+/// Show the elements of a stream: place, value, meaning, clause. Works on damaged streams.
+///
+/// Places are byte offsets; 0x1a4+3 is bit 3 of byte 0x1a4. The clauses are those of the specification.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  splatstream inspect talk.gss | less\n  \
+    splatstream inspect talk.gss --units\n  splatstream inspect talk.gss --ops --json\n  \
+    splatstream inspect talk.gss --hex 3")]
+pub(crate) struct Inspect {
+    /// The stream.
+    #[arg(value_name = "IN.gss")]
+    input: PathBuf,
+    #[command(flatten)]
+    view: View,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+#[derive(Args)]
+#[group(multiple = false)]
+struct View {
+    /// Every element of every unit (this is what is shown if nothing is asked for).
+    #[arg(long)]
+    tree: bool,
+    /// One line a unit.
+    #[arg(long)]
+    units: bool,
+    /// The operating points: bytes, Gaussians and bits a Gaussian of each.
+    #[arg(long)]
+    ops: bool,
+    /// What each attribute and each kind of unit costs.
+    #[arg(long)]
+    stats: bool,
+    /// The bytes of one unit beside its elements; units count from 0.
+    #[arg(long, value_name = "UNIT")]
+    hex: Option<usize>,
+}
+
+impl Inspect {
+    /// Shows one view; the first error of the stream comes after what can be shown.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        let stream = StreamFile::read(&self.input)?;
+        let limits = self.limits.limits();
+        let error = match &self.view {
+            View { units: true, .. } => units::show(&stream, &limits, console),
+            View { ops: true, .. } => points::show(&stream, &limits, console),
+            View { stats: true, .. } => costs::show(&stream, &limits, console),
+            View { hex: Some(unit), .. } => hex::show(&stream, *unit, &limits, console),
+            View { .. } => tree::show(&stream, &limits, console),
+        }?;
+        error.map_or(Ok(()), |error| Err(stream.fault(error)))
+    }
+}
+
+/// What a view gives back: the first error of the stream, shown after the view.
+type Shown = Result<Option<Error>, Failure>;
+
+/// The span of bytes from `at` on.
+fn span(at: u64, bytes: u64) -> String {
+    format!("{at:#x}..{:#x}", at.saturating_add(bytes))
+}

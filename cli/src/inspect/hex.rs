@@ -1,0 +1,87 @@
+//! The bytes of one unit beside its elements.
+
+use super::tree::{Branch, Elements, Row, place};
+use super::{Shown, span};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::stream_file::StreamFile;
+use serde::Serialize;
+use splatstream_format::Limits;
+use std::fmt::Write;
+
+/// Bytes a line.
+const WIDTH: usize = 16;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Dump {
+    unit: usize,
+    #[serde(rename = "type")]
+    kind: String,
+    at: u64,
+    bytes: u64,
+    elements: Vec<Bytes>,
+}
+
+/// One element and its bytes.
+#[derive(Serialize)]
+struct Bytes {
+    #[serde(flatten)]
+    row: Row,
+    hex: String,
+}
+
+/// Dumps one unit.
+pub(super) fn show(stream: &StreamFile, number: usize, limits: &Limits, console: &Console) -> Shown {
+    let Elements { mut units, error, .. } = Elements::of(stream, limits);
+    if number >= units.len() {
+        if error.is_some() {
+            return Ok(error);
+        }
+        let (path, count) = (stream.path.display(), units.len());
+        return Err(Failure::Usage(format!("{path}: there is no unit {number}, the stream has {count}")));
+    }
+    let Branch { unit, kind, at, bytes, elements } = units.swap_remove(number);
+    let elements = elements.into_iter().map(|row| Bytes { hex: hex(stream, &row), row }).collect();
+    let dump = Dump { unit, kind, at, bytes, elements };
+    console.report(&dump, || dump.text())?;
+    Ok(error)
+}
+
+/// The bytes that an element touches, as the inspector found them within the stream.
+fn hex(stream: &StreamFile, row: &Row) -> String {
+    let start = usize::try_from(row.at_bit / 8).unwrap_or(usize::MAX);
+    let end = usize::try_from((row.at_bit + row.bits).div_ceil(8)).unwrap_or(usize::MAX);
+    let bytes = stream.bytes.get(start..end).unwrap_or_default();
+    let mut text = String::with_capacity(bytes.len() * 2);
+    for byte in bytes {
+        // Writing to a string cannot fail.
+        let _infallible = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+impl Dump {
+    fn text(&self) -> String {
+        let mut text = format!("unit {} {}  {}\n", self.unit, self.kind, span(self.at, self.bytes));
+        self.elements.iter().for_each(|element| element.push(&mut text));
+        text
+    }
+}
+
+impl Bytes {
+    /// The lines of an element: its name and value stand beside the first.
+    fn push(&self, text: &mut String) {
+        let row = &self.row;
+        let name = format!("{}.{} = {} ({})", row.record, row.name, row.value, row.clause);
+        let lines = self.hex.as_bytes().chunks(2 * WIDTH);
+        for (line, digits) in lines.enumerate() {
+            let pairs: Vec<&str> = digits.chunks(2).filter_map(|pair| str::from_utf8(pair).ok()).collect();
+            let at = row.at_bit + (line * WIDTH * 8) as u64;
+            let beside = if line == 0 { name.as_str() } else { "" };
+            let shown = format!("{:<10} {:<47}  {beside}", place(at), pairs.join(" "));
+            *text += shown.trim_end();
+            text.push('\n');
+        }
+    }
+}

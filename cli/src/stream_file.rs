@@ -1,0 +1,82 @@
+//! A stream on disk, and how much a command agrees to decode of it.
+
+use crate::failure::Failure;
+use clap::Args;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_format::syntax::{SIGNATURE, SequenceParameters, UnitType};
+use splatstream_format::unit::Stream;
+use splatstream_format::{Error, Limits};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// How much a stream may ask of this machine.
+#[derive(Args)]
+pub(crate) struct LimitArgs {
+    /// Gaussians that a frame may have; a stream that asks for more is refused (exit code 13).
+    #[arg(long, value_name = "N", default_value_t = Limits::default().max_gaussians)]
+    max_gaussians: u32,
+}
+
+impl LimitArgs {
+    /// The limits asked for.
+    pub(crate) fn limits(&self) -> Limits {
+        Limits { max_gaussians: self.max_gaussians, ..Limits::default() }
+    }
+}
+
+/// The bytes of a stream and the file they came from.
+pub(crate) struct StreamFile {
+    /// The file.
+    pub(crate) path: PathBuf,
+    /// All of it.
+    pub(crate) bytes: Vec<u8>,
+}
+
+impl StreamFile {
+    /// Reads a file; its content is not looked at.
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let bytes = std::fs::read(path).map_err(|error| Failure::file("read", path, &error))?;
+        Ok(Self { path: path.to_path_buf(), bytes })
+    }
+
+    /// A failure of this stream.
+    pub(crate) fn fault(&self, error: Error) -> Failure {
+        Failure::stream(&self.path, error)
+    }
+
+    /// The sequence parameters, if the stream starts as it should.
+    pub(crate) fn sequence(&self, limits: &Limits) -> Option<SequenceParameters> {
+        let unit = Stream::open(&self.bytes, limits).ok()?.units().next()?.ok()?;
+        (unit.header.unit_type() == UnitType::SequenceParameters)
+            .then(|| SequenceParameters::parse_payload(unit.payload, unit.payload_at).ok())?
+    }
+
+    /// Refuses an operating point that the stream cannot have: it would silently be another one.
+    pub(crate) fn check_point(&self, point: OperatingPoint, limits: &Limits) -> Result<(), Failure> {
+        let Some(sequence) = self.sequence(limits) else { return Ok(()) };
+        let has = |value: u8, count: u8| value == u8::MAX || value < count;
+        if has(point.spatial, sequence.spatial_layer_count)
+            && has(point.temporal, sequence.temporal_layer_count)
+            && has(point.refinement, sequence.refinement_count)
+        {
+            return Ok(());
+        }
+        let path = self.path.display();
+        let last = OperatingPoint {
+            spatial: sequence.spatial_layer_count.saturating_sub(1),
+            temporal: sequence.temporal_layer_count.saturating_sub(1),
+            refinement: sequence.refinement_count.saturating_sub(1),
+        };
+        Err(Failure::Usage(format!(
+            "{path}: there is no operating point {point}; the points go from s0,t0,r0 to {last}: \
+             `splatstream inspect --ops {path}` lists them"
+        )))
+    }
+}
+
+/// Whether a file starts like a stream; no if it cannot be read.
+pub(crate) fn is_stream(path: &Path) -> bool {
+    let mut start = [0; SIGNATURE.len()];
+    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE
+}

@@ -1,0 +1,326 @@
+//! Every broken rule of clauses 6.4 to 6.11 that one unit shows is refused with its class, its code, the clause
+//! and the offset.
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    reason = "a panic is a failed test"
+)]
+
+mod sample;
+
+use sample::case::{Case, assert_refused, case, put};
+use sample::{CODEBOOK, DC, END, FRAME, GOP, INDEX, REFINEMENT, SEQUENCE, SH};
+use splatstream_format::Limits;
+
+fn assert_payloads_refused(cases: &[Case]) {
+    for (number, case) in cases.iter().enumerate() {
+        let mut units = sample::units();
+        (case.edit)(&mut units[case.unit].1);
+        let at = sample::unit_at(&units, case.unit) + 20 + case.fault;
+        let what = format!("case {number}, unit {}", case.unit);
+        assert_refused(&what, sample::verdict(&sample::stream(&units)), case, at);
+    }
+}
+
+// covers: SS-ER-001, SS-SP-001, SS-SP-002, SS-SP-003
+#[test]
+fn broken_sequence_parameters_are_refused() {
+    const NAN: [u8; 4] = f32::NAN.to_le_bytes();
+    const INFINITE: [u8; 4] = f32::INFINITY.to_le_bytes();
+    assert_payloads_refused(&[
+        case(SEQUENCE, |p| p[0] = 4, "OUT_OF_RANGE", "6.4", 0),
+        case(SEQUENCE, |p| p[1] = 0, "OUT_OF_RANGE", "6.4", 1),
+        case(SEQUENCE, |p| p[1] = 2, "OUT_OF_RANGE", "6.4", 1),
+        case(SEQUENCE, |p| p[2] = 2, "OUT_OF_RANGE", "6.4", 2),
+        case(SEQUENCE, |p| p[3] = 0, "OUT_OF_RANGE", "6.4", 3),
+        case(SEQUENCE, |p| p[3] = 11, "OUT_OF_RANGE", "6.4", 3),
+        case(SEQUENCE, |p| p[4] = 0, "OUT_OF_RANGE", "6.4", 4),
+        case(SEQUENCE, |p| p[5] = 20, "OUT_OF_RANGE", "6.4", 5),
+        case(SEQUENCE, |p| p[5] = 100, "OUT_OF_RANGE", "6.4", 5),
+        case(SEQUENCE, |p| p[6] = 99, "OUT_OF_RANGE", "6.4", 6),
+        case(SEQUENCE, |p| p[6] = 101, "OUT_OF_RANGE", "6.4", 6),
+        case(SEQUENCE, |p| p[7] = 100, "OUT_OF_RANGE", "6.4", 7),
+        case(SEQUENCE, |p| p[13] = 1, "OUT_OF_RANGE", "6.4", 13),
+        case(SEQUENCE, |p| p[14] = 0, "OUT_OF_RANGE", "6.4", 14),
+        case(SEQUENCE, |p| p[14] = 21, "OUT_OF_RANGE", "6.4", 14),
+        case(SEQUENCE, |p| p[15] = 5, "OUT_OF_RANGE", "6.4", 15),
+        case(SEQUENCE, |p| p[15] = 17, "OUT_OF_RANGE", "6.4", 15),
+        case(SEQUENCE, |p| p[16] = 4, "RESERVED_BITS", "6.4", 16),
+        case(SEQUENCE, |p| p[18] = 31, "OUT_OF_RANGE", "6.4", 18),
+        case(SEQUENCE, |p| p[19] = 21, "OUT_OF_RANGE", "6.4", 19),
+        case(SEQUENCE, |p| put(p, 24, [0; 4]), "OUT_OF_RANGE", "6.4", 24),
+        case(SEQUENCE, |p| put(p, 32, NAN), "CONSTRAINT", "6.4", 32),
+        case(SEQUENCE, |p| put(p, 36, INFINITE), "CONSTRAINT", "6.4", 36),
+        case(
+            SEQUENCE,
+            |p| put(p, 40, (-1.1e12_f32).to_le_bytes()),
+            "CONSTRAINT",
+            "6.4",
+            40,
+        ),
+        case(SEQUENCE, |p| put(p, 44, [0; 4]), "CONSTRAINT", "6.4", 44),
+        case(SEQUENCE, |p| put(p, 48, NAN), "CONSTRAINT", "6.4", 48),
+        case(
+            SEQUENCE,
+            |p| put(p, 52, (-0.5_f32).to_le_bytes()),
+            "CONSTRAINT",
+            "6.4",
+            52,
+        ),
+        case(
+            SEQUENCE,
+            |p| put(p, 56, 1.01_f32.to_le_bytes()),
+            "CONSTRAINT",
+            "6.4",
+            56,
+        ),
+        case(SEQUENCE, |p| put(p, 60, INFINITE), "CONSTRAINT", "6.4", 60),
+        case(
+            SEQUENCE,
+            |p| put(p, 64, 1.1e6_f32.to_le_bytes()),
+            "CONSTRAINT",
+            "6.4",
+            64,
+        ),
+        case(
+            SEQUENCE,
+            |p| put(p, 68, 9e-13_f32.to_le_bytes()),
+            "CONSTRAINT",
+            "6.4",
+            68,
+        ),
+        case(SEQUENCE, |p| put(p, 72, NAN), "CONSTRAINT", "6.4", 72),
+        // The first broken element in the order of the table counts.
+        case(SEQUENCE, |p| put(p, 14, [0, 0]), "OUT_OF_RANGE", "6.4", 14),
+    ]);
+}
+
+// covers: SS-SP-003
+#[test]
+fn the_ends_of_the_ranges_are_accepted() {
+    let mut units = sample::units();
+    let payload = &mut units[SEQUENCE].1;
+    let (smallest, largest) = (2_f32.powi(-40).to_le_bytes(), 2_f32.powi(20).to_le_bytes());
+    put(payload, 32, 2_f32.powi(40).to_le_bytes());
+    put(payload, 36, (-2_f32.powi(40)).to_le_bytes());
+    put(payload, 40, (-0.0_f32).to_le_bytes());
+    put(payload, 44, smallest);
+    put(payload, 52, largest);
+    put(payload, 56, 1_f32.to_le_bytes());
+    assert_eq!(sample::verdict(&sample::stream(&units)), None);
+}
+
+// covers: SS-GH-002, SS-GH-003, SS-FR-001
+#[test]
+fn broken_gop_and_frame_headers_are_refused() {
+    assert_payloads_refused(&[
+        case(GOP, |p| put(p, 4, [0; 4]), "OUT_OF_RANGE", "6.5", 4),
+        case(GOP, |p| p[8] = 1, "RESERVED", "6.5", 8),
+        case(GOP, |p| p[9] = 1, "RESERVED_BITS", "6.5", 9),
+        case(GOP, |p| p[11] = 1, "RESERVED_BITS", "6.5", 11),
+        case(FRAME, |p| p[0] = 1, "RESERVED", "6.6", 0),
+        case(FRAME, |p| p[0] = 2, "RESERVED", "6.6", 0),
+        case(FRAME, |p| p[1] = 16, "OUT_OF_RANGE", "6.6", 1),
+        case(FRAME, |p| p[1] = 255, "OUT_OF_RANGE", "6.6", 1),
+        case(FRAME, |p| p[2] = 16, "OUT_OF_RANGE", "6.6", 2),
+        case(FRAME, |p| p[3] = 1, "RESERVED_BITS", "6.6", 3),
+        case(
+            FRAME,
+            |p| put(p, 4, u32::MAX.to_le_bytes()),
+            "OVER_LIMIT",
+            "A.2",
+            4,
+        ),
+    ]);
+    let mut units = sample::units();
+    units[GOP].0.frame = u32::MAX;
+    assert_eq!(sample::verdict(&sample::stream(&units)), None);
+    put(&mut units[GOP].1, 4, 2_u32.to_le_bytes());
+    let expected = case(GOP, |_| (), "OUT_OF_RANGE", "6.5", 4);
+    let at = sample::unit_at(&units, GOP) + 24;
+    assert_refused(
+        "last display index",
+        sample::verdict(&sample::stream(&units)),
+        &expected,
+        at,
+    );
+}
+
+// covers: SS-TF-001, SS-TF-002, SS-TF-004
+#[test]
+fn broken_transforms_are_refused() {
+    assert_payloads_refused(&[
+        case(DC, |p| p[0] = 16, "OUT_OF_RANGE", "6.7", 0),
+        case(DC, |p| p[1] = 2, "RESERVED", "6.7", 1),
+        case(DC, |p| p[2] = 9, "MISMATCH", "6.7", 2),
+        case(SH, |p| p[2] = 24, "MISMATCH", "6.7", 2),
+        case(SH, |p| p[2] = 0, "MISMATCH", "6.7", 2),
+        case(DC, |p| p[3] = 0, "OUT_OF_RANGE", "6.7", 3),
+        case(DC, |p| p[3] = 4, "OUT_OF_RANGE", "6.7", 3),
+        case(SH, |p| p[3] = 10, "OUT_OF_RANGE", "6.7", 3),
+        case(
+            DC,
+            |p| put(p, 8, (1_i32 << 30).wrapping_add(1).to_le_bytes()),
+            "OUT_OF_RANGE",
+            "6.7",
+            8,
+        ),
+        case(
+            DC,
+            |p| put(p, 12, i32::MIN.to_le_bytes()),
+            "OUT_OF_RANGE",
+            "6.7",
+            12,
+        ),
+        case(
+            DC,
+            |p| put(p, 16, 4097_i16.to_le_bytes()),
+            "OUT_OF_RANGE",
+            "6.7",
+            16,
+        ),
+        case(
+            DC,
+            |p| put(p, 32, (-4097_i16).to_le_bytes()),
+            "OUT_OF_RANGE",
+            "6.7",
+            32,
+        ),
+        // Bytes left over come before values.
+        case(
+            DC,
+            |p| {
+                put(p, 16, 4097_i16.to_le_bytes());
+                p.push(0);
+            },
+            "TRAILING_BYTES",
+            "5.7",
+            34,
+        ),
+    ]);
+}
+
+// covers: SS-RU-002; SS-RU-003 and SS-RU-004 as far as one unit shows them
+#[test]
+fn broken_codebooks_and_refinements_are_refused() {
+    assert_payloads_refused(&[
+        case(CODEBOOK, |p| p[0] = 16, "OUT_OF_RANGE", "6.8", 0),
+        case(CODEBOOK, |p| p[1] = 0, "OUT_OF_RANGE", "6.8", 1),
+        case(CODEBOOK, |p| p[1] = 46, "OUT_OF_RANGE", "6.8", 1),
+        case(CODEBOOK, |p| p[4] = 0, "OUT_OF_RANGE", "6.8", 4),
+        case(CODEBOOK, |p| p[4] = 3, "OUT_OF_RANGE", "6.8", 4),
+        case(REFINEMENT, |p| p[12] = 16, "OUT_OF_RANGE", "6.9", 12),
+        case(REFINEMENT, |p| p[13] = 6, "OUT_OF_RANGE", "6.9", 13),
+        case(REFINEMENT, |p| p[14] = 3, "RESERVED", "6.9", 14),
+        case(REFINEMENT, |p| p[15] = 0, "OUT_OF_RANGE", "6.9", 15),
+        case(REFINEMENT, |p| p[15] = 5, "OUT_OF_RANGE", "6.9", 15),
+        case(REFINEMENT, |p| p[14] = 1, "OUT_OF_RANGE", "6.9", 15),
+        case(REFINEMENT, |p| p[16] = 16, "OUT_OF_RANGE", "6.9", 16),
+        case(REFINEMENT, |p| p[17] = 0, "OUT_OF_RANGE", "6.9", 17),
+        case(REFINEMENT, |p| p[19] = 7, "OUT_OF_RANGE", "6.9", 19),
+        case(REFINEMENT, |p| put(p, 8, [0; 4]), "MISMATCH", "6.9", 20),
+        case(
+            REFINEMENT,
+            |p| drop(p.splice(20..21, [0x83, 0])),
+            "NUMBER",
+            "5.9",
+            20,
+        ),
+        case(
+            REFINEMENT,
+            |p| drop(p.splice(20..21, [0x80, 0x80, 0x80, 0x80, 16])),
+            "NUMBER",
+            "5.9",
+            20,
+        ),
+        case(
+            REFINEMENT,
+            |p| drop(p.splice(25..26, [0x85, 0])),
+            "NUMBER",
+            "5.9",
+            25,
+        ),
+        // More blocks than bytes: refused before room is made for them.
+        case(
+            REFINEMENT,
+            |p| put(p, 8, (1_u32 << 22).to_le_bytes()),
+            "SHORT_SECTION",
+            "5.9",
+            24,
+        ),
+        case(
+            REFINEMENT,
+            |p| put(p, 8, u32::MAX.to_le_bytes()),
+            "OVER_LIMIT",
+            "A.2",
+            8,
+        ),
+        case(INDEX, |p| p[8] = 1, "RESERVED_BITS", "6.10", 8),
+        case(
+            INDEX,
+            |p| put(p, 0, u32::MAX.to_le_bytes()),
+            "SHORT_SECTION",
+            "5.10",
+            4,
+        ),
+    ]);
+}
+
+// covers: SS-ER-003
+#[test]
+fn a_payload_that_is_too_long_or_too_short_is_refused() {
+    // The last element of each payload: its name is in the error, its first byte is the offset.
+    let last = [
+        (SEQUENCE, "5.4", 72),
+        (GOP, "5.5", 9),
+        (DC, "5.7", 16),
+        (SH, "5.7", 40),
+        (CODEBOOK, "5.8", 5),
+        (FRAME, "5.6", 4),
+        (REFINEMENT, "5.9", 30),
+        (INDEX, "5.10", 4),
+        (END, "5.11", 8),
+    ];
+    for (unit, clause, fault) in last {
+        let length = u64::try_from(sample::units()[unit].1.len()).unwrap();
+        assert_payloads_refused(&[
+            case(unit, |p| p.truncate(p.len() - 1), "SHORT_SECTION", clause, fault),
+            case(unit, |p| p.push(0), "TRAILING_BYTES", clause, length),
+            case(unit, Vec::clear, "SHORT_SECTION", clause, 0),
+        ]);
+    }
+}
+
+// covers: SS-LM-003
+#[test]
+fn limits_of_the_caller_are_kept() {
+    let bytes = sample::stream(&sample::units());
+    let refused = |limits: Limits| {
+        let error = splatstream_format::inspect::inspect(&bytes, &limits, &mut |_| ()).unwrap();
+        (error.class().name(), error.at)
+    };
+    let (all, units) = (Limits::default(), sample::units());
+    let place = |unit, offset| ("over-limit", sample::unit_at(&units, unit) + offset);
+    assert_eq!(refused(Limits { max_units: 3, ..all }), place(3, 0));
+    assert_eq!(
+        refused(Limits {
+            max_payload: 75,
+            ..all
+        }),
+        place(SEQUENCE, 12)
+    );
+    assert_eq!(
+        refused(Limits {
+            max_codebook_values: 3,
+            ..all
+        }),
+        place(CODEBOOK, 22)
+    );
+    assert_eq!(
+        refused(Limits {
+            max_gaussians: 499,
+            ..all
+        }),
+        place(FRAME, 24)
+    );
+}

@@ -1,0 +1,175 @@
+//! A small stream with one unit of each known type, and the means to break it.
+#![allow(dead_code, reason = "every test file uses a part")]
+#![allow(
+    clippy::unwrap_used,
+    reason = "a sample that cannot be written is a failed test"
+)]
+
+pub(crate) mod case;
+
+use splatstream_format::payload::{Codebook, Index, Transform, write_refinement};
+use splatstream_format::syntax::{
+    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, RefinementHeader,
+    SequenceParameters, TransformHeader, UnitId, UnitType,
+};
+use splatstream_format::unit::{write_file_header, write_unit};
+use splatstream_format::{Error, Limits, inspect::inspect};
+
+/// Bytes of file_header, and of unit_header.
+pub(crate) const FILE_HEADER: usize = 16;
+pub(crate) const UNIT_HEADER: usize = 20;
+
+/// Places of the units in [`units`].
+pub(crate) const SEQUENCE: usize = 0;
+pub(crate) const GOP: usize = 1;
+pub(crate) const DC: usize = 2;
+pub(crate) const SH: usize = 3;
+pub(crate) const CODEBOOK: usize = 4;
+pub(crate) const FRAME: usize = 5;
+pub(crate) const REFINEMENT: usize = 6;
+pub(crate) const INDEX: usize = 7;
+pub(crate) const END: usize = 8;
+
+pub(crate) type Units = Vec<(UnitId, Vec<u8>)>;
+
+pub(crate) fn sequence() -> SequenceParameters {
+    SequenceParameters {
+        sh_degree: 1,
+        spatial_layer_count: 1,
+        temporal_layer_count: 1,
+        refinement_count: 3,
+        refinement_percent: [20, 50, 100, 0, 0, 0, 0, 0, 0, 0],
+        position_bits: 16,
+        block_log2: 6,
+        sequence_flags: SequenceParameters::flags(true, false),
+        rotation_threshold: [30, 20, 10],
+        frame_count: 1,
+        ticks_per_second: 30,
+        ticks_per_frame: 1,
+        position_offset: [(-1.0_f32).to_bits(), 0, 1.0_f32.to_bits()],
+        position_step: 0.001_f32.to_bits(),
+        log_scale_offset: (-8.0_f32).to_bits(),
+        log_scale_step: 0.0625_f32.to_bits(),
+        rotation_step: 0.0078125_f32.to_bits(),
+        opacity_offset: 0,
+        opacity_step: 0.125_f32.to_bits(),
+        dc_step: 0.03125_f32.to_bits(),
+        sh_step: 0.0625_f32.to_bits(),
+    }
+}
+
+pub(crate) fn refinement_header() -> RefinementHeader {
+    RefinementHeader {
+        refinement_digest: 0x0123_4567_89AB_CDEF,
+        gaussian_count: 100,
+        position_shift: 2,
+        lanes_log2: 3,
+        sh_mode: 2,
+        vq_stage_count: 1,
+        codebook_ids: [7, NO_CODEBOOK, NO_CODEBOOK, NO_CODEBOOK],
+    }
+}
+
+fn transform(transform_id: u8, transform_kind: u8, dimension: u8, rank: u8) -> Vec<u8> {
+    let header = TransformHeader {
+        transform_id,
+        transform_kind,
+        dimension,
+        rank,
+    };
+    let mean = (0..i32::from(dimension)).map(|place| place * 1000 - 1).collect();
+    let basis = (0..i16::from(rank) * i16::from(dimension))
+        .map(|place| place * 7 - 4096)
+        .collect();
+    Transform { header, mean, basis }.to_bytes(&sequence()).unwrap()
+}
+
+/// The units in order; the payloads can be edited before [`stream`].
+pub(crate) fn units() -> Units {
+    let codebook = Codebook {
+        header: CodebookHeader {
+            codebook_id: 7,
+            component_count: 2,
+            entry_count_minus1: 1,
+            value_bytes: 1,
+        },
+        entries: vec![-128, 127, 0, 5],
+    };
+    let blocks: [&[u8]; 2] = [&[1, 2, 3, 4], &[5, 6, 7, 8, 9]];
+    let refinement = write_refinement(&refinement_header(), &sequence(), &[10, 11, 12], &blocks).unwrap();
+    let sequence = sequence().to_bytes().unwrap();
+    // The GOP header stands behind the file header and the sequence parameters.
+    let offset = u64::try_from(FILE_HEADER + UNIT_HEADER + sequence.len()).unwrap();
+    let entries = vec![IndexEntry {
+        frame: 0,
+        reserved_zero: 0,
+        offset,
+    }];
+    let mut units = vec![
+        (UnitId::stream(UnitType::SequenceParameters), sequence),
+        (
+            UnitId::of_frame(UnitType::GopHeader, 0),
+            GopHeader::intra(0, 1).to_bytes().unwrap(),
+        ),
+        (UnitId::of_frame(UnitType::Transform, 0), transform(3, 0, 3, 3)),
+        (UnitId::of_frame(UnitType::Transform, 0), transform(4, 1, 9, 2)),
+        (
+            UnitId::of_frame(UnitType::Codebook, 0),
+            codebook.to_bytes().unwrap(),
+        ),
+        (
+            UnitId::of_frame(UnitType::FrameHeader, 0),
+            FrameHeader::intra(3, Some(4), 500).to_bytes().unwrap(),
+        ),
+        (UnitId::of_refinement(0, 0), refinement),
+        (
+            UnitId::stream(UnitType::Index),
+            Index { entries }.to_bytes().unwrap(),
+        ),
+    ];
+    let end = EndOfStream {
+        frame_count: 1,
+        unit_count: 8,
+        index_offset: unit_at(&units, INDEX),
+    };
+    units.push((UnitId::stream(UnitType::End), end.to_bytes().unwrap()));
+    units
+}
+
+/// Offset of a unit in the stream of [`stream`].
+pub(crate) fn unit_at(units: &Units, place: usize) -> u64 {
+    let before = units
+        .iter()
+        .take(place)
+        .map(|(_, payload)| UNIT_HEADER + payload.len());
+    u64::try_from(FILE_HEADER + before.sum::<usize>()).unwrap()
+}
+
+/// The stream of these units, with check sums that fit.
+pub(crate) fn stream(units: &Units) -> Vec<u8> {
+    let mut bytes = write_file_header(2).unwrap();
+    for (id, payload) in units {
+        write_unit(&mut bytes, *id, payload).unwrap();
+    }
+    bytes
+}
+
+/// Makes the check sum of the unit header at `at` fit again.
+pub(crate) fn seal_unit_header(bytes: &mut [u8], at: usize) {
+    let mut crc = crc32fast::Hasher::new();
+    crc.update(&bytes[at..at + 6]);
+    crc.update(&bytes[at + 8..at + 20]);
+    let check = crc.finalize().to_le_bytes();
+    bytes[at + 6..at + 8].copy_from_slice(&check[..2]);
+}
+
+/// Makes the check sum of the file header fit again.
+pub(crate) fn seal_file_header(bytes: &mut [u8]) {
+    let crc = crc32fast::hash(&bytes[..12]);
+    bytes[12..16].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// The first error of a stream, as the inspector finds it: it reads every unit and every payload.
+pub(crate) fn verdict(bytes: &[u8]) -> Option<Error> {
+    inspect(bytes, &Limits::default(), &mut |_| ())
+}

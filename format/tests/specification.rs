@@ -1,0 +1,117 @@
+//! The tables of `spec/05-syntax.md` are the tables of the code.
+#![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
+
+use splatstream_format::payload::VARIABLE_ROWS;
+use splatstream_format::syntax::{TABLES, Table};
+use std::path::Path;
+
+/// Name, type and clause of semantics of an element.
+type Row = (String, String, String);
+
+fn clause_5() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/05-syntax.md");
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The rows of the table under the heading `## clause record`.
+fn specified(text: &str, table: &Table) -> Vec<Row> {
+    let heading = format!("{} {}", table.syntax, table.name);
+    let is_heading = |line: &str| line.starts_with('#');
+    let under_heading = text
+        .lines()
+        .skip_while(|line| !is_heading(line) || line.trim_start_matches('#').trim() != heading);
+    let rows: Vec<Row> = under_heading
+        .skip(1)
+        .take_while(|line| !is_heading(line))
+        .filter_map(row)
+        .collect();
+    assert!(
+        !rows.is_empty(),
+        "spec/05-syntax.md has no table under the heading `{heading}`"
+    );
+    rows
+}
+
+/// `| `element` | type | clause |`; the head of the table and other lines are none.
+fn row(line: &str) -> Option<Row> {
+    let mut cells = line.strip_prefix('|')?.split('|').map(str::trim);
+    let name = cells.next()?.strip_prefix('`')?.strip_suffix('`')?;
+    Some((
+        name.to_owned(),
+        cells.next()?.to_owned(),
+        cells.next()?.to_owned(),
+    ))
+}
+
+/// The fixed rows of the code, and the variable ones behind them.
+fn coded(table: &Table) -> Vec<Row> {
+    let fixed = table.rows.iter().map(|row| (row.name, row.type_name));
+    let behind = VARIABLE_ROWS.iter().filter(|row| row.record == table.name);
+    let behind = behind.map(|row| (row.name, row.type_name));
+    let row =
+        |(name, type_name): (&str, &str)| (name.to_owned(), type_name.to_owned(), table.semantics.to_owned());
+    fixed.chain(behind).map(row).collect()
+}
+
+#[test]
+fn every_syntax_table_is_that_of_the_specification() {
+    let text = clause_5();
+    for table in TABLES {
+        let (specified, coded) = (specified(&text, &table), coded(&table));
+        for (place, (specified, coded)) in specified.iter().zip(&coded).enumerate() {
+            assert_eq!(
+                specified,
+                coded,
+                "{}, row {}: specification, code",
+                table.name,
+                place + 1
+            );
+        }
+        let extra = specified
+            .iter()
+            .skip(coded.len())
+            .chain(coded.iter().skip(specified.len()));
+        let extra: Vec<_> = extra.collect();
+        assert!(
+            extra.is_empty(),
+            "{}: rows on one side only: {extra:?}",
+            table.name
+        );
+    }
+}
+
+#[test]
+fn every_table_of_the_specification_is_in_the_code() {
+    // 5.1 has no table; 5.12 and 5.13 are bit sections, which clause 8 reads.
+    let text = clause_5();
+    let headings = text
+        .lines()
+        .filter_map(|line| line.trim_start_matches('#').trim().split_once(' '));
+    let headings = headings.filter(|(clause, _)| clause.starts_with("5."));
+    let fixed = headings.filter(|(clause, _)| !["5.1", "5.12", "5.13"].contains(clause));
+    for (clause, record) in fixed {
+        let known = TABLES
+            .iter()
+            .any(|table| (table.syntax, table.name) == (clause, record));
+        assert!(known, "{clause} {record} has no record in the code");
+    }
+}
+
+#[test]
+fn rows_and_sizes_agree() {
+    let sizes = TABLES.map(|table| (table.name, table.size()));
+    let expected = [
+        ("file_header", 16),
+        ("unit_header", 20),
+        ("sequence_parameters", 76),
+        ("gop_header", 12),
+        ("frame_header", 8),
+        ("transform", 4),
+        ("codebook", 5),
+        ("refinement", 20),
+        ("index", 4),
+        ("index_entry", 16),
+        ("end", 16),
+    ];
+    assert_eq!(sizes, expected);
+}
