@@ -19,15 +19,19 @@ impl Console {
     }
 
     /// Prints the result of a command, in the form asked for.
-    pub(crate) fn report(&self, report: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), Failure> {
+    pub(crate) fn report(
+        &self,
+        report: &impl Serialize,
+        text: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
         let mut output = if self.json { to_json(report)? } else { text() };
         if !output.ends_with('\n') {
             output.push('\n');
         }
         match io::stdout().lock().write_all(output.as_bytes()) {
-            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-                Err(Failure::other(format!("cannot write to standard output: {error}")))
-            }
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::other(format!(
+                "cannot write to standard output: {error}"
+            ))),
             _ => Ok(()),
         }
     }

@@ -33,7 +33,12 @@ pub(crate) struct Decode {
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
     /// A directory for frame_0000.ply and so on, or a .ply, .spz or .splat file for one frame.
-    #[arg(short, long = "out", value_name = "DIR_OR_FILE", required_unless_present = "dry_run")]
+    #[arg(
+        short,
+        long = "out",
+        value_name = "DIR_OR_FILE",
+        required_unless_present = "dry_run"
+    )]
     out: Option<PathBuf>,
     /// The operating point: highest spatial layer, temporal layer and refinement; default is everything.
     #[arg(long, value_name = "sS,tT,rR")]
@@ -105,11 +110,15 @@ impl Decode {
         let options = self.options();
         stream.check_point(options.operating_point, &options.limits)?;
         let frames = self.frames.unwrap_or(FrameRange::ALL);
-        let announced = stream.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
+        let announced = stream
+            .sequence(&options.limits)
+            .map_or(0, |sequence| sequence.frame_count);
         let target = self.target(frames.count_in(announced))?;
         let mut decoding = Decoding::new(frames, target.as_ref(), announced);
         let start = Instant::now();
-        let summary = decode_stream(&stream.bytes, &options, |sequence, frame| decoding.take(sequence, &frame));
+        let summary = decode_stream(&stream.bytes, &options, |sequence, frame| {
+            decoding.take(sequence, &frame)
+        });
         let total = start.elapsed();
         if let Some(failure) = decoding.failed.take() {
             return Err(failure);
@@ -118,7 +127,9 @@ impl Decode {
         let report = self.report(decoding, summary.end, total);
         if announced > 0 && frames.count_in(announced) == 0 {
             let path = stream.path.display();
-            return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));
+            return Err(Failure::Usage(format!(
+                "{path}: no such frames, the stream has {announced}"
+            )));
         }
         console.report(&report, || report.text())?;
         first_error.map_or(Ok(()), |error| Err(stream.fault(error)))
@@ -135,7 +146,10 @@ impl Decode {
 
     /// Where `frames` frames go; none for a dry run.
     fn target(&self, frames: u32) -> Result<Option<Target>, Failure> {
-        self.out.as_deref().map(|path| Target::new(path, self.format, frames)).transpose()
+        self.out
+            .as_deref()
+            .map(|path| Target::new(path, self.format, frames))
+            .transpose()
     }
 
     fn report(&self, decoding: Decoding<'_>, end: Option<Error>, total: Duration) -> Report {
@@ -178,7 +192,9 @@ impl<'a> Decoding<'a> {
             self.count(frame);
             let gaussians = to_gaussians(&frame.planes, sequence);
             let start = Instant::now();
-            self.failed = self.target.and_then(|target| target.write(frame.number, &gaussians).err());
+            self.failed = self
+                .target
+                .and_then(|target| target.write(frame.number, &gaussians).err());
             self.writing += start.elapsed();
         }
         self.progress.at(frame.number.saturating_add(1));
@@ -195,7 +211,11 @@ impl<'a> Decoding<'a> {
         if let Some(error) = frame.lost {
             self.first_error = self.first_error.or(Some(error));
             let fault = StreamFault::from(error);
-            self.lost.push(Lost { frame: frame.number, refinements: frame.refinements, fault });
+            self.lost.push(Lost {
+                frame: frame.number,
+                refinements: frame.refinements,
+                fault,
+            });
         }
     }
 }
@@ -206,7 +226,11 @@ impl Report {
             Some(path) => path.display().to_string(),
             None => "nothing written (--dry-run)".to_owned(),
         };
-        let digests = if self.verified { "agree with the frames shown" } else { "not compared (--no-verify)" };
+        let digests = if self.verified {
+            "agree with the frames shown"
+        } else {
+            "not compared (--no-verify)"
+        };
         let mut text = format!(
             "{place}\n  frames       {}\n  Gaussians    {}\n  decoding     {:.3} s, {} Gaussians a second\n  \
              in all       {:.3} s\n  digests      {digests}\n",
@@ -217,7 +241,10 @@ impl Report {
             self.seconds_total,
         );
         for lost in &self.lost {
-            text += &format!("  frame {} stops after {} refinements\n", lost.frame, lost.refinements);
+            text += &format!(
+                "  frame {} stops after {} refinements\n",
+                lost.frame, lost.refinements
+            );
         }
         text
     }

@@ -41,7 +41,10 @@ impl Failure {
 
     /// A stream that breaks the specification.
     pub(crate) fn stream(path: &Path, error: Error) -> Self {
-        Self::Stream { path: path.to_path_buf(), error }
+        Self::Stream {
+            path: path.to_path_buf(),
+            error,
+        }
     }
 
     /// 2 usage, 1 files and settings, 10 to 14 by the class of a stream's error.
@@ -61,7 +64,11 @@ impl fmt::Display for Failure {
             Self::Other(message) => f.write_str(message),
             Self::Stream { path, error } => {
                 let path = path.display();
-                write!(f, "{path}: {error}\n  {}", advice(error.class()).replace("FILE", &path.to_string()))
+                write!(
+                    f,
+                    "{path}: {error}\n  {}",
+                    advice(error.class()).replace("FILE", &path.to_string())
+                )
             }
         }
     }
@@ -77,7 +84,9 @@ fn advice(class: Class) -> &'static str {
             "the file breaks that clause of the specification: tell whoever made it; \
              `splatstream inspect FILE` shows the elements up to there"
         }
-        Class::Unsupported => "the file needs a later version or another profile: look for a newer splatstream",
+        Class::Unsupported => {
+            "the file needs a later version or another profile: look for a newer splatstream"
+        }
         Class::OverLimit => "if you trust the file, raise the limit with --max-gaussians",
         Class::Truncated => {
             "the file is cut short: copy it again; `splatstream decode FILE -o DIR` writes what is there"
@@ -109,6 +118,10 @@ impl From<Error> for StreamFault {
 
 impl fmt::Display for StreamFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "byte {:#x}: {} (clause {})", self.byte, self.message, self.clause)
+        write!(
+            f,
+            "byte {:#x}: {} (clause {})",
+            self.byte, self.message, self.clause
+        )
     }
 }

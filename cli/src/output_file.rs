@@ -19,16 +19,27 @@ impl OutputFile {
             _ => Path::new("."),
         };
         if path.is_dir() {
-            return Err(Failure::other(format!("{} is a directory: give the name of a file", path.display())));
+            return Err(Failure::other(format!(
+                "{} is a directory: give the name of a file",
+                path.display()
+            )));
         }
-        let file = builder().tempfile_in(parent).map_err(|error| Failure::file("write", path, &error))?;
-        Ok(Self { writer: BufWriter::with_capacity(1 << 20, file), path: path.to_path_buf() })
+        let file = builder()
+            .tempfile_in(parent)
+            .map_err(|error| Failure::file("write", path, &error))?;
+        Ok(Self {
+            writer: BufWriter::with_capacity(1 << 20, file),
+            path: path.to_path_buf(),
+        })
     }
 
     /// Moves the file to its place, over one that may be there.
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let failed = |error: std::io::Error| Failure::file("write", &self.path, &error);
-        let file = self.writer.into_inner().map_err(|error| failed(error.into_error()))?;
+        let file = self
+            .writer
+            .into_inner()
+            .map_err(|error| failed(error.into_error()))?;
         file.persist(&self.path).map_err(|error| failed(error.error))?;
         Ok(())
     }
@@ -36,7 +47,9 @@ impl OutputFile {
     /// Writes a whole file.
     pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let mut file = Self::create(path)?;
-        file.writer.write_all(bytes).map_err(|error| Failure::file("write", path, &error))?;
+        file.writer
+            .write_all(bytes)
+            .map_err(|error| Failure::file("write", path, &error))?;
         file.finish()
     }
 }

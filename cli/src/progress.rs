@@ -10,8 +10,11 @@ pub(crate) struct Progress(ProgressBar);
 impl Progress {
     /// A bar for `frames` frames; 0 if their number is not known. `verb` is "encoding" or the like.
     pub(crate) fn frames(verb: &'static str, frames: u32) -> Self {
-        let target =
-            if io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target = if io::stderr().is_terminal() {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
         let length = (frames > 0).then_some(u64::from(frames));
         let bar = ProgressBar::with_draw_target(length, target).with_message(verb);
         if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} frames, {eta} left") {

@@ -21,7 +21,10 @@ pub(crate) struct LimitArgs {
 impl LimitArgs {
     /// The limits asked for.
     pub(crate) fn limits(&self) -> Limits {
-        Limits { max_gaussians: self.max_gaussians, ..Limits::default() }
+        Limits {
+            max_gaussians: self.max_gaussians,
+            ..Limits::default()
+        }
     }
 }
 
@@ -37,7 +40,10 @@ impl StreamFile {
     /// Reads a file; its content is not looked at.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = std::fs::read(path).map_err(|error| Failure::file("read", path, &error))?;
-        Ok(Self { path: path.to_path_buf(), bytes })
+        Ok(Self {
+            path: path.to_path_buf(),
+            bytes,
+        })
     }
 
     /// A failure of this stream.
@@ -54,7 +60,9 @@ impl StreamFile {
 
     /// Refuses an operating point that the stream cannot have: it would silently be another one.
     pub(crate) fn check_point(&self, point: OperatingPoint, limits: &Limits) -> Result<(), Failure> {
-        let Some(sequence) = self.sequence(limits) else { return Ok(()) };
+        let Some(sequence) = self.sequence(limits) else {
+            return Ok(());
+        };
         let has = |value: u8, count: u8| value == u8::MAX || value < count;
         if has(point.spatial, sequence.spatial_layer_count)
             && has(point.temporal, sequence.temporal_layer_count)
@@ -78,5 +86,8 @@ impl StreamFile {
 /// Whether a file starts like a stream; no if it cannot be read.
 pub(crate) fn is_stream(path: &Path) -> bool {
     let mut start = [0; SIGNATURE.len()];
-    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE
+    File::open(path)
+        .and_then(|mut file| file.read_exact(&mut start))
+        .is_ok()
+        && start == SIGNATURE
 }

@@ -24,9 +24,35 @@ pub struct CodedBlock {
     pub log_scale: [Vec<i32>; 3],
     /// Reconstructed opacity.
     pub opacity: Vec<i32>,
+    /// For each plane the sum of the magnitudes of the attribute's planes up to it; kept as planes are added,
+    /// so that a group of n planes costs n additions and not n squared.
+    magnitudes: Vec<Vec<i32>>,
 }
 
 impl CodedBlock {
+    /// A block with these deltas, and no planes yet.
+    pub fn new(deltas: Vec<u64>) -> Self {
+        Self { deltas, ..Self::default() }
+    }
+
+    /// Adds the next plane in coding order.
+    pub fn push(&mut self, info: PlaneInfo, coded: Vec<i32>) {
+        let before = if info.place > 0 { self.magnitudes.last() } else { None };
+        let sums = match before {
+            Some(before) => {
+                before.iter().zip(&coded).map(|(&sum, &value)| sum.wrapping_add(value.wrapping_abs())).collect()
+            }
+            None => coded.iter().map(|&value| value.wrapping_abs()).collect(),
+        };
+        self.magnitudes.push(sums);
+        self.coded.push(coded);
+    }
+
+    /// The sums of the magnitudes of the attribute's planes before `plane`, which is not its first.
+    pub fn magnitudes_before(&self, plane: usize) -> &[i32] {
+        self.magnitudes.get(plane.wrapping_sub(1)).map(Vec::as_slice).unwrap_or_default()
+    }
+
     /// Gaussians in the block.
     pub fn len(&self) -> usize {
         self.deltas.len()
@@ -85,10 +111,10 @@ pub fn decode_coded(
     decoders: &[PlaneDecoder],
 ) -> Result<CodedBlock> {
     let mut reader = BlockReader::open(bytes, at, unit.lanes_log2)?;
-    let mut block = CodedBlock { deltas: vec![0; count], ..CodedBlock::default() };
+    let mut block = CodedBlock::new(vec![0; count]);
     for (plane, (&info, decoder)) in unit.layout.planes().iter().zip(decoders).enumerate() {
         let coded = read_plane(&mut reader, decoder, plane, info, &mut block);
-        block.coded.push(coded);
+        block.push(info, coded);
         keep_for_contexts(&mut block, info, decoder.bias());
     }
     reader.finish()?;
@@ -108,32 +134,56 @@ fn read_plane(
         return Vec::new();
     }
     let mut out = vec![0; block.len()];
-    let on_first = axis_contexts(first, plane, info, block);
-    let on_second = axis_contexts(second, plane, info, block);
+    let on_first = axis_contexts(first, plane, block);
+    let on_second = axis_contexts(second, plane, block);
     if info.alphabet == Alphabet::Index {
         reader.indices(decoder, &combine(&on_first, &on_second, second.contexts()), &mut out);
     } else if is_serial(first.source) || is_serial(second.source) {
-        let mut neighbours = Neighbours::default();
-        let on_axis = |axis: usize, known: &[u8], place: usize, neighbours: &Neighbours, source: Source| {
-            if is_serial(source) {
-                decoder.axis_context(axis, neighbours.value(source))
-            } else {
-                known.get(place).copied().unwrap_or(0)
-            }
-        };
-        let context = |place: usize, previous: i32| {
-            if place > 0 {
-                neighbours.push(previous);
-            }
-            let a = on_axis(0, &on_first, place, &neighbours, first.source);
-            let b = on_axis(1, &on_second, place, &neighbours, second.source);
-            decoder.context(a, b)
-        };
-        reader.signed_serial(decoder, context, &mut out);
+        read_serial(reader, decoder, [&on_first, &on_second], &mut out);
     } else {
         reader.signed(decoder, &combine(&on_first, &on_second, second.contexts()), &mut out);
     }
     out
+}
+
+/// Reads a plane with a context axis that depends on its own values; `known` are the contexts of the other.
+fn read_serial(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, known: [&[u8]; 2], out: &mut [i32]) {
+    let [first, second] = decoder.axes().each_ref().map(|axis| axis.source);
+    let [known_first, known_second] = known;
+    let at = |known: &[u8], place: usize| known.get(place).copied().unwrap_or(0);
+    match (is_serial(first), is_serial(second)) {
+        (true, false) => {
+            let context = |place: usize, neighbours: &Neighbours| {
+                decoder.context(decoder.first_context(neighbours.value(first)), at(known_second, place))
+            };
+            reader.signed_serial(decoder, following(context), out);
+        }
+        (false, _) => {
+            let context = |place: usize, neighbours: &Neighbours| {
+                decoder.context(at(known_first, place), decoder.second_context(neighbours.value(second)))
+            };
+            reader.signed_serial(decoder, following(context), out);
+        }
+        (true, true) => {
+            let context = |_: usize, neighbours: &Neighbours| {
+                let a = decoder.first_context(neighbours.value(first));
+                decoder.context(a, decoder.second_context(neighbours.value(second)))
+            };
+            reader.signed_serial(decoder, following(context), out);
+        }
+    }
+}
+
+/// Keeps the neighbours of the value that is read next.
+#[inline(always)]
+fn following(context: impl Fn(usize, &Neighbours) -> u8) -> impl FnMut(usize, i32) -> u8 {
+    let mut neighbours = Neighbours::default();
+    move |place, previous| {
+        if place > 0 {
+            neighbours.push(previous);
+        }
+        context(place, &neighbours)
+    }
 }
 
 fn read_deltas(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, deltas: &mut [u64]) {
@@ -143,10 +193,10 @@ fn read_deltas(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, deltas: &mu
         if place > 0 {
             neighbours.push(previous);
         }
-        let on_axis = |axis: usize, has_source: bool| {
-            if has_source { decoder.axis_context(axis, neighbours.value()) } else { 0 }
-        };
-        decoder.context(on_axis(0, has_first), on_axis(1, has_second))
+        let value = neighbours.value();
+        let first = if has_first { decoder.first_context(value) } else { 0 };
+        let second = if has_second { decoder.second_context(value) } else { 0 };
+        decoder.context(first, second)
     };
     reader.deltas(decoder, context, deltas);
 }

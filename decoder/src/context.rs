@@ -1,7 +1,6 @@
 //! Clause 8.5: the values that choose the context of a symbol.
 
 use crate::block::CodedBlock;
-use crate::layout::{Attribute, PlaneInfo};
 use splatstream_format::entropy::model::{ContextAxis, Source};
 
 /// The last four coded values of a plane, and what the two serial sources make of them.
@@ -64,22 +63,13 @@ pub fn is_serial(source: Source) -> bool {
 }
 
 /// The values of a source that is not serial for every Gaussian of a block, known before `plane` is read.
-pub fn values(source: Source, plane: usize, info: PlaneInfo, block: &CodedBlock) -> Vec<i32> {
+pub fn values(source: Source, plane: usize, block: &CodedBlock) -> Vec<i32> {
     let coded = |plane: usize| block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
     let [largest, middle, smallest] = &block.log_scale;
     match source {
         Source::None | Source::NeighbourSum | Source::NeighbourMagnitude => Vec::new(),
         Source::PreviousPlane => coded(plane.wrapping_sub(1)).to_vec(),
-        Source::GroupMagnitude => {
-            let first = plane.wrapping_sub(usize::from(info.place));
-            let mut sums = vec![0_i32; block.len()];
-            for group_plane in first..plane {
-                for (sum, &value) in sums.iter_mut().zip(coded(group_plane)) {
-                    *sum = sum.wrapping_add(value.wrapping_abs());
-                }
-            }
-            sums
-        }
+        Source::GroupMagnitude => block.magnitudes_before(plane).to_vec(),
         Source::LargestLogScale => largest.clone(),
         Source::MiddleLogScale => middle.clone(),
         Source::LogVolume => largest
@@ -101,11 +91,11 @@ fn spacing(deltas: &[u64]) -> Vec<i32> {
 }
 
 /// The contexts of one axis for every Gaussian; empty if the axis has no or a serial source.
-pub fn axis_contexts(axis: &ContextAxis, plane: usize, info: PlaneInfo, block: &CodedBlock) -> Vec<u8> {
+pub fn axis_contexts(axis: &ContextAxis, plane: usize, block: &CodedBlock) -> Vec<u8> {
     if axis.source == Source::None || is_serial(axis.source) {
         return Vec::new();
     }
-    let values = values(axis.source, plane, info, block);
+    let values = values(axis.source, plane, block);
     let mut contexts = vec![0_u8; values.len()];
     for &threshold in &axis.thresholds {
         for (context, &value) in contexts.iter_mut().zip(&values) {
@@ -121,11 +111,9 @@ pub fn axis_contexts(axis: &ContextAxis, plane: usize, info: PlaneInfo, block: &
 pub fn plane_contexts(
     axes: &[ContextAxis; 2],
     plane: usize,
-    info: PlaneInfo,
     block: &CodedBlock,
     values: &[i32],
 ) -> Vec<u8> {
-    debug_assert!(info.attribute != Attribute::Position, "positions have contexts of their own");
     let [first, second] = axes;
     if first.source == Source::None {
         return Vec::new();
@@ -134,7 +122,7 @@ pub fn plane_contexts(
         if is_serial(axis.source) {
             serial_contexts(axis, values)
         } else {
-            axis_contexts(axis, plane, info, block)
+            axis_contexts(axis, plane, block)
         }
     };
     combine(&on_axis(first), &on_axis(second), second.contexts())

@@ -1,5 +1,7 @@
 //! Clause 7.9: the canonical integer planes of a frame.
 
+use rayon::prelude::*;
+
 /// A reconstructed frame: integers on the lattices of the sequence, Gaussians in coded order.
 ///
 /// All planes have the same length.
@@ -43,14 +45,21 @@ impl QuantizedFrame {
         self.opacity.is_empty()
     }
 
-    /// Appends the Gaussians of `other`, which has as many SH planes.
-    pub fn append(&mut self, other: &Self) {
-        for (plane, more) in self.position.iter_mut().zip(&other.position) {
-            plane.extend_from_slice(more);
+    /// Appends blocks that have as many SH planes, one plane a task.
+    pub fn append(&mut self, blocks: &[Self]) {
+        for (axis, plane) in self.position.iter_mut().enumerate() {
+            for more in blocks.iter().filter_map(|block| block.position.get(axis)) {
+                plane.extend_from_slice(more);
+            }
         }
-        for (plane, more) in self.signed_planes_mut().zip(other.signed_planes()) {
-            plane.extend_from_slice(more);
+        let mut parts: Vec<(&mut Vec<i32>, Vec<&[i32]>)> =
+            self.signed_planes_mut().map(|plane| (plane, Vec::with_capacity(blocks.len()))).collect();
+        for block in blocks {
+            for ((_, parts), part) in parts.iter_mut().zip(block.signed_planes()) {
+                parts.push(part);
+            }
         }
+        parts.into_par_iter().for_each(|(plane, parts)| parts.iter().for_each(|part| plane.extend_from_slice(part)));
     }
 
     /// Keeps the first `count` Gaussians.

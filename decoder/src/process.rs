@@ -331,7 +331,7 @@ impl<'a> Decoder<'a> {
     fn assemble(
         &self,
         frame: &PendingFrame<'a>,
-        results: Vec<Result<QuantizedFrame>>,
+        results: Vec<Result<Vec<QuantizedFrame>>>,
         sequence: &SequenceParameters,
     ) -> Result<DecodedFrame> {
         let count = usize::try_from(frame.header.gaussian_count).unwrap_or(usize::MAX);
@@ -346,8 +346,8 @@ impl<'a> Decoder<'a> {
         let mut digests: Vec<UnitDigest> = Vec::new();
         for (unit, result) in frame.units.iter().zip(results) {
             let start = decoded.planes.len();
-            let checked = result.and_then(|planes| {
-                decoded.planes.append(&planes);
+            let checked = result.and_then(|blocks| {
+                decoded.planes.append(&blocks);
                 self.check_digest(unit, &decoded.planes, start, &mut digests)
             });
             match checked {

@@ -171,7 +171,7 @@ fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedB
                 Alphabet::Index => u64::from(value.cast_unsigned()),
                 _ => u64::from(zigzag(value)),
             };
-            (plane_contexts(&model.axes, plane, info, block, coded), coded.iter().map(unsigned).collect())
+            (plane_contexts(&model.axes, plane, block, coded), coded.iter().map(unsigned).collect())
         }
     };
     let cost = |(place, &value): (usize, &u64)| {

@@ -103,14 +103,14 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
     }
 }
 
-/// Decodes the units of a frame, in order of refinement. A unit that fails fails alone, and with it those
+/// Decodes the units of a frame, in order of refinement, to blocks. A unit that fails fails alone, and with it those
 /// that reuse its models.
 pub fn decode_units(
     units: &[CodedUnit<'_, '_>],
     gop: &Gop,
     transforms: Transforms<'_>,
     sequence: &SequenceParameters,
-) -> Vec<Result<QuantizedFrame>> {
+) -> Vec<Result<Vec<QuantizedFrame>>> {
     let mut prepared: Vec<PreparedUnit<'_, '_, '_>> = Vec::with_capacity(units.len());
     let mut failure = None;
     for &unit in units {
@@ -136,14 +136,11 @@ pub fn decode_units(
             (place, decode_block(bytes, at, count, &unit.parameters(sequence), &unit.decoders))
         })
         .collect();
-    let mut frames: Vec<Result<QuantizedFrame>> = prepared
-        .iter()
-        .map(|_| Ok(QuantizedFrame::with_capacity(0, usize::from(sequence.sh_dimension()))))
-        .collect();
+    let mut frames: Vec<Result<Vec<QuantizedFrame>>> = prepared.iter().map(|_| Ok(Vec::new())).collect();
     for (place, block) in blocks {
         let Some(slot) = frames.get_mut(place) else { continue };
         match (slot.as_mut(), block) {
-            (Ok(frame), Ok(block)) => frame.append(&block),
+            (Ok(unit), Ok(block)) => unit.push(block),
             (Ok(_), Err(error)) => *slot = Err(error),
             (Err(_), _) => {}
         }

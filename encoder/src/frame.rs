@@ -117,7 +117,7 @@ fn code_unit(
         .map(|block| reconstruct(block.clone(), &plan.parameters, biases, 0))
         .collect::<Result<_, _>>()?;
     let mut reconstruction = QuantizedFrame::with_capacity(indices.len(), plan.parameters.colour.sh_planes);
-    parts.iter().for_each(|part| reconstruction.append(part));
+    reconstruction.append(&parts);
     let digest = unit_digest(&reconstruction, 0..indices.len());
     Ok(CodedUnit { blocks, models, digest })
 }
@@ -136,27 +136,26 @@ fn gathered(frame: &CodedFrame, part: &[(u64, u32)], planes: &[PlaneInfo], biase
         .collect();
     let geometry = &frame.geometry;
     let log_scale = geometry.log_scale.each_ref().map(|plane| pick(plane));
-    let coded = planes
-        .iter()
-        .zip(biases)
-        .map(|(info, &bias)| {
-            let place = usize::from(info.place);
-            let mut values = match info.attribute {
-                Attribute::Position => Vec::new(),
-                Attribute::LogScale if place == 0 => log_scale[0].clone(),
-                Attribute::LogScale => {
-                    log_scale[place - 1].iter().zip(&log_scale[place]).map(|(a, b)| a - b).collect()
-                }
-                Attribute::Opacity => pick(&geometry.opacity),
-                Attribute::Rotation => pick(&geometry.rotation[place]),
-                Attribute::Dc => pick(&frame.dc[place]),
-                Attribute::Sh => pick(&frame.sh[place]),
-            };
-            values.iter_mut().for_each(|value| *value -= bias);
-            values
-        })
-        .collect();
-    CodedBlock { deltas, coded, log_scale, opacity: pick(&geometry.opacity) }
+    let mut block = CodedBlock::new(deltas);
+    for (&info, &bias) in planes.iter().zip(biases) {
+        let place = usize::from(info.place);
+        let mut values = match info.attribute {
+            Attribute::Position => Vec::new(),
+            Attribute::LogScale if place == 0 => log_scale[0].clone(),
+            Attribute::LogScale => {
+                log_scale[place - 1].iter().zip(&log_scale[place]).map(|(a, b)| a - b).collect()
+            }
+            Attribute::Opacity => pick(&geometry.opacity),
+            Attribute::Rotation => pick(&geometry.rotation[place]),
+            Attribute::Dc => pick(&frame.dc[place]),
+            Attribute::Sh => pick(&frame.sh[place]),
+        };
+        values.iter_mut().for_each(|value| *value -= bias);
+        block.push(info, values);
+    }
+    block.log_scale = log_scale;
+    block.opacity = pick(&geometry.opacity);
+    block
 }
 
 /// The mean of each plane over the frame, rounded; 0 for positions and indices.

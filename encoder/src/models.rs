@@ -37,7 +37,7 @@ pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block:
         return context::delta_contexts(&model.axes, &block.deltas);
     }
     let values = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-    context::plane_contexts(&model.axes, plane, info, block, values)
+    context::plane_contexts(&model.axes, plane, block, values)
 }
 
 /// The sources worth trying for a plane, the most promising first.
@@ -83,7 +83,7 @@ fn source_values(source: Source, info: PlaneInfo, plane: usize, block: &CodedBlo
         };
         return coded.iter().map(step).collect();
     }
-    context::values(source, plane, info, block)
+    context::values(source, plane, block)
 }
 
 /// Thresholds that cut the values in parts of about equal size.

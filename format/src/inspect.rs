@@ -189,23 +189,26 @@ impl Inspector<'_> {
         for block in 0..blocks.len() {
             self.number("block_length", Some(block), &mut rest, place)?;
         }
-        for (number, (block, block_at)) in blocks.into_iter().enumerate() {
-            let Some(row) = variable_row("refinement", "blocks") else {
-                continue;
-            };
-            let name = format!("blocks[{number}]").into();
-            let value = format!("{} bytes", block.len());
+        self.blocks(&blocks);
+        Ok(())
+    }
+
+    fn blocks(&mut self, blocks: &[(&[u8], u64)]) {
+        let Some(row) = variable_row("refinement", "blocks") else {
+            return;
+        };
+        for (place, (block, at)) in blocks.iter().enumerate() {
+            let (name, value) = (format!("blocks[{place}]"), format!("{} bytes", block.len()));
             self.show(
-                block_at,
+                *at,
                 block.len(),
-                name,
+                name.into(),
                 value,
                 row.meaning,
                 row.clause,
                 row.record,
             );
         }
-        Ok(())
     }
 
     fn index(&mut self, payload: &[u8], at: u64) -> Result<()> {

@@ -258,6 +258,17 @@ fn broken_codebooks_and_refinements_are_refused() {
         case(INDEX, |p| p[8] = 1, "RESERVED_BITS", "6.10", 8),
         case(
             INDEX,
+            |p| {
+                p.extend([0; 16]);
+                p[0] = 2;
+                p[24] = 1;
+            },
+            "RESERVED_BITS",
+            "6.10",
+            24,
+        ),
+        case(
+            INDEX,
             |p| put(p, 0, u32::MAX.to_le_bytes()),
             "SHORT_SECTION",
             "5.10",

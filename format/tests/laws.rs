@@ -26,6 +26,11 @@ fn made<T>(seed: &[u8], make: impl FnOnce(&mut Unstructured<'_>) -> arbitrary::R
     make(&mut Unstructured::new(seed)).unwrap()
 }
 
+/// A stream made of random bytes.
+fn stream(seed: &[u8]) -> ArbitraryStream {
+    ArbitraryStream::arbitrary(&mut Unstructured::new(seed)).unwrap()
+}
+
 /// A record that is refused when read is refused when written, for the same reason.
 macro_rules! reading_and_writing_refuse_alike {
     ($($law:ident $Record:ident($parse:expr);)+) => { proptest! { $(
@@ -124,7 +129,8 @@ proptest! {
         prop_assert_eq!(added.map(u64::from).sum::<u64>(), u64::from(gaussians));
         for (r, percent) in (0..sequence.refinement_count).zip(sequence.refinement_percent) {
             let prefix = u64::from(sequence.prefix_length(r, gaussians));
-            prop_assert_eq!(prefix, (u64::from(percent) * u64::from(gaussians) + 99) / 100);
+            let share = u64::from(percent) * u64::from(gaussians);
+            prop_assert!(100 * prefix >= share && 100 * prefix < share + 100);
         }
     }
 
@@ -166,13 +172,31 @@ proptest! {
     }
 }
 
+#[test]
+fn every_code_of_a_unit_is_one_type() {
+    for code in 0..=u8::MAX {
+        let unit_type = UnitType::from_code(code);
+        assert_eq!(unit_type.code(), code);
+        let name = match code {
+            0 => "forbidden",
+            1..=8 => unit_type.name(),
+            9..=127 => "reserved",
+            128.. => "user",
+        };
+        assert_eq!(
+            (unit_type.name(), unit_type.is_known()),
+            (name, (1..=8).contains(&code))
+        );
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     // covers: SS-BS-007
     #[test]
     fn an_arbitrary_stream_is_accepted(seed in vec(any::<u8>(), 0..6000)) {
-        let stream = made(&seed, |u| ArbitraryStream::arbitrary(u));
+        let stream = stream(&seed);
         let bytes = stream.to_bytes().unwrap();
         prop_assert_eq!(inspect(&bytes, &Limits::default(), &mut |_| ()), None);
         let units: Result<Vec<_>> = Stream::open(&bytes, &Limits::default()).unwrap().units().collect();
@@ -188,7 +212,7 @@ proptest! {
 
     #[test]
     fn the_elements_of_a_stream_are_all_its_bits_in_order(seed in vec(any::<u8>(), 0..6000)) {
-        let bytes = made(&seed, |u| ArbitraryStream::arbitrary(u)).to_bytes().unwrap();
+        let bytes = stream(&seed).to_bytes().unwrap();
         let mut next = 0;
         let mut gap = None;
         inspect(&bytes, &Limits::default(), &mut |element| {
@@ -207,7 +231,7 @@ proptest! {
         changes in vec(any::<(usize, u8)>(), 1..5),
         seal: bool,
     ) {
-        let mut bytes = made(&seed, |u| ArbitraryStream::arbitrary(u)).to_bytes().unwrap();
+        let mut bytes = stream(&seed).to_bytes().unwrap();
         for (place, value) in changes {
             let place = place % bytes.len();
             bytes[place] = value;

@@ -14,7 +14,11 @@ pub(crate) struct Choice {
 
 impl Choice {
     fn new(tool: &'static str, choice: impl Into<String>, why: impl Into<String>) -> Self {
-        Self { tool, choice: choice.into(), why: why.into() }
+        Self {
+            tool,
+            choice: choice.into(),
+            why: why.into(),
+        }
     }
 
     /// A line for people.
@@ -25,7 +29,11 @@ impl Choice {
 
 /// Every decision that the report tells of.
 pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
-    let mut choices = vec![positions(report, settings), axes(report), degree(report, settings)];
+    let mut choices = vec![
+        positions(report, settings),
+        axes(report),
+        degree(report, settings),
+    ];
     if report.sh_degree.1 > 0 {
         choices.push(harmonics(report, settings));
     }
@@ -37,7 +45,8 @@ fn positions(report: &Report, settings: &Settings) -> Choice {
     let bits = report.position_bits;
     let choice = format!("{bits} bits an axis, cells of {}", report.position_step);
     let inner = settings.steps.position_bits;
-    let why = format!("the inner 98 % span 2^{inner} cells at this quality; the rest is for what lies outside");
+    let why =
+        format!("the inner 98 % span 2^{inner} cells at this quality; the rest is for what lies outside");
     Choice::new("position", choice, why)
 }
 
@@ -46,7 +55,11 @@ fn axes(report: &Report) -> Choice {
     let why = format!(
         "scale and rotation take {bits_sorted:.2} bits a Gaussian sorted, {bits_unsorted:.2} as they come"
     );
-    Choice::new("axes", if sorted { "sorted by size" } else { "as they come" }, why)
+    Choice::new(
+        "axes",
+        if sorted { "sorted by size" } else { "as they come" },
+        why,
+    )
 }
 
 fn degree(report: &Report, settings: &Settings) -> Choice {
@@ -65,7 +78,10 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
     let rank = report.sh_rank;
     let choice = match report.sh_codebook_entries {
         0 => format!("{rank} coefficients"),
-        entries => format!("codebook of {} entries, {rank} components", grouped(entries.into())),
+        entries => format!(
+            "codebook of {} entries, {rank} components",
+            grouped(entries.into())
+        ),
     };
     let asked = match settings.sh {
         ShChoice::Auto => "not tried with this preset or scene",
@@ -90,5 +106,9 @@ fn invisible(report: &Report, settings: &Settings) -> Choice {
     }
     let share = percent(report.invisible, report.invisible + report.gaussians);
     let choice = format!("{} left out ({share:.2} %)", grouped(report.invisible));
-    Choice::new("invisible", choice, "opacity below 1/255 everywhere; --keep-invisible keeps them")
+    Choice::new(
+        "invisible",
+        choice,
+        "opacity below 1/255 everywhere; --keep-invisible keeps them",
+    )
 }

@@ -1,35 +1,46 @@
 //! Clause 8.4: decoding the symbols of a block.
 
-use super::model::{ContextAxis, MAX_THRESHOLDS, PlaneModel};
+use super::model::{ContextAxis, PlaneModel};
 use super::token::{join, unzigzag};
 use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
 use crate::bits::BitReader;
 use crate::payload::leb128;
 use crate::{Error, ErrorKind, Result};
 
-/// A frequency table arranged for decoding: slot to token, token to interval.
+/// Slots of a table.
+const SLOTS: usize = 4096;
+/// Tokens of a table.
+const TOKENS: usize = 256;
+/// Values between the outermost thresholds up to which an axis is looked up instead of compared.
+const LOOKUP_SPAN: i64 = 1 << 12;
+
+/// The thresholds of an axis as a table of contexts: one load where a serial source waits for the value before.
 #[derive(Debug, Clone)]
-struct DecodeTable {
-    token_of_slot: Box<[u8; 4096]>,
-    /// Frequency in the high half, first slot in the low half.
-    interval_of_token: Box<[u32; 256]>,
+struct AxisLookup {
+    /// The value of the first entry, which stands for all smaller values too.
+    least: i32,
+    /// Context of each value from `least` on; the last stands for all greater values. Empty: not used.
+    contexts: Vec<u8>,
 }
 
-impl DecodeTable {
-    fn new(of_token: &[u16]) -> Self {
-        let mut token_of_slot = Box::new([0_u8; 4096]);
-        let mut interval_of_token = Box::new([0_u32; 256]);
-        let mut slots = token_of_slot.iter_mut();
-        let mut first = 0_u32;
-        for ((token, &frequency), interval) in (0_u8..).zip(of_token).zip(interval_of_token.iter_mut()) {
-            let frequency = u32::from(frequency);
-            *interval = frequency.wrapping_shl(16) | first;
-            first = first.wrapping_add(frequency);
-            for slot in slots.by_ref().take(usize::from(u16::try_from(frequency).unwrap_or(0))) {
-                *slot = token;
-            }
+impl AxisLookup {
+    fn new(axis: &ContextAxis) -> Self {
+        let (Some(&first), Some(&last)) = (axis.thresholds.first(), axis.thresholds.last()) else {
+            return Self { least: 0, contexts: vec![0] };
+        };
+        let span = i64::from(last).wrapping_sub(i64::from(first));
+        let least = first.saturating_sub(1);
+        if span > LOOKUP_SPAN {
+            return Self { least, contexts: Vec::new() };
         }
-        Self { token_of_slot, interval_of_token }
+        Self { least, contexts: (least..=last).map(|value| axis.context(value)).collect() }
+    }
+
+    #[inline(always)]
+    fn context(&self, axis: &ContextAxis, value: i32) -> u8 {
+        let Some((&greatest, _)) = self.contexts.split_last() else { return axis.context(value) };
+        let place = usize::try_from(value.saturating_sub(self.least).max(0)).unwrap_or(0);
+        self.contexts.get(place).copied().unwrap_or(greatest)
     }
 }
 
@@ -38,24 +49,27 @@ impl DecodeTable {
 pub struct PlaneDecoder {
     bias: i32,
     axes: [ContextAxis; 2],
-    /// The thresholds of each axis, filled up with values that no source reaches: a loop of fixed length.
-    thresholds: [[i32; MAX_THRESHOLDS]; 2],
+    lookups: [AxisLookup; 2],
     second_contexts: usize,
-    tables: Vec<DecodeTable>,
-    table_of_context: [u8; 64],
-    value_of_token: Box<[u64; 256]>,
-    raw_bits_of_token: Box<[u8; 256]>,
+    /// First slot, in `token_of_slot`, of the table of each context.
+    slots_of_context: [u32; 64],
+    /// The tables one behind the other.
+    token_of_slot: Vec<u8>,
+    /// Frequency in the high half, first slot in the low half.
+    interval_of_token: Vec<u32>,
+    value_of_token: Box<[u64; TOKENS]>,
+    raw_bits_of_token: Box<[u8; TOKENS]>,
 }
 
 impl PlaneDecoder {
     /// Expands the tables of a model.
     pub fn new(model: &PlaneModel) -> Self {
-        let mut table_of_context = [0; 64];
-        for (slot, &place) in table_of_context.iter_mut().zip(&model.table_of_context) {
-            *slot = place;
+        let mut slots_of_context = [0; 64];
+        for (slots, &place) in slots_of_context.iter_mut().zip(&model.table_of_context) {
+            *slots = u32::from(place).wrapping_shl(FREQUENCY_BITS);
         }
-        let mut value_of_token = Box::new([0_u64; 256]);
-        let mut raw_bits_of_token = Box::new([0_u8; 256]);
+        let mut value_of_token = Box::new([0_u64; TOKENS]);
+        let mut raw_bits_of_token = Box::new([0_u8; TOKENS]);
         for ((token, value), raw_bits) in
             (0..=u8::MAX).zip(value_of_token.iter_mut()).zip(raw_bits_of_token.iter_mut())
         {
@@ -64,15 +78,28 @@ impl PlaneDecoder {
             *raw_bits = u8::try_from(bits).unwrap_or(0);
         }
         let [_, second] = &model.axes;
-        Self {
+        let mut decoder = Self {
             bias: model.bias,
             axes: model.axes.clone(),
-            thresholds: model.axes.each_ref().map(padded),
+            lookups: model.axes.each_ref().map(AxisLookup::new),
             second_contexts: second.contexts(),
-            tables: model.tables.iter().map(|table| DecodeTable::new(table.of_token())).collect(),
-            table_of_context,
+            slots_of_context,
+            token_of_slot: Vec::with_capacity(model.tables.len().saturating_mul(SLOTS)),
+            interval_of_token: Vec::with_capacity(model.tables.len().saturating_mul(TOKENS)),
             value_of_token,
             raw_bits_of_token,
+        };
+        model.tables.iter().for_each(|table| decoder.expand(table.of_token()));
+        decoder
+    }
+
+    fn expand(&mut self, of_token: &[u16]) {
+        let mut first = 0_u32;
+        for token in 0..=u8::MAX {
+            let frequency = of_token.get(usize::from(token)).copied().unwrap_or(0);
+            self.token_of_slot.extend(core::iter::repeat_n(token, usize::from(frequency)));
+            self.interval_of_token.push(u32::from(frequency).wrapping_shl(16) | first);
+            first = first.wrapping_add(u32::from(frequency));
         }
     }
 
@@ -86,11 +113,18 @@ impl PlaneDecoder {
         &self.axes
     }
 
-    /// The context of a value on one axis: [`ContextAxis::context`], faster.
+    /// The context of a value on the first axis: [`ContextAxis::context`], faster.
     #[inline(always)]
-    pub fn axis_context(&self, axis: usize, value: i32) -> u8 {
-        let Some(thresholds) = self.thresholds.get(axis) else { return 0 };
-        thresholds.iter().map(|&threshold| u8::from(threshold <= value)).fold(0, u8::wrapping_add)
+    pub fn first_context(&self, value: i32) -> u8 {
+        let ([axis, _], [lookup, _]) = (&self.axes, &self.lookups);
+        lookup.context(axis, value)
+    }
+
+    /// The context of a value on the second axis.
+    #[inline(always)]
+    pub fn second_context(&self, value: i32) -> u8 {
+        let ([_, axis], [_, lookup]) = (&self.axes, &self.lookups);
+        lookup.context(axis, value)
     }
 
     /// The context of a Gaussian from its contexts on the two axes.
@@ -100,14 +134,6 @@ impl PlaneDecoder {
         let [low, ..] = context.to_le_bytes();
         low
     }
-}
-
-fn padded(axis: &ContextAxis) -> [i32; MAX_THRESHOLDS] {
-    let mut thresholds = [i32::MAX; MAX_THRESHOLDS];
-    for (slot, &threshold) in thresholds.iter_mut().zip(&axis.thresholds) {
-        *slot = threshold;
-    }
-    thresholds
 }
 
 /// Reads the symbols of one block, plane by plane.
@@ -166,10 +192,9 @@ impl<'a> BlockReader<'a> {
         let mut previous = start;
         for (place, out) in out.iter_mut().enumerate() {
             let context = usize::from(context(place, previous)) & 63;
-            let table = decoder.table_of_context.get(context).copied().unwrap_or(0);
-            let Some(table) = decoder.tables.get(usize::from(table)) else { continue };
+            let slots = decoder.slots_of_context.get(context).copied().unwrap_or(0);
             let Some(state) = self.states.get_mut(place & mask) else { continue };
-            let token = Self::token(state, table, &mut self.words, &mut self.words_missing);
+            let token = Self::token(state, decoder, slots, &mut self.words, &mut self.words_missing);
             let mut value = decoder.value_of_token.get(usize::from(token)).copied().unwrap_or(0);
             let raw_bits = decoder.raw_bits_of_token.get(usize::from(token)).copied().unwrap_or(0);
             if raw_bits > 0 {
@@ -180,14 +205,20 @@ impl<'a> BlockReader<'a> {
         }
     }
 
-    /// One rANS step.
+    /// One rANS step in the table that starts at `slots`.
     #[inline(always)]
-    fn token(state: &mut u32, table: &DecodeTable, words: &mut &[u8], missing: &mut bool) -> u8 {
-        let [low, high, ..] = state.to_le_bytes();
-        let slot = u32::from(u16::from_le_bytes([low, high & 0x0F]));
-        let place = usize::from(u16::from_le_bytes([low, high & 0x0F]));
-        let token = table.token_of_slot.get(place).copied().unwrap_or(0);
-        let interval = table.interval_of_token.get(usize::from(token)).copied().unwrap_or(0);
+    fn token(
+        state: &mut u32,
+        decoder: &PlaneDecoder,
+        slots: u32,
+        words: &mut &[u8],
+        missing: &mut bool,
+    ) -> u8 {
+        let slot = *state & 0xFFF;
+        let place = usize::try_from(slots | slot).unwrap_or(0);
+        let token = decoder.token_of_slot.get(place).copied().unwrap_or(0);
+        let interval_place = usize::try_from(slots >> 4 | u32::from(token)).unwrap_or(0);
+        let interval = decoder.interval_of_token.get(interval_place).copied().unwrap_or(0);
         let frequency = interval >> 16;
         let first = interval & 0xFFFF;
         let mut next = frequency

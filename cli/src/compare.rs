@@ -1,0 +1,182 @@
+//! `splatstream compare`: how far apart two scenes or streams are, attribute by attribute.
+
+pub(crate) mod errors;
+mod frames;
+mod grid;
+pub(crate) mod matching;
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::numbers::grouped;
+use crate::progress::Progress;
+use crate::stream_file::LimitArgs;
+use clap::{Args, ValueEnum};
+use errors::{AttributeErrors, ErrorSums};
+use frames::{Frames, Opened};
+use matching::Matching;
+use serde::Serialize;
+use splatstream_encoder::canonical::canonicalise;
+use splatstream_scene::GaussianFrame;
+use std::path::PathBuf;
+
+/// Compare two scenes or streams: the error of each attribute.
+///
+/// A and B are streams, scene files, or directories of frames; they are compared frame by frame. Both are
+/// brought into canonical form first, so that Gaussians that render alike count as alike. Every Gaussian of
+/// the smaller frame is compared with its partner in the larger one.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  splatstream compare frames/ talk.gss\n  \
+    splatstream compare garden.ply garden.gss --match nearest --json")]
+pub(crate) struct Compare {
+    /// A stream, a scene, or a directory of frames.
+    a: PathBuf,
+    /// Another.
+    b: PathBuf,
+    /// How Gaussians find their partners.
+    #[arg(long = "match", value_enum, default_value_t = Match::Auto)]
+    matching: Match,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// How Gaussians find their partners.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Match {
+    /// By order where counts are equal and positions correspond, by position elsewhere.
+    Auto,
+    /// The first with the first, and so on; counts must be equal.
+    Order,
+    /// The nearest; among those equally near, the one most alike.
+    Nearest,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    a: PathBuf,
+    b: PathBuf,
+    frames: u32,
+    frames_a: u32,
+    frames_b: u32,
+    gaussians_a: u64,
+    gaussians_b: u64,
+    pairs: u64,
+    /// The matching of each frame.
+    matched_by: Vec<Matching>,
+    attributes: AttributeErrors,
+}
+
+impl Compare {
+    /// Compares frame by frame; frames that only one side has are counted and left alone.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        let limits = self.limits.limits();
+        let (opened_a, opened_b) = (Opened::open(&self.a)?, Opened::open(&self.b)?);
+        let (mut frames_a, mut frames_b) = (opened_a.frames(&limits)?, opened_b.frames(&limits)?);
+        let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
+        let mut report = self.empty_report();
+        let mut sums = ErrorSums::default();
+        loop {
+            let (a, b) = (
+                next(&mut frames_a, &mut report.frames_a)?,
+                next(&mut frames_b, &mut report.frames_b)?,
+            );
+            match (a, b) {
+                (Some(a), Some(b)) => self.frame(&a, &b, &mut report, &mut sums)?,
+                (None, None) => break,
+                _ => {}
+            }
+            progress.at(report.frames_a.max(report.frames_b));
+        }
+        drop(progress);
+        report.pairs = sums.pairs();
+        report.attributes = sums.errors();
+        console.report(&report, || report.text())
+    }
+
+    fn empty_report(&self) -> Report {
+        Report {
+            a: self.a.clone(),
+            b: self.b.clone(),
+            frames: 0,
+            frames_a: 0,
+            frames_b: 0,
+            gaussians_a: 0,
+            gaussians_b: 0,
+            pairs: 0,
+            matched_by: Vec::new(),
+            attributes: AttributeErrors::default(),
+        }
+    }
+
+    fn frame(
+        &self,
+        a: &GaussianFrame,
+        b: &GaussianFrame,
+        report: &mut Report,
+        sums: &mut ErrorSums,
+    ) -> Result<(), Failure> {
+        if self.matching == Match::Order && a.len() != b.len() {
+            let (number, a, b) = (report.frames, a.len(), b.len());
+            return Err(Failure::Usage(format!(
+                "frame {number}: --match order needs equal counts, A has {a} Gaussians and B {b}; \
+                 use --match nearest"
+            )));
+        }
+        report.frames += 1;
+        report.gaussians_a += a.len() as u64;
+        report.gaussians_b += b.len() as u64;
+        report.matched_by.push(compare_frames(a, b, self.matching, sums));
+        Ok(())
+    }
+}
+
+/// Adds the errors between two frames; says how they were matched.
+pub(crate) fn compare_frames(
+    a: &GaussianFrame,
+    b: &GaussianFrame,
+    choice: Match,
+    sums: &mut ErrorSums,
+) -> Matching {
+    let (a, b) = (canonical(a), canonical(b));
+    let (small, large) = if b.len() <= a.len() { (&b, &a) } else { (&a, &b) };
+    let (matching, partners) = matching::partners(small, large, choice);
+    sums.add(small, large, &partners);
+    matching
+}
+
+fn canonical(frame: &GaussianFrame) -> GaussianFrame {
+    let all: Vec<u32> = (0..frame.len() as u32).collect();
+    canonicalise(frame, &all, true)
+}
+
+fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<GaussianFrame>, Failure> {
+    let frame = frames.next()?;
+    *count += u32::from(frame.is_some());
+    Ok(frame)
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let mut text = format!(
+            "A {}: {} frames, {} Gaussians in those compared\nB {}: {} frames, {} Gaussians in those compared\n",
+            self.a.display(),
+            grouped(self.frames_a.into()),
+            grouped(self.gaussians_a),
+            self.b.display(),
+            grouped(self.frames_b.into()),
+            grouped(self.gaussians_b),
+        );
+        let by_order = self
+            .matched_by
+            .iter()
+            .filter(|matching| **matching == Matching::Order)
+            .count() as u32;
+        text += &format!(
+            "{} frames compared, {} pairs; {by_order} frames matched by order, {} by nearest position\n\n",
+            grouped(self.frames.into()),
+            grouped(self.pairs),
+            self.frames - by_order,
+        );
+        text + &self.attributes.text()
+    }
+}

@@ -1,0 +1,211 @@
+//! `splatstream demo`: everything once, without any input.
+
+mod report;
+
+use crate::compare::errors::{AttributeErrors, ErrorSums};
+use crate::compare::{Match, compare_frames};
+use crate::console::{Console, to_json};
+use crate::failure::Failure;
+use crate::numbers::bits_per_gaussian;
+use crate::output_file::{OutputFile, make_directory};
+use crate::progress::Progress;
+use clap::Args;
+use report::{Demonstration, Encoding, Point, Scene};
+use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_encoder::{Report, Settings, encode};
+use splatstream_format::Limits;
+use splatstream_scene::builtin::BuiltinScene;
+use splatstream_scene::{GaussianFrame, ply};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Try everything without any input: make a scene, encode it, decode it at every operating point, verify.
+///
+/// Writes the source and the decoded frames, the stream, and a report.
+#[derive(Args)]
+#[command(after_help = "Example:\n  splatstream demo --out /tmp/demo")]
+pub(crate) struct Demo {
+    /// Where the files go.
+    #[arg(short, long, value_name = "DIR", default_value = "splatstream-demo")]
+    out: PathBuf,
+    /// Gaussians of the scene.
+    #[arg(long, value_name = "N", default_value_t = BuiltinScene::default().gaussians)]
+    #[arg(value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    gaussians: u32,
+    /// Frames of the scene.
+    #[arg(long, value_name = "N", default_value_t = BuiltinScene::default().frames)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    frames: u32,
+}
+
+/// The stream's name in the directory of the demo.
+const STREAM: &str = "demo.gss";
+
+impl Demo {
+    /// Makes, encodes, decodes, verifies, reports.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        make_directory(&self.out)?;
+        let scene = BuiltinScene {
+            gaussians: self.gaussians,
+            frames: self.frames,
+            ..BuiltinScene::default()
+        };
+        let mut source = self.write_source(scene)?;
+        let (stream, encoding, digests) = self.encode(&mut source.frames)?;
+        let infos = operating_points(&stream, &Limits::default()).map_err(|error| self.fault(error))?;
+        let points: Vec<Point> = infos
+            .iter()
+            .map(|info| self.decode(&stream, info))
+            .collect::<Result<_, _>>()?;
+        let errors = self.verify(&stream, &source.frames, &digests)?;
+        let demonstration = Demonstration {
+            directory: self.out.clone(),
+            scene: source.summary,
+            encoding,
+            operating_points: points,
+            errors,
+        };
+        let text = demonstration.text();
+        OutputFile::write(&self.out.join("report.json"), to_json(&demonstration)?.as_bytes())?;
+        OutputFile::write(&self.out.join("report.txt"), text.as_bytes())?;
+        console.report(&demonstration, || text)
+    }
+
+    /// Makes the frames and writes them as PLY.
+    fn write_source(&self, scene: BuiltinScene) -> Result<Source, Failure> {
+        let directory = self.out.join("source");
+        make_directory(&directory)?;
+        let frames: Vec<GaussianFrame> = (0..scene.frames).map(|number| scene.frame(number)).collect();
+        let mut ply_bytes = 0;
+        for (number, frame) in frames.iter().enumerate() {
+            let bytes = ply::write(frame);
+            ply_bytes += bytes.len() as u64;
+            OutputFile::write(&frame_path(&directory, number), &bytes)?;
+        }
+        let gaussians = frames.iter().map(|frame| frame.len() as u64).sum();
+        let summary = Scene {
+            frames: scene.frames,
+            gaussians,
+            sh_degree: scene.sh_degree,
+            ply_bytes,
+        };
+        Ok(Source { frames, summary })
+    }
+
+    fn encode(&self, frames: &mut Vec<GaussianFrame>) -> Result<(Vec<u8>, Encoding, Vec<u64>), Failure> {
+        let progress = Progress::frames("encoding", self.frames);
+        let start = Instant::now();
+        let mut stream = Vec::new();
+        let Report {
+            bytes,
+            gaussians,
+            digests,
+            ..
+        } = encode(frames, &Settings::default(), &mut stream, &mut |done, _| {
+            progress.at(done)
+        })
+        .map_err(|error| Failure::other(error.to_string()))?;
+        let seconds = start.elapsed().as_secs_f64();
+        OutputFile::write(&self.out.join(STREAM), &stream)?;
+        let rate = gaussians as f64 / seconds.max(f64::MIN_POSITIVE);
+        let bpg = bits_per_gaussian(bytes, gaussians);
+        Ok((
+            stream,
+            Encoding {
+                bytes,
+                gaussians,
+                bpg,
+                seconds,
+                gaussians_per_second: rate,
+            },
+            digests,
+        ))
+    }
+
+    /// Decodes one operating point, every digest compared, and writes its frames.
+    fn decode(&self, stream: &[u8], info: &OperatingPointInfo) -> Result<Point, Failure> {
+        let directory = self
+            .out
+            .join(format!("decoded-{}", info.point.to_string().replace(',', "")));
+        make_directory(&directory)?;
+        let (mut failed, mut writing) = (None, Duration::ZERO);
+        let options = Options {
+            operating_point: info.point,
+            ..Options::default()
+        };
+        let start = Instant::now();
+        let summary = decode_stream(stream, &options, |sequence, frame| {
+            let gaussians = to_gaussians(&frame.planes, sequence);
+            let start = Instant::now();
+            let path = frame_path(&directory, frame.number as usize);
+            failed = OutputFile::write(&path, &ply::write(&gaussians)).err();
+            writing += start.elapsed();
+            if failed.is_some() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        let seconds = start.elapsed().saturating_sub(writing).as_secs_f64();
+        match (failed, summary.end) {
+            (Some(failure), _) => Err(failure),
+            (None, Some(error)) => Err(self.fault(error)),
+            (None, None) => Ok(Point::new(info, seconds)),
+        }
+    }
+
+    /// Compares all of the decoded stream with what the encoder says it is, and with the source.
+    fn verify(
+        &self,
+        stream: &[u8],
+        source: &[GaussianFrame],
+        digests: &[u64],
+    ) -> Result<AttributeErrors, Failure> {
+        let mut sums = ErrorSums::default();
+        let mut decoded = Vec::new();
+        let options = Options {
+            operating_point: OperatingPoint::ALL,
+            ..Options::default()
+        };
+        let summary = decode_stream(stream, &options, |sequence, frame| {
+            decoded.extend(frame.digest);
+            // One frame says enough about the errors of a scene like this one.
+            if frame.number == 0
+                && let Some(original) = source.first()
+            {
+                compare_frames(
+                    original,
+                    &to_gaussians(&frame.planes, sequence),
+                    Match::Auto,
+                    &mut sums,
+                );
+            }
+            ControlFlow::Continue(())
+        });
+        match summary.end {
+            Some(error) => Err(self.fault(error)),
+            None if decoded != digests => Err(Failure::other(
+                "the decoder's digests are not the encoder's: please report this",
+            )),
+            None => Ok(sums.errors()),
+        }
+    }
+
+    fn fault(&self, error: splatstream_format::Error) -> Failure {
+        Failure::stream(&self.out.join(STREAM), error)
+    }
+}
+
+/// The scene that is encoded.
+struct Source {
+    frames: Vec<GaussianFrame>,
+    summary: Scene,
+}
+
+fn frame_path(directory: &Path, number: usize) -> PathBuf {
+    directory.join(format!("frame_{number:04}.ply"))
+}
