@@ -76,10 +76,8 @@ impl Compare {
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();
         loop {
-            let (a, b) = (
-                next(&mut frames_a, &mut report.frames_a)?,
-                next(&mut frames_b, &mut report.frames_b)?,
-            );
+            let (a, b) =
+                (next(&mut frames_a, &mut report.frames_a)?, next(&mut frames_b, &mut report.frames_b)?);
             match (a, b) {
                 (Some(a), Some(b)) => self.frame(&a, &b, &mut report, &mut sums)?,
                 (None, None) => break,
@@ -166,11 +164,7 @@ impl Report {
             grouped(self.frames_b.into()),
             grouped(self.gaussians_b),
         );
-        let by_order = self
-            .matched_by
-            .iter()
-            .filter(|matching| **matching == Matching::Order)
-            .count() as u32;
+        let by_order = self.matched_by.iter().filter(|matching| **matching == Matching::Order).count() as u32;
         text += &format!(
             "{} frames compared, {} pairs; {by_order} frames matched by order, {} by nearest position\n\n",
             grouped(self.frames.into()),

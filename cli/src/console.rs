@@ -29,9 +29,9 @@ impl Console {
             output.push('\n');
         }
         match io::stdout().lock().write_all(output.as_bytes()) {
-            Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::other(format!(
-                "cannot write to standard output: {error}"
-            ))),
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+                Err(Failure::other(format!("cannot write to standard output: {error}")))
+            }
             _ => Ok(()),
         }
     }

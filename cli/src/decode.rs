@@ -33,12 +33,7 @@ pub(crate) struct Decode {
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
     /// A directory for frame_0000.ply and so on, or a .ply, .spz or .splat file for one frame.
-    #[arg(
-        short,
-        long = "out",
-        value_name = "DIR_OR_FILE",
-        required_unless_present = "dry_run"
-    )]
+    #[arg(short, long = "out", value_name = "DIR_OR_FILE", required_unless_present = "dry_run")]
     out: Option<PathBuf>,
     /// The operating point: highest spatial layer, temporal layer and refinement; default is everything.
     #[arg(long, value_name = "sS,tT,rR")]
@@ -94,6 +89,8 @@ struct Decoding<'a> {
     target: Option<&'a Target>,
     progress: Progress,
     gaussians: u64,
+    /// Gaussians of the frames before the first one asked for: decoded too.
+    passed: u64,
     bytes: u64,
     digests: Vec<Option<String>>,
     lost: Vec<Lost>,
@@ -110,15 +107,12 @@ impl Decode {
         let options = self.options();
         stream.check_point(options.operating_point, &options.limits)?;
         let frames = self.frames.unwrap_or(FrameRange::ALL);
-        let announced = stream
-            .sequence(&options.limits)
-            .map_or(0, |sequence| sequence.frame_count);
+        let announced = stream.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
         let target = self.target(frames.count_in(announced))?;
         let mut decoding = Decoding::new(frames, target.as_ref(), announced);
         let start = Instant::now();
-        let summary = decode_stream(&stream.bytes, &options, |sequence, frame| {
-            decoding.take(sequence, &frame)
-        });
+        let summary =
+            decode_stream(&stream.bytes, &options, |sequence, frame| decoding.take(sequence, &frame));
         let total = start.elapsed();
         if let Some(failure) = decoding.failed.take() {
             return Err(failure);
@@ -127,9 +121,7 @@ impl Decode {
         let report = self.report(decoding, summary.end, total);
         if announced > 0 && frames.count_in(announced) == 0 {
             let path = stream.path.display();
-            return Err(Failure::Usage(format!(
-                "{path}: no such frames, the stream has {announced}"
-            )));
+            return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));
         }
         console.report(&report, || report.text())?;
         first_error.map_or(Ok(()), |error| Err(stream.fault(error)))
@@ -146,14 +138,12 @@ impl Decode {
 
     /// Where `frames` frames go; none for a dry run.
     fn target(&self, frames: u32) -> Result<Option<Target>, Failure> {
-        self.out
-            .as_deref()
-            .map(|path| Target::new(path, self.format, frames))
-            .transpose()
+        self.out.as_deref().map(|path| Target::new(path, self.format, frames)).transpose()
     }
 
     fn report(&self, decoding: Decoding<'_>, end: Option<Error>, total: Duration) -> Report {
         let seconds = total.saturating_sub(decoding.writing).as_secs_f64();
+        let decoded = decoding.gaussians + decoding.passed;
         Report {
             output: self.out.clone(),
             frames: decoding.digests.len() as u32,
@@ -161,7 +151,7 @@ impl Decode {
             bytes: decoding.bytes,
             seconds,
             seconds_total: total.as_secs_f64(),
-            gaussians_per_second: decoding.gaussians as f64 / seconds.max(f64::MIN_POSITIVE),
+            gaussians_per_second: decoded as f64 / seconds.max(f64::MIN_POSITIVE),
             verified: !self.no_verify,
             digests: decoding.digests,
             lost: decoding.lost,
@@ -177,6 +167,7 @@ impl<'a> Decoding<'a> {
             target,
             progress: Progress::frames("decoding", frames.end.map_or(announced, |end| end.min(announced))),
             gaussians: 0,
+            passed: 0,
             bytes: 0,
             digests: Vec::new(),
             lost: Vec::new(),
@@ -192,10 +183,10 @@ impl<'a> Decoding<'a> {
             self.count(frame);
             let gaussians = to_gaussians(&frame.planes, sequence);
             let start = Instant::now();
-            self.failed = self
-                .target
-                .and_then(|target| target.write(frame.number, &gaussians).err());
+            self.failed = self.target.and_then(|target| target.write(frame.number, &gaussians).err());
             self.writing += start.elapsed();
+        } else {
+            self.passed += frame.planes.len() as u64;
         }
         self.progress.at(frame.number.saturating_add(1));
         if self.failed.is_some() || self.frames.is_over(frame.number.saturating_add(1)) {
@@ -211,11 +202,7 @@ impl<'a> Decoding<'a> {
         if let Some(error) = frame.lost {
             self.first_error = self.first_error.or(Some(error));
             let fault = StreamFault::from(error);
-            self.lost.push(Lost {
-                frame: frame.number,
-                refinements: frame.refinements,
-                fault,
-            });
+            self.lost.push(Lost { frame: frame.number, refinements: frame.refinements, fault });
         }
     }
 }
@@ -226,11 +213,8 @@ impl Report {
             Some(path) => path.display().to_string(),
             None => "nothing written (--dry-run)".to_owned(),
         };
-        let digests = if self.verified {
-            "agree with the frames shown"
-        } else {
-            "not compared (--no-verify)"
-        };
+        let digests =
+            if self.verified { "agree with the frames shown" } else { "not compared (--no-verify)" };
         let mut text = format!(
             "{place}\n  frames       {}\n  Gaussians    {}\n  decoding     {:.3} s, {} Gaussians a second\n  \
              in all       {:.3} s\n  digests      {digests}\n",
@@ -241,10 +225,7 @@ impl Report {
             self.seconds_total,
         );
         for lost in &self.lost {
-            text += &format!(
-                "  frame {} stops after {} refinements\n",
-                lost.frame, lost.refinements
-            );
+            text += &format!("  frame {} stops after {} refinements\n", lost.frame, lost.refinements);
         }
         text
     }

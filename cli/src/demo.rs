@@ -49,18 +49,13 @@ impl Demo {
     /// Makes, encodes, decodes, verifies, reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         make_directory(&self.out)?;
-        let scene = BuiltinScene {
-            gaussians: self.gaussians,
-            frames: self.frames,
-            ..BuiltinScene::default()
-        };
+        let scene =
+            BuiltinScene { gaussians: self.gaussians, frames: self.frames, ..BuiltinScene::default() };
         let mut source = self.write_source(scene)?;
         let (stream, encoding, digests) = self.encode(&mut source.frames)?;
         let infos = operating_points(&stream, &Limits::default()).map_err(|error| self.fault(error))?;
-        let points: Vec<Point> = infos
-            .iter()
-            .map(|info| self.decode(&stream, info))
-            .collect::<Result<_, _>>()?;
+        let points: Vec<Point> =
+            infos.iter().map(|info| self.decode(&stream, info)).collect::<Result<_, _>>()?;
         let errors = self.verify(&stream, &source.frames, &digests)?;
         let demonstration = Demonstration {
             directory: self.out.clone(),
@@ -87,12 +82,7 @@ impl Demo {
             OutputFile::write(&frame_path(&directory, number), &bytes)?;
         }
         let gaussians = frames.iter().map(|frame| frame.len() as u64).sum();
-        let summary = Scene {
-            frames: scene.frames,
-            gaussians,
-            sh_degree: scene.sh_degree,
-            ply_bytes,
-        };
+        let summary = Scene { frames: scene.frames, gaussians, sh_degree: scene.sh_degree, ply_bytes };
         Ok(Source { frames, summary })
     }
 
@@ -100,43 +90,22 @@ impl Demo {
         let progress = Progress::frames("encoding", self.frames);
         let start = Instant::now();
         let mut stream = Vec::new();
-        let Report {
-            bytes,
-            gaussians,
-            digests,
-            ..
-        } = encode(frames, &Settings::default(), &mut stream, &mut |done, _| {
-            progress.at(done)
-        })
-        .map_err(|error| Failure::other(error.to_string()))?;
+        let Report { bytes, gaussians, digests, .. } =
+            encode(frames, &Settings::default(), &mut stream, &mut |done, _| progress.at(done))
+                .map_err(|error| Failure::other(error.to_string()))?;
         let seconds = start.elapsed().as_secs_f64();
         OutputFile::write(&self.out.join(STREAM), &stream)?;
         let rate = gaussians as f64 / seconds.max(f64::MIN_POSITIVE);
         let bpg = bits_per_gaussian(bytes, gaussians);
-        Ok((
-            stream,
-            Encoding {
-                bytes,
-                gaussians,
-                bpg,
-                seconds,
-                gaussians_per_second: rate,
-            },
-            digests,
-        ))
+        Ok((stream, Encoding { bytes, gaussians, bpg, seconds, gaussians_per_second: rate }, digests))
     }
 
     /// Decodes one operating point, every digest compared, and writes its frames.
     fn decode(&self, stream: &[u8], info: &OperatingPointInfo) -> Result<Point, Failure> {
-        let directory = self
-            .out
-            .join(format!("decoded-{}", info.point.to_string().replace(',', "")));
+        let directory = self.out.join(format!("decoded-{}", info.point.to_string().replace(',', "")));
         make_directory(&directory)?;
         let (mut failed, mut writing) = (None, Duration::ZERO);
-        let options = Options {
-            operating_point: info.point,
-            ..Options::default()
-        };
+        let options = Options { operating_point: info.point, ..Options::default() };
         let start = Instant::now();
         let summary = decode_stream(stream, &options, |sequence, frame| {
             let gaussians = to_gaussians(&frame.planes, sequence);
@@ -144,11 +113,7 @@ impl Demo {
             let path = frame_path(&directory, frame.number as usize);
             failed = OutputFile::write(&path, &ply::write(&gaussians)).err();
             writing += start.elapsed();
-            if failed.is_some() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
+            if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         let seconds = start.elapsed().saturating_sub(writing).as_secs_f64();
         match (failed, summary.end) {
@@ -167,30 +132,22 @@ impl Demo {
     ) -> Result<AttributeErrors, Failure> {
         let mut sums = ErrorSums::default();
         let mut decoded = Vec::new();
-        let options = Options {
-            operating_point: OperatingPoint::ALL,
-            ..Options::default()
-        };
+        let options = Options { operating_point: OperatingPoint::ALL, ..Options::default() };
         let summary = decode_stream(stream, &options, |sequence, frame| {
             decoded.extend(frame.digest);
             // One frame says enough about the errors of a scene like this one.
             if frame.number == 0
                 && let Some(original) = source.first()
             {
-                compare_frames(
-                    original,
-                    &to_gaussians(&frame.planes, sequence),
-                    Match::Auto,
-                    &mut sums,
-                );
+                compare_frames(original, &to_gaussians(&frame.planes, sequence), Match::Auto, &mut sums);
             }
             ControlFlow::Continue(())
         });
         match summary.end {
             Some(error) => Err(self.fault(error)),
-            None if decoded != digests => Err(Failure::other(
-                "the decoder's digests are not the encoder's: please report this",
-            )),
+            None if decoded != digests => {
+                Err(Failure::other("the decoder's digests are not the encoder's: please report this"))
+            }
             None => Ok(sums.errors()),
         }
     }

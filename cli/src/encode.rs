@@ -20,10 +20,8 @@ use std::time::Instant;
 /// Frames are .ply, .compressed.ply, .spz, .sog or .splat files, or SOG directories (those with a meta.json).
 /// They are taken in the natural order of their names: frame_9 before frame_10.
 #[derive(Args)]
-#[command(
-    after_help = "Examples:\n  splatstream encode frames/ -o talk.gss --fps 30\n  \
-    splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small"
-)]
+#[command(after_help = "Examples:\n  splatstream encode frames/ -o talk.gss --fps 30\n  \
+    splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small")]
 pub(crate) struct Encode {
     /// Files, or one directory of frames.
     #[arg(required = true, value_name = "INPUT")]
@@ -45,12 +43,7 @@ pub(crate) struct Encode {
     #[arg(long, value_name = "HEIGHTS", default_value = "1080", value_parser = parse_layers)]
     layers: String,
     /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100.
-    #[arg(
-        long,
-        value_name = "PERCENTS",
-        value_delimiter = ',',
-        default_value = "10,20,30,50,100"
-    )]
+    #[arg(long, value_name = "PERCENTS", value_delimiter = ',', default_value = "10,20,30,50,100")]
     refinements: Vec<u8>,
     /// Highest degree of spherical harmonics kept; default is what the scene needs.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=3))]
@@ -129,10 +122,8 @@ impl Encode {
         let mut file = OutputFile::create(&self.out)?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
-        let report = encode(&mut source, &settings, &mut file, &mut |done, _| {
-            progress.at(done)
-        })
-        .map_err(|error| self.failed(&source, &error))?;
+        let report = encode(&mut source, &settings, &mut file, &mut |done, _| progress.at(done))
+            .map_err(|error| self.failed(&source, &error))?;
         drop(progress);
         file.finish()?;
         let encoded = self.encoded(&report, &settings, start.elapsed().as_secs_f64());

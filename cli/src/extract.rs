@@ -58,10 +58,6 @@ impl Report {
     fn text(&self) -> String {
         let share = percent(self.bytes, self.bytes_in);
         let (bytes, all) = (grouped(self.bytes), grouped(self.bytes_in));
-        format!(
-            "{}: {}, {bytes} of {all} bytes ({share:.1} %)",
-            self.output.display(),
-            self.op
-        )
+        format!("{}: {}, {bytes} of {all} bytes ({share:.1} %)", self.output.display(), self.op)
     }
 }

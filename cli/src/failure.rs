@@ -41,10 +41,7 @@ impl Failure {
 
     /// A stream that breaks the specification.
     pub(crate) fn stream(path: &Path, error: Error) -> Self {
-        Self::Stream {
-            path: path.to_path_buf(),
-            error,
-        }
+        Self::Stream { path: path.to_path_buf(), error }
     }
 
     /// 2 usage, 1 files and settings, 10 to 14 by the class of a stream's error.
@@ -64,11 +61,7 @@ impl fmt::Display for Failure {
             Self::Other(message) => f.write_str(message),
             Self::Stream { path, error } => {
                 let path = path.display();
-                write!(
-                    f,
-                    "{path}: {error}\n  {}",
-                    advice(error.class()).replace("FILE", &path.to_string())
-                )
+                write!(f, "{path}: {error}\n  {}", advice(error.class()).replace("FILE", &path.to_string()))
             }
         }
     }
@@ -118,10 +111,6 @@ impl From<Error> for StreamFault {
 
 impl fmt::Display for StreamFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "byte {:#x}: {} (clause {})",
-            self.byte, self.message, self.clause
-        )
+        write!(f, "byte {:#x}: {} (clause {})", self.byte, self.message, self.clause)
     }
 }

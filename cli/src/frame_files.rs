@@ -51,10 +51,7 @@ impl FrameSource for FrameFiles {
         {
             return Ok(frame.clone());
         }
-        let path = self
-            .paths
-            .get(number as usize)
-            .ok_or_else(|| format!("there is no frame {number}"))?;
+        let path = self.paths.get(number as usize).ok_or_else(|| format!("there is no frame {number}"))?;
         let frame = read_scene(path, &ReadLimits::default())?;
         self.last = Some((number, frame.clone()));
         Ok(frame)
@@ -65,9 +62,7 @@ impl FrameSource for FrameFiles {
 fn check_file(path: &Path) -> Result<(), Failure> {
     if path.is_dir() && !is_sog(path) {
         let path = path.display();
-        return Err(Failure::Usage(format!(
-            "{path}: give one directory of frames by itself, or only files"
-        )));
+        return Err(Failure::Usage(format!("{path}: give one directory of frames by itself, or only files")));
     }
     match path.metadata() {
         Ok(_) => Ok(()),
@@ -109,9 +104,7 @@ fn kind_of(path: &Path) -> Option<&'static str> {
         return Some("sog");
     }
     let extension = path.extension()?.to_str()?;
-    let known = EXTENSIONS
-        .into_iter()
-        .find(|known| extension.eq_ignore_ascii_case(known));
+    let known = EXTENSIONS.into_iter().find(|known| extension.eq_ignore_ascii_case(known));
     known.filter(|_| path.is_file())
 }
 
@@ -155,28 +148,9 @@ mod tests {
 
     #[test]
     fn frames_come_in_the_order_that_people_count_in() {
-        let mut names = [
-            "f10.ply",
-            "f9.ply",
-            "f010.ply",
-            "f1b2.ply",
-            "f1b10.ply",
-            "a.ply",
-            "f.ply",
-        ];
+        let mut names = ["f10.ply", "f9.ply", "f010.ply", "f1b2.ply", "f1b10.ply", "a.ply", "f.ply"];
         names.sort_by(|a, b| natural_order(a, b));
-        assert_eq!(
-            names,
-            [
-                "a.ply",
-                "f.ply",
-                "f1b2.ply",
-                "f1b10.ply",
-                "f9.ply",
-                "f010.ply",
-                "f10.ply"
-            ]
-        );
+        assert_eq!(names, ["a.ply", "f.ply", "f1b2.ply", "f1b10.ply", "f9.ply", "f010.ply", "f10.ply"]);
     }
 
     #[test]

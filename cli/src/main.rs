@@ -73,11 +73,8 @@ fn in_threads(
     work: impl FnOnce() -> Result<(), Failure> + Send,
 ) -> Result<(), Failure> {
     let Some(threads) = threads else { return work() };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.into())
-        .build();
-    pool.map_err(|error| Failure::other(format!("cannot start {threads} threads: {error}")))?
-        .install(work)
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build();
+    pool.map_err(|error| Failure::other(format!("cannot start {threads} threads: {error}")))?.install(work)
 }
 
 impl Command {

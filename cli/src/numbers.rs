@@ -55,9 +55,7 @@ impl FrameRange {
 
     /// Frames of it in a stream of `frames` frames.
     pub(crate) fn count_in(&self, frames: u32) -> u32 {
-        self.end
-            .map_or(frames, |end| end.min(frames))
-            .saturating_sub(self.first)
+        self.end.map_or(frames, |end| end.min(frames)).saturating_sub(self.first)
     }
 
     /// `A..B`, `A..` or `..B`.
@@ -67,9 +65,9 @@ impl FrameRange {
         let number = |part: &str| (!part.is_empty()).then(|| part.parse::<u32>()).transpose();
         let bounds = || -> Result<_, ParseIntError> { Ok((number(first)?.unwrap_or(0), number(end)?)) };
         match bounds().map_err(|_| wrong())? {
-            (first, Some(end)) if first >= end => Err(format!(
-                "'{text}' holds no frame: the end is the frame after the last"
-            )),
+            (first, Some(end)) if first >= end => {
+                Err(format!("'{text}' holds no frame: the end is the frame after the last"))
+            }
             (first, end) => Ok(Self { first, end }),
         }
     }
@@ -78,12 +76,7 @@ impl FrameRange {
 /// Frames a second as ticks a second and ticks a frame: `30`, `29.97` or `30000/1001`.
 pub(crate) fn parse_frame_rate(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("'{text}' is not a frame rate; write 30, 29.97 or 30000/1001");
-    let positive = |part: &str| {
-        part.parse::<u32>()
-            .ok()
-            .filter(|&number| number > 0)
-            .ok_or_else(wrong)
-    };
+    let positive = |part: &str| part.parse::<u32>().ok().filter(|&number| number > 0).ok_or_else(wrong);
     if let Some((ticks, per_frame)) = text.split_once('/') {
         return Ok((positive(ticks)?, positive(per_frame)?));
     }
@@ -100,26 +93,16 @@ mod tests {
 
     #[test]
     fn thousands_are_apart() {
-        assert_eq!(
-            [0, 999, 1000, 1_234_567].map(grouped),
-            ["0", "999", "1,000", "1,234,567"]
-        );
+        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
     }
 
     #[test]
     fn a_span_of_frames_ends_before_its_end() {
         let span = FrameRange::parse("2..4").unwrap();
-        assert_eq!(
-            (0..6).filter(|&frame| span.contains(frame)).collect::<Vec<_>>(),
-            [2, 3]
-        );
+        assert_eq!((0..6).filter(|&frame| span.contains(frame)).collect::<Vec<_>>(), [2, 3]);
         assert_eq!(FrameRange::parse(".."), Ok(FrameRange::ALL));
         assert_eq!((span.count_in(3), FrameRange::ALL.count_in(3)), (1, 3));
-        assert!(
-            ["", "3", "4..4", "a..b", "1..2..3"]
-                .iter()
-                .all(|text| FrameRange::parse(text).is_err())
-        );
+        assert!(["", "3", "4..4", "a..b", "1..2..3"].iter().all(|text| FrameRange::parse(text).is_err()));
     }
 
     #[test]
@@ -127,10 +110,6 @@ mod tests {
         assert_eq!(parse_frame_rate("30"), Ok((30, 1)));
         assert_eq!(parse_frame_rate("29.97"), Ok((2997, 100)));
         assert_eq!(parse_frame_rate("30000/1001"), Ok((30000, 1001)));
-        assert!(
-            ["0", "-1", "1/0", "x", "1e9"]
-                .iter()
-                .all(|text| parse_frame_rate(text).is_err())
-        );
+        assert!(["0", "-1", "1/0", "x", "1e9"].iter().all(|text| parse_frame_rate(text).is_err()));
     }
 }

@@ -24,22 +24,14 @@ impl OutputFile {
                 path.display()
             )));
         }
-        let file = builder()
-            .tempfile_in(parent)
-            .map_err(|error| Failure::file("write", path, &error))?;
-        Ok(Self {
-            writer: BufWriter::with_capacity(1 << 20, file),
-            path: path.to_path_buf(),
-        })
+        let file = builder().tempfile_in(parent).map_err(|error| Failure::file("write", path, &error))?;
+        Ok(Self { writer: BufWriter::with_capacity(1 << 20, file), path: path.to_path_buf() })
     }
 
     /// Moves the file to its place, over one that may be there.
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let failed = |error: std::io::Error| Failure::file("write", &self.path, &error);
-        let file = self
-            .writer
-            .into_inner()
-            .map_err(|error| failed(error.into_error()))?;
+        let file = self.writer.into_inner().map_err(|error| failed(error.into_error()))?;
         file.persist(&self.path).map_err(|error| failed(error.error))?;
         Ok(())
     }
@@ -47,9 +39,7 @@ impl OutputFile {
     /// Writes a whole file.
     pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let mut file = Self::create(path)?;
-        file.writer
-            .write_all(bytes)
-            .map_err(|error| Failure::file("write", path, &error))?;
+        file.writer.write_all(bytes).map_err(|error| Failure::file("write", path, &error))?;
         file.finish()
     }
 }

@@ -21,10 +21,7 @@ pub(crate) struct LimitArgs {
 impl LimitArgs {
     /// The limits asked for.
     pub(crate) fn limits(&self) -> Limits {
-        Limits {
-            max_gaussians: self.max_gaussians,
-            ..Limits::default()
-        }
+        Limits { max_gaussians: self.max_gaussians, ..Limits::default() }
     }
 }
 
@@ -40,10 +37,7 @@ impl StreamFile {
     /// Reads a file; its content is not looked at.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = std::fs::read(path).map_err(|error| Failure::file("read", path, &error))?;
-        Ok(Self {
-            path: path.to_path_buf(),
-            bytes,
-        })
+        Ok(Self { path: path.to_path_buf(), bytes })
     }
 
     /// A failure of this stream.
@@ -86,8 +80,5 @@ impl StreamFile {
 /// Whether a file starts like a stream; no if it cannot be read.
 pub(crate) fn is_stream(path: &Path) -> bool {
     let mut start = [0; SIGNATURE.len()];
-    File::open(path)
-        .and_then(|mut file| file.read_exact(&mut start))
-        .is_ok()
-        && start == SIGNATURE
+    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE
 }

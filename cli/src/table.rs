@@ -8,9 +8,7 @@ pub(crate) struct Table {
 impl Table {
     /// A table with these headings.
     pub(crate) fn new<const N: usize>(headings: [&str; N]) -> Self {
-        Self {
-            rows: vec![headings.map(str::to_owned).to_vec()],
-        }
+        Self { rows: vec![headings.map(str::to_owned).to_vec()] }
     }
 
     /// Adds a row.
@@ -33,13 +31,12 @@ impl Table {
         let numeric: Vec<bool> = (0..columns).map(|column| self.is_numeric(column)).collect();
         let line = |row: &Vec<String>| {
             let cells = row.iter().zip(&widths).zip(&numeric);
-            let padded = cells.map(|((cell, &width), &numeric)| {
-                if numeric {
-                    format!("{cell:>width$}")
-                } else {
-                    format!("{cell:<width$}")
-                }
-            });
+            let padded =
+                cells.map(
+                    |((cell, &width), &numeric)| {
+                        if numeric { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+                    },
+                );
             padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
         };
         self.rows.iter().map(line).collect()
@@ -47,12 +44,7 @@ impl Table {
 
     /// Whether every cell below the heading starts like a number.
     fn is_numeric(&self, column: usize) -> bool {
-        let mut cells = self
-            .rows
-            .iter()
-            .skip(1)
-            .filter_map(|row| row.get(column))
-            .peekable();
+        let mut cells = self.rows.iter().skip(1).filter_map(|row| row.get(column)).peekable();
         let numeric = |cell: &String| cell.starts_with(|first: char| first.is_ascii_digit() || first == '-');
         cells.peek().is_some() && cells.all(|cell| numeric(cell) && !cell.starts_with("0x"))
     }

@@ -43,15 +43,10 @@ impl Validate {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
-        let frames = stream
-            .sequence(&limits)
-            .map_or(0, |sequence| sequence.frame_count);
+        let frames = stream.sequence(&limits).map_or(0, |sequence| sequence.frame_count);
         let progress = Progress::frames("checking", frames);
         let mut gaussians = 0;
-        let options = Options {
-            limits,
-            ..Options::default()
-        };
+        let options = Options { limits, ..Options::default() };
         let summary = decode_stream(&stream.bytes, &options, |_, frame| {
             gaussians += frame.planes.len() as u64;
             progress.at(frame.number.saturating_add(1));
@@ -80,18 +75,12 @@ impl Verdict {
     }
 
     fn text(&self, path: &std::path::Path) -> String {
-        let (path, frames, gaussians) = (
-            path.display(),
-            grouped(self.frames.into()),
-            grouped(self.gaussians),
-        );
+        let (path, frames, gaussians) =
+            (path.display(), grouped(self.frames.into()), grouped(self.gaussians));
         match self.class {
             None => format!("{path}: accept ({frames} frames, {gaussians} Gaussians, every digest agrees)"),
             Some(class) => {
-                format!(
-                    "{path}: {} ({class}, after {frames} frames without fault)",
-                    self.outcome
-                )
+                format!("{path}: {} ({class}, after {frames} frames without fault)", self.outcome)
             }
         }
     }

@@ -9,8 +9,8 @@ use splatstream_format::{Error, ErrorKind, Result};
 /// The values of a component.
 pub const COMPONENT_RANGE: RangeInclusive<i32> = -8191..=8191;
 
-/// Gaussians transformed at a time: their components stay in the first-level cache.
-const TILE: usize = 64;
+/// Gaussians transformed at a time: their sums stay in registers.
+const TILE: usize = 32;
 
 /// Everything a unit needs to turn components into colour.
 #[derive(Debug, Clone, Copy)]

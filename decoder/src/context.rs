@@ -1,6 +1,7 @@
 //! Clause 8.5: the values that choose the context of a symbol.
 
 use crate::block::CodedBlock;
+use std::borrow::Cow;
 use splatstream_format::entropy::model::{ContextAxis, Source};
 
 /// The last four coded values of a plane, and what the two serial sources make of them.
@@ -63,15 +64,15 @@ pub fn is_serial(source: Source) -> bool {
 }
 
 /// The values of a source that is not serial for every Gaussian of a block, known before `plane` is read.
-pub fn values(source: Source, plane: usize, block: &CodedBlock) -> Vec<i32> {
+pub fn values(source: Source, plane: usize, block: &CodedBlock) -> Cow<'_, [i32]> {
     let coded = |plane: usize| block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
     let [largest, middle, smallest] = &block.log_scale;
     match source {
-        Source::None | Source::NeighbourSum | Source::NeighbourMagnitude => Vec::new(),
-        Source::PreviousPlane => coded(plane.wrapping_sub(1)).to_vec(),
-        Source::GroupMagnitude => block.magnitudes_before(plane).to_vec(),
-        Source::LargestLogScale => largest.clone(),
-        Source::MiddleLogScale => middle.clone(),
+        Source::None | Source::NeighbourSum | Source::NeighbourMagnitude => Cow::default(),
+        Source::PreviousPlane => coded(plane.wrapping_sub(1)).into(),
+        Source::GroupMagnitude => block.magnitudes_before(plane).into(),
+        Source::LargestLogScale => largest.into(),
+        Source::MiddleLogScale => middle.into(),
         Source::LogVolume => largest
             .iter()
             .zip(middle)
@@ -79,8 +80,8 @@ pub fn values(source: Source, plane: usize, block: &CodedBlock) -> Vec<i32> {
             .map(|((&a, &b), &c)| a.wrapping_add(b).wrapping_add(c))
             .collect(),
         Source::Anisotropy => largest.iter().zip(smallest).map(|(&a, &b)| a.wrapping_sub(b)).collect(),
-        Source::Opacity => block.opacity.clone(),
-        Source::PositionSpacing => spacing(&block.deltas),
+        Source::Opacity => (&block.opacity).into(),
+        Source::PositionSpacing => spacing(&block.deltas).into(),
     }
 }
 
@@ -98,7 +99,7 @@ pub fn axis_contexts(axis: &ContextAxis, plane: usize, block: &CodedBlock) -> Ve
     let values = values(axis.source, plane, block);
     let mut contexts = vec![0_u8; values.len()];
     for &threshold in &axis.thresholds {
-        for (context, &value) in contexts.iter_mut().zip(&values) {
+        for (context, &value) in contexts.iter_mut().zip(values.iter()) {
             *context = context.wrapping_add(u8::from(threshold <= value));
         }
     }

@@ -83,7 +83,7 @@ fn source_values(source: Source, info: PlaneInfo, plane: usize, block: &CodedBlo
         };
         return coded.iter().map(step).collect();
     }
-    context::values(source, plane, block)
+    context::values(source, plane, block).into_owned()
 }
 
 /// Thresholds that cut the values in parts of about equal size.

@@ -49,35 +49,24 @@ impl ErrorSums {
     /// Adds Gaussian `i` of `small` against Gaussian `partners[i]` of `large`, for every `i`. The frames are
     /// in canonical form.
     pub(crate) fn add(&mut self, small: &GaussianFrame, large: &GaussianFrame, partners: &[u32]) {
-        let rows: Vec<(usize, usize)> = partners
-            .iter()
-            .enumerate()
-            .map(|(row, &partner)| (row, partner as usize))
-            .collect();
-        let tasks: Vec<Self> = rows
-            .par_chunks(TASK)
-            .map(|rows| Self::of(small, large, rows))
-            .collect();
+        let rows: Vec<(usize, usize)> =
+            partners.iter().enumerate().map(|(row, &partner)| (row, partner as usize)).collect();
+        let tasks: Vec<Self> = rows.par_chunks(TASK).map(|rows| Self::of(small, large, rows)).collect();
         tasks.iter().for_each(|task| self.join(task));
     }
 
     fn of(small: &GaussianFrame, large: &GaussianFrame, rows: &[(usize, usize)]) -> Self {
-        let mut sums = Self {
-            pairs: rows.len() as u64,
-            ..Self::default()
-        };
+        let mut sums = Self { pairs: rows.len() as u64, ..Self::default() };
         sums.position.planes(small.position(), large.position(), rows);
         sums.log_scale.planes(small.log_scale(), large.log_scale(), rows);
-        sums.opacity_logit
-            .plane(small.opacity_logit(), large.opacity_logit(), rows);
+        sums.opacity_logit.plane(small.opacity_logit(), large.opacity_logit(), rows);
         sums.dc.planes(small.dc(), large.dc(), rows);
         for plane in 0..small.sh().len().max(large.sh().len()) {
             let values = |frame: &GaussianFrame, row: usize| {
                 // A frame of a lower degree has zeros there.
                 frame.sh().get(plane).map_or(0.0, |values| values[row])
             };
-            rows.iter()
-                .for_each(|&(a, b)| sums.sh.push(values(small, a), values(large, b)));
+            rows.iter().for_each(|&(a, b)| sums.sh.push(values(small, a), values(large, b)));
         }
         for &(a, b) in rows {
             let difference = turn_difference(rotation(small, a), rotation(large, b));
@@ -123,8 +112,7 @@ impl Sum {
     }
 
     fn plane(&mut self, a: &[f32], b: &[f32], rows: &[(usize, usize)]) {
-        rows.iter()
-            .for_each(|&(row, partner)| self.push(a[row], b[partner]));
+        rows.iter().for_each(|&(row, partner)| self.push(a[row], b[partner]));
     }
 
     fn planes(&mut self, a: &[Vec<f32>; 3], b: &[Vec<f32>; 3], rows: &[(usize, usize)]) {
@@ -138,10 +126,7 @@ impl Sum {
     }
 
     fn error(&self) -> AttributeError {
-        AttributeError {
-            rmse: (self.squares / self.count.max(1) as f64).sqrt(),
-            max: self.max,
-        }
+        AttributeError { rmse: (self.squares / self.count.max(1) as f64).sqrt(), max: self.max }
     }
 }
 
@@ -157,9 +142,7 @@ pub(crate) fn turn_difference(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     let signed = turned.into_iter().flat_map(|turn| [turn, turn.map(|part| -part)]);
     let differences = signed.map(|turn| [0, 1, 2, 3].map(|part: usize| a[part] - turn[part]));
     let square = |difference: &[f32; 4]| -> f32 { difference.iter().map(|part| part * part).sum() };
-    differences
-        .min_by(|one, other| square(one).total_cmp(&square(other)))
-        .unwrap_or_default()
+    differences.min_by(|one, other| square(one).total_cmp(&square(other))).unwrap_or_default()
 }
 
 impl AttributeErrors {
@@ -175,11 +158,7 @@ impl AttributeErrors {
             ("sh", self.sh),
         ];
         for (name, error) in rows {
-            table.row([
-                name.to_owned(),
-                format!("{:.6}", error.rmse),
-                format!("{:.6}", error.max),
-            ]);
+            table.row([name.to_owned(), format!("{:.6}", error.rmse), format!("{:.6}", error.max)]);
         }
         table.text()
     }
@@ -196,10 +175,6 @@ mod tests {
         for other in [turn, turn.map(|part| -part), about_x] {
             assert_eq!(turn_difference(turn, other), [0.0; 4]);
         }
-        assert!(
-            turn_difference(turn, [1.0, 0.0, 0.0, 0.0])
-                .iter()
-                .any(|part| part.abs() > 0.1)
-        );
+        assert!(turn_difference(turn, [1.0, 0.0, 0.0, 0.0]).iter().any(|part| part.abs() > 0.1));
     }
 }

@@ -22,12 +22,7 @@ pub(super) enum Opened {
 /// The frames of one side, in order.
 pub(super) enum Frames<'a> {
     /// Decoded as they are asked for.
-    Stream {
-        file: &'a StreamFile,
-        units: Units<'a>,
-        decoder: Box<Decoder<'a>>,
-        expected: u32,
-    },
+    Stream { file: &'a StreamFile, units: Units<'a>, decoder: Box<Decoder<'a>>, expected: u32 },
     /// Read as they are asked for.
     Files { files: FrameFiles, next: u32 },
 }
@@ -46,18 +41,10 @@ impl Opened {
         match self {
             Self::Stream(file) => {
                 let stream = Stream::open(&file.bytes, limits).map_err(|error| file.fault(error))?;
-                let options = Options {
-                    limits: *limits,
-                    ..Options::default()
-                };
+                let options = Options { limits: *limits, ..Options::default() };
                 let expected = file.sequence(limits).map_or(0, |sequence| sequence.frame_count);
                 let decoder = Box::new(Decoder::new(stream.header(), options));
-                Ok(Frames::Stream {
-                    file,
-                    units: stream.units(),
-                    decoder,
-                    expected,
-                })
+                Ok(Frames::Stream { file, units: stream.units(), decoder, expected })
             }
             Self::Scene(path) => {
                 let files = FrameFiles::find(std::slice::from_ref(path))?;
@@ -79,9 +66,7 @@ impl Frames<'_> {
     /// The next frame.
     pub(super) fn next(&mut self) -> Result<Option<GaussianFrame>, Failure> {
         match self {
-            Self::Stream {
-                file, units, decoder, ..
-            } => {
+            Self::Stream { file, units, decoder, .. } => {
                 let decoded = next_decoded(units, decoder).map_err(|error| file.fault(error))?;
                 Ok(decoded
                     .zip(decoder.sequence())
@@ -91,9 +76,7 @@ impl Frames<'_> {
                 if *next >= files.len() {
                     return Ok(None);
                 }
-                let frame = files
-                    .frame(*next)
-                    .map_err(|error| Failure::other(error.to_string()))?;
+                let frame = files.frame(*next).map_err(|error| Failure::other(error.to_string()))?;
                 *next += 1;
                 Ok(Some(frame))
             }

@@ -3,11 +3,11 @@
 //! The grid spans the box of the inner points; those outside are put into the cells of its border. Moving
 //! points to the border brings them closer together, never apart, so that a search by cells misses nothing.
 
-/// Cells an axis, at most: the grid stays small however unlike a cube the scene is.
-const MOST_CELLS: f32 = 128.0;
+/// Cells an axis, at most: 16 MB of cells.
+const MOST_CELLS: f32 = 160.0;
 
-/// Points that a cell holds on average.
-const POINTS_A_CELL: f32 = 2.0;
+/// Points that a cell holds on average. Scenes are surfaces: most cells are empty, and the others hold some.
+const POINTS_A_CELL: f32 = 0.125;
 
 /// Points in cells.
 pub(super) struct Grid<'a> {
@@ -34,31 +34,19 @@ impl<'a> Grid<'a> {
     pub(super) fn new(points: [&'a [f32]; 3]) -> Self {
         let [low, high] = inner_box(points);
         let sides = [0, 1, 2].map(|axis: usize| high[axis] - low[axis]);
-        let longest = sides
-            .iter()
-            .fold(f32::MIN_POSITIVE, |longest, &side| longest.max(side));
-        let wanted = (points[0].len() as f32 / POINTS_A_CELL)
-            .cbrt()
-            .clamp(1.0, MOST_CELLS);
+        let longest = sides.iter().fold(f32::MIN_POSITIVE, |longest, &side| longest.max(side));
+        let wanted = (points[0].len() as f32 / POINTS_A_CELL).cbrt().clamp(1.0, MOST_CELLS);
         let cell = longest / wanted;
         let cells = sides.map(|side| (side / cell).floor() as usize + 1);
-        let mut grid = Self {
-            points,
-            low,
-            cell,
-            cells,
-            starts: Vec::new(),
-            members: Vec::new(),
-        };
+        let mut grid = Self { points, low, cell, cells, starts: Vec::new(), members: Vec::new() };
         grid.fill();
         grid
     }
 
     /// Counting sort: how many a cell has, where it starts, who is in it.
     fn fill(&mut self) {
-        let homes: Vec<usize> = (0..self.points[0].len())
-            .map(|row| self.index_of(self.cell_of(self.point(row))))
-            .collect();
+        let homes: Vec<usize> =
+            (0..self.points[0].len()).map(|row| self.index_of(self.cell_of(self.point(row)))).collect();
         self.starts = vec![0; self.cells.iter().product::<usize>() + 1];
         homes.iter().for_each(|&home| self.starts[home + 1] += 1);
         for cell in 1..self.starts.len() {
@@ -112,20 +100,14 @@ impl<'a> Grid<'a> {
         };
         for z in span(2) {
             for y in span(1) {
-                let mut visit_cell = |x: usize| {
-                    self.cell_members([x, y, z])
-                        .iter()
-                        .for_each(|&index| visit(index))
-                };
+                let mut visit_cell =
+                    |x: usize| self.cell_members([x, y, z]).iter().for_each(|&index| visit(index));
                 if z.abs_diff(centre[2]) == shell || y.abs_diff(centre[1]) == shell {
                     span(0).for_each(visit_cell);
                 } else {
                     // Between its faces, a shell has only the two ends on x.
                     centre[0].checked_sub(shell).into_iter().for_each(&mut visit_cell);
-                    Some(centre[0] + shell)
-                        .filter(|&x| x < self.cells[0])
-                        .into_iter()
-                        .for_each(visit_cell);
+                    Some(centre[0] + shell).filter(|&x| x < self.cells[0]).into_iter().for_each(visit_cell);
                 }
             }
         }
@@ -167,10 +149,7 @@ pub(super) fn inner_box(points: [&[f32]; 3]) -> [[f32; 3]; 2] {
     });
     let at = |share: usize| {
         sorted.each_ref().map(|plane| {
-            plane
-                .get((plane.len() * share / 100).min(plane.len().saturating_sub(1)))
-                .copied()
-                .unwrap_or(0.0)
+            plane.get((plane.len() * share / 100).min(plane.len().saturating_sub(1))).copied().unwrap_or(0.0)
         })
     };
     [at(1), at(99)]
@@ -206,19 +185,13 @@ mod tests {
         for row in 0..700 {
             let to = mine.each_ref().map(|plane| plane[row]);
             let all: Vec<Neighbour> = (0..911).map(|index| grid.neighbour(index, to)).collect();
-            let best = all
-                .iter()
-                .copied()
-                .reduce(|a, b| if b.squared < a.squared { b } else { a });
+            let best = all.iter().copied().reduce(|a, b| if b.squared < a.squared { b } else { a });
             assert_eq!(grid.nearest(to), best);
             let mut near = Vec::new();
             grid.within(to, 0.2, &mut |found| near.push(found.index));
             near.sort_unstable();
-            let expected: Vec<u32> = all
-                .iter()
-                .filter(|found| found.squared <= 0.2 * 0.2)
-                .map(|found| found.index)
-                .collect();
+            let expected: Vec<u32> =
+                all.iter().filter(|found| found.squared <= 0.2 * 0.2).map(|found| found.index).collect();
             assert_eq!(near, expected);
         }
     }

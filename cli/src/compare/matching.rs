@@ -37,11 +37,7 @@ pub(super) fn partners(small: &GaussianFrame, large: &GaussianFrame, choice: Mat
 /// Whether two frames of equal counts have their Gaussians in the same order.
 fn corresponds(a: &GaussianFrame, b: &GaussianFrame) -> bool {
     let [low, high] = inner_box(a.position().each_ref().map(Vec::as_slice));
-    let longest = low
-        .iter()
-        .zip(high)
-        .map(|(low, high)| high - low)
-        .fold(0.0, f32::max);
+    let longest = low.iter().zip(high).map(|(low, high)| high - low).fold(0.0, f32::max);
     let squared = |row: usize| -> f32 {
         let (a, b) = (position(a, row), position(b, row));
         a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
@@ -57,8 +53,7 @@ fn nearest(small: &GaussianFrame, large: &GaussianFrame) -> Vec<u32> {
     let closest: Vec<(u32, f32)> = (0..small.len())
         .into_par_iter()
         .map(|row| {
-            grid.nearest(position(small, row))
-                .map_or((0, 0.0), |found| (found.index, found.squared.sqrt()))
+            grid.nearest(position(small, row)).map_or((0, 0.0), |found| (found.index, found.squared.sqrt()))
         })
         .collect();
     let mut distances: Vec<f32> = closest.iter().map(|&(_, distance)| distance).collect();
@@ -85,10 +80,7 @@ fn nearest(small: &GaussianFrame, large: &GaussianFrame) -> Vec<u32> {
 /// each attribute shows.
 fn unlikeness(a: &GaussianFrame, row: usize, b: &GaussianFrame, partner: usize) -> f32 {
     let planes = |a: &[Vec<f32>; 3], b: &[Vec<f32>; 3]| -> f32 {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a[row] - b[partner]) * (a[row] - b[partner]))
-            .sum()
+        a.iter().zip(b).map(|(a, b)| (a[row] - b[partner]) * (a[row] - b[partner])).sum()
     };
     let opacity = a.opacity_logit()[row] - b.opacity_logit()[partner];
     let turn = |frame: &GaussianFrame, row: usize| frame.rotation().each_ref().map(|plane| plane[row]);
@@ -117,12 +109,7 @@ mod tests {
     use splatstream_scene::builtin::BuiltinScene;
 
     fn scene() -> GaussianFrame {
-        BuiltinScene {
-            gaussians: 500,
-            sh_degree: 0,
-            ..BuiltinScene::default()
-        }
-        .frame(0)
+        BuiltinScene { gaussians: 500, sh_degree: 0, ..BuiltinScene::default() }.frame(0)
     }
 
     #[test]

@@ -43,9 +43,7 @@ impl Target {
             && format != named
         {
             let (path, asked) = (path.display(), format.extension());
-            return Err(Failure::Usage(format!(
-                "{path}: --format {asked} contradicts the name of the file"
-            )));
+            return Err(Failure::Usage(format!("{path}: --format {asked} contradicts the name of the file")));
         }
         if !target.is_file {
             make_directory(path)?;
@@ -67,8 +65,7 @@ impl Target {
         if self.is_file {
             return self.path.clone();
         }
-        self.path
-            .join(format!("frame_{number:04}.{}", self.format.extension()))
+        self.path.join(format!("frame_{number:04}.{}", self.format.extension()))
     }
 }
 

@@ -67,19 +67,8 @@ impl Point {
 impl Demonstration {
     /// The report for people.
     pub(super) fn text(&self) -> String {
-        let Scene {
-            frames,
-            gaussians,
-            sh_degree,
-            ply_bytes,
-        } = &self.scene;
-        let Encoding {
-            bytes,
-            bpg,
-            seconds,
-            gaussians_per_second: rate,
-            ..
-        } = &self.encoding;
+        let Scene { frames, gaussians, sh_degree, ply_bytes } = &self.scene;
+        let Encoding { bytes, bpg, seconds, gaussians_per_second: rate, .. } = &self.encoding;
         let place = self.directory.display();
         format!(
             "scene     {frames} frames, {} Gaussians in all, SH degree {sh_degree}: {} bytes as PLY\n\

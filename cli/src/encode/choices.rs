@@ -14,11 +14,7 @@ pub(crate) struct Choice {
 
 impl Choice {
     fn new(tool: &'static str, choice: impl Into<String>, why: impl Into<String>) -> Self {
-        Self {
-            tool,
-            choice: choice.into(),
-            why: why.into(),
-        }
+        Self { tool, choice: choice.into(), why: why.into() }
     }
 
     /// A line for people.
@@ -29,11 +25,7 @@ impl Choice {
 
 /// Every decision that the report tells of.
 pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
-    let mut choices = vec![
-        positions(report, settings),
-        axes(report),
-        degree(report, settings),
-    ];
+    let mut choices = vec![positions(report, settings), axes(report), degree(report, settings)];
     if report.sh_degree.1 > 0 {
         choices.push(harmonics(report, settings));
     }
@@ -55,11 +47,7 @@ fn axes(report: &Report) -> Choice {
     let why = format!(
         "scale and rotation take {bits_sorted:.2} bits a Gaussian sorted, {bits_unsorted:.2} as they come"
     );
-    Choice::new(
-        "axes",
-        if sorted { "sorted by size" } else { "as they come" },
-        why,
-    )
+    Choice::new("axes", if sorted { "sorted by size" } else { "as they come" }, why)
 }
 
 fn degree(report: &Report, settings: &Settings) -> Choice {
@@ -69,6 +57,7 @@ fn degree(report: &Report, settings: &Settings) -> Choice {
         None if stream < source => {
             format!("the source has {source}; no coefficient above {stream} reaches half a step")
         }
+        None if source == 0 => "the source has no spherical harmonics".to_owned(),
         None => format!("the source has {source}, and every band rises above half a step"),
     };
     Choice::new("sh degree", stream.to_string(), why)
@@ -78,10 +67,7 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
     let rank = report.sh_rank;
     let choice = match report.sh_codebook_entries {
         0 => format!("{rank} coefficients"),
-        entries => format!(
-            "codebook of {} entries, {rank} components",
-            grouped(entries.into())
-        ),
+        entries => format!("codebook of {} entries, {rank} components", grouped(entries.into())),
     };
     let asked = match settings.sh {
         ShChoice::Auto => "not tried with this preset or scene",
@@ -106,9 +92,5 @@ fn invisible(report: &Report, settings: &Settings) -> Choice {
     }
     let share = percent(report.invisible, report.invisible + report.gaussians);
     let choice = format!("{} left out ({share:.2} %)", grouped(report.invisible));
-    Choice::new(
-        "invisible",
-        choice,
-        "opacity below 1/255 everywhere; --keep-invisible keeps them",
-    )
+    Choice::new("invisible", choice, "opacity below 1/255 everywhere; --keep-invisible keeps them")
 }

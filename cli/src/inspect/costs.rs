@@ -55,12 +55,7 @@ impl Costs {
             let of_one = |bits: f64| bits / gaussians.max(1) as f64;
             let (symbols_bpg, models_bpg) = (of_one(cost.symbol_bits), of_one(cost.model_bits as f64));
             let bpg = symbols_bpg + models_bpg;
-            OfAttribute {
-                attribute: cost.attribute.name(),
-                symbols_bpg,
-                models_bpg,
-                bpg,
-            }
+            OfAttribute { attribute: cost.attribute.name(), symbols_bpg, models_bpg, bpg }
         };
         let units = |cost: &UnitCost| OfUnits {
             kind: cost.unit_type.name(),

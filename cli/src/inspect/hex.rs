@@ -39,31 +39,11 @@ pub(super) fn show(stream: &StreamFile, number: usize, limits: &Limits, console:
             return Ok(error);
         }
         let (path, count) = (stream.path.display(), units.len());
-        return Err(Failure::Usage(format!(
-            "{path}: there is no unit {number}, the stream has {count}"
-        )));
+        return Err(Failure::Usage(format!("{path}: there is no unit {number}, the stream has {count}")));
     }
-    let Branch {
-        unit,
-        kind,
-        at,
-        bytes,
-        elements,
-    } = units.swap_remove(number);
-    let elements = elements
-        .into_iter()
-        .map(|row| Bytes {
-            hex: hex(stream, &row),
-            row,
-        })
-        .collect();
-    let dump = Dump {
-        unit,
-        kind,
-        at,
-        bytes,
-        elements,
-    };
+    let Branch { unit, kind, at, bytes, elements } = units.swap_remove(number);
+    let elements = elements.into_iter().map(|row| Bytes { hex: hex(stream, &row), row }).collect();
+    let dump = Dump { unit, kind, at, bytes, elements };
     console.report(&dump, || dump.text())?;
     Ok(error)
 }
@@ -83,12 +63,7 @@ fn hex(stream: &StreamFile, row: &Row) -> String {
 
 impl Dump {
     fn text(&self) -> String {
-        let mut text = format!(
-            "unit {} {}  {}\n",
-            self.unit,
-            self.kind,
-            span(self.at, self.bytes)
-        );
+        let mut text = format!("unit {} {}  {}\n", self.unit, self.kind, span(self.at, self.bytes));
         self.elements.iter().for_each(|element| element.push(&mut text));
         text
     }
@@ -101,10 +76,7 @@ impl Bytes {
         let name = format!("{}.{} = {} ({})", row.record, row.name, row.value, row.clause);
         let lines = self.hex.as_bytes().chunks(2 * WIDTH);
         for (line, digits) in lines.enumerate() {
-            let pairs: Vec<&str> = digits
-                .chunks(2)
-                .filter_map(|pair| str::from_utf8(pair).ok())
-                .collect();
+            let pairs: Vec<&str> = digits.chunks(2).filter_map(|pair| str::from_utf8(pair).ok()).collect();
             let at = row.at_bit + (line * WIDTH * 8) as u64;
             let beside = if line == 0 { name.as_str() } else { "" };
             let shown = format!("{:<10} {:<47}  {beside}", place(at), pairs.join(" "));

@@ -44,14 +44,7 @@ impl From<&OperatingPointInfo> for Point {
 }
 
 fn text(points: &Vec<Point>) -> String {
-    let mut table = Table::new([
-        "point",
-        "bytes",
-        "frames",
-        "Gaussians",
-        "% of a frame",
-        "bits a Gaussian",
-    ]);
+    let mut table = Table::new(["point", "bytes", "frames", "Gaussians", "% of a frame", "bits a Gaussian"]);
     for point in points {
         table.row([
             point.op.clone(),

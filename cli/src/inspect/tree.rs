@@ -80,38 +80,21 @@ impl Elements {
                 None => file_header.push(Row::from(element)),
             }
         });
-        Self {
-            file_header,
-            units,
-            error,
-        }
+        Self { file_header, units, error }
     }
 }
 
 fn is_start_of_unit(element: &Element) -> bool {
     let header = UnitHeader::TABLE;
-    element.record == header.name
-        && header
-            .rows
-            .first()
-            .is_some_and(|first| element.name == first.name)
+    element.record == header.name && header.rows.first().is_some_and(|first| element.name == first.name)
 }
 
 impl Branch {
     fn new(unit: usize, first: &Element) -> Self {
         // The value of unit_type is the code, and in brackets the name.
-        let name = first
-            .value
-            .split_once('(')
-            .map_or(first.value.as_str(), |(_, name)| name);
+        let name = first.value.split_once('(').map_or(first.value.as_str(), |(_, name)| name);
         let kind = name.trim_end_matches(')').to_owned();
-        Self {
-            unit,
-            kind,
-            at: first.at_bit / 8,
-            bytes: 0,
-            elements: Vec::new(),
-        }
+        Self { unit, kind, at: first.at_bit / 8, bytes: 0, elements: Vec::new() }
     }
 
     fn push(&mut self, element: Element) {
@@ -124,24 +107,8 @@ impl Branch {
 
 impl From<Element> for Row {
     fn from(element: Element) -> Self {
-        let Element {
-            at_bit,
-            bits,
-            record,
-            name,
-            value,
-            meaning,
-            clause,
-        } = element;
-        Self {
-            at_bit,
-            bits,
-            record,
-            name: name.into_owned(),
-            value,
-            meaning: meaning.into_owned(),
-            clause,
-        }
+        let Element { at_bit, bits, record, name, value, meaning, clause } = element;
+        Self { at_bit, bits, record, name: name.into_owned(), value, meaning: meaning.into_owned(), clause }
     }
 }
 
@@ -150,12 +117,7 @@ impl Tree {
         let mut text = String::new();
         push_rows(&mut text, &self.file_header);
         for unit in &self.units {
-            text += &format!(
-                "unit {} {}  {}\n",
-                unit.unit,
-                unit.kind,
-                span(unit.at, unit.bytes)
-            );
+            text += &format!("unit {} {}  {}\n", unit.unit, unit.kind, span(unit.at, unit.bytes));
             push_rows(&mut text, &unit.elements);
         }
         if let Some(error) = &self.error {
@@ -196,9 +158,5 @@ pub(super) fn place(at_bit: u64) -> String {
 }
 
 fn length(bits: u64) -> String {
-    if bits.is_multiple_of(8) {
-        format!("{} B", bits / 8)
-    } else {
-        format!("{bits} bit")
-    }
+    if bits.is_multiple_of(8) { format!("{} B", bits / 8) } else { format!("{bits} bit") }
 }

@@ -36,10 +36,7 @@ struct Line {
 pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> Shown {
     let mut lines = Vec::new();
     let error = list(stream, limits, &mut lines);
-    let listing = Listing {
-        units: lines,
-        error: error.map(StreamFault::from),
-    };
+    let listing = Listing { units: lines, error: error.map(StreamFault::from) };
     console.report(&listing, || listing.text())?;
     Ok(error)
 }
@@ -83,16 +80,7 @@ impl Line {
 
 impl Listing {
     fn text(&self) -> String {
-        let mut table = Table::new([
-            "unit",
-            "type",
-            "place",
-            "bytes",
-            "frame",
-            "layer",
-            "refinement",
-            "",
-        ]);
+        let mut table = Table::new(["unit", "type", "place", "bytes", "frame", "layer", "refinement", ""]);
         for line in &self.units {
             table.row([
                 line.unit.to_string(),
@@ -102,11 +90,7 @@ impl Listing {
                 line.frame.to_string(),
                 format!("s{},t{}", line.spatial_layer, line.temporal_layer),
                 line.refinement.to_string(),
-                if line.damaged {
-                    "damaged".to_owned()
-                } else {
-                    String::new()
-                },
+                if line.damaged { "damaged".to_owned() } else { String::new() },
             ]);
         }
         let mut text = table.text();

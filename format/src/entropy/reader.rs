@@ -57,8 +57,8 @@ pub struct PlaneDecoder {
     token_of_slot: Vec<u8>,
     /// Frequency in the high half, first slot in the low half.
     interval_of_token: Vec<u32>,
-    value_of_token: Box<[u64; TOKENS]>,
-    raw_bits_of_token: Box<[u8; TOKENS]>,
+    /// Smallest value and number of raw bits.
+    value_of_token: Box<[(u64, u32); TOKENS]>,
 }
 
 impl PlaneDecoder {
@@ -68,14 +68,9 @@ impl PlaneDecoder {
         for (slots, &place) in slots_of_context.iter_mut().zip(&model.table_of_context) {
             *slots = u32::from(place).wrapping_shl(FREQUENCY_BITS);
         }
-        let mut value_of_token = Box::new([0_u64; TOKENS]);
-        let mut raw_bits_of_token = Box::new([0_u8; TOKENS]);
-        for ((token, value), raw_bits) in
-            (0..=u8::MAX).zip(value_of_token.iter_mut()).zip(raw_bits_of_token.iter_mut())
-        {
-            let (base, bits) = join(token, model.direct_log2);
-            *value = base;
-            *raw_bits = u8::try_from(bits).unwrap_or(0);
+        let mut value_of_token = Box::new([(0, 0); TOKENS]);
+        for (token, value) in (0..=u8::MAX).zip(value_of_token.iter_mut()) {
+            *value = join(token, model.direct_log2);
         }
         let [_, second] = &model.axes;
         let mut decoder = Self {
@@ -87,7 +82,6 @@ impl PlaneDecoder {
             token_of_slot: Vec::with_capacity(model.tables.len().saturating_mul(SLOTS)),
             interval_of_token: Vec::with_capacity(model.tables.len().saturating_mul(TOKENS)),
             value_of_token,
-            raw_bits_of_token,
         };
         model.tables.iter().for_each(|table| decoder.expand(table.of_token()));
         decoder
@@ -143,11 +137,34 @@ impl PlaneDecoder {
 pub struct BlockReader<'a> {
     states: [u32; MAX_LANES],
     lanes: usize,
-    words: &'a [u8],
-    words_missing: bool,
+    words: Words<'a>,
     raw: BitReader<'a>,
     at: u64,
     raw_at: u64,
+}
+
+/// The words of a block. Past the end they are 0, and the place keeps counting.
+#[derive(Debug, Clone, Copy)]
+struct Words<'a> {
+    bytes: &'a [u8],
+    place: usize,
+}
+
+impl Words<'_> {
+    /// The next word is taken only if the state is below its bound: a choice of values, not a branch, for
+    /// no processor guesses it.
+    #[inline(always)]
+    fn refill(&mut self, state: u32) -> u32 {
+        let rest = self.bytes.get(self.place..).unwrap_or_default();
+        let word = rest.first_chunk::<2>().map_or(0, |bytes| u16::from_le_bytes(*bytes));
+        let low = state < STATE_LOW;
+        self.place = self.place.wrapping_add(usize::from(low).wrapping_mul(2));
+        if low { state.wrapping_shl(16) | u32::from(word) } else { state }
+    }
+
+    fn are_spent(&self) -> bool {
+        self.place == self.bytes.len()
+    }
 }
 
 impl<'a> BlockReader<'a> {
@@ -161,8 +178,7 @@ impl<'a> BlockReader<'a> {
         let (word_count, rest) = leb128(block, at, "word_count", "5.13")?;
         let (states_bytes, rest) = rest.split_at_checked(lanes.wrapping_mul(4)).ok_or(short("state"))?;
         let word_bytes = usize::try_from(word_count).ok().and_then(|count| count.checked_mul(2));
-        let (words, raw) =
-            word_bytes.and_then(|count| rest.split_at_checked(count)).ok_or(short("word"))?;
+        let (bytes, raw) = word_bytes.and_then(|count| rest.split_at_checked(count)).ok_or(short("word"))?;
         let mut states = [STATE_LOW; MAX_LANES];
         for (state, bytes) in states.iter_mut().zip(states_bytes.chunks_exact(4)) {
             *state = bytes.try_into().map_or(0, u32::from_le_bytes);
@@ -172,8 +188,7 @@ impl<'a> BlockReader<'a> {
         }
         let raw_offset = block.len().wrapping_sub(raw.len());
         let raw_at = at.wrapping_add(u64::try_from(raw_offset).unwrap_or(0));
-        let raw = BitReader::new(raw);
-        Ok(Self { states, lanes, words, words_missing: false, raw, at, raw_at })
+        Ok(Self { states, lanes, words: Words { bytes, place: 0 }, raw: BitReader::new(raw), at, raw_at })
     }
 
     /// Reads one plane: the value of `out[i]` is coded in context `context(i, previous value)`.
@@ -188,58 +203,37 @@ impl<'a> BlockReader<'a> {
         mut context: impl FnMut(usize, V) -> u8,
         map: impl Fn(u64) -> V,
     ) {
+        // Copies, so that the loop keeps them in registers.
+        let (mut states, mut words) = (self.states, self.words);
         let mask = self.lanes.wrapping_sub(1) & 31;
         let mut previous = start;
         for (place, out) in out.iter_mut().enumerate() {
             let context = usize::from(context(place, previous)) & 63;
             let slots = decoder.slots_of_context.get(context).copied().unwrap_or(0);
-            let Some(state) = self.states.get_mut(place & mask) else { continue };
-            let token = Self::token(state, decoder, slots, &mut self.words, &mut self.words_missing);
-            let mut value = decoder.value_of_token.get(usize::from(token)).copied().unwrap_or(0);
-            let raw_bits = decoder.raw_bits_of_token.get(usize::from(token)).copied().unwrap_or(0);
+            let Some(state) = states.get_mut(place & mask) else { continue };
+            let (token, next) = Self::token(*state, decoder, slots);
+            *state = words.refill(next);
+            let (mut value, raw_bits) = decoder.value_of_token.get(usize::from(token)).copied().unwrap_or((0, 0));
             if raw_bits > 0 {
-                value = value.wrapping_add(self.raw.bits(u32::from(raw_bits)));
+                value = value.wrapping_add(self.raw.bits(raw_bits));
             }
             previous = map(value);
             *out = previous;
         }
+        (self.states, self.words) = (states, words);
     }
 
-    /// One rANS step in the table that starts at `slots`.
+    /// One rANS step in the table that starts at `slots`: the token, and the state before a word is taken.
     #[inline(always)]
-    fn token(
-        state: &mut u32,
-        decoder: &PlaneDecoder,
-        slots: u32,
-        words: &mut &[u8],
-        missing: &mut bool,
-    ) -> u8 {
-        let slot = *state & 0xFFF;
+    fn token(state: u32, decoder: &PlaneDecoder, slots: u32) -> (u8, u32) {
+        let slot = state & 0xFFF;
         let place = usize::try_from(slots | slot).unwrap_or(0);
         let token = decoder.token_of_slot.get(place).copied().unwrap_or(0);
         let interval_place = usize::try_from(slots >> 4 | u32::from(token)).unwrap_or(0);
         let interval = decoder.interval_of_token.get(interval_place).copied().unwrap_or(0);
-        let frequency = interval >> 16;
-        let first = interval & 0xFFFF;
-        let mut next = frequency
-            .wrapping_mul(state.wrapping_shr(FREQUENCY_BITS))
-            .wrapping_add(slot)
-            .wrapping_sub(first);
-        if next < STATE_LOW {
-            let word = match words.split_first_chunk::<2>() {
-                Some((word, rest)) => {
-                    *words = rest;
-                    u16::from_le_bytes(*word)
-                }
-                None => {
-                    *missing = true;
-                    0
-                }
-            };
-            next = next.wrapping_shl(16) | u32::from(word);
-        }
-        *state = next;
-        token
+        let [first, frequency] = [interval & 0xFFFF, interval >> 16];
+        let next = frequency.wrapping_mul(state.wrapping_shr(FREQUENCY_BITS));
+        (token, next.wrapping_add(slot).wrapping_sub(first))
     }
 
     /// Reads signed values; contexts are known beforehand (`contexts` empty: all 0).
@@ -284,7 +278,7 @@ impl<'a> BlockReader<'a> {
     /// Malformed otherwise.
     pub fn finish(self) -> Result<()> {
         let spent = self.states.iter().all(|&state| state == STATE_LOW);
-        if !spent || self.words_missing || !self.words.is_empty() {
+        if !spent || !self.words.are_spent() {
             return Err(Error::new(self.at, "8.4", ErrorKind::EntropyFinalState));
         }
         self.raw.finish(self.raw_at, "raw_bits", "8.4")

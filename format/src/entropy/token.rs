@@ -95,7 +95,7 @@ mod tests {
             let token = split(value, direct_log2);
             let (base, raw_bits) = join(token.token, direct_log2);
             prop_assert_eq!(raw_bits, token.raw_bits);
-            prop_assert_eq!(base + token.raw, value);
+            prop_assert_eq!(base.checked_add(token.raw), Some(value));
             prop_assert!(token.token <= Alphabet::Position.last_token(direct_log2).unwrap());
         }
 
