@@ -18,13 +18,16 @@ impl Console {
         Self { json }
     }
 
-    /// Prints the result of a command, in the form asked for.
+    /// Prints the result of a command, in the form asked for; no text prints nothing.
     pub(crate) fn report(
         &self,
         report: &impl Serialize,
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
         let mut output = if self.json { to_json(report)? } else { text() };
+        if output.is_empty() {
+            return Ok(());
+        }
         if !output.ends_with('\n') {
             output.push('\n');
         }

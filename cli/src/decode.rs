@@ -69,6 +69,7 @@ struct Report {
     gaussians_per_second: f64,
     verified: bool,
     digests: Vec<Option<String>>,
+    refinements: Vec<u8>,
     lost: Vec<Lost>,
     error: Option<StreamFault>,
 }
@@ -93,6 +94,7 @@ struct Decoding<'a> {
     passed: u64,
     bytes: u64,
     digests: Vec<Option<String>>,
+    refinements: Vec<u8>,
     lost: Vec<Lost>,
     first_error: Option<Error>,
     failed: Option<Failure>,
@@ -123,7 +125,10 @@ impl Decode {
             let path = stream.path.display();
             return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));
         }
-        console.report(&report, || report.text())?;
+        // Of a file that is no stream there is nothing to tell people but the error.
+        console.report(&report, || {
+            if report.frames > 0 || first_error.is_none() { report.text() } else { String::new() }
+        })?;
         first_error.map_or(Ok(()), |error| Err(stream.fault(error)))
     }
 
@@ -154,6 +159,7 @@ impl Decode {
             gaussians_per_second: decoded as f64 / seconds.max(f64::MIN_POSITIVE),
             verified: !self.no_verify,
             digests: decoding.digests,
+            refinements: decoding.refinements,
             lost: decoding.lost,
             error: end.map(StreamFault::from),
         }
@@ -170,6 +176,7 @@ impl<'a> Decoding<'a> {
             passed: 0,
             bytes: 0,
             digests: Vec::new(),
+            refinements: Vec::new(),
             lost: Vec::new(),
             first_error: None,
             failed: None,
@@ -199,6 +206,7 @@ impl<'a> Decoding<'a> {
         self.gaussians += frame.planes.len() as u64;
         self.bytes += frame.bytes;
         self.digests.push(frame.digest.map(hex_digest));
+        self.refinements.push(frame.refinements);
         if let Some(error) = frame.lost {
             self.first_error = self.first_error.or(Some(error));
             let fault = StreamFault::from(error);
@@ -224,6 +232,10 @@ impl Report {
             grouped(self.gaussians_per_second as u64),
             self.seconds_total,
         );
+        if self.error.is_some() {
+            let last = self.refinements.last().copied().unwrap_or(0);
+            text += &format!("  stopped early; the last frame has {last} refinements\n");
+        }
         for lost in &self.lost {
             text += &format!("  frame {} stops after {} refinements\n", lost.frame, lost.refinements);
         }

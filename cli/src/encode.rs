@@ -119,6 +119,7 @@ impl Encode {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let mut source = FrameFiles::find(&self.inputs)?;
         let settings = self.settings();
+        self.check_out(&source)?;
         let mut file = OutputFile::create(&self.out)?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
@@ -128,6 +129,18 @@ impl Encode {
         file.finish()?;
         let encoded = self.encoded(&report, &settings, start.elapsed().as_secs_f64());
         console.report(&encoded, || encoded.text())
+    }
+
+    /// Nobody wants a stream in the place of a frame.
+    fn check_out(&self, source: &FrameFiles) -> Result<(), Failure> {
+        let Ok(out) = self.out.canonicalize() else { return Ok(()) };
+        if source.paths().iter().any(|path| path.canonicalize().is_ok_and(|path| path == out)) {
+            let out = self.out.display();
+            return Err(Failure::Usage(format!(
+                "{out}: is a frame to encode; give another file for the stream"
+            )));
+        }
+        Ok(())
     }
 
     fn settings(&self) -> Settings {
@@ -157,7 +170,7 @@ impl Encode {
                 Failure::other(format!("{}: {error}", path.display()))
             }
             Error::Output(cause) => Failure::file("write", &self.out, cause),
-            _ => Failure::other(format!("{}: {error}", self.out.display())),
+            _ => Failure::other(error.to_string()),
         }
     }
 

@@ -80,7 +80,7 @@ impl Verdict {
         match self.class {
             None => format!("{path}: accept ({frames} frames, {gaussians} Gaussians, every digest agrees)"),
             Some(class) => {
-                format!("{path}: {} ({class}, after {frames} frames without fault)", self.outcome)
+                format!("{path}: {} ({class}, {frames} frames decoded up to there)", self.outcome)
             }
         }
     }

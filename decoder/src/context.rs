@@ -2,7 +2,7 @@
 
 use crate::block::CodedBlock;
 use std::borrow::Cow;
-use splatstream_format::entropy::model::{ContextAxis, Source};
+use splatstream_format::entropy::model::{AxisLookup, ContextAxis, Source};
 
 /// The last four coded values of a plane, and what the two serial sources make of them.
 #[derive(Debug, Clone, Copy, Default)]
@@ -145,11 +145,12 @@ pub fn delta_contexts(axes: &[ContextAxis; 2], deltas: &[u64]) -> Vec<u8> {
 }
 
 fn serial_contexts(axis: &ContextAxis, values: &[i32]) -> Vec<u8> {
+    let lookup = AxisLookup::new(axis);
     let mut neighbours = Neighbours::default();
     values
         .iter()
         .map(|&value| {
-            let context = axis.context(neighbours.value(axis.source));
+            let context = lookup.context(neighbours.value(axis.source));
             neighbours.push(value);
             context
         })

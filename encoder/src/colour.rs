@@ -1,6 +1,7 @@
 //! Colour on its way in: transforms, components, and the choice between coefficients and codebooks.
 
 use crate::entropy_cost::entropy_of;
+use crate::lattice::nearest_integer;
 use crate::pca::Components;
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
@@ -39,34 +40,44 @@ pub(crate) fn transform(kind: TransformKind, planes: &[&[f32]], step: f32) -> Tr
     }
 }
 
-/// Components in units of the step, not rounded; one plane a component.
-fn project(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<f32>> {
+/// Gaussians projected at a time: their planes stay in the second-level cache.
+const TILE: usize = 1 << 12;
+
+/// Components in units of the step, turned into `V` by `map`; one plane a component.
+fn project<V: Send + Sync + Copy>(
+    transform: &Transform,
+    planes: &[&[f32]],
+    step: f32,
+    map: impl Fn(f32) -> V + Sync,
+) -> Vec<Vec<V>> {
     let means: Vec<f32> =
         transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
-    let scale = 1.0 / step;
-    transform
-        .basis
-        .par_chunks(planes.len().max(1))
-        .map(|row| {
-            let mut sums = vec![0.0_f32; planes.first().map_or(0, |plane| plane.len())];
-            for ((&entry, plane), &mean) in row.iter().zip(planes).zip(&means) {
-                let weight = f32::from(entry) / UNIT as f32 * scale;
-                for (sum, &value) in sums.iter_mut().zip(plane.iter()) {
+    let scale = 1.0 / (step * UNIT as f32);
+    let count = planes.first().map_or(0, |plane| plane.len());
+    let starts: Vec<usize> = (0..count).step_by(TILE).collect();
+    let tile = |&start: &usize| -> Vec<Vec<V>> {
+        let end = count.min(start + TILE);
+        let row = |weights: &[i16]| {
+            let mut sums = vec![0.0_f32; end - start];
+            for ((&weight, plane), &mean) in weights.iter().zip(planes).zip(&means) {
+                let weight = f32::from(weight) * scale;
+                for (sum, &value) in sums.iter_mut().zip(&plane[start..end]) {
                     *sum += weight * (value - mean);
                 }
             }
-            sums
-        })
-        .collect()
+            sums.into_iter().map(&map).collect()
+        };
+        transform.rows().map(row).collect()
+    };
+    let tiles: Vec<Vec<Vec<V>>> = starts.par_iter().map(tile).collect();
+    let component = |place: usize| tiles.iter().flat_map(|tile| tile[place].iter().copied()).collect();
+    (0..transform.rows().len()).into_par_iter().map(component).collect()
 }
 
 /// Components rounded to the step.
 pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<i32>> {
     let limit = *COMPONENT_RANGE.end() as f32;
-    project(transform, planes, step)
-        .par_iter()
-        .map(|plane| plane.iter().map(|&value| libm::rintf(value).clamp(-limit, limit) as i32).collect())
-        .collect()
+    project(transform, planes, step, |value| nearest_integer(value.clamp(-limit, limit)))
 }
 
 /// Drops the last components that are 0 for every Gaussian; at least one stays.
@@ -105,10 +116,8 @@ pub(crate) fn plan_sh(
     if !try_it || count < 2 {
         return coefficients;
     }
-    let projected = project(transform, planes, step);
-    let rank = projected.len();
-    let stride = (count / (2 * TRIAL)).max(1);
-    let rows = vq::rows(&projected, stride);
+    let rank = usize::from(transform.header.rank);
+    let rows = sampled_rows(transform, planes, step, (count / (2 * TRIAL)).max(1));
     let (training, test) = vq::halves(&rows, rank);
     let entries = vq::entry_count(gaussians_of_gop, choice == ShChoice::VectorQuantised);
     let book = vq::train(&training, rank, entries.min(training.len() / rank / 4).max(1));
@@ -123,8 +132,16 @@ pub(crate) fn plan_sh(
     if choice == ShChoice::Auto && cost(by_coefficients) <= cost(by_vq) {
         return ShPlan { trial, ..coefficients };
     }
-    let all = vq::rows(&projected, (count / vq::MAX_TRAINING).max(1));
+    let all = sampled_rows(transform, planes, step, (count / vq::MAX_TRAINING).max(1));
     ShPlan { codebooks: vec![vq::train(&all, rank, entries.min(count))], trial }
+}
+
+/// The components of every `stride`-th Gaussian, one behind the other.
+fn sampled_rows(transform: &Transform, planes: &[&[f32]], step: f32, stride: usize) -> Vec<f32> {
+    let sampled: Vec<Vec<f32>> =
+        planes.iter().map(|plane| plane.iter().step_by(stride).copied().collect()).collect();
+    let sampled: Vec<&[f32]> = sampled.iter().map(Vec::as_slice).collect();
+    vq::rows(&project(transform, &sampled, step, |value| value))
 }
 
 /// Bits and squared error a Gaussian of rounding every component.
@@ -134,7 +151,7 @@ fn coefficient_cost(rows: &[f32], rank: usize) -> (f64, f64) {
     let mut error = 0.0;
     for component in 0..rank {
         let values = rows.iter().skip(component).step_by(rank);
-        let rounded: Vec<i32> = values.clone().map(|&value| libm::rintf(value) as i32).collect();
+        let rounded: Vec<i32> = values.clone().map(|&value| nearest_integer(value)).collect();
         bits += entropy_of(&rounded);
         error += values.zip(&rounded).map(|(&v, &r)| f64::from(v - r as f32) * f64::from(v - r as f32)).sum::<f64>();
     }
@@ -143,7 +160,6 @@ fn coefficient_cost(rows: &[f32], rank: usize) -> (f64, f64) {
 
 /// The codebook index of every Gaussian.
 pub(crate) fn indices(transform: &Transform, planes: &[&[f32]], step: f32, codebook: &Codebook) -> Vec<i32> {
-    let projected = project(transform, planes, step);
-    let rank = projected.len();
-    vq::assign(codebook, &vq::rows(&projected, 1), rank).0
+    let rank = usize::from(transform.header.rank);
+    vq::assign(codebook, &sampled_rows(transform, planes, step, 1), rank).0
 }

@@ -183,6 +183,11 @@ fn biases(frame: &CodedFrame, planes: &[PlaneInfo]) -> Vec<i32> {
 
 /// For each plane the unit's own model, or the one before if that saves its tables.
 fn cheapest(unit: &CodedUnit, previous: Option<&[PlaneModel]>, planes: &[PlaneInfo]) -> Vec<PlaneModel> {
+    // Where there are many symbols, tables of their own always pay.
+    const MANY: usize = 1 << 15;
+    if unit.blocks.iter().map(CodedBlock::len).sum::<usize>() > MANY {
+        return unit.models.clone();
+    }
     let choose = |(plane, own): (usize, &PlaneModel)| {
         let Some(before) = previous.and_then(|models| models.get(plane)) else { return own.clone() };
         let bits = |model: &PlaneModel| -> Option<f64> {

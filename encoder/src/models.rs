@@ -8,7 +8,7 @@ use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context::{self, DeltaNeighbours, Neighbours, is_serial};
 use splatstream_decoder::layout::{Attribute, PlaneInfo, is_available};
 use splatstream_format::entropy::frequencies::Frequencies;
-use splatstream_format::entropy::model::{ContextAxis, PlaneModel, Source};
+use splatstream_format::entropy::model::{AxisLookup, ContextAxis, PlaneModel, Source};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 
 /// Gaussians after which only every other block is looked at.
@@ -136,7 +136,8 @@ impl PlaneView<'_> {
             thresholds: quantile_thresholds(values, parts),
         };
         let on_axis = |axis: &ContextAxis, values: &[i32]| -> Vec<u8> {
-            values.iter().map(|&value| axis.context(value)).collect()
+            let lookup = AxisLookup::new(axis);
+            values.iter().map(|&value| lookup.context(value)).collect()
         };
         let values: Vec<Vec<i32>> = sources.iter().map(|&source| self.values(source)).collect();
         let mut best = self.candidate([ContextAxis::NONE, ContextAxis::NONE], &[]);

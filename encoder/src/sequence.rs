@@ -3,7 +3,7 @@
 use crate::canonical::{canonicalise, visible};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
-use crate::lattice::{Extent, inner_side, position_lattice};
+use crate::lattice::{Extent, inner_side, nearest_integer, position_lattice};
 use crate::settings::Settings;
 use crate::source::FrameSource;
 use splatstream_format::Limits;
@@ -101,7 +101,7 @@ fn try_axes(frame: &GaussianFrame, settings: &Settings) -> [f64; 2] {
     [true, false].map(|sort| {
         let canonical = canonicalise(frame, &sample, sort);
         let round = |plane: &Vec<f32>, step: f32| -> Vec<i32> {
-            plane.iter().map(|&value| libm::rintf(value / step) as i32).collect()
+            plane.iter().map(|&value| nearest_integer(value / step)).collect()
         };
         let scales = canonical.log_scale().each_ref().map(|plane| round(plane, settings.steps.log_scale));
         let differences = |a: usize, b: usize| -> Vec<i32> {

@@ -89,7 +89,7 @@ pub fn encode(
                 made.write(&mut writer, &sequence, first, &mut report)?;
                 tools = Some(made);
             }
-            if let Some(tools) = &tools {
+            if let Some(tools) = &mut tools {
                 write_frame(&mut writer, &prepared, &sequence, tools, settings, number, &mut report)?;
             }
             progress(number + 1, source.len());
@@ -119,6 +119,8 @@ fn prepare(
 struct GopTools {
     dc: Transform,
     sh: Option<(Transform, ShPlan)>,
+    /// SH components of the first frame, which were needed to find the rank.
+    first_components: Option<Vec<Vec<i32>>>,
 }
 
 /// The SH planes that the sequence carries; a frame of a lower degree has fewer.
@@ -136,6 +138,7 @@ impl GopTools {
     fn new(frame: &GaussianFrame, sequence: &SequenceParameters, settings: &Settings, frames: u32) -> Self {
         let dc = colour::transform(TransformKind::Dc, &dc_planes(frame), sequence.dc_step());
         let zeros = vec![0.0; frame.len()];
+        let mut first_components = None;
         let sh = (sequence.sh_degree > 0).then(|| {
             let planes = sh_planes(frame, sequence, &zeros);
             let step = sequence.sh_step();
@@ -144,9 +147,10 @@ impl GopTools {
             colour::drop_unused(&mut transform, &mut components);
             let gaussians = frame.len() * frames as usize;
             let plan = colour::plan_sh(&transform, &planes, step, gaussians, settings.sh, settings.preset);
+            first_components = plan.codebooks.is_empty().then_some(components);
             (transform, plan)
         });
-        Self { dc, sh }
+        Self { dc, sh, first_components }
     }
 
     fn write(
@@ -187,7 +191,7 @@ fn write_frame(
     writer: &mut UnitWriter<'_>,
     frame: &GaussianFrame,
     sequence: &SequenceParameters,
-    tools: &GopTools,
+    tools: &mut GopTools,
     settings: &Settings,
     number: u32,
     report: &mut Report,
@@ -229,21 +233,23 @@ fn write_frame(
 fn coded_frame(
     frame: &GaussianFrame,
     sequence: &SequenceParameters,
-    tools: &GopTools,
+    tools: &mut GopTools,
     number: u32,
 ) -> Result<CodedFrame, Error> {
     let zeros = vec![0.0; frame.len()];
-    let sh = tools.sh.as_ref().map_or_else(Vec::new, |(transform, plan)| {
+    let first = tools.first_components.take();
+    let sh = first.or_else(|| {
+        let (transform, plan) = tools.sh.as_ref()?;
         let planes = sh_planes(frame, sequence, &zeros);
-        match plan.codebooks.first() {
+        Some(match plan.codebooks.first() {
             None => colour::components(transform, &planes, sequence.sh_step()),
             Some(book) => vec![colour::indices(transform, &planes, sequence.sh_step(), book)],
-        }
+        })
     });
     Ok(CodedFrame {
         geometry: geometry(frame, sequence, number)?,
         dc: colour::components(&tools.dc, &dc_planes(frame), sequence.dc_step()),
-        sh,
+        sh: sh.unwrap_or_default(),
         order: importance::order(&importance::opacity_volume(frame)),
     })
 }

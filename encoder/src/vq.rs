@@ -20,10 +20,10 @@ pub(crate) fn entry_count(gaussians: usize, forced: bool) -> usize {
     (gaussians / 64).clamp(1, most)
 }
 
-/// Every `stride`-th vector of component planes, as rows.
-pub(crate) fn rows(planes: &[Vec<f32>], stride: usize) -> Vec<f32> {
+/// Component planes as rows.
+pub(crate) fn rows(planes: &[Vec<f32>]) -> Vec<f32> {
     let count = planes.first().map_or(0, Vec::len);
-    (0..count).step_by(stride).flat_map(|place| planes.iter().map(move |plane| plane[place])).collect()
+    (0..count).flat_map(|place| planes.iter().map(move |plane| plane[place])).collect()
 }
 
 /// Rows of even and of odd place.

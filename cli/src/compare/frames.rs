@@ -24,7 +24,7 @@ pub(super) enum Frames<'a> {
     /// Decoded as they are asked for.
     Stream { file: &'a StreamFile, units: Units<'a>, decoder: Box<Decoder<'a>>, expected: u32 },
     /// Read as they are asked for.
-    Files { files: FrameFiles, next: u32 },
+    Files { files: Box<FrameFiles>, next: u32 },
 }
 
 impl Opened {
@@ -47,7 +47,7 @@ impl Opened {
                 Ok(Frames::Stream { file, units: stream.units(), decoder, expected })
             }
             Self::Scene(path) => {
-                let files = FrameFiles::find(std::slice::from_ref(path))?;
+                let files = Box::new(FrameFiles::find(std::slice::from_ref(path))?);
                 Ok(Frames::Files { files, next: 0 })
             }
         }

@@ -45,14 +45,14 @@ impl Target {
             let (path, asked) = (path.display(), format.extension());
             return Err(Failure::Usage(format!("{path}: --format {asked} contradicts the name of the file")));
         }
-        if !target.is_file {
-            make_directory(path)?;
-        }
         Ok(target)
     }
 
-    /// Writes one frame.
+    /// Writes one frame; the directory is made with the first.
     pub(crate) fn write(&self, number: u32, frame: &GaussianFrame) -> Result<(), Failure> {
+        if !self.is_file {
+            make_directory(&self.path)?;
+        }
         let path = self.path_of(number);
         let bytes = self
             .format

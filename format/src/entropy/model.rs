@@ -89,6 +89,43 @@ impl ContextAxis {
     }
 }
 
+/// Values between the outermost thresholds up to which an axis is looked up instead of compared.
+const LOOKUP_SPAN: i64 = 1 << 12;
+
+/// The thresholds of an axis as a table of contexts: one load where a serial source waits for the value before.
+#[derive(Debug, Clone)]
+pub struct AxisLookup {
+    axis: ContextAxis,
+    /// The value of the first entry, which stands for all smaller values too.
+    least: i32,
+    /// Context of each value from `least` on; the last stands for all greater values. Empty: not used.
+    contexts: Vec<u8>,
+}
+
+impl AxisLookup {
+    /// The contexts of an axis.
+    pub fn new(axis: &ContextAxis) -> Self {
+        let (Some(&first), Some(&last)) = (axis.thresholds.first(), axis.thresholds.last()) else {
+            return Self { axis: axis.clone(), least: 0, contexts: vec![0] };
+        };
+        let span = i64::from(last).wrapping_sub(i64::from(first));
+        let least = first.saturating_sub(1);
+        if span > LOOKUP_SPAN {
+            return Self { axis: axis.clone(), least, contexts: Vec::new() };
+        }
+        let contexts = (least..=last).map(|value| axis.context(value)).collect();
+        Self { axis: axis.clone(), least, contexts }
+    }
+
+    /// [`ContextAxis::context`] of the axis.
+    #[inline(always)]
+    pub fn context(&self, value: i32) -> u8 {
+        let Some((&greatest, _)) = self.contexts.split_last() else { return self.axis.context(value) };
+        let place = usize::try_from(value.saturating_sub(self.least).max(0)).unwrap_or(0);
+        self.contexts.get(place).copied().unwrap_or(greatest)
+    }
+}
+
 /// The model with which a plane of a refinement unit is coded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlaneModel {

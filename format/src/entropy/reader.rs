@@ -1,6 +1,6 @@
 //! Clause 8.4: decoding the symbols of a block.
 
-use super::model::{ContextAxis, PlaneModel};
+use super::model::{AxisLookup, ContextAxis, PlaneModel};
 use super::token::{join, unzigzag};
 use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
 use crate::bits::BitReader;
@@ -11,39 +11,6 @@ use crate::{Error, ErrorKind, Result};
 const SLOTS: usize = 4096;
 /// Tokens of a table.
 const TOKENS: usize = 256;
-/// Values between the outermost thresholds up to which an axis is looked up instead of compared.
-const LOOKUP_SPAN: i64 = 1 << 12;
-
-/// The thresholds of an axis as a table of contexts: one load where a serial source waits for the value before.
-#[derive(Debug, Clone)]
-struct AxisLookup {
-    /// The value of the first entry, which stands for all smaller values too.
-    least: i32,
-    /// Context of each value from `least` on; the last stands for all greater values. Empty: not used.
-    contexts: Vec<u8>,
-}
-
-impl AxisLookup {
-    fn new(axis: &ContextAxis) -> Self {
-        let (Some(&first), Some(&last)) = (axis.thresholds.first(), axis.thresholds.last()) else {
-            return Self { least: 0, contexts: vec![0] };
-        };
-        let span = i64::from(last).wrapping_sub(i64::from(first));
-        let least = first.saturating_sub(1);
-        if span > LOOKUP_SPAN {
-            return Self { least, contexts: Vec::new() };
-        }
-        Self { least, contexts: (least..=last).map(|value| axis.context(value)).collect() }
-    }
-
-    #[inline(always)]
-    fn context(&self, axis: &ContextAxis, value: i32) -> u8 {
-        let Some((&greatest, _)) = self.contexts.split_last() else { return axis.context(value) };
-        let place = usize::try_from(value.saturating_sub(self.least).max(0)).unwrap_or(0);
-        self.contexts.get(place).copied().unwrap_or(greatest)
-    }
-}
-
 /// A plane model arranged for decoding. Built once a unit, shared by its blocks.
 #[derive(Debug, Clone)]
 pub struct PlaneDecoder {
@@ -110,15 +77,15 @@ impl PlaneDecoder {
     /// The context of a value on the first axis: [`ContextAxis::context`], faster.
     #[inline(always)]
     pub fn first_context(&self, value: i32) -> u8 {
-        let ([axis, _], [lookup, _]) = (&self.axes, &self.lookups);
-        lookup.context(axis, value)
+        let [lookup, _] = &self.lookups;
+        lookup.context(value)
     }
 
     /// The context of a value on the second axis.
     #[inline(always)]
     pub fn second_context(&self, value: i32) -> u8 {
-        let ([_, axis], [_, lookup]) = (&self.axes, &self.lookups);
-        lookup.context(axis, value)
+        let [_, lookup] = &self.lookups;
+        lookup.context(value)
     }
 
     /// The context of a Gaussian from its contexts on the two axes.

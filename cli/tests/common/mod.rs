@@ -1,0 +1,75 @@
+//! Runs the binary as a user would.
+#![allow(dead_code, reason = "each test file uses its part")]
+
+use serde_json::Value;
+use splatstream_scene::builtin::BuiltinScene;
+use splatstream_scene::ply;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// A directory that goes away with the test.
+pub(crate) fn directory() -> TempDir {
+    tempfile::tempdir().expect("a temporary directory")
+}
+
+/// Runs `splatstream` with these arguments.
+pub(crate) fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_splatstream")).args(arguments).output().expect("the binary starts")
+}
+
+/// Runs `splatstream`, which shall succeed; gives standard output.
+pub(crate) fn succeed(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// Runs `splatstream ... --json`, which shall succeed.
+pub(crate) fn json(arguments: &[&str]) -> Value {
+    let output = succeed(&[arguments, &["--json"]].concat());
+    serde_json::from_str(&output).expect("JSON")
+}
+
+/// Runs `splatstream`, which shall end with `code`; gives standard error.
+pub(crate) fn fail(code: i32, arguments: &[&str]) -> String {
+    let output = run(arguments);
+    let stderr = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+    stderr
+}
+
+/// A path as an argument.
+pub(crate) fn text(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+/// A small moving scene.
+pub(crate) fn scene() -> BuiltinScene {
+    BuiltinScene { gaussians: 600, frames: 3, sh_degree: 1, ..BuiltinScene::default() }
+}
+
+/// Writes the frames of the small scene to `frames` in a directory.
+pub(crate) fn write_frames(directory: &Path) -> PathBuf {
+    let frames = directory.join("frames");
+    std::fs::create_dir(&frames).expect("a directory");
+    for number in 0..scene().frames {
+        // Without leading zeros and in tens: names sort otherwise than people count.
+        let path = frames.join(format!("f{}.ply", 8 + number));
+        std::fs::write(path, ply::write(&scene().frame(number))).expect("a file");
+    }
+    frames
+}
+
+/// Encodes the small scene to a stream in a directory.
+pub(crate) fn write_stream(directory: &Path) -> PathBuf {
+    let frames = write_frames(directory);
+    let stream = directory.join("small.gss");
+    succeed(&["encode", text(&frames), "-o", text(&stream), "--gop", "2"]);
+    stream
+}
+
+/// The stream of the snapshots: committed, so that they change with the bitstream and not with the encoder.
+pub(crate) fn fixture() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/small.gss")
+}

@@ -1,0 +1,104 @@
+//! What the inspector prints is part of the interface: it is compared with what it printed before.
+
+mod common;
+
+use common::{directory, fail, fixture, json, run, succeed, text};
+use splatstream_encoder::{Quality, Settings, encode};
+use splatstream_scene::builtin::BuiltinScene;
+use std::fs;
+
+/// Writes the committed stream anew; only for a change of the bitstream.
+#[test]
+#[ignore = "writes tests/data/small.gss: cargo test -p splatstream-cli --test inspect -- --ignored"]
+fn write_the_fixture() {
+    let mut scene = BuiltinScene { gaussians: 120, frames: 2, sh_degree: 1, ..BuiltinScene::default() };
+    let settings = Settings {
+        steps: Quality::Medium.steps(),
+        refinements: vec![25, 50, 100],
+        block_log2: 6,
+        gop: 1,
+        ..Settings::default()
+    };
+    let mut stream = Vec::new();
+    encode(&mut scene, &settings, &mut stream, &mut |_, _| ()).unwrap();
+    fs::write(fixture(), stream).unwrap();
+}
+
+#[test]
+fn units_are_listed_one_a_line() {
+    insta::assert_snapshot!(succeed(&["inspect", text(&fixture()), "--units"]));
+}
+
+#[test]
+fn the_tree_has_every_element() {
+    insta::assert_snapshot!(succeed(&["inspect", text(&fixture())]));
+}
+
+#[test]
+fn the_tree_covers_every_byte_once() {
+    let tree = json(&["inspect", text(&fixture()), "--tree"]);
+    let units = tree["units"].as_array().unwrap();
+    let elements = units.iter().flat_map(|unit| unit["elements"].as_array().unwrap());
+    let mut end = 0;
+    for element in tree["file_header"].as_array().unwrap().iter().chain(elements) {
+        assert_eq!(element["at_bit"].as_u64(), Some(end), "{element}");
+        end += element["bits"].as_u64().unwrap();
+    }
+    assert_eq!(end, fs::metadata(fixture()).unwrap().len() * 8);
+}
+
+#[test]
+fn the_dump_of_a_unit_holds_its_bytes() {
+    let bytes = fs::read(fixture()).unwrap();
+    let dump = json(&["inspect", text(&fixture()), "--hex", "1"]);
+    let (at, length) = (dump["at"].as_u64().unwrap() as usize, dump["bytes"].as_u64().unwrap() as usize);
+    let elements = dump["elements"].as_array().unwrap();
+    let hex: String = elements.iter().filter_map(|element| element["hex"].as_str()).collect();
+    let expected: String = bytes[at..at + length].iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(hex, expected);
+    let shown = succeed(&["inspect", text(&fixture()), "--hex", "1"]);
+    assert!(shown.contains("unit_header.unit_type = 2 (gop_header) (5.3)"), "{shown}");
+}
+
+#[test]
+fn operating_points_are_the_streams_that_extraction_makes() {
+    let directory = directory();
+    let part = directory.path().join("part.gss");
+    let points = json(&["inspect", text(&fixture()), "--ops"]);
+    let points = points.as_array().unwrap();
+    assert_eq!(points.len(), 3);
+    for point in points {
+        succeed(&["extract", text(&fixture()), "--op", point["op"].as_str().unwrap(), "-o", text(&part)]);
+        assert_eq!(point["bytes"], fs::metadata(&part).unwrap().len());
+        assert_eq!(point["gaussians"], json(&["validate", text(&part)])["gaussians"]);
+    }
+}
+
+#[test]
+fn costs_of_units_add_up_to_the_stream() {
+    let costs = json(&["inspect", text(&fixture()), "--stats"]);
+    let units = costs["units"].as_array().unwrap();
+    let bytes: u64 = units.iter().filter_map(|unit| unit["bytes"].as_u64()).sum();
+    assert_eq!(bytes + 16, costs["bytes"], "units and the file header are all there is");
+    let attributes = costs["attributes"].as_array().unwrap();
+    let bits: f64 = attributes.iter().filter_map(|attribute| attribute["bpg"].as_f64()).sum();
+    assert!(bits > 0.0 && bits < costs["bpg"].as_f64().unwrap());
+}
+
+#[test]
+fn a_cut_stream_is_shown_up_to_the_cut() {
+    let directory = directory();
+    let path = directory.path().join("cut.gss");
+    let bytes = fs::read(fixture()).unwrap();
+    fs::write(&path, &bytes[..300]).unwrap();
+    for view in ["--tree", "--units"] {
+        let output = run(&["inspect", text(&path), view, "--json"]);
+        assert_eq!(output.status.code(), Some(14), "{view}");
+        let shown: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(shown["units"][0]["type"], "sequence_parameters");
+        assert_eq!(shown["error"]["class"], "truncated");
+    }
+    for view in ["--ops", "--stats"] {
+        fail(14, &["inspect", text(&path), view]);
+    }
+}

@@ -1,0 +1,160 @@
+//! Encode, decode, extract, compare.
+
+mod common;
+
+use common::{directory, fail, json, run, scene, succeed, text, write_frames, write_stream};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The files of a directory in order of their names.
+fn files(directory: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(directory).expect("a directory").map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn what_is_decoded_is_within_a_step_of_what_was_encoded() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let stream = directory.path().join("small.gss");
+    let encoded = json(&["encode", text(&frames), "-o", text(&stream), "--quality", "visually-lossless"]);
+    assert_eq!(encoded["frames"], 3);
+    assert_eq!(encoded["bytes"], fs::metadata(&stream).unwrap().len());
+    let decoded = directory.path().join("decoded");
+    let report = json(&["decode", text(&stream), "-o", text(&decoded)]);
+    assert_eq!(report["digests"], encoded["digests"]);
+    assert_eq!(report["gaussians"], encoded["gaussians"]);
+    assert_eq!(files(&decoded).len(), 3);
+    for other in [&stream, &decoded] {
+        let compared = json(&["compare", text(&frames), text(other)]);
+        let largest = |attribute: &str| compared["attributes"][attribute]["max"].as_f64().unwrap();
+        assert_eq!(compared["frames"], 3);
+        assert!(largest("log_scale") <= 0.0151, "half a step of 0.03: {}", largest("log_scale"));
+        assert!(largest("opacity_logit") <= 0.0501, "half a step of 0.1: {}", largest("opacity_logit"));
+        assert!(largest("rotation") <= 0.02, "{}", largest("rotation"));
+        assert!(largest("position") <= 0.001, "{}", largest("position"));
+    }
+}
+
+#[test]
+fn frames_come_in_the_order_that_people_count_in() {
+    let directory = directory();
+    let stream = write_stream(directory.path());
+    // f8, f9, f10: by order of names, frame 0 of the stream would be f10.
+    let first = directory.path().join("frames/f8.ply");
+    let compared = json(&["compare", text(&first), text(&stream), "--match", "nearest"]);
+    assert_eq!((&compared["frames"], &compared["frames_b"]), (&1.into(), &3.into()));
+    assert!(compared["attributes"]["position"]["max"].as_f64().unwrap() < 0.001);
+}
+
+#[test]
+fn a_scene_is_itself_by_order_and_by_position() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    for (matching, matched_by) in [("auto", "order"), ("order", "order"), ("nearest", "nearest")] {
+        let compared = json(&["compare", text(&frames), text(&frames), "--match", matching]);
+        assert_eq!(compared["matched_by"], serde_json::json!([matched_by, matched_by, matched_by]));
+        for attribute in ["position", "log_scale", "opacity_logit", "rotation", "dc", "sh"] {
+            assert_eq!(compared["attributes"][attribute]["max"], 0.0, "{matching} {attribute}");
+        }
+    }
+}
+
+#[test]
+fn decoding_an_extracted_stream_is_decoding_at_its_operating_point() {
+    let directory = directory();
+    let stream = write_stream(directory.path());
+    for op in ["s0,t0,r0", "s0,t0,r2", "s0,t0,r4"] {
+        let part = directory.path().join("part.gss");
+        succeed(&["extract", text(&stream), "--op", op, "-o", text(&part)]);
+        succeed(&["validate", text(&part)]);
+        let [whole, extracted] = ["whole", "extracted"].map(|name| directory.path().join(name));
+        succeed(&["decode", text(&stream), "--op", op, "-o", text(&whole)]);
+        succeed(&["decode", text(&part), "-o", text(&extracted)]);
+        let contents = |place: &Path| -> Vec<Vec<u8>> {
+            files(place).iter().map(|path| fs::read(path).unwrap()).collect()
+        };
+        assert_eq!(contents(&whole).len(), 3);
+        assert_eq!(contents(&whole), contents(&extracted), "{op}");
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes_and_digests() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let of = |threads: &str| {
+        let stream = directory.path().join(format!("{threads}.gss"));
+        let encoded = json(&["encode", text(&frames), "-o", text(&stream), "--threads", threads]);
+        let decoded = json(&["--threads", threads, "decode", text(&stream), "--dry-run"]);
+        assert_eq!(encoded["digests"], decoded["digests"]);
+        (fs::read(stream).unwrap(), decoded["digests"].clone())
+    };
+    assert_eq!(of("1"), of("2"));
+}
+
+#[test]
+fn a_span_of_frames_is_what_is_written() {
+    let directory = directory();
+    let stream = write_stream(directory.path());
+    let out = directory.path().join("out");
+    let all = json(&["decode", text(&stream), "--dry-run"]);
+    let part = json(&["decode", text(&stream), "-o", text(&out), "--frames", "1..3"]);
+    assert_eq!(part["digests"].as_array().unwrap(), &all["digests"].as_array().unwrap()[1..3]);
+    let names: Vec<_> = files(&out).iter().map(|path| path.file_name().unwrap().to_owned()).collect();
+    assert_eq!(names, ["frame_0001.ply", "frame_0002.ply"]);
+    fail(2, &["decode", text(&stream), "-o", text(&out), "--frames", "7..9"]);
+}
+
+#[test]
+fn one_frame_can_go_to_a_file_of_any_format() {
+    let directory = directory();
+    let stream = write_stream(directory.path());
+    for name in ["one.ply", "one.spz", "one.splat"] {
+        let file = directory.path().join(name);
+        succeed(&["decode", text(&stream), "-o", text(&file), "--frames", "0..1"]);
+        let compared = json(&["compare", text(&file), text(&stream)]);
+        assert_eq!(compared["gaussians_a"], u64::from(scene().gaussians), "{name}");
+    }
+    let said = fail(2, &["decode", text(&stream), "-o", text(&directory.path().join("all.ply"))]);
+    assert!(said.contains("3 frames do not fit in one file"), "{said}");
+}
+
+#[test]
+fn what_fails_leaves_nothing_behind() {
+    let directory = directory();
+    let broken = directory.path().join("broken.ply");
+    fs::write(&broken, b"ply\nnot a header").unwrap();
+    let stream = directory.path().join("out.gss");
+    let said = fail(1, &["encode", text(&broken), "-o", text(&stream)]);
+    assert!(said.contains("broken.ply"), "{said}");
+    assert_eq!(files(directory.path()), [broken.clone()]);
+    let said = fail(2, &["encode", text(&broken), "-o", text(&broken)]);
+    assert!(said.contains("another file"), "{said}");
+    fail(10, &["decode", text(&broken), "-o", text(&directory.path().join("out"))]);
+    assert_eq!(files(directory.path()), [broken]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_result_has_the_permissions_of_any_other_file() {
+    use std::os::unix::fs::PermissionsExt;
+    let directory = directory();
+    let stream = write_stream(directory.path());
+    let plain = directory.path().join("plain");
+    fs::write(&plain, b"").unwrap();
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+    assert_eq!(mode(&stream), mode(&plain));
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    for command in ["demo", "encode", "decode", "inspect", "validate", "extract", "compare"] {
+        let help = succeed(&[command, "--help"]);
+        let example = help.rsplit_once("Example").map_or("", |(_, example)| example);
+        assert!(example.contains(&format!("splatstream {command}")), "{help}");
+    }
+    assert_eq!(run(&["--version"]).status.code(), Some(0));
+}
