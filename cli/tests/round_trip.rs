@@ -130,7 +130,7 @@ fn what_fails_leaves_nothing_behind() {
     let stream = directory.path().join("out.gss");
     let said = fail(1, &["encode", text(&broken), "-o", text(&stream)]);
     assert!(said.contains("broken.ply"), "{said}");
-    assert_eq!(files(directory.path()), [broken.clone()]);
+    assert_eq!(files(directory.path()), std::slice::from_ref(&broken));
     let said = fail(2, &["encode", text(&broken), "-o", text(&broken)]);
     assert!(said.contains("another file"), "{said}");
     fail(10, &["decode", text(&broken), "-o", text(&directory.path().join("out"))]);

@@ -39,9 +39,11 @@ impl CodedBlock {
     pub fn push(&mut self, info: PlaneInfo, coded: Vec<i32>) {
         let before = if info.place > 0 { self.magnitudes.last() } else { None };
         let sums = match before {
-            Some(before) => {
-                before.iter().zip(&coded).map(|(&sum, &value)| sum.wrapping_add(value.wrapping_abs())).collect()
-            }
+            Some(before) => before
+                .iter()
+                .zip(&coded)
+                .map(|(&sum, &value)| sum.wrapping_add(value.wrapping_abs()))
+                .collect(),
             None => coded.iter().map(|&value| value.wrapping_abs()).collect(),
         };
         self.magnitudes.push(sums);

@@ -1,8 +1,8 @@
 //! Clause 8.5: the values that choose the context of a symbol.
 
 use crate::block::CodedBlock;
-use std::borrow::Cow;
 use splatstream_format::entropy::model::{AxisLookup, ContextAxis, Source};
+use std::borrow::Cow;
 
 /// The last four coded values of a plane, and what the two serial sources make of them.
 #[derive(Debug, Clone, Copy, Default)]
@@ -109,22 +109,13 @@ pub fn axis_contexts(axis: &ContextAxis, plane: usize, block: &CodedBlock) -> Ve
 /// The contexts of a plane whose values are known: what the encoder codes with.
 ///
 /// `values` are the plane's coded values; the position plane goes through [`delta_contexts`].
-pub fn plane_contexts(
-    axes: &[ContextAxis; 2],
-    plane: usize,
-    block: &CodedBlock,
-    values: &[i32],
-) -> Vec<u8> {
+pub fn plane_contexts(axes: &[ContextAxis; 2], plane: usize, block: &CodedBlock, values: &[i32]) -> Vec<u8> {
     let [first, second] = axes;
     if first.source == Source::None {
         return Vec::new();
     }
     let on_axis = |axis: &ContextAxis| {
-        if is_serial(axis.source) {
-            serial_contexts(axis, values)
-        } else {
-            axis_contexts(axis, plane, block)
-        }
+        if is_serial(axis.source) { serial_contexts(axis, values) } else { axis_contexts(axis, plane, block) }
     };
     combine(&on_axis(first), &on_axis(second), second.contexts())
 }

@@ -59,7 +59,9 @@ impl QuantizedFrame {
                 parts.push(part);
             }
         }
-        parts.into_par_iter().for_each(|(plane, parts)| parts.iter().for_each(|part| plane.extend_from_slice(part)));
+        parts
+            .into_par_iter()
+            .for_each(|(plane, parts)| parts.iter().for_each(|part| plane.extend_from_slice(part)));
     }
 
     /// Keeps the first `count` Gaussians.
@@ -70,12 +72,7 @@ impl QuantizedFrame {
 
     /// The planes after the positions, in canonical order: log-scale, opacity, rotation, dc, sh.
     pub fn signed_planes(&self) -> impl Iterator<Item = &Vec<i32>> {
-        self.log_scale
-            .iter()
-            .chain([&self.opacity])
-            .chain(&self.rotation)
-            .chain(&self.dc)
-            .chain(&self.sh)
+        self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation).chain(&self.dc).chain(&self.sh)
     }
 
     fn signed_planes_mut(&mut self) -> impl Iterator<Item = &mut Vec<i32>> {

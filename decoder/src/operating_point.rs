@@ -3,7 +3,9 @@
 use core::fmt;
 use core::str::FromStr;
 use splatstream_format::payload::Index;
-use splatstream_format::syntax::{EndOfStream, FrameHeader, IndexEntry, SequenceParameters, UnitHeader, UnitType};
+use splatstream_format::syntax::{
+    EndOfStream, FrameHeader, IndexEntry, SequenceParameters, UnitHeader, UnitType,
+};
 use splatstream_format::unit::{Stream, Unit, write_file_header, write_unit};
 use splatstream_format::{Limits, Result as FormatResult};
 
@@ -171,6 +173,10 @@ mod tests {
     fn an_operating_point_reads_as_it_is_written() {
         let point = OperatingPoint { spatial: 0, temporal: 1, refinement: 4 };
         assert_eq!(point.to_string().parse(), Ok(point));
-        assert!(["", "s0", "s0,t0", "s0,t0,r", "t0,s0,r0", "s0,t0,r0,x"].iter().all(|text| text.parse::<OperatingPoint>().is_err()));
+        assert!(
+            ["", "s0", "s0,t0", "s0,t0,r", "t0,s0,r0", "s0,t0,r0,x"]
+                .iter()
+                .all(|text| text.parse::<OperatingPoint>().is_err())
+        );
     }
 }

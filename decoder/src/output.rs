@@ -40,7 +40,8 @@ pub fn to_gaussians(frame: &QuantizedFrame, sequence: &SequenceParameters) -> Ga
 
 /// w is what makes the quaternion a unit, 0 if x, y, z are already longer than one.
 fn rotations(planes: &[Vec<i32>; 3], step: f32) -> [Vec<f32>; 4] {
-    let [x, y, z] = planes.each_ref().map(|plane| -> Vec<f32> { plane.par_iter().map(|&q| step * q as f32).collect() });
+    let [x, y, z] =
+        planes.each_ref().map(|plane| -> Vec<f32> { plane.par_iter().map(|&q| step * q as f32).collect() });
     let w = x
         .par_iter()
         .zip(&y)

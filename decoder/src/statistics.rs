@@ -1,5 +1,8 @@
 //! What each attribute of a stream costs. Informative; the figures leave the decoding process alone.
-#![expect(clippy::float_arithmetic, reason = "statistics are fractions of bits; nothing is decoded from them")]
+#![expect(
+    clippy::float_arithmetic,
+    reason = "statistics are fractions of bits; nothing is decoded from them"
+)]
 
 use crate::block::CodedBlock;
 use crate::context::{delta_contexts, plane_contexts};
@@ -111,7 +114,8 @@ impl State {
         let coded = CodedUnit { refinement: &refinement, payload_at: unit.payload_at };
         let mut trace = BitsOfPlanes::default();
         let before = self.models.as_ref().map(|(layout, models)| (layout, models.as_slice()));
-        let prepared = PreparedUnit::new(coded, gop, transforms, sequence, before, &mut trace)?.with_decoders();
+        let prepared =
+            PreparedUnit::new(coded, gop, transforms, sequence, before, &mut trace)?.with_decoders();
         let gaussians = u64::from(refinement.header.gaussian_count);
         statistics.gaussians = statistics.gaussians.saturating_add(gaussians);
         let blocks = prepared.coded_blocks(sequence)?;
@@ -120,7 +124,8 @@ impl State {
             let of_attribute = |cost: &&mut AttributeCost| cost.attribute == info.attribute;
             if let Some(cost) = statistics.attributes.iter_mut().find(of_attribute) {
                 cost.model_bits = cost.model_bits.saturating_add(model_bits);
-                cost.symbol_bits += blocks.iter().map(|block| symbol_bits(model, info, plane, block)).sum::<f64>();
+                cost.symbol_bits +=
+                    blocks.iter().map(|block| symbol_bits(model, info, plane, block)).sum::<f64>();
             }
         }
         if !prepared.models.is_empty() {
@@ -133,7 +138,8 @@ impl State {
 impl Statistics {
     fn count(&mut self, header: &UnitHeader) {
         let unit_type = header.unit_type();
-        let size = u64::try_from(UnitHeader::SIZE).unwrap_or(0).saturating_add(u64::from(header.payload_length));
+        let size =
+            u64::try_from(UnitHeader::SIZE).unwrap_or(0).saturating_add(u64::from(header.payload_length));
         match self.units.iter_mut().find(|cost| cost.unit_type == unit_type) {
             Some(cost) => {
                 cost.units = cost.units.saturating_add(1);

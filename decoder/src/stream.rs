@@ -38,7 +38,8 @@ fn run(
     let stream = Stream::open(bytes, &options.limits)?;
     let mut decoder = Decoder::new(stream.header(), *options);
     let mut units = stream.units();
-    let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame) {
+    let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame)
+    {
         (Some(sequence), Some(frame)) => {
             *frames = frames.wrapping_add(1);
             on_frame(sequence, frame)
@@ -48,9 +49,7 @@ fn run(
     while let Some(delivery) = units.next_unit() {
         let step = match delivery {
             Ok(Delivery::Intact(unit)) => decoder.unit(&unit),
-            Ok(Delivery::Damaged(damaged)) => {
-                decoder.damaged(&damaged.header, damaged.error).map(|()| None)
-            }
+            Ok(Delivery::Damaged(damaged)) => decoder.damaged(&damaged.header, damaged.error).map(|()| None),
             Err(error) => Err(error),
         };
         let frame = match step {

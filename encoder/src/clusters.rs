@@ -26,10 +26,11 @@ pub(crate) fn cluster(histograms: Vec<Histogram>, width: usize) -> Clustering {
         [right, below].into_iter().flatten()
     };
     let mut pairs: Vec<(usize, usize)> = (0..contexts).flat_map(neighbours).collect();
-    let saving = |tables: &[Option<Histogram>], bits: &[f64], (a, b): (usize, usize)| match (&tables[a], &tables[b]) {
-        (Some(first), Some(second)) => bits[a] + bits[b] - first.merged(second).total_bits(),
-        _ => f64::NEG_INFINITY,
-    };
+    let saving =
+        |tables: &[Option<Histogram>], bits: &[f64], (a, b): (usize, usize)| match (&tables[a], &tables[b]) {
+            (Some(first), Some(second)) => bits[a] + bits[b] - first.merged(second).total_bits(),
+            _ => f64::NEG_INFINITY,
+        };
     let mut savings: Vec<f64> = pairs.iter().map(|&pair| saving(&tables, &bits, pair)).collect();
     loop {
         let best = (0..pairs.len()).max_by(|&a, &b| savings[a].total_cmp(&savings[b]).then(b.cmp(&a)));
@@ -74,12 +75,16 @@ impl Clustering {
     pub(crate) fn simplified(self, axes: [ContextAxis; 2]) -> ([ContextAxis; 2], Vec<u8>) {
         let [first, second] = axes;
         let rows: Vec<&[u8]> = self.table_of_context.chunks(self.width).collect();
-        let kept_rows: Vec<usize> = (0..rows.len()).filter(|&row| row == 0 || rows[row] != rows[row - 1]).collect();
+        let kept_rows: Vec<usize> =
+            (0..rows.len()).filter(|&row| row == 0 || rows[row] != rows[row - 1]).collect();
         let column = |place: usize| rows.iter().map(|row| row[place]).collect::<Vec<u8>>();
         let kept_columns: Vec<usize> =
             (0..self.width).filter(|&place| place == 0 || column(place) != column(place - 1)).collect();
-        let table_of_context: Vec<u8> =
-            kept_rows.iter().flat_map(|&row| kept_columns.iter().map(move |&place| (row, place))).map(|(row, place)| rows[row][place]).collect();
+        let table_of_context: Vec<u8> = kept_rows
+            .iter()
+            .flat_map(|&row| kept_columns.iter().map(move |&place| (row, place)))
+            .map(|(row, place)| rows[row][place])
+            .collect();
         let first = keep_thresholds(first, &kept_rows);
         let second = keep_thresholds(second, &kept_columns);
         let axes = if first.thresholds.is_empty() { [second, ContextAxis::NONE] } else { [first, second] };

@@ -23,11 +23,11 @@ const TRIAL: usize = 1 << 13;
 pub(crate) fn transform(kind: TransformKind, planes: &[&[f32]], step: f32) -> Transform {
     let dimension = planes.len();
     let components = Components::of(planes);
-    let mean = components.mean.iter().map(|&mean| {
-        libm::round(mean / f64::from(step) * FRACTION).clamp(-MEAN_LIMIT, MEAN_LIMIT) as i32
-    });
-    let basis =
-        components.rows.iter().flatten().map(|&entry| libm::round(entry * UNIT) as i16).collect();
+    let mean = components
+        .mean
+        .iter()
+        .map(|&mean| libm::round(mean / f64::from(step) * FRACTION).clamp(-MEAN_LIMIT, MEAN_LIMIT) as i32);
+    let basis = components.rows.iter().flatten().map(|&entry| libm::round(entry * UNIT) as i16).collect();
     Transform {
         header: TransformHeader {
             transform_id: 0,
@@ -82,7 +82,8 @@ pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) ->
 
 /// Drops the last components that are 0 for every Gaussian; at least one stays.
 pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<i32>>) {
-    let used = planes.iter().rposition(|plane| plane.iter().any(|&value| value != 0)).map_or(1, |last| last + 1);
+    let used =
+        planes.iter().rposition(|plane| plane.iter().any(|&value| value != 0)).map_or(1, |last| last + 1);
     planes.truncate(used);
     transform.basis.truncate(used * usize::from(transform.header.dimension));
     transform.header.rank = used as u8;
@@ -153,7 +154,10 @@ fn coefficient_cost(rows: &[f32], rank: usize) -> (f64, f64) {
         let values = rows.iter().skip(component).step_by(rank);
         let rounded: Vec<i32> = values.clone().map(|&value| nearest_integer(value)).collect();
         bits += entropy_of(&rounded);
-        error += values.zip(&rounded).map(|(&v, &r)| f64::from(v - r as f32) * f64::from(v - r as f32)).sum::<f64>();
+        error += values
+            .zip(&rounded)
+            .map(|(&v, &r)| f64::from(v - r as f32) * f64::from(v - r as f32))
+            .sum::<f64>();
     }
     (bits / gaussians, error / gaussians)
 }

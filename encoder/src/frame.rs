@@ -56,8 +56,10 @@ pub(crate) struct UnitPlan<'a> {
 pub(crate) fn code_frame(frame: &CodedFrame, plan: &UnitPlan<'_>) -> Result<FrameUnits, Error> {
     let units = divided(frame, plan);
     let biases = biases(frame, plan.parameters.layout.planes());
-    let coded: Vec<CodedUnit> =
-        units.par_iter().map(|indices| code_unit(frame, indices, &biases, plan)).collect::<Result<_, Error>>()?;
+    let coded: Vec<CodedUnit> = units
+        .par_iter()
+        .map(|indices| code_unit(frame, indices, &biases, plan))
+        .collect::<Result<_, Error>>()?;
     let mut digests: Vec<UnitDigest> = Vec::new();
     let mut payloads = Vec::new();
     let mut previous: Option<Vec<PlaneModel>> = None;
@@ -108,8 +110,10 @@ fn code_unit(
     plan: &UnitPlan<'_>,
 ) -> Result<CodedUnit, Error> {
     let planes = plan.parameters.layout.planes();
-    let blocks: Vec<CodedBlock> =
-        indices.par_chunks(1 << plan.sequence.block_log2).map(|part| gathered(frame, part, planes, biases)).collect();
+    let blocks: Vec<CodedBlock> = indices
+        .par_chunks(1 << plan.sequence.block_log2)
+        .map(|part| gathered(frame, part, planes, biases))
+        .collect();
     let models =
         if blocks.is_empty() { Vec::new() } else { models::choose_all(planes, &blocks, biases, plan.preset) };
     let parts: Vec<QuantizedFrame> = blocks
@@ -233,8 +237,12 @@ fn payload(
     } else {
         write_models(models, &plan.parameters.layout.alphabets(), previous)
     };
-    let header =
-        RefinementHeader { refinement_digest: digest, gaussian_count: count as u32, lanes_log2, ..plan.header };
+    let header = RefinementHeader {
+        refinement_digest: digest,
+        gaussian_count: count as u32,
+        lanes_log2,
+        ..plan.header
+    };
     Ok(write_refinement(&header, plan.sequence, &section, &blocks)?)
 }
 

@@ -58,7 +58,8 @@ pub(crate) fn inner_side(frame: &GaussianFrame) -> f32 {
     let side = |plane: &Vec<f32>| {
         let mut sorted = plane.clone();
         sorted.sort_unstable_by(f32::total_cmp);
-        let at = |percent: usize| sorted.get((sorted.len().max(1) - 1) * percent / 100).copied().unwrap_or(0.0);
+        let at =
+            |percent: usize| sorted.get((sorted.len().max(1) - 1) * percent / 100).copied().unwrap_or(0.0);
         at(99) - at(1)
     };
     frame.position().iter().map(side).fold(0.0, f32::max)
@@ -77,7 +78,8 @@ pub(crate) fn position_lattice(extent: Extent, inner_side: f32, steps: &Steps) -
     let least = (side / cells).max(f32::from_bits(88 << 23));
     let step = asked.max(least).min(f32::from_bits(146 << 23));
     let last = libm::rintf(side / step);
-    let bits = (1..=MAX_POSITION_BITS).find(|&bits| last < (1_u32 << bits) as f32).unwrap_or(MAX_POSITION_BITS);
+    let bits =
+        (1..=MAX_POSITION_BITS).find(|&bits| last < (1_u32 << bits) as f32).unwrap_or(MAX_POSITION_BITS);
     (extent.low, step, bits as u8)
 }
 
@@ -94,14 +96,20 @@ pub(crate) fn nearest_integer(value: f32) -> i32 {
 ///
 /// # Errors
 /// A value beyond the range of its integer.
-pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters, number: u32) -> Result<Geometry, Error> {
+pub(crate) fn geometry(
+    frame: &GaussianFrame,
+    sequence: &SequenceParameters,
+    number: u32,
+) -> Result<Geometry, Error> {
     let last = ((1_u32 << sequence.position_bits) - 1) as f32;
     let step = sequence.position_step();
     let mut position = [const { Vec::new() }; 3];
     for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
         let offset = sequence.position_offset()[axis];
-        *plane =
-            values.par_iter().map(|&value| nearest_integer(((value - offset) / step).clamp(0.0, last)) as u32).collect();
+        *plane = values
+            .par_iter()
+            .map(|&value| nearest_integer(((value - offset) / step).clamp(0.0, last)) as u32)
+            .collect();
     }
     let mut log_scale = [const { Vec::new() }; 3];
     for (plane, values) in log_scale.iter_mut().zip(frame.log_scale()) {

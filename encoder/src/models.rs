@@ -182,12 +182,17 @@ fn direct_log2(info: PlaneInfo, values: &[u64]) -> u8 {
 }
 
 /// The model of one plane of a unit. `bias` has been taken off the coded values already.
-pub(crate) fn choose(info: PlaneInfo, plane: usize, blocks: &[CodedBlock], bias: i32, preset: Preset) -> PlaneModel {
+pub(crate) fn choose(
+    info: PlaneInfo,
+    plane: usize,
+    blocks: &[CodedBlock],
+    bias: i32,
+    preset: Preset,
+) -> PlaneModel {
     let total: usize = blocks.iter().map(CodedBlock::len).sum();
     let stride = if total > SAMPLE && preset != Preset::Small { 2 } else { 1 };
     let sample: Vec<&CodedBlock> = blocks.iter().step_by(stride).collect();
-    let values: Vec<u64> =
-        sample.iter().flat_map(|block| unsigned_values(info, plane, block)).collect();
+    let values: Vec<u64> = sample.iter().flat_map(|block| unsigned_values(info, plane, block)).collect();
     let direct_log2 = direct_log2(info, &values);
     let tokens = values.iter().map(|&value| split(value, direct_log2).token).collect();
     let view = PlaneView { info, plane, blocks: sample, direct_log2, tokens };
@@ -229,7 +234,12 @@ pub(crate) fn choose_all(
 }
 
 /// Bits of a plane's symbols under a model; none if a token cannot be coded.
-pub(crate) fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Option<f64> {
+pub(crate) fn symbol_bits(
+    model: &PlaneModel,
+    info: PlaneInfo,
+    plane: usize,
+    block: &CodedBlock,
+) -> Option<f64> {
     let contexts = contexts(model, info, plane, block);
     let costs: Vec<Vec<f64>> = model.tables.iter().map(token_costs).collect();
     let mut bits = 0.0;

@@ -39,8 +39,7 @@ impl Components {
             .zip(&mean)
             .map(|(plane, &mean)| plane.iter().step_by(stride).map(|&v| v - mean as f32).collect())
             .collect();
-        let pairs: Vec<(usize, usize)> =
-            (0..dimension).flat_map(|i| (0..=i).map(move |j| (i, j))).collect();
+        let pairs: Vec<(usize, usize)> = (0..dimension).flat_map(|i| (0..=i).map(move |j| (i, j))).collect();
         let products: Vec<f64> =
             pairs.par_iter().map(|&(i, j)| dot(&centred[i], &centred[j]) / samples as f64).collect();
         let mut covariance = vec![vec![0.0; dimension]; dimension];
@@ -70,7 +69,10 @@ fn eigenvectors(mut matrix: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut vectors = Components::identity(dimension).rows;
     let scale: f64 = (0..dimension).map(|i| matrix[i][i]).sum();
     for _ in 0..SWEEPS {
-        let off: f64 = (0..dimension).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| matrix[i][j] * matrix[i][j]).sum();
+        let off: f64 = (0..dimension)
+            .flat_map(|i| (0..i).map(move |j| (i, j)))
+            .map(|(i, j)| matrix[i][j] * matrix[i][j])
+            .sum();
         if off <= scale * scale * 1e-24 {
             break;
         }

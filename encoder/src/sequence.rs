@@ -61,7 +61,11 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
 
 fn level_of(frame: &GaussianFrame, number: u32) -> Result<u8, Error> {
     let level = u32::try_from(frame.len()).ok().and_then(Limits::level_of);
-    level.ok_or(Error::TooManyGaussians { frame: number, count: frame.len(), max: Limits::gaussians_of_level(4) })
+    level.ok_or(Error::TooManyGaussians {
+        frame: number,
+        count: frame.len(),
+        max: Limits::gaussians_of_level(4),
+    })
 }
 
 fn check(settings: &Settings) -> Result<(), Error> {
@@ -108,7 +112,8 @@ fn try_axes(frame: &GaussianFrame, settings: &Settings) -> [f64; 2] {
             scales[a].iter().zip(&scales[b]).map(|(a, b)| a - b).collect()
         };
         let [_, x, y, z] = canonical.rotation();
-        let rotation: f64 = [x, y, z].map(|plane| entropy_of(&round(plane, settings.steps.rotation))).iter().sum();
+        let rotation: f64 =
+            [x, y, z].map(|plane| entropy_of(&round(plane, settings.steps.rotation))).iter().sum();
         let scale = entropy_of(&scales[0]) + entropy_of(&differences(0, 1)) + entropy_of(&differences(1, 2));
         (scale + rotation) / sample.len().max(1) as f64
     })

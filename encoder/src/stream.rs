@@ -13,8 +13,8 @@ use splatstream_decoder::colour::Colour;
 use splatstream_decoder::layout::{Layout, ShCoding};
 use splatstream_format::payload::{Index, Transform};
 use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, RefinementHeader,
-    SequenceParameters, ShMode, TransformKind, UnitId, UnitType,
+    EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, RefinementHeader, SequenceParameters,
+    ShMode, TransformKind, UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_scene::{GaussianFrame, importance};
@@ -124,7 +124,11 @@ struct GopTools {
 }
 
 /// The SH planes that the sequence carries; a frame of a lower degree has fewer.
-fn sh_planes<'a>(frame: &'a GaussianFrame, sequence: &SequenceParameters, zeros: &'a [f32]) -> Vec<&'a [f32]> {
+fn sh_planes<'a>(
+    frame: &'a GaussianFrame,
+    sequence: &SequenceParameters,
+    zeros: &'a [f32],
+) -> Vec<&'a [f32]> {
     (0..usize::from(sequence.sh_dimension()))
         .map(|plane| frame.sh().get(plane).map_or(zeros, Vec::as_slice))
         .collect()

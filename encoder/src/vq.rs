@@ -98,7 +98,8 @@ pub(crate) fn train(rows: &[f32], rank: usize, entries: usize) -> Codebook {
 /// k-means++: each seed is drawn with a weight of its squared distance to the seeds before.
 fn seeds(rows: &[f32], rank: usize, entries: usize) -> Vec<f32> {
     let count = rows.len() / rank;
-    let pool: Vec<&[f32]> = rows.chunks_exact(rank).step_by(count.div_ceil(SEEDING.max(entries * 2)).max(1)).collect();
+    let pool: Vec<&[f32]> =
+        rows.chunks_exact(rank).step_by(count.div_ceil(SEEDING.max(entries * 2)).max(1)).collect();
     let mut state = 0x5EED_u64;
     let mut centres = pool[0].to_vec();
     let mut distances = vec![f32::INFINITY; pool.len()];

@@ -66,37 +66,19 @@ impl<'a> Arbitrary<'a> for ArbitraryStream {
     fn arbitrary(u: &mut Unstructured<'a>) -> Result<Self> {
         let sequence = sequence_parameters(u)?;
         let gop_count = u.int_in_range(0..=3)?;
-        let gops = (0..gop_count)
-            .map(|_| gop(u, &sequence))
-            .collect::<Result<Vec<_>>>()?;
-        Ok(Self {
-            level: u.int_in_range(1..=4)?,
-            sequence,
-            gops,
-            has_index: u.arbitrary()?,
-        })
+        let gops = (0..gop_count).map(|_| gop(u, &sequence)).collect::<Result<Vec<_>>>()?;
+        Ok(Self { level: u.int_in_range(1..=4)?, sequence, gops, has_index: u.arbitrary()? })
     }
 }
 
 impl ArbitraryStream {
     /// The bytes of the stream.
     pub fn to_bytes(&self) -> crate::Result<Vec<u8>> {
-        let mut out = Output {
-            bytes: write_file_header(self.level)?,
-            frame_count: 0,
-            unit_count: 0,
-        };
-        out.unit(
-            UnitId::stream(UnitType::SequenceParameters),
-            &self.sequence.to_bytes()?,
-        )?;
+        let mut out = Output { bytes: write_file_header(self.level)?, frame_count: 0, unit_count: 0 };
+        out.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
         let mut entries = Vec::new();
         for (gop_index, gop) in (0..).zip(&self.gops) {
-            entries.push(IndexEntry {
-                frame: out.frame_count,
-                reserved_zero: 0,
-                offset: out.position(),
-            });
+            entries.push(IndexEntry { frame: out.frame_count, reserved_zero: 0, offset: out.position() });
             out.gop(gop_index, gop, &self.sequence)?;
         }
         let index_offset = if self.has_index { out.position() } else { 0 };
@@ -104,11 +86,7 @@ impl ArbitraryStream {
             out.unit(UnitId::stream(UnitType::Index), &Index { entries }.to_bytes()?)?;
         }
         let (frame_count, unit_count) = (out.frame_count, out.unit_count);
-        let end = EndOfStream {
-            frame_count,
-            unit_count,
-            index_offset,
-        };
+        let end = EndOfStream { frame_count, unit_count, index_offset };
         out.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)?;
         Ok(out.bytes)
     }
@@ -145,31 +123,20 @@ impl Output {
             self.unit(UnitId::stream(UnitType::User(200)), private)?;
         }
         for transform in &gop.transforms {
-            self.unit(
-                UnitId::of_frame(UnitType::Transform, first),
-                &transform.to_bytes(sequence)?,
-            )?;
+            self.unit(UnitId::of_frame(UnitType::Transform, first), &transform.to_bytes(sequence)?)?;
         }
         for codebook in &gop.codebooks {
             self.unit(UnitId::of_frame(UnitType::Codebook, first), &codebook.to_bytes()?)?;
         }
-        gop.frames
-            .iter()
-            .try_for_each(|frame| self.frame(frame, sequence))
+        gop.frames.iter().try_for_each(|frame| self.frame(frame, sequence))
     }
 
     fn frame(&mut self, frame: &ArbitraryFrame, sequence: &SequenceParameters) -> crate::Result<()> {
         let place = self.frame_count;
         self.frame_count = place.saturating_add(1);
-        self.unit(
-            UnitId::of_frame(UnitType::FrameHeader, place),
-            &frame.header.to_bytes()?,
-        )?;
+        self.unit(UnitId::of_frame(UnitType::FrameHeader, place), &frame.header.to_bytes()?)?;
         for (number, refinement) in (0..).zip(&frame.refinements) {
-            self.unit(
-                UnitId::of_refinement(place, number),
-                &refinement.to_bytes(sequence)?,
-            )?;
+            self.unit(UnitId::of_refinement(place, number), &refinement.to_bytes(sequence)?)?;
         }
         Ok(())
     }
@@ -221,38 +188,22 @@ pub fn transform(
 ) -> Result<Transform> {
     let dimension = kind.dimension(sequence);
     let rank = u.int_in_range(1..=dimension.max(1))?;
-    let header = TransformHeader {
-        transform_id,
-        transform_kind: kind.code(),
-        dimension,
-        rank,
-    };
-    let mean = (0..dimension)
-        .map(|_| u.int_in_range(-(1 << 30)..=1 << 30))
-        .collect::<Result<_>>()?;
+    let header = TransformHeader { transform_id, transform_kind: kind.code(), dimension, rank };
+    let mean = (0..dimension).map(|_| u.int_in_range(-(1 << 30)..=1 << 30)).collect::<Result<_>>()?;
     let weights = u16::from(dimension).saturating_mul(rank.into());
-    let basis = (0..weights)
-        .map(|_| u.int_in_range(-(1 << 12)..=1 << 12))
-        .collect::<Result<_>>()?;
+    let basis = (0..weights).map(|_| u.int_in_range(-(1 << 12)..=1 << 12)).collect::<Result<_>>()?;
     Ok(Transform { header, mean, basis })
 }
 
 /// Any small codebook that is accepted.
 pub fn codebook(u: &mut Unstructured<'_>, codebook_id: u8, component_count: u8) -> Result<Codebook> {
     let (entry_count_minus1, value_bytes) = (u.int_in_range(0..=7)?, u.int_in_range(1..=2)?);
-    let header = CodebookHeader {
-        codebook_id,
-        component_count,
-        entry_count_minus1,
-        value_bytes,
-    };
+    let header = CodebookHeader { codebook_id, component_count, entry_count_minus1, value_bytes };
     let value = |u: &mut Unstructured<'_>| match value_bytes {
         1 => i8::arbitrary(u).map(i16::from),
         _ => i16::arbitrary(u),
     };
-    let entries = (0..header.value_count())
-        .map(|_| value(u))
-        .collect::<Result<_>>()?;
+    let entries = (0..header.value_count()).map(|_| value(u)).collect::<Result<_>>()?;
     Ok(Codebook { header, entries })
 }
 
@@ -271,11 +222,7 @@ pub fn refinement(
         (true, false) => ShMode::VectorQuantised,
     };
     let sh_mode = u.int_in_range(0..=modes.code())?;
-    let vq_stage_count = if sh_mode == ShMode::VectorQuantised.code() {
-        u.int_in_range(1..=4)?
-    } else {
-        0
-    };
+    let vq_stage_count = if sh_mode == ShMode::VectorQuantised.code() { u.int_in_range(1..=4)? } else { 0 };
     let mut codebook_ids = [NO_CODEBOOK; 4];
     for id in codebook_ids.iter_mut().take(vq_stage_count.into()) {
         *id = *u.choose(stages)?;
@@ -289,19 +236,9 @@ pub fn refinement(
         vq_stage_count,
         codebook_ids,
     };
-    let model = if gaussian_count == 0 {
-        Vec::new()
-    } else {
-        section(u)?
-    };
-    let blocks = (0..header.block_count(sequence))
-        .map(|_| section(u))
-        .collect::<Result<_>>()?;
-    Ok(ArbitraryRefinement {
-        header,
-        model,
-        blocks,
-    })
+    let model = if gaussian_count == 0 { Vec::new() } else { section(u)? };
+    let blocks = (0..header.block_count(sequence)).map(|_| section(u)).collect::<Result<_>>()?;
+    Ok(ArbitraryRefinement { header, model, blocks })
 }
 
 fn gop(u: &mut Unstructured<'_>, sequence: &SequenceParameters) -> Result<ArbitraryGop> {
@@ -311,22 +248,14 @@ fn gop(u: &mut Unstructured<'_>, sequence: &SequenceParameters) -> Result<Arbitr
     if sequence.sh_degree > 0 && u.arbitrary()? {
         let sh = transform(u, (dc ^ 1) & MAX_ID, TransformKind::Sh, sequence)?;
         let codebook_count = u.int_in_range(0..=3)?;
-        codebooks = (0..codebook_count)
-            .map(|id| codebook(u, id, sh.header.rank))
-            .collect::<Result<_>>()?;
+        codebooks = (0..codebook_count).map(|id| codebook(u, id, sh.header.rank)).collect::<Result<_>>()?;
         transforms.push(sh);
     }
     let frame_count = u.int_in_range(1..=3)?;
-    let frames = (0..frame_count)
-        .map(|_| frame(u, sequence, &transforms, &codebooks))
-        .collect::<Result<_>>()?;
+    let frames =
+        (0..frame_count).map(|_| frame(u, sequence, &transforms, &codebooks)).collect::<Result<_>>()?;
     let private = if u.arbitrary()? { Some(section(u)?) } else { None };
-    Ok(ArbitraryGop {
-        transforms,
-        codebooks,
-        frames,
-        private,
-    })
+    Ok(ArbitraryGop { transforms, codebooks, frames, private })
 }
 
 fn frame(
@@ -336,28 +265,20 @@ fn frame(
     codebooks: &[Codebook],
 ) -> Result<ArbitraryFrame> {
     let id_of = |kind| {
-        let found = transforms
-            .iter()
-            .find(|transform| transform.header.kind() == Some(kind));
+        let found = transforms.iter().find(|transform| transform.header.kind() == Some(kind));
         found.map(|transform| transform.header.transform_id)
     };
     let gaussian_count = u.int_in_range(0..=MAX_GAUSSIANS)?;
     let sh = id_of(TransformKind::Sh);
     let header = FrameHeader::intra(id_of(TransformKind::Dc).unwrap_or(0), sh, gaussian_count);
-    let stages: Vec<u8> = codebooks
-        .iter()
-        .map(|codebook| codebook.header.codebook_id)
-        .collect();
+    let stages: Vec<u8> = codebooks.iter().map(|codebook| codebook.header.codebook_id).collect();
     // A frame may stop at any refinement.
     let refinement_count = u.int_in_range(1..=sequence.refinement_count)?;
     let refinements = (0..refinement_count).map(|number| {
         let added = sequence.refinement_length(number, gaussian_count);
         refinement(u, sequence, added, &stages, sh.is_some())
     });
-    Ok(ArbitraryFrame {
-        header,
-        refinements: refinements.collect::<Result<_>>()?,
-    })
+    Ok(ArbitraryFrame { header, refinements: refinements.collect::<Result<_>>()? })
 }
 
 /// Strictly increasing to 100 in `refinement_count` places, then zero.

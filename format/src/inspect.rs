@@ -36,12 +36,7 @@ pub struct Element {
 /// Visits every element of a stream in order, and gives the first error. Behind a damaged payload it goes on
 /// with the next unit.
 pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) -> Option<Error> {
-    let mut inspector = Inspector {
-        visit,
-        limits: *limits,
-        sequence: None,
-        first: None,
-    };
+    let mut inspector = Inspector { visit, limits: *limits, sequence: None, first: None };
     inspector.stream(bytes);
     inspector.first
 }
@@ -109,15 +104,7 @@ impl Inspector<'_> {
             unknown @ (UnitType::Reserved(_) | UnitType::User(_)) => {
                 let value = format!("{} bytes", payload.len());
                 let meaning = "skipped by decoders of this version";
-                self.show(
-                    at,
-                    payload.len(),
-                    "payload".into(),
-                    value,
-                    meaning,
-                    "5.3",
-                    unknown.name(),
-                );
+                self.show(at, payload.len(), "payload".into(), value, meaning, "5.3", unknown.name());
             }
         }
         Ok(())
@@ -128,22 +115,10 @@ impl Inspector<'_> {
         let transform = Transform::parse(payload, at, &self.sequence_at(at)?)?;
         let mean_at = after(at, TransformHeader::SIZE);
         let mean_bytes = size_of_val(transform.mean.as_slice());
-        self.variable(
-            "transform",
-            "mean",
-            mean_at,
-            mean_bytes,
-            value::summary(&transform.mean),
-        );
+        self.variable("transform", "mean", mean_at, mean_bytes, value::summary(&transform.mean));
         let basis_bytes = size_of_val(transform.basis.as_slice());
         let basis = value::summary(&transform.basis);
-        self.variable(
-            "transform",
-            "basis",
-            after(mean_at, mean_bytes),
-            basis_bytes,
-            basis,
-        );
+        self.variable("transform", "basis", after(mean_at, mean_bytes), basis_bytes, basis);
         Ok(())
     }
 
@@ -152,13 +127,7 @@ impl Inspector<'_> {
         let codebook = Codebook::parse(payload, at, &self.limits)?;
         let bytes = payload.len().saturating_sub(CodebookHeader::SIZE);
         let entries = value::summary(&codebook.entries);
-        self.variable(
-            "codebook",
-            "entries",
-            after(at, CodebookHeader::SIZE),
-            bytes,
-            entries,
-        );
+        self.variable("codebook", "entries", after(at, CodebookHeader::SIZE), bytes, entries);
         Ok(())
     }
 
@@ -170,19 +139,11 @@ impl Inspector<'_> {
         let mut rest = payload.get(RefinementHeader::SIZE..).unwrap_or_default();
         let place = |rest: &[u8]| after(at, payload.len().saturating_sub(rest.len()));
         let model_length = self.number("model_length", None, &mut rest, place)?;
-        let model = usize::try_from(model_length)
-            .ok()
-            .and_then(|length| rest.split_at_checked(length));
+        let model = usize::try_from(model_length).ok().and_then(|length| rest.split_at_checked(length));
         let Some((model, after_model)) = model else {
             return parsed.map(drop);
         };
-        self.variable(
-            "refinement",
-            "models",
-            place(rest),
-            model.len(),
-            format!("{} bytes", model.len()),
-        );
+        self.variable("refinement", "models", place(rest), model.len(), format!("{} bytes", model.len()));
         rest = after_model;
         // The count of a header that was refused is not to be trusted.
         let blocks = parsed?.blocks;
@@ -199,15 +160,7 @@ impl Inspector<'_> {
         };
         for (place, (block, at)) in blocks.iter().enumerate() {
             let (name, value) = (format!("blocks[{place}]"), format!("{} bytes", block.len()));
-            self.show(
-                *at,
-                block.len(),
-                name.into(),
-                value,
-                row.meaning,
-                row.clause,
-                row.record,
-            );
+            self.show(*at, block.len(), name.into(), value, row.meaning, row.clause, row.record);
         }
     }
 
@@ -236,15 +189,7 @@ impl Inspector<'_> {
         *rest = behind;
         if let Some(row) = variable_row("refinement", name) {
             let name = place.map_or(name.into(), |place| format!("{name}[{place}]").into());
-            self.show(
-                start,
-                bytes,
-                name,
-                value.to_string(),
-                row.meaning,
-                row.clause,
-                row.record,
-            );
+            self.show(start, bytes, name, value.to_string(), row.meaning, row.clause, row.record);
         }
         Ok(value)
     }
@@ -257,12 +202,7 @@ impl Inspector<'_> {
                 return;
             };
             let value = value::of_row(table.name, row, raw);
-            let Row {
-                name,
-                meaning,
-                clause,
-                ..
-            } = *row;
+            let Row { name, meaning, clause, .. } = *row;
             self.show(at, row.bytes, name.into(), value, meaning, clause, table.name);
             rest = behind;
             at = after(at, row.bytes);
@@ -287,21 +227,11 @@ impl Inspector<'_> {
         record: &'static str,
     ) {
         let (at_bit, bits) = (at.saturating_mul(8), after(0, bytes).saturating_mul(8));
-        (self.visit)(Element {
-            at_bit,
-            bits,
-            record,
-            name,
-            value,
-            meaning: meaning.into(),
-            clause,
-        });
+        (self.visit)(Element { at_bit, bits, record, name, value, meaning: meaning.into(), clause });
     }
 
     fn sequence_at(&self, at: u64) -> Result<SequenceParameters> {
-        let kind = ErrorKind::UnexpectedUnit {
-            unit: "sequence-dependent",
-        };
+        let kind = ErrorKind::UnexpectedUnit { unit: "sequence-dependent" };
         self.sequence.ok_or(Error::new(at, "7.1.2", kind))
     }
 
@@ -311,7 +241,5 @@ impl Inspector<'_> {
 }
 
 fn variable_row(record: &str, name: &str) -> Option<&'static VariableRow> {
-    VARIABLE_ROWS
-        .iter()
-        .find(|row| row.record == record && row.name == name)
+    VARIABLE_ROWS.iter().find(|row| row.record == record && row.name == name)
 }

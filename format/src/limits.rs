@@ -18,7 +18,12 @@ pub struct Limits {
 impl Default for Limits {
     /// The limits of level 3, annex A.
     fn default() -> Self {
-        Self { max_gaussians: 1 << 22, max_payload: 1 << 30, max_units: 1 << 24, max_codebook_values: 1 << 23 }
+        Self {
+            max_gaussians: 1 << 22,
+            max_payload: 1 << 30,
+            max_units: 1 << 24,
+            max_codebook_values: 1 << 23,
+        }
     }
 }
 

@@ -41,31 +41,13 @@ const fn row(
     type_name: &'static str,
     meaning: &'static str,
 ) -> VariableRow {
-    VariableRow {
-        record,
-        name,
-        type_name,
-        meaning,
-        clause,
-    }
+    VariableRow { record, name, type_name, meaning, clause }
 }
 
 /// The rows behind the fixed part of the records, in the order of clause 5.
 pub const VARIABLE_ROWS: [VariableRow; 8] = [
-    row(
-        "5.7",
-        "transform",
-        "mean",
-        "i32[dimension]",
-        "output of components 0, step/64",
-    ),
-    row(
-        "5.7",
-        "transform",
-        "basis",
-        "i16[rank*dimension]",
-        "weights, Q12, component by component",
-    ),
+    row("5.7", "transform", "mean", "i32[dimension]", "output of components 0, step/64"),
+    row("5.7", "transform", "basis", "i16[rank*dimension]", "weights, Q12, component by component"),
     row(
         "5.8",
         "codebook",
@@ -74,34 +56,10 @@ pub const VARIABLE_ROWS: [VariableRow; 8] = [
         "values, entry by entry",
     ),
     row("5.9", "refinement", "model_length", "leb128", "bytes of models"),
-    row(
-        "5.9",
-        "refinement",
-        "models",
-        "u8[model_length]",
-        "the models of the planes",
-    ),
-    row(
-        "5.9",
-        "refinement",
-        "block_length",
-        "leb128[block_count]",
-        "bytes of each block",
-    ),
-    row(
-        "5.9",
-        "refinement",
-        "blocks",
-        "u8[...]",
-        "entropy-coded Gaussians",
-    ),
-    row(
-        "5.10",
-        "index",
-        "entries",
-        "index_entry[entry_count]",
-        "one for each group",
-    ),
+    row("5.9", "refinement", "models", "u8[model_length]", "the models of the planes"),
+    row("5.9", "refinement", "block_length", "leb128[block_count]", "bytes of each block"),
+    row("5.9", "refinement", "blocks", "u8[...]", "entropy-coded Gaussians"),
+    row("5.10", "index", "entries", "index_entry[entry_count]", "one for each group"),
 ];
 
 /// What nom carries: the bytes from the offending element on stand for its offset.
@@ -127,10 +85,7 @@ type Parsed<'a, T> = IResult<&'a [u8], T, Fault<'a>>;
 
 /// Fails at `rest`.
 fn fault<T>(rest: &[u8], kind: ErrorKind) -> Parsed<'_, T> {
-    Err(nom::Err::Failure(Fault {
-        rest,
-        kind: Some(kind),
-    }))
+    Err(nom::Err::Failure(Fault { rest, kind: Some(kind) }))
 }
 
 /// Names an element: when it does not fit, the error stands at its first byte.
@@ -142,10 +97,7 @@ fn element<'a, T>(
         parser.parse(input).map_err(|error| {
             error.map(|cause| match cause.kind {
                 Some(_) => cause,
-                None => Fault {
-                    rest: input,
-                    kind: Some(ErrorKind::ShortSection { element: name }),
-                },
+                None => Fault { rest: input, kind: Some(ErrorKind::ShortSection { element: name }) },
             })
         })
     }
@@ -158,9 +110,7 @@ fn whole<'a, T>(
     at: u64,
     mut parser: impl Parser<&'a [u8], Output = T, Error = Fault<'a>>,
 ) -> Result<T> {
-    let (rest, value) = parser
-        .parse(section)
-        .map_err(|error| located(table, section, at, error))?;
+    let (rest, value) = parser.parse(section).map_err(|error| located(table, section, at, error))?;
     nothing_after(table, rest, after(at, section.offset(rest)))?;
     Ok(value)
 }
@@ -171,11 +121,7 @@ fn located(table: &Table, section: &[u8], at: u64, error: nom::Err<Fault<'_>>) -
     match error {
         nom::Err::Error(fault) | nom::Err::Failure(fault) => {
             let kind = fault.kind.unwrap_or(short);
-            let clause = if kind.class() == Class::Malformed {
-                table.syntax
-            } else {
-                table.semantics
-            };
+            let clause = if kind.class() == Class::Malformed { table.syntax } else { table.semantics };
             Error::new(after(at, section.offset(fault.rest)), clause, kind)
         }
         // Only `complete` parsers are used: this one does not occur.

@@ -182,10 +182,7 @@ pub(crate) fn nothing_after(table: &Table, rest: &[u8], at: u64) -> Result<()> {
     if rest.is_empty() {
         return Ok(());
     }
-    let kind = ErrorKind::TrailingBytes {
-        element: table.name,
-        bytes: after(0, rest.len()),
-    };
+    let kind = ErrorKind::TrailingBytes { element: table.name, bytes: after(0, rest.len()) };
     Err(Error::new(at, table.syntax, kind))
 }
 
@@ -202,11 +199,7 @@ impl Table {
 
     /// Bytes before an element of the record.
     pub fn offset(&self, element: &str) -> usize {
-        self.rows
-            .iter()
-            .take_while(|row| row.name != element)
-            .map(|row| row.bytes)
-            .sum()
+        self.rows.iter().take_while(|row| row.name != element).map(|row| row.bytes).sum()
     }
 
     /// The checks of one record at a place in the stream.
@@ -261,12 +254,7 @@ impl Check {
         max: impl Into<i64>,
     ) -> Result<()> {
         let (value, min, max) = (value.into(), min.into(), max.into());
-        let kind = ErrorKind::OutOfRange {
-            element,
-            value,
-            min,
-            max,
-        };
+        let kind = ErrorKind::OutOfRange { element, value, min, max };
         self.holds((min..=max).contains(&value), element, place, kind)
     }
 
@@ -284,29 +272,12 @@ impl Check {
 
     /// `value` is kept for a later version unless `known`.
     pub(crate) fn known(self, known: bool, element: &'static str, value: u8) -> Result<()> {
-        self.holds(
-            known,
-            element,
-            0,
-            ErrorKind::Reserved {
-                element,
-                value: value.into(),
-            },
-        )
+        self.holds(known, element, 0, ErrorKind::Reserved { element, value: value.into() })
     }
 
     /// `value` shall be what the elements before it imply.
     pub(crate) fn equal(self, element: &'static str, value: u64, expected: u64) -> Result<()> {
-        self.holds(
-            value == expected,
-            element,
-            0,
-            ErrorKind::Mismatch {
-                element,
-                value,
-                expected,
-            },
-        )
+        self.holds(value == expected, element, 0, ErrorKind::Mismatch { element, value, expected })
     }
 
     /// A rule without a single number.
@@ -326,44 +297,23 @@ impl Check {
         if stored == computed || cfg!(fuzzing) {
             return Ok(());
         }
-        let kind = ErrorKind::CheckSum {
-            element,
-            stored,
-            computed,
-        };
+        let kind = ErrorKind::CheckSum { element, stored, computed };
         Err(Error::new(self.offset(element, 0), self.table.syntax, kind))
     }
 
     /// Malformed, unless `holds`: cites the clause of the syntax.
     pub(crate) fn well_formed(self, holds: bool, element: &'static str, kind: ErrorKind) -> Result<()> {
-        if holds {
-            Ok(())
-        } else {
-            Err(Error::new(self.offset(element, 0), self.table.syntax, kind))
-        }
+        if holds { Ok(()) } else { Err(Error::new(self.offset(element, 0), self.table.syntax, kind)) }
     }
 
     fn holds(self, holds: bool, element: &'static str, place: usize, kind: ErrorKind) -> Result<()> {
-        if holds {
-            Ok(())
-        } else {
-            Err(Error::new(
-                self.offset(element, place),
-                self.table.semantics,
-                kind,
-            ))
-        }
+        if holds { Ok(()) } else { Err(Error::new(self.offset(element, place), self.table.semantics, kind)) }
     }
 
     /// Absolute offset of a place of an element.
     pub(crate) fn offset(self, element: &str, place: usize) -> u64 {
         let row = self.table.rows.iter().find(|row| row.name == element);
         let one = row.and_then(|row| row.bytes.checked_div(row.places)).unwrap_or(0);
-        after(
-            self.at,
-            self.table
-                .offset(element)
-                .saturating_add(one.saturating_mul(place)),
-        )
+        after(self.at, self.table.offset(element).saturating_add(one.saturating_mul(place)))
     }
 }

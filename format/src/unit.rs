@@ -75,11 +75,7 @@ impl<'a> Stream<'a> {
     /// Reads and checks the file header of the stream that `bytes` is.
     pub fn open(bytes: &'a [u8], limits: &Limits) -> Result<Self> {
         let (header, _) = FileHeader::parse(bytes)?;
-        Ok(Self {
-            header,
-            bytes,
-            limits: *limits,
-        })
+        Ok(Self { header, bytes, limits: *limits })
     }
 
     /// The file header.
@@ -101,17 +97,8 @@ impl<'a> Stream<'a> {
 impl<'a> Units<'a> {
     /// The units of a stream from an offset on. Past the end of the stream there are none.
     pub(crate) fn starting_at(stream: &'a [u8], at: u64, limits: &Limits) -> Self {
-        let rest = usize::try_from(at)
-            .ok()
-            .and_then(|start| stream.get(start..))
-            .unwrap_or_default();
-        Self {
-            rest,
-            at,
-            limits: *limits,
-            unit_count: 0,
-            state: State::Open,
-        }
+        let rest = usize::try_from(at).ok().and_then(|start| stream.get(start..)).unwrap_or_default();
+        Self { rest, at, limits: *limits, unit_count: 0, state: State::Open }
     }
 
     /// Absolute offset of the next unit.
@@ -149,13 +136,7 @@ impl<'a> Units<'a> {
     fn read(&mut self) -> Result<Delivery<'a>> {
         let at = self.at;
         if self.rest.is_empty() {
-            return Err(Error::new(
-                at,
-                CLAUSE,
-                ErrorKind::Truncated {
-                    element: "unit_header",
-                },
-            ));
+            return Err(Error::new(at, CLAUSE, ErrorKind::Truncated { element: "unit_header" }));
         }
         let (header, rest) = UnitHeader::parse(self.rest, at)?;
         let units = u64::from(self.unit_count).saturating_add(1);
@@ -172,12 +153,7 @@ impl<'a> Units<'a> {
             self.state = State::Ended;
         }
         Ok(match header.check_payload(at, payload) {
-            Ok(()) => Delivery::Intact(Unit {
-                at,
-                header,
-                payload,
-                payload_at,
-            }),
+            Ok(()) => Delivery::Intact(Unit { at, header, payload, payload_at }),
             Err(error) => Delivery::Damaged(Damaged { at, header, error }),
         })
     }
@@ -187,10 +163,7 @@ impl<'a> Units<'a> {
         if self.rest.is_empty() {
             return Ok(());
         }
-        let kind = ErrorKind::TrailingBytes {
-            element: "stream",
-            bytes: after(0, self.rest.len()),
-        };
+        let kind = ErrorKind::TrailingBytes { element: "stream", bytes: after(0, self.rest.len()) };
         Err(Error::new(self.at, CLAUSE, kind))
     }
 }
@@ -226,10 +199,7 @@ pub fn write_unit(out: &mut Vec<u8>, id: UnitId, payload: &[u8]) -> Result<()> {
 /// A record that does not end within the stream: the stream is cut, not malformed.
 pub(crate) fn cut_is_truncated(error: Error) -> Error {
     match error.kind {
-        ErrorKind::ShortSection { element } => Error {
-            kind: ErrorKind::Truncated { element },
-            ..error
-        },
+        ErrorKind::ShortSection { element } => Error { kind: ErrorKind::Truncated { element }, ..error },
         _ => error,
     }
 }

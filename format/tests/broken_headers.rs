@@ -1,10 +1,6 @@
 //! Every broken rule of file_header and unit_header (clauses 6.2 and 6.3) is refused with its class, its code,
 //! the clause and the offset.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "a panic is a failed test"
-)]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is a failed test")]
 
 mod sample;
 
@@ -22,12 +18,7 @@ fn assert_headers_refused(cases: &[Case]) {
         sample::seal_unit_header(&mut unit, 0);
         bytes.extend(unit);
         let fault = u64::try_from(at).unwrap() + case.fault;
-        assert_refused(
-            &format!("header case {number}"),
-            sample::verdict(&bytes),
-            case,
-            fault,
-        );
+        assert_refused(&format!("header case {number}"), sample::verdict(&bytes), case, fault);
     }
 }
 
@@ -43,10 +34,7 @@ fn a_broken_file_header_is_refused() {
     let cases: [(bool, Case); 9] = [
         (true, case(0, |b| b[0] = 0x88, "SIGNATURE", "5.2", 0)),
         // What a text-mode transfer makes of it.
-        (
-            true,
-            case(0, |b| b.retain(|byte| *byte != 0x0D), "SIGNATURE", "5.2", 0),
-        ),
+        (true, case(0, |b| b.retain(|byte| *byte != 0x0D), "SIGNATURE", "5.2", 0)),
         (false, case(0, |b| b[15] ^= 1, "CHECK_SUM", "5.2", 12)),
         // The check sum comes before the version.
         (false, case(0, |b| b[8] = 2, "CHECK_SUM", "5.2", 12)),
@@ -104,20 +92,8 @@ fn a_broken_unit_header_is_refused() {
         case(GOP, |b| put(b, 0, [0, 2, 1, 1, 1, 1]), "NUMBER", "5.3", 0),
         case(GOP, |b| put(b, 0, [9, 3, 1, 1, 1, 1]), "RESERVED_BITS", "6.3", 1),
         case(GOP, |b| put(b, 0, [9, 1, 1, 1, 1, 1]), "RESERVED_BITS", "6.3", 5),
-        case(
-            GOP,
-            |b| put(b, 12, (1_u32 << 31).to_le_bytes()),
-            "OVER_LIMIT",
-            "A.2",
-            12,
-        ),
-        case(
-            GOP,
-            |b| put(b, 12, (1_u32 << 30).to_le_bytes()),
-            "TRUNCATED",
-            "B.1",
-            20,
-        ),
+        case(GOP, |b| put(b, 12, (1_u32 << 31).to_le_bytes()), "OVER_LIMIT", "A.2", 12),
+        case(GOP, |b| put(b, 12, (1_u32 << 30).to_le_bytes()), "TRUNCATED", "B.1", 20),
     ]);
 }
 

@@ -1,10 +1,6 @@
 //! Every broken rule of clauses 6.4 to 6.11 that one unit shows is refused with its class, its code, the clause
 //! and the offset.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "a panic is a failed test"
-)]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is a failed test")]
 
 mod sample;
 
@@ -51,44 +47,14 @@ fn broken_sequence_parameters_are_refused() {
         case(SEQUENCE, |p| put(p, 24, [0; 4]), "OUT_OF_RANGE", "6.4", 24),
         case(SEQUENCE, |p| put(p, 32, NAN), "CONSTRAINT", "6.4", 32),
         case(SEQUENCE, |p| put(p, 36, INFINITE), "CONSTRAINT", "6.4", 36),
-        case(
-            SEQUENCE,
-            |p| put(p, 40, (-1.1e12_f32).to_le_bytes()),
-            "CONSTRAINT",
-            "6.4",
-            40,
-        ),
+        case(SEQUENCE, |p| put(p, 40, (-1.1e12_f32).to_le_bytes()), "CONSTRAINT", "6.4", 40),
         case(SEQUENCE, |p| put(p, 44, [0; 4]), "CONSTRAINT", "6.4", 44),
         case(SEQUENCE, |p| put(p, 48, NAN), "CONSTRAINT", "6.4", 48),
-        case(
-            SEQUENCE,
-            |p| put(p, 52, (-0.5_f32).to_le_bytes()),
-            "CONSTRAINT",
-            "6.4",
-            52,
-        ),
-        case(
-            SEQUENCE,
-            |p| put(p, 56, 1.01_f32.to_le_bytes()),
-            "CONSTRAINT",
-            "6.4",
-            56,
-        ),
+        case(SEQUENCE, |p| put(p, 52, (-0.5_f32).to_le_bytes()), "CONSTRAINT", "6.4", 52),
+        case(SEQUENCE, |p| put(p, 56, 1.01_f32.to_le_bytes()), "CONSTRAINT", "6.4", 56),
         case(SEQUENCE, |p| put(p, 60, INFINITE), "CONSTRAINT", "6.4", 60),
-        case(
-            SEQUENCE,
-            |p| put(p, 64, 1.1e6_f32.to_le_bytes()),
-            "CONSTRAINT",
-            "6.4",
-            64,
-        ),
-        case(
-            SEQUENCE,
-            |p| put(p, 68, 9e-13_f32.to_le_bytes()),
-            "CONSTRAINT",
-            "6.4",
-            68,
-        ),
+        case(SEQUENCE, |p| put(p, 64, 1.1e6_f32.to_le_bytes()), "CONSTRAINT", "6.4", 64),
+        case(SEQUENCE, |p| put(p, 68, 9e-13_f32.to_le_bytes()), "CONSTRAINT", "6.4", 68),
         case(SEQUENCE, |p| put(p, 72, NAN), "CONSTRAINT", "6.4", 72),
         // The first broken element in the order of the table counts.
         case(SEQUENCE, |p| put(p, 14, [0, 0]), "OUT_OF_RANGE", "6.4", 14),
@@ -124,13 +90,7 @@ fn broken_gop_and_frame_headers_are_refused() {
         case(FRAME, |p| p[1] = 255, "OUT_OF_RANGE", "6.6", 1),
         case(FRAME, |p| p[2] = 16, "OUT_OF_RANGE", "6.6", 2),
         case(FRAME, |p| p[3] = 1, "RESERVED_BITS", "6.6", 3),
-        case(
-            FRAME,
-            |p| put(p, 4, u32::MAX.to_le_bytes()),
-            "OVER_LIMIT",
-            "A.2",
-            4,
-        ),
+        case(FRAME, |p| put(p, 4, u32::MAX.to_le_bytes()), "OVER_LIMIT", "A.2", 4),
     ]);
     let mut units = sample::units();
     units[GOP].0.frame = u32::MAX;
@@ -138,12 +98,7 @@ fn broken_gop_and_frame_headers_are_refused() {
     put(&mut units[GOP].1, 4, 2_u32.to_le_bytes());
     let expected = case(GOP, |_| (), "OUT_OF_RANGE", "6.5", 4);
     let at = sample::unit_at(&units, GOP) + 24;
-    assert_refused(
-        "last display index",
-        sample::verdict(&sample::stream(&units)),
-        &expected,
-        at,
-    );
+    assert_refused("last display index", sample::verdict(&sample::stream(&units)), &expected, at);
 }
 
 // covers: SS-TF-001, SS-TF-002, SS-TF-004
@@ -158,34 +113,10 @@ fn broken_transforms_are_refused() {
         case(DC, |p| p[3] = 0, "OUT_OF_RANGE", "6.7", 3),
         case(DC, |p| p[3] = 4, "OUT_OF_RANGE", "6.7", 3),
         case(SH, |p| p[3] = 10, "OUT_OF_RANGE", "6.7", 3),
-        case(
-            DC,
-            |p| put(p, 8, (1_i32 << 30).wrapping_add(1).to_le_bytes()),
-            "OUT_OF_RANGE",
-            "6.7",
-            8,
-        ),
-        case(
-            DC,
-            |p| put(p, 12, i32::MIN.to_le_bytes()),
-            "OUT_OF_RANGE",
-            "6.7",
-            12,
-        ),
-        case(
-            DC,
-            |p| put(p, 16, 4097_i16.to_le_bytes()),
-            "OUT_OF_RANGE",
-            "6.7",
-            16,
-        ),
-        case(
-            DC,
-            |p| put(p, 32, (-4097_i16).to_le_bytes()),
-            "OUT_OF_RANGE",
-            "6.7",
-            32,
-        ),
+        case(DC, |p| put(p, 8, (1_i32 << 30).wrapping_add(1).to_le_bytes()), "OUT_OF_RANGE", "6.7", 8),
+        case(DC, |p| put(p, 12, i32::MIN.to_le_bytes()), "OUT_OF_RANGE", "6.7", 12),
+        case(DC, |p| put(p, 16, 4097_i16.to_le_bytes()), "OUT_OF_RANGE", "6.7", 16),
+        case(DC, |p| put(p, 32, (-4097_i16).to_le_bytes()), "OUT_OF_RANGE", "6.7", 32),
         // Bytes left over come before values.
         case(
             DC,
@@ -219,42 +150,12 @@ fn broken_codebooks_and_refinements_are_refused() {
         case(REFINEMENT, |p| p[17] = 0, "OUT_OF_RANGE", "6.9", 17),
         case(REFINEMENT, |p| p[19] = 7, "OUT_OF_RANGE", "6.9", 19),
         case(REFINEMENT, |p| put(p, 8, [0; 4]), "MISMATCH", "6.9", 20),
-        case(
-            REFINEMENT,
-            |p| drop(p.splice(20..21, [0x83, 0])),
-            "NUMBER",
-            "5.9",
-            20,
-        ),
-        case(
-            REFINEMENT,
-            |p| drop(p.splice(20..21, [0x80, 0x80, 0x80, 0x80, 16])),
-            "NUMBER",
-            "5.9",
-            20,
-        ),
-        case(
-            REFINEMENT,
-            |p| drop(p.splice(25..26, [0x85, 0])),
-            "NUMBER",
-            "5.9",
-            25,
-        ),
+        case(REFINEMENT, |p| drop(p.splice(20..21, [0x83, 0])), "NUMBER", "5.9", 20),
+        case(REFINEMENT, |p| drop(p.splice(20..21, [0x80, 0x80, 0x80, 0x80, 16])), "NUMBER", "5.9", 20),
+        case(REFINEMENT, |p| drop(p.splice(25..26, [0x85, 0])), "NUMBER", "5.9", 25),
         // More blocks than bytes: refused before room is made for them.
-        case(
-            REFINEMENT,
-            |p| put(p, 8, (1_u32 << 22).to_le_bytes()),
-            "SHORT_SECTION",
-            "5.9",
-            24,
-        ),
-        case(
-            REFINEMENT,
-            |p| put(p, 8, u32::MAX.to_le_bytes()),
-            "OVER_LIMIT",
-            "A.2",
-            8,
-        ),
+        case(REFINEMENT, |p| put(p, 8, (1_u32 << 22).to_le_bytes()), "SHORT_SECTION", "5.9", 24),
+        case(REFINEMENT, |p| put(p, 8, u32::MAX.to_le_bytes()), "OVER_LIMIT", "A.2", 8),
         case(INDEX, |p| p[8] = 1, "RESERVED_BITS", "6.10", 8),
         case(
             INDEX,
@@ -267,13 +168,7 @@ fn broken_codebooks_and_refinements_are_refused() {
             "6.10",
             24,
         ),
-        case(
-            INDEX,
-            |p| put(p, 0, u32::MAX.to_le_bytes()),
-            "SHORT_SECTION",
-            "5.10",
-            4,
-        ),
+        case(INDEX, |p| put(p, 0, u32::MAX.to_le_bytes()), "SHORT_SECTION", "5.10", 4),
     ]);
 }
 
@@ -313,25 +208,7 @@ fn limits_of_the_caller_are_kept() {
     let (all, units) = (Limits::default(), sample::units());
     let place = |unit, offset| ("over-limit", sample::unit_at(&units, unit) + offset);
     assert_eq!(refused(Limits { max_units: 3, ..all }), place(3, 0));
-    assert_eq!(
-        refused(Limits {
-            max_payload: 75,
-            ..all
-        }),
-        place(SEQUENCE, 12)
-    );
-    assert_eq!(
-        refused(Limits {
-            max_codebook_values: 3,
-            ..all
-        }),
-        place(CODEBOOK, 22)
-    );
-    assert_eq!(
-        refused(Limits {
-            max_gaussians: 499,
-            ..all
-        }),
-        place(FRAME, 24)
-    );
+    assert_eq!(refused(Limits { max_payload: 75, ..all }), place(SEQUENCE, 12));
+    assert_eq!(refused(Limits { max_codebook_values: 3, ..all }), place(CODEBOOK, 22));
+    assert_eq!(refused(Limits { max_gaussians: 499, ..all }), place(FRAME, 24));
 }

@@ -1,9 +1,5 @@
 //! What damage to a stream does: it is found, and what can be delimited is still given out.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "a panic is a failed test"
-)]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is a failed test")]
 
 mod sample;
 
@@ -21,10 +17,7 @@ fn one_changed_byte_is_always_found() {
             let mut changed = bytes.clone();
             changed[place] ^= change;
             let error = sample::verdict(&changed);
-            assert!(
-                error.is_some(),
-                "byte {place} changed by {change:#04x} is not found"
-            );
+            assert!(error.is_some(), "byte {place} changed by {change:#04x} is not found");
         }
     }
 }
@@ -37,10 +30,7 @@ fn every_truncation_is_of_class_truncated() {
         let error = sample::verdict(&bytes[..length]).unwrap();
         assert_eq!(error.class(), Class::Truncated, "{length} bytes: {error}");
         assert_eq!(error.class().exit_code(), 14);
-        assert!(
-            error.at <= u64::try_from(length).unwrap(),
-            "{length} bytes: {error}"
-        );
+        assert!(error.at <= u64::try_from(length).unwrap(), "{length} bytes: {error}");
     }
 }
 
@@ -63,12 +53,7 @@ fn a_stream_without_end_unit_is_truncated_where_the_next_unit_should_start() {
     units.pop();
     let bytes = sample::stream(&units);
     let error = sample::verdict(&bytes).unwrap();
-    assert_eq!(
-        error.kind,
-        ErrorKind::Truncated {
-            element: "unit_header"
-        }
-    );
+    assert_eq!(error.kind, ErrorKind::Truncated { element: "unit_header" });
     assert_eq!(error.at, u64::try_from(bytes.len()).unwrap());
 }
 
@@ -103,10 +88,7 @@ fn nothing_is_given_out_behind_a_damaged_header() {
     let units = sample::units();
     let mut bytes = sample::stream(&units);
     bytes[usize::try_from(sample::unit_at(&units, FRAME)).unwrap() + 13] ^= 1;
-    let given: Vec<_> = Stream::open(&bytes, &Limits::default())
-        .unwrap()
-        .units()
-        .collect();
+    let given: Vec<_> = Stream::open(&bytes, &Limits::default()).unwrap().units().collect();
     assert_eq!(given.len(), FRAME + 1);
     assert_eq!(given.iter().filter(|unit| unit.is_err()).count(), 1);
     assert!(given.last().unwrap().is_err());
@@ -132,11 +114,7 @@ fn an_unknown_unit_that_is_not_critical_is_passed_over_unread() {
             let mut bytes = sample::stream(&units);
             let at = usize::try_from(sample::unit_at(&units, place)).unwrap();
             bytes.splice(at..at, private.iter().copied());
-            assert_eq!(
-                sample::verdict(&bytes),
-                None,
-                "type {unit_type} before unit {place}"
-            );
+            assert_eq!(sample::verdict(&bytes), None, "type {unit_type} before unit {place}");
         }
     }
 }
@@ -162,14 +140,8 @@ fn a_unit_that_a_reader_refuses_is_not_written() {
         UnitId::stream(UnitType::User(1)),
         UnitId::of_frame(UnitType::End, 1),
         UnitId::of_refinement(0, 10),
-        UnitId {
-            spatial_layer: 1,
-            ..UnitId::of_frame(UnitType::FrameHeader, 0)
-        },
-        UnitId {
-            refinement: 1,
-            ..UnitId::of_frame(UnitType::FrameHeader, 0)
-        },
+        UnitId { spatial_layer: 1, ..UnitId::of_frame(UnitType::FrameHeader, 0) },
+        UnitId { refinement: 1, ..UnitId::of_frame(UnitType::FrameHeader, 0) },
     ] {
         assert!(write_unit(&mut out, id, &[]).is_err(), "{id:?}");
         assert_eq!(out, kept);

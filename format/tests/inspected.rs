@@ -1,9 +1,5 @@
 //! What the inspector says of a stream.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "a panic is a failed test"
-)]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is a failed test")]
 
 mod sample;
 
@@ -18,9 +14,7 @@ fn elements(bytes: &[u8]) -> (Vec<Element>, Option<Error>) {
 
 /// The values of an element wherever it occurs.
 fn values(elements: &[Element], record: &str, name: &str) -> Vec<String> {
-    let found = elements
-        .iter()
-        .filter(|element| element.record == record && element.name == name);
+    let found = elements.iter().filter(|element| element.record == record && element.name == name);
     found.map(|element| element.value.clone()).collect()
 }
 
@@ -29,27 +23,15 @@ fn codes_are_shown_with_what_they_stand_for() {
     let (elements, error) = elements(&sample::stream(&sample::units()));
     assert_eq!(error, None);
     let one = |record, name| values(&elements, record, name).join("; ");
-    assert_eq!(
-        one("file_header", "signature"),
-        "[89, 47, 53, 53, 0D, 0A, 1A, 0A]"
-    );
+    assert_eq!(one("file_header", "signature"), "[89, 47, 53, 53, 0D, 0A, 1A, 0A]");
     assert_eq!(one("file_header", "profile"), "0 (Intra)");
-    assert_eq!(
-        values(&elements, "unit_header", "unit_type")[sample::REFINEMENT],
-        "6 (refinement)"
-    );
-    assert_eq!(
-        values(&elements, "unit_header", "unit_flags")[sample::END],
-        "1 (critical)"
-    );
+    assert_eq!(values(&elements, "unit_header", "unit_type")[sample::REFINEMENT], "6 (refinement)");
+    assert_eq!(values(&elements, "unit_header", "unit_flags")[sample::END], "1 (critical)");
     assert_eq!(one("sequence_parameters", "sequence_flags"), "1 (canonical_axes)");
     assert_eq!(one("sequence_parameters", "position_offset"), "[-1, 0, 1]");
     assert_eq!(one("sequence_parameters", "log_scale_step"), "0.0625");
     assert_eq!(one("transform", "transform_kind"), "0 (dc); 1 (sh)");
-    assert_eq!(
-        one("transform", "mean"),
-        "3 values, -1 to 1999; 9 values, -1 to 7999"
-    );
+    assert_eq!(one("transform", "mean"), "3 values, -1 to 1999; 9 values, -1 to 7999");
     assert_eq!(one("codebook", "entries"), "4 values, -128 to 127");
     assert_eq!(one("frame_header", "frame_type"), "0 (I)");
     assert_eq!(one("refinement", "refinement_digest"), "0x0123456789abcdef");
@@ -78,9 +60,7 @@ fn a_cut_stream_shows_what_is_there() {
         let (part, error) = elements(&bytes[..length]);
         assert!(error.is_some());
         assert_eq!(part, whole[..part.len()], "{length} bytes");
-        let end = part
-            .last()
-            .map_or(0, |element| (element.at_bit + element.bits) / 8);
+        let end = part.last().map_or(0, |element| (element.at_bit + element.bits) / 8);
         assert!(end <= u64::try_from(length).unwrap());
     }
 }

@@ -1,10 +1,6 @@
 //! Laws of the syntax: what is written is read back, what is read is written back, and nothing panics.
 #![cfg(feature = "arbitrary")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "a panic is a failed test"
-)]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is a failed test")]
 
 mod sample;
 
@@ -183,10 +179,7 @@ fn every_code_of_a_unit_is_one_type() {
             9..=127 => "reserved",
             128.. => "user",
         };
-        assert_eq!(
-            (unit_type.name(), unit_type.is_known()),
-            (name, (1..=8).contains(&code))
-        );
+        assert_eq!((unit_type.name(), unit_type.is_known()), (name, (1..=8).contains(&code)));
     }
 }
 

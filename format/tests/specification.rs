@@ -17,18 +17,10 @@ fn clause_5() -> String {
 fn specified(text: &str, table: &Table) -> Vec<Row> {
     let heading = format!("{} {}", table.syntax, table.name);
     let is_heading = |line: &str| line.starts_with('#');
-    let under_heading = text
-        .lines()
-        .skip_while(|line| !is_heading(line) || line.trim_start_matches('#').trim() != heading);
-    let rows: Vec<Row> = under_heading
-        .skip(1)
-        .take_while(|line| !is_heading(line))
-        .filter_map(row)
-        .collect();
-    assert!(
-        !rows.is_empty(),
-        "spec/05-syntax.md has no table under the heading `{heading}`"
-    );
+    let under_heading =
+        text.lines().skip_while(|line| !is_heading(line) || line.trim_start_matches('#').trim() != heading);
+    let rows: Vec<Row> = under_heading.skip(1).take_while(|line| !is_heading(line)).filter_map(row).collect();
+    assert!(!rows.is_empty(), "spec/05-syntax.md has no table under the heading `{heading}`");
     rows
 }
 
@@ -36,11 +28,7 @@ fn specified(text: &str, table: &Table) -> Vec<Row> {
 fn row(line: &str) -> Option<Row> {
     let mut cells = line.strip_prefix('|')?.split('|').map(str::trim);
     let name = cells.next()?.strip_prefix('`')?.strip_suffix('`')?;
-    Some((
-        name.to_owned(),
-        cells.next()?.to_owned(),
-        cells.next()?.to_owned(),
-    ))
+    Some((name.to_owned(), cells.next()?.to_owned(), cells.next()?.to_owned()))
 }
 
 /// The fixed rows of the code, and the variable ones behind them.
@@ -59,24 +47,11 @@ fn every_syntax_table_is_that_of_the_specification() {
     for table in TABLES {
         let (specified, coded) = (specified(&text, &table), coded(&table));
         for (place, (specified, coded)) in specified.iter().zip(&coded).enumerate() {
-            assert_eq!(
-                specified,
-                coded,
-                "{}, row {}: specification, code",
-                table.name,
-                place + 1
-            );
+            assert_eq!(specified, coded, "{}, row {}: specification, code", table.name, place + 1);
         }
-        let extra = specified
-            .iter()
-            .skip(coded.len())
-            .chain(coded.iter().skip(specified.len()));
+        let extra = specified.iter().skip(coded.len()).chain(coded.iter().skip(specified.len()));
         let extra: Vec<_> = extra.collect();
-        assert!(
-            extra.is_empty(),
-            "{}: rows on one side only: {extra:?}",
-            table.name
-        );
+        assert!(extra.is_empty(), "{}: rows on one side only: {extra:?}", table.name);
     }
 }
 
@@ -84,15 +59,11 @@ fn every_syntax_table_is_that_of_the_specification() {
 fn every_table_of_the_specification_is_in_the_code() {
     // 5.1 has no table; 5.12 and 5.13 are bit sections, which clause 8 reads.
     let text = clause_5();
-    let headings = text
-        .lines()
-        .filter_map(|line| line.trim_start_matches('#').trim().split_once(' '));
+    let headings = text.lines().filter_map(|line| line.trim_start_matches('#').trim().split_once(' '));
     let headings = headings.filter(|(clause, _)| clause.starts_with("5."));
     let fixed = headings.filter(|(clause, _)| !["5.1", "5.12", "5.13"].contains(clause));
     for (clause, record) in fixed {
-        let known = TABLES
-            .iter()
-            .any(|table| (table.syntax, table.name) == (clause, record));
+        let known = TABLES.iter().any(|table| (table.syntax, table.name) == (clause, record));
         assert!(known, "{clause} {record} has no record in the code");
     }
 }

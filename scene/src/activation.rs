@@ -53,10 +53,7 @@ mod tests {
             assert!(logit.is_finite());
             let back = byte_of_logit(logit);
             // The two ends sit on the boundary between two codes and may go to either.
-            assert!(
-                back.abs_diff(byte) <= u8::from(byte == 0 || byte == 255),
-                "{byte} {back}"
-            );
+            assert!(back.abs_diff(byte) <= u8::from(byte == 0 || byte == 255), "{byte} {back}");
         }
     }
 }

@@ -55,13 +55,7 @@ pub struct BuiltinScene {
 
 impl Default for BuiltinScene {
     fn default() -> Self {
-        Self {
-            gaussians: 20_000,
-            frames: 8,
-            seed: 1,
-            tracking: Tracking::Tracked,
-            sh_degree: MAX_SH_DEGREE,
-        }
+        Self { gaussians: 20_000, frames: 8, seed: 1, tracking: Tracking::Tracked, sh_degree: MAX_SH_DEGREE }
     }
 }
 
@@ -77,9 +71,7 @@ impl BuiltinScene {
                 Tracking::Tracked => gaussian.push(&mut planes),
                 Tracking::Untracked => {
                     let mut random = Random::new([self.seed, 2, u64::from(t), u64::from(index)]);
-                    recapture::again(gaussian, &mut random)
-                        .iter()
-                        .for_each(|again| again.push(&mut planes));
+                    recapture::again(gaussian, &mut random).iter().for_each(|again| again.push(&mut planes));
                 }
             }
         }
@@ -102,11 +94,7 @@ impl Stage {
         let moving = gaussians / 3;
         let ring = gaussians - moving;
         let starts = [ring, ring + moving / 3, ring + moving / 3 * 2];
-        Self {
-            seed: scene.seed,
-            gaussians,
-            starts,
-        }
+        Self { seed: scene.seed, gaussians, starts }
     }
 
     /// The order of the Gaussians: shuffled, as that of a trained scene says nothing about its parts.

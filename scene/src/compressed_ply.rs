@@ -42,12 +42,7 @@ const RANGES: [&str; 18] = [
     "max_b",
 ];
 
-const WORDS: [&str; 4] = [
-    "packed_position",
-    "packed_rotation",
-    "packed_scale",
-    "packed_color",
-];
+const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
 /// Reads a compressed PLY file. Opacity 0 and 255 become finite logits, half a step inside.
 ///
@@ -64,21 +59,16 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
     for element in &header.elements {
         match element.name.as_str() {
             "chunk" => ranges = body.columns(element, &layout.ranges)?,
-            "vertex" => words
-                .iter_mut()
-                .zip(body.columns(element, &owned(&WORDS))?)
-                .for_each(|(to, from)| *to = from),
+            "vertex" => {
+                words.iter_mut().zip(body.columns(element, &owned(&WORDS))?).for_each(|(to, from)| *to = from)
+            }
             "sh" => rest = body.columns(element, &layout.rest)?,
             _ => body.skip(element)?,
         }
     }
     let mut planes = unpack(&ranges, &words);
     planes.sh = planes_of_rest(layout.sh_degree, rest);
-    planes
-        .sh
-        .iter_mut()
-        .flatten()
-        .for_each(|value| *value = sh_of_byte(*value));
+    planes.sh.iter_mut().flatten().for_each(|value| *value = sh_of_byte(*value));
     GaussianFrame::from_read(layout.sh_degree, planes)
 }
 
@@ -99,36 +89,22 @@ impl Layout {
         let ranges = owned(if coloured { &RANGES } else { &RANGES[..12] });
         require(chunk, &ranges)?;
         if chunk.count < vertex.count.div_ceil(CHUNK as u64) {
-            let what = format!(
-                "{} chunks of 256 cannot hold {} vertices",
-                chunk.count, vertex.count
-            );
+            let what = format!("{} chunks of 256 cannot hold {} vertices", chunk.count, vertex.count);
             return Err(SceneError::inconsistent(what, "export the file again"));
         }
         let Some(sh) = header.element("sh") else {
-            return Ok(Self {
-                ranges,
-                rest: Vec::new(),
-                sh_degree: 0,
-            });
+            return Ok(Self { ranges, rest: Vec::new(), sh_degree: 0 });
         };
         let sh_degree = degree_of_rest(sh)?;
         let rest: Vec<_> = rest_names(sh_degree).collect();
         require(sh, &rest)?;
-        Ok(Self {
-            ranges,
-            rest,
-            sh_degree,
-        })
+        Ok(Self { ranges, rest, sh_degree })
     }
 }
 
 fn wanted<'a>(header: &'a Header, name: &str) -> Result<&'a Element, SceneError> {
     header.element(name).ok_or_else(|| {
-        SceneError::inconsistent(
-            format!("no element is called {name}"),
-            "this is no compressed PLY",
-        )
+        SceneError::inconsistent(format!("no element is called {name}"), "this is no compressed PLY")
     })
 }
 
@@ -165,10 +141,7 @@ fn within(range: Option<&[Vec<f32>]>, axis: usize, chunk: usize, fraction: f64) 
     let Some([min_x, min_y, min_z, max_x, max_y, max_z]) = range else {
         return fraction;
     };
-    let (low, high) = (
-        [min_x, min_y, min_z][axis][chunk],
-        [max_x, max_y, max_z][axis][chunk],
-    );
+    let (low, high) = ([min_x, min_y, min_z][axis][chunk], [max_x, max_y, max_z][axis][chunk]);
     f64::from(low) + (f64::from(high) - f64::from(low)) * fraction
 }
 

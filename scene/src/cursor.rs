@@ -25,9 +25,7 @@ impl<'a> Cursor<'a> {
 
     /// The next `count` bytes. `what` names them in the error when they are not there.
     pub(crate) fn take(&mut self, count: u64, what: &'static str) -> Result<&'a [u8], SceneError> {
-        let split = usize::try_from(count)
-            .ok()
-            .and_then(|count| self.rest.split_at_checked(count));
+        let split = usize::try_from(count).ok().and_then(|count| self.rest.split_at_checked(count));
         let (taken, rest) =
             split.ok_or_else(|| SceneError::truncated(self.at, what, count, self.rest.len()))?;
         self.at += taken.len();

@@ -49,9 +49,5 @@ pub(crate) fn zstd(frame: &[u8], size: u64, at: usize, what: &'static str) -> Re
     if read_up_to(&mut decoder, 1, at, what)?.is_empty() {
         return Ok(out);
     }
-    Err(SceneError::malformed(
-        at,
-        format!("{what} holds more than the {size} bytes it should"),
-        DAMAGED,
-    ))
+    Err(SceneError::malformed(at, format!("{what} holds more than the {size} bytes it should"), DAMAGED))
 }

@@ -95,10 +95,7 @@ impl fmt::Display for SceneError {
 
 impl<K: Into<SceneErrorKind>> From<K> for SceneError {
     fn from(kind: K) -> Self {
-        Self {
-            path: None,
-            kind: kind.into(),
-        }
+        Self { path: None, kind: kind.into() }
     }
 }
 
@@ -110,37 +107,18 @@ impl SceneError {
     }
 
     pub(crate) fn malformed(at: usize, what: impl Into<String>, advice: &'static str) -> Self {
-        SceneErrorKind::Malformed {
-            at: at as u64,
-            what: what.into(),
-            advice,
-        }
-        .into()
+        SceneErrorKind::Malformed { at: at as u64, what: what.into(), advice }.into()
     }
 
     pub(crate) fn inconsistent(what: impl Into<String>, advice: &'static str) -> Self {
-        SceneErrorKind::Inconsistent {
-            what: what.into(),
-            advice,
-        }
-        .into()
+        SceneErrorKind::Inconsistent { what: what.into(), advice }.into()
     }
 
     pub(crate) fn unsupported(what: impl Into<String>, advice: &'static str) -> Self {
-        SceneErrorKind::Unsupported {
-            what: what.into(),
-            advice,
-        }
-        .into()
+        SceneErrorKind::Unsupported { what: what.into(), advice }.into()
     }
 
     pub(crate) fn truncated(at: usize, what: &'static str, needed: u64, available: usize) -> Self {
-        SceneErrorKind::Truncated {
-            at: at as u64,
-            what,
-            needed,
-            available: available as u64,
-        }
-        .into()
+        SceneErrorKind::Truncated { at: at as u64, what, needed, available: available as u64 }.into()
     }
 }

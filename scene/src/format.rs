@@ -71,8 +71,7 @@ pub(crate) fn read_file(path: &Path, limits: &ReadLimits) -> Result<Vec<u8>, Sce
         let size = limits.bytes(file.metadata()?.len())?;
         let mut bytes = Vec::with_capacity(size);
         // The file may grow while it is read.
-        file.take(limits.max_bytes.saturating_add(1))
-            .read_to_end(&mut bytes)?;
+        file.take(limits.max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
         limits.bytes(bytes.len() as u64)?;
         Ok(bytes)
     };
@@ -84,20 +83,14 @@ fn sog_directory(path: &Path) -> Option<PathBuf> {
     if path.file_name().is_some_and(|name| name == sog::META) {
         return Some(path.parent()?.to_path_buf());
     }
-    fs::metadata(path)
-        .is_ok_and(|found| found.is_dir())
-        .then(|| path.to_path_buf())
+    fs::metadata(path).is_ok_and(|found| found.is_dir()).then(|| path.to_path_buf())
 }
 
 fn format_of(bytes: &[u8], path: &Path) -> Result<SceneFormat, SceneError> {
     if ply::is_ply(bytes) {
         let header = ply::parse_header(bytes)?;
         let packed = header.element("vertex").is_some_and(ply::is_packed);
-        return Ok(if packed {
-            SceneFormat::CompressedPly
-        } else {
-            SceneFormat::Ply
-        });
+        return Ok(if packed { SceneFormat::CompressedPly } else { SceneFormat::Ply });
     }
     if spz::is_spz(bytes) {
         return Ok(SceneFormat::Spz);
@@ -105,10 +98,7 @@ fn format_of(bytes: &[u8], path: &Path) -> Result<SceneFormat, SceneError> {
     if sog::is_zip(bytes) {
         return Ok(SceneFormat::Sog);
     }
-    if path
-        .extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("splat"))
-    {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splat")) {
         return Ok(SceneFormat::Splat);
     }
     Err(SceneErrorKind::Unsupported {

@@ -139,19 +139,11 @@ impl GaussianFrame {
         }
         let (expected, found) = (sh_coefficients(sh_degree) * 3, planes.sh.len());
         if found != expected {
-            return Err(FrameError::ShPlanes {
-                degree: sh_degree,
-                expected,
-                found,
-            });
+            return Err(FrameError::ShPlanes { degree: sh_degree, expected, found });
         }
         let rows = planes.position[0].len();
         if let Some((property, plane)) = planes.named(sh_degree).find(|(_, plane)| plane.len() != rows) {
-            return Err(FrameError::Length {
-                property,
-                expected: rows,
-                found: plane.len(),
-            });
+            return Err(FrameError::Length { property, expected: rows, found: plane.len() });
         }
         Ok(Self { sh_degree, planes })
     }
@@ -225,10 +217,7 @@ impl GaussianFrame {
     /// If an index is not below [`GaussianFrame::len`].
     #[must_use]
     pub fn select(&self, indices: &[u32]) -> Self {
-        Self {
-            sh_degree: self.sh_degree,
-            planes: self.planes.gather(indices),
-        }
+        Self { sh_degree: self.sh_degree, planes: self.planes.gather(indices) }
     }
 
     /// Checks that every value is finite and every rotation has a direction.
@@ -238,12 +227,7 @@ impl GaussianFrame {
     pub fn validate(&self) -> Result<(), Defect> {
         for (property, plane) in self.planes.named(self.sh_degree) {
             if let Some(row) = plane.iter().position(|value| !value.is_finite()) {
-                return Err(Defect {
-                    row,
-                    property,
-                    kind: DefectKind::NotFinite,
-                    value: plane[row],
-                });
+                return Err(Defect { row, property, kind: DefectKind::NotFinite, value: plane[row] });
             }
         }
         let [w, x, y, z] = self.rotation();
@@ -251,12 +235,7 @@ impl GaussianFrame {
         match (0..self.len()).find(zero) {
             Some(row) => {
                 let property = "rot_0..rot_3".to_owned();
-                Err(Defect {
-                    row,
-                    property,
-                    kind: DefectKind::ZeroRotation,
-                    value: 0.0,
-                })
+                Err(Defect { row, property, kind: DefectKind::ZeroRotation, value: 0.0 })
             }
             None => Ok(()),
         }
@@ -269,11 +248,7 @@ mod tests {
 
     fn one(sh_degree: u8) -> Planes {
         let mut planes = Planes::with_room(sh_degree, 1);
-        let plain = planes
-            .position
-            .iter_mut()
-            .chain(&mut planes.log_scale)
-            .chain(&mut planes.rotation);
+        let plain = planes.position.iter_mut().chain(&mut planes.log_scale).chain(&mut planes.rotation);
         for plane in plain.chain(&mut planes.dc).chain(&mut planes.sh) {
             plane.push(0.5);
         }
@@ -285,10 +260,7 @@ mod tests {
     fn the_defect_names_the_row_and_the_property() {
         let mut planes = one(1);
         planes.sh[4][0] = f32::NAN;
-        let defect = GaussianFrame::from_planes(1, planes)
-            .unwrap()
-            .validate()
-            .unwrap_err();
+        let defect = GaussianFrame::from_planes(1, planes).unwrap().validate().unwrap_err();
         // Plane 4 is the second coefficient of green; green starts at f_rest_3.
         assert_eq!((defect.row, defect.property.as_str()), (0, "f_rest_4"));
         assert!(defect.to_string().starts_with("Gaussian 0: f_rest_4 is NaN"));

@@ -24,11 +24,7 @@ pub fn order(scores: &[f64]) -> Vec<u32> {
     let key = |index: u32| {
         let score = scores[index as usize];
         // Adding zero makes one zero of the two.
-        if score.is_nan() {
-            f64::NEG_INFINITY
-        } else {
-            score + 0.0
-        }
+        if score.is_nan() { f64::NEG_INFINITY } else { score + 0.0 }
     };
     let mut indices: Vec<u32> = (0..scores.len() as u32).collect();
     indices.sort_unstable_by(|&a, &b| key(b).total_cmp(&key(a)).then(a.cmp(&b)));

@@ -13,10 +13,7 @@ pub struct ReadLimits {
 
 impl Default for ReadLimits {
     fn default() -> Self {
-        Self {
-            max_gaussians: 32 << 20,
-            max_bytes: 4 << 30,
-        }
+        Self { max_gaussians: 32 << 20, max_bytes: 4 << 30 }
     }
 }
 
@@ -33,12 +30,7 @@ impl ReadLimits {
 }
 
 fn within(limit: &'static str, unit: &'static str, asked: u64, allowed: u64) -> Result<usize, SceneError> {
-    let over = || SceneErrorKind::OverLimit {
-        limit,
-        unit,
-        asked,
-        allowed,
-    };
+    let over = || SceneErrorKind::OverLimit { limit, unit, asked, allowed };
     if asked > allowed {
         return Err(over().into());
     }

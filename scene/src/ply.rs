@@ -35,11 +35,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
     require(vertex, &names)?;
     limits.gaussians(vertex.count)?;
     let mut body = Body::new(bytes, &header);
-    for element in header
-        .elements
-        .iter()
-        .take_while(|element| element.name != "vertex")
-    {
+    for element in header.elements.iter().take_while(|element| element.name != "vertex") {
         body.skip(element)?;
     }
     let columns = body.columns(vertex, &names)?;
@@ -50,10 +46,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
 pub fn write(frame: &GaussianFrame) -> Vec<u8> {
     let mut names = names(frame.sh_degree());
     names.splice(3..3, ["nx", "ny", "nz"].map(str::to_owned));
-    let mut text = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
-        frame.len()
-    );
+    let mut text = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", frame.len());
     for name in &names {
         text.push_str(&format!("property float {name}\n"));
     }
@@ -77,38 +70,22 @@ pub(crate) fn is_packed(vertex: &Element) -> bool {
 
 /// Refuses an element that lacks any of `names`; the error lists all that are missing.
 pub(crate) fn require(element: &Element, names: &[String]) -> Result<(), SceneError> {
-    let missing: Vec<&str> = names
-        .iter()
-        .filter(|name| !element.has(name))
-        .map(String::as_str)
-        .collect();
+    let missing: Vec<&str> = names.iter().filter(|name| !element.has(name)).map(String::as_str).collect();
     if missing.is_empty() {
         return Ok(());
     }
     let what = format!("element {} lacks {}", element.name, missing.join(", "));
-    Err(SceneError::inconsistent(
-        what,
-        "export it as a Gaussian splatting PLY with all its properties",
-    ))
+    Err(SceneError::inconsistent(what, "export it as a Gaussian splatting PLY with all its properties"))
 }
 
 /// The SH degree that an element's number of `f_rest_*` properties stands for.
 pub(crate) fn degree_of_rest(element: &Element) -> Result<u8, SceneError> {
-    let is_rest = |name: &str| {
-        name.strip_prefix("f_rest_")
-            .is_some_and(|digits| digits.parse::<u32>().is_ok())
-    };
-    let found = element
-        .properties
-        .iter()
-        .filter(|property| is_rest(&property.name))
-        .count();
+    let is_rest =
+        |name: &str| name.strip_prefix("f_rest_").is_some_and(|digits| digits.parse::<u32>().is_ok());
+    let found = element.properties.iter().filter(|property| is_rest(&property.name)).count();
     degree_of_values(found).ok_or_else(|| {
         let what = format!("element {} has {found} f_rest properties", element.name);
-        SceneError::inconsistent(
-            what,
-            "SH degrees 0 to 3 have 0, 9, 24 or 45; export it with one of these",
-        )
+        SceneError::inconsistent(what, "SH degrees 0 to 3 have 0, 9, 24 or 45; export it with one of these")
     })
 }
 
@@ -120,9 +97,7 @@ pub(crate) fn rest_names(sh_degree: u8) -> impl Iterator<Item = String> {
 /// SH planes, coefficient by coefficient, of `f_rest_*` columns, channel by channel.
 pub(crate) fn planes_of_rest<T: Default>(sh_degree: u8, mut rest: Vec<T>) -> Vec<T> {
     let planes = 0..rest.len();
-    planes
-        .map(|plane| std::mem::take(&mut rest[rest_index(plane, sh_degree)]))
-        .collect()
+    planes.map(|plane| std::mem::take(&mut rest[rest_index(plane, sh_degree)])).collect()
 }
 
 /// The properties that make a Gaussian, in the order of the original code, without normals.
@@ -149,14 +124,7 @@ fn planes_of_columns(sh_degree: u8, columns: Vec<Vec<f32>>) -> Planes {
     let opacity_logit = next();
     let log_scale = std::array::from_fn(|_| next());
     let rotation = std::array::from_fn(|_| next());
-    Planes {
-        position,
-        log_scale,
-        rotation,
-        opacity_logit,
-        dc,
-        sh: planes_of_rest(sh_degree, rest),
-    }
+    Planes { position, log_scale, rotation, opacity_logit, dc, sh: planes_of_rest(sh_degree, rest) }
 }
 
 /// The columns that [`write`] writes; none where it writes zeros.

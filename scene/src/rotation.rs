@@ -28,10 +28,7 @@ pub(crate) fn normalise_rows(rotation: &mut [Vec<f32>; 4]) -> Result<(), Defect>
 /// `quaternion` at unit length, or nothing where its norm is zero. Infinite or NaN components pass through:
 /// validation names them.
 pub(crate) fn normalised(quaternion: [f32; 4]) -> Option<[f32; 4]> {
-    let norm2: f64 = quaternion
-        .iter()
-        .map(|&part| f64::from(part) * f64::from(part))
-        .sum();
+    let norm2: f64 = quaternion.iter().map(|&part| f64::from(part) * f64::from(part)).sum();
     if norm2 == 0.0 {
         return None;
     }

@@ -52,10 +52,7 @@ mod tests {
     #[test]
     fn the_degrees_have_0_3_8_and_15_coefficients() {
         assert_eq!([0, 1, 2, 3].map(sh_coefficients), [0, 3, 8, 15]);
-        assert_eq!(
-            [0, 9, 24, 45, 12].map(degree_of_values),
-            [Some(0), Some(1), Some(2), Some(3), None]
-        );
+        assert_eq!([0, 9, 24, 45, 12].map(degree_of_values), [Some(0), Some(1), Some(2), Some(3), None]);
     }
 
     #[test]

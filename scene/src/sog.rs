@@ -56,14 +56,10 @@ pub fn read_zip(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, Scen
     let mut archive =
         ZipArchive::new(Cursor::new(bytes)).map_err(|error| refuse(format!("cannot list it: {error}")))?;
     let fetch = |name: &str| {
-        let mut member = archive
-            .by_name(name)
-            .map_err(|error| refuse(format!("{name}: {error}")))?;
+        let mut member = archive.by_name(name).map_err(|error| refuse(format!("{name}: {error}")))?;
         let mut content = Vec::new();
         // One byte more than allowed tells a member that is too large from one that just fits.
-        let read = (&mut member)
-            .take(limits.max_bytes.saturating_add(1))
-            .read_to_end(&mut content);
+        let read = (&mut member).take(limits.max_bytes.saturating_add(1)).read_to_end(&mut content);
         read.map_err(|error| refuse(format!("{name}: {error}")))?;
         limits.bytes(content.len() as u64)?;
         Ok(content)

@@ -49,11 +49,7 @@ fn push(planes: &mut Planes, record: &[u8; RECORD]) {
         planes.position[axis].push(float(axis * 4));
         let scale = float(12 + axis * 4);
         // Not `max`, which would hide a NaN.
-        let scale = if scale < SMALLEST_SCALE {
-            SMALLEST_SCALE
-        } else {
-            scale
-        };
+        let scale = if scale < SMALLEST_SCALE { SMALLEST_SCALE } else { scale };
         planes.log_scale[axis].push(libm::log(f64::from(scale)) as f32);
         planes.dc[axis].push(dc_of_colour(f64::from(record[24 + axis]) / 255.0));
     }
@@ -83,12 +79,7 @@ pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
             let scale = (libm::exp(f64::from(plane[row])) as f32).min(f32::MAX);
             out.extend_from_slice(&scale.to_le_bytes());
         }
-        out.extend(
-            frame
-                .dc()
-                .iter()
-                .map(|plane| to_byte(colour_of_dc(plane[row]) * 255.0)),
-        );
+        out.extend(frame.dc().iter().map(|plane| to_byte(colour_of_dc(plane[row]) * 255.0)));
         out.push(byte_of_logit(frame.opacity_logit()[row]));
         let rotation = frame.rotation().each_ref().map(|plane| plane[row]);
         // Validated: no quaternion is zero.

@@ -39,11 +39,7 @@ pub struct WriteOptions {
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self {
-            fractional_bits: None,
-            sh1_bits: 5,
-            sh_rest_bits: 4,
-        }
+        Self { fractional_bits: None, sh1_bits: 5, sh_rest_bits: 4 }
     }
 }
 

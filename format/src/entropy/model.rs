@@ -50,7 +50,11 @@ impl Source {
 
     /// The code in the stream.
     pub fn code(self) -> u8 {
-        Self::ALL.iter().position(|&source| source == self).and_then(|code| u8::try_from(code).ok()).unwrap_or(0)
+        Self::ALL
+            .iter()
+            .position(|&source| source == self)
+            .and_then(|code| u8::try_from(code).ok())
+            .unwrap_or(0)
     }
 
     /// The source of a code; codes above 10 are reserved.
@@ -152,7 +156,11 @@ impl ModelTrace for () {
 }
 
 /// Writes the models of a unit, clause 5.12. A plane whose model equals the previous unit's is one bit.
-pub fn write_models(models: &[PlaneModel], alphabets: &[Alphabet], previous: Option<&[PlaneModel]>) -> Vec<u8> {
+pub fn write_models(
+    models: &[PlaneModel],
+    alphabets: &[Alphabet],
+    previous: Option<&[PlaneModel]>,
+) -> Vec<u8> {
     let mut bits = BitWriter::new();
     for (plane, (model, &alphabet)) in models.iter().zip(alphabets).enumerate() {
         let reuse = previous.and_then(|models| models.get(plane)) == Some(model);

@@ -180,7 +180,8 @@ impl<'a> BlockReader<'a> {
             let Some(state) = states.get_mut(place & mask) else { continue };
             let (token, next) = Self::token(*state, decoder, slots);
             *state = words.refill(next);
-            let (mut value, raw_bits) = decoder.value_of_token.get(usize::from(token)).copied().unwrap_or((0, 0));
+            let (mut value, raw_bits) =
+                decoder.value_of_token.get(usize::from(token)).copied().unwrap_or((0, 0));
             if raw_bits > 0 {
                 value = value.wrapping_add(self.raw.bits(raw_bits));
             }
@@ -230,12 +231,7 @@ impl<'a> BlockReader<'a> {
     }
 
     /// Reads Morton deltas; the context depends on the deltas just read.
-    pub fn deltas(
-        &mut self,
-        decoder: &PlaneDecoder,
-        context: impl FnMut(usize, u64) -> u8,
-        out: &mut [u64],
-    ) {
+    pub fn deltas(&mut self, decoder: &PlaneDecoder, context: impl FnMut(usize, u64) -> u8, out: &mut [u64]) {
         self.plane(decoder, out, 0, context, |value| value);
     }
 

@@ -78,8 +78,11 @@ impl BlockWriter {
     ) -> Result<()> {
         self.symbols.reserve(values.len());
         let mask = 1_usize.wrapping_shl(u32::from(self.lanes_log2)).wrapping_sub(1);
-        let uncodable =
-            Error::new(0, "8.3", ErrorKind::Constraint { rule: "a coded token has a frequency of at least 1" });
+        let uncodable = Error::new(
+            0,
+            "8.3",
+            ErrorKind::Constraint { rule: "a coded token has a frequency of at least 1" },
+        );
         for (place, value) in values.enumerate() {
             let context = contexts.get(place).copied().unwrap_or(0);
             let token = split(value, encoder.direct_log2);
@@ -120,7 +123,8 @@ impl BlockWriter {
         }
         let lanes = 1_usize.wrapping_shl(u32::from(self.lanes_log2));
         let raw = self.raw.into_bytes();
-        let mut bytes = Vec::with_capacity(words.len().wrapping_mul(2).wrapping_add(raw.len()).wrapping_add(133));
+        let mut bytes =
+            Vec::with_capacity(words.len().wrapping_mul(2).wrapping_add(raw.len()).wrapping_add(133));
         write_leb128(u32::try_from(words.len()).unwrap_or(u32::MAX), &mut bytes);
         for state in states.iter().take(lanes) {
             bytes.extend_from_slice(&state.to_le_bytes());

@@ -25,18 +25,12 @@ pub(super) fn summary<T: Ord + core::fmt::Display>(values: &[T]) -> String {
 }
 
 fn little_endian(bytes: &[u8]) -> u64 {
-    bytes
-        .iter()
-        .rev()
-        .fold(0, |number, byte| number.wrapping_shl(8) | u64::from(*byte))
+    bytes.iter().rev().fold(0, |number, byte| number.wrapping_shl(8) | u64::from(*byte))
 }
 
 fn one(row: &Row, number: u64) -> String {
     if row.type_name.starts_with("f32") {
-        return u32::try_from(number)
-            .map(f32::from_bits)
-            .unwrap_or_default()
-            .to_string();
+        return u32::try_from(number).map(f32::from_bits).unwrap_or_default().to_string();
     }
     match row.name {
         "signature" => format!("{number:02X}"),
@@ -54,10 +48,9 @@ fn named(record: &str, element: &str, number: u64) -> Option<&'static str> {
         ("file_header", "profile") => (code == 0).then_some("Intra"),
         ("unit_header", "unit_type") => Some(UnitType::from_code(code).name()),
         ("unit_header", "unit_flags") => flags(code, &["critical"]),
-        ("sequence_parameters", "sequence_flags") => flags(
-            code,
-            &["canonical_axes", "antialiased", "canonical_axes and antialiased"],
-        ),
+        ("sequence_parameters", "sequence_flags") => {
+            flags(code, &["canonical_axes", "antialiased", "canonical_axes and antialiased"])
+        }
         ("gop_header", "gop_structure") => (code == 0).then_some("all intra"),
         ("frame_header", "frame_type") => match code {
             0 => Some("I"),
@@ -74,8 +67,5 @@ fn named(record: &str, element: &str, number: u64) -> Option<&'static str> {
 
 /// The name of a set of flags; `names` holds those of 1, 2, ...
 fn flags(code: u8, names: &[&'static str]) -> Option<&'static str> {
-    usize::from(code)
-        .checked_sub(1)
-        .and_then(|place| names.get(place))
-        .copied()
+    usize::from(code).checked_sub(1).and_then(|place| names.get(place)).copied()
 }

@@ -31,16 +31,8 @@ impl Codebook {
         let at = after(at, CodebookHeader::SIZE);
         let raw: &[u8] = whole(table, rest, at, element("entries", take(bytes)))?;
         let entries = match header.value_bytes {
-            1 => raw
-                .iter()
-                .map(|value| i8::from_le_bytes([*value]).into())
-                .collect(),
-            _ => raw
-                .as_chunks::<2>()
-                .0
-                .iter()
-                .map(|value| i16::from_le_bytes(*value))
-                .collect(),
+            1 => raw.iter().map(|value| i8::from_le_bytes([*value]).into()).collect(),
+            _ => raw.as_chunks::<2>().0.iter().map(|value| i16::from_le_bytes(*value)).collect(),
         };
         Ok(Self { header, entries })
     }
@@ -51,11 +43,7 @@ impl Codebook {
         self.header.validate(0)?;
         if self.entries.len() != length(self.header.value_count()) {
             let rule = "entries have the places of the header";
-            return Err(Error::new(
-                0,
-                CodebookHeader::TABLE.semantics,
-                ErrorKind::Constraint { rule },
-            ));
+            return Err(Error::new(0, CodebookHeader::TABLE.semantics, ErrorKind::Constraint { rule }));
         }
         let mut bytes = encode(&CodebookHeader::TABLE, &self.header)?;
         for &entry in &self.entries {
@@ -70,19 +58,13 @@ impl Codebook {
 
     /// Each entry in turn, `component_count` values of it.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = &[i16]> {
-        self.entries
-            .chunks_exact(usize::from(self.header.component_count).max(1))
+        self.entries.chunks_exact(usize::from(self.header.component_count).max(1))
     }
 
     fn narrow(entry: i16, place: usize) -> Result<i8> {
         i8::try_from(entry).map_err(|_| {
             let (value, min, max) = (entry.into(), i8::MIN.into(), i8::MAX.into());
-            let kind = ErrorKind::OutOfRange {
-                element: "entries",
-                value,
-                min,
-                max,
-            };
+            let kind = ErrorKind::OutOfRange { element: "entries", value, min, max };
             Error::new(after(0, place), CodebookHeader::TABLE.semantics, kind)
         })
     }

@@ -23,11 +23,7 @@ impl Index {
         let raw: &[u8] = whole(table, rest, at, element("entries", take(bytes)))?;
         let places = (0_usize..).step_by(IndexEntry::SIZE);
         let entry = |(raw, place)| Ok(IndexEntry::parse(raw, after(at, place))?.0);
-        let entries = raw
-            .chunks(IndexEntry::SIZE)
-            .zip(places)
-            .map(entry)
-            .collect::<Result<_>>()?;
+        let entries = raw.chunks(IndexEntry::SIZE).zip(places).map(entry).collect::<Result<_>>()?;
         Ok(Self { entries })
     }
 

@@ -22,14 +22,10 @@ pub fn leb128<'a>(
 ) -> Result<(u32, &'a [u8])> {
     match number(element)(bytes) {
         Ok((rest, value)) => Ok((value, rest)),
-        Err(nom::Err::Error(Fault {
-            rest,
-            kind: Some(kind),
-        }))
-        | Err(nom::Err::Failure(Fault {
-            rest,
-            kind: Some(kind),
-        })) => Err(Error::new(after(at, bytes.offset(rest)), clause, kind)),
+        Err(nom::Err::Error(Fault { rest, kind: Some(kind) }))
+        | Err(nom::Err::Failure(Fault { rest, kind: Some(kind) })) => {
+            Err(Error::new(after(at, bytes.offset(rest)), clause, kind))
+        }
         Err(_) => Err(Error::new(at, clause, ErrorKind::ShortSection { element })),
     }
 }

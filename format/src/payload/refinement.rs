@@ -43,12 +43,7 @@ impl<'a> Refinement<'a> {
         // Every section lies within `rest`, so that its place there gives its offset.
         let offset = |section: &[u8]| after(at, rest.offset(section));
         let blocks = blocks.into_iter().map(|block| (block, offset(block))).collect();
-        Ok(Self {
-            header,
-            model,
-            model_at: offset(model),
-            blocks,
-        })
+        Ok(Self { header, model, model_at: offset(model), blocks })
     }
 
     /// The bytes of the payload; see [`write_refinement`].
@@ -104,12 +99,7 @@ fn sections<'a>(
     let (input, model) = element("models", take(model_length)).parse(input)?;
     // Every length takes a byte: no more room is asked for than there are bytes.
     if block_count > input.len() {
-        return fault(
-            input,
-            ErrorKind::ShortSection {
-                element: "block_length",
-            },
-        );
+        return fault(input, ErrorKind::ShortSection { element: "block_length" });
     }
     let (mut input, lengths) = count(number("block_length"), block_count).parse(input)?;
     let mut blocks = Vec::with_capacity(lengths.len());
@@ -129,9 +119,5 @@ fn validate_model_length(
     if header.gaussian_count > 0 || model_length == 0 {
         return Ok(());
     }
-    Err(ErrorKind::Mismatch {
-        element: "model_length",
-        value: model_length.into(),
-        expected: 0,
-    })
+    Err(ErrorKind::Mismatch { element: "model_length", value: model_length.into(), expected: 0 })
 }

@@ -35,10 +35,7 @@ impl Transform {
         let table = &TransformHeader::TABLE;
         // At most 45 and 45 * 45.
         let (means, weights) = Self::places(&header);
-        let sections = (
-            element("mean", count(le_i32, means)),
-            element("basis", count(le_i16, weights)),
-        );
+        let sections = (element("mean", count(le_i32, means)), element("basis", count(le_i16, weights)));
         let (mean, basis) = whole(table, rest, after(at, TransformHeader::SIZE), sections)?;
         let transform = Self { header, mean, basis };
         transform.validate_values(at)?;
@@ -75,9 +72,7 @@ impl Transform {
             // Only a transform made by hand: the parser counts.
             return refuse(
                 at,
-                ErrorKind::Constraint {
-                    rule: "mean and basis have the places of the header",
-                },
+                ErrorKind::Constraint { rule: "mean and basis have the places of the header" },
             );
         }
         let mut at = after(at, TransformHeader::SIZE);
@@ -99,10 +94,5 @@ impl Transform {
 
 /// Outside `-max..=max`.
 const fn out_of_range(element: &'static str, value: i64, max: i64) -> ErrorKind {
-    ErrorKind::OutOfRange {
-        element,
-        value,
-        min: max.saturating_neg(),
-        max,
-    }
+    ErrorKind::OutOfRange { element, value, min: max.saturating_neg(), max }
 }

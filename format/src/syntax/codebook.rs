@@ -44,11 +44,6 @@ impl CodebookHeader {
     /// A.2: the codebook is not larger than agreed.
     pub fn within(&self, at: u64, limits: &Limits) -> Result<()> {
         let at = Self::TABLE.check(at).offset("entry_count_minus1", 0);
-        Limits::check(
-            at,
-            "max_codebook_values",
-            self.value_count().into(),
-            limits.max_codebook_values.into(),
-        )
+        Limits::check(at, "max_codebook_values", self.value_count().into(), limits.max_codebook_values.into())
     }
 }

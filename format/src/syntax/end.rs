@@ -26,11 +26,7 @@ impl EndOfStream {
     /// 6.11: the numbers are those of the stream, which is `expected`.
     pub fn validate_against(&self, at: u64, expected: &Self) -> Result<()> {
         let check = Self::TABLE.check(at);
-        check.equal(
-            "frame_count",
-            self.frame_count.into(),
-            expected.frame_count.into(),
-        )?;
+        check.equal("frame_count", self.frame_count.into(), expected.frame_count.into())?;
         check.equal("unit_count", self.unit_count.into(), expected.unit_count.into())?;
         check.equal("index_offset", self.index_offset, expected.index_offset)
     }

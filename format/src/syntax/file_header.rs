@@ -45,10 +45,7 @@ impl FileHeader {
             level,
             header_crc: 0,
         };
-        let header = Self {
-            header_crc: header.covered_crc()?,
-            ..header
-        };
+        let header = Self { header_crc: header.covered_crc()?, ..header };
         header.validate(0)?;
         Ok(header)
     }
@@ -57,10 +54,7 @@ impl FileHeader {
     pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8])> {
         // First of all, and on as many bytes as there are: another file format is not a truncated stream.
         Self::TABLE.check(0).well_formed(
-            bytes
-                .iter()
-                .zip(SIGNATURE)
-                .all(|(found, expected)| *found == expected),
+            bytes.iter().zip(SIGNATURE).all(|(found, expected)| *found == expected),
             "signature",
             ErrorKind::Signature,
         )?;
@@ -81,11 +75,7 @@ impl FileHeader {
         let check = Self::TABLE.check(at);
         check.well_formed(self.signature == SIGNATURE, "signature", ErrorKind::Signature)?;
         check.check_sum("header_crc", self.header_crc, self.covered_crc()?)?;
-        check.known(
-            self.version_major == VERSION.0,
-            "version_major",
-            self.version_major,
-        )?;
+        check.known(self.version_major == VERSION.0, "version_major", self.version_major)?;
         check.known(self.profile == PROFILE_INTRA, "profile", self.profile)?;
         check.known(LEVELS.contains(&self.level), "level", self.level)
     }
@@ -93,8 +83,6 @@ impl FileHeader {
     /// What `header_crc` shall be.
     fn covered_crc(&self) -> Result<u32> {
         let bytes = encode(&Self::TABLE, self)?;
-        Ok(bytes
-            .split_last_chunk::<CRC_SIZE>()
-            .map_or(0, |(covered, _)| crc32fast::hash(covered)))
+        Ok(bytes.split_last_chunk::<CRC_SIZE>().map_or(0, |(covered, _)| crc32fast::hash(covered)))
     }
 }

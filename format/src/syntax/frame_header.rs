@@ -58,11 +58,6 @@ impl FrameHeader {
     /// A.2: the frame is not larger than agreed.
     pub fn within(&self, at: u64, limits: &Limits) -> Result<()> {
         let at = Self::TABLE.check(at).offset("gaussian_count", 0);
-        Limits::check(
-            at,
-            "max_gaussians",
-            self.gaussian_count.into(),
-            limits.max_gaussians.into(),
-        )
+        Limits::check(at, "max_gaussians", self.gaussian_count.into(), limits.max_gaussians.into())
     }
 }

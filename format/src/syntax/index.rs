@@ -37,8 +37,6 @@ impl IndexHeader {
 impl IndexEntry {
     /// 6.10.
     pub fn validate(&self, at: u64) -> Result<()> {
-        Self::TABLE
-            .check(at)
-            .reserved_bits("reserved_zero", 0, self.reserved_zero)
+        Self::TABLE.check(at).reserved_bits("reserved_zero", 0, self.reserved_zero)
     }
 }

@@ -91,12 +91,7 @@ impl RefinementHeader {
     /// 6.9, as far as it needs no other unit of the frame.
     pub fn validate(&self, at: u64, sequence: &SequenceParameters) -> Result<()> {
         let check = Self::TABLE.check(at);
-        check.range(
-            "position_shift",
-            self.position_shift,
-            0,
-            sequence.position_bits.saturating_sub(1),
-        )?;
+        check.range("position_shift", self.position_shift, 0, sequence.position_bits.saturating_sub(1))?;
         check.range("lanes_log2", self.lanes_log2, 0, 5)?;
         check.known(self.mode().is_some(), "sh_mode", self.sh_mode)?;
         let vector_quantised = self.mode() == Some(ShMode::VectorQuantised);
@@ -104,11 +99,7 @@ impl RefinementHeader {
         check.range("vq_stage_count", self.vq_stage_count, min, max)?;
         for (place, id) in self.codebook_ids.into_iter().enumerate() {
             let used = place < usize::from(self.vq_stage_count);
-            let (min, max) = if used {
-                (0, MAX_ID)
-            } else {
-                (NO_CODEBOOK, NO_CODEBOOK)
-            };
+            let (min, max) = if used { (0, MAX_ID) } else { (NO_CODEBOOK, NO_CODEBOOK) };
             check.range_in("codebook_ids", place, id, min, max)?;
         }
         Ok(())
@@ -116,18 +107,12 @@ impl RefinementHeader {
 
     /// ceil(gaussian_count / 2^block_log2).
     pub fn block_count(&self, sequence: &SequenceParameters) -> u32 {
-        self.gaussian_count
-            .div_ceil(1_u32.wrapping_shl(sequence.block_log2.into()))
+        self.gaussian_count.div_ceil(1_u32.wrapping_shl(sequence.block_log2.into()))
     }
 
     /// A.2: the unit adds no more than a frame may have.
     pub fn within(&self, at: u64, limits: &Limits) -> Result<()> {
         let at = Self::TABLE.check(at).offset("gaussian_count", 0);
-        Limits::check(
-            at,
-            "max_gaussians",
-            self.gaussian_count.into(),
-            limits.max_gaussians.into(),
-        )
+        Limits::check(at, "max_gaussians", self.gaussian_count.into(), limits.max_gaussians.into())
     }
 }

@@ -80,11 +80,7 @@ impl SequenceParameters {
         self.validate_percents(at)?;
         check.range("position_bits", self.position_bits, 1, 20)?;
         check.range("block_log2", self.block_log2, 6, 16)?;
-        check.reserved_bits(
-            "sequence_flags",
-            0,
-            self.sequence_flags & !(CANONICAL_AXES | ANTIALIASED),
-        )?;
+        check.reserved_bits("sequence_flags", 0, self.sequence_flags & !(CANONICAL_AXES | ANTIALIASED))?;
         let thresholds = self.rotation_threshold;
         for (place, (before, this)) in (1..).zip(thresholds.iter().zip(thresholds.iter().skip(1))) {
             check.range_in("rotation_threshold", place, *this, 0, *before)?;
@@ -132,11 +128,8 @@ impl SequenceParameters {
 
     /// P(r) - P(r-1): how many Gaussians refinement `refinement` adds to a frame of `gaussian_count`.
     pub fn refinement_length(&self, refinement: u8, gaussian_count: u32) -> u32 {
-        let before = refinement
-            .checked_sub(1)
-            .map_or(0, |before| self.prefix_length(before, gaussian_count));
-        self.prefix_length(refinement, gaussian_count)
-            .saturating_sub(before)
+        let before = refinement.checked_sub(1).map_or(0, |before| self.prefix_length(before, gaussian_count));
+        self.prefix_length(refinement, gaussian_count).saturating_sub(before)
     }
 
     /// Strictly increasing to 100 over the refinements in use, then zero.
@@ -175,12 +168,7 @@ impl SequenceParameters {
         step("position_step", self.position_step())?;
         offset("log_scale_offset", 0, self.log_scale_offset())?;
         step("log_scale_step", self.log_scale_step())?;
-        check.rule(
-            (MIN_STEP..=1.0).contains(&self.rotation_step()),
-            "rotation_step",
-            0,
-            ROTATION_STEP,
-        )?;
+        check.rule((MIN_STEP..=1.0).contains(&self.rotation_step()), "rotation_step", 0, ROTATION_STEP)?;
         offset("opacity_offset", 0, self.opacity_offset())?;
         step("opacity_step", self.opacity_step())?;
         step("dc_step", self.dc_step())?;

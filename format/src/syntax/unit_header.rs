@@ -140,29 +140,17 @@ pub struct UnitId {
 impl UnitId {
     /// A unit of the whole stream: all axes 0.
     pub const fn stream(unit_type: UnitType) -> Self {
-        Self {
-            unit_type,
-            spatial_layer: 0,
-            temporal_layer: 0,
-            refinement: 0,
-            frame: 0,
-        }
+        Self { unit_type, spatial_layer: 0, temporal_layer: 0, refinement: 0, frame: 0 }
     }
 
     /// A unit of a frame, or of the group that starts with the frame.
     pub const fn of_frame(unit_type: UnitType, frame: u32) -> Self {
-        Self {
-            frame,
-            ..Self::stream(unit_type)
-        }
+        Self { frame, ..Self::stream(unit_type) }
     }
 
     /// A refinement unit.
     pub const fn of_refinement(frame: u32, refinement: u8) -> Self {
-        Self {
-            refinement,
-            ..Self::of_frame(UnitType::Refinement, frame)
-        }
+        Self { refinement, ..Self::of_frame(UnitType::Refinement, frame) }
     }
 }
 
@@ -181,10 +169,7 @@ impl UnitHeader {
             payload_length: payload_length(payload)?,
             payload_crc: crc32fast::hash(payload),
         };
-        let header = Self {
-            header_check: header.covered_check()?,
-            ..header
-        };
+        let header = Self { header_check: header.covered_check()?, ..header };
         // A `Reserved(3)` made by hand would come back as a frame header.
         Self::TABLE.check(0).known(
             UnitType::from_code(header.unit_type) == id.unit_type,
@@ -233,47 +218,25 @@ impl UnitHeader {
     /// 6.3. The check sum comes first: behind a wrong one no element can be trusted.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
-        check.check_sum(
-            "header_check",
-            self.header_check.into(),
-            self.covered_check()?.into(),
-        )?;
-        check.well_formed(
-            self.unit_type != 0,
-            "unit_type",
-            ErrorKind::Number { element: "unit_type" },
-        )?;
+        check.check_sum("header_check", self.header_check.into(), self.covered_check()?.into())?;
+        check.well_formed(self.unit_type != 0, "unit_type", ErrorKind::Number { element: "unit_type" })?;
         check.reserved_bits("unit_flags", 0, self.unit_flags & !CRITICAL)?;
         check.reserved_bits("reserved_zero", 0, self.reserved_zero)?;
         let unit_type = self.unit_type();
         if !unit_type.is_known() {
             return check.known(!self.is_critical(), "unit_type", self.unit_type);
         }
-        let refinements = if unit_type == UnitType::Refinement {
-            super::MAX_REFINEMENTS
-        } else {
-            1
-        };
+        let refinements = if unit_type == UnitType::Refinement { super::MAX_REFINEMENTS } else { 1 };
         check.range("spatial_layer", self.spatial_layer, 0, 0)?;
         check.range("temporal_layer", self.temporal_layer, 0, 0)?;
         check.range("refinement", self.refinement, 0, refinements.saturating_sub(1))?;
-        check.range(
-            "frame",
-            self.frame,
-            0,
-            if unit_type.has_frame() { u32::MAX } else { 0 },
-        )
+        check.range("frame", self.frame, 0, if unit_type.has_frame() { u32::MAX } else { 0 })
     }
 
     /// A.2: the payload is not longer than agreed.
     pub(crate) fn within(&self, at: u64, limits: &Limits) -> Result<()> {
         let at = Self::TABLE.check(at).offset("payload_length", 0);
-        Limits::check(
-            at,
-            "max_payload",
-            self.payload_length.into(),
-            limits.max_payload.into(),
-        )
+        Limits::check(at, "max_payload", self.payload_length.into(), limits.max_payload.into())
     }
 
     /// 6.3: a payload that is read has the check sum of the header; that of an unknown unit is not read.
@@ -281,9 +244,7 @@ impl UnitHeader {
         if !self.unit_type().is_known() {
             return Ok(());
         }
-        Self::TABLE
-            .check(at)
-            .check_sum("payload_crc", self.payload_crc, crc32fast::hash(payload))
+        Self::TABLE.check(at).check_sum("payload_crc", self.payload_crc, crc32fast::hash(payload))
     }
 
     /// What `header_check` shall be.
@@ -303,11 +264,7 @@ impl UnitHeader {
 fn payload_length(payload: &[u8]) -> Result<u32> {
     u32::try_from(payload.len()).map_err(|_| {
         let (asked, allowed) = (super::after(0, payload.len()), u32::MAX.into());
-        let kind = ErrorKind::OverLimit {
-            limit: "max_payload",
-            asked,
-            allowed,
-        };
+        let kind = ErrorKind::OverLimit { limit: "max_payload", asked, allowed };
         Error::new(0, UnitHeader::TABLE.semantics, kind)
     })
 }

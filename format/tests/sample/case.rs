@@ -19,13 +19,7 @@ pub(crate) const fn case(
     clause: &'static str,
     fault: u64,
 ) -> Case {
-    Case {
-        unit,
-        edit,
-        code,
-        clause,
-        fault,
-    }
+    Case { unit, edit, code, clause, fault }
 }
 
 pub(crate) fn put(bytes: &mut [u8], at: usize, value: impl AsRef<[u8]>) {
@@ -44,13 +38,7 @@ fn class_of(code: &str) -> &'static str {
 }
 
 pub(crate) fn assert_refused(what: &str, error: Option<Error>, case: &Case, at: u64) {
-    let Some(error) = error else {
-        panic!("{what}: accepted, {} was expected", case.code)
-    };
+    let Some(error) = error else { panic!("{what}: accepted, {} was expected", case.code) };
     let found = (error.class().name(), error.kind.code(), error.clause, error.at);
-    assert_eq!(
-        found,
-        (class_of(case.code), case.code, case.clause, at),
-        "{what}: {error}"
-    );
+    assert_eq!(found, (class_of(case.code), case.code, case.clause, at), "{what}: {error}");
 }

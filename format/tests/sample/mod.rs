@@ -1,9 +1,6 @@
 //! A small stream with one unit of each known type, and the means to break it.
 #![allow(dead_code, reason = "every test file uses a part")]
-#![allow(
-    clippy::unwrap_used,
-    reason = "a sample that cannot be written is a failed test"
-)]
+#![allow(clippy::unwrap_used, reason = "a sample that cannot be written is a failed test")]
 
 pub(crate) mod case;
 
@@ -71,28 +68,16 @@ pub(crate) fn refinement_header() -> RefinementHeader {
 }
 
 fn transform(transform_id: u8, transform_kind: u8, dimension: u8, rank: u8) -> Vec<u8> {
-    let header = TransformHeader {
-        transform_id,
-        transform_kind,
-        dimension,
-        rank,
-    };
+    let header = TransformHeader { transform_id, transform_kind, dimension, rank };
     let mean = (0..i32::from(dimension)).map(|place| place * 1000 - 1).collect();
-    let basis = (0..i16::from(rank) * i16::from(dimension))
-        .map(|place| place * 7 - 4096)
-        .collect();
+    let basis = (0..i16::from(rank) * i16::from(dimension)).map(|place| place * 7 - 4096).collect();
     Transform { header, mean, basis }.to_bytes(&sequence()).unwrap()
 }
 
 /// The units in order; the payloads can be edited before [`stream`].
 pub(crate) fn units() -> Units {
     let codebook = Codebook {
-        header: CodebookHeader {
-            codebook_id: 7,
-            component_count: 2,
-            entry_count_minus1: 1,
-            value_bytes: 1,
-        },
+        header: CodebookHeader { codebook_id: 7, component_count: 2, entry_count_minus1: 1, value_bytes: 1 },
         entries: vec![-128, 127, 0, 5],
     };
     let blocks: [&[u8]; 2] = [&[1, 2, 3, 4], &[5, 6, 7, 8, 9]];
@@ -100,48 +85,25 @@ pub(crate) fn units() -> Units {
     let sequence = sequence().to_bytes().unwrap();
     // The GOP header stands behind the file header and the sequence parameters.
     let offset = u64::try_from(FILE_HEADER + UNIT_HEADER + sequence.len()).unwrap();
-    let entries = vec![IndexEntry {
-        frame: 0,
-        reserved_zero: 0,
-        offset,
-    }];
+    let entries = vec![IndexEntry { frame: 0, reserved_zero: 0, offset }];
     let mut units = vec![
         (UnitId::stream(UnitType::SequenceParameters), sequence),
-        (
-            UnitId::of_frame(UnitType::GopHeader, 0),
-            GopHeader::intra(0, 1).to_bytes().unwrap(),
-        ),
+        (UnitId::of_frame(UnitType::GopHeader, 0), GopHeader::intra(0, 1).to_bytes().unwrap()),
         (UnitId::of_frame(UnitType::Transform, 0), transform(3, 0, 3, 3)),
         (UnitId::of_frame(UnitType::Transform, 0), transform(4, 1, 9, 2)),
-        (
-            UnitId::of_frame(UnitType::Codebook, 0),
-            codebook.to_bytes().unwrap(),
-        ),
-        (
-            UnitId::of_frame(UnitType::FrameHeader, 0),
-            FrameHeader::intra(3, Some(4), 500).to_bytes().unwrap(),
-        ),
+        (UnitId::of_frame(UnitType::Codebook, 0), codebook.to_bytes().unwrap()),
+        (UnitId::of_frame(UnitType::FrameHeader, 0), FrameHeader::intra(3, Some(4), 500).to_bytes().unwrap()),
         (UnitId::of_refinement(0, 0), refinement),
-        (
-            UnitId::stream(UnitType::Index),
-            Index { entries }.to_bytes().unwrap(),
-        ),
+        (UnitId::stream(UnitType::Index), Index { entries }.to_bytes().unwrap()),
     ];
-    let end = EndOfStream {
-        frame_count: 1,
-        unit_count: 8,
-        index_offset: unit_at(&units, INDEX),
-    };
+    let end = EndOfStream { frame_count: 1, unit_count: 8, index_offset: unit_at(&units, INDEX) };
     units.push((UnitId::stream(UnitType::End), end.to_bytes().unwrap()));
     units
 }
 
 /// Offset of a unit in the stream of [`stream`].
 pub(crate) fn unit_at(units: &Units, place: usize) -> u64 {
-    let before = units
-        .iter()
-        .take(place)
-        .map(|(_, payload)| UNIT_HEADER + payload.len());
+    let before = units.iter().take(place).map(|(_, payload)| UNIT_HEADER + payload.len());
     u64::try_from(FILE_HEADER + before.sum::<usize>()).unwrap()
 }
 

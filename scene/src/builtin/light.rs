@@ -33,11 +33,7 @@ fn bricks(texture: DVec3) -> f64 {
     let course = (texture.y / 0.2).floor();
     let along = texture.x / 0.5 + 0.5 * course;
     let inside = |position: f64| position - position.floor();
-    if inside(texture.y / 0.2) < 0.12 || inside(along) < 0.05 {
-        1.0
-    } else {
-        0.0
-    }
+    if inside(texture.y / 0.2) < 0.12 || inside(along) < 0.05 { 1.0 } else { 0.0 }
 }
 
 fn checks(texture: DVec3) -> f64 {
@@ -50,9 +46,7 @@ fn checks(texture: DVec3) -> f64 {
 pub(super) fn highlight(material: &Material, texture: DVec3, normal: DVec3) -> [f64; 15] {
     let mirrored = 2.0 * normal.dot(SUN) * normal - SUN;
     // The direction of view in splatting goes from the eye to the Gaussian.
-    let seen = (0.4 * noise::drift(texture * 1.5, 2) - mirrored)
-        .try_normalize()
-        .unwrap_or(DVec3::Z);
+    let seen = (0.4 * noise::drift(texture * 1.5, 2) - mirrored).try_normalize().unwrap_or(DVec3::Z);
     let mut values = sh_basis(seen.to_array());
     for (at, value) in values.iter_mut().enumerate() {
         let band = if at < 3 { 0 } else { usize::from(at >= 8) + 1 };

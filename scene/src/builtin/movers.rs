@@ -47,21 +47,9 @@ struct Segment {
 }
 
 const SEGMENTS: [Segment; 3] = [
-    Segment {
-        length: 0.75,
-        radius: 0.11,
-        joint: (0.1, 0.35, 1.1),
-    },
-    Segment {
-        length: 0.55,
-        radius: 0.085,
-        joint: (0.7, 0.5, 1.7),
-    },
-    Segment {
-        length: 0.4,
-        radius: 0.06,
-        joint: (0.5, 0.6, 2.6),
-    },
+    Segment { length: 0.75, radius: 0.11, joint: (0.1, 0.35, 1.1) },
+    Segment { length: 0.55, radius: 0.085, joint: (0.7, 0.5, 1.7) },
+    Segment { length: 0.4, radius: 0.06, joint: (0.5, 0.6, 2.6) },
 ];
 
 /// A point of the arm: each segment turns with all those before it.
@@ -115,10 +103,7 @@ const CLOTH_HEIGHT: f64 = 1.2;
 pub(super) fn cloth(random: &mut Random, count: u32, seconds: f64) -> Sample {
     let across = random.between(-CLOTH_WIDTH / 2.0, CLOTH_WIDTH / 2.0);
     let down = random.between(0.0, CLOTH_HEIGHT);
-    let (long, short) = (
-        4.0 * across - 2.2 * seconds,
-        7.0 * across + 3.0 * down - 3.1 * seconds,
-    );
+    let (long, short) = (4.0 * across - 2.2 * seconds, 7.0 * across + 3.0 * down - 3.1 * seconds);
     let ((cos_long, sin_long), (cos_short, sin_short)) = (circle(long), circle(short));
     let wave = 0.16 * sin_long + 0.05 * sin_short;
     // The derivatives of down × wave.

@@ -16,9 +16,10 @@ pub(super) fn mix(mut bits: u64) -> u64 {
 impl Random {
     /// The stream that `key` names; streams of different keys are unrelated.
     pub(super) fn new(key: [u64; 4]) -> Self {
-        Self(key.iter().fold(0, |state: u64, &part| {
-            mix(state.wrapping_add(STEP) ^ mix(part.wrapping_add(STEP)))
-        }))
+        Self(
+            key.iter()
+                .fold(0, |state: u64, &part| mix(state.wrapping_add(STEP) ^ mix(part.wrapping_add(STEP)))),
+        )
     }
 
     fn bits(&mut self) -> u64 {
@@ -64,9 +65,6 @@ mod tests {
         let numbers: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
         let mean = numbers.iter().sum::<f64>() / 20_000.0;
         let variance = numbers.iter().map(|number| number * number).sum::<f64>() / 20_000.0;
-        assert!(
-            mean.abs() < 0.03 && (variance - 1.0).abs() < 0.03,
-            "{mean} {variance}"
-        );
+        assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.03, "{mean} {variance}");
     }
 }

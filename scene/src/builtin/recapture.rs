@@ -18,11 +18,7 @@ pub(super) fn again(gaussian: Gaussian, random: &mut Random) -> Vec<Gaussian> {
         return Vec::new();
     }
     let jittered = jitter(gaussian, random);
-    if fate < MISSING + SPLIT {
-        split(&jittered).into()
-    } else {
-        vec![jittered]
-    }
+    if fate < MISSING + SPLIT { split(&jittered).into() } else { vec![jittered] }
 }
 
 /// Moves it within its own ellipsoid, turns it a little and changes every value a little.
@@ -43,9 +39,7 @@ fn jitter(mut gaussian: Gaussian, random: &mut Random) -> Gaussian {
 
 /// Two smaller Gaussians side by side along the longest axis.
 fn split(whole: &Gaussian) -> [Gaussian; 2] {
-    let longest = (0..3)
-        .max_by(|&a, &b| whole.log_scale[a].total_cmp(&whole.log_scale[b]))
-        .unwrap_or(0);
+    let longest = (0..3).max_by(|&a, &b| whole.log_scale[a].total_cmp(&whole.log_scale[b])).unwrap_or(0);
     let half = 0.6 * libm::exp(whole.log_scale[longest]);
     let offset = whole.rotation * (DVec3::AXES[longest] * half);
     [-1.0, 1.0].map(|side| {

@@ -46,15 +46,7 @@ pub(super) fn sample(random: &mut Random, count: u32) -> Sample {
 }
 
 fn still(position: DVec3, normal: DVec3, tangent: DVec3, spacing: f64, material: Material) -> Sample {
-    Sample {
-        position,
-        normal,
-        tangent,
-        turn: DQuat::IDENTITY,
-        texture: position,
-        spacing,
-        material,
-    }
+    Sample { position, normal, tangent, turn: DQuat::IDENTITY, texture: position, spacing, material }
 }
 
 fn ground(random: &mut Random, count: f64) -> Sample {
@@ -67,13 +59,7 @@ fn ground(random: &mut Random, count: f64) -> Sample {
         gloss: 0.25,
         opacity_shift: 0.0,
     };
-    still(
-        DVec3::new(x * radius, 0.0, z * radius),
-        DVec3::NEG_Y,
-        DVec3::X,
-        spacing,
-        material,
-    )
+    still(DVec3::new(x * radius, 0.0, z * radius), DVec3::NEG_Y, DVec3::X, spacing, material)
 }
 
 fn wall(random: &mut Random, count: f64) -> Sample {
@@ -85,13 +71,7 @@ fn wall(random: &mut Random, count: f64) -> Sample {
         gloss: 0.1,
         opacity_shift: 0.0,
     };
-    still(
-        position,
-        DVec3::NEG_Z,
-        DVec3::X,
-        spacing(WALL_WIDTH * WALL_HEIGHT, count),
-        material,
-    )
+    still(position, DVec3::NEG_Z, DVec3::X, spacing(WALL_WIDTH * WALL_HEIGHT, count), material)
 }
 
 fn column(random: &mut Random, count: f64) -> Sample {
@@ -114,26 +94,15 @@ fn leaf(random: &mut Random, count: f64) -> Sample {
     let (centre, radius) = BUSHES[random.below(BUSHES.len() as u64) as usize];
     let outwards = direction(random);
     let position = centre + radius * random.unit().sqrt() * outwards;
-    let normal = (outwards + 0.8 * direction(random))
-        .try_normalize()
-        .unwrap_or(DVec3::NEG_Y);
-    let area: f64 = BUSHES
-        .iter()
-        .map(|(_, radius)| LEAF_LAYERS * 4.0 * PI * radius * radius)
-        .sum();
+    let normal = (outwards + 0.8 * direction(random)).try_normalize().unwrap_or(DVec3::NEG_Y);
+    let area: f64 = BUSHES.iter().map(|(_, radius)| LEAF_LAYERS * 4.0 * PI * radius * radius).sum();
     let material = Material {
         colours: [DVec3::new(0.16, 0.36, 0.12), DVec3::new(0.42, 0.52, 0.18)],
         pattern: Pattern::Clouds,
         gloss: 0.35,
         opacity_shift: -1.2,
     };
-    still(
-        position,
-        normal,
-        normal.any_orthonormal_vector(),
-        spacing(area, count),
-        material,
-    )
+    still(position, normal, normal.any_orthonormal_vector(), spacing(area, count), material)
 }
 
 /// Uniform over the sphere.

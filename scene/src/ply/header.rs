@@ -129,11 +129,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, SceneError> {
             }
             Line::End => {
                 let encoding = encoding.ok_or_else(|| refuse(rest, "the format line is missing".into()))?;
-                return Ok(Header {
-                    encoding,
-                    elements,
-                    length: bytes.len() - after.len(),
-                });
+                return Ok(Header { encoding, elements, length: bytes.len() - after.len() });
             }
         }
         rest = after;
@@ -147,11 +143,7 @@ fn unique(
     name: &str,
 ) -> Result<(), String> {
     let new = names.insert((owner.map(str::to_owned), name.to_owned()));
-    if new {
-        Ok(())
-    } else {
-        Err(format!("the name {name} comes twice"))
-    }
+    if new { Ok(()) } else { Err(format!("the name {name} comes twice")) }
 }
 
 fn first_line(input: &[u8]) -> IResult<&[u8], ()> {
@@ -163,13 +155,7 @@ fn line(input: &[u8]) -> IResult<&[u8], Line> {
         map(preceded((tag("format"), space1), encoding), Line::Format),
         map(preceded((tag("element"), space1), element), Line::Element),
         map(preceded((tag("property"), space1), property), Line::Property),
-        map(
-            (
-                alt((tag("comment"), tag("obj_info"))),
-                take_while(|byte| byte != b'\n'),
-            ),
-            |_| Line::Remark,
-        ),
+        map((alt((tag("comment"), tag("obj_info"))), take_while(|byte| byte != b'\n')), |_| Line::Remark),
         map(tag("end_header"), |_| Line::End),
         map(space0, |_| Line::Remark),
     ));
@@ -188,22 +174,12 @@ fn encoding(input: &[u8]) -> IResult<&[u8], Encoding> {
 
 fn element(input: &[u8]) -> IResult<&[u8], Element> {
     let (rest, (name, _, count)) = (word, space1, decimal).parse(input)?;
-    Ok((
-        rest,
-        Element {
-            name,
-            count,
-            properties: Vec::new(),
-        },
-    ))
+    Ok((rest, Element { name, count, properties: Vec::new() }))
 }
 
 fn property(input: &[u8]) -> IResult<&[u8], Property> {
     let list = preceded((tag("list"), space1), (terminated(scalar, space1), scalar));
-    let kind = alt((
-        map(list, |(count, item)| Kind::List { count, item }),
-        map(scalar, Kind::Scalar),
-    ));
+    let kind = alt((map(list, |(count, item)| Kind::List { count, item }), map(scalar, Kind::Scalar)));
     let (rest, (kind, _, name)) = (kind, space1, word).parse(input)?;
     Ok((rest, Property { name, kind }))
 }
@@ -220,29 +196,21 @@ fn scalar(input: &[u8]) -> IResult<&[u8], Scalar> {
         b"float" | b"float32" => Scalar::F32,
         b"double" | b"float64" => Scalar::F64,
         _ => {
-            return Err(nom::Err::Error(nom::error::Error::new(
-                input,
-                nom::error::ErrorKind::Alt,
-            )));
+            return Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Alt)));
         }
     };
     Ok((rest, scalar))
 }
 
 fn word(input: &[u8]) -> IResult<&[u8], String> {
-    map(take_while1(|byte: u8| byte.is_ascii_graphic()), |name| {
-        String::from_utf8_lossy(name).into_owned()
-    })
-    .parse(input)
+    map(take_while1(|byte: u8| byte.is_ascii_graphic()), |name| String::from_utf8_lossy(name).into_owned())
+        .parse(input)
 }
 
 /// The start of a line that was not understood, for people.
 fn excerpt(line: &[u8]) -> String {
     let shown = line.iter().take(40).take_while(|&&byte| byte != b'\n');
-    shown
-        .flat_map(|&byte| std::ascii::escape_default(byte))
-        .map(char::from)
-        .collect()
+    shown.flat_map(|&byte| std::ascii::escape_default(byte)).map(char::from).collect()
 }
 
 #[cfg(test)]
@@ -258,22 +226,14 @@ mod tests {
         assert_eq!(header.encoding, Encoding::Ascii);
         let vertex = header.element("vertex").unwrap();
         assert_eq!((vertex.count, vertex.properties.len()), (3, 2));
-        assert_eq!(
-            vertex.properties[1].kind,
-            Kind::List {
-                count: Scalar::U8,
-                item: Scalar::I32
-            }
-        );
+        assert_eq!(vertex.properties[1].kind, Kind::List { count: Scalar::U8, item: Scalar::I32 });
     }
 
     #[test]
     fn the_error_says_which_line() {
         let error = parse(b"ply\nformat ascii 1.0\nelement vertex many\n").unwrap_err();
         assert!(
-            error
-                .to_string()
-                .starts_with("byte 21: no PLY header line: \"element vertex many\""),
+            error.to_string().starts_with("byte 21: no PLY header line: \"element vertex many\""),
             "{error}"
         );
     }

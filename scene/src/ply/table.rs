@@ -38,10 +38,7 @@ impl<'a> Body<'a> {
         let mut cursor = Cursor::new(file);
         // The header was parsed from these bytes, so that many are there; if not, nothing is left to read.
         let _ = cursor.take(header.length as u64, "header");
-        Self {
-            cursor,
-            encoding: header.encoding,
-        }
+        Self { cursor, encoding: header.encoding }
     }
 
     /// Passes over an element.
@@ -50,10 +47,7 @@ impl<'a> Body<'a> {
             return Ok(());
         }
         if let (Some(stride), false) = (stride(element), self.encoding == Encoding::Ascii) {
-            return self
-                .cursor
-                .take_rows(element.count, stride as u64, "a skipped element")
-                .map(|_| ());
+            return self.cursor.take_rows(element.count, stride as u64, "a skipped element").map(|_| ());
         }
         // Each row takes at least one byte, so this ends with the bytes whatever the count says.
         for _ in 0..element.count {
@@ -71,10 +65,7 @@ impl<'a> Body<'a> {
         // `as` saturates: a negative or broken count is an empty list.
         let items = self.scalar(count)? as u64;
         if self.encoding != Encoding::Ascii {
-            return self
-                .cursor
-                .take_rows(items, item.size() as u64, "a list")
-                .map(|_| ());
+            return self.cursor.take_rows(items, item.size() as u64, "a list").map(|_| ());
         }
         (0..items).try_for_each(|_| self.token().map(|_| ()))
     }
@@ -101,9 +92,7 @@ impl<'a> Body<'a> {
         names: &[String],
         stride: usize,
     ) -> Result<Vec<Vec<T>>, SceneError> {
-        let rows = self
-            .cursor
-            .take_rows(element.count, stride as u64, "the element's rows")?;
+        let rows = self.cursor.take_rows(element.count, stride as u64, "the element's rows")?;
         let places: Vec<_> = names.iter().filter_map(|name| place(element, name)).collect();
         let count = rows.len() / stride.max(1);
         let mut columns: Vec<Vec<T>> = places.iter().map(|_| Vec::with_capacity(count)).collect();
@@ -121,18 +110,10 @@ impl<'a> Body<'a> {
         names: &[String],
     ) -> Result<Vec<Vec<T>>, SceneError> {
         // A value takes a digit and a separator, the very last only a digit.
-        let least = element
-            .count
-            .saturating_mul(element.properties.len() as u64 * 2)
-            .saturating_sub(1);
+        let least = element.count.saturating_mul(element.properties.len() as u64 * 2).saturating_sub(1);
         let left = self.cursor.remaining().len();
         if least > left as u64 {
-            return Err(SceneError::truncated(
-                self.cursor.at(),
-                "the element's rows",
-                least,
-                left,
-            ));
+            return Err(SceneError::truncated(self.cursor.at(), "the element's rows", least, left));
         }
         let target: Vec<Option<usize>> = element
             .properties
@@ -171,21 +152,12 @@ impl<'a> Body<'a> {
 
     /// The next run of bytes between blanks.
     fn token(&mut self) -> Result<&'a [u8], SceneError> {
-        let blanks = self
-            .cursor
-            .remaining()
-            .iter()
-            .take_while(|byte| byte.is_ascii_whitespace())
-            .count();
+        let blanks = self.cursor.remaining().iter().take_while(|byte| byte.is_ascii_whitespace()).count();
         self.cursor.take(blanks as u64, "blanks")?;
         let rest = self.cursor.remaining();
         let length = rest.iter().take_while(|byte| !byte.is_ascii_whitespace()).count();
         if length == 0 {
-            return Err(SceneError::malformed(
-                self.cursor.at(),
-                "a number is missing",
-                CUT_SHORT,
-            ));
+            return Err(SceneError::malformed(self.cursor.at(), "a number is missing", CUT_SHORT));
         }
         self.cursor.take(length as u64, "a number")
     }
@@ -193,13 +165,10 @@ impl<'a> Body<'a> {
 
 /// Bytes of one row, unless a list makes them vary.
 fn stride(element: &Element) -> Option<usize> {
-    element
-        .properties
-        .iter()
-        .try_fold(0, |sum, property| match property.kind {
-            Kind::Scalar(kind) => Some(sum + kind.size()),
-            Kind::List { .. } => None,
-        })
+    element.properties.iter().try_fold(0, |sum, property| match property.kind {
+        Kind::Scalar(kind) => Some(sum + kind.size()),
+        Kind::List { .. } => None,
+    })
 }
 
 /// Where in a row the property is, and of what type.
@@ -226,14 +195,10 @@ fn extend<T: Cell>(
     kind: Scalar,
     encoding: Encoding,
 ) {
-    let cells = block
-        .chunks_exact(stride)
-        .filter_map(|row| row.get(offset..offset + kind.size()));
+    let cells = block.chunks_exact(stride).filter_map(|row| row.get(offset..offset + kind.size()));
     // The common case has its own loop, free of the choice of type in each cell.
     if (kind, encoding) == (Scalar::F32, Encoding::LittleEndian) {
-        let floats = cells
-            .filter_map(|cell| cell.try_into().ok())
-            .map(f32::from_le_bytes);
+        let floats = cells.filter_map(|cell| cell.try_into().ok()).map(f32::from_le_bytes);
         column.extend(floats.map(|value| T::from_f64(f64::from(value))));
     } else {
         column.extend(cells.map(|cell| T::from_f64(decode(cell, kind, encoding))));

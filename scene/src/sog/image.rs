@@ -36,11 +36,7 @@ impl Image {
         let channels = usize::from(decoder.color_type().channel_count());
         let mut pixels = vec![0; limits.bytes(decoder.total_bytes())?];
         decoder.read_image(&mut pixels).map_err(refuse)?;
-        Ok(Self {
-            width: width as usize,
-            pixels,
-            channels,
-        })
+        Ok(Self { width: width as usize, pixels, channels })
     }
 
     /// Red, green, blue, alpha of every pixel.

@@ -60,19 +60,14 @@ impl Meta {
         let meta: Self = serde_json::from_slice(json).map_err(|error| broken(error.to_string()))?;
         match meta.version.unwrap_or(1) {
             1 | 2 => Ok(meta),
-            other => Err(SceneError::unsupported(
-                format!("SOG version {other}"),
-                "export it as version 2",
-            )),
+            other => Err(SceneError::unsupported(format!("SOG version {other}"), "export it as version 2")),
         }
     }
 
     /// Gaussians, as the file says: not yet compared with anything.
     pub(crate) fn count(&self) -> Result<u64, SceneError> {
         let shape = self.means.shape.as_ref().and_then(|shape| shape.first());
-        self.count
-            .or(shape.copied())
-            .ok_or_else(|| broken("the count is missing"))
+        self.count.or(shape.copied()).ok_or_else(|| broken("the count is missing"))
     }
 
     /// Whether opacity is a byte of its own; before version 2 it is a logit, coded as colour is.
@@ -105,19 +100,14 @@ impl Coded {
     /// The file whose name has `part` in it: labels and centroids come in either order.
     pub(crate) fn file_with(&self, part: &str) -> Result<&str, SceneError> {
         let found = self.files.iter().find(|name| name.contains(part));
-        found
-            .map(String::as_str)
-            .ok_or_else(|| broken(format!("shN has no {part} file")))
+        found.map(String::as_str).ok_or_else(|| broken(format!("shN has no {part} file")))
     }
 
     /// What the bytes of `channel` mean.
     pub(crate) fn codebook(&self, channel: usize) -> Result<Codebook, SceneError> {
         if let Some(codebook) = &self.codebook {
             if codebook.len() < CODES {
-                return Err(broken(format!(
-                    "a codebook has {} entries, 256 are needed",
-                    codebook.len()
-                )));
+                return Err(broken(format!("a codebook has {} entries, 256 are needed", codebook.len())));
             }
             return Ok(codebook.clone());
         }
@@ -129,17 +119,12 @@ impl Coded {
         let (Some(low), Some(high)) = (end(&self.mins), end(&self.maxs)) else {
             return Err(broken("an attribute has neither a codebook nor mins and maxs"));
         };
-        Ok((0..CODES)
-            .map(|code| low + (high - low) * code as f64 / 255.0)
-            .collect())
+        Ok((0..CODES).map(|code| low + (high - low) * code as f64 / 255.0).collect())
     }
 }
 
 fn first(files: &[String]) -> Result<&str, SceneError> {
-    files
-        .first()
-        .map(String::as_str)
-        .ok_or_else(|| broken("an attribute has no file"))
+    files.first().map(String::as_str).ok_or_else(|| broken("an attribute has no file"))
 }
 
 fn broken(what: impl Into<String>) -> SceneError {

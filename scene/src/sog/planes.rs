@@ -32,10 +32,7 @@ pub(crate) fn read(
     let meta = Meta::parse(&fetch(META)?)?;
     let rows = limits.gaussians(meta.count()?)?;
     let images = Images::fetch(&meta, rows, fetch, limits)?;
-    let sh_degree = images
-        .palette
-        .as_ref()
-        .map_or(0, |(_, palette)| palette.sh_degree);
+    let sh_degree = images.palette.as_ref().map_or(0, |(_, palette)| palette.sh_degree);
     let mut planes = Planes::with_room(sh_degree, rows);
     let pixels = |image| Image::pixels(image).take(rows);
     positions(&meta, pixels(&images.low).zip(images.high.pixels()), &mut planes);
@@ -48,9 +45,7 @@ pub(crate) fn read(
     }
     let colours = pixels(&images.colours);
     if meta.has_plain_opacity() {
-        planes
-            .opacity_logit
-            .extend(colours.map(|[.., opacity]| logit_of_byte(opacity)));
+        planes.opacity_logit.extend(colours.map(|[.., opacity]| logit_of_byte(opacity)));
     } else {
         look_up(&meta.sh0, 3, colours, &mut planes.opacity_logit)?;
     }
@@ -90,27 +85,13 @@ impl Images {
         let (quats, scales) = (image(meta.quats.file()?)?, image(meta.scales.file()?)?);
         let colours = image(meta.sh0.file()?)?;
         let Some(rest) = &meta.rest else {
-            return Ok(Self {
-                low,
-                high,
-                quats,
-                scales,
-                colours,
-                palette: None,
-            });
+            return Ok(Self { low, high, quats, scales, colours, palette: None });
         };
         let labels = image(rest.file_with("label")?)?;
         let name = rest.file_with("centroid")?;
         let centroids = Image::decode(name, &fetch(name)?, PALETTE_PIXELS, limits)?;
         let palette = Some((labels, Palette::read(rest, name, &centroids)?));
-        Ok(Self {
-            low,
-            high,
-            quats,
-            scales,
-            colours,
-            palette,
-        })
+        Ok(Self { low, high, quats, scales, colours, palette })
     }
 }
 
@@ -167,19 +148,12 @@ impl Palette {
     fn read(coded: &Coded, name: &str, image: &Image) -> Result<Self, SceneError> {
         let degree = |&degree: &u8| sh_coefficients(degree) * ENTRIES_A_ROW == image.width;
         let sh_degree = (1..=MAX_SH_DEGREE).find(degree).ok_or_else(|| {
-            let what = format!(
-                "{name} is {} pixels wide; 192, 512 and 960 are known",
-                image.width
-            );
+            let what = format!("{name} is {} pixels wide; 192, 512 and 960 are known", image.width);
             SceneError::inconsistent(what, EXPORT)
         })?;
         let books = [coded.codebook(0)?, coded.codebook(1)?, coded.codebook(2)?];
-        let colours = image
-            .pixels()
-            .flat_map(|pixel| [0, 1, 2].map(|channel| (channel, pixel[channel])));
-        let values = colours
-            .map(|(channel, code)| books[channel][usize::from(code)] as f32)
-            .collect();
+        let colours = image.pixels().flat_map(|pixel| [0, 1, 2].map(|channel| (channel, pixel[channel])));
+        let values = colours.map(|(channel, code)| books[channel][usize::from(code)] as f32).collect();
         Ok(Self { sh_degree, values })
     }
 

@@ -22,21 +22,13 @@ pub(crate) fn unpack(shape: &Shape, streams: &Streams) -> Planes {
     let mut planes = Planes::with_room(shape.sh_degree, shape.gaussians);
     let [positions, alphas, colours, scales, rotations, sh] = streams;
     unpack_positions(shape, positions, &mut planes);
-    planes
-        .opacity_logit
-        .extend(alphas.iter().map(|&byte| logit_of_byte(byte)));
+    planes.opacity_logit.extend(alphas.iter().map(|&byte| logit_of_byte(byte)));
     for (axis, plane) in planes.dc.iter_mut().enumerate() {
         let bytes = colours.iter().skip(axis).step_by(3);
         plane.extend(bytes.map(|&byte| ((f64::from(byte) / 255.0 - 0.5) / COLOUR_SCALE) as f32));
     }
     for (axis, plane) in planes.log_scale.iter_mut().enumerate() {
-        plane.extend(
-            scales
-                .iter()
-                .skip(axis)
-                .step_by(3)
-                .map(|&byte| f32::from(byte) / 16.0 - 10.0),
-        );
+        plane.extend(scales.iter().skip(axis).step_by(3).map(|&byte| f32::from(byte) / 16.0 - 10.0));
     }
     unpack_rotations(shape, rotations, &mut planes);
     let signs = shape.flip.sh();
@@ -68,21 +60,14 @@ fn unpack_positions(shape: &Shape, bytes: &[u8], planes: &mut Planes) {
 fn unpack_rotations(shape: &Shape, bytes: &[u8], planes: &mut Planes) {
     let signs = shape.flip.rotation();
     let mut push = |[x, y, z, w]: [f32; 4]| {
-        for (plane, part) in planes
-            .rotation
-            .iter_mut()
-            .zip([w, x * signs[0], y * signs[1], z * signs[2]])
-        {
+        for (plane, part) in planes.rotation.iter_mut().zip([w, x * signs[0], y * signs[1], z * signs[2]]) {
             plane.push(part);
         }
     };
     if shape.version < 3 {
         for xyz in bytes.as_chunks::<3>().0 {
             // w is not stored and not negative, as if it were always the largest.
-            push(from_smallest_three(
-                3,
-                xyz.map(|byte| f64::from(byte) / 127.5 - 1.0),
-            ));
+            push(from_smallest_three(3, xyz.map(|byte| f64::from(byte) / 127.5 - 1.0)));
         }
         return;
     }
@@ -90,16 +75,9 @@ fn unpack_rotations(shape: &Shape, bytes: &[u8], planes: &mut Planes) {
         let word = u32::from_le_bytes(word);
         let part = |shift: u32| {
             let magnitude = f64::from(word >> shift & 0x1ff) / LARGEST_MAGNITUDE * FRAC_1_SQRT_2;
-            if word >> (shift + 9) & 1 == 1 {
-                -magnitude
-            } else {
-                magnitude
-            }
+            if word >> (shift + 9) & 1 == 1 { -magnitude } else { magnitude }
         };
-        push(from_smallest_three(
-            (word >> 30) as usize,
-            [part(20), part(10), part(0)],
-        ));
+        push(from_smallest_three((word >> 30) as usize, [part(20), part(10), part(0)]));
     }
 }
 
@@ -130,18 +108,10 @@ pub(crate) fn pack(frame: &GaussianFrame, options: &WriteOptions) -> Result<(Sha
     };
     let streams = [
         pack_positions(frame, &shape),
-        frame
-            .opacity_logit()
-            .iter()
-            .map(|&logit| byte_of_logit(logit))
-            .collect(),
-        interleave(frame.dc(), |dc| {
-            to_byte((f64::from(dc) * COLOUR_SCALE + 0.5) * 255.0)
-        }),
+        frame.opacity_logit().iter().map(|&logit| byte_of_logit(logit)).collect(),
+        interleave(frame.dc(), |dc| to_byte((f64::from(dc) * COLOUR_SCALE + 0.5) * 255.0)),
         interleave(frame.log_scale(), |log| to_byte((f64::from(log) + 10.0) * 16.0)),
-        (0..frame.len())
-            .flat_map(|row| pack_rotation(frame, row, shape.flip))
-            .collect(),
+        (0..frame.len()).flat_map(|row| pack_rotation(frame, row, shape.flip)).collect(),
         pack_sh(frame, options, shape.flip),
     ];
     Ok((shape, streams))
@@ -151,20 +121,13 @@ pub(crate) fn pack(frame: &GaussianFrame, options: &WriteOptions) -> Result<(Sha
 fn interleave(planes: &[Vec<f32>; 3], byte: impl Fn(f32) -> u8) -> Vec<u8> {
     let [a, b, c] = planes;
     let rows = a.iter().zip(b).zip(c);
-    rows.flat_map(|((&a, &b), &c)| [byte(a), byte(b), byte(c)])
-        .collect()
+    rows.flat_map(|((&a, &b), &c)| [byte(a), byte(b), byte(c)]).collect()
 }
 
 fn check_sh_bits(options: &WriteOptions) -> Result<(), SceneError> {
-    for (name, bits) in [
-        ("sh1_bits", options.sh1_bits),
-        ("sh_rest_bits", options.sh_rest_bits),
-    ] {
+    for (name, bits) in [("sh1_bits", options.sh1_bits), ("sh_rest_bits", options.sh_rest_bits)] {
         if !(1..=8).contains(&bits) {
-            return Err(SceneError::unsupported(
-                format!("{name} is {bits}"),
-                "choose 1 to 8",
-            ));
+            return Err(SceneError::unsupported(format!("{name} is {bits}"), "choose 1 to 8"));
         }
     }
     Ok(())
@@ -172,11 +135,7 @@ fn check_sh_bits(options: &WriteOptions) -> Result<(), SceneError> {
 
 /// The fractional bits asked for, or the most that fit.
 fn fractional_bits(frame: &GaussianFrame, options: &WriteOptions) -> Result<u8, SceneError> {
-    let farthest = frame
-        .position()
-        .iter()
-        .flatten()
-        .fold(0.0_f32, |most, value| most.max(value.abs()));
+    let farthest = frame.position().iter().flatten().fold(0.0_f32, |most, value| most.max(value.abs()));
     let fits = |bits: u8| (f64::from(farthest) * f64::from(1_u32 << bits)).round() <= LARGEST_FIXED;
     let bits = match options.fractional_bits {
         Some(bits) => Some(bits).filter(|&bits| bits <= 23 && fits(bits)),
@@ -210,9 +169,7 @@ fn pack_rotation(frame: &GaussianFrame, row: usize, flip: Flip) -> [u8; 4] {
     let [sx, sy, sz] = flip.rotation();
     let (largest, smallest) = to_smallest_three([x * sx, y * sy, z * sz, w]);
     let word = smallest.iter().fold(largest as u32, |word, &part| {
-        let magnitude = (part.abs() / FRAC_1_SQRT_2 * LARGEST_MAGNITUDE)
-            .round()
-            .min(LARGEST_MAGNITUDE);
+        let magnitude = (part.abs() / FRAC_1_SQRT_2 * LARGEST_MAGNITUDE).round().min(LARGEST_MAGNITUDE);
         word << 10 | u32::from(part < 0.0) << 9 | magnitude as u32
     });
     word.to_le_bytes()
@@ -223,11 +180,7 @@ fn pack_sh(frame: &GaussianFrame, options: &WriteOptions, flip: Flip) -> Vec<u8>
     let mut out = Vec::with_capacity(frame.len() * frame.sh().len());
     for row in 0..frame.len() {
         for (at, plane) in frame.sh().iter().enumerate() {
-            let bits = if at < 9 {
-                options.sh1_bits
-            } else {
-                options.sh_rest_bits
-            };
+            let bits = if at < 9 { options.sh1_bits } else { options.sh_rest_bits };
             out.push(sh_byte(plane[row] * signs[at / 3], bits));
         }
     }

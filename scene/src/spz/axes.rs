@@ -53,23 +53,7 @@ impl Flip {
     /// Signs of the SH coefficients of bands 1 to 3: those of the polynomials in x, y, z that they multiply.
     pub(crate) fn sh(self) -> [f32; 15] {
         let [x, y, z] = self.0;
-        [
-            y,
-            z,
-            x,
-            x * y,
-            y * z,
-            1.0,
-            x * z,
-            1.0,
-            y,
-            x * y * z,
-            y,
-            z,
-            x,
-            z,
-            x,
-        ]
+        [y, z, x, x * y, y * z, 1.0, x * z, 1.0, y, x * y * z, y, z, x, z, x]
     }
 }
 

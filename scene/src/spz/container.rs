@@ -81,21 +81,14 @@ impl Shape {
     /// Checks a header: nothing in it is used before.
     fn of_header(header: &StreamHeader, limits: &ReadLimits) -> Result<Self, SceneError> {
         if header.magic != MAGIC {
-            return Err(SceneError::malformed(
-                0,
-                format!("magic is {:#010x}", header.magic),
-                NOT_SPZ,
-            ));
+            return Err(SceneError::malformed(0, format!("magic is {:#010x}", header.magic), NOT_SPZ));
         }
         if header.sh_degree > MAX_SH_DEGREE {
             let what = format!("SPZ with SH degree {}", header.sh_degree);
             return Err(SceneError::unsupported(what, "convert it to degree 3 or less"));
         }
         if header.fractional_bits > 31 {
-            let what = format!(
-                "fractional_bits is {}, at most 31 make sense",
-                header.fractional_bits
-            );
+            let what = format!("fractional_bits is {}, at most 31 make sense", header.fractional_bits);
             return Err(SceneError::malformed(13, what, NOT_SPZ));
         }
         let shape = Self {
@@ -105,10 +98,7 @@ impl Shape {
             fractional_bits: header.fractional_bits,
             flip: Flip::default(),
         };
-        shape
-            .strides()
-            .iter()
-            .try_for_each(|&stride| limits.bytes(shape.size(stride)).map(|_| ()))?;
+        shape.strides().iter().try_for_each(|&stride| limits.bytes(shape.size(stride)).map(|_| ()))?;
         Ok(shape)
     }
 
@@ -123,11 +113,7 @@ pub(crate) fn is_spz(bytes: &[u8]) -> bool {
 }
 
 pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), SceneError> {
-    if bytes.starts_with(&GZIP) {
-        read_gzip(bytes, limits)
-    } else {
-        read_zstd(bytes, limits)
-    }
+    if bytes.starts_with(&GZIP) { read_gzip(bytes, limits) } else { read_zstd(bytes, limits) }
 }
 
 fn read_gzip(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), SceneError> {
@@ -135,10 +121,7 @@ fn read_gzip(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
     let header: StreamHeader = parse(&decompress::read_exactly(&mut content, 16, 0, "the header")?, 0)?;
     if !(1..=3).contains(&header.version) {
         let what = format!("gzip SPZ of version {}", header.version);
-        return Err(SceneError::unsupported(
-            what,
-            "versions 1 to 3 are known in gzip, 4 without",
-        ));
+        return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
     }
     let mut shape = Shape::of_header(&header, limits)?;
     let mut streams = Streams::default();
@@ -160,10 +143,7 @@ fn read_zstd(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
     let header: StreamHeader = parse(cursor.take(16, "the header")?, 0)?;
     if header.magic == MAGIC && header.version != 4 {
         let what = format!("SPZ of version {} without gzip", header.version);
-        return Err(SceneError::unsupported(
-            what,
-            "versions 1 to 3 are known in gzip, 4 without",
-        ));
+        return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
     }
     let mut shape = Shape::of_header(&header, limits)?;
     let tail: FileHeader = parse(cursor.take(16, "the header")?, 16)?;
@@ -181,30 +161,18 @@ fn read_zstd(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
 fn read_frames(cursor: &mut Cursor<'_>, shape: &Shape, count: u8) -> Result<Streams, SceneError> {
     let sizes = shape.strides().map(|stride| shape.size(stride));
     // An attribute without bytes has no stream.
-    let present = || {
-        sizes
-            .into_iter()
-            .zip(NAMES)
-            .enumerate()
-            .filter(|(_, (size, _))| *size > 0)
-    };
+    let present = || sizes.into_iter().zip(NAMES).enumerate().filter(|(_, (size, _))| *size > 0);
     if usize::from(count) != present().count() {
         let what = format!("{count} streams, these attributes are {}", present().count());
         return Err(SceneError::malformed(15, what, NOT_SPZ));
     }
     let at = cursor.at();
-    let entries = cursor
-        .take_rows(u64::from(count), 16, "the table of contents")?
-        .as_chunks::<16>()
-        .0;
+    let entries = cursor.take_rows(u64::from(count), 16, "the table of contents")?.as_chunks::<16>().0;
     let mut streams = Streams::default();
     for ((row, entry), (place, (size, name))) in entries.iter().enumerate().zip(present()) {
         let entry: Entry = parse(entry, at + row * 16)?;
         if entry.decompressed != size {
-            let what = format!(
-                "{name} is {} bytes, its Gaussians have {size}",
-                entry.decompressed
-            );
+            let what = format!("{name} is {} bytes, its Gaussians have {size}", entry.decompressed);
             return Err(SceneError::malformed(at + row * 16 + 8, what, NOT_SPZ));
         }
         let at = cursor.at();
@@ -253,9 +221,7 @@ pub(crate) fn write(shape: &Shape, streams: &Streams) -> Result<Vec<u8>, SceneEr
         flags: 0,
         reserved: 0,
     };
-    let header = header
-        .to_bytes()
-        .map_err(|error| SceneError::malformed(0, error.to_string(), NOT_SPZ))?;
+    let header = header.to_bytes().map_err(|error| SceneError::malformed(0, error.to_string(), NOT_SPZ))?;
     let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
     gzip.write_all(&header)?;
     streams.iter().try_for_each(|stream| gzip.write_all(stream))?;

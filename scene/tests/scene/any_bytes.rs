@@ -7,13 +7,7 @@ use super::samples::{LIMITS, small_files};
 
 type Reader = fn(&[u8], &splatstream_scene::ReadLimits) -> Result<GaussianFrame, SceneError>;
 
-const READERS: [Reader; 5] = [
-    ply::read,
-    compressed_ply::read,
-    splat::read,
-    spz::read,
-    sog::read_zip,
-];
+const READERS: [Reader; 5] = [ply::read, compressed_ply::read, splat::read, spz::read, sog::read_zip];
 
 /// Every reader on `bytes`; what they say does not matter here.
 fn read_all(bytes: &[u8]) {
@@ -49,10 +43,7 @@ fn a_file_cut_at_any_byte_is_an_error() {
             let result = reader_of(name)(&bytes[..length], &LIMITS);
             // Records have no frame around them: whole ones are a shorter scene.
             let whole_records = name == "a.splat" && length % 32 == 0;
-            assert!(
-                whole_records || result.is_err(),
-                "{name} cut to {length} bytes reads"
-            );
+            assert!(whole_records || result.is_err(), "{name} cut to {length} bytes reads");
         }
     }
 }

@@ -60,70 +60,36 @@ fn a_number_of_rest_properties_between_degrees_is_refused() {
 fn a_count_beyond_the_bytes_says_how_many_are_missing() {
     let bytes = ply::write(&small_frame());
     let message = message(&bytes[..bytes.len() - 1]);
-    assert!(
-        message.contains("the element's rows needs 312 bytes, 311 are left"),
-        "{message}"
-    );
+    assert!(message.contains("the element's rows needs 312 bytes, 311 are left"), "{message}");
 }
 
 #[test]
 fn a_count_beyond_the_limit_names_the_limit() {
-    let error = ply::read(
-        &ply::write(&small_frame()),
-        &ReadLimits {
-            max_gaussians: 2,
-            ..LIMITS
-        },
-    )
-    .unwrap_err();
-    assert!(matches!(
-        error.kind,
-        SceneErrorKind::OverLimit {
-            asked: 3,
-            allowed: 2,
-            ..
-        }
-    ));
+    let error =
+        ply::read(&ply::write(&small_frame()), &ReadLimits { max_gaussians: 2, ..LIMITS }).unwrap_err();
+    assert!(matches!(error.kind, SceneErrorKind::OverLimit { asked: 3, allowed: 2, .. }));
     assert!(error.to_string().contains("raise ReadLimits::max_gaussians"));
 }
 
 #[test]
 fn splat_says_how_many_bytes_are_over() {
     let error = splat::read(&[0; 69], &LIMITS).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .starts_with("byte 64: 5 bytes over the last whole 32-byte record"),
-        "{error}"
-    );
+    assert!(error.to_string().starts_with("byte 64: 5 bytes over the last whole 32-byte record"), "{error}");
 }
 
 #[test]
 fn sog_names_the_gaussian_and_the_file() {
     let error = sog::read_zip(&sog_with(&meta(), 100), &LIMITS).unwrap_err();
-    assert!(
-        error.to_string().contains("Gaussian 0: rotation alpha is 100"),
-        "{error}"
-    );
-    let error = sog::read_zip(
-        &sog_with(&meta().replace("\"count\":4", "\"count\":5"), 252),
-        &LIMITS,
-    )
-    .unwrap_err();
-    assert!(
-        error.to_string().contains("l.webp has 4 pixels for 5 Gaussians"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("Gaussian 0: rotation alpha is 100"), "{error}");
+    let error =
+        sog::read_zip(&sog_with(&meta().replace("\"count\":4", "\"count\":5"), 252), &LIMITS).unwrap_err();
+    assert!(error.to_string().contains("l.webp has 4 pixels for 5 Gaussians"), "{error}");
 }
 
 #[test]
 fn a_sog_directory_cannot_name_files_elsewhere() {
     let directory = tempfile::tempdir().unwrap();
-    fs::write(
-        directory.path().join("meta.json"),
-        meta().replace("l.webp", "../l.webp"),
-    )
-    .unwrap();
+    fs::write(directory.path().join("meta.json"), meta().replace("l.webp", "../l.webp")).unwrap();
     let error = read_scene(directory.path(), &LIMITS).unwrap_err();
     assert!(error.to_string().contains("no plain file name"), "{error}");
 }
@@ -133,9 +99,7 @@ fn content_decides_the_format_and_errors_carry_the_path() {
     let directory = tempfile::tempdir().unwrap();
     for (name, bytes) in small_files() {
         // A wrong extension does not matter where the content says enough.
-        let path = directory
-            .path()
-            .join(if name == "a.splat" { name } else { "scene.bin" });
+        let path = directory.path().join(if name == "a.splat" { name } else { "scene.bin" });
         fs::write(&path, &bytes).unwrap();
         let expected = match name {
             "a.ply" => SceneFormat::Ply,
@@ -149,22 +113,9 @@ fn content_decides_the_format_and_errors_carry_the_path() {
     }
     let path = directory.path().join("text.txt");
     fs::write(&path, "hello").unwrap();
-    for error in [
-        detect(&path).unwrap_err(),
-        read_scene(&path, &LIMITS).unwrap_err(),
-    ] {
+    for error in [detect(&path).unwrap_err(), read_scene(&path, &LIMITS).unwrap_err()] {
         assert_eq!(error.path.as_deref(), Some(path.as_path()));
-        assert!(
-            error
-                .to_string()
-                .contains("text.txt: the content is of no known scene format"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("text.txt: the content is of no known scene format"), "{error}");
     }
-    assert!(
-        read_scene(&directory.path().join("absent.ply"), &LIMITS)
-            .unwrap_err()
-            .path
-            .is_some()
-    );
+    assert!(read_scene(&directory.path().join("absent.ply"), &LIMITS).unwrap_err().path.is_some());
 }

@@ -42,14 +42,8 @@ fn check(bytes: &[u8]) {
         let at = usize::from(row);
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             assert_eq!(f64::from(frame.position()[axis][at]), value(name, row));
-            assert_eq!(
-                f64::from(frame.log_scale()[axis][at]),
-                value(&format!("scale_{axis}"), row)
-            );
-            assert_eq!(
-                f64::from(frame.dc()[axis][at]),
-                value(&format!("f_dc_{axis}"), row)
-            );
+            assert_eq!(f64::from(frame.log_scale()[axis][at]), value(&format!("scale_{axis}"), row));
+            assert_eq!(f64::from(frame.dc()[axis][at]), value(&format!("f_dc_{axis}"), row));
         }
         assert_eq!(f64::from(frame.opacity_logit()[at]), value("opacity", row));
     }
@@ -76,11 +70,7 @@ fn doubles_in_either_byte_order() {
             bytes.push(200);
             for name in NAMES {
                 let value = value(name, row);
-                bytes.extend(if big {
-                    value.to_be_bytes()
-                } else {
-                    value.to_le_bytes()
-                });
+                bytes.extend(if big { value.to_be_bytes() } else { value.to_le_bytes() });
             }
         }
         check(&bytes);
@@ -103,15 +93,9 @@ fn rest_coefficients_come_channel_by_channel() {
 #[test]
 fn packed_vertices_reach_both_ends_of_their_ranges() {
     let frame = compressed_ply::read(&packed(), &LIMITS).unwrap();
-    assert_eq!(
-        frame.position().each_ref().map(|plane| plane[0]),
-        [-1.0, -2.0, -3.0]
-    );
+    assert_eq!(frame.position().each_ref().map(|plane| plane[0]), [-1.0, -2.0, -3.0]);
     assert_eq!(frame.position().each_ref().map(|plane| plane[1]), [1.0, 2.0, 3.0]);
-    assert_eq!(
-        frame.log_scale().each_ref().map(|plane| plane[1]),
-        [-3.0, -2.0, -1.0]
-    );
+    assert_eq!(frame.log_scale().each_ref().map(|plane| plane[1]), [-3.0, -2.0, -1.0]);
     assert!(frame.opacity_logit()[0] < -6.0 && frame.opacity_logit()[1] > 6.0);
     // The third component is the largest, so nearly 1.
     assert!(frame.rotation()[2][0] > 0.999);

@@ -53,15 +53,9 @@ fn static_scenes_have_their_counts() {
 fn dynamic_scenes_have_their_counts() {
     let Some(data) = data() else { return };
     for frame in 0..32 {
-        assert_eq!(
-            read(&data.join(format!("dynamic/lam_p2/frame_{frame:04}.ply"))).len(),
-            20_018
-        );
+        assert_eq!(read(&data.join(format!("dynamic/lam_p2/frame_{frame:04}.ply"))).len(), 20_018);
     }
     for frame in 1..=50 {
-        assert_eq!(
-            read(&data.join(format!("dynamic/monkey/monkey_{frame:04}.sog"))).len(),
-            31_658
-        );
+        assert_eq!(read(&data.join(format!("dynamic/monkey/monkey_{frame:04}.sog"))).len(), 31_658);
     }
 }

@@ -7,10 +7,7 @@ use splatstream_scene::{GaussianFrame, ply, splat, spz};
 use super::samples::{LIMITS, frames};
 
 fn bits(planes: &[Vec<f32>]) -> Vec<Vec<u32>> {
-    planes
-        .iter()
-        .map(|plane| plane.iter().map(|value| value.to_bits()).collect())
-        .collect()
+    planes.iter().map(|plane| plane.iter().map(|value| value.to_bits()).collect()).collect()
 }
 
 fn opacity(logit: f32) -> f64 {
@@ -21,16 +18,12 @@ fn opacity(logit: f32) -> f64 {
 fn largest(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
     assert!(a.iter().flatten().count() == b.iter().flatten().count());
     let pairs = a.iter().flatten().zip(b.iter().flatten());
-    pairs
-        .map(|(&a, &b)| (f64::from(a) - f64::from(b)).abs())
-        .fold(0.0, f64::max)
+    pairs.map(|(&a, &b)| (f64::from(a) - f64::from(b)).abs()).fold(0.0, f64::max)
 }
 
 fn largest_opacity(a: &GaussianFrame, b: &GaussianFrame) -> f64 {
     let pairs = a.opacity_logit().iter().zip(b.opacity_logit());
-    pairs
-        .map(|(&a, &b)| (opacity(a) - opacity(b)).abs())
-        .fold(0.0, f64::max)
+    pairs.map(|(&a, &b)| (opacity(a) - opacity(b)).abs()).fold(0.0, f64::max)
 }
 
 /// The largest distance between the rotations of two frames, as unit quaternions of either sign.
@@ -41,11 +34,7 @@ fn largest_turn(a: &GaussianFrame, b: &GaussianFrame) -> f64 {
         q.map(|part| part / norm)
     };
     let distance = |a: [f64; 4], b: [f64; 4], sign: f64| {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - sign * b) * (a - sign * b))
-            .sum::<f64>()
-            .sqrt()
+        a.iter().zip(b).map(|(a, b)| (a - sign * b) * (a - sign * b)).sum::<f64>().sqrt()
     };
     (0..a.len())
         .map(|row| distance(unit(a, row), unit(b, row), 1.0).min(distance(unit(a, row), unit(b, row), -1.0)))

@@ -9,10 +9,7 @@ use proptest::prelude::*;
 use splatstream_scene::{GaussianFrame, Planes, ReadLimits, ply, sh_coefficients, splat, spz};
 
 /// Small, so that a test of broken files cannot take all memory.
-pub(crate) const LIMITS: ReadLimits = ReadLimits {
-    max_gaussians: 1 << 14,
-    max_bytes: 1 << 22,
-};
+pub(crate) const LIMITS: ReadLimits = ReadLimits { max_gaussians: 1 << 14, max_bytes: 1 << 22 };
 
 /// The values of one Gaussian: position, log scale, rotation, opacity logit, DC, SH.
 type Row = ([f32; 3], [f32; 3], [f32; 4], f32, [f32; 3], Vec<f32>);
@@ -39,9 +36,7 @@ fn frame_of(degree: u8, rows: &[Row]) -> GaussianFrame {
         rotation: [0, 1, 2, 3].map(|at| rows.iter().map(|row| row.2[at]).collect()),
         opacity_logit: rows.iter().map(|row| row.3).collect(),
         dc: [0, 1, 2].map(|at| rows.iter().map(|row| row.4[at]).collect()),
-        sh: (0..sh_coefficients(degree) * 3)
-            .map(|at| rows.iter().map(|row| row.5[at]).collect())
-            .collect(),
+        sh: (0..sh_coefficients(degree) * 3).map(|at| rows.iter().map(|row| row.5[at]).collect()).collect(),
     };
     GaussianFrame::from_planes(degree, planes).unwrap()
 }
@@ -91,34 +86,23 @@ pub(crate) fn compressed_ply() -> Vec<u8> {
         "max_scale_z",
     ];
     let mut text = String::from("ply\nformat binary_little_endian 1.0\nelement chunk 1\n");
-    ranges
-        .iter()
-        .for_each(|name| text.push_str(&format!("property float {name}\n")));
+    ranges.iter().for_each(|name| text.push_str(&format!("property float {name}\n")));
     text.push_str("element vertex 2\n");
-    for name in [
-        "packed_position",
-        "packed_rotation",
-        "packed_scale",
-        "packed_color",
-    ] {
+    for name in ["packed_position", "packed_rotation", "packed_scale", "packed_color"] {
         text.push_str(&format!("property uint {name}\n"));
     }
     text.push_str("element sh 2\n");
     (0..9).for_each(|at| text.push_str(&format!("property uchar f_rest_{at}\n")));
     text.push_str("end_header\n");
     let mut bytes = text.into_bytes();
-    for value in [
-        -1.0_f32, -2.0, -3.0, 1.0, 2.0, 3.0, -9.0, -8.0, -7.0, -3.0, -2.0, -1.0,
-    ] {
+    for value in [-1.0_f32, -2.0, -3.0, 1.0, 2.0, 3.0, -9.0, -8.0, -7.0, -3.0, -2.0, -1.0] {
         bytes.extend(value.to_le_bytes());
     }
     let middle = 2 << 30 | 512 << 20 | 512 << 10 | 512;
     for word in [0, middle, 0, 0, u32::MAX, middle, u32::MAX, u32::MAX] {
         bytes.extend(word.to_le_bytes());
     }
-    bytes.extend([
-        0, 1, 2, 3, 4, 5, 6, 7, 8, 255, 254, 253, 252, 251, 250, 249, 248, 128,
-    ]);
+    bytes.extend([0, 1, 2, 3, 4, 5, 6, 7, 8, 255, 254, 253, 252, 251, 250, 249, 248, 128]);
     bytes
 }
 
@@ -145,9 +129,7 @@ pub(crate) fn sog_with(meta: &str, alpha: u8) -> Vec<u8> {
     let labels = vec![0, 0, 0, 255, 1, 0, 0, 255, 63, 0, 0, 255, 5, 0, 0, 255];
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     let mut add = |name: &str, content: &[u8]| {
-        archive
-            .start_file(name, zip::write::SimpleFileOptions::default())
-            .unwrap();
+        archive.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
         archive.write_all(content).unwrap();
     };
     add("meta.json", meta.as_bytes());
@@ -164,8 +146,6 @@ pub(crate) fn sog_with(meta: &str, alpha: u8) -> Vec<u8> {
 fn webp(rgba: &[u8], width: u32) -> Vec<u8> {
     let mut out = Vec::new();
     let height = rgba.len() as u32 / 4 / width;
-    WebPEncoder::new_lossless(&mut out)
-        .write_image(rgba, width, height, ExtendedColorType::Rgba8)
-        .unwrap();
+    WebPEncoder::new_lossless(&mut out).write_image(rgba, width, height, ExtendedColorType::Rgba8).unwrap();
     out
 }

@@ -45,9 +45,7 @@ fn version_4_with(frame: &GaussianFrame, extension: u32, value: u32) -> Vec<u8> 
     out[15] = sizes.iter().filter(|&&size| size > 0).count() as u8;
     out.extend(44_u32.to_le_bytes());
     out.extend([0; 12]);
-    [extension, 4, value]
-        .iter()
-        .for_each(|word| out.extend(word.to_le_bytes()));
+    [extension, 4, value].iter().for_each(|word| out.extend(word.to_le_bytes()));
     let mut frames = Vec::new();
     for size in sizes.into_iter().filter(|&size| size > 0) {
         let (stream, after) = rest.split_at(size);
@@ -89,10 +87,7 @@ fn version_2_stores_x_y_z_of_the_rotation() {
     content.extend([0x00, 0x10, 0x00, 0x00, 0x20, 0x00, 0x00, 0xd0, 0xff]);
     content.extend([128, 255, 128, 0, 160, 160, 160, 255, 128, 128]);
     let frame = spz::read(&gzip(&content), &LIMITS).unwrap();
-    assert_eq!(
-        frame.position().each_ref().map(|plane| plane[0]),
-        [1.0, -2.0, 3.0]
-    );
+    assert_eq!(frame.position().each_ref().map(|plane| plane[0]), [1.0, -2.0, 3.0]);
     assert_eq!(frame.log_scale()[0][0], 0.0);
     // x is 1, so the rest is next to nothing.
     assert!(frame.rotation()[1][0] > 0.999 && frame.rotation()[0][0].abs() < 0.1);
@@ -104,21 +99,13 @@ fn version_1_has_half_floats() {
     content.extend([0x00, 0x3c, 0x00, 0xc0, 0x00, 0x38]);
     content.extend([128, 255, 128, 0, 160, 160, 160, 128, 128, 128]);
     let frame = spz::read(&gzip(&content), &LIMITS).unwrap();
-    assert_eq!(
-        frame.position().each_ref().map(|plane| plane[0]),
-        [1.0, 2.0, -0.5]
-    );
+    assert_eq!(frame.position().each_ref().map(|plane| plane[0]), [1.0, 2.0, -0.5]);
 }
 
 #[test]
 fn a_count_beyond_the_bytes_is_refused_without_room_for_it() {
     let error = spz::read(&gzip(&header(3, 1 << 13, 3, 0)), &LIMITS).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("positions needs 73728 bytes, 0 are left"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("positions needs 73728 bytes, 0 are left"), "{error}");
     let error = spz::read(&gzip(&header(3, u32::MAX, 0, 0)), &LIMITS).unwrap_err();
     assert!(error.to_string().contains("max_gaussians"), "{error}");
 }
