@@ -237,7 +237,10 @@ impl Report {
             text += &format!("  stopped early; the last frame has {last} refinements\n");
         }
         for lost in &self.lost {
-            text += &format!("  frame {} stops after {} refinements\n", lost.frame, lost.refinements);
+            text += &format!(
+                "  frame {} stops after {} refinements: {}\n",
+                lost.frame, lost.refinements, lost.fault
+            );
         }
         text
     }

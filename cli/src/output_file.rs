@@ -18,6 +18,12 @@ impl OutputFile {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
+        if !parent.is_dir() {
+            let (path, parent) = (path.display(), parent.display());
+            return Err(Failure::other(format!(
+                "{path}: cannot write: there is no directory {parent}\n  make it first"
+            )));
+        }
         if path.is_dir() {
             return Err(Failure::other(format!(
                 "{} is a directory: give the name of a file",

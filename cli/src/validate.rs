@@ -79,9 +79,7 @@ impl Verdict {
             (path.display(), grouped(self.frames.into()), grouped(self.gaussians));
         match self.class {
             None => format!("{path}: accept ({frames} frames, {gaussians} Gaussians, every digest agrees)"),
-            Some(class) => {
-                format!("{path}: {} ({class}, {frames} frames decoded up to there)", self.outcome)
-            }
+            Some(class) => format!("{path}: {class}, {frames} frames decoded up to there"),
         }
     }
 }

@@ -80,6 +80,11 @@ impl Elements {
                 None => file_header.push(Row::from(element)),
             }
         });
+        // The payload of a damaged unit has no elements, and still takes its bytes.
+        let starts: Vec<u64> = units.iter().skip(1).map(|unit| unit.at).collect();
+        for (unit, next) in units.iter_mut().zip(starts) {
+            unit.bytes = next.saturating_sub(unit.at);
+        }
         Self { file_header, units, error }
     }
 }
@@ -138,7 +143,7 @@ fn push_rows(text: &mut String, rows: &[Row]) {
         // Writing to a string cannot fail.
         let _infallible = writeln!(
             text,
-            "    {:<12} {:>8}  {:<20} {:<26} {} ({})",
+            "    {:<12} {:>8}  {:<20} {:<26}  {} ({})",
             place(row.at_bit),
             length(row.bits),
             row.name,
