@@ -4,7 +4,7 @@ use crate::colour::Colour;
 use crate::layout::ShCoding;
 use splatstream_format::payload::{Codebook, Refinement, Transform};
 use splatstream_format::syntax::{
-    FrameHeader, GopHeader, SequenceParameters, ShMode, TransformKind, UnitType,
+    FrameHeader, GopHeader, SequenceParameters, TransformKind, UnitType,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
@@ -100,11 +100,7 @@ impl Gop {
             let kind = ErrorKind::OutOfRange { element: "sh_mode", value, min: 0, max: 0 };
             return Err(Error::new(at, "6.9", kind));
         }
-        let mode = match header.mode() {
-            Some(ShMode::Coefficients) => ShCoding::Coefficients { rank },
-            Some(ShMode::VectorQuantised) => ShCoding::VectorQuantised { stages: header.vq_stage_count },
-            _ => ShCoding::None,
-        };
+        let mode = ShCoding::of(header, rank);
         let mut codebooks = [None; 4];
         for (slot, id) in codebooks.iter_mut().zip(header.codebooks()) {
             let undefined = ErrorKind::Undefined { element: "codebook_ids", id: u64::from(id) };

@@ -10,7 +10,7 @@
 //! | 7.9 canonical planes and digest | [`frame`], [`digest`] |
 //! | 7.10 output | [`output`] |
 //! | 7.11 operating points | [`operating_point`] |
-//! | 8.5 contexts | [`context`], [`layout`] |
+//! | 8.5 contexts | [`context`] |
 //!
 //! The encoder calls the same functions: what it reconstructs is what a decoder reconstructs.
 #![deny(
@@ -22,6 +22,8 @@
     clippy::unwrap_used
 )]
 
+pub use splatstream_format::entropy::layout;
+
 pub mod attribute;
 pub mod block;
 pub mod colour;
@@ -29,7 +31,6 @@ pub mod context;
 pub mod digest;
 pub mod frame;
 pub mod gop;
-pub mod layout;
 pub mod operating_point;
 pub mod output;
 pub mod position;

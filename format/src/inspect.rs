@@ -10,8 +10,10 @@ use crate::syntax::{
 };
 use crate::unit::{Delivery, Unit, Units};
 use crate::{Error, ErrorKind, Limits, Result};
+use section::Coding;
 use std::borrow::Cow;
 
+mod section;
 mod value;
 
 /// One syntax element of a stream.
@@ -36,7 +38,7 @@ pub struct Element {
 /// Visits every element of a stream in order, and gives the first error. Behind a damaged payload it goes on
 /// with the next unit.
 pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) -> Option<Error> {
-    let mut inspector = Inspector { visit, limits: *limits, sequence: None, first: None };
+    let mut inspector = Inspector { visit, limits: *limits, sequence: None, coding: Coding::default(), first: None };
     inspector.stream(bytes);
     inspector.first
 }
@@ -45,6 +47,7 @@ struct Inspector<'v> {
     visit: &'v mut dyn FnMut(Element),
     limits: Limits,
     sequence: Option<SequenceParameters>,
+    coding: Coding,
     first: Option<Error>,
 }
 
@@ -87,11 +90,14 @@ impl Inspector<'_> {
             }
             UnitType::GopHeader => {
                 self.fixed(&GopHeader::TABLE, payload, at);
+                self.coding = Coding::default();
                 GopHeader::parse_payload(payload, at)?.validate_from(at, unit.header.frame)?;
             }
             UnitType::FrameHeader => {
                 self.fixed(&FrameHeader::TABLE, payload, at);
-                FrameHeader::parse_payload(payload, at)?.within(at, &self.limits)?;
+                let header = FrameHeader::parse_payload(payload, at)?;
+                self.coding.start_frame(&header);
+                header.within(at, &self.limits)?;
             }
             UnitType::Transform => self.transform(payload, at)?,
             UnitType::Codebook => self.codebook(payload, at)?,
@@ -113,6 +119,7 @@ impl Inspector<'_> {
     fn transform(&mut self, payload: &[u8], at: u64) -> Result<()> {
         self.fixed(&TransformHeader::TABLE, payload, at);
         let transform = Transform::parse(payload, at, &self.sequence_at(at)?)?;
+        self.coding.define(&transform.header);
         let mean_at = after(at, TransformHeader::SIZE);
         let mean_bytes = size_of_val(transform.mean.as_slice());
         self.variable("transform", "mean", mean_at, mean_bytes, value::summary(&transform.mean));
@@ -143,25 +150,18 @@ impl Inspector<'_> {
         let Some((model, after_model)) = model else {
             return parsed.map(drop);
         };
-        self.variable("refinement", "models", place(rest), model.len(), format!("{} bytes", model.len()));
+        self.models(&parsed, model, place(rest));
         rest = after_model;
         // The count of a header that was refused is not to be trusted.
-        let blocks = parsed?.blocks;
+        let Refinement { header, blocks, .. } = parsed?;
+        let lanes_log2 = header.lanes_log2;
         for block in 0..blocks.len() {
             self.number("block_length", Some(block), &mut rest, place)?;
         }
-        self.blocks(&blocks);
-        Ok(())
-    }
-
-    fn blocks(&mut self, blocks: &[(&[u8], u64)]) {
-        let Some(row) = variable_row("refinement", "blocks") else {
-            return;
-        };
-        for (place, (block, at)) in blocks.iter().enumerate() {
-            let (name, value) = (format!("blocks[{place}]"), format!("{} bytes", block.len()));
-            self.show(*at, block.len(), name.into(), value, row.meaning, row.clause, row.record);
+        for (place, (block, at)) in blocks.into_iter().enumerate() {
+            self.block(place, block, at, lanes_log2);
         }
+        Ok(())
     }
 
     fn index(&mut self, payload: &[u8], at: u64) -> Result<()> {

@@ -36,7 +36,7 @@ fn codes_are_shown_with_what_they_stand_for() {
     assert_eq!(one("frame_header", "frame_type"), "0 (I)");
     assert_eq!(one("refinement", "refinement_digest"), "0x0123456789abcdef");
     assert_eq!(one("refinement", "sh_mode"), "2 (vector quantised)");
-    assert_eq!(one("refinement", "models"), "3 bytes");
+    assert!(one("refinement", "models").starts_with("3 bytes, not readable: "));
     assert_eq!(one("refinement", "block_length[1]"), "5");
     assert_eq!(one("refinement", "blocks[1]"), "5 bytes");
     assert_eq!(one("index_entry", "offset"), "112");

@@ -69,20 +69,19 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
         0 => format!("{rank} coefficients"),
         entries => format!("codebook of {} entries, {rank} components", grouped(entries.into())),
     };
+    let trial = report.sh_trial.map(|[(bits, error), (book_bits, book_error)]| {
+        format!(
+            "coefficients take {bits:.2} bits a Gaussian (squared error {error:.3} steps), \
+             a codebook {book_bits:.2} ({book_error:.3})"
+        )
+    });
     let asked = match settings.sh {
-        ShChoice::Auto => "not tried with this preset or scene",
-        ShChoice::Coefficients => "--sh coefficients",
-        ShChoice::VectorQuantised => "--sh vq",
+        ShChoice::Auto => None,
+        ShChoice::Coefficients => Some("--sh coefficients".to_owned()),
+        ShChoice::VectorQuantised => Some("--sh vq".to_owned()),
     };
-    let why = report.sh_trial.map_or_else(
-        || asked.to_owned(),
-        |[(bits, error), (book_bits, book_error)]| {
-            format!(
-                "coefficients take {bits:.2} bits a Gaussian (squared error {error:.3} steps), \
-                 a codebook {book_bits:.2} ({book_error:.3})"
-            )
-        },
-    );
+    let reasons: Vec<String> = asked.into_iter().chain(trial).collect();
+    let why = if reasons.is_empty() { "the only one tried".to_owned() } else { reasons.join("; ") };
     Choice::new("sh coding", choice, why)
 }
 

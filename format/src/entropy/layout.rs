@@ -1,8 +1,9 @@
-//! Clause 8.5: which planes a refinement unit codes, in which order, and which contexts each may use.
+//! Clauses 8.1 and 8.5: which planes a refinement unit codes, in which order, and which contexts each may use.
 
-use splatstream_format::entropy::model::{PlaneModel, Source};
-use splatstream_format::entropy::token::Alphabet;
-use splatstream_format::{Error, ErrorKind, Result};
+use super::model::{PlaneModel, Source};
+use super::token::Alphabet;
+use crate::syntax::{RefinementHeader, ShMode};
+use crate::{Error, ErrorKind, Result};
 
 /// What a coded plane belongs to, in coding order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,6 +55,17 @@ pub enum ShCoding {
         /// How many codebooks are added.
         stages: u8,
     },
+}
+
+impl ShCoding {
+    /// What a refinement header says, for an sh transform of `rank` components.
+    pub fn of(header: &RefinementHeader, rank: u8) -> Self {
+        match header.mode() {
+            Some(ShMode::Coefficients) => Self::Coefficients { rank },
+            Some(ShMode::VectorQuantised) => Self::VectorQuantised { stages: header.vq_stage_count },
+            _ => Self::None,
+        }
+    }
 }
 
 /// One coded plane.
