@@ -3,7 +3,7 @@
 mod common;
 
 use common::{directory, fail, fixture, json, run, succeed, text};
-use splatstream_encoder::{Quality, Settings, encode};
+use splatstream_encoder::{Preset, Quality, Settings, ShChoice, encode};
 use splatstream_scene::builtin::BuiltinScene;
 use std::fs;
 
@@ -17,6 +17,8 @@ fn write_the_fixture() {
         refinements: vec![25, 50, 100],
         block_log2: 6,
         gop: 1,
+        preset: Preset::Fast,
+        sh: ShChoice::VectorQuantised,
         ..Settings::default()
     };
     let mut stream = Vec::new();
@@ -31,7 +33,11 @@ fn units_are_listed_one_a_line() {
 
 #[test]
 fn the_tree_has_every_element() {
-    insta::assert_snapshot!(succeed(&["inspect", text(&fixture())]));
+    let tree = succeed(&["inspect", text(&fixture())]);
+    // Up to the second refinement every kind of unit has come but the last two; what they hold is short.
+    let (start, rest) = tree.split_once("unit 7 ").unwrap();
+    let (_, end) = rest.split_once("unit 17 ").unwrap();
+    insta::assert_snapshot!(format!("{start}...\nunit 17 {end}"));
 }
 
 #[test]
@@ -55,7 +61,7 @@ fn the_dump_of_a_unit_holds_its_bytes() {
     let elements = dump["elements"].as_array().unwrap();
     let hex: String = elements.iter().filter_map(|element| element["hex"].as_str()).collect();
     let expected: String = bytes[at..at + length].iter().map(|byte| format!("{byte:02x}")).collect();
-    assert_eq!(hex, expected);
+    assert_eq!(hex, expected, "a GOP header has no element that shares a byte with another");
     let shown = succeed(&["inspect", text(&fixture()), "--hex", "1"]);
     assert!(shown.contains("unit_header.unit_type = 2 (gop_header) (5.3)"), "{shown}");
 }

@@ -3,9 +3,7 @@
 use crate::colour::Colour;
 use crate::layout::ShCoding;
 use splatstream_format::payload::{Codebook, Refinement, Transform};
-use splatstream_format::syntax::{
-    FrameHeader, GopHeader, SequenceParameters, TransformKind, UnitType,
-};
+use splatstream_format::syntax::{FrameHeader, GopHeader, SequenceParameters, TransformKind, UnitType};
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
 

@@ -156,14 +156,17 @@ impl<'a> Decoder<'a> {
         }
     }
 
-    /// The frame that was arriving when the stream broke off, as far as it is there.
+    /// The frame before an error if it was complete; if the decoder is tolerant, also one that was still arriving.
     ///
     /// # Errors
     /// As [`Decoder::unit`].
     pub fn cut(&mut self) -> Result<Option<DecodedFrame>> {
         match self.finished.take() {
             Some(frame) => Ok(Some(frame)),
-            None => self.close_frame(None),
+            None => {
+                let frame = self.close_frame(None)?;
+                Ok(frame.filter(|_| self.options.tolerant))
+            }
         }
     }
 

@@ -18,7 +18,7 @@ pub struct Summary {
 /// Decodes a stream; hands out each frame as it is complete, until `on_frame` breaks off.
 ///
 /// When the stream breaks off or turns out wrong, the frame that was arriving is handed out as far as it is
-/// there.
+/// there, provided the options are tolerant.
 pub fn decode_stream(
     bytes: &[u8],
     options: &Options,

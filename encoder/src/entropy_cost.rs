@@ -53,7 +53,12 @@ impl Histogram {
     pub(crate) fn table_bits(&self) -> f64 {
         let last = self.counts.iter().rposition(|&count| count > 0).unwrap_or(0);
         let used = self.counts.iter().filter(|&&count| count > 0).count();
-        if used <= 1 { 5.0 } else { 18.0 + 2.0 * (last as f64) + 2.6 * (used as f64) }
+        match (used, last) {
+            (0 | 1, 0) => 2.0,
+            (0 | 1, _) => 11.0,
+            // A token more of the same length is one bit; one that occurs changes it and has a mantissa.
+            _ => 18.0 + last as f64 + 4.0 * used as f64,
+        }
     }
 
     /// Symbols and table.

@@ -111,6 +111,12 @@ struct PlaneView<'a> {
 struct Candidate {
     axes: [ContextAxis; 2],
     clustering: Clustering,
+    bits: f64,
+}
+
+/// Bits that carrying an axis takes, nearly: codes and counts, and an exp-Golomb number a threshold.
+fn axis_bits(axis: &ContextAxis) -> f64 {
+    if axis.source == Source::None { 4.0 } else { 8.0 + 8.0 * axis.thresholds.len() as f64 }
 }
 
 impl PlaneView<'_> {
@@ -126,7 +132,8 @@ impl PlaneView<'_> {
             histograms[usize::from(contexts.get(place).copied().unwrap_or(0))].add(token);
         }
         let clustering = cluster(histograms, second.contexts());
-        Candidate { axes, clustering }
+        let bits = clustering.bits + axis_bits(first) + axis_bits(second);
+        Candidate { bits, axes, clustering }
     }
 
     /// The best pair of axes among the sources.
@@ -149,7 +156,7 @@ impl PlaneView<'_> {
             }
             let contexts = on_axis(&axis, values);
             let candidate = self.candidate([axis.clone(), ContextAxis::NONE], &contexts);
-            if candidate.clustering.bits < best.clustering.bits {
+            if candidate.bits < best.bits {
                 best = candidate;
                 first = Some((place, axis, contexts));
             }
@@ -162,7 +169,7 @@ impl PlaneView<'_> {
             }
             let contexts = context::combine(&on_first, &on_axis(&second, values), second.contexts());
             let candidate = self.candidate([first.clone(), second], &contexts);
-            if candidate.clustering.bits < best.clustering.bits {
+            if candidate.bits < best.bits {
                 best = candidate;
             }
         }

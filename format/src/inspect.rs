@@ -38,7 +38,8 @@ pub struct Element {
 /// Visits every element of a stream in order, and gives the first error. Behind a damaged payload it goes on
 /// with the next unit.
 pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) -> Option<Error> {
-    let mut inspector = Inspector { visit, limits: *limits, sequence: None, coding: Coding::default(), first: None };
+    let mut inspector =
+        Inspector { visit, limits: *limits, sequence: None, coding: Coding::default(), first: None };
     inspector.stream(bytes);
     inspector.first
 }

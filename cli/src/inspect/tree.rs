@@ -145,7 +145,7 @@ fn push_rows(text: &mut String, rows: &[Row]) {
             text,
             "    {:<12} {:>8}  {:<20} {:<26}  {} ({})",
             place(row.at_bit),
-            length(row.bits),
+            length(row.at_bit, row.bits),
             row.name,
             row.value,
             row.meaning,
@@ -162,6 +162,10 @@ pub(super) fn place(at_bit: u64) -> String {
     }
 }
 
-fn length(bits: u64) -> String {
-    if bits.is_multiple_of(8) { format!("{} B", bits / 8) } else { format!("{bits} bit") }
+fn length(at_bit: u64, bits: u64) -> String {
+    if at_bit.is_multiple_of(8) && bits.is_multiple_of(8) {
+        format!("{} B", bits / 8)
+    } else {
+        format!("{bits} bit")
+    }
 }

@@ -1,11 +1,11 @@
 //! Inside a refinement: the models bit by bit, the blocks section by section.
 
 use super::{Element, Inspector, variable_row};
+use crate::Result;
 use crate::entropy::layout::{Layout, PlaneInfo, ShCoding};
 use crate::entropy::model::{ModelTrace, PlaneModel, read_models};
 use crate::payload::{Refinement, leb128};
 use crate::syntax::{FrameHeader, TransformHeader, TransformKind, after};
-use crate::Result;
 
 /// What the models of a unit depend on: the ranks of the transforms, and the models before.
 #[derive(Default)]
@@ -100,7 +100,8 @@ impl Inspector<'_> {
         let mut end = 0;
         for element in elements {
             let plane = planes.get(element.plane);
-            let meaning = plane.map_or(String::new(), |plane| format!("{} {}", plane.attribute.name(), plane.place));
+            let meaning =
+                plane.map_or(String::new(), |plane| format!("{} {}", plane.attribute.name(), plane.place));
             (self.visit)(Element {
                 at_bit: first_bit.saturating_add(element.bit),
                 bits: element.bits,

@@ -1,0 +1,187 @@
+//! Clause 8.4 step by step, written anew: the table of D.4, and a check of the fast reader.
+
+use splatstream_decoder::context::{delta_contexts, plane_contexts};
+use splatstream_decoder::gop::Gop;
+use splatstream_decoder::unit::{CodedUnit, PreparedUnit};
+use splatstream_format::Limits;
+use splatstream_format::bits::BitReader;
+use splatstream_format::entropy::layout::{Attribute, Layout};
+use splatstream_format::entropy::model::PlaneModel;
+use splatstream_format::entropy::token::{Alphabet, join, unzigzag};
+use splatstream_format::payload::Refinement;
+use splatstream_format::syntax::{FrameHeader, GopHeader, SequenceParameters, UnitType};
+use splatstream_format::unit::Stream;
+use std::fmt::Write as _;
+
+/// Appends one table a block.
+pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
+    text.push_str(
+        "\n## D.4 The blocks symbol by symbol\n\nStates in hexadecimal. The coded value of the position plane is the \
+         Morton delta, of the others `e` of 8.1; the bias is not yet added.\n",
+    );
+    let limits = Limits::default();
+    let (mut sequence, mut gop, mut frame, mut before) = (None, None, None, None);
+    for unit in Stream::open(bytes, &limits).unwrap().units() {
+        let unit = unit.unwrap();
+        let (payload, at) = (unit.payload, unit.payload_at);
+        match unit.header.unit_type() {
+            UnitType::SequenceParameters => {
+                sequence = Some(SequenceParameters::parse_payload(payload, at).unwrap())
+            }
+            UnitType::GopHeader => gop = Some(Gop::new(GopHeader::parse_payload(payload, at).unwrap(), 0)),
+            UnitType::FrameHeader => frame = Some(FrameHeader::parse_payload(payload, at).unwrap()),
+            UnitType::Transform => {
+                let (Some(gop), Some(sequence)) = (&mut gop, &sequence) else { panic!("order") };
+                gop.tool(&unit, sequence, &limits).unwrap();
+            }
+            UnitType::Refinement => {
+                let (Some(gop), Some(sequence), Some(frame)) = (&gop, &sequence, &frame) else {
+                    panic!("order")
+                };
+                let refinement = Refinement::parse(payload, at, sequence, &limits).unwrap();
+                let coded = CodedUnit { refinement: &refinement, payload_at: at };
+                let transforms = gop.transforms(frame, at).unwrap();
+                let known = before
+                    .as_ref()
+                    .map(|(layout, models): &(Layout, Vec<PlaneModel>)| (layout, models.as_slice()));
+                let prepared = PreparedUnit::new(coded, gop, transforms, sequence, known, &mut ())
+                    .unwrap()
+                    .with_decoders();
+                let fast = prepared.coded_blocks(sequence).unwrap();
+                let title = format!("refinement {}", unit.header.refinement);
+                for (place, block) in prepared.blocks(sequence).into_iter().enumerate() {
+                    write!(text, "\n### Block {place} of {title}\n").unwrap();
+                    let slow = one(text, &prepared, block.0, block.2, refinement.header.lanes_log2);
+                    let expected = (fast[place].deltas.clone(), fast[place].coded[1..].to_vec());
+                    assert_eq!(slow, expected, "two readers of the same block");
+                }
+                before = Some((prepared.layout.clone(), prepared.models.clone()));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The deltas and the coded planes of a block.
+type Values = (Vec<u64>, Vec<Vec<i32>>);
+
+fn one(
+    text: &mut String,
+    unit: &PreparedUnit<'_, '_, '_>,
+    block: &[u8],
+    count: usize,
+    lanes_log2: u8,
+) -> Values {
+    assert!(block[0] < 128, "a small block has a one-byte word_count");
+    let lanes = 1 << lanes_log2;
+    let mut bytes = block[1..].iter().copied();
+    let mut number =
+        |size: usize| (0..size).fold(0, |sum, place| sum | u32::from(bytes.next().unwrap()) << (8 * place));
+    let mut states: Vec<u32> = (0..lanes).map(|_| number(4)).collect();
+    let words: Vec<u32> = (0..block[0]).map(|_| number(2)).collect();
+    let mut raw = BitReader::new(&block[1 + 4 * lanes + 2 * words.len()..]);
+    let mut next_word = words.into_iter();
+    text.push_str(
+        "\n| Plane | i | Context | State before | Slot | Token | Word | Raw bits | State after | Coded value |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    let (mut deltas, mut planes) = (Vec::new(), vec![Vec::new()]);
+    let mut known = splatstream_decoder::block::CodedBlock::new(Vec::new());
+    for (plane, (&info, model)) in unit.layout.planes().iter().zip(&unit.models).enumerate() {
+        for i in 0..count {
+            let context = context(model, plane, info.alphabet, &known, &deltas, &planes[plane]);
+            let table = &model.tables[usize::from(model.table_of_context[context])];
+            let state = states[i % lanes];
+            let slot = state % 4096;
+            let (token, first) = token_of(table.of_token(), slot);
+            let mut after = u32::from(table.of_token()[token]) * (state >> 12) + slot - first;
+            let mut word = String::new();
+            if after < 65_536 {
+                let taken = next_word.next().unwrap();
+                after = (after << 16) + taken;
+                word = format!("{taken:04x}");
+            }
+            states[i % lanes] = after;
+            let (base, raw_bits) = join(token as u8, model.direct_log2);
+            let value = base + raw.bits(raw_bits);
+            let coded = match info.alphabet {
+                Alphabet::Attribute => i64::from(unzigzag(value as u32)),
+                _ => value as i64,
+            };
+            let name = format!("{} {}", info.attribute.name(), info.place);
+            writeln!(
+                text,
+                "| {name} | {i} | {context} | {state:08x} | {slot} | {token} | {word} | {raw_bits} | {after:08x} | {coded} |"
+            )
+            .unwrap();
+            if info.attribute == Attribute::Position {
+                deltas.push(value);
+            } else {
+                planes[plane].push(coded as i32);
+            }
+        }
+        known.deltas.clone_from(&deltas);
+        remember(&mut known, info, planes[plane].clone(), model.bias);
+        planes.push(Vec::new());
+    }
+    assert!(states.iter().all(|&state| state == 65_536) && next_word.next().is_none());
+    planes.pop();
+    (deltas, planes.split_off(1))
+}
+
+/// The context of the next value of a plane of which `values` are known.
+fn context(
+    model: &PlaneModel,
+    plane: usize,
+    alphabet: Alphabet,
+    known: &splatstream_decoder::block::CodedBlock,
+    deltas: &[u64],
+    values: &[i32],
+) -> usize {
+    let contexts = if alphabet == Alphabet::Position {
+        let mut with_next = deltas.to_vec();
+        with_next.push(0);
+        delta_contexts(&model.axes, &with_next)
+    } else {
+        let mut with_next = values.to_vec();
+        with_next.push(0);
+        plane_contexts(&model.axes, plane, known, &with_next)
+    };
+    let place = if alphabet == Alphabet::Position { deltas.len() } else { values.len() };
+    contexts.get(place).copied().unwrap_or(0).into()
+}
+
+/// The token whose interval holds the slot, and the first slot of the interval.
+fn token_of(frequencies: &[u16], slot: u32) -> (usize, u32) {
+    let mut first = 0;
+    for (token, &frequency) in frequencies.iter().enumerate() {
+        if slot < first + u32::from(frequency) {
+            return (token, first);
+        }
+        first += u32::from(frequency);
+    }
+    panic!("a table has 4096 slots");
+}
+
+/// What later contexts need of a plane, clauses 7.4 and 7.5.
+fn remember(
+    known: &mut splatstream_decoder::block::CodedBlock,
+    info: splatstream_format::entropy::layout::PlaneInfo,
+    values: Vec<i32>,
+    bias: i32,
+) {
+    let place = usize::from(info.place);
+    match info.attribute {
+        Attribute::LogScale if place == 0 => {
+            known.log_scale[0] = values.iter().map(|value| value + bias).collect();
+        }
+        Attribute::LogScale => {
+            let larger = known.log_scale[place - 1].clone();
+            known.log_scale[place] =
+                larger.iter().zip(&values).map(|(larger, value)| larger - value - bias).collect();
+        }
+        Attribute::Opacity => known.opacity = values.iter().map(|value| value + bias).collect(),
+        _ => {}
+    }
+    known.push(info, values);
+}
