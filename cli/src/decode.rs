@@ -114,7 +114,7 @@ impl Decode {
         let mut decoding = Decoding::new(frames, target.as_ref(), announced);
         let start = Instant::now();
         let summary =
-            decode_stream(&stream.bytes, &options, |sequence, frame| decoding.take(sequence, &frame));
+            decode_stream(&stream.bytes, &options, |sequence, frame| decoding.take(sequence, frame));
         let total = start.elapsed();
         if let Some(failure) = decoding.failed.take() {
             return Err(failure);
@@ -185,18 +185,19 @@ impl<'a> Decoding<'a> {
     }
 
     /// Takes a frame out of the decoder; breaks off after the last frame asked for and when a file fails.
-    fn take(&mut self, sequence: &SequenceParameters, frame: &DecodedFrame) -> ControlFlow<()> {
-        if self.frames.contains(frame.number) {
-            self.count(frame);
-            let gaussians = to_gaussians(&frame.planes, sequence);
+    fn take(&mut self, sequence: &SequenceParameters, frame: DecodedFrame) -> ControlFlow<()> {
+        let number = frame.number;
+        if self.frames.contains(number) {
+            self.count(&frame);
+            let gaussians = to_gaussians(frame.planes, sequence);
             let start = Instant::now();
-            self.failed = self.target.and_then(|target| target.write(frame.number, &gaussians).err());
+            self.failed = self.target.and_then(|target| target.write(number, &gaussians).err());
             self.writing += start.elapsed();
         } else {
             self.passed += frame.planes.len() as u64;
         }
-        self.progress.at(frame.number.saturating_add(1));
-        if self.failed.is_some() || self.frames.is_over(frame.number.saturating_add(1)) {
+        self.progress.at(number.saturating_add(1));
+        if self.failed.is_some() || self.frames.is_over(number.saturating_add(1)) {
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())

@@ -3,7 +3,7 @@
 use crate::attribute::{self, ATTRIBUTE_RANGE, in_range};
 use crate::colour::Colour;
 use crate::context::{DeltaNeighbours, Neighbours, axis_contexts, combine, is_serial};
-use crate::frame::QuantizedFrame;
+use crate::frame::FrameSlice;
 use crate::layout::{Attribute, Layout, PlaneInfo};
 use crate::position;
 use splatstream_format::Result;
@@ -85,20 +85,21 @@ pub struct UnitParameters<'a> {
     pub colour: Colour<'a>,
 }
 
-/// Clause 7.3 to 7.8 for one block of `count` Gaussians at absolute offset `at`.
+/// Clause 7.3 to 7.8 for one block at absolute offset `at`, of as many Gaussians as `out` holds.
 ///
 /// # Errors
 /// Malformed or invalid as the clauses say.
 pub fn decode_block(
     bytes: &[u8],
     at: u64,
-    count: usize,
     unit: &UnitParameters<'_>,
     decoders: &[PlaneDecoder],
-) -> Result<QuantizedFrame> {
+    out: &mut FrameSlice<'_>,
+) -> Result<()> {
+    let count = out.planes.first().map_or(0, |plane| plane.len());
     let block = decode_coded(bytes, at, count, unit, decoders)?;
     let biases: Vec<i32> = decoders.iter().map(PlaneDecoder::bias).collect();
-    reconstruct(block, unit, &biases, at)
+    reconstruct(&block, unit, &biases, at, out)
 }
 
 /// Clause 8.4: the coded values of a block, its entropy state checked.
@@ -217,6 +218,11 @@ fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, bias: i32) {
     }
 }
 
+/// Places of the attributes among the planes of a [`FrameSlice`].
+const OPACITY: usize = 3;
+const ROTATION: usize = 4;
+const DC: usize = 7;
+
 /// Coded planes, all there, to the integer attributes of the block. The encoder calls this too.
 ///
 /// `biases` are those of the plane models, by plane.
@@ -224,15 +230,19 @@ fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, bias: i32) {
 /// # Errors
 /// Invalid if a value is out of range.
 pub fn reconstruct(
-    block: CodedBlock,
+    block: &CodedBlock,
     unit: &UnitParameters<'_>,
     biases: &[i32],
     at: u64,
-) -> Result<QuantizedFrame> {
-    let position = position::positions(&block.deltas, unit.position_bits, unit.position_shift, at)?;
+    out: &mut FrameSlice<'_>,
+) -> Result<()> {
+    position::positions(&block.deltas, unit.position_bits, unit.position_shift, &mut out.position, at)?;
     attribute::check_log_scales(&block.log_scale, unit.canonical_axes, at)?;
     in_range(&block.opacity, &ATTRIBUTE_RANGE, "opacity", "7.5", at)?;
-    let mut rotation = [(); 3].map(|()| Vec::new());
+    for (place, plane) in block.log_scale.iter().enumerate() {
+        out.write(place, plane);
+    }
+    out.write(OPACITY, &block.opacity);
     let mut dc_components = Vec::new();
     let mut sh_components = Vec::new();
     let [largest, _, smallest] = &block.log_scale;
@@ -240,16 +250,15 @@ pub fn reconstruct(
         match info.attribute {
             Attribute::Rotation => {
                 let values = attribute::unbias(coded, bias);
-                if let Some(plane) = rotation.get_mut(usize::from(info.place)) {
-                    let thresholds = unit.rotation_thresholds;
-                    *plane = attribute::rotations(&values, largest, smallest, thresholds, at)?;
-                }
+                let thresholds = unit.rotation_thresholds;
+                let fine = attribute::rotations(&values, largest, smallest, thresholds, at)?;
+                out.write(ROTATION.wrapping_add(usize::from(info.place)), &fine);
             }
             Attribute::Dc => dc_components.push(attribute::unbias(coded, bias)),
             Attribute::Sh => sh_components.push(attribute::unbias(coded, bias)),
             Attribute::Position | Attribute::LogScale | Attribute::Opacity => {}
         }
     }
-    let (dc, sh) = unit.colour.reconstruct(&dc_components, &sh_components, block.deltas.len(), at)?;
-    Ok(QuantizedFrame { position, log_scale: block.log_scale, opacity: block.opacity, rotation, dc, sh })
+    let colour = out.planes.get_mut(DC..).unwrap_or_default();
+    unit.colour.reconstruct(&dc_components, &sh_components, colour, at)
 }

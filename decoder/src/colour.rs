@@ -23,15 +23,10 @@ pub struct Colour<'a> {
     pub mode: ShCoding,
     /// The codebooks of the stages.
     pub codebooks: [Option<&'a Codebook>; 4],
-    /// SH planes of a frame of this sequence.
-    pub sh_planes: usize,
 }
 
-/// Red, green and blue, and the SH planes.
-pub type ColourPlanes = ([Vec<i32>; 3], Vec<Vec<i32>>);
-
 impl Colour<'_> {
-    /// The dc planes and the SH planes of `count` Gaussians.
+    /// Writes red, green, blue and the SH planes of a block to `out`.
     ///
     /// # Errors
     /// Invalid if a component is out of range or an index names no entry.
@@ -39,20 +34,21 @@ impl Colour<'_> {
         &self,
         dc: &[Vec<i32>],
         sh: &[Vec<i32>],
-        count: usize,
+        out: &mut [&mut [i32]],
         at: u64,
-    ) -> Result<ColourPlanes> {
-        let mut colour = inverse(self.dc, dc, count, at)?.into_iter();
-        let mut next = || colour.next().unwrap_or_default();
-        let dc = [next(), next(), next()];
-        let sh = match (self.mode, self.sh) {
-            (ShCoding::Coefficients { .. }, Some(transform)) => inverse(transform, sh, count, at)?,
+    ) -> Result<()> {
+        let (dc_out, sh_out) = out.split_at_mut_checked(3).unwrap_or_default();
+        inverse(self.dc, dc, dc_out, at)?;
+        match (self.mode, self.sh) {
+            (ShCoding::Coefficients { .. }, Some(transform)) => inverse(transform, sh, sh_out, at),
             (ShCoding::VectorQuantised { .. }, Some(transform)) => {
-                inverse(transform, &self.entries(sh, usize::from(transform.header.rank), at)?, count, at)?
+                inverse(transform, &self.entries(sh, usize::from(transform.header.rank), at)?, sh_out, at)
             }
-            _ => vec![vec![0; count]; self.sh_planes],
-        };
-        Ok((dc, sh))
+            _ => {
+                sh_out.iter_mut().for_each(|plane| plane.fill(0));
+                Ok(())
+            }
+        }
     }
 
     /// Clause 7.8. Adds up the codebook entries of the stages; the sum is clamped.
@@ -97,31 +93,31 @@ fn in_entries(stage: &[i32], largest: usize, at: u64) -> Result<()> {
 pub fn inverse(
     transform: &Transform,
     components: &[Vec<i32>],
-    count: usize,
+    out: &mut [&mut [i32]],
     at: u64,
-) -> Result<Vec<Vec<i32>>> {
+) -> Result<()> {
     let dimension = usize::from(transform.header.dimension);
     for plane in components {
         in_range(plane, &COMPONENT_RANGE, "component", "7.7", at)?;
     }
-    let mut planes: Vec<Vec<i32>> = (0..dimension).map(|_| Vec::with_capacity(count)).collect();
+    let count = out.first().map_or(0, |plane| plane.len());
     let mut tile = vec![[0_i16; TILE]; components.len()];
     let mut start = 0_usize;
     while start < count {
-        let width = TILE.min(count.wrapping_sub(start));
         for (tile, plane) in tile.iter_mut().zip(components) {
             for (value, &component) in tile.iter_mut().zip(plane.get(start..).unwrap_or_default()) {
                 *value = component as i16;
             }
         }
-        for (axis, (plane, &mean)) in planes.iter_mut().zip(&transform.mean).enumerate() {
+        for (axis, (plane, &mean)) in out.iter_mut().zip(&transform.mean).enumerate() {
             let sums = tile_sums(transform, axis, dimension, &tile);
-            let rounded = sums.iter().take(width).map(|&sum| mean.wrapping_add(sum.wrapping_add(32) >> 6));
-            plane.extend(rounded);
+            for (slot, sum) in plane.get_mut(start..).unwrap_or_default().iter_mut().zip(sums) {
+                *slot = mean.wrapping_add(sum.wrapping_add(32) >> 6);
+            }
         }
         start = start.wrapping_add(TILE);
     }
-    Ok(planes)
+    Ok(())
 }
 
 #[inline(always)]

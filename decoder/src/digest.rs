@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     fn frame() -> QuantizedFrame {
-        let mut frame = QuantizedFrame::with_capacity(0, 0);
+        let mut frame = QuantizedFrame::zeroed(0, 0);
         let plane: Vec<i32> = (0..3000).collect();
         frame.position = [(); 3].map(|()| (0..3000).collect());
         frame.log_scale = [(); 3].map(|()| plane.clone());

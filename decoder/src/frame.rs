@@ -1,7 +1,5 @@
 //! Clause 7.9: the canonical integer planes of a frame.
 
-use rayon::prelude::*;
-
 /// A reconstructed frame: integers on the lattices of the sequence, Gaussians in coded order.
 ///
 /// All planes have the same length.
@@ -21,18 +19,69 @@ pub struct QuantizedFrame {
     pub sh: Vec<Vec<i32>>,
 }
 
+/// A run of Gaussians of a frame, to be written.
+#[derive(Debug)]
+pub struct FrameSlice<'a> {
+    /// Lattice position x, y, z.
+    pub position: Vec<&'a mut [u32]>,
+    /// The other planes in canonical order: log-scale, opacity, rotation, dc, sh.
+    pub planes: Vec<&'a mut [i32]>,
+}
+
+impl FrameSlice<'_> {
+    /// Copies values into one of `planes`.
+    pub fn write(&mut self, plane: usize, values: &[i32]) {
+        for (slot, &value) in
+            self.planes.get_mut(plane).into_iter().flat_map(|plane| plane.iter_mut()).zip(values)
+        {
+            *slot = value;
+        }
+    }
+}
+
+/// Splits the first `length` values off `rest`.
+fn take<'a, T>(rest: &mut &'a mut [T], length: usize) -> &'a mut [T] {
+    let (first, after) = core::mem::take(rest).split_at_mut_checked(length).unwrap_or_default();
+    *rest = after;
+    first
+}
+
 impl QuantizedFrame {
-    /// An empty frame with `sh_planes` SH planes and room for `count` Gaussians.
-    pub fn with_capacity(count: usize, sh_planes: usize) -> Self {
-        let planes = || [(); 3].map(|()| Vec::with_capacity(count));
+    /// A frame of `count` Gaussians, every integer 0, with `sh_planes` SH planes.
+    pub fn zeroed(count: usize, sh_planes: usize) -> Self {
+        let planes = || [(); 3].map(|()| vec![0; count]);
         Self {
-            position: [(); 3].map(|()| Vec::with_capacity(count)),
+            position: [(); 3].map(|()| vec![0; count]),
             log_scale: planes(),
-            opacity: Vec::with_capacity(count),
+            opacity: vec![0; count],
             rotation: planes(),
             dc: planes(),
-            sh: (0..sh_planes).map(|_| Vec::with_capacity(count)).collect(),
+            sh: (0..sh_planes).map(|_| vec![0; count]).collect(),
         }
+    }
+
+    /// Divides the frame in runs of the given lengths, so that each can be written by itself.
+    pub fn slices(&mut self, lengths: &[usize]) -> Vec<FrameSlice<'_>> {
+        let planes = 10_usize.wrapping_add(self.sh.len());
+        let mut slices: Vec<FrameSlice<'_>> = lengths
+            .iter()
+            .map(|_| FrameSlice { position: Vec::with_capacity(3), planes: Vec::with_capacity(planes) })
+            .collect();
+        let Self { position, log_scale, opacity, rotation, dc, sh } = self;
+        for plane in position {
+            let mut rest = plane.as_mut_slice();
+            for (slice, &length) in slices.iter_mut().zip(lengths) {
+                slice.position.push(take(&mut rest, length));
+            }
+        }
+        let others = log_scale.iter_mut().chain([opacity]).chain(rotation).chain(dc).chain(sh);
+        for plane in others {
+            let mut rest = plane.as_mut_slice();
+            for (slice, &length) in slices.iter_mut().zip(lengths) {
+                slice.planes.push(take(&mut rest, length));
+            }
+        }
+        slices
     }
 
     /// Gaussians in the frame.
@@ -43,25 +92,6 @@ impl QuantizedFrame {
     /// True if the frame has no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.opacity.is_empty()
-    }
-
-    /// Appends blocks that have as many SH planes, one plane a task.
-    pub fn append(&mut self, blocks: &[Self]) {
-        for (axis, plane) in self.position.iter_mut().enumerate() {
-            for more in blocks.iter().filter_map(|block| block.position.get(axis)) {
-                plane.extend_from_slice(more);
-            }
-        }
-        let mut parts: Vec<(&mut Vec<i32>, Vec<&[i32]>)> =
-            self.signed_planes_mut().map(|plane| (plane, Vec::with_capacity(blocks.len()))).collect();
-        for block in blocks {
-            for ((_, parts), part) in parts.iter_mut().zip(block.signed_planes()) {
-                parts.push(part);
-            }
-        }
-        parts
-            .into_par_iter()
-            .for_each(|(plane, parts)| parts.iter().for_each(|part| plane.extend_from_slice(part)));
     }
 
     /// Keeps the first `count` Gaussians.

@@ -88,7 +88,6 @@ impl Gop {
         &'a self,
         transforms: Transforms<'a>,
         refinement: &Refinement<'_>,
-        sequence: &SequenceParameters,
         at: u64,
     ) -> Result<Colour<'a>> {
         let header = &refinement.header;
@@ -113,8 +112,7 @@ impl Gop {
             }
             *slot = Some(codebook);
         }
-        let sh_planes = usize::from(sequence.sh_dimension());
-        Ok(Colour { dc: transforms.dc, sh: transforms.sh, mode, codebooks, sh_planes })
+        Ok(Colour { dc: transforms.dc, sh: transforms.sh, mode, codebooks })
     }
 }
 

@@ -12,44 +12,50 @@ use splatstream_scene::{GaussianFrame, Planes};
 /// dc and sh integers are on a lattice 64 times finer than their step.
 const COLOUR_FRACTION: f32 = 1.0 / 64.0;
 
-/// The frame as Gaussians in PLY's domain.
-pub fn to_gaussians(frame: &QuantizedFrame, sequence: &SequenceParameters) -> GaussianFrame {
-    let [x, y, z] = &frame.position;
-    let offset = sequence.position_offset();
-    let step = sequence.position_step();
-    let position = [(x, offset[0]), (y, offset[1]), (z, offset[2])]
-        .map(|(plane, offset)| plane.par_iter().map(|&q| offset + step * q as f32).collect());
-    let scaled = |plane: &Vec<i32>, offset: f32, step: f32| -> Vec<f32> {
-        plane.par_iter().map(|&q| offset + step * q as f32).collect()
+/// The frame as Gaussians in PLY's domain. The planes of integers become the planes of f32: no third copy of a
+/// frame is ever held.
+pub fn to_gaussians(frame: QuantizedFrame, sequence: &SequenceParameters) -> GaussianFrame {
+    let QuantizedFrame { position, log_scale, opacity, rotation, dc, sh } = frame;
+    let [log_scale_offset, opacity_offset] = [sequence.log_scale_offset(), sequence.opacity_offset()];
+    let [log_scale_step, opacity_step] = [sequence.log_scale_step(), sequence.opacity_step()];
+    let rotation_step = sequence.rotation_step();
+    let dc_step = sequence.dc_step() * COLOUR_FRACTION;
+    let sh_step = sequence.sh_step() * COLOUR_FRACTION;
+    let mut planes = Planes {
+        position: placed(position, sequence),
+        log_scale: log_scale.map(|plane| affine(plane, log_scale_offset, log_scale_step)),
+        rotation: [const { Vec::new() }; 4],
+        opacity_logit: affine(opacity, opacity_offset, opacity_step),
+        dc: dc.map(|plane| scaled(plane, dc_step)),
+        sh: sh.into_par_iter().map(|plane| scaled(plane, sh_step)).collect(),
     };
-    let log_scale = frame
-        .log_scale
-        .each_ref()
-        .map(|plane| scaled(plane, sequence.log_scale_offset(), sequence.log_scale_step()));
-    let opacity_logit = scaled(&frame.opacity, sequence.opacity_offset(), sequence.opacity_step());
-    let colour = |plane: &Vec<i32>, step: f32| -> Vec<f32> {
-        let fine_step = step * COLOUR_FRACTION;
-        plane.par_iter().map(|&q| fine_step * q as f32).collect()
-    };
-    let dc = frame.dc.each_ref().map(|plane| colour(plane, sequence.dc_step()));
-    let sh = frame.sh.iter().map(|plane| colour(plane, sequence.sh_step())).collect();
-    let rotation = rotations(&frame.rotation, sequence.rotation_step());
-    let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh };
+    let [x, y, z] = rotation.map(|plane| scaled(plane, rotation_step));
+    planes.rotation = [unit_w(&x, &y, &z), x, y, z];
     GaussianFrame::from_planes(sequence.sh_degree, planes).unwrap_or_default()
 }
 
+fn placed(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {
+    let step = sequence.position_step();
+    let mut offsets = sequence.position_offset().into_iter();
+    position.map(|plane| {
+        let offset = offsets.next().unwrap_or_default();
+        plane.into_iter().map(|q| offset + step * q as f32).collect()
+    })
+}
+
+fn affine(plane: Vec<i32>, offset: f32, step: f32) -> Vec<f32> {
+    plane.into_iter().map(|q| offset + step * q as f32).collect()
+}
+
+fn scaled(plane: Vec<i32>, step: f32) -> Vec<f32> {
+    plane.into_iter().map(|q| step * q as f32).collect()
+}
+
 /// w is what makes the quaternion a unit, 0 if x, y, z are already longer than one.
-fn rotations(planes: &[Vec<i32>; 3], step: f32) -> [Vec<f32>; 4] {
-    let [x, y, z] =
-        planes.each_ref().map(|plane| -> Vec<f32> { plane.par_iter().map(|&q| step * q as f32).collect() });
-    let w = x
-        .par_iter()
-        .zip(&y)
-        .zip(&z)
-        .map(|((&x, &y), &z)| {
-            let squares = x * x + y * y + z * z;
-            (1.0 - squares).max(0.0).sqrt()
-        })
-        .collect();
-    [w, x, y, z]
+fn unit_w(x: &[f32], y: &[f32], z: &[f32]) -> Vec<f32> {
+    let of = |((&x, &y), &z): ((&f32, &f32), &f32)| {
+        let squares = x * x + y * y + z * z;
+        (1.0 - squares).max(0.0).sqrt()
+    };
+    x.iter().zip(y).zip(z).map(of).collect()
 }

@@ -35,30 +35,29 @@ pub fn refine(coarse: u32, shift: u8) -> u32 {
     coarse.wrapping_shl(shift).wrapping_add(1_u32.wrapping_shl(shift) >> 1)
 }
 
-/// The positions of a block from its Morton deltas.
+/// Writes the positions of a block from its Morton deltas: x, y, z.
 ///
 /// `bits` is position_bits, `shift` position_shift of the unit; `at` goes into the error.
 ///
 /// # Errors
 /// Invalid if a code leaves the lattice.
-pub fn positions(deltas: &[u64], bits: u8, shift: u8, at: u64) -> Result<[Vec<u32>; 3]> {
+pub fn positions(deltas: &[u64], bits: u8, shift: u8, out: &mut [&mut [u32]], at: u64) -> Result<()> {
     let coarse_bits = u32::from(bits.saturating_sub(shift));
-    let mut planes = [(); 3].map(|()| Vec::with_capacity(deltas.len()));
-    let [xs, ys, zs] = &mut planes;
+    let [xs, ys, zs] = out else { return Ok(()) };
     let mut code = 0_u64;
     let mut outside = 0_u64;
-    for &delta in deltas {
+    for (((&delta, x), y), z) in deltas.iter().zip(xs.iter_mut()).zip(ys.iter_mut()).zip(zs.iter_mut()) {
         code = code.wrapping_add(delta);
         outside |= code.wrapping_shr(coarse_bits.wrapping_mul(3));
-        xs.push(refine(collect(code), shift));
-        ys.push(refine(collect(code >> 1), shift));
-        zs.push(refine(collect(code >> 2), shift));
+        *x = refine(collect(code), shift);
+        *y = refine(collect(code >> 1), shift);
+        *z = refine(collect(code >> 2), shift);
     }
     if outside != 0 {
         let rule = "a position lies outside the lattice";
         return Err(Error::new(at, "7.3", ErrorKind::Constraint { rule }));
     }
-    Ok(planes)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -326,47 +326,48 @@ impl<'a> Decoder<'a> {
             .map(|unit| CodedUnit { refinement: &unit.refinement, payload_at: unit.payload_at })
             .collect();
         let tools = gop.transforms(&frame.header, 0)?;
-        let results = decode_units(&coded, gop, tools, sequence);
-        self.assemble(&frame, results, sequence).map(Some)
+        let (planes, results) = decode_units(&coded, gop, tools, sequence);
+        self.assemble(&frame, planes, results).map(Some)
     }
 
-    /// Puts the units of a frame together, up to the first that failed.
+    /// Checks the units of a frame, and cuts the planes before the first that failed.
     fn assemble(
         &self,
         frame: &PendingFrame<'a>,
-        results: Vec<Result<Vec<QuantizedFrame>>>,
-        sequence: &SequenceParameters,
+        planes: QuantizedFrame,
+        results: Vec<Result<usize>>,
     ) -> Result<DecodedFrame> {
-        let count = usize::try_from(frame.header.gaussian_count).unwrap_or(usize::MAX);
         let mut decoded = DecodedFrame {
             number: frame.number,
-            planes: QuantizedFrame::with_capacity(count, usize::from(sequence.sh_dimension())),
+            planes,
             refinements: 0,
             digest: None,
             bytes: frame.bytes,
             lost: frame.lost,
         };
         let mut digests: Vec<UnitDigest> = Vec::new();
+        let mut gaussians = 0_usize;
         for (unit, result) in frame.units.iter().zip(results) {
-            let start = decoded.planes.len();
-            let checked = result.and_then(|blocks| {
-                decoded.planes.append(&blocks);
-                self.check_digest(unit, &decoded.planes, start, &mut digests)
+            let checked = result.and_then(|count| {
+                let end = gaussians.wrapping_add(count);
+                let digest = self.check_digest(unit, &decoded.planes, gaussians..end, &mut digests)?;
+                Ok((end, digest))
             });
             match checked {
-                Ok(digest) => {
+                Ok((end, digest)) => {
+                    gaussians = end;
                     decoded.digest = digest;
                     decoded.refinements = decoded.refinements.wrapping_add(1);
                     decoded.bytes = decoded.bytes.wrapping_add(unit.bytes);
                 }
                 Err(error) if self.options.tolerant => {
-                    decoded.planes.truncate(start);
                     decoded.lost = Some(error);
                     break;
                 }
                 Err(error) => return Err(error),
             }
         }
+        decoded.planes.truncate(gaussians);
         Ok(decoded)
     }
 
@@ -374,13 +375,13 @@ impl<'a> Decoder<'a> {
         &self,
         unit: &PendingUnit<'_>,
         planes: &QuantizedFrame,
-        start: usize,
+        gaussians: core::ops::Range<usize>,
         digests: &mut Vec<UnitDigest>,
     ) -> Result<Option<u64>> {
         if !self.options.verify {
             return Ok(None);
         }
-        digests.push(unit_digest(planes, start..planes.len()));
+        digests.push(unit_digest(planes, gaussians));
         let computed = frame_digest(digests);
         let stored = unit.refinement.header.refinement_digest;
         if computed != stored {

@@ -5,11 +5,11 @@ use crate::frame::QuantizedFrame;
 use crate::gop::{Gop, Transforms};
 use crate::layout::Layout;
 use rayon::prelude::*;
-use splatstream_format::Result;
 use splatstream_format::entropy::model::{ModelTrace, PlaneModel, read_models};
 use splatstream_format::entropy::reader::PlaneDecoder;
 use splatstream_format::payload::Refinement;
 use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::{Error, Result};
 
 /// A refinement unit whose payload has been divided.
 #[derive(Debug, Clone, Copy)]
@@ -40,12 +40,11 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
         unit: CodedUnit<'r, 'a>,
         gop: &'g Gop,
         transforms: Transforms<'g>,
-        sequence: &SequenceParameters,
         before: Option<(&Layout, &[PlaneModel])>,
         trace: &mut impl ModelTrace,
     ) -> Result<Self> {
         let refinement = unit.refinement;
-        let colour = gop.colour(transforms, refinement, sequence, unit.payload_at)?;
+        let colour = gop.colour(transforms, refinement, unit.payload_at)?;
         let layout = Layout::new(transforms.dc.header.rank, colour.mode);
         let models = if refinement.header.gaussian_count == 0 {
             Vec::new()
@@ -103,20 +102,59 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
     }
 }
 
-/// Decodes the units of a frame, in order of refinement, to blocks. A unit that fails fails alone, and with it those
-/// that reuse its models.
+/// Decodes the units of a frame, in order of refinement, one behind the other.
+///
+/// Gives the frame and for each unit its Gaussians or its error. A unit that fails fails alone, and with it
+/// those that reuse its models; the Gaussians of a failed unit mean nothing.
 pub fn decode_units(
     units: &[CodedUnit<'_, '_>],
     gop: &Gop,
     transforms: Transforms<'_>,
     sequence: &SequenceParameters,
-) -> Vec<Result<Vec<QuantizedFrame>>> {
-    let mut prepared: Vec<PreparedUnit<'_, '_, '_>> = Vec::with_capacity(units.len());
+) -> (QuantizedFrame, Vec<Result<usize>>) {
+    let (prepared, failure) = prepare(units, gop, transforms);
+    let tasks: Vec<_> = prepared
+        .iter()
+        .enumerate()
+        .flat_map(|(place, unit)| unit.blocks(sequence).into_iter().map(move |block| (place, unit, block)))
+        .collect();
+    let lengths: Vec<usize> = tasks.iter().map(|(_, _, (_, _, count))| *count).collect();
+    let total = lengths.iter().copied().fold(0, usize::wrapping_add);
+    let mut frame = QuantizedFrame::zeroed(total, usize::from(sequence.sh_dimension()));
+    let outputs = frame.slices(&lengths);
+    let decoded: Vec<(usize, Result<usize>)> = tasks
+        .into_par_iter()
+        .zip(outputs)
+        .map(|((place, unit, (bytes, at, count)), mut out)| {
+            let done = decode_block(bytes, at, &unit.parameters(sequence), &unit.decoders, &mut out);
+            (place, done.map(|()| count))
+        })
+        .collect();
+    let mut results: Vec<Result<usize>> = prepared.iter().map(|_| Ok(0)).collect();
+    for (place, block) in decoded {
+        let Some(slot) = results.get_mut(place) else { continue };
+        match (slot.as_mut(), block) {
+            (Ok(gaussians), Ok(count)) => *gaussians = gaussians.wrapping_add(count),
+            (Ok(_), Err(error)) => *slot = Err(error),
+            (Err(_), _) => {}
+        }
+    }
+    results.extend(failure.map(Err));
+    (frame, results)
+}
+
+/// Reads the models of the units up to the first that cannot be read, and expands them.
+fn prepare<'g, 'r, 'a>(
+    units: &[CodedUnit<'r, 'a>],
+    gop: &'g Gop,
+    transforms: Transforms<'g>,
+) -> (Vec<PreparedUnit<'g, 'r, 'a>>, Option<Error>) {
+    let mut prepared: Vec<PreparedUnit<'g, 'r, 'a>> = Vec::with_capacity(units.len());
     let mut failure = None;
     for &unit in units {
         let before = prepared.iter().rev().find(|unit| !unit.models.is_empty());
         let before = before.map(|unit| (&unit.layout, unit.models.as_slice()));
-        match PreparedUnit::new(unit, gop, transforms, sequence, before, &mut ()) {
+        match PreparedUnit::new(unit, gop, transforms, before, &mut ()) {
             Ok(unit) => prepared.push(unit),
             Err(error) => {
                 failure = Some(error);
@@ -124,27 +162,5 @@ pub fn decode_units(
             }
         }
     }
-    let prepared: Vec<_> = prepared.into_par_iter().map(PreparedUnit::with_decoders).collect();
-    let tasks: Vec<_> = prepared
-        .iter()
-        .enumerate()
-        .flat_map(|(place, unit)| unit.blocks(sequence).into_iter().map(move |block| (place, unit, block)))
-        .collect();
-    let blocks: Vec<(usize, Result<QuantizedFrame>)> = tasks
-        .into_par_iter()
-        .map(|(place, unit, (bytes, at, count))| {
-            (place, decode_block(bytes, at, count, &unit.parameters(sequence), &unit.decoders))
-        })
-        .collect();
-    let mut frames: Vec<Result<Vec<QuantizedFrame>>> = prepared.iter().map(|_| Ok(Vec::new())).collect();
-    for (place, block) in blocks {
-        let Some(slot) = frames.get_mut(place) else { continue };
-        match (slot.as_mut(), block) {
-            (Ok(unit), Ok(block)) => unit.push(block),
-            (Ok(_), Err(error)) => *slot = Err(error),
-            (Err(_), _) => {}
-        }
-    }
-    frames.extend(failure.map(Err));
-    frames
+    (prepared.into_par_iter().map(PreparedUnit::with_decoders).collect(), failure)
 }

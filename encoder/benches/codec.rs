@@ -56,7 +56,7 @@ fn decode_verify<const VERIFY: usize>(bencher: Bencher, name: &str) {
     let options = Options { verify: VERIFY == 1, ..Options::default() };
     bencher.counter(ItemsCount::new(frame.len())).bench(|| {
         let summary = decode_stream(black_box(&bytes), &options, |sequence, frame| {
-            black_box(to_gaussians(&frame.planes, sequence));
+            black_box(to_gaussians(frame.planes, sequence));
             ControlFlow::Continue(())
         });
         assert_eq!(summary.end, None);

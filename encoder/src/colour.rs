@@ -133,7 +133,7 @@ pub(crate) fn plan_sh(
     if choice == ShChoice::Auto && cost(by_coefficients) <= cost(by_vq) {
         return ShPlan { trial, ..coefficients };
     }
-    let all = sampled_rows(transform, planes, step, (count / vq::MAX_TRAINING).max(1));
+    let all = sampled_rows(transform, planes, step, (count / (vq::TRAINING_PER_ENTRY * entries)).max(1));
     ShPlan { codebooks: vec![vq::train(&all, rank, entries.min(count))], trial }
 }
 

@@ -116,12 +116,14 @@ fn code_unit(
         .collect();
     let models =
         if blocks.is_empty() { Vec::new() } else { models::choose_all(planes, &blocks, biases, plan.preset) };
-    let parts: Vec<QuantizedFrame> = blocks
+    let sh_planes = usize::from(plan.sequence.sh_dimension());
+    let mut reconstruction = QuantizedFrame::zeroed(indices.len(), sh_planes);
+    let lengths: Vec<usize> = blocks.iter().map(CodedBlock::len).collect();
+    let outputs = reconstruction.slices(&lengths);
+    blocks
         .par_iter()
-        .map(|block| reconstruct(block.clone(), &plan.parameters, biases, 0))
-        .collect::<Result<_, _>>()?;
-    let mut reconstruction = QuantizedFrame::with_capacity(indices.len(), plan.parameters.colour.sh_planes);
-    reconstruction.append(&parts);
+        .zip(outputs)
+        .try_for_each(|(block, mut out)| reconstruct(block, &plan.parameters, biases, 0, &mut out))?;
     let digest = unit_digest(&reconstruction, 0..indices.len());
     Ok(CodedUnit { blocks, models, digest })
 }

@@ -217,7 +217,6 @@ fn write_frame(
                 sh: tools.sh.as_ref().map(|(transform, _)| transform),
                 mode: coding,
                 codebooks: [codebooks.first(), codebooks.get(1), codebooks.get(2), codebooks.get(3)],
-                sh_planes: usize::from(sequence.sh_dimension()),
             },
         },
         header: header_of(coding),

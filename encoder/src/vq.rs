@@ -4,8 +4,8 @@ use rayon::prelude::*;
 use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::CodebookHeader;
 
-/// Vectors used for training, at most.
-pub(crate) const MAX_TRAINING: usize = 1 << 16;
+/// Vectors used for training, for each entry.
+pub(crate) const TRAINING_PER_ENTRY: usize = 64;
 /// Lloyd iterations.
 const ITERATIONS: usize = 8;
 /// Vectors that seeds are drawn from.
@@ -46,18 +46,42 @@ pub(crate) fn assign(codebook: &Codebook, rows: &[f32], rank: usize) -> (Vec<i32
     (found.into_iter().map(|(index, _)| index as i32).collect(), error)
 }
 
+/// Entries compared at a time: their distances stay in registers.
+const LANES: usize = 16;
+
+/// The nearest entry of each row and its squared distance; ties go to the first.
 fn nearest(entries: &[f32], rows: &[f32], rank: usize) -> Vec<(u32, f32)> {
+    let groups = side_by_side(entries, rank);
     let search = |row: &[f32]| {
         let mut best = (0_u32, f32::INFINITY);
-        for (index, entry) in (0..).zip(entries.chunks_exact(rank)) {
-            let distance = squared_distance(row, entry);
-            if distance < best.1 {
-                best = (index, distance);
+        for (group, coordinates) in (0..).zip(groups.chunks_exact(rank)) {
+            let mut distances = [0.0_f32; LANES];
+            for (&value, entries) in row.iter().zip(coordinates) {
+                for (distance, &entry) in distances.iter_mut().zip(entries) {
+                    *distance += (value - entry) * (value - entry);
+                }
+            }
+            for (lane, &distance) in (0..).zip(&distances) {
+                if distance < best.1 {
+                    best = (group * LANES as u32 + lane, distance);
+                }
             }
         }
         best
     };
     rows.par_chunks_exact(rank).with_min_len(64).map(search).collect()
+}
+
+/// The entries in groups of [`LANES`]: for each group and coordinate, that coordinate of its entries. Missing
+/// entries are infinitely far.
+fn side_by_side(entries: &[f32], rank: usize) -> Vec<[f32; LANES]> {
+    let group = |group: &[f32]| {
+        let lane = |coordinate: usize, lane: usize| group.get(lane * rank + coordinate).copied();
+        let of =
+            move |coordinate| core::array::from_fn(|place| lane(coordinate, place).unwrap_or(f32::INFINITY));
+        (0..rank).map(of).collect::<Vec<[f32; LANES]>>()
+    };
+    entries.chunks(rank * LANES).flat_map(group).collect()
 }
 
 /// In eight partial sums, added in order.

@@ -44,7 +44,7 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
                 let known = before
                     .as_ref()
                     .map(|(layout, models): &(Layout, Vec<PlaneModel>)| (layout, models.as_slice()));
-                let prepared = PreparedUnit::new(coded, gop, transforms, sequence, known, &mut ())
+                let prepared = PreparedUnit::new(coded, gop, transforms, known, &mut ())
                     .unwrap()
                     .with_decoders();
                 let fast = prepared.coded_blocks(sequence).unwrap();
