@@ -33,7 +33,7 @@ pub(super) struct Branch {
 }
 
 /// One element.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(super) struct Row {
     pub(super) at_bit: u64,
     pub(super) bits: u64,
@@ -123,13 +123,34 @@ impl Tree {
         push_rows(&mut text, &self.file_header);
         for unit in &self.units {
             text += &format!("unit {} {}  {}\n", unit.unit, unit.kind, span(unit.at, unit.bytes));
-            push_rows(&mut text, &unit.elements);
+            push_rows(&mut text, &folded(&unit.elements));
         }
         if let Some(error) = &self.error {
             text += &format!("the first error is at {error}\n");
         }
         text
     }
+}
+
+/// The rows for people: the frequencies of a table, two elements a token, become one row. JSON has them all.
+fn folded(rows: &[Row]) -> Vec<Row> {
+    let is_frequency = |row: &Row| matches!(row.name.as_str(), "length_delta" | "mantissa");
+    let mut result = Vec::new();
+    for run in rows.chunk_by(|a, b| is_frequency(a) && is_frequency(b)) {
+        match run {
+            [first, .., last] => {
+                let tokens = run.iter().filter(|row| row.name == "length_delta").count();
+                result.push(Row {
+                    bits: last.at_bit + last.bits - first.at_bit,
+                    name: "length_delta, mantissa".to_owned(),
+                    value: format!("{tokens} frequencies"),
+                    ..first.clone()
+                });
+            }
+            _ => result.extend_from_slice(run),
+        }
+    }
+    result
 }
 
 /// Rows under the name of their record, which is given once.
@@ -143,7 +164,7 @@ fn push_rows(text: &mut String, rows: &[Row]) {
         // Writing to a string cannot fail.
         let _infallible = writeln!(
             text,
-            "    {:<12} {:>8}  {:<20} {:<26}  {} ({})",
+            "    {:<12} {:>8}  {:<24} {:<26}  {} ({})",
             place(row.at_bit),
             length(row.at_bit, row.bits),
             row.name,

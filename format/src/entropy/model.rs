@@ -57,6 +57,23 @@ impl Source {
             .unwrap_or(0)
     }
 
+    /// The name in the table of clause 8.5.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::NeighbourSum => "neighbour_sum",
+            Self::NeighbourMagnitude => "neighbour_magnitude",
+            Self::PreviousPlane => "previous_plane",
+            Self::GroupMagnitude => "group_magnitude",
+            Self::LargestLogScale => "largest_log_scale",
+            Self::MiddleLogScale => "middle_log_scale",
+            Self::LogVolume => "log_volume",
+            Self::Anisotropy => "anisotropy",
+            Self::Opacity => "opacity",
+            Self::PositionSpacing => "position_spacing",
+        }
+    }
+
     /// The source of a code; codes above 10 are reserved.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.get(usize::from(code)).copied()

@@ -3,7 +3,7 @@
 use super::{Element, Inspector, variable_row};
 use crate::Result;
 use crate::entropy::layout::{Layout, PlaneInfo, ShCoding};
-use crate::entropy::model::{ModelTrace, PlaneModel, read_models};
+use crate::entropy::model::{ModelTrace, PlaneModel, Source, read_models};
 use crate::payload::{Refinement, leb128};
 use crate::syntax::{FrameHeader, TransformHeader, TransformKind, after};
 
@@ -42,6 +42,17 @@ struct ModelElement {
     bits: u64,
     value: i64,
     plane: usize,
+}
+
+impl ModelElement {
+    /// The value, with the name of the source where it is one.
+    fn text(&self) -> String {
+        let source = match self.name {
+            "source_a" | "source_b" => u8::try_from(self.value).ok().and_then(Source::from_code),
+            _ => None,
+        };
+        source.map_or(self.value.to_string(), |source| format!("{} ({})", self.value, source.name()))
+    }
 }
 
 #[derive(Default)]
@@ -107,7 +118,7 @@ impl Inspector<'_> {
                 bits: element.bits,
                 record: "plane_model",
                 name: element.name.into(),
-                value: element.value.to_string(),
+                value: element.text(),
                 meaning: meaning.into(),
                 clause: "5.12",
             });
