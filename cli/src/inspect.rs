@@ -3,6 +3,7 @@
 mod costs;
 mod hex;
 mod points;
+mod statistics;
 mod tree;
 mod units;
 

@@ -35,6 +35,5 @@ pub mod operating_point;
 pub mod output;
 pub mod position;
 pub mod process;
-pub mod statistics;
 pub mod stream;
 pub mod unit;

@@ -4,9 +4,9 @@ use core::fmt;
 use core::str::FromStr;
 use splatstream_format::payload::Index;
 use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, IndexEntry, SequenceParameters, UnitHeader, UnitType,
+    EndOfStream, FileHeader, FrameHeader, IndexEntry, SequenceParameters, UnitHeader, UnitType,
 };
-use splatstream_format::unit::{Stream, Unit, write_file_header, write_unit};
+use splatstream_format::unit::{Stream, Unit, write_unit};
 use splatstream_format::{Limits, Result as FormatResult};
 
 /// The layers a client takes: every unit up to these indices on each axis.
@@ -126,7 +126,7 @@ pub fn operating_points(bytes: &[u8], limits: &Limits) -> FormatResult<Vec<Opera
 /// What delimiting the units finds; a damaged unit is an error.
 pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatResult<Vec<u8>> {
     let stream = Stream::open(bytes, limits)?;
-    let mut out = write_file_header(stream.header().level)?;
+    let mut out = bytes.get(..FileHeader::SIZE).unwrap_or_default().to_vec();
     let mut units = 0_u32;
     let mut frames = 0_u32;
     let mut entries = Vec::new();

@@ -7,7 +7,8 @@ use crate::operating_point::OperatingPoint;
 use crate::unit::{CodedUnit, decode_units};
 use splatstream_format::payload::{Index, Refinement};
 use splatstream_format::syntax::{
-    EndOfStream, FileHeader, FrameHeader, GopHeader, SequenceParameters, UnitHeader, UnitType,
+    EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, RefinementHeader,
+    SequenceParameters, Table, UnitHeader, UnitType,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
@@ -56,6 +57,8 @@ struct PendingFrame<'a> {
     units: Vec<PendingUnit<'a>>,
     bytes: u64,
     lost: Option<Error>,
+    /// Whether a refinement unit stood in the stream, decoded or not.
+    has_unit: bool,
 }
 
 struct PendingUnit<'a> {
@@ -68,6 +71,8 @@ struct PendingUnit<'a> {
 pub struct Decoder<'a> {
     options: Options,
     level: u8,
+    /// Whether the units before the first GOP header are not known (B.3).
+    starts_inside: bool,
     sequence: Option<(SequenceParameters, &'a [u8])>,
     gop: Option<Gop>,
     frame: Option<PendingFrame<'a>>,
@@ -87,6 +92,7 @@ impl<'a> Decoder<'a> {
         Self {
             options,
             level: file.level,
+            starts_inside: false,
             sequence: None,
             gop: None,
             frame: None,
@@ -97,6 +103,12 @@ impl<'a> Decoder<'a> {
             index_offset: None,
             ended: false,
         }
+    }
+
+    /// Clause B.3: a decoder that is given the sequence parameters and then the units from any GOP header on.
+    /// What relates to the start of the stream is not checked.
+    pub fn starting_inside(file: &FileHeader, options: Options) -> Self {
+        Self { starts_inside: true, ..Self::new(file, options) }
     }
 
     /// The sequence parameters, once they have arrived.
@@ -123,7 +135,8 @@ impl<'a> Decoder<'a> {
         }
         let repeatable = unit_type == UnitType::SequenceParameters;
         let indexed = self.index_offset.is_some() && unit_type != UnitType::End;
-        if self.ended || !repeatable && (self.sequence.is_none() || indexed) {
+        let surplus = unit_type == UnitType::FrameHeader && self.frames_left() == 0;
+        if self.ended || surplus || !repeatable && (self.sequence.is_none() || indexed) {
             return Err(unexpected(unit));
         }
         let done = match unit_type {
@@ -147,10 +160,13 @@ impl<'a> Decoder<'a> {
     pub fn damaged(&mut self, header: &UnitHeader, error: Error) -> Result<()> {
         self.units = self.units.wrapping_add(1);
         match &mut self.frame {
-            _ if !self.options.operating_point.takes(header) => Ok(()),
-            Some(frame) if self.options.tolerant && header.unit_type() == UnitType::Refinement => {
-                frame.lost = frame.lost.or(Some(error));
-                Ok(())
+            Some(frame) if header.unit_type() == UnitType::Refinement => {
+                frame.has_unit = true;
+                if !self.options.operating_point.takes(header) || frame.lost.is_some() {
+                    return Ok(());
+                }
+                frame.lost = Some(error);
+                if self.options.tolerant { Ok(()) } else { Err(error) }
             }
             _ => Err(error),
         }
@@ -187,29 +203,41 @@ impl<'a> Decoder<'a> {
     }
 
     fn sequence_parameters(&mut self, unit: &Unit<'a>) -> Result<()> {
+        let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at)?;
         match &self.sequence {
             None => {
-                let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at)?;
                 self.sequence = Some((sequence, unit.payload));
                 Ok(())
             }
             Some((_, first)) if *first == unit.payload => Ok(()),
             Some(_) => {
                 let rule = "a stream has one set of sequence parameters";
-                Err(Error::new(unit.at, "6.4", ErrorKind::Constraint { rule }))
+                Err(Error::new(unit.payload_at, "6.4", ErrorKind::Constraint { rule }))
             }
         }
     }
 
     fn gop_header(&mut self, unit: &Unit<'a>) -> Result<()> {
         self.close_gop(unit.at)?;
-        same(unit.at, "6.5", "frame", unit.header.frame, self.frames)?;
+        let starts_here = self.starts_inside && self.gop.is_none();
+        if starts_here {
+            self.frames = unit.header.frame;
+        }
+        same(frame_at(unit), "6.5", "frame", unit.header.frame, self.frames)?;
         let header = GopHeader::parse_payload(unit.payload, unit.payload_at)?;
-        self.gops.push((self.frames, unit.at));
         let expected = self.gop.as_ref().map_or(0, |gop| gop.header.gop_index.wrapping_add(1));
+        let expected = if starts_here { header.gop_index } else { expected };
         same(unit.payload_at, "6.5", "gop_index", header.gop_index, expected)?;
+        header.validate_from(unit.payload_at, self.frames)?;
+        self.gops.push((self.frames, unit.at));
         self.gop = Some(Gop::new(header, self.frames));
         Ok(())
+    }
+
+    /// Frames of the GOP still to come.
+    fn frames_left(&self) -> u32 {
+        let Some(gop) = &self.gop else { return 0 };
+        gop.header.gop_frame_count.wrapping_sub(self.frames.wrapping_sub(gop.first_frame))
     }
 
     /// Checks that the GOP has the frames it announced.
@@ -223,45 +251,47 @@ impl<'a> Decoder<'a> {
         let (Some(gop), Some((sequence, _)), None) = (&mut self.gop, &self.sequence, &self.frame) else {
             return Err(unexpected(unit));
         };
-        same(unit.at, "6.3", "frame", unit.header.frame, gop.first_frame)?;
-        if self.frames != gop.first_frame {
-            return Err(unexpected(unit));
-        }
+        same(frame_at(unit), "6.3", "frame", unit.header.frame, gop.first_frame)?;
         gop.tool(unit, sequence, &self.options.limits)
     }
 
     fn frame_header(&mut self, unit: &Unit<'a>) -> Result<()> {
         let Some(gop) = &self.gop else { return Err(unexpected(unit)) };
-        if self.frames.wrapping_sub(gop.first_frame) >= gop.header.gop_frame_count {
-            return Err(unexpected(unit));
-        }
-        same(unit.at, "6.6", "frame", unit.header.frame, self.frames)?;
+        same(frame_at(unit), "6.6", "frame", unit.header.frame, self.frames)?;
         let header = FrameHeader::parse_payload(unit.payload, unit.payload_at)?;
         gop.transforms(&header, unit.payload_at)?;
         let most = self.options.limits.max_gaussians.min(Limits::gaussians_of_level(self.level));
         header.within(unit.payload_at, &Limits { max_gaussians: most, ..self.options.limits })?;
         let bytes = unit_bytes(unit);
         let number = unit.header.frame;
-        self.frame = Some(PendingFrame { number, header, units: Vec::new(), bytes, lost: None });
+        let units = Vec::new();
+        self.frame = Some(PendingFrame { number, header, units, bytes, lost: None, has_unit: false });
         self.frames = self.frames.wrapping_add(1);
         Ok(())
     }
 
     fn refinement(&mut self, unit: &Unit<'a>) -> Result<()> {
-        let (Some(frame), Some((sequence, _))) = (&mut self.frame, &self.sequence) else {
-            return Err(unexpected(unit));
-        };
-        same(unit.at, "6.9", "frame", unit.header.frame, frame.number)?;
-        if !self.options.operating_point.takes(&unit.header) || frame.lost.is_some() {
+        let takes = self.options.operating_point.takes(&unit.header);
+        let Some(frame) = &mut self.frame else { return Err(unexpected(unit)) };
+        frame.has_unit = true;
+        if !takes || frame.lost.is_some() {
             return Ok(());
         }
+        let number = frame.number;
+        if unit.header.frame != number && self.has_lost()? {
+            return Ok(());
+        }
+        same(frame_at(unit), "6.9", "frame", unit.header.frame, number)?;
+        let (Some(frame), Some((sequence, _)), Some(gop)) = (&mut self.frame, &self.sequence, &self.gop) else {
+            return Err(unexpected(unit));
+        };
         let expected = frame.units.len();
         let parsed = if usize::from(unit.header.refinement) != expected
             || unit.header.refinement >= sequence.refinement_count
         {
             Err(unexpected(unit))
         } else {
-            parse_refinement(unit, sequence, frame.header.gaussian_count, &self.options.limits)
+            parse_refinement(unit, sequence, &frame.header, gop)
         };
         match parsed {
             Ok(refinement) => {
@@ -279,13 +309,20 @@ impl<'a> Decoder<'a> {
 
     fn index(&mut self, unit: &Unit<'a>) -> Result<()> {
         self.close_gop(unit.at)?;
+        if !self.starts_inside {
+            let (header, _) = IndexHeader::parse(unit.payload, unit.payload_at)?;
+            let gops = u32::try_from(self.gops.len()).unwrap_or(u32::MAX);
+            same(unit.payload_at, "6.10", "entry_count", header.entry_count, gops)?;
+        }
         let index = Index::parse(unit.payload, unit.payload_at)?;
-        let found = index.entries.iter().map(|entry| (entry.frame, entry.offset));
-        if !found.eq(self.gops.iter().copied()) {
-            let (value, expected) = (index.entries.len(), self.gops.len());
-            let [value, expected] = [value, expected].map(|count| u64::try_from(count).unwrap_or(u64::MAX));
-            let kind = ErrorKind::Mismatch { element: "entries", value, expected };
-            return Err(Error::new(unit.payload_at, "6.10", kind));
+        let mut at = after(unit.payload_at, IndexHeader::SIZE);
+        for (entry, &(frame, offset)) in index.entries.iter().zip(&self.gops) {
+            if self.starts_inside {
+                break;
+            }
+            same(at, "6.10", "frame", entry.frame, frame)?;
+            same(element_at(&IndexEntry::TABLE, at, "offset"), "6.10", "offset", entry.offset, offset)?;
+            at = after(at, IndexEntry::SIZE);
         }
         self.index_offset = Some(unit.at);
         Ok(())
@@ -299,19 +336,22 @@ impl<'a> Decoder<'a> {
             unit_count: self.units,
             index_offset: self.index_offset.unwrap_or(0),
         };
+        self.ended = true;
+        if self.starts_inside {
+            return Ok(());
+        }
         end.validate_against(unit.payload_at, &expected)?;
         let announced = self.sequence().map_or(0, |sequence| sequence.frame_count);
         if announced != 0 {
             same(unit.payload_at, "6.4", "frame_count", self.frames, announced)?;
         }
-        self.ended = true;
         Ok(())
     }
 
     /// Ends the pending frame; `at` is the offset of the unit that ends it, if a unit does.
     fn close_frame(&mut self, at: Option<u64>) -> Result<Option<DecodedFrame>> {
         let Some(mut frame) = self.frame.take() else { return Ok(None) };
-        if let (Some(at), true, None) = (at, frame.units.is_empty(), frame.lost) {
+        if let (Some(at), false) = (at, frame.has_unit) {
             let rule = "a frame has a refinement unit";
             let error = Error::new(at, "7.1", ErrorKind::Constraint { rule });
             if !self.options.tolerant {
@@ -319,6 +359,21 @@ impl<'a> Decoder<'a> {
             }
             frame.lost = Some(error);
         }
+        self.decode(&frame)
+    }
+
+    /// Decodes the pending frame as far as it is there: whether a unit of it is lost, so that later ones are not
+    /// looked at. Blocks are not decoded when they arrive; an error that ends decoding asks for it.
+    fn has_lost(&mut self) -> Result<bool> {
+        let decoded = self.frame.as_ref().map_or(Ok(None), |frame| self.decode(frame))?;
+        if let (Some(frame), Some(decoded)) = (&mut self.frame, decoded) {
+            frame.units.truncate(usize::from(decoded.refinements));
+            frame.lost = decoded.lost;
+        }
+        Ok(self.frame.as_ref().is_some_and(|frame| frame.lost.is_some()))
+    }
+
+    fn decode(&self, frame: &PendingFrame<'a>) -> Result<Option<DecodedFrame>> {
         let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else { return Ok(None) };
         let coded: Vec<CodedUnit<'_, '_>> = frame
             .units
@@ -327,7 +382,7 @@ impl<'a> Decoder<'a> {
             .collect();
         let tools = gop.transforms(&frame.header, 0)?;
         let (planes, results) = decode_units(&coded, gop, tools, sequence);
-        self.assemble(&frame, planes, results).map(Some)
+        self.assemble(frame, planes, results).map(Some)
     }
 
     /// Checks the units of a frame, and cuts the planes before the first that failed.
@@ -394,13 +449,16 @@ impl<'a> Decoder<'a> {
 fn parse_refinement<'a>(
     unit: &Unit<'a>,
     sequence: &SequenceParameters,
-    frame_gaussians: u32,
-    limits: &Limits,
+    frame: &FrameHeader,
+    gop: &Gop,
 ) -> Result<Refinement<'a>> {
-    let refinement = Refinement::parse(unit.payload, unit.payload_at, sequence, limits)?;
-    let expected = sequence.refinement_length(unit.header.refinement, frame_gaussians);
-    same(unit.payload_at, "7.2", "gaussian_count", refinement.header.gaussian_count, expected)?;
-    Ok(refinement)
+    let at = unit.payload_at;
+    let (header, rest) = RefinementHeader::parse(unit.payload, at, sequence)?;
+    let expected = sequence.refinement_length(unit.header.refinement, frame.gaussian_count);
+    let count_at = element_at(&RefinementHeader::TABLE, at, "gaussian_count");
+    same(count_at, "6.9", "gaussian_count", header.gaussian_count, expected)?;
+    gop.colour(gop.transforms(frame, at)?, &header, at)?;
+    Refinement::parse_behind(header, rest, at, sequence)
 }
 
 fn unexpected(unit: &Unit<'_>) -> Error {
@@ -408,12 +466,32 @@ fn unexpected(unit: &Unit<'_>) -> Error {
     Error::new(unit.at, "7.1", ErrorKind::UnexpectedUnit { unit: name })
 }
 
-fn same(at: u64, clause: &'static str, element: &'static str, value: u32, expected: u32) -> Result<()> {
+fn same<T: Into<u64>>(
+    at: u64,
+    clause: &'static str,
+    element: &'static str,
+    value: T,
+    expected: T,
+) -> Result<()> {
+    let (value, expected) = (value.into(), expected.into());
     if value == expected {
         return Ok(());
     }
-    let kind = ErrorKind::Mismatch { element, value: u64::from(value), expected: u64::from(expected) };
-    Err(Error::new(at, clause, kind))
+    Err(Error::new(at, clause, ErrorKind::Mismatch { element, value, expected }))
+}
+
+/// Absolute offset of an element of a record that starts at `at`.
+fn element_at(table: &Table, at: u64, element: &str) -> u64 {
+    after(at, table.offset(element))
+}
+
+/// Absolute offset of `frame` in the header of a unit.
+fn frame_at(unit: &Unit<'_>) -> u64 {
+    element_at(&UnitHeader::TABLE, unit.at, "frame")
+}
+
+fn after(at: u64, bytes: usize) -> u64 {
+    at.saturating_add(u64::try_from(bytes).unwrap_or(u64::MAX))
 }
 
 fn unit_bytes(unit: &Unit<'_>) -> u64 {

@@ -44,7 +44,7 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
         trace: &mut impl ModelTrace,
     ) -> Result<Self> {
         let refinement = unit.refinement;
-        let colour = gop.colour(transforms, refinement, unit.payload_at)?;
+        let colour = gop.colour(transforms, &refinement.header, unit.payload_at)?;
         let layout = Layout::new(transforms.dc.header.rank, colour.mode);
         let models = if refinement.header.gaussian_count == 0 {
             Vec::new()

@@ -5,7 +5,7 @@ use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::CodebookHeader;
 
 /// Vectors used for training, for each entry.
-pub(crate) const TRAINING_PER_ENTRY: usize = 64;
+pub(crate) const TRAINING_PER_ENTRY: usize = 16;
 /// Lloyd iterations.
 const ITERATIONS: usize = 8;
 /// Vectors that seeds are drawn from.

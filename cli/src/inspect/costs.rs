@@ -1,12 +1,12 @@
 //! What each attribute and each kind of unit costs.
 
 use super::Shown;
+use super::statistics::{AttributeCost, Statistics, UnitCost, stream_statistics};
 use crate::console::Console;
 use crate::numbers::{bits_per_gaussian, grouped, percent};
 use crate::stream_file::StreamFile;
 use crate::table::Table;
 use serde::Serialize;
-use splatstream_decoder::statistics::{AttributeCost, Statistics, UnitCost, stream_statistics};
 use splatstream_format::Limits;
 
 /// What `--json` prints.

@@ -1,14 +1,10 @@
-//! What each attribute of a stream costs. Informative; the figures leave the decoding process alone.
-#![expect(
-    clippy::float_arithmetic,
-    reason = "statistics are fractions of bits; nothing is decoded from them"
-)]
+//! What each attribute of a stream costs. From decoding its symbols again.
 
-use crate::block::CodedBlock;
-use crate::context::{delta_contexts, plane_contexts};
-use crate::gop::Gop;
-use crate::layout::{Attribute, Layout, PlaneInfo};
-use crate::unit::{CodedUnit, PreparedUnit};
+use splatstream_decoder::block::CodedBlock;
+use splatstream_decoder::context::{delta_contexts, plane_contexts};
+use splatstream_decoder::gop::Gop;
+use splatstream_decoder::unit::{CodedUnit, PreparedUnit};
+use splatstream_format::entropy::layout::{Attribute, Layout, PlaneInfo};
 use splatstream_format::entropy::model::{ModelTrace, PlaneModel};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 use splatstream_format::payload::Refinement;
@@ -18,44 +14,44 @@ use splatstream_format::{Limits, Result};
 
 /// Bits spent on one attribute over a whole stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AttributeCost {
+pub(super) struct AttributeCost {
     /// The attribute.
-    pub attribute: Attribute,
+    pub(super) attribute: Attribute,
     /// Bits of symbols: the information of the tokens in their tables, and raw bits.
-    pub symbol_bits: f64,
+    pub(super) symbol_bits: f64,
     /// Bits of plane models.
-    pub model_bits: u64,
+    pub(super) model_bits: u64,
 }
 
 /// Bytes of one kind of unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct UnitCost {
+pub(super) struct UnitCost {
     /// The kind.
-    pub unit_type: UnitType,
+    pub(super) unit_type: UnitType,
     /// How many.
-    pub units: u32,
+    pub(super) units: u32,
     /// Bytes, headers included.
-    pub bytes: u64,
+    pub(super) bytes: u64,
 }
 
 /// What a stream spends on what.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Statistics {
+pub(super) struct Statistics {
     /// Gaussians over all frames.
-    pub gaussians: u64,
+    pub(super) gaussians: u64,
     /// Bytes of the stream.
-    pub bytes: u64,
+    pub(super) bytes: u64,
     /// By attribute, in coding order.
-    pub attributes: Vec<AttributeCost>,
+    pub(super) attributes: Vec<AttributeCost>,
     /// By kind of unit, in order of first appearance.
-    pub units: Vec<UnitCost>,
+    pub(super) units: Vec<UnitCost>,
 }
 
 /// Adds up the costs of a stream.
 ///
 /// # Errors
 /// As decoding, digests not verified.
-pub fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
+pub(super) fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
     let cost = |attribute| AttributeCost { attribute, symbol_bits: 0.0, model_bits: 0 };
     let mut statistics = Statistics {
         gaussians: 0,
