@@ -1,0 +1,100 @@
+//! Small frames, and streams decoded to what a test compares.
+#![allow(dead_code, reason = "each test binary uses a part of it")]
+
+use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::process::{DecodedFrame, Options};
+use splatstream_decoder::stream::{Summary, decode_stream};
+use splatstream_encoder::{Report, Settings, encode};
+use splatstream_format::Limits;
+use splatstream_scene::builtin::{BuiltinScene, Tracking};
+use splatstream_scene::{GaussianFrame, Planes, sh_coefficients};
+use std::ops::ControlFlow;
+
+/// A frame of the built-in scene.
+pub(crate) fn builtin(gaussians: u32, sh_degree: u8) -> GaussianFrame {
+    BuiltinScene { gaussians, frames: 1, seed: 3, tracking: Tracking::Untracked, sh_degree }.frame(0)
+}
+
+/// A frame from a list of numbers: every attribute takes the next ones, so that any list is a frame.
+pub(crate) fn frame_of(numbers: &[f32], count: usize, sh_degree: u8) -> GaussianFrame {
+    let mut next = numbers.iter().copied().cycle();
+    let mut plane =
+        |scale: f32| -> Vec<f32> { (0..count).map(|_| next.next().unwrap_or(0.0) * scale).collect() };
+    let planes = Planes {
+        position: [plane(1.0), plane(2.0), plane(0.5)],
+        log_scale: [plane(3.0), plane(3.0), plane(3.0)],
+        rotation: [plane(1.0).into_iter().map(|w| w + 2.0).collect(), plane(1.0), plane(1.0), plane(1.0)],
+        opacity_logit: plane(4.0),
+        dc: [plane(1.0), plane(1.0), plane(1.0)],
+        sh: (0..3 * sh_coefficients(sh_degree)).map(|_| plane(0.5)).collect(),
+    };
+    GaussianFrame::from_planes(sh_degree, planes).unwrap()
+}
+
+/// The stream of some frames and what the encoder says of it.
+pub(crate) fn encoded(mut frames: Vec<GaussianFrame>, settings: &Settings) -> (Vec<u8>, Report) {
+    let mut bytes = Vec::new();
+    let report = encode(&mut frames, settings, &mut bytes, &mut |_, _| {}).unwrap();
+    (bytes, report)
+}
+
+/// The frames of a stream and how it ended.
+pub(crate) fn decoded(bytes: &[u8], options: &Options) -> (Vec<DecodedFrame>, Summary) {
+    let mut frames = Vec::new();
+    let summary = decode_stream(bytes, options, |_, frame| {
+        frames.push(frame);
+        ControlFlow::Continue(())
+    });
+    (frames, summary)
+}
+
+/// Strict options with limits that suit small streams.
+pub(crate) fn strict() -> Options {
+    let limits = Limits { max_gaussians: 1 << 20, ..Limits::default() };
+    Options { limits, tolerant: false, verify: true, operating_point: OperatingPoint::ALL }
+}
+
+/// The planes of every frame of a stream that must be right.
+pub(crate) fn planes(bytes: &[u8]) -> Vec<QuantizedFrame> {
+    let (frames, summary) = decoded(bytes, &strict());
+    assert_eq!(summary.end, None);
+    frames.into_iter().map(|frame| frame.planes).collect()
+}
+
+/// splitmix64: the same mutations on every machine.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        bits ^ (bits >> 31)
+    }
+
+    pub(crate) fn below(&mut self, bound: usize) -> usize {
+        (self.next() % bound.max(1) as u64) as usize
+    }
+
+    /// One damage: a bit, a byte, a run deleted, inserted, zeroed or copied elsewhere, or the end cut off.
+    pub(crate) fn mutated(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let mut bytes = bytes.to_vec();
+        let at = self.below(bytes.len());
+        let length = self.below(64).min(bytes.len() - at);
+        match self.below(7) {
+            0 => bytes[at] ^= 1 << self.below(8),
+            1 => bytes[at] = bytes[at].wrapping_add(1 + self.below(255) as u8),
+            2 => drop(bytes.drain(at..at + length)),
+            3 => drop(bytes.splice(at..at, (0..length).map(|place| place as u8))),
+            4 => bytes[at..at + length].fill(0),
+            5 => {
+                let to = self.below(bytes.len() - length);
+                bytes.copy_within(at..at + length, to);
+            }
+            _ => bytes.truncate(at),
+        }
+        bytes
+    }
+}

@@ -1,0 +1,186 @@
+//! What the encoder reconstructs is what the decoder reconstructs, for any frame and any setting.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
+
+mod common;
+
+use common::{builtin, decoded, encoded, frame_of, planes, strict};
+use proptest::prelude::*;
+use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_points};
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_encoder::{Preset, Quality, Settings, ShChoice};
+use splatstream_format::Limits;
+use splatstream_scene::GaussianFrame;
+use std::ops::ControlFlow;
+
+fn settings() -> impl Strategy<Value = Settings> {
+    let preset = prop_oneof![Just(Preset::Fast), Just(Preset::Balanced), Just(Preset::Small)];
+    let quality = prop_oneof![Just(Quality::Low), Just(Quality::High), Just(Quality::VisuallyLossless)];
+    let sh = prop_oneof![Just(ShChoice::Auto), Just(ShChoice::Coefficients), Just(ShChoice::VectorQuantised)];
+    let refinements = prop_oneof![Just(vec![100]), Just(vec![10, 20, 30, 50, 100]), Just(vec![1, 99, 100])];
+    (preset, quality, sh, refinements, 1_u32..4, 6_u8..=8).prop_map(
+        |(preset, quality, sh, refinements, gop, block_log2)| Settings {
+            preset,
+            steps: quality.steps(),
+            sh,
+            refinements,
+            gop,
+            block_log2,
+            keep_invisible: true,
+            ..Settings::default()
+        },
+    )
+}
+
+fn frames() -> impl Strategy<Value = Vec<GaussianFrame>> {
+    let count = prop_oneof![Just(0_usize), Just(1), Just(2), Just(3), Just(10), Just(101), 100..300_usize];
+    let number = prop_oneof![Just(0.0_f32), Just(1.0), Just(-1.0), -1.0..1.0_f32, -8.0..8.0_f32];
+    let frame = (prop::collection::vec(number, 1..400), count);
+    (prop::collection::vec(frame, 1..4), 0_u8..=3).prop_map(|(frames, sh_degree)| {
+        frames.iter().map(|(numbers, count)| frame_of(numbers, *count, sh_degree)).collect()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    // covers: SS-RU-005, SS-DG-003
+    #[test]
+    fn the_decoder_finds_the_digests_of_the_encoder(frames in frames(), settings in settings()) {
+        let counts: Vec<usize> = frames.iter().map(GaussianFrame::len).collect();
+        let (bytes, report) = encoded(frames, &settings);
+        prop_assert_eq!(report.bytes, bytes.len() as u64);
+        let (decoded, summary) = decoded(&bytes, &strict());
+        prop_assert_eq!(summary.end, None);
+        prop_assert_eq!(decoded.iter().map(|frame| frame.planes.len()).collect::<Vec<_>>(), counts);
+        let digests: Vec<u64> = decoded.iter().filter_map(|frame| frame.digest).collect();
+        prop_assert_eq!(digests, report.digests);
+    }
+
+    // covers: SS-OP-001, SS-OP-003, SS-OP-004, SS-OP-005
+    #[test]
+    fn an_extracted_stream_decodes_as_the_stream_at_that_point(frames in frames(), settings in settings()) {
+        let (bytes, _) = encoded(frames, &settings);
+        let full = planes(&bytes);
+        let limits = Limits::default();
+        for info in operating_points(&bytes, &limits).unwrap() {
+            let small = extract(&bytes, info.point, &limits).unwrap();
+            prop_assert_eq!(small.len() as u64, info.bytes);
+            prop_assert_eq!(&extract(&small, info.point, &limits).unwrap(), &small);
+            let options = Options { operating_point: info.point, ..strict() };
+            let (at_point, summary) = decoded(&bytes, &options);
+            prop_assert_eq!(summary.end, None);
+            let extracted = planes(&small);
+            for ((at_point, extracted), full) in at_point.iter().zip(&extracted).zip(&full) {
+                prop_assert_eq!(&at_point.planes, extracted);
+                let mut prefix = full.clone();
+                prefix.truncate(extracted.len());
+                prop_assert_eq!(&prefix, extracted);
+            }
+        }
+        prop_assert_eq!(extract(&bytes, OperatingPoint::ALL, &limits).unwrap(), bytes);
+    }
+}
+
+#[test]
+fn the_same_bytes_and_frames_with_any_number_of_threads() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let (bytes, _) = encoded(vec![builtin(5000, 3), builtin(4000, 3)], &Settings::default());
+            let decoded = planes(&bytes);
+            (bytes, decoded)
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(5));
+}
+
+/// Each decoded Gaussian has a source Gaussian within half a step, and none is used twice.
+#[test]
+fn every_attribute_is_within_half_a_step_of_the_source() {
+    let source = builtin(2000, 0);
+    let settings = Settings { keep_invisible: true, ..Settings::default() };
+    let (bytes, report) = encoded(vec![source.clone()], &settings);
+    let mut output = None;
+    decode_stream(&bytes, &strict(), |sequence, frame| {
+        output = Some(to_gaussians(frame.planes, sequence));
+        ControlFlow::Continue(())
+    });
+    let output = output.unwrap();
+    let sorted = |frame: &GaussianFrame, i: usize| {
+        let mut scales = [0, 1, 2].map(|axis| frame.log_scale()[axis][i]);
+        scales.sort_by(f32::total_cmp);
+        scales
+    };
+    // Half a step, and what f32 rounds at this place.
+    let half = |value: f32| 0.5001 * report.position_step + 2.0 * f32::EPSILON * value.abs();
+    let mut used = vec![false; source.len()];
+    for i in 0..output.len() {
+        let close = |j: &usize| {
+            let position = (0..3).all(|a| {
+                let value = source.position()[a][*j];
+                (output.position()[a][i] - value).abs() <= half(value)
+            });
+            let scales =
+                sorted(&output, i).iter().zip(sorted(&source, *j)).all(|(a, b)| (a - b).abs() <= 0.0601);
+            let opacity = (output.opacity_logit()[i] - source.opacity_logit()[*j]).abs() <= 0.2001;
+            position && scales && opacity && !used[*j]
+        };
+        let found = (0..source.len()).find(close);
+        used[found.expect("a source Gaussian within half a step")] = true;
+    }
+}
+
+#[test]
+fn extremes_of_scale_and_opacity_are_coded() {
+    let mut planes = builtin(100, 0).into_planes();
+    planes.log_scale[0][3] = -30.0;
+    planes.log_scale[1][4] = 10.0;
+    planes.opacity_logit[5] = 80.0;
+    planes.opacity_logit[6] = -80.0;
+    for axis in 0..3 {
+        planes.log_scale[axis][7] = -4.0;
+        planes.position[axis].fill(2.5);
+    }
+    planes.rotation = [0, 1, 2, 3].map(|part| planes.rotation[part].iter().map(|v| v * 1.0e-3).collect());
+    let frame = GaussianFrame::from_planes(0, planes).unwrap();
+    let settings = Settings { keep_invisible: true, ..Settings::default() };
+    let (bytes, _) = encoded(vec![frame], &settings);
+    let decoded = &common::planes(&bytes)[0];
+    assert_eq!((decoded.opacity.iter().max(), decoded.opacity.iter().min()), (Some(&200), Some(&-200)));
+    assert!(
+        decoded.position.iter().all(|plane| plane.iter().all(|&q| q == 0)),
+        "one point is one lattice point"
+    );
+}
+
+#[test]
+fn settings_that_no_stream_can_carry_are_refused_with_a_reason() {
+    let refused = |settings: Settings| {
+        let result = splatstream_encoder::encode(
+            &mut vec![builtin(100, 0)],
+            &settings,
+            &mut Vec::new(),
+            &mut |_, _| {},
+        );
+        result.unwrap_err().to_string()
+    };
+    let refinements =
+        |refinements: &[u8]| Settings { refinements: refinements.to_vec(), ..Settings::default() };
+    for wrong in
+        [&[][..], &[50], &[100, 100], &[0, 100], &[60, 50, 100], &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 100]]
+    {
+        assert!(refused(refinements(wrong)).contains("increasing percentages"));
+    }
+    assert!(refused(Settings { gop: 0, ..Settings::default() }).contains("gop is 0"));
+    assert!(refused(Settings { sh_degree: Some(4), ..Settings::default() }).contains("0 to 3"));
+    let none = splatstream_encoder::encode(
+        &mut Vec::<GaussianFrame>::new(),
+        &Settings::default(),
+        &mut Vec::new(),
+        &mut |_, _| {},
+    );
+    assert!(none.unwrap_err().to_string().contains("no frame"));
+}
