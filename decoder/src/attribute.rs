@@ -39,31 +39,18 @@ pub fn next_log_scale(before: &[i32], differences: &[i32]) -> Vec<i32> {
     before.iter().zip(differences).map(|(&before, &difference)| before.wrapping_sub(difference)).collect()
 }
 
-/// Clause 7.4. Checks the three log-scales of a block.
+/// Clause 7.4. Checks one plane of log-scales and the values it came from.
 ///
 /// # Errors
-/// Invalid if one is out of range, or the axes are canonical and not sorted from the largest.
-pub fn check_log_scales(planes: &[Vec<i32>; 3], canonical: bool, at: u64) -> Result<()> {
-    let [largest, middle, smallest] = planes;
-    in_range(largest, &ATTRIBUTE_RANGE, "log_scale", "7.4", at)?;
-    check_differences(largest, middle, canonical, at)?;
-    check_differences(middle, smallest, canonical, at)
-}
-
-/// Clause 7.4. The coded differences, the log-scales they give, and their order.
-fn check_differences(before: &[i32], plane: &[i32], canonical: bool, at: u64) -> Result<()> {
-    let outside = |value: i32| value < *ATTRIBUTE_RANGE.start() || value > *ATTRIBUTE_RANGE.end();
-    let broken = |&(&before, &value): &(&i32, &i32)| {
-        let difference = before.wrapping_sub(value);
-        outside(difference) | outside(value) | (canonical & (difference < 0))
-    };
-    if !before.iter().zip(plane).fold(false, |any, pair| any | broken(&pair)) {
-        return Ok(());
+/// Invalid if one is out of range, or a difference of canonical axes is negative.
+pub fn check_log_scale(values: &[i32], log_scale: &[i32], canonical_difference: bool, at: u64) -> Result<()> {
+    in_range(values, &ATTRIBUTE_RANGE, "log_scale", "7.4", at)?;
+    in_range(log_scale, &ATTRIBUTE_RANGE, "log_scale", "7.4", at)?;
+    if canonical_difference && values.iter().any(|&difference| difference < 0) {
+        let rule = "canonical axes are sorted from largest to smallest";
+        return Err(Error::new(at, "7.4", ErrorKind::Constraint { rule }));
     }
-    let Some((&before, &value)) = before.iter().zip(plane).find(broken) else { return Ok(()) };
-    in_range(&[before.wrapping_sub(value), value], &ATTRIBUTE_RANGE, "log_scale", "7.4", at)?;
-    let rule = "canonical axes are sorted from largest to smallest";
-    Err(Error::new(at, "7.4", ErrorKind::Constraint { rule }))
+    Ok(())
 }
 
 /// Clause 7.6. How many bits coarser the rotation of a nearly round Gaussian is coded.

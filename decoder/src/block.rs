@@ -237,7 +237,11 @@ pub fn reconstruct(
     out: &mut FrameSlice<'_>,
 ) -> Result<()> {
     position::positions(&block.deltas, unit.position_bits, unit.position_shift, &mut out.position, at)?;
-    attribute::check_log_scales(&block.log_scale, unit.canonical_axes, at)?;
+    for (plane, log_scale) in (1..).zip(&block.log_scale) {
+        let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+        let values = attribute::unbias(coded, biases.get(plane).copied().unwrap_or(0));
+        attribute::check_log_scale(&values, log_scale, unit.canonical_axes && plane > 1, at)?;
+    }
     in_range(&block.opacity, &ATTRIBUTE_RANGE, "opacity", "7.5", at)?;
     for (place, plane) in block.log_scale.iter().enumerate() {
         out.write(place, plane);

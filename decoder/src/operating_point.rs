@@ -89,8 +89,8 @@ pub struct OperatingPointInfo {
 pub fn operating_points(bytes: &[u8], limits: &Limits) -> FormatResult<Vec<OperatingPointInfo>> {
     let stream = Stream::open(bytes, limits)?;
     let mut sequence = None;
-    let mut counts = Vec::new();
-    let mut highest = 0;
+    // Gaussians and last refinement of each frame.
+    let mut frames: Vec<(u32, Option<u8>)> = Vec::new();
     for unit in stream.units() {
         let unit = unit?;
         match unit.header.unit_type() {
@@ -98,26 +98,33 @@ pub fn operating_points(bytes: &[u8], limits: &Limits) -> FormatResult<Vec<Opera
                 sequence = Some(SequenceParameters::parse_payload(unit.payload, unit.payload_at)?);
             }
             UnitType::FrameHeader => {
-                counts.push(FrameHeader::parse_payload(unit.payload, unit.payload_at)?.gaussian_count);
+                let header = FrameHeader::parse_payload(unit.payload, unit.payload_at)?;
+                frames.push((header.gaussian_count, None));
             }
-            UnitType::Refinement => highest = highest.max(unit.header.refinement),
+            UnitType::Refinement => {
+                if let Some((_, last)) = frames.last_mut() {
+                    *last = Some(unit.header.refinement);
+                }
+            }
             _ => {}
         }
     }
     let Some(sequence) = sequence else { return Ok(Vec::new()) };
     let info = |refinement| {
         let point = OperatingPoint { spatial: 0, temporal: 0, refinement };
-        let shown = |&count: &u32| u64::from(sequence.prefix_length(refinement, count));
+        let shown = |&(count, last): &(u32, Option<u8>)| {
+            last.map_or(0, |last| u64::from(sequence.prefix_length(refinement.min(last), count)))
+        };
         let place = usize::from(refinement);
         Ok(OperatingPointInfo {
             point,
             bytes: u64::try_from(extract(bytes, point, limits)?.len()).unwrap_or(u64::MAX),
-            gaussians: counts.iter().map(shown).fold(0, u64::saturating_add),
-            frames: u32::try_from(counts.len()).unwrap_or(u32::MAX),
+            gaussians: frames.iter().map(shown).fold(0, u64::saturating_add),
+            frames: u32::try_from(frames.len()).unwrap_or(u32::MAX),
             percent: sequence.refinement_percent.get(place).copied().unwrap_or(100),
         })
     };
-    (0..=highest).map(info).collect()
+    (0..sequence.refinement_count).map(info).collect()
 }
 
 /// The stream that holds just the units of an operating point; index and end are made anew.

@@ -282,7 +282,8 @@ impl<'a> Decoder<'a> {
             return Ok(());
         }
         same(frame_at(unit), "6.9", "frame", unit.header.frame, number)?;
-        let (Some(frame), Some((sequence, _)), Some(gop)) = (&mut self.frame, &self.sequence, &self.gop) else {
+        let (Some(frame), Some((sequence, _)), Some(gop)) = (&mut self.frame, &self.sequence, &self.gop)
+        else {
             return Err(unexpected(unit));
         };
         let expected = frame.units.len();

@@ -241,7 +241,8 @@ impl<'a> BlockReader<'a> {
     /// Malformed otherwise.
     pub fn finish(self) -> Result<()> {
         let spent = self.states.iter().all(|&state| state == STATE_LOW);
-        if !spent || !self.words.are_spent() {
+        // Raw bits that were not there are the first thing that went wrong.
+        if !self.raw.overran() && (!spent || !self.words.are_spent()) {
             return Err(Error::new(self.at, "8.4", ErrorKind::EntropyFinalState));
         }
         self.raw.finish(self.raw_at, "raw_bits", "8.4")

@@ -1,0 +1,120 @@
+"""Clause 5: the tables of the records, as data, and the reader of a fixed part.
+
+A row is (element, type, places, clause). Elements of the variable part are read in semantics.py,
+in the order of the tables of clause 5.
+"""
+
+FILE_HEADER = [
+    ("signature", "u8", 8, "6.2"),
+    ("version_major", "u8", 1, "6.2"),
+    ("version_minor", "u8", 1, "6.2"),
+    ("profile", "u8", 1, "6.2"),
+    ("level", "u8", 1, "6.2"),
+    ("header_crc", "u32", 1, "6.2"),
+]
+
+UNIT_HEADER = [
+    ("unit_type", "u8", 1, "6.3"),
+    ("unit_flags", "u8", 1, "6.3"),
+    ("spatial_layer", "u8", 1, "6.3"),
+    ("temporal_layer", "u8", 1, "6.3"),
+    ("refinement", "u8", 1, "6.3"),
+    ("reserved_zero", "u8", 1, "6.3"),
+    ("header_check", "u16", 1, "6.3"),
+    ("frame", "u32", 1, "6.3"),
+    ("payload_length", "u32", 1, "6.3"),
+    ("payload_crc", "u32", 1, "6.3"),
+]
+
+SEQUENCE_PARAMETERS = [
+    ("sh_degree", "u8", 1, "6.4"),
+    ("spatial_layer_count", "u8", 1, "6.4"),
+    ("temporal_layer_count", "u8", 1, "6.4"),
+    ("refinement_count", "u8", 1, "6.4"),
+    ("refinement_percent", "u8", 10, "6.4"),
+    ("position_bits", "u8", 1, "6.4"),
+    ("block_log2", "u8", 1, "6.4"),
+    ("sequence_flags", "u8", 1, "6.4"),
+    ("rotation_threshold", "u8", 3, "6.4"),
+    ("frame_count", "u32", 1, "6.4"),
+    ("ticks_per_second", "u32", 1, "6.4"),
+    ("ticks_per_frame", "u32", 1, "6.4"),
+    ("position_offset", "f32", 3, "6.4"),
+    ("position_step", "f32", 1, "6.4"),
+    ("log_scale_offset", "f32", 1, "6.4"),
+    ("log_scale_step", "f32", 1, "6.4"),
+    ("rotation_step", "f32", 1, "6.4"),
+    ("opacity_offset", "f32", 1, "6.4"),
+    ("opacity_step", "f32", 1, "6.4"),
+    ("dc_step", "f32", 1, "6.4"),
+    ("sh_step", "f32", 1, "6.4"),
+]
+
+GOP_HEADER = [
+    ("gop_index", "u32", 1, "6.5"),
+    ("gop_frame_count", "u32", 1, "6.5"),
+    ("gop_structure", "u8", 1, "6.5"),
+    ("reserved_zero", "u8", 3, "6.5"),
+]
+
+FRAME_HEADER = [
+    ("frame_type", "u8", 1, "6.6"),
+    ("dc_transform_id", "u8", 1, "6.6"),
+    ("sh_transform_id", "u8", 1, "6.6"),
+    ("reserved_zero", "u8", 1, "6.6"),
+    ("gaussian_count", "u32", 1, "6.6"),
+]
+
+TRANSFORM_FIXED = [
+    ("transform_id", "u8", 1, "6.7"),
+    ("transform_kind", "u8", 1, "6.7"),
+    ("dimension", "u8", 1, "6.7"),
+    ("rank", "u8", 1, "6.7"),
+]
+
+CODEBOOK_FIXED = [
+    ("codebook_id", "u8", 1, "6.8"),
+    ("component_count", "u8", 1, "6.8"),
+    ("entry_count_minus1", "u16", 1, "6.8"),
+    ("value_bytes", "u8", 1, "6.8"),
+]
+
+REFINEMENT_FIXED = [
+    ("refinement_digest", "u64", 1, "6.9"),
+    ("gaussian_count", "u32", 1, "6.9"),
+    ("position_shift", "u8", 1, "6.9"),
+    ("lanes_log2", "u8", 1, "6.9"),
+    ("sh_mode", "u8", 1, "6.9"),
+    ("vq_stage_count", "u8", 1, "6.9"),
+    ("codebook_ids", "u8", 4, "6.9"),
+]
+
+INDEX_FIXED = [("entry_count", "u32", 1, "6.10")]
+
+INDEX_ENTRY = [
+    ("frame", "u32", 1, "6.10"),
+    ("reserved_zero", "u32", 1, "6.10"),
+    ("offset", "u64", 1, "6.10"),
+]
+
+END = [
+    ("frame_count", "u32", 1, "6.11"),
+    ("unit_count", "u32", 1, "6.11"),
+    ("index_offset", "u64", 1, "6.11"),
+]
+
+
+class Record:
+    """The elements of a record by name; `at(name)` is the offset in the stream of an element."""
+
+    def __init__(self, table, reader):
+        self._offset = {}
+        for element, kind, places, clause in table:
+            self._offset[element] = reader.pos
+            if places == 1:
+                setattr(self, element, reader.value(kind, clause))
+            else:
+                setattr(self, element, reader.values(kind, places, clause))
+
+    def at(self, element):
+        return self._offset[element]
