@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 
 fn vectors(folder: &str) -> Vec<(PathBuf, Value)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/vectors").join(folder);
-    let mut streams: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut streams: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     streams.retain(|path| path.extension().is_some_and(|extension| extension == "gss"));
     streams.sort();
     let expected = |path: PathBuf| {

@@ -1,7 +1,7 @@
 //! The refinement units of a frame, all their blocks at once on all cores.
 
 use crate::block::{CodedBlock, UnitParameters, decode_block, decode_coded};
-use crate::frame::QuantizedFrame;
+use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::gop::{Gop, Transforms};
 use crate::layout::Layout;
 use rayon::prelude::*;
@@ -28,7 +28,6 @@ pub struct PreparedUnit<'g, 'r, 'a> {
     /// One model a plane; empty if the unit has no Gaussian.
     pub models: Vec<PlaneModel>,
     colour: crate::colour::Colour<'g>,
-    decoders: Vec<PlaneDecoder>,
 }
 
 impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
@@ -54,13 +53,16 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
             read_models(refinement.model, refinement.model_at, &alphabets, &reusable, trace)?
         };
         layout.check(&models, refinement.model_at)?;
-        Ok(Self { unit, layout, models, colour, decoders: Vec::new() })
+        Ok(Self { unit, layout, models, colour })
     }
 
-    /// Expands the tables.
-    pub fn with_decoders(mut self) -> Self {
-        self.decoders = self.models.iter().map(PlaneDecoder::new).collect();
-        self
+    /// The models with their tables expanded: 5 KB a table.
+    fn decoders(&self) -> Vec<PlaneDecoder> {
+        self.models.iter().map(PlaneDecoder::new).collect()
+    }
+
+    fn tables(&self) -> usize {
+        self.models.iter().map(|model| model.tables.len()).fold(0, usize::wrapping_add)
     }
 
     /// What the sequence and the unit say about a block.
@@ -94,10 +96,10 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
     /// # Errors
     /// As decoding.
     pub fn coded_blocks(&self, sequence: &SequenceParameters) -> Result<Vec<CodedBlock>> {
-        let parameters = self.parameters(sequence);
+        let (parameters, decoders) = (self.parameters(sequence), self.decoders());
         self.blocks(sequence)
             .into_iter()
-            .map(|(bytes, at, count)| decode_coded(bytes, at, count, &parameters, &self.decoders))
+            .map(|(bytes, at, count)| decode_coded(bytes, at, count, &parameters, &decoders))
             .collect()
     }
 }
@@ -113,24 +115,64 @@ pub fn decode_units(
     sequence: &SequenceParameters,
 ) -> (QuantizedFrame, Vec<Result<usize>>) {
     let (prepared, failure) = prepare(units, gop, transforms);
-    let tasks: Vec<_> = prepared
-        .iter()
-        .enumerate()
-        .flat_map(|(place, unit)| unit.blocks(sequence).into_iter().map(move |block| (place, unit, block)))
-        .collect();
-    let lengths: Vec<usize> = tasks.iter().map(|(_, _, (_, _, count))| *count).collect();
+    let blocks: Vec<_> = prepared.iter().map(|unit| unit.blocks(sequence)).collect();
+    let lengths: Vec<usize> = blocks.iter().flatten().map(|&(_, _, count)| count).collect();
     let total = lengths.iter().copied().fold(0, usize::wrapping_add);
     let mut frame = QuantizedFrame::zeroed(total, usize::from(sequence.sh_dimension()));
-    let outputs = frame.slices(&lengths);
+    let mut outputs = frame.slices(&lengths).into_iter();
+    let mut results: Vec<Result<usize>> = Vec::with_capacity(units.len());
+    let mut rest = prepared.iter().zip(&blocks).collect::<Vec<_>>();
+    while !rest.is_empty() {
+        let later = rest.split_off(group_length(&rest));
+        results.extend(decode_group(&rest, sequence, &mut outputs));
+        rest = later;
+    }
+    results.extend(failure.map(Err));
+    (frame, results)
+}
+
+/// Bytes, offset and Gaussians of a block.
+type Block<'a> = (&'a [u8], u64, usize);
+
+/// A prepared unit and its blocks.
+type UnitBlocks<'p, 'g, 'r, 'a> = (&'p PreparedUnit<'g, 'r, 'a>, &'p Vec<Block<'a>>);
+
+/// How many of the units, at least one, have their tables expanded at the same time. All of those of an honest
+/// frame; a stream made to take memory gets one unit at a time.
+fn group_length(units: &[UnitBlocks<'_, '_, '_, '_>]) -> usize {
+    const MOST_TABLES: usize = 1 << 12;
+    let mut tables = 0_usize;
+    let fits = |(unit, _): &&UnitBlocks<'_, '_, '_, '_>| {
+        tables = tables.wrapping_add(unit.tables());
+        tables <= MOST_TABLES
+    };
+    units.iter().take_while(fits).count().max(1)
+}
+
+/// Decodes all blocks of some units at once; for each unit its Gaussians or its first error.
+fn decode_group<'f>(
+    units: &[UnitBlocks<'_, '_, '_, '_>],
+    sequence: &SequenceParameters,
+    outputs: &mut impl Iterator<Item = FrameSlice<'f>>,
+) -> Vec<Result<usize>> {
+    let decoders: Vec<Vec<PlaneDecoder>> = units.par_iter().map(|(unit, _)| unit.decoders()).collect();
+    let tasks: Vec<_> = units
+        .iter()
+        .zip(&decoders)
+        .enumerate()
+        .flat_map(|(place, ((unit, blocks), decoders))| {
+            blocks.iter().map(move |&block| (place, unit, decoders, block))
+        })
+        .zip(outputs)
+        .collect();
     let decoded: Vec<(usize, Result<usize>)> = tasks
         .into_par_iter()
-        .zip(outputs)
-        .map(|((place, unit, (bytes, at, count)), mut out)| {
-            let done = decode_block(bytes, at, &unit.parameters(sequence), &unit.decoders, &mut out);
+        .map(|((place, unit, decoders, (bytes, at, count)), mut out)| {
+            let done = decode_block(bytes, at, &unit.parameters(sequence), decoders, &mut out);
             (place, done.map(|()| count))
         })
         .collect();
-    let mut results: Vec<Result<usize>> = prepared.iter().map(|_| Ok(0)).collect();
+    let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (place, block) in decoded {
         let Some(slot) = results.get_mut(place) else { continue };
         match (slot.as_mut(), block) {
@@ -139,11 +181,10 @@ pub fn decode_units(
             (Err(_), _) => {}
         }
     }
-    results.extend(failure.map(Err));
-    (frame, results)
+    results
 }
 
-/// Reads the models of the units up to the first that cannot be read, and expands them.
+/// Reads the models of the units up to the first that cannot be read.
 fn prepare<'g, 'r, 'a>(
     units: &[CodedUnit<'r, 'a>],
     gop: &'g Gop,
@@ -162,5 +203,5 @@ fn prepare<'g, 'r, 'a>(
             }
         }
     }
-    (prepared.into_par_iter().map(PreparedUnit::with_decoders).collect(), failure)
+    (prepared, failure)
 }

@@ -110,7 +110,7 @@ impl State {
         let coded = CodedUnit { refinement: &refinement, payload_at: unit.payload_at };
         let mut trace = BitsOfPlanes::default();
         let before = self.models.as_ref().map(|(layout, models)| (layout, models.as_slice()));
-        let prepared = PreparedUnit::new(coded, gop, transforms, before, &mut trace)?.with_decoders();
+        let prepared = PreparedUnit::new(coded, gop, transforms, before, &mut trace)?;
         let gaussians = u64::from(refinement.header.gaussian_count);
         statistics.gaussians = statistics.gaussians.saturating_add(gaussians);
         let blocks = prepared.coded_blocks(sequence)?;

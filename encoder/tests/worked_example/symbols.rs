@@ -44,8 +44,7 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
                 let known = before
                     .as_ref()
                     .map(|(layout, models): &(Layout, Vec<PlaneModel>)| (layout, models.as_slice()));
-                let prepared =
-                    PreparedUnit::new(coded, gop, transforms, known, &mut ()).unwrap().with_decoders();
+                let prepared = PreparedUnit::new(coded, gop, transforms, known, &mut ()).unwrap();
                 let fast = prepared.coded_blocks(sequence).unwrap();
                 let title = format!("refinement {}", unit.header.refinement);
                 for (place, block) in prepared.blocks(sequence).into_iter().enumerate() {
