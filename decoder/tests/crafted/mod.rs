@@ -7,6 +7,7 @@
 pub(crate) mod contexts;
 pub(crate) mod expect;
 pub(crate) mod reference;
+pub(crate) mod sample;
 pub(crate) mod scene;
 
 use splatstream_format::payload::Index;
@@ -82,9 +83,7 @@ impl Script {
     /// The header elements of a unit, to be changed.
     pub(crate) fn id(&mut self, kind: UnitType, n: usize) -> &mut UnitId {
         let part = self.find(kind, n);
-        match self.solid(part) {
-            (id, _) => id,
-        }
+        self.solid(part).0
     }
 
     /// The payload of a unit, to be changed.

@@ -7,7 +7,8 @@ use xxhash_rust::xxh64::xxh64;
 
 /// P(r) of 7.2.
 pub(crate) fn prefix(sequence: &SequenceParameters, refinement: usize, gaussians: u64) -> u64 {
-    (u64::from(sequence.refinement_percent[refinement]) * gaussians + 99) / 100
+    let share = u64::from(sequence.refinement_percent[refinement]) * gaussians;
+    share.div_ceil(100)
 }
 
 /// The canonical planes of a unit, 7.9; none if a rule of 7.3 to 7.8 is broken.

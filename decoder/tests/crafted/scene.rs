@@ -10,7 +10,8 @@ use splatstream_format::entropy::token::split;
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 use splatstream_format::payload::{Codebook, Transform, write_leb128};
 use splatstream_format::syntax::{
-    CodebookHeader, FrameHeader, GopHeader, NO_TRANSFORM, SequenceParameters, TransformHeader, UnitId, UnitType,
+    CodebookHeader, FrameHeader, GopHeader, NO_TRANSFORM, SequenceParameters, TransformHeader, UnitId,
+    UnitType,
 };
 use std::collections::BTreeMap;
 
@@ -180,7 +181,12 @@ impl Unit {
     }
 
     /// The blocks coded with models.
-    pub(crate) fn coded_blocks(&self, planes: &[PlaneInfo], models: &[PlaneModel], block_log2: u8) -> Vec<Vec<u8>> {
+    pub(crate) fn coded_blocks(
+        &self,
+        planes: &[PlaneInfo],
+        models: &[PlaneModel],
+        block_log2: u8,
+    ) -> Vec<Vec<u8>> {
         let biases: Vec<i64> = models.iter().map(|model| model.bias.into()).collect();
         let block = |run: &[Gaussian]| {
             let values = self.values_with(planes, run, &biases);
@@ -255,8 +261,9 @@ impl Frame {
     }
 
     fn parts(&self, number: u32, sequence: &SequenceParameters, gop: &Gop, parts: &mut Vec<Part>) {
-        let mut header =
-            FrameHeader::intra(self.dc_transform, Some(self.sh_transform), self.gaussians()).to_bytes().unwrap();
+        let mut header = FrameHeader::intra(self.dc_transform, Some(self.sh_transform), self.gaussians())
+            .to_bytes()
+            .unwrap();
         header[2] = self.sh_transform;
         parts.push(Part::unit(UnitType::FrameHeader, number, header));
         let Some(tools) = gop.tools(self) else { return };

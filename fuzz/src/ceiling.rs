@@ -1,0 +1,70 @@
+//! A heap that ends: a request that was sized by a count in the input is refused, and so is what many small
+//! ones add up to. libFuzzer's own limits need a sanitizer's heap, which stable toolchains lack, or look at pages
+//! in use, which zeroed ones are not.
+#![expect(unsafe_code, reason = "GlobalAlloc is an unsafe trait; each request goes to the system as it came")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::ptr::null_mut;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// Most bytes of one request.
+pub const MOST: usize = 64 << 20;
+/// Most bytes of all requests together.
+pub const MOST_IN_USE: usize = 2 * MOST;
+
+struct Ceiling {
+    in_use: AtomicUsize,
+}
+
+#[global_allocator]
+static CEILING: Ceiling = Ceiling { in_use: AtomicUsize::new(0) };
+
+impl Ceiling {
+    /// Whether there is room for `size` more bytes, which then are in use.
+    fn claim(&self, size: usize) -> bool {
+        if size > MOST {
+            return false;
+        }
+        let has_room = self.in_use.fetch_add(size, Relaxed) <= MOST_IN_USE - size;
+        if !has_room {
+            self.release(size);
+        }
+        has_room
+    }
+
+    fn release(&self, size: usize) {
+        self.in_use.fetch_sub(size, Relaxed);
+    }
+
+    fn claimed(&self, size: usize, request: impl FnOnce() -> *mut u8) -> *mut u8 {
+        let place = if self.claim(size) { request() } else { return null_mut() };
+        if place.is_null() {
+            self.release(size);
+        }
+        place
+    }
+}
+
+// SAFETY: System keeps the contract; null is what it gives too where there is no memory.
+unsafe impl GlobalAlloc for Ceiling {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        self.claimed(layout.size(), || unsafe { System.alloc(layout) })
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        self.claimed(layout.size(), || unsafe { System.alloc_zeroed(layout) })
+    }
+
+    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let place = self.claimed(size, || unsafe { System.realloc(place, layout, size) });
+        if !place.is_null() {
+            self.release(layout.size());
+        }
+        place
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        self.release(layout.size());
+        unsafe { System.dealloc(place, layout) }
+    }
+}

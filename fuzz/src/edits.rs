@@ -1,0 +1,69 @@
+//! Edits of a valid stream, taken from bytes: five to an edit, so that changing one byte changes one edit.
+
+use crate::seal::set_payload_length;
+use crate::streams;
+use splatstream_format::Limits;
+use splatstream_format::syntax::{FileHeader, UnitHeader};
+use splatstream_format::unit::Stream;
+
+/// Bytes of an edit: what, in which unit, where (16 bits), and with which value.
+const EDIT: usize = 5;
+/// More add time, not depth.
+const MOST_EDITS: usize = 32;
+
+/// One of the valid streams with edits.
+pub fn edited(data: &[u8]) -> Vec<u8> {
+    let (choice, edits) = data.split_first().unwrap_or((&0, &[]));
+    let stream = streams::ALL[usize::from(*choice) % streams::ALL.len()];
+    let mut units = units(stream);
+    for &[what, unit, low, high, value] in edits.as_chunks::<EDIT>().0.iter().take(MOST_EDITS) {
+        apply(&mut units, what, unit.into(), u16::from_le_bytes([low, high]).into(), value);
+    }
+    let mut out = stream[..FileHeader::SIZE].to_vec();
+    out.extend(units.into_iter().flatten());
+    out
+}
+
+/// Header and payload of each unit.
+fn units(stream: &[u8]) -> Vec<Vec<u8>> {
+    let limits = Limits::default();
+    let Ok(opened) = Stream::open(stream, &limits) else { return Vec::new() };
+    let mut rest = &stream[FileHeader::SIZE..];
+    let mut units = Vec::new();
+    for unit in opened.units().map_while(Result::ok) {
+        let (this, behind) = rest.split_at(UnitHeader::SIZE + unit.payload.len());
+        units.push(this.to_vec());
+        rest = behind;
+    }
+    units
+}
+
+fn apply(units: &mut Vec<Vec<u8>>, what: u8, unit: usize, place: usize, value: u8) {
+    let count = units.len();
+    if count == 0 {
+        return;
+    }
+    let unit = unit % count;
+    let bytes = &mut units[unit];
+    let place = place % bytes.len();
+    match what % 8 {
+        0 => bytes[place] = value,
+        1 => bytes[place] ^= 1 << (value % 8),
+        2 => bytes[place] = bytes[place].wrapping_add(value),
+        // In the payload, and the header knows: the other units stay what they are.
+        3 => {
+            bytes.insert(place.max(UnitHeader::SIZE), value);
+            set_payload_length(bytes);
+        }
+        4 => {
+            bytes.truncate(place.max(UnitHeader::SIZE));
+            set_payload_length(bytes);
+        }
+        5 => drop(units.remove(unit)),
+        6 => {
+            let again = bytes.clone();
+            units.insert(usize::from(value) % count, again);
+        }
+        _ => units.swap(unit, usize::from(value) % count),
+    }
+}

@@ -1,0 +1,38 @@
+//! What is fuzzed, as ordinary functions: libFuzzer calls them (`targets/`), and `tests/regressions.rs` replays
+//! with them what was found, on any toolchain.
+//!
+//! Each takes any bytes and returns. A panic is a finding, and so are a request for more memory than
+//! [`ceiling`] allows and an input that takes seconds.
+
+pub mod ceiling;
+pub mod decode;
+pub mod edits;
+pub mod payload;
+pub mod scene;
+pub mod seal;
+pub mod streams;
+pub mod units;
+
+use splatstream_format::Limits;
+
+/// Small, so that an input which keeps within them is cheap.
+pub const LIMITS: Limits =
+    Limits { max_gaussians: 1 << 12, max_payload: 1 << 18, max_units: 1 << 9, max_codebook_values: 1 << 16 };
+
+/// Runs a target on the files named as arguments of the program.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn replay(run: fn(&[u8])) -> std::io::Result<()> {
+    for path in std::env::args_os().skip(1) {
+        run(&std::fs::read(path)?);
+    }
+    Ok(())
+}
+
+/// Lets parallel work happen on the calling thread, which must be the only one: coverage then depends on
+/// the input alone, and no time goes into waking threads.
+pub fn stay_on_this_thread() {
+    // Fails only if there is a pool already, and that one serves as well.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
+}

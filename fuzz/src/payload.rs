@@ -1,0 +1,130 @@
+//! Payloads: what is written is read, what is read is written, and any bytes are refused or read.
+
+use crate::LIMITS;
+use arbitrary::{Arbitrary, Unstructured};
+use splatstream_format::Limits;
+use splatstream_format::arbitrary_stream::{ArbitraryGop, ArbitraryStream, sequence_parameters};
+use splatstream_format::entropy::layout::{Layout, ShCoding};
+use splatstream_format::entropy::model::{read_models, write_models};
+use splatstream_format::payload::{Codebook, Index, Refinement, Transform};
+use splatstream_format::syntax::{SequenceParameters, UnitType};
+use splatstream_format::unit::{Stream, Unit};
+
+/// Bytes that sequence parameters are made of, for parsers that need some.
+pub const SEQUENCE: usize = 96;
+
+/// The first byte of the input chooses what the others are.
+pub fn run(data: &[u8]) {
+    let Some((choice, data)) = data.split_first() else { return };
+    if choice % 6 == 0 {
+        // Fails only where the bytes do not suffice.
+        if let Ok(stream) = ArbitraryStream::arbitrary(&mut Unstructured::new(data)) {
+            comes_back(&stream);
+        }
+        return;
+    }
+    let (head, payload) = data.split_at_checked(SEQUENCE).unwrap_or((data, &[]));
+    let Ok(sequence) = sequence_parameters(&mut Unstructured::new(head)) else { return };
+    match choice % 6 {
+        1 => writes_back(payload, Transform::parse(payload, 0, &sequence), |read| read.to_bytes(&sequence)),
+        2 => writes_back(payload, Codebook::parse(payload, 0, &LIMITS), Codebook::to_bytes),
+        3 => writes_back(payload, Index::parse(payload, 0), Index::to_bytes),
+        4 => {
+            let read = Refinement::parse(payload, 0, &sequence, &LIMITS);
+            writes_back(payload, read, |read| read.to_bytes(&sequence));
+        }
+        _ => models(payload),
+    }
+}
+
+/// What is accepted has one form.
+fn writes_back<T>(
+    payload: &[u8],
+    read: splatstream_format::Result<T>,
+    write: impl FnOnce(&T) -> splatstream_format::Result<Vec<u8>>,
+) {
+    if let Ok(read) = read {
+        assert_eq!(write(&read).as_deref(), Ok(payload));
+    }
+}
+
+/// Models have several forms; the one that is written stands for the same models.
+fn models(data: &[u8]) {
+    let [dc_rank, coding, sh_rank, section @ ..] = data else { return };
+    let (dc_rank, sh_rank) = (dc_rank % 3 + 1, sh_rank % 45 + 1);
+    let coding = match coding % 3 {
+        0 => ShCoding::None,
+        1 => ShCoding::Coefficients { rank: sh_rank },
+        _ => ShCoding::VectorQuantised { stages: sh_rank % 4 + 1 },
+    };
+    let alphabets = Layout::new(dc_rank, coding).alphabets();
+    let first = vec![None; alphabets.len()];
+    let Ok(models) = read_models(section, 0, &alphabets, &first, &mut ()) else { return };
+    let written = write_models(&models, &alphabets, None);
+    assert_eq!(read_models(&written, 0, &alphabets, &first, &mut ()).as_ref(), Ok(&models));
+    let reused = write_models(&models, &alphabets, Some(&models));
+    let reusable: Vec<_> = models.iter().map(Some).collect();
+    assert_eq!(read_models(&reused, 0, &alphabets, &reusable, &mut ()).as_ref(), Ok(&models));
+}
+
+/// A stream that obeys the syntax is written, and read again unit by unit.
+fn comes_back(stream: &ArbitraryStream) {
+    let bytes = stream.to_bytes().expect("a valid stream can be written");
+    let limits = Limits::default();
+    let opened = Stream::open(&bytes, &limits).expect("it starts with a file header");
+    assert_eq!(opened.header().level, stream.level);
+    let units: Vec<Unit<'_>> = opened.units().collect::<Result<_, _>>().expect("units lie back to back");
+    let mut units = Payloads { units: units.iter() };
+    let sequence = units.next(UnitType::SequenceParameters);
+    assert_eq!(SequenceParameters::parse_payload(sequence.payload, sequence.payload_at), Ok(stream.sequence));
+    stream.gops.iter().for_each(|gop| units.gop(gop, &stream.sequence));
+    if stream.has_index {
+        let index = units.next(UnitType::Index);
+        let index = Index::parse(index.payload, index.payload_at).expect("an index");
+        assert_eq!(index.entries.len(), stream.gops.len());
+    }
+    units.next(UnitType::End);
+    assert_eq!(units.units.next(), None);
+}
+
+/// The units of a stream, to be compared with what they were made of.
+struct Payloads<'u, 'a> {
+    units: core::slice::Iter<'u, Unit<'a>>,
+}
+
+impl<'u, 'a> Payloads<'u, 'a> {
+    fn next(&mut self, expected: UnitType) -> &'u Unit<'a> {
+        let unit = self.units.next().expect("there are more units");
+        assert_eq!(unit.header.unit_type(), expected);
+        unit
+    }
+
+    fn gop(&mut self, gop: &ArbitraryGop, sequence: &SequenceParameters) {
+        self.next(UnitType::GopHeader);
+        if let Some(private) = &gop.private {
+            assert_eq!(self.next(UnitType::User(200)).payload, private);
+        }
+        for transform in &gop.transforms {
+            let unit = self.next(UnitType::Transform);
+            assert_eq!(Transform::parse(unit.payload, unit.payload_at, sequence).as_ref(), Ok(transform));
+        }
+        for codebook in &gop.codebooks {
+            let unit = self.next(UnitType::Codebook);
+            assert_eq!(Codebook::parse(unit.payload, unit.payload_at, &LIMITS).as_ref(), Ok(codebook));
+        }
+        for frame in &gop.frames {
+            assert_eq!(
+                self.next(UnitType::FrameHeader).payload,
+                frame.header.to_bytes().expect("a frame header")
+            );
+            for refinement in &frame.refinements {
+                let unit = self.next(UnitType::Refinement);
+                let read = Refinement::parse(unit.payload, unit.payload_at, sequence, &LIMITS);
+                let read = read.expect("a refinement");
+                assert_eq!((read.header, read.model), (refinement.header, refinement.model.as_slice()));
+                let blocks = read.blocks.iter().map(|(block, _)| *block);
+                assert!(blocks.eq(refinement.blocks.iter().map(Vec::as_slice)), "blocks come back");
+            }
+        }
+    }
+}

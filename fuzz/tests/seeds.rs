@@ -1,0 +1,132 @@
+//! Where fuzzing starts. `BLESS=1 cargo test --test seeds` writes the seeds anew, after a change of the bitstream;
+//! without it, they are checked to be still good.
+
+use arbitrary::{Arbitrary, Unstructured};
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_format::arbitrary_stream::{self as random, ArbitraryStream};
+use splatstream_format::payload::Index;
+use splatstream_format::syntax::{IndexEntry, SequenceParameters, TransformKind};
+use splatstream_fuzz::{payload, scene, streams};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+#[path = "seeds/contexts.rs"]
+mod contexts;
+#[path = "seeds/scenes.rs"]
+mod scenes;
+#[path = "seeds/valid_streams.rs"]
+mod valid_streams;
+
+/// The seeds of a target: they are part of every clone.
+const MOST_BYTES: usize = 50_000;
+
+fn folder(target: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds").join(target)
+}
+
+fn bless(target: &str, seeds: &[(String, Vec<u8>)]) {
+    if std::env::var_os("BLESS").is_none() {
+        return;
+    }
+    let folder = folder(target);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    for (name, bytes) in seeds {
+        std::fs::write(folder.join(name).with_extension("bin"), bytes).unwrap();
+    }
+}
+
+fn saved(target: &str) -> Vec<(PathBuf, Vec<u8>)> {
+    let files = std::fs::read_dir(folder(target)).unwrap().map(|entry| entry.unwrap().path());
+    let files: Vec<_> = files.map(|path| (path.clone(), std::fs::read(path).unwrap())).collect();
+    let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
+    assert!(bytes <= MOST_BYTES, "the seeds of {target} take {bytes} bytes");
+    files
+}
+
+/// Bytes without pattern, the same on every machine (SplitMix64).
+fn noise(seed: u64, length: usize) -> Vec<u8> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ mixed >> 31) as u8
+    };
+    (0..length).map(|_| next()).collect()
+}
+
+#[test]
+fn streams_decode_with_all_their_digests() {
+    bless("units", &valid_streams::all());
+    let saved = saved("units");
+    assert_eq!(saved.len(), streams::ALL.len(), "src/streams.rs names them all");
+    for (path, bytes) in saved {
+        let summary = decode_stream(&bytes, &Options::default(), |_, _| ControlFlow::Continue(()));
+        assert_eq!(summary.end, None, "{}: write the seeds anew, with BLESS=1", path.display());
+    }
+}
+
+#[test]
+fn edits_are_seeds_of_decode() {
+    let edits = |count: usize| {
+        (0..streams::ALL.len() as u8).map(move |choice| {
+            let edits = if count == 0 { Vec::new() } else { noise(u64::from(choice), count * 5) };
+            (format!("{count}-edits-of-{choice}"), [vec![choice], edits].concat())
+        })
+    };
+    bless("decode", &edits(0).chain(edits(1)).chain(edits(4)).collect::<Vec<_>>());
+    assert_eq!(saved("decode").len(), 3 * streams::ALL.len());
+}
+
+#[test]
+fn scene_files_read() {
+    bless("scene", &scenes::all());
+    for (path, bytes) in saved("scene") {
+        let (choice, file) = bytes.split_first().unwrap();
+        let read = scene::READERS[usize::from(*choice)](file, &scene::LIMITS);
+        assert!(!read.unwrap_or_else(|error| panic!("{}: {error}", path.display())).is_empty());
+    }
+}
+
+#[test]
+fn payloads_are_accepted() {
+    let mut seeds: Vec<(String, Vec<u8>)> =
+        (1..=6).map(|seed| (format!("stream-{seed}"), [vec![0], noise(seed, 700)].concat())).collect();
+    for seed in 1..=3_u64 {
+        let head = noise(seed + 100, payload::SEQUENCE);
+        let sequence = random::sequence_parameters(&mut Unstructured::new(&head)).unwrap();
+        for (choice, name, bytes) in payloads(seed, &sequence) {
+            seeds.push((format!("{name}-{seed}"), [vec![choice], head.clone(), bytes].concat()));
+        }
+    }
+    for (place, section) in valid_streams::model_sections().into_iter().enumerate() {
+        let head = vec![0; payload::SEQUENCE];
+        seeds.push((format!("models-{place}"), [vec![5], head, section].concat()));
+    }
+    bless("payload", &seeds);
+    for (path, bytes) in saved("payload") {
+        if bytes[0] == 0 {
+            let stream = ArbitraryStream::arbitrary(&mut Unstructured::new(&bytes[1..])).unwrap();
+            assert!(stream.to_bytes().is_ok(), "{}", path.display());
+        }
+    }
+}
+
+/// One payload of each kind that needs sequence parameters, or none.
+fn payloads(seed: u64, sequence: &SequenceParameters) -> Vec<(u8, &'static str, Vec<u8>)> {
+    let noise = noise(seed + 200, 3000);
+    let mut u = Unstructured::new(&noise);
+    let kind = if sequence.sh_degree > 0 { TransformKind::Sh } else { TransformKind::Dc };
+    let transform = random::transform(&mut u, 1, kind, sequence).unwrap();
+    let codebook = random::codebook(&mut u, 2, 5).unwrap();
+    let entries = vec![IndexEntry { frame: 0, reserved_zero: 0, offset: 112 }; 2];
+    let refinement = random::refinement(&mut u, sequence, 200, &[2], true).unwrap();
+    vec![
+        (1, "transform", transform.to_bytes(sequence).unwrap()),
+        (2, "codebook", codebook.to_bytes().unwrap()),
+        (3, "index", Index { entries }.to_bytes().unwrap()),
+        (4, "refinement", refinement.to_bytes(sequence).unwrap()),
+    ]
+}

@@ -1,0 +1,93 @@
+//! Streams of the encoder, as small as it makes them.
+
+use crate::contexts;
+use splatstream_encoder::{Preset, Quality, Settings, ShChoice, Steps, encode};
+use splatstream_format::Limits;
+use splatstream_format::payload::{Refinement, Transform};
+use splatstream_format::syntax::{SequenceParameters, ShMode, UnitType};
+use splatstream_format::unit::Stream;
+use splatstream_scene::builtin::{BuiltinScene, Tracking};
+
+/// Name and bytes; each uses other parts of the syntax.
+pub(crate) fn all() -> Vec<(String, Vec<u8>)> {
+    let fast = Settings { preset: Preset::Fast, steps: Quality::Low.steps(), ..Settings::default() };
+    // A degree and a step with which the scene's faint harmonics are not left out.
+    let steps = Steps { sh: 0.02, ..fast.steps };
+    let with_sh = |degree, sh| {
+        let refinements = vec![50, 100];
+        Settings { preset: Preset::Balanced, sh_degree: Some(degree), sh, refinements, steps, ..fast.clone() }
+    };
+    let settings = [
+        ("plain", 0, 1, Settings { refinements: vec![100], ..fast.clone() }),
+        ("groups", 1, 3, Settings { refinements: vec![30, 100], gop: 2, ..fast.clone() }),
+        ("coefficients", 3, 1, with_sh(3, ShChoice::Coefficients)),
+        ("vectors", 2, 1, with_sh(2, ShChoice::VectorQuantised)),
+        ("blocks", 0, 1, Settings { block_log2: 6, keep_invisible: true, ..fast }),
+    ];
+    let encoded =
+        settings.into_iter().map(|(name, sh, frames, settings)| (name, stream(sh, frames, &settings)));
+    let by_hand = [("contexts", contexts::stream(&one_refinement()))];
+    encoded.chain(by_hand).map(|(name, bytes)| (name.to_owned(), bytes)).collect()
+}
+
+fn stream(sh_degree: u8, frames: u32, settings: &Settings) -> Vec<u8> {
+    let mut scene = BuiltinScene { gaussians: 100, frames, seed: 7, tracking: Tracking::Tracked, sh_degree };
+    let mut bytes = Vec::new();
+    encode(&mut scene, settings, &mut bytes, &mut |_, _| {}).unwrap();
+    bytes
+}
+
+/// Everything at once, in blocks of 64.
+fn one_refinement() -> SequenceParameters {
+    let one = 1.0_f32.to_bits();
+    let mut refinement_percent = [0; 10];
+    refinement_percent[0] = 100;
+    SequenceParameters {
+        sh_degree: 1,
+        spatial_layer_count: 1,
+        temporal_layer_count: 1,
+        refinement_count: 1,
+        refinement_percent,
+        position_bits: 10,
+        block_log2: 6,
+        sequence_flags: SequenceParameters::flags(true, false),
+        rotation_threshold: [20, 10, 5],
+        frame_count: 1,
+        ticks_per_second: 30,
+        ticks_per_frame: 1,
+        position_offset: [0; 3],
+        position_step: one,
+        log_scale_offset: 0,
+        log_scale_step: one,
+        rotation_step: one,
+        opacity_offset: 0,
+        opacity_step: one,
+        dc_step: one,
+        sh_step: one,
+    }
+}
+
+/// Model sections of these streams' first units, behind what says which planes they are for.
+pub(crate) fn model_sections() -> Vec<Vec<u8>> {
+    all().iter().map(|(_, bytes)| model_section(bytes)).collect()
+}
+
+fn model_section(bytes: &[u8]) -> Vec<u8> {
+    let limits = Limits::default();
+    let units: Vec<_> = Stream::open(bytes, &limits).unwrap().units().map(Result::unwrap).collect();
+    let of_type = |unit_type| units.iter().filter(move |unit| unit.header.unit_type() == unit_type);
+    let first = of_type(UnitType::SequenceParameters).next().unwrap();
+    let sequence = SequenceParameters::parse_payload(first.payload, first.payload_at).unwrap();
+    let ranks: Vec<u8> = of_type(UnitType::Transform)
+        .map(|unit| Transform::parse(unit.payload, unit.payload_at, &sequence).unwrap().header.rank)
+        .collect();
+    let unit = of_type(UnitType::Refinement).next().unwrap();
+    let refinement = Refinement::parse(unit.payload, unit.payload_at, &sequence, &limits).unwrap();
+    let header = &refinement.header;
+    // As `splatstream_fuzz::payload` takes them apart.
+    let sh = match header.mode() {
+        Some(ShMode::VectorQuantised) => header.vq_stage_count + 2,
+        _ => ranks.get(1).map_or(0, |rank| rank - 1),
+    };
+    [&[ranks[0] - 1, header.sh_mode, sh], refinement.model].concat()
+}
