@@ -70,14 +70,14 @@ class BlockValues:
     def log_scales(self, v):
         q = [[], [], []]
         for k in range(3):
-            for i in range(self.n):
-                value = v[k][i]
-                integer = value if k == 0 else q[k - 1][i] - value
-                self.check(VALUE_MIN <= value <= VALUE_MAX, "OUT_OF_RANGE", "7.4")
-                self.check(VALUE_MIN <= integer <= VALUE_MAX, "OUT_OF_RANGE", "7.4")
-                if self.seq.canonical_axes == 1 and k > 0:
+            q[k] = [v[k][i] if k == 0 else q[k - 1][i] - v[k][i] for i in range(self.n)]
+            # The order of 9.3: the ranges of v, then those of q, then SS-AT-002.
+            for values in (v[k], q[k]):
+                for value in values:
+                    self.check(VALUE_MIN <= value <= VALUE_MAX, "OUT_OF_RANGE", "7.4")
+            if self.seq.canonical_axes == 1 and k > 0:
+                for value in v[k]:
                     self.check(value >= 0, "CONSTRAINT", "7.4")
-                q[k].append(integer)
         return q
 
     # ---- 7.5 ----

@@ -30,6 +30,11 @@ impl<'a> BitReader<'a> {
         self.consumed_bits
     }
 
+    /// Bits there are in all.
+    pub fn available(&self) -> u64 {
+        self.available_bits
+    }
+
     /// Descriptor u(n), n at most [`BitReader::MAX_BITS`].
     #[inline(always)]
     pub fn bits(&mut self, count: u32) -> u64 {

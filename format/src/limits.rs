@@ -28,7 +28,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Gaussians of a frame that a level allows, table of annex A.3; 0 for a level that is not defined.
+    /// Gaussians of a frame that a level allows, table of annex A.2; 0 for a level that is not defined.
     pub const fn gaussians_of_level(level: u8) -> u32 {
         match level {
             1 => 1 << 18,

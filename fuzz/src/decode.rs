@@ -11,7 +11,7 @@ use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::inspect::inspect;
 use splatstream_format::syntax::{SequenceParameters, UnitType};
-use splatstream_format::unit::Stream;
+use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Error, ErrorKind, Result};
 use std::borrow::Cow;
 
@@ -48,6 +48,7 @@ pub fn run(data: &[u8]) {
         let choice = data.iter().fold(0_u32, |sum, byte| sum.wrapping_mul(31).wrapping_add((*byte).into()));
         extracted(&bytes, &strict, choice);
         with_losses(&bytes, &strict, choice);
+        from_inside(&bytes, &strict, choice).expect("decoding can start at any GOP header");
     }
     shown(tolerant);
 }
@@ -132,6 +133,30 @@ fn lossy(bytes: &[u8], losses: u32) -> Result<Vec<DecodedFrame>> {
         }
     }
     Ok(frames)
+}
+
+/// Decoding starts at a GOP header, behind the sequence parameters: the frames from there on are the same.
+fn from_inside(bytes: &[u8], strict: &Decoded, choice: u32) -> Result<()> {
+    let stream = Stream::open(bytes, &LIMITS)?;
+    let units: Vec<Unit<'_>> = stream.units().collect::<Result<_>>()?;
+    let of_type =
+        |unit_type| units.iter().enumerate().filter(move |(_, unit)| unit.header.unit_type() == unit_type);
+    let gops: Vec<usize> = of_type(UnitType::GopHeader).map(|(place, _)| place).collect();
+    let (Some((_, parameters)), false) = (of_type(UnitType::SequenceParameters).next(), gops.is_empty())
+    else {
+        return Ok(());
+    };
+    let start = gops[choice as usize % gops.len()];
+    let mut decoder = Decoder::starting_inside(stream.header(), STRICT);
+    decoder.unit(parameters)?;
+    let mut frames = Vec::new();
+    for unit in &units[start..] {
+        frames.extend(decoder.unit(unit)?);
+    }
+    assert!(strict.frames.ends_with(&frames), "frames depend on what is before their GOP");
+    let first = units[start].header.frame as usize;
+    assert_eq!(frames.len(), strict.frames.len() - first);
+    Ok(())
 }
 
 fn is_prefix(parts: &[DecodedFrame], wholes: &[DecodedFrame]) {

@@ -300,8 +300,9 @@ struct ModelReader<'a, 't, T> {
 }
 
 impl<T: ModelTrace> ModelReader<'_, '_, T> {
+    /// The byte at which reading has arrived, at most the end of the section.
     fn here(&self) -> u64 {
-        self.at.wrapping_add(self.bits.position() / 8)
+        self.at.wrapping_add(self.bits.position().min(self.bits.available()) / 8)
     }
 
     fn broken(&self, rule: &'static str) -> Error {
