@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 ///
 /// Writes the source and the decoded frames, the stream, and a report.
 #[derive(Args)]
-#[command(after_help = "Example:\n  splatstream demo --out /tmp/demo")]
+#[command(after_help = "Example:\n  splatstream demo --out first-look")]
 pub(crate) struct Demo {
     /// Where the files go.
     #[arg(short, long, value_name = "DIR", default_value = "splatstream-demo")]
