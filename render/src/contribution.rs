@@ -1,0 +1,1 @@
+//! How much each Gaussian shows in a set of views.

@@ -1,0 +1,19 @@
+//! Gaussians to pixels, and how far apart two pictures are.
+//!
+//! * [`camera`]: pinhole cameras, read from the JSON files in use or made for a scene that has none;
+//! * [`rasterise`]: a frame of Gaussians to a picture, as 3D Gaussian splatting defines it;
+//! * [`contribution`]: how much each Gaussian shows in a set of views;
+//! * [`metrics`]: PSNR, SSIM, a learned metric, and the mean difference of two rate-distortion curves.
+//!
+//! Pictures are equal for any number of threads and on every machine: single IEEE operations in a stated
+//! order, `libm` for the rest, and sums in a fixed order.
+
+pub mod camera;
+pub mod contribution;
+pub mod image;
+pub mod metrics;
+pub mod rasterise;
+
+pub use camera::Camera;
+pub use image::Image;
+pub use rasterise::{Options, Rendering, render};
