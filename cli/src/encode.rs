@@ -8,10 +8,11 @@ use crate::frame_files::FrameFiles;
 use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
 use crate::output_file::OutputFile;
 use crate::progress::Progress;
+use crate::setting_names::{PresetName, QualityName, ShName, ToolName};
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use splatstream_encoder::{FrameSource, Preset, Quality, Report, Settings, ShChoice, encode};
+use splatstream_encoder::{FrameSource, Quality, Report, Settings, encode};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -60,31 +61,9 @@ pub(crate) struct Encode {
     /// What puts Gaussians into the first refinements.
     #[arg(long, value_enum, default_value_t = Importance::Volume)]
     importance: Importance,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum PresetName {
-    Fast,
-    Balanced,
-    Small,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum QualityName {
-    Low,
-    Medium,
-    High,
-    VisuallyLossless,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum ShName {
-    /// Whichever costs less on the scene.
-    Auto,
-    /// Transform coefficients.
-    Coefficients,
-    /// Vector quantisation.
-    Vq,
+    /// Tools to leave out, to see what each is worth.
+    #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
+    without: Vec<ToolName>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -146,7 +125,7 @@ impl Encode {
     fn settings(&self) -> Settings {
         // One value: it is here so that the default can be written down.
         let Importance::Volume = self.importance;
-        Settings {
+        let mut settings = Settings {
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
             gop: self.gop,
@@ -156,7 +135,9 @@ impl Encode {
             keep_invisible: self.keep_invisible,
             ticks: self.fps,
             ..Settings::default()
-        }
+        };
+        self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
+        settings
     }
 
     /// The encoder counts frames; a user has files.
@@ -202,36 +183,5 @@ impl Encoded {
             self.bpg,
             self.seconds,
         )
-    }
-}
-
-impl From<PresetName> for Preset {
-    fn from(name: PresetName) -> Self {
-        match name {
-            PresetName::Fast => Self::Fast,
-            PresetName::Balanced => Self::Balanced,
-            PresetName::Small => Self::Small,
-        }
-    }
-}
-
-impl From<QualityName> for Quality {
-    fn from(name: QualityName) -> Self {
-        match name {
-            QualityName::Low => Self::Low,
-            QualityName::Medium => Self::Medium,
-            QualityName::High => Self::High,
-            QualityName::VisuallyLossless => Self::VisuallyLossless,
-        }
-    }
-}
-
-impl From<ShName> for ShChoice {
-    fn from(name: ShName) -> Self {
-        match name {
-            ShName::Auto => Self::Auto,
-            ShName::Coefficients => Self::Coefficients,
-            ShName::Vq => Self::VectorQuantised,
-        }
     }
 }
