@@ -4,18 +4,22 @@
 //! `f64` in a fixed order, so that results are equal for any number of threads.
 
 mod bjontegaard;
+mod comparison;
 mod psnr;
 mod ssim;
+mod st_lpips;
 
 pub use bjontegaard::{RatePoint, bd_psnr, bd_rate};
+pub use comparison::{Comparison, compare};
 pub use psnr::{LOSSLESS_DB, Mask, YuvPsnr, psnr, psnr_masked, yuv_psnr};
 pub use ssim::{SsimMap, ssim};
+pub use st_lpips::{Features, StLpips, WeightsError};
 
 use crate::image::Image;
 
 /// What a screen shows of a pixel.
+#[expect(clippy::manual_clamp, reason = "unlike `clamp`, this makes a number of NaN")]
 fn shown(pixel: [f32; 3]) -> [f32; 3] {
-    // Unlike `clamp`, this makes a number of NaN.
     pixel.map(|channel| channel.max(0.0).min(1.0))
 }
 

@@ -62,10 +62,7 @@ impl SsimMap {
             let first = width * BAND * band;
             let last = first + width * (values.len() / inner + 2 * RADIUS);
             let rows = [&reference.pixels()[first..last], &image.pixels()[first..last]];
-            pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || compare_band(rows, width, &weights, values),
-            );
+            pulp::Arch::new().dispatch(Band { rows, width, weights: &weights, values });
         });
         Some(Self { width, values })
     }
@@ -107,7 +104,25 @@ fn weights() -> [f64; TAPS] {
     bell.map(|weight: f64| weight / sum)
 }
 
-/// Computes the rows `values` of the map from the rows of both pictures that their windows touch.
+/// Some rows of the map, and the rows of both pictures that their windows touch. Not a closure: the compiler
+/// calls those that it could inline, which loses the wide registers.
+struct Band<'a> {
+    rows: [&'a [[f32; 3]]; 2],
+    width: usize,
+    weights: &'a [f64; TAPS],
+    values: &'a mut [f64],
+}
+
+impl pulp::WithSimd for Band<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        compare_band(self.rows, self.width, self.weights, self.values);
+    }
+}
+
+/// Computes the rows `values` of the map from the rows of both pictures.
 ///
 /// The moments are those of p = a + b and q = a - b, which need four filters where those of a and b need five:
 /// 2 mean(a) mean(b) = (mean(p)² - mean(q)²) / 2, mean(a)² + mean(b)² = (mean(p)² + mean(q)²) / 2, and so on.
