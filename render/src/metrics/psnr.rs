@@ -1,0 +1,149 @@
+//! Peak signal to noise ratio, over a frame or the part of it that a scene covers.
+
+use super::{assert_same_size, shown};
+use crate::image::Image;
+use rayon::prelude::*;
+
+/// The figure, dB, that reports give instead of an infinite or a higher one, so that means are finite and JSON
+/// has a number. One step of 8 bits in one channel of one pixel in 51,000 amounts to as much.
+pub const LOSSLESS_DB: f64 = 100.0;
+
+/// The pixels that count, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mask {
+    included: Vec<bool>,
+}
+
+impl Mask {
+    /// Pixels of the reference rendering with an alpha above 0.
+    #[must_use]
+    pub fn covered(alpha: &[f32]) -> Self {
+        Self { included: alpha.iter().map(|&alpha| alpha > 0.0).collect() }
+    }
+
+    /// For each pixel, row by row: whether it counts.
+    #[must_use]
+    pub fn included(&self) -> &[bool] {
+        &self.included
+    }
+
+    /// The number of pixels that count.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.included.iter().filter(|&&included| included).count()
+    }
+}
+
+/// PSNR over red, green and blue, dB: the mean square error is over all three channels of all pixels, the peak
+/// is 1. Infinite for equal pictures.
+///
+/// # Panics
+/// If the sizes differ.
+#[must_use]
+pub fn psnr(reference: &Image, image: &Image) -> f64 {
+    let sum = total(reference, image, |difference, _| squares(difference).iter().sum());
+    decibel(sum / (3 * reference.pixels().len()) as f64)
+}
+
+/// As [`psnr`], but the mean is over the pixels of the mask only. None if the mask is empty.
+///
+/// # Panics
+/// If the sizes differ.
+#[must_use]
+pub fn psnr_masked(reference: &Image, image: &Image, mask: &Mask) -> Option<f64> {
+    assert_eq!(
+        mask.included.len(),
+        reference.pixels().len(),
+        "the mask is of another size than the pictures"
+    );
+    let count = mask.count();
+    let sum: f64 =
+        total(
+            reference,
+            image,
+            |difference, pixel| {
+                if mask.included[pixel] { squares(difference).iter().sum() } else { 0.0 }
+            },
+        );
+    (count > 0).then(|| decibel(sum / (3 * count) as f64))
+}
+
+/// PSNR of luma and the two colour differences, dB; infinite where a component is equal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct YuvPsnr {
+    /// Luma, Y'.
+    pub y: f64,
+    /// Blue difference, Cb.
+    pub u: f64,
+    /// Red difference, Cr.
+    pub v: f64,
+}
+
+impl YuvPsnr {
+    /// (6 Y + U + V) / 8, dB, of the three figures, each at most [`LOSSLESS_DB`]: grey pictures that differ in
+    /// luma only would be infinitely good otherwise.
+    ///
+    /// Source: the weights of the common test conditions of HEVC, which are in use for point clouds too.
+    #[must_use]
+    pub fn weighted(&self) -> f64 {
+        let [y, u, v] = [self.y, self.u, self.v].map(|figure| figure.min(LOSSLESS_DB));
+        (6.0 * y + u + v) / 8.0
+    }
+}
+
+/// PSNR in full-range Y'CbCr of ITU-R BT.709, of components in 0..1 and -0.5..0.5 at the resolution of the
+/// picture, not rounded: Y' = 0.2126 R' + 0.7152 G' + 0.0722 B', Cb = (B' - Y') / 1.8556,
+/// Cr = (R' - Y') / 1.5748. The peak is 1 for each.
+///
+/// # Panics
+/// If the sizes differ.
+#[must_use]
+pub fn yuv_psnr(reference: &Image, image: &Image) -> YuvPsnr {
+    let count = reference.pixels().len() as f64;
+    // The components are linear, hence the component of a difference is the difference of the components.
+    let [y, u, v] = totals(reference, image, |[red, green, blue], _| {
+        let luma = 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+        squares([luma, (blue - luma) / 1.8556, (red - luma) / 1.5748])
+    })
+    .map(|sum| decibel(sum / count));
+    YuvPsnr { y, u, v }
+}
+
+fn squares(values: [f64; 3]) -> [f64; 3] {
+    values.map(|value| value * value)
+}
+
+/// PSNR, dB, of a mean square error where the peak is 1.
+fn decibel(mean_square_error: f64) -> f64 {
+    // Not `-10.0 *`, which makes a negative zero of no signal at all.
+    0.0 - 10.0 * libm::log10(mean_square_error)
+}
+
+/// The sum over all pixels of a function of the difference of their channels and their index.
+fn total(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> f64 + Sync) -> f64 {
+    totals(reference, image, |difference, pixel| [error(difference, pixel), 0.0, 0.0])[0]
+}
+
+/// Three sums at once.
+fn totals(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> [f64; 3] + Sync) -> [f64; 3] {
+    assert_same_size(reference, image);
+    let width = reference.width();
+    let rows = reference.pixels().par_chunks(width).zip(image.pixels().par_chunks(width));
+    let sums: Vec<[f64; 3]> = rows
+        .enumerate()
+        .map(|(row, (reference, image))| {
+            let pixels = reference.iter().zip(image).enumerate();
+            add(pixels.map(|(column, (&reference, &image))| {
+                let (reference, image) = (shown(reference), shown(image));
+                let difference = [0, 1, 2].map(|c| f64::from(reference[c]) - f64::from(image[c]));
+                error(difference, row * width + column)
+            }))
+        })
+        .collect();
+    // Rows in their order, whoever computed them.
+    add(sums.into_iter())
+}
+
+fn add(terms: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
+    terms.fold([0.0; 3], |sum, term| [0, 1, 2].map(|component| sum[component] + term[component]))
+}
