@@ -21,6 +21,6 @@ mod stream;
 mod vq;
 
 pub use error::Error;
-pub use settings::{Preset, Quality, Settings, ShChoice, Steps};
+pub use settings::{Preset, Quality, Settings, ShChoice, Steps, Tools};
 pub use source::FrameSource;
 pub use stream::{Progress, Report, encode};

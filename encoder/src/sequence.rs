@@ -57,7 +57,8 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
     let degree = settings.sh_degree.unwrap_or(degree).min(source_degree);
     let (offset, step, bits) = position_lattice(extent, inner, &settings.steps);
     let [sorted, unsorted] = axes_trial;
-    let flags = SequenceParameters::flags(sorted <= unsorted, antialiased);
+    let canonical_axes = settings.tools.axis_sort && sorted <= unsorted;
+    let flags = SequenceParameters::flags(canonical_axes, antialiased);
     let parameters = parameters(settings, frames, degree, flags, (offset, step, bits));
     Ok(Analysis { parameters, level, source_sh_degree: source_degree, axes_trial })
 }

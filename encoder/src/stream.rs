@@ -5,6 +5,7 @@ use crate::colour::{self, ShPlan};
 use crate::error::Error;
 use crate::frame::{CodedFrame, UnitPlan, code_frame};
 use crate::lattice::geometry;
+use crate::pca::Components;
 use crate::sequence::analyse;
 use crate::settings::Settings;
 use crate::source::FrameSource;
@@ -140,13 +141,18 @@ fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
 
 impl GopTools {
     fn new(frame: &GaussianFrame, sequence: &SequenceParameters, settings: &Settings, frames: u32) -> Self {
-        let dc = colour::transform(TransformKind::Dc, &dc_planes(frame), sequence.dc_step());
+        let dc = Components::of(&dc_planes(frame));
+        let dc = colour::transform(TransformKind::Dc, &dc, sequence.dc_step());
         let zeros = vec![0.0; frame.len()];
         let mut first_components = None;
         let sh = (sequence.sh_degree > 0).then(|| {
             let planes = sh_planes(frame, sequence, &zeros);
             let step = sequence.sh_step();
-            let mut transform = colour::transform(TransformKind::Sh, &planes, step);
+            let basis = match settings.tools.sh_transform {
+                true => Components::of(&planes),
+                false => Components::identity(planes.len()),
+            };
+            let mut transform = colour::transform(TransformKind::Sh, &basis, step);
             let mut components = colour::components(&transform, &planes, step);
             colour::drop_unused(&mut transform, &mut components);
             let gaussians = frame.len() * frames as usize;
@@ -222,6 +228,7 @@ fn write_frame(
         header: header_of(coding),
         sequence,
         preset: settings.preset,
+        tools: settings.tools,
     };
     let units = code_frame(&coded, &plan)?;
     report.digests.push(units.digest);
