@@ -2,6 +2,7 @@
 
 mod choices;
 
+use crate::cameras::{CameraArgs, Views};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
@@ -12,7 +13,7 @@ use crate::setting_names::{PresetName, QualityName, ShName, ToolName};
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use splatstream_encoder::{FrameSource, Quality, Report, Settings, encode};
+use splatstream_encoder::{FrameSource, Importance, Quality, Report, Settings, encode};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -58,17 +59,27 @@ pub(crate) struct Encode {
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     #[arg(long)]
     keep_invisible: bool,
-    /// What puts Gaussians into the first refinements.
-    #[arg(long, value_enum, default_value_t = Importance::Volume)]
-    importance: Importance,
+    /// What puts Gaussians into the first refinements; default is removal, and volume for the fast preset.
+    #[arg(long, value_enum)]
+    importance: Option<ImportanceName>,
+    /// Views to measure importance in: a cameras.json or transforms.json, ring:N or forward:N; default is all
+    /// around.
+    #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
+    cameras: Option<Views>,
+    #[command(flatten)]
+    views: CameraArgs,
     /// Tools to leave out, to see what each is worth.
     #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
     without: Vec<ToolName>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Importance {
-    /// Opacity times volume.
+enum ImportanceName {
+    /// What pictures lose without a Gaussian, weighed anew at each refinement.
+    Removal,
+    /// Transmittance times alpha over the pixels of all views.
+    Contribution,
+    /// Opacity times volume; needs no views.
     Volume,
 }
 
@@ -97,7 +108,7 @@ impl Encode {
     /// Encodes to a file that appears when it is whole.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let mut source = FrameFiles::find(&self.inputs)?;
-        let settings = self.settings();
+        let settings = self.settings(&mut source)?;
         self.check_out(&source)?;
         let mut file = OutputFile::create(&self.out)?;
         let start = Instant::now();
@@ -122,9 +133,14 @@ impl Encode {
         Ok(())
     }
 
-    fn settings(&self) -> Settings {
-        // One value: it is here so that the default can be written down.
-        let Importance::Volume = self.importance;
+    fn settings(&self, source: &mut FrameFiles) -> Result<Settings, Failure> {
+        let cameras = match &self.cameras {
+            None => Vec::new(),
+            Some(views) => {
+                let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
+                self.views.cameras(views, &first)?
+            }
+        };
         let mut settings = Settings {
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
@@ -134,10 +150,12 @@ impl Encode {
             sh: self.sh.into(),
             keep_invisible: self.keep_invisible,
             ticks: self.fps,
+            importance: self.importance.map(Into::into),
+            cameras,
             ..Settings::default()
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
-        settings
+        Ok(settings)
     }
 
     /// The encoder counts frames; a user has files.
@@ -183,5 +201,15 @@ impl Encoded {
             self.bpg,
             self.seconds,
         )
+    }
+}
+
+impl From<ImportanceName> for Importance {
+    fn from(name: ImportanceName) -> Self {
+        match name {
+            ImportanceName::Removal => Self::Removal,
+            ImportanceName::Contribution => Self::Contribution,
+            ImportanceName::Volume => Self::Volume,
+        }
     }
 }

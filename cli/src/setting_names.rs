@@ -1,7 +1,7 @@
 //! How the command line spells what the encoder can be told.
 
 use clap::ValueEnum;
-use splatstream_encoder::{Preset, Quality, Settings, ShChoice};
+use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice};
 
 /// How much to search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -51,6 +51,8 @@ pub(crate) enum ToolName {
     TableReuse,
     /// Leaving out Gaussians that can never be seen.
     Prune,
+    /// Importance measured in views; without it, opacity times volume.
+    ViewImportance,
 }
 
 impl ToolName {
@@ -62,6 +64,7 @@ impl ToolName {
             Self::ShTransform => settings.tools.sh_transform = false,
             Self::TableReuse => settings.tools.table_reuse = false,
             Self::Prune => settings.keep_invisible = true,
+            Self::ViewImportance => settings.importance = Some(Importance::Volume),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! What a user asks for: quality, effort, layers.
 
+use splatstream_render::Camera;
+
 /// How much is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
@@ -75,6 +77,17 @@ pub enum ShChoice {
     VectorQuantised,
 }
 
+/// What puts Gaussians into the first refinements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Importance {
+    /// What the pictures lose without a Gaussian; weighed anew at each refinement, from the last down.
+    Removal,
+    /// Transmittance times alpha, summed over the pixels of all views.
+    Contribution,
+    /// Opacity times volume: the paper's, and the only one that needs no views.
+    Volume,
+}
+
 /// Tools that can be left out, to see what each is worth. Streams are valid with any of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tools {
@@ -111,6 +124,10 @@ pub struct Settings {
     pub sh: ShChoice,
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     pub keep_invisible: bool,
+    /// What puts Gaussians into the first refinements; none: volume for the fast preset, removal for others.
+    pub importance: Option<Importance>,
+    /// The views that importance is measured in; none: made for the first frame, all around.
+    pub cameras: Vec<Camera>,
     /// Tools that may be used.
     pub tools: Tools,
     /// log2 of the Gaussians in an entropy block.
@@ -129,6 +146,8 @@ impl Default for Settings {
             sh_degree: None,
             sh: ShChoice::default(),
             keep_invisible: false,
+            importance: None,
+            cameras: Vec::new(),
             tools: Tools::default(),
             block_log2: 14,
             ticks: (30, 1),

@@ -9,7 +9,8 @@ use splatstream_render::metrics::{
 /// Pictures of one size, 11 to 40 pixels on a side, with values a bit beyond 0..1.
 fn pictures<const COUNT: usize>() -> impl Strategy<Value = [Image; COUNT]> {
     (11_usize..40, 11_usize..40).prop_flat_map(|(width, height)| {
-        let pixels = || proptest::collection::vec(prop::array::uniform3(-0.1_f32..1.1), width * height);
+        let channel = || (-26_i16..282).prop_map(|step| f32::from(step) / 255.0);
+        let pixels = || proptest::collection::vec([channel(), channel(), channel()], width * height);
         [(); COUNT]
             .map(|()| pixels())
             .prop_map(move |pictures| pictures.map(|pixels| Image::new(width, pixels)))

@@ -35,6 +35,7 @@ fn rate_plot(scene: &SceneChart, metric: &Metric) -> Plot {
         };
         Series { style, line: Line::Solid, dots: run.points.iter().filter_map(dot).collect() }
     }));
+    series.extend(reordered(scene, metric));
     series.extend(peers(scene, metric));
     Plot {
         id: format!("{}-rate-{}", scene.name, metric.id),
@@ -49,6 +50,22 @@ fn rate_plot(scene: &SceneChart, metric: &Metric) -> Plot {
         top: Some((scene.mbit_per_bpg(), format!("Mbit/s at {} frames per second", scene.fps))),
         series,
     }
+}
+
+/// Variants that order Gaussians otherwise, in the colour of their quality.
+fn reordered(scene: &SceneChart, metric: &Metric) -> Vec<Series> {
+    let style = scene.baseline().position(|run| run.quality == scene.quality).unwrap_or(0);
+    let other = scene.runs.iter().filter(|run| run.group == Group::Without && run.points.len() > 1);
+    let series = |run: &super::measure::Run| {
+        let dot = |(place, point): (usize, &super::measure::Point)| {
+            let (rate, value) = (scene.rate(point), (metric.of)(&point.figures)?);
+            let name = format!("{} ({}), {} %", run.variant, run.quality, point.info.percent);
+            let label = (place == 0).then(|| run.variant.clone());
+            Some(Dot { at: (rate, value), label, hint: hint(&name, rate, value, metric) })
+        };
+        Series { style, line: Line::Dashed, dots: run.points.iter().enumerate().filter_map(dot).collect() }
+    };
+    other.map(series).collect()
 }
 
 fn hint(name: &str, rate: f64, value: f64, metric: &Metric) -> String {
@@ -94,7 +111,7 @@ fn peers(scene: &SceneChart, metric: &Metric) -> Vec<Series> {
 
 /// A speed, and what it is a speed of.
 type Speed = (&'static str, fn(&Standing) -> f64);
-/// An accuracy: id, name on the axis, figure, and whether less is better.
+/// An accuracy: name, name on the axis, figure, and whether less is better.
 type Accuracy = (&'static str, &'static str, fn(&Standing) -> Option<f64>, bool);
 
 /// Speed of encoding and decoding against PSNR at equal rate and against BD-rate.
@@ -102,8 +119,8 @@ pub(super) fn speed_figures(scene: &SceneChart) -> Vec<Figure> {
     let speeds: [Speed; 2] =
         [("encode", |standing| standing.encode_speed), ("decode", |standing| standing.decode_speed)];
     let accuracies: [Accuracy; 2] = [
-        ("psnr", "PSNR at the baseline's rate, dB", |standing| standing.psnr_at_rate, false),
-        ("bd-rate", "BD-rate against the baseline, % (less is better)", |standing| standing.bd_rate, true),
+        ("PSNR", "PSNR at the baseline's rate, dB", |standing| standing.psnr_at_rate, false),
+        ("BD-rate", "BD-rate against the baseline, % (less is better)", |standing| standing.bd_rate, true),
     ];
     let standings = scene.standings();
     let plots = accuracies
@@ -116,7 +133,7 @@ fn speed_plot(
     scene: &SceneChart,
     standings: &[Standing],
     (verb, speed): &Speed,
-    (id, axis, accuracy, less_is_better): &Accuracy,
+    (name, axis, accuracy, less_is_better): &Accuracy,
 ) -> Plot {
     let placed: Vec<(&Standing, (f64, f64))> = standings
         .iter()
@@ -136,8 +153,8 @@ fn speed_plot(
         series.push(Series { style, line: Line::None, dots: of_group.map(dot).collect() });
     }
     Plot {
-        id: format!("{}-{verb}-speed-{id}", scene.name),
-        title: format!("{}: speed to {verb} and {id}", scene.name),
+        id: format!("{}-{verb}-speed-{}", scene.name, name.to_lowercase()),
+        title: format!("{}: speed to {verb} and {name}", scene.name),
         description: format!(
             "Each variant's speed to {verb}, in million Gaussians a second, against {axis}; the band joins \
              the variants that no other beats in both."

@@ -110,12 +110,8 @@ pub(crate) fn measure(
 
 /// Steps of progress that [`measure`] takes.
 pub(crate) fn steps(sweep: &Sweep) -> u32 {
-    let of_run = |(variant, _): (&Variant, QualityName)| 1 + points_of(variant, sweep.refinements.len());
+    let of_run = |(variant, quality): (&Variant, QualityName)| 1 + sweep.points(variant, quality);
     sweep.runs().map(of_run).sum::<usize>() as u32
-}
-
-fn points_of(variant: &Variant, all: usize) -> usize {
-    if variant.group == Group::Baseline { all } else { 1 }
 }
 
 fn run(
@@ -134,9 +130,9 @@ fn run(
     progress.advance();
     let limits = Limits::default();
     let infos = operating_points(&stream, &limits).map_err(fault)?;
-    let wanted = points_of(variant, infos.len());
+    let passed = infos.len().saturating_sub(sweep.points(variant, quality));
     let mut points = Vec::new();
-    for &info in infos.iter().skip(infos.len() - wanted) {
+    for &info in infos.iter().skip(passed) {
         progress.step(format!("{what}: pictures of {} %", info.percent));
         points.push(point(&stream, info, judge)?);
         progress.advance();

@@ -59,6 +59,8 @@ pub(crate) struct Variant {
     pub(crate) name: String,
     /// What it is one of.
     pub(crate) group: Group,
+    /// Whether it orders Gaussians otherwise than the baseline: then refinement levels differ too.
+    reorders: bool,
     /// The settings; the quality comes from the sweep.
     settings: Settings,
 }
@@ -103,17 +105,24 @@ impl SweepArgs {
         };
         let base = presets.iter().copied().find(|&preset| preset == PresetName::Balanced);
         let base = base.or(presets.first().copied()).unwrap_or(PresetName::Balanced);
-        let baseline = Variant { name: spelled(base), group: Group::Baseline, settings: settings(base) };
+        let baseline = Variant {
+            name: spelled(base),
+            group: Group::Baseline,
+            reorders: false,
+            settings: settings(base),
+        };
         let others = presets.iter().filter(|&&preset| preset != base).map(|&preset| Variant {
             name: spelled(preset),
             group: Group::Preset,
+            reorders: false,
             settings: settings(preset),
         });
         let tools = given(&self.without, quick, &[ToolName::Contexts]);
         let without = tools.iter().map(|&tool| {
             let mut settings = settings(base);
             tool.leave_out_of(&mut settings);
-            Variant { name: format!("without {}", spelled(tool)), group: Group::Without, settings }
+            let reorders = tool == ToolName::ViewImportance;
+            Variant { name: format!("without {}", spelled(tool)), group: Group::Without, reorders, settings }
         });
         let variants = std::iter::once(baseline).chain(others).chain(without).collect();
         let repeat = self.repeat.unwrap_or(if quick { 1 } else { 3 });
@@ -137,6 +146,12 @@ impl Sweep {
     pub(crate) fn quality(&self) -> QualityName {
         let high = self.qualities.iter().copied().find(|&quality| quality == QualityName::High);
         high.or(self.qualities.last().copied()).unwrap_or(QualityName::High)
+    }
+
+    /// Operating points of a run that are looked at: every refinement level where the curve over them is drawn.
+    pub(crate) fn points(&self, variant: &Variant, quality: QualityName) -> usize {
+        let all = variant.group == Group::Baseline || variant.reorders && quality == self.quality();
+        if all { self.refinements.len() } else { 1 }
     }
 
     /// Pairs of a variant and a quality.

@@ -2,7 +2,7 @@
 
 use crate::numbers::{grouped, percent};
 use serde::Serialize;
-use splatstream_encoder::{Report, Settings, ShChoice};
+use splatstream_encoder::{Importance, Report, Settings, ShChoice, Tools};
 
 /// One decision of the encoder.
 #[derive(Debug, Clone, Serialize)]
@@ -29,7 +29,9 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     if report.sh_degree.1 > 0 {
         choices.push(harmonics(report, settings));
     }
+    choices.extend(order(report, settings));
     choices.push(invisible(report, settings));
+    choices.extend(left_out(settings));
     choices
 }
 
@@ -83,6 +85,36 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
     let reasons: Vec<String> = asked.into_iter().chain(trial).collect();
     let why = if reasons.is_empty() { "the only one tried".to_owned() } else { reasons.join("; ") };
     Choice::new("sh coding", choice, why)
+}
+
+fn order(report: &Report, settings: &Settings) -> Option<Choice> {
+    let (choice, why) = match report.importance? {
+        Importance::Removal => {
+            ("removal", "what pictures lose without a Gaussian, weighed anew at each refinement")
+        }
+        Importance::Contribution => {
+            ("contribution", "transmittance times alpha over the pixels of all views")
+        }
+        Importance::Volume => ("volume", "opacity times volume, no views"),
+    };
+    let views = match (report.importance?, settings.cameras.len()) {
+        (Importance::Volume, _) => String::new(),
+        (_, 0) => "; views made all around the scene".to_owned(),
+        (_, count) => format!("; {count} views given"),
+    };
+    Some(Choice::new("order", choice, format!("{why}{views}")))
+}
+
+fn left_out(settings: &Settings) -> Option<Choice> {
+    let Tools { contexts, axis_sort, sh_transform, table_reuse } = settings.tools;
+    let tools = [
+        (contexts, "contexts"),
+        (axis_sort, "axis-sort"),
+        (sh_transform, "sh-transform"),
+        (table_reuse, "table-reuse"),
+    ];
+    let names: Vec<&str> = tools.into_iter().filter(|(used, _)| !used).map(|(_, name)| name).collect();
+    (!names.is_empty()).then(|| Choice::new("left out", names.join(", "), "--without"))
 }
 
 fn invisible(report: &Report, settings: &Settings) -> Choice {

@@ -16,7 +16,7 @@ pub(crate) type Lanes = [f32; TILE];
 pub(crate) trait Blend {
     /// `visible` is transmittance times alpha of each pixel of a line of the tile; `splat` counts from the
     /// nearest.
-    fn line(&mut self, splat: usize, line: usize, visible: &Lanes);
+    fn line(&mut self, splat: usize, line: usize, visible: &Lanes, passing: &Lanes);
 
     /// The Gaussian at this place of the tile's entries has added all its lines.
     fn done(&mut self, _entry: usize) {}
@@ -77,7 +77,7 @@ pub(crate) fn blend_tile(splats: &Splats, entries: &[u32], tile: &mut Tile, blen
         for line in first..=last as usize {
             if tile.alive[line] {
                 let visible = blend_line(splat, tile.origin, line, &mut tile.passing[line]);
-                blend.line(place as usize, line, &visible);
+                blend.line(place as usize, line, &visible, &tile.passing[line]);
             }
         }
         blend.done(entry);
@@ -92,17 +92,22 @@ fn blend_line(splat: &Splat, origin: [f32; 2], line: usize, passing: &mut Lanes)
     let constant = splat.yy * dy * dy + splat.peak;
     let linear = splat.xy * dy;
     let mut visible = [0.0; TILE];
+    // Everything is computed and then chosen: without branches the sixteen pixels go side by side.
     for lane in 0..TILE {
         let dx = dx + lane as f32;
         let exponent = (splat.xx * dx + linear) * dx + constant;
         let before = passing[lane];
-        let drawn = exponent >= -LOG2_255 && before > 0.0;
-        let alpha = if drawn { exp2(exponent.max(-LOG2_255)).min(MAX_ALPHA) } else { 0.0 };
+        let reached = if exponent >= -LOG2_255 { exponent } else { -LOG2_255 };
+        let alpha = exp2(reached);
+        let alpha = if alpha < MAX_ALPHA { alpha } else { MAX_ALPHA };
+        let alpha = if exponent >= -LOG2_255 { alpha } else { 0.0 };
+        let alpha = if before > 0.0 { alpha } else { 0.0 };
         let stopped = alpha * before;
         let after = before - stopped;
-        let done = after < MIN_TRANSMITTANCE && before > 0.0;
+        // A pixel that was done already has a transmittance below the least, and stays as it is.
+        let done = after < MIN_TRANSMITTANCE;
         visible[lane] = if done { 0.0 } else { stopped };
-        passing[lane] = if done { -before } else { after };
+        passing[lane] = if done { -before.abs() } else { after };
     }
     visible
 }

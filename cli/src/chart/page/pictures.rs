@@ -50,7 +50,7 @@ fn scale() -> Markup {
     let end = 255.0 / AMPLIFICATION;
     html! {
         div.scale {
-            svg viewBox="0 0 240 18" role="img" aria-label="colours of differences, from none to the end of the scale" {
+            svg viewBox="0 0 240 18" preserveAspectRatio="none" role="img" aria-label="colours of differences, from none to the end of the scale" {
                 @for step in 0..STEPS { rect x=(step * 10) width="10.5" height="18" fill=(colour(step)) {} }
             }
             div.ends { span { "0" } span { (format!("{:.0}", end / 2.0)) } span { (format!("{end:.0} of 255 or more")) } }

@@ -37,7 +37,7 @@ pub(super) fn facts(chart: &SceneChart) -> Markup {
     let of =
         if frames as u32 == of_source { String::new() } else { format!(" of {}", grouped(of_source.into())) };
     html! {
-        code { (chart.source) } ": " (frames) (of) @if frames == 1 && of_source == 1 { " frame, " } @else { " frames, " }
+        (chart.source) ": " (frames) (of) @if frames == 1 && of_source == 1 { " frame, " } @else { " frames, " }
         (grouped(per_frame)) " Gaussians per frame, spherical harmonics of degree " (chart.sh_degree) "; "
         (cameras) " cameras, " (width) " × " (height) " pixels; " (chart.fps) " frames per second."
     }
@@ -48,7 +48,8 @@ fn rates(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
         h3 { "Quality against rate" }
         (how_to_read(
             "each coloured curve is one quality, its points the refinement levels, so the further right, the more \
-             Gaussians were received; the dashed black curve joins the qualities with all Gaussians; up and to \
+             Gaussians were received; the dashed black curve joins the qualities with all Gaussians, a dashed coloured one shows a quality with \
+             Gaussians in another order; up and to \
              the left is better, but for ST-LPIPS down and to the left."
         ))
         (figures(&drawn.rates))

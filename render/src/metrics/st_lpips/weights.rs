@@ -51,7 +51,11 @@ pub enum WeightsError {
 
 /// Reads the weights. The blurs, which are in the file too, are not read: they are the same in each channel.
 pub(super) fn read(path: &Path) -> Result<StLpips, WeightsError> {
-    let mut archive = ZipArchive::new(File::open(path)?)?;
+    read_archive(File::open(path)?)
+}
+
+fn read_archive(file: File) -> Result<StLpips, WeightsError> {
+    let mut archive = ZipArchive::new(file)?;
     let mut three = |name: &str| -> Result<[f32; 3], WeightsError> {
         let values = array(&mut archive, name.to_owned(), &[1, 3, 1, 1])?;
         Ok([values[0], values[1], values[2]])
@@ -90,4 +94,50 @@ fn array(archive: &mut ZipArchive<File>, name: String, shape: &[usize]) -> Resul
         return Err(WeightsError::NotFinite(name));
     }
     Ok(array.values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use zip::write::{SimpleFileOptions, ZipWriter};
+
+    /// What reading an archive of one array says.
+    fn refusal(name: &str, shape: &str, values: &[f32]) -> String {
+        let mut archive = ZipWriter::new(tempfile::tempfile().unwrap());
+        archive.start_file(name, SimpleFileOptions::default()).unwrap();
+        let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+        archive.write_all(b"\x93NUMPY\x01\x00").unwrap();
+        archive.write_all(&(header.len() as u16).to_le_bytes()).unwrap();
+        archive.write_all(header.as_bytes()).unwrap();
+        for value in values {
+            archive.write_all(&value.to_le_bytes()).unwrap();
+        }
+        read_archive(archive.finish().unwrap()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_refusal_names_the_array() {
+        let shift = "scaling_layer.shift.npy";
+        let cases = [
+            (refusal("other.npy", "(1,)", &[0.0]), "no array scaling_layer.shift "),
+            (refusal(shift, "(3,)", &[0.0; 3]), "array scaling_layer.shift in the weights has the shape [3]"),
+            (
+                refusal(shift, "(1, 3, 1, 1)", &[f32::NAN; 3]),
+                "array scaling_layer.shift in the weights has values",
+            ),
+            (refusal(shift, "(1, 3, 1, 1)", &[0.0; 2]), "array scaling_layer.shift in the weights is not"),
+            (refusal(shift, "(9999,)", &[0.0; 9999]), "array scaling_layer.shift in the weights is not"),
+            (refusal(shift, "(1, 3, 1, 1)", &[0.0; 3]), "no array scaling_layer.scale "),
+        ];
+        for (refusal, expected) in cases {
+            assert!(refusal.contains(expected), "{refusal}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_archive_is_refused() {
+        assert!(matches!(read_archive(tempfile::tempfile().unwrap()), Err(WeightsError::Archive(_))));
+        assert!(matches!(read(Path::new("no/such/file")), Err(WeightsError::Io(_))));
+    }
 }
