@@ -13,7 +13,7 @@ use super::sweep::{Group, Sweep};
 use crate::numbers::grouped;
 use crate::setting_names::spelled;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use words::{NOT_MEASURED, figure, millions, size};
+use words::{Heading, NOT_MEASURED, figure, size};
 
 const STYLE: &str = include_str!("page/style.css");
 
@@ -96,17 +96,28 @@ impl Page<'_> {
     }
 
     fn summary(&self) -> Markup {
+        let numbers = [
+            "Frames",
+            "Gaussians per frame",
+            "Size",
+            "Bits per Gaussian",
+            "Mbit/s",
+            "PSNR, dB",
+            "SSIM",
+            "ST-LPIPS",
+            "Encoding",
+            "Decoding",
+        ];
+        let mut headings = vec![Heading::Words("Scene")];
+        headings.extend(numbers.map(Heading::Numbers));
         html! {
             section {
                 h2 { "In short" }
                 (words::how_to_read(
                     "each row is one scene with the baseline settings and all Gaussians sent: fewer bits and \
-                     more dB are better; a speed of 1 M/s is a million Gaussians a second."
+                     more dB are better; speeds are thousands (k) or millions (M) of Gaussians a second."
                 ))
-                (words::table(&[
-                    "Scene", "Frames", "Gaussians per frame", "Size", "Bits per Gaussian", "Mbit/s", "PSNR, dB", "SSIM",
-                    "ST-LPIPS", "Encoding", "Decoding",
-                ], &html! { @for chart in self.charts { (summary_row(chart)) } }))
+                (words::table(&headings, &html! { @for chart in self.charts { (summary_row(chart)) } }))
                 @if !self.charts.iter().any(SceneChart::has_learned) {
                     p.note { "ST-LPIPS, the learned metric: " (NOT_MEASURED) "." }
                 }
@@ -170,7 +181,7 @@ fn summary_row(chart: &SceneChart) -> Markup {
         return html! {};
     };
     let frames = chart.frames.0.max(1) as u64;
-    let speed = |seconds: f64| millions(run.gaussians as f64 / seconds.max(f64::MIN_POSITIVE));
+    let speed = |seconds: f64| words::speed(run.gaussians as f64 / seconds.max(f64::MIN_POSITIVE));
     html! {
         tr {
             th scope="row" { a href=(format!("#{}", chart.name)) { (chart.name) } }

@@ -1,7 +1,7 @@
 //! Other codecs on the same scene.
 
-use super::tables::{metric_cells, metric_headings};
-use super::words::{how_to_read, made_by, millions, size, table};
+use super::tables::{METRIC_HEADINGS, metric_cells};
+use super::words::{Heading, how_to_read, made_by, size, speed, table};
 use crate::chart::peers::PeerPoint;
 use crate::chart::scene_chart::SceneChart;
 use crate::chart::standing::bytes_for_the_same;
@@ -13,7 +13,7 @@ pub(super) fn part(chart: &SceneChart, command: &str) -> Markup {
         @if !chart.peers.is_empty() {
             h3 { "Other codecs" }
             (how_to_read(
-                "each row is another codec's output, rendered and compared exactly as ours; the last but two columns say what \
+                "each row is another codec's output, rendered and compared exactly as ours; the third column from the right says what \
                  SplatStream's baseline needs for the same PSNR, so below 100 % it is smaller."
             ))
             (results(chart))
@@ -28,36 +28,27 @@ pub(super) fn part(chart: &SceneChart, command: &str) -> Markup {
 }
 
 fn results(chart: &SceneChart) -> Markup {
-    let [psnr, ssim, learned] = metric_headings(chart);
-    let headings = [
-        "Codec",
-        "Options",
-        "Size per frame",
-        "Bits per Gaussian of the source",
-        &psnr,
-        &ssim,
-        &learned,
-        "Our size at its PSNR",
-        "Encoding",
-        "Decoding",
-    ];
+    let mut headings: Vec<Heading<'_>> = ["Codec", "Options"].map(Heading::Words).to_vec();
+    headings.extend(["Size per frame", "Bits per Gaussian of the source"].map(Heading::Numbers));
+    headings.extend(METRIC_HEADINGS);
+    headings.extend(["Our size at its PSNR", "Encoding", "Decoding"].map(Heading::Numbers));
     let anchor = chart.anchor();
     let ours = |peer: &PeerPoint| match bytes_for_the_same(&anchor, peer.rate_point()) {
         Some(percent) => format!("{percent:.0} %"),
         None => "PSNR outside our qualities".to_owned(),
     };
-    let speed = |speed: Option<f64>| speed.map_or_else(|| "–".to_owned(), millions);
+    let measured = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), speed);
     let body = html! {
-        @for peer in &chart.peers {
+        @for (place, peer) in chart.peers.iter().enumerate() {
             tr {
                 th scope="row" { (peer.peer) }
                 td.text { (peer.details) }
                 td { (size(peer.bytes / u64::from(peer.frames.max(1)))) }
                 td { (format!("{:.2}", peer.bpg)) }
-                (metric_cells(&peer.figures))
+                (metric_cells(chart, &peer.figures, place, chart.peers.len()))
                 td { (ours(peer)) }
-                td { (speed(peer.encode_speed)) }
-                td { (speed(peer.decode_speed)) }
+                td { (measured(peer.encode_speed)) }
+                td { (measured(peer.decode_speed)) }
             }
         }
     };

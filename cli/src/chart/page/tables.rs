@@ -1,6 +1,6 @@
 //! The tables of a scene.
 
-use super::words::{NOT_MEASURED, figure, how_to_read, made_by, millions, signed, size, table};
+use super::words::{Heading, NOT_MEASURED, figure, how_to_read, made_by, signed, size, speed, table};
 use crate::chart::scene_chart::{METRICS, SceneChart};
 use crate::chart::standing::Standing;
 use crate::chart::sweep::Group;
@@ -11,29 +11,36 @@ use splatstream_render::metrics::Comparison;
 /// Frames whose units have columns of their own.
 const COLUMNS: usize = 4;
 
-/// Names of the metrics, as headings.
-pub(super) fn metric_headings(chart: &SceneChart) -> [String; 3] {
-    let learned =
-        if chart.has_learned() { "ST-LPIPS".to_owned() } else { format!("ST-LPIPS ({NOT_MEASURED})") };
-    ["PSNR, dB".to_owned(), "SSIM".to_owned(), learned]
-}
+/// Headings of the metrics.
+pub(super) const METRIC_HEADINGS: [Heading<'_>; 3] =
+    [Heading::Numbers("PSNR, dB"), Heading::Numbers("SSIM"), Heading::Numbers("ST-LPIPS")];
 
-pub(super) fn metric_cells(figures: &Comparison) -> Markup {
-    html! { @for metric in &METRICS { td { (figure(metric, figures)) } } }
+/// The metrics of row `row` of `rows`; one cell for all rows says why there is no learned metric.
+pub(super) fn metric_cells(chart: &SceneChart, figures: &Comparison, row: usize, rows: usize) -> Markup {
+    let [psnr, ssim, learned] = &METRICS;
+    html! {
+        td { (figure(psnr, figures)) }
+        td { (figure(ssim, figures)) }
+        @if chart.has_learned() {
+            td { (figure(learned, figures)) }
+        } @else if row == 0 {
+            td.absent rowspan=(rows) { (NOT_MEASURED) }
+        }
+    }
 }
 
 /// Table 1 of the paper.
 pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
     let rows = chart.refinement_rows();
     let columns = rows.first().map_or(0, |row| row.unit_bytes.len()).min(COLUMNS);
-    let mut headings = vec!["Level".to_owned()];
-    headings.extend((0..columns).map(|frame| format!("I{frame} size")));
+    let frames: Vec<String> = (0..columns).map(|frame| format!("I{frame} size")).collect();
+    let mut headings = vec![Heading::Words("Level")];
+    headings.extend(frames.iter().map(|name| Heading::Numbers(name)));
     let rest = ["Added size", "Total size", "Gaussians", "Cumulative bits per Gaussian"];
-    headings.extend(rest.map(str::to_owned));
-    headings.extend(metric_headings(chart));
-    let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+    headings.extend(rest.map(Heading::Numbers));
+    headings.extend(METRIC_HEADINGS);
     let body = html! {
-        @for row in &rows {
+        @for (place, row) in rows.iter().enumerate() {
             tr {
                 th scope="row" { (row.percent) " %" }
                 @for bytes in row.unit_bytes.iter().take(columns) { td { (size(*bytes)) } }
@@ -41,7 +48,7 @@ pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
                 td { (size(row.total_bytes)) }
                 td { (grouped(row.gaussians)) }
                 td { (format!("{:.2}", row.bpg)) }
-                (metric_cells(&row.figures))
+                (metric_cells(chart, &row.figures, place, rows.len()))
             }
         }
     };
@@ -59,22 +66,14 @@ pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
 
 /// Table 2 of the paper.
 pub(super) fn bandwidth(chart: &SceneChart, command: &str) -> Markup {
-    let [psnr, ssim, learned] = metric_headings(chart);
-    let headings = [
-        "Mode",
-        "Units",
-        "Frames shown",
-        "Playback",
-        "Refinement",
-        "Size per GOP",
-        "Required bandwidth",
-        "Gaussians",
-        &psnr,
-        &ssim,
-        &learned,
-    ];
+    let rows = chart.bandwidth_rows();
+    let mut headings: Vec<Heading<'_>> = ["Mode", "Units"].map(Heading::Words).to_vec();
+    headings.extend([Heading::Numbers("Frames shown"), Heading::Words("Playback")]);
+    let numbers = ["Refine\u{ad}ment", "Size per GOP", "Required bandwidth", "Gaussians"];
+    headings.extend(numbers.map(Heading::Numbers));
+    headings.extend(METRIC_HEADINGS);
     let body = html! {
-        @for row in chart.bandwidth_rows() {
+        @for (place, row) in rows.iter().enumerate() {
             tr {
                 th scope="row" { (row.mode) }
                 td.text { (row.units) }
@@ -84,7 +83,7 @@ pub(super) fn bandwidth(chart: &SceneChart, command: &str) -> Markup {
                 td { (size(row.gop_bytes)) }
                 td { (format!("{:.1} Mbit/s", row.mbit_s)) }
                 td { (grouped(row.gaussians)) }
-                (metric_cells(&row.figures))
+                (metric_cells(chart, &row.figures, place, rows.len()))
             }
         }
     };
@@ -104,14 +103,15 @@ pub(super) fn variants(chart: &SceneChart) -> Markup {
     let standings = chart.standings();
     let base = standings.first().and_then(|standing| standing.psnr_at_rate);
     let gain = |standing: &Standing| Some(standing.psnr_at_rate? - base?);
-    let headings =
-        ["Variant", "Encoding", "Decoding", "PSNR at the baseline's rate", "Against the baseline", "BD-rate"];
+    let numbers = ["Encoding", "Decoding", "PSNR at the baseline's rate", "Against the baseline", "BD-rate"];
+    let mut headings = vec![Heading::Words("Variant")];
+    headings.extend(numbers.map(Heading::Numbers));
     let body = html! {
         @for standing in &standings {
             tr.baseline[standing.group == Group::Baseline] {
                 th scope="row" { (standing.name) @if standing.group == Group::Baseline { " (baseline)" } }
-                td { (millions(standing.encode_speed)) }
-                td { (millions(standing.decode_speed)) }
+                td { (speed(standing.encode_speed)) }
+                td { (speed(standing.decode_speed)) }
                 td { (standing.psnr_at_rate.map_or_else(|| "not reached".to_owned(), |psnr| format!("{psnr:.2} dB"))) }
                 td { (signed(gain(standing), " dB")) }
                 td { (signed(standing.bd_rate, " %")) }

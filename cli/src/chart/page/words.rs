@@ -18,12 +18,30 @@ pub(super) fn made_by(command: &str) -> Markup {
     html! { p.made { "made by " code { (command) } } }
 }
 
+/// What stands over a column.
+#[derive(Clone, Copy)]
+pub(super) enum Heading<'a> {
+    /// Over words.
+    Words(&'a str),
+    /// Over numbers.
+    Numbers(&'a str),
+}
+
 /// A table that scrolls where it is wider than the screen.
-pub(super) fn table(headings: &[&str], rows: &Markup) -> Markup {
+pub(super) fn table(headings: &[Heading<'_>], rows: &Markup) -> Markup {
     html! {
         div.scroll tabindex="0" {
             table {
-                thead { tr { @for heading in headings { th scope="col" { (heading) } } } }
+                thead {
+                    tr {
+                        @for heading in headings {
+                            @match heading {
+                                Heading::Words(name) => { th.text scope="col" { (name) } }
+                                Heading::Numbers(name) => { th scope="col" { (name) } }
+                            }
+                        }
+                    }
+                }
                 tbody { (rows) }
             }
         }
@@ -59,11 +77,35 @@ pub(super) fn size(bytes: u64) -> String {
 }
 
 /// Gaussians a second.
-pub(super) fn millions(speed: f64) -> String {
-    format!("{:.2} M/s", speed / 1e6)
+pub(super) fn speed(speed: f64) -> String {
+    match speed {
+        0.0..1e6 => format!("{:.0} k/s", speed / 1e3),
+        _ => format!("{:.2} M/s", speed / 1e6),
+    }
 }
 
 /// A number with its sign, or a dash.
 pub(super) fn signed(value: Option<f64>, unit: &str) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{value:+.2}{unit}").replace('-', "−"))
+    let Some(value) = value else { return "–".to_owned() };
+    let text = format!("{value:+.2}");
+    let text = if ["+0.00", "-0.00"].contains(&text.as_str()) { "0.00".to_owned() } else { text };
+    format!("{text}{unit}").replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_has_no_sign() {
+        assert_eq!(signed(Some(-0.001), " dB"), "0.00 dB");
+        assert_eq!(signed(Some(-1.5), " %"), "−1.50 %");
+        assert_eq!(signed(Some(2.0), ""), "+2.00");
+    }
+
+    #[test]
+    fn sizes_and_speeds_have_three_digits_or_so() {
+        assert_eq!([999, 1500, 2_340_000].map(size), ["999 B", "1.5 kB", "2.34 MB"]);
+        assert_eq!([21_700.0, 3.0e6].map(speed), ["22 k/s", "3.00 M/s"]);
+    }
 }
