@@ -36,6 +36,10 @@ pub(crate) struct Encode {
     /// How close the decoded scene is to the source.
     #[arg(long, value_enum, default_value_t = QualityName::High)]
     quality: QualityName,
+    /// Fit the quantisers to the first frame instead, for pictures with this PSNR, decibels; takes a few seconds
+    /// more.
+    #[arg(long, value_name = "DB", conflicts_with = "quality", value_parser = parse_psnr)]
+    psnr: Option<f32>,
     /// Frames in a group; decoding can start at each.
     #[arg(long, value_name = "N", default_value_t = Settings::default().gop)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
@@ -104,6 +108,11 @@ enum ImportanceName {
     Volume,
 }
 
+fn parse_psnr(text: &str) -> Result<f32, String> {
+    let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
+    decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
+}
+
 fn parse_layers(text: &str) -> Result<String, String> {
     if text == "1080" {
         return Ok(text.to_owned());
@@ -165,6 +174,7 @@ impl Encode {
         Ok(Settings {
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
+            psnr: self.psnr,
             gop: self.gop,
             refinements: self.refinements.clone(),
             sh_degree: self.sh_degree,
