@@ -4,6 +4,7 @@ A peer is a module with
     PACKAGES                      what it needs from the registries: [Package, ...]
     rates(scene)                  the points to measure: [Rate, ...], empty where the peer does not take the scene
     code(rate, scene, decoded, tools)  ->  Coded; writes one PLY for every path of `decoded`
+Seconds are CPU seconds of all threads: on a machine that others use too, they are what can be repeated.
 """
 
 import os
@@ -39,6 +40,9 @@ class Coded:
     command: str
 
 
+SLOW = 60.0  # seconds: what takes longer is not repeated
+
+
 class Missing(Exception):
     """The peer cannot be measured here; the text says why."""
 
@@ -56,21 +60,31 @@ def in_process(work, repeat):
         begin = time.process_time()
         result = work()
         seconds.append(time.process_time() - begin)
+        if seconds[-1] > SLOW:
+            break
     return result, statistics.median(seconds)
 
 
 def process(command, repeat=1):
-    """The median CPU seconds of a command; its output is shown only when it fails."""
+    """The median CPU seconds of a command."""
     seconds = []
     for _ in range(repeat):
         begin = _children_seconds()
         run(command)
         seconds.append(_children_seconds() - begin)
+        if seconds[-1] > SLOW:
+            break
     return statistics.median(seconds)
 
 
-def run(command, stdin=None):
-    done = subprocess.run([str(word) for word in command], input=stdin, capture_output=True)
+def run(command, stdin=None, limit=None):
+    """What a command prints; one that fails or takes more than `limit` seconds is Missing."""
+    try:
+        done = subprocess.run([str(word) for word in command], input=stdin, capture_output=True, timeout=limit)
+    except FileNotFoundError:
+        raise Missing("%s is not on this machine" % command[0]) from None
+    except subprocess.TimeoutExpired:
+        raise Missing("stopped after %d s" % limit) from None
     if done.returncode:
         tail = (done.stderr or done.stdout).decode(errors="replace").strip().splitlines()[-3:]
         raise Missing("%s: exit %d: %s" % (os.path.basename(str(command[0])), done.returncode, " / ".join(tail)))

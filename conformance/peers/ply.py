@@ -9,6 +9,7 @@ GROUPS = {"position": ["x", "y", "z"], "colour": ["f_dc_0", "f_dc_1", "f_dc_2"],
 SCALARS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
            "double": "<f8", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2", "int32": "<i4",
            "uint32": "<u4", "float32": "<f4", "float64": "<f8"}
+CERTAIN = np.float32(13.815510)  # the logit of 1 - 1e-6, written for an opacity of exactly 0 or 1
 DEGREES = {0: 0, 9: 1, 24: 2, 45: 3}
 
 
@@ -70,6 +71,8 @@ def write(path, gaussians):
     names, columns = [], []
     for group in GROUPS:
         column = getattr(gaussians, group)
+        if group == "opacity":
+            column = np.nan_to_num(column, nan=np.nan, posinf=CERTAIN, neginf=-CERTAIN)
         names += GROUPS[group] or ["f_rest_%d" % k for k in range(column.shape[1])]
         columns.append(column)
     table = np.ascontiguousarray(np.concatenate(columns, axis=1), "<f4")

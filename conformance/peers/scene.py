@@ -1,12 +1,15 @@
 """A scene, or the frames of one, brought once to a standard PLY that every peer starts from."""
 
+import json
 import os
 from dataclasses import dataclass
 
 import dither
 import ply
 import transform
+from measure import run
 
+CLOSE = 1e-5  # rounding of two float32 readers, in units of the scene
 
 @dataclass
 class Scene:
@@ -46,6 +49,18 @@ def prepare(source, folder, tools, dithered):
     return Scene(name, source, paths, counts, degrees[0], sequence)
 
 
+def check(scene, splatstream):
+    """Our own reader must see the reference in the source: as many Gaussians, in the same places."""
+    for source, path in zip(_frames(scene.source)[0], scene.paths):
+        if os.path.basename(source) == "meta.json":
+            source = os.path.dirname(source)
+        found = json.loads(run([splatstream, "compare", source, path, "--json"]))
+        apart = found["attributes"]["position"]["rmse"]
+        if found["gaussians_a"] != found["gaussians_b"] or apart > CLOSE:
+            raise ValueError("%s: splatstream reads %d Gaussians, the reference has %d; positions are %g apart"
+                             % (source, found["gaussians_a"], found["gaussians_b"], apart))
+
+
 def _frames(source):
     """(the files, whether they are frames): a folder is a sequence unless it is one SOG."""
     if not os.path.isdir(source):
@@ -71,5 +86,6 @@ def _read(path, tools):
 def _name(source):
     source = os.path.normpath(source)
     stem = os.path.basename(source).split(".")[0]
-    return "%s_%s" % (os.path.basename(os.path.dirname(source)), stem) if os.path.isdir(source) and os.path.exists(
-        os.path.join(source, "meta.json")) else stem
+    if os.path.exists(os.path.join(source, "meta.json")):
+        return "%s_%s" % (os.path.basename(os.path.dirname(source)), stem)
+    return stem

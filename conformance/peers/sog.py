@@ -8,7 +8,7 @@ PACKAGES = [transform.TRANSFORM]
 
 def rates(scene):
     """The SH iterations are its only knob of quality."""
-    choices = (2, 10, 20) if scene.degree and not scene.sequence else (10,)
+    choices = (2, 10) if scene.degree and not scene.sequence else (10,)
     return [Rate("SOG", "iterations %d" % n, {"iterations": n}) for n in choices]
 
 

@@ -1,7 +1,7 @@
 // Codes frames with @adobe/spz, in memory. Standard input is a job, the last line of the output is its result.
 import { readFileSync, writeFileSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
-import { median, seconds } from './clock.mjs';
+import { timed } from './clock.mjs';
 
 const job = JSON.parse(readFileSync(0));
 const { default: createSpzModule } = await import(pathToFileURL(job.module));
@@ -10,8 +10,10 @@ const { RDF } = spz.CoordinateSystem;
 const shValues = 3 * ((job.degree + 1) ** 2 - 1);
 const clouds = job.frames.map(cloud);
 
-const [packed, encode_s] = timed(() => clouds.map((c) => spz.saveSpzToBuffer(c, { from: RDF, ...job.pack })));
-const [unpacked, decode_s] = timed(() => packed.map((bytes) => spz.loadSpzFromBuffer(bytes, { to: RDF })));
+const pack = (c) => spz.saveSpzToBuffer(c, { from: RDF, ...job.pack });
+const unpack = (bytes) => spz.loadSpzFromBuffer(bytes, { to: RDF });
+const [packed, encode_s] = await timed(job.repeat, () => clouds.map(pack));
+const [unpacked, decode_s] = await timed(job.repeat, () => packed.map(unpack));
 
 unpacked.forEach((c, i) => writeFileSync(job.frames[i].out, flat(c)));
 console.log(JSON.stringify({
@@ -19,17 +21,6 @@ console.log(JSON.stringify({
   gaussians: unpacked.reduce((sum, c) => sum + c.numPoints, 0),
   encode_s, decode_s,
 }));
-
-function timed(work) {
-  const runs = [];
-  let result;
-  for (let i = 0; i < job.repeat; i += 1) {
-    const begin = seconds();
-    result = work();
-    runs.push(seconds() - begin);
-  }
-  return [result, median(runs)];
-}
 
 function cloud({ in: path, count }) {
   const bytes = readFileSync(path);

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import venv
 
-from measure import Missing, Package, run
+from measure import Package, run
 
 NUMPY = Package("pip", "numpy", "2.4.6")
 
@@ -24,9 +24,10 @@ def enter(cache):
 
 
 class Tools:
-    def __init__(self, cache, repeat):
+    def __init__(self, cache, repeat, limit):
         self.cache = os.path.abspath(cache)
         self.repeat = repeat
+        self.limit = limit
         self.work = os.path.join(self.cache, "work")
         os.makedirs(self.work, exist_ok=True)
 
@@ -49,7 +50,7 @@ class Tools:
     def node(self, script, job):
         """Runs a script of this folder on a job; both sides speak JSON."""
         path = os.path.join(os.path.dirname(os.path.abspath(__file__)), script)
-        out = run(["node", path], stdin=json.dumps(job).encode())
+        out = run(["node", path], stdin=json.dumps(job).encode(), limit=self.limit)
         return json.loads(out.splitlines()[-1])
 
     def scratch(self, name):
@@ -65,10 +66,7 @@ class Tools:
         os.makedirs(folder, exist_ok=True)
         with open(os.path.join(folder, "package.json"), "w") as file:
             json.dump({"private": True, "dependencies": {package.name: package.version}}, file)
-        try:
-            run(["npm", "install", "--silent", "--no-audit", "--no-fund", "--prefix", folder])
-        except FileNotFoundError:
-            raise Missing("npm is not on this machine") from None
+        run(["npm", "install", "--silent", "--no-audit", "--no-fund", "--prefix", folder])
 
 
 def _pip(python, package):

@@ -3,7 +3,7 @@
 import { readFileSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { median, seconds } from './clock.mjs';
+import { timed } from './clock.mjs';
 
 const job = JSON.parse(readFileSync(0));
 const splat = await import(pathToFileURL(job.module));
@@ -22,14 +22,14 @@ async function convertAll() {
   const total = { bytes: 0, encode_s: 0, decode_s: 0 };
   for (const frame of job.frames) {
     const input = files(frame.in);
-    const [coded, encode_s] = await timed(() => convert(input, basename(frame.in), `frame.${job.suffix}`));
+    const [coded, encode_s] = await timed(job.repeat, () => convert(input, basename(frame.in), `frame.${job.suffix}`));
     total.bytes += coded.length;
     total.encode_s += encode_s;
     let written = coded;
     if (job.decode) {
       const memory = new splat.MemoryReadFileSystem();
       memory.set(`frame.${job.suffix}`, coded);
-      const [decoded, decode_s] = await timed(() => convert(memory, `frame.${job.suffix}`, 'decoded.ply'));
+      const [decoded, decode_s] = await timed(job.repeat, () => convert(memory, `frame.${job.suffix}`, 'decoded.ply'));
       total.decode_s += decode_s;
       written = decoded;
     }
@@ -58,15 +58,4 @@ function files(path) {
     images.forEach((name) => memory.set(name, readFileSync(join(dirname(path), name))));
   }
   return memory;
-}
-
-async function timed(work) {
-  const runs = [];
-  let result;
-  for (let i = 0; i < job.repeat; i += 1) {
-    const begin = seconds();
-    result = await work();
-    runs.push(seconds() - begin);
-  }
-  return [result, median(runs)];
 }
