@@ -3,6 +3,7 @@
 pub(crate) mod errors;
 mod grid;
 pub(crate) mod matching;
+mod pictures;
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -13,19 +14,21 @@ use crate::stream_file::LimitArgs;
 use clap::{Args, ValueEnum};
 use errors::{AttributeErrors, ErrorSums};
 use matching::Matching;
+use pictures::{PictureArgs, PictureErrors, Pictures};
 use serde::Serialize;
 use splatstream_encoder::canonical::canonicalise;
 use splatstream_scene::GaussianFrame;
 use std::path::PathBuf;
 
-/// Compare two scenes or streams: the error of each attribute.
+/// Compare two scenes or streams: the error of each attribute and, with cameras, of pictures.
 ///
 /// A and B are streams, scene files, or directories of frames; they are compared frame by frame. Both are
 /// brought into canonical form first, so that Gaussians that render alike count as alike. Every Gaussian of
 /// the smaller frame is compared with its partner in the larger one.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream compare frames/ talk.gss\n  \
-    splatstream compare garden.ply garden.gss --match nearest --json")]
+    splatstream compare garden.ply garden.gss --match nearest --json\n  \
+    splatstream compare garden.ply garden.gss --cameras ring:8 --height 1080")]
 pub(crate) struct Compare {
     /// A stream, a scene, or a directory of frames.
     a: PathBuf,
@@ -34,6 +37,8 @@ pub(crate) struct Compare {
     /// How Gaussians find their partners.
     #[arg(long = "match", value_enum, default_value_t = Match::Auto)]
     matching: Match,
+    #[command(flatten)]
+    pictures: PictureArgs,
     #[command(flatten)]
     limits: LimitArgs,
 }
@@ -63,6 +68,8 @@ struct Report {
     /// The matching of each frame.
     matched_by: Vec<Matching>,
     attributes: AttributeErrors,
+    #[serde(flatten)]
+    pictures: PictureErrors,
 }
 
 impl Compare {
@@ -74,11 +81,12 @@ impl Compare {
         let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();
+        let mut pictures = self.pictures.start()?;
         loop {
             let (a, b) =
                 (next(&mut frames_a, &mut report.frames_a)?, next(&mut frames_b, &mut report.frames_b)?);
             match (a, b) {
-                (Some(a), Some(b)) => self.frame(&a, &b, &mut report, &mut sums)?,
+                (Some(a), Some(b)) => self.frame(&a, &b, &mut report, &mut sums, &mut pictures)?,
                 (None, None) => break,
                 _ => {}
             }
@@ -87,6 +95,7 @@ impl Compare {
         drop(progress);
         report.pairs = sums.pairs();
         report.attributes = sums.errors();
+        report.pictures = pictures.errors();
         console.report(&report, || report.text())
     }
 
@@ -102,6 +111,7 @@ impl Compare {
             pairs: 0,
             matched_by: Vec::new(),
             attributes: AttributeErrors::default(),
+            pictures: PictureErrors::default(),
         }
     }
 
@@ -111,6 +121,7 @@ impl Compare {
         b: &GaussianFrame,
         report: &mut Report,
         sums: &mut ErrorSums,
+        pictures: &mut Pictures<'_>,
     ) -> Result<(), Failure> {
         if self.matching == Match::Order && a.len() != b.len() {
             let (number, a, b) = (report.frames, a.len(), b.len());
@@ -123,7 +134,7 @@ impl Compare {
         report.gaussians_a += a.len() as u64;
         report.gaussians_b += b.len() as u64;
         report.matched_by.push(compare_frames(a, b, self.matching, sums));
-        Ok(())
+        pictures.add(a, b)
     }
 }
 
@@ -170,6 +181,6 @@ impl Report {
             grouped(self.pairs),
             self.frames - by_order,
         );
-        text + &self.attributes.text()
+        text + &self.attributes.text() + &self.pictures.text()
     }
 }

@@ -37,6 +37,10 @@ pub(crate) struct Encode {
     /// How close the decoded scene is to the source.
     #[arg(long, value_enum, default_value_t = QualityName::High)]
     quality: QualityName,
+    /// Fit the quantisers to the first frame instead, for pictures with this PSNR, decibels; takes a few seconds
+    /// more.
+    #[arg(long, value_name = "DB", conflicts_with = "quality", value_parser = parse_psnr)]
+    psnr: Option<f32>,
     /// Frames in a group; decoding can start at each.
     #[arg(long, value_name = "N", default_value_t = Settings::default().gop)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
@@ -81,6 +85,11 @@ enum ImportanceName {
     Contribution,
     /// Opacity times volume; needs no views.
     Volume,
+}
+
+fn parse_psnr(text: &str) -> Result<f32, String> {
+    let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
+    decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
 }
 
 fn parse_layers(text: &str) -> Result<String, String> {
@@ -144,6 +153,7 @@ impl Encode {
         let mut settings = Settings {
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
+            psnr: self.psnr,
             gop: self.gop,
             refinements: self.refinements.clone(),
             sh_degree: self.sh_degree,

@@ -74,7 +74,7 @@ pub(crate) fn position_lattice(extent: Extent, inner_side: f32, steps: &Steps) -
     }
     let side = extent.largest_side();
     let cells = ((1_u32 << MAX_POSITION_BITS) - 1) as f32;
-    let asked = inner_side / (1_u32 << steps.position_bits) as f32;
+    let asked = inner_side / libm::exp2f(steps.position_bits);
     let least = (side / cells).max(f32::from_bits(88 << 23));
     let step = asked.max(least).min(f32::from_bits(146 << 23));
     let last = libm::rintf(side / step);

@@ -5,6 +5,7 @@
 //! reconstruction are the decoder's own functions. Same frames and settings, same bytes, on every machine
 //! and with any number of threads.
 
+mod allocation;
 pub mod canonical;
 mod clusters;
 mod colour;

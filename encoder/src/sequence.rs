@@ -80,6 +80,12 @@ fn check(settings: &Settings) -> Result<(), Error> {
         return Err(Error::Refinements(percents.clone()));
     }
     let setting = |name, value: String, allowed| Err(Error::Setting { name, value, allowed });
+    if settings.psnr.is_some_and(|decibels| !(20.0..=90.0).contains(&decibels)) {
+        return setting("psnr", format!("{:?}", settings.psnr), "20 to 90");
+    }
+    if !(1.0..=20.0).contains(&settings.steps.position_bits) {
+        return setting("position_bits", settings.steps.position_bits.to_string(), "1 to 20");
+    }
     if settings.gop == 0 {
         return setting("gop", "0".into(), "1 or more");
     }

@@ -1,5 +1,6 @@
 //! The second pass: units in their order, written as they are made.
 
+use crate::allocation;
 use crate::canonical::{canonicalise, visible};
 use crate::colour::{self, ShPlan};
 use crate::error::Error;
@@ -8,7 +9,7 @@ use crate::importance::Ranking;
 use crate::lattice::geometry;
 use crate::pca::Components;
 use crate::sequence::analyse;
-use crate::settings::{Importance, Settings};
+use crate::settings::{Importance, Settings, Steps};
 use crate::source::FrameSource;
 use splatstream_decoder::block::UnitParameters;
 use splatstream_decoder::colour::Colour;
@@ -50,6 +51,8 @@ pub struct Report {
     pub sh_codebook_entries: u32,
     /// Bits a Gaussian and mean squared error in steps, of coefficients and of codebooks, if compared.
     pub sh_trial: Option<[(f64, f64); 2]>,
+    /// Quantiser steps.
+    pub steps: Option<Steps>,
     /// What ordered the Gaussians.
     pub importance: Option<Importance>,
     /// Reconstruction digest of each frame, all refinements.
@@ -66,10 +69,13 @@ pub fn encode(
     sink: &mut dyn Write,
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
+    let fitted = fitted(source, settings)?;
+    let settings = &fitted;
     let analysis = analyse(source, settings)?;
     let sequence = analysis.parameters;
     let mut ranking = Ranking::new(settings);
     let mut report = Report {
+        steps: Some(settings.steps),
         importance: Some(ranking.importance()),
         frames: source.len(),
         sh_degree: (analysis.source_sh_degree, sequence.sh_degree),
@@ -104,6 +110,18 @@ pub fn encode(
     finish(&mut writer, index, source.len())?;
     report.bytes = writer.offset;
     Ok(report)
+}
+
+/// The settings with steps that reach the quality asked for on the first frame.
+fn fitted(source: &mut dyn FrameSource, settings: &Settings) -> Result<Settings, Error> {
+    let mut settings = settings.clone();
+    if let Some(decibels) = settings.psnr
+        && !source.is_empty()
+    {
+        let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
+        settings.steps = allocation::fit(&first, &settings, decibels);
+    }
+    Ok(settings)
 }
 
 /// A frame in canonical form, and its Gaussians, most important first.

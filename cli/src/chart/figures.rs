@@ -85,13 +85,14 @@ fn all_gaussians(scene: &SceneChart, metric: &Metric) -> Series {
 /// One series a peer, its name at the last point.
 fn peers(scene: &SceneChart, metric: &Metric) -> Vec<Series> {
     let mut names: Vec<&str> = Vec::new();
-    scene.peers.iter().for_each(|point| {
+    let lossy = || scene.peers.iter().filter(|point| !point.is_lossless());
+    lossy().for_each(|point| {
         if !names.contains(&point.peer.as_str()) {
             names.push(&point.peer);
         }
     });
     let one = |(place, name): (usize, &&str)| {
-        let mut points: Vec<_> = scene.peers.iter().filter(|point| point.peer == **name).collect();
+        let mut points: Vec<_> = lossy().filter(|point| point.peer == **name).collect();
         points.sort_by(|a, b| a.bpg.total_cmp(&b.bpg));
         let dots: Vec<Dot> = points
             .iter()

@@ -86,6 +86,7 @@ impl Page<'_> {
                      one command on one machine; "
                     a href="#terms" { "terms are explained at the end" } "."
                 }
+                p.narrow.note { "On a narrow screen, figures and tables scroll sideways." }
                 nav aria-label="Scenes" {
                     @for chart in self.charts { a href=(format!("#{}", chart.name)) { (chart.name) } }
                     a href="#conditions" { "conditions" }

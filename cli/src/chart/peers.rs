@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use serde::Deserialize;
 use splatstream_encoder::FrameSource;
-use splatstream_render::metrics::{Comparison, RatePoint};
+use splatstream_render::metrics::{Comparison, LOSSLESS_DB, RatePoint};
 use std::path::{Path, PathBuf};
 
 /// The version of the schema that this reads.
@@ -95,6 +95,11 @@ pub(crate) struct PeerPoint {
 }
 
 impl PeerPoint {
+    /// Whether its pictures are those of the source: then there is no distortion to draw.
+    pub(crate) fn is_lossless(&self) -> bool {
+        self.figures.psnr_db >= LOSSLESS_DB
+    }
+
     /// Its place among curves.
     pub(crate) fn rate_point(&self) -> RatePoint {
         RatePoint { rate: self.bpg, quality: self.figures.psnr_db }

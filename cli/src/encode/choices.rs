@@ -2,7 +2,7 @@
 
 use crate::numbers::{grouped, percent};
 use serde::Serialize;
-use splatstream_encoder::{Importance, Report, Settings, ShChoice, Tools};
+use splatstream_encoder::{Importance, Report, Settings, ShChoice, Steps, Tools};
 
 /// One decision of the encoder.
 #[derive(Debug, Clone, Serialize)]
@@ -26,6 +26,7 @@ impl Choice {
 /// Every decision that the report tells of.
 pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     let mut choices = vec![positions(report, settings), axes(report), degree(report, settings)];
+    choices.extend(steps(report, settings));
     if report.sh_degree.1 > 0 {
         choices.push(harmonics(report, settings));
     }
@@ -38,10 +39,24 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
 fn positions(report: &Report, settings: &Settings) -> Choice {
     let bits = report.position_bits;
     let choice = format!("{bits} bits an axis, cells of {}", report.position_step);
-    let inner = settings.steps.position_bits;
+    let inner = report.steps.unwrap_or(settings.steps).position_bits;
     let why =
-        format!("the inner 98 % span 2^{inner} cells at this quality; the rest is for what lies outside");
+        format!("the inner 98 % span 2^{inner:.2} cells at this quality; the rest is for what lies outside");
     Choice::new("position", choice, why)
+}
+
+/// The steps that were fitted; those of a quality are in its documentation.
+fn steps(report: &Report, settings: &Settings) -> Option<Choice> {
+    let (decibels, steps) = (settings.psnr?, report.steps?);
+    let Steps { log_scale, rotation, opacity, dc, sh, .. } = steps;
+    let choice = format!(
+        "log-scale {log_scale:.3}, rotation {rotation:.4}, opacity {opacity:.3}, dc {dc:.3}, sh {sh:.3}"
+    );
+    Some(Choice::new(
+        "steps",
+        choice,
+        format!("the fewest bits for {decibels} dB, measured on the first frame"),
+    ))
 }
 
 fn axes(report: &Report) -> Choice {

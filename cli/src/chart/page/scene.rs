@@ -53,6 +53,9 @@ fn rates(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
              the left is better, but for ST-LPIPS down and to the left."
         ))
         (figures(&drawn.rates))
+        @for peer in chart.peers.iter().filter(|peer| peer.is_lossless()) {
+            p.note { (peer.peer) " gives the pictures of the source; it is in the table of other codecs, not in the figures." }
+        }
         @if !chart.has_learned() { p.note { "ST-LPIPS: " (NOT_MEASURED) "." } }
         (made_by(command))
     }

@@ -15,7 +15,7 @@ pub(super) fn how_to_read(sentence: &str) -> Markup {
 
 /// The command behind a figure or a table.
 pub(super) fn made_by(command: &str) -> Markup {
-    html! { p.made { "made by " code { (command) } } }
+    html! { p.made { "made by " code { @for word in command.split(' ') { span { (word) } " " } } } }
 }
 
 /// What stands over a column.

@@ -2,8 +2,8 @@
 
 /// Height of a line of text.
 const HEIGHT: f64 = 14.0;
-/// Mean width of a letter.
-const LETTER: f64 = 6.7;
+/// Width of a letter, on the safe side: fonts differ.
+const LETTER: f64 = 7.5;
 
 /// A rectangle: left, top, right, bottom.
 #[derive(Debug, Clone, Copy, PartialEq)]

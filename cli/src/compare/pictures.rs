@@ -1,0 +1,172 @@
+//! How far apart two scenes look: renderings of both from the same cameras.
+
+use crate::cameras::{CameraArgs, Views};
+use crate::failure::Failure;
+use crate::table::Table;
+use clap::Args;
+use serde::Serialize;
+use splatstream_render::metrics::{Comparison, StLpips, compare};
+use splatstream_render::{Camera, Image, Rendering, render};
+use splatstream_scene::GaussianFrame;
+use std::path::{Path, PathBuf};
+
+/// What is drawn and compared.
+#[derive(Args)]
+pub(crate) struct PictureArgs {
+    /// Draw both from these cameras and compare the pictures: a cameras.json or transforms.json; ring:N and
+    /// forward:N make N cameras for the first frame of A.
+    #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
+    cameras: Option<Views>,
+    #[command(flatten)]
+    views: CameraArgs,
+    /// Weights of the learned metric ST-LPIPS (an .npz file); without them it is left out.
+    #[arg(long, value_name = "WEIGHTS.npz", requires = "cameras")]
+    st_lpips: Option<PathBuf>,
+    /// Photographs, one PNG file a camera and named after it: both scenes are compared with these as well.
+    #[arg(long, value_name = "DIR", requires = "cameras")]
+    photos: Option<PathBuf>,
+}
+
+/// Means over all frames and views; nothing where no cameras are given. A is the reference.
+#[derive(Serialize, Default)]
+pub(super) struct PictureErrors {
+    #[serde(flatten)]
+    rendered: Figures,
+    /// A and B against photographs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    photos: Option<[Figures; 2]>,
+    /// Pictures compared.
+    pictures: usize,
+}
+
+/// The figures of a comparison, all of them null where there is none.
+#[derive(Serialize, Default, Clone, Copy)]
+pub(super) struct Figures {
+    psnr_db: Option<f64>,
+    psnr_masked_db: Option<f64>,
+    yuv_psnr_db: Option<f64>,
+    ssim: Option<f64>,
+    ssim_masked: Option<f64>,
+    st_lpips: Option<f64>,
+}
+
+/// Compares pictures as frames come by.
+pub(super) struct Pictures<'a> {
+    args: &'a PictureArgs,
+    learned: Option<StLpips>,
+    cameras: Vec<Camera>,
+    rendered: Vec<Comparison>,
+    photos: [Vec<Comparison>; 2],
+}
+
+impl PictureArgs {
+    /// Ready for the first frame; the weights are read.
+    pub(super) fn start(&self) -> Result<Pictures<'_>, Failure> {
+        let learned = self.st_lpips.as_deref().map(read_weights).transpose()?;
+        let photos = [const { Vec::new() }; 2];
+        Ok(Pictures { args: self, learned, cameras: Vec::new(), rendered: Vec::new(), photos })
+    }
+}
+
+/// The weights of the learned metric in a file.
+pub(crate) fn read_weights(path: &Path) -> Result<StLpips, Failure> {
+    StLpips::read(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
+}
+
+impl Pictures<'_> {
+    /// Draws and compares one frame of each.
+    pub(super) fn add(&mut self, a: &GaussianFrame, b: &GaussianFrame) -> Result<(), Failure> {
+        let Some(views) = &self.args.cameras else { return Ok(()) };
+        if self.cameras.is_empty() {
+            self.cameras = self.args.views.cameras(views, a)?;
+        }
+        for camera in &self.cameras {
+            let [a, b] = [a, b].map(|frame| render(frame, camera, [0.0; 3]));
+            self.rendered.push(compare(&a.colour, &a.alpha, &b.colour, self.learned.as_ref()));
+            if let Some(directory) = &self.args.photos {
+                let photo = read_photo(directory, camera)?;
+                let against =
+                    |drawn: &Rendering| compare(&photo, &a.alpha, &drawn.colour, self.learned.as_ref());
+                let [of_a, of_b] = [against(&a), against(&b)];
+                self.photos[0].push(of_a);
+                self.photos[1].push(of_b);
+            }
+        }
+        Ok(())
+    }
+
+    /// Means over everything that was added.
+    pub(super) fn errors(&self) -> PictureErrors {
+        PictureErrors {
+            rendered: Figures::of(&self.rendered),
+            photos: self.args.photos.as_ref().map(|_| self.photos.each_ref().map(|list| Figures::of(list))),
+            pictures: self.rendered.len(),
+        }
+    }
+}
+
+/// The photograph of a camera, which must be of its size.
+fn read_photo(directory: &Path, camera: &Camera) -> Result<Image, Failure> {
+    let stem = Path::new(&camera.name).file_stem().unwrap_or(camera.name.as_ref());
+    let path = directory.join(stem).with_extension("png");
+    let bytes = std::fs::read(&path).map_err(|error| Failure::file("read", &path, &error))?;
+    let photo =
+        Image::from_png(&bytes).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+    let (width, height) = (camera.width, camera.height);
+    if (photo.width(), photo.height()) != (width as usize, height as usize) {
+        return Err(Failure::other(format!(
+            "{}: is {} x {} pixels, its camera {width} x {height}\n  scale the photographs, or set --height to theirs",
+            path.display(),
+            photo.width(),
+            photo.height(),
+        )));
+    }
+    Ok(photo)
+}
+
+impl Figures {
+    fn of(pictures: &[Comparison]) -> Self {
+        let Some(mean) = Comparison::mean(pictures) else { return Self::default() };
+        Self {
+            psnr_db: Some(mean.psnr_db),
+            psnr_masked_db: mean.psnr_masked_db,
+            yuv_psnr_db: Some(mean.yuv_psnr_db),
+            ssim: mean.ssim,
+            ssim_masked: mean.ssim_masked,
+            st_lpips: mean.st_lpips,
+        }
+    }
+
+    fn row(&self, what: &str) -> [String; 7] {
+        let cell = |figure: Option<f64>, digits: usize| {
+            figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.digits$}"))
+        };
+        [
+            what.to_owned(),
+            cell(self.psnr_db, 2),
+            cell(self.psnr_masked_db, 2),
+            cell(self.yuv_psnr_db, 2),
+            cell(self.ssim, 4),
+            cell(self.ssim_masked, 4),
+            cell(self.st_lpips, 4),
+        ]
+    }
+}
+
+impl PictureErrors {
+    /// A table for people; nothing if no picture was drawn.
+    pub(super) fn text(&self) -> String {
+        if self.pictures == 0 {
+            return String::new();
+        }
+        let mut rows = vec![self.rendered.row("B against A")];
+        if let Some([a, b]) = &self.photos {
+            rows.push(a.row("A against photographs"));
+            rows.push(b.row("B against photographs"));
+        }
+        let mut table =
+            Table::new(["", "PSNR dB", "covered dB", "YUV dB", "SSIM", "covered SSIM", "ST-LPIPS"]);
+        rows.into_iter().for_each(|row| table.row(row));
+        format!("\n{} pictures, means over all of them\n{}", self.pictures, table.text())
+    }
+}

@@ -1,0 +1,42 @@
+// Codes frames with @adobe/spz, in memory. Standard input is a job, the last line of the output is its result.
+import { readFileSync, writeFileSync } from 'node:fs';
+import { pathToFileURL } from 'node:url';
+import { timed } from './clock.mjs';
+
+const job = JSON.parse(readFileSync(0));
+const { default: createSpzModule } = await import(pathToFileURL(job.module));
+const spz = await createSpzModule({ print: () => {} });
+const { RDF } = spz.CoordinateSystem;
+const shValues = 3 * ((job.degree + 1) ** 2 - 1);
+const clouds = job.frames.map(cloud);
+
+const pack = (c) => spz.saveSpzToBuffer(c, { from: RDF, ...job.pack });
+const unpack = (bytes) => spz.loadSpzFromBuffer(bytes, { to: RDF });
+const [packed, encode_s] = await timed(job.repeat, () => clouds.map(pack));
+const [unpacked, decode_s] = await timed(job.repeat, () => packed.map(unpack));
+
+unpacked.forEach((c, i) => writeFileSync(job.frames[i].out, flat(c)));
+console.log(JSON.stringify({
+  bytes: packed.reduce((sum, bytes) => sum + bytes.length, 0),
+  gaussians: unpacked.reduce((sum, c) => sum + c.numPoints, 0),
+  encode_s, decode_s,
+}));
+
+function cloud({ in: path, count }) {
+  const bytes = readFileSync(path);
+  let at = bytes.byteOffset;
+  const take = (width) => {
+    const part = new Float32Array(bytes.buffer.slice(at, at + 4 * width * count));
+    at += 4 * width * count;
+    return part;
+  };
+  return {
+    numPoints: count, shDegree: job.degree, antialiased: false, extensions: [],
+    positions: take(3), scales: take(3), rotations: take(4), alphas: take(1), colors: take(3), sh: take(shValues),
+  };
+}
+
+function flat(c) {
+  const parts = [c.positions, c.scales, c.rotations, c.alphas, c.colors, c.sh];
+  return Buffer.concat(parts.map((p) => Buffer.from(p.buffer, p.byteOffset, p.byteLength)));
+}
