@@ -6,7 +6,7 @@ use common::{directory, json, text, write_frames};
 use std::path::Path;
 
 fn read(path: &Path) -> String {
-    std::fs::read_to_string(path).unwrap()
+    std::fs::read_to_string(path).expect("a text file")
 }
 
 /// The values of an attribute in a page.
