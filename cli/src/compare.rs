@@ -1,18 +1,17 @@
 //! `splatstream compare`: how far apart two scenes or streams are, attribute by attribute.
 
 pub(crate) mod errors;
-mod frames;
 mod grid;
 pub(crate) mod matching;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::frames::{Frames, Opened};
 use crate::numbers::grouped;
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::{Args, ValueEnum};
 use errors::{AttributeErrors, ErrorSums};
-use frames::{Frames, Opened};
 use matching::Matching;
 use serde::Serialize;
 use splatstream_encoder::canonical::canonicalise;
@@ -71,7 +70,7 @@ impl Compare {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let limits = self.limits.limits();
         let (opened_a, opened_b) = (Opened::open(&self.a)?, Opened::open(&self.b)?);
-        let (mut frames_a, mut frames_b) = (opened_a.frames(&limits)?, opened_b.frames(&limits)?);
+        let (mut frames_a, mut frames_b) = (opened_a.frames(&limits, None)?, opened_b.frames(&limits, None)?);
         let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();

@@ -2,6 +2,7 @@
 
 mod choices;
 
+use crate::cameras::{CameraArgs, Views};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
@@ -11,7 +12,7 @@ use crate::progress::Progress;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use splatstream_encoder::{FrameSource, Preset, Quality, Report, Settings, ShChoice, encode};
+use splatstream_encoder::{FrameSource, Importance, Preset, Quality, Report, Settings, ShChoice, encode};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -57,9 +58,15 @@ pub(crate) struct Encode {
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     #[arg(long)]
     keep_invisible: bool,
-    /// What puts Gaussians into the first refinements.
-    #[arg(long, value_enum, default_value_t = Importance::Volume)]
-    importance: Importance,
+    /// What puts Gaussians into the first refinements; default is removal, and volume for the fast preset.
+    #[arg(long, value_enum)]
+    importance: Option<ImportanceName>,
+    /// Views to measure importance in: a cameras.json or transforms.json, ring:N or forward:N; default is all
+    /// around.
+    #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
+    cameras: Option<Views>,
+    #[command(flatten)]
+    views: CameraArgs,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -88,8 +95,12 @@ enum ShName {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Importance {
-    /// Opacity times volume.
+enum ImportanceName {
+    /// What pictures lose without a Gaussian, weighed anew at each refinement.
+    Removal,
+    /// Transmittance times alpha over the pixels of all views.
+    Contribution,
+    /// Opacity times volume; needs no views.
     Volume,
 }
 
@@ -118,7 +129,7 @@ impl Encode {
     /// Encodes to a file that appears when it is whole.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let mut source = FrameFiles::find(&self.inputs)?;
-        let settings = self.settings();
+        let settings = self.settings(&mut source)?;
         self.check_out(&source)?;
         let mut file = OutputFile::create(&self.out)?;
         let start = Instant::now();
@@ -143,10 +154,15 @@ impl Encode {
         Ok(())
     }
 
-    fn settings(&self) -> Settings {
-        // One value: it is here so that the default can be written down.
-        let Importance::Volume = self.importance;
-        Settings {
+    fn settings(&self, source: &mut FrameFiles) -> Result<Settings, Failure> {
+        let cameras = match &self.cameras {
+            None => Vec::new(),
+            Some(views) => {
+                let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
+                self.views.cameras(views, &first)?
+            }
+        };
+        Ok(Settings {
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
             gop: self.gop,
@@ -155,8 +171,10 @@ impl Encode {
             sh: self.sh.into(),
             keep_invisible: self.keep_invisible,
             ticks: self.fps,
+            importance: self.importance.map(Into::into),
+            cameras,
             ..Settings::default()
-        }
+        })
     }
 
     /// The encoder counts frames; a user has files.
@@ -222,6 +240,16 @@ impl From<QualityName> for Quality {
             QualityName::Medium => Self::Medium,
             QualityName::High => Self::High,
             QualityName::VisuallyLossless => Self::VisuallyLossless,
+        }
+    }
+}
+
+impl From<ImportanceName> for Importance {
+    fn from(name: ImportanceName) -> Self {
+        match name {
+            ImportanceName::Removal => Self::Removal,
+            ImportanceName::Contribution => Self::Contribution,
+            ImportanceName::Volume => Self::Volume,
         }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! One file a subcommand; `console` speaks to the user, `failure` says what went wrong and what to do.
 
+mod cameras;
 mod compare;
 mod console;
 mod decode;
@@ -10,10 +11,12 @@ mod encode;
 mod extract;
 mod failure;
 mod frame_files;
+mod frames;
 mod inspect;
 mod numbers;
 mod output_file;
 mod progress;
+mod render;
 mod stream_file;
 mod table;
 mod validate;
@@ -53,6 +56,7 @@ enum Command {
     Validate(validate::Validate),
     Extract(extract::Extract),
     Compare(compare::Compare),
+    Render(render::Render),
 }
 
 fn main() -> ExitCode {
@@ -87,6 +91,7 @@ impl Command {
             Self::Validate(command) => command.run(console),
             Self::Extract(command) => command.run(console),
             Self::Compare(command) => command.run(console),
+            Self::Render(command) => command.run(console),
         }
     }
 }

@@ -31,7 +31,8 @@ pub fn to_gaussians(frame: QuantizedFrame, sequence: &SequenceParameters) -> Gau
     };
     let [x, y, z] = rotation.map(|plane| scaled(plane, rotation_step));
     planes.rotation = [unit_w(&x, &y, &z), x, y, z];
-    GaussianFrame::from_planes(sequence.sh_degree, planes).unwrap_or_default()
+    let frame = GaussianFrame::from_planes(sequence.sh_degree, planes).unwrap_or_default();
+    frame.with_antialiased(sequence.antialiased())
 }
 
 fn placed(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {

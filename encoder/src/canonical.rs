@@ -90,7 +90,8 @@ pub fn canonicalise(frame: &GaussianFrame, indices: &[u32], sort: bool) -> Gauss
     let log_scale = [0, 1, 2].map(|axis: usize| forms.iter().map(|(scales, _)| scales[axis]).collect());
     let rotation = [0, 1, 2, 3].map(|part: usize| forms.iter().map(|(_, turn)| turn[part]).collect());
     let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh };
-    GaussianFrame::from_planes(frame.sh_degree(), planes).unwrap_or_default()
+    let canonical = GaussianFrame::from_planes(frame.sh_degree(), planes).unwrap_or_default();
+    canonical.with_antialiased(frame.antialiased())
 }
 
 #[cfg(test)]

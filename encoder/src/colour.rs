@@ -19,10 +19,9 @@ const MEAN_LIMIT: f64 = 16_777_215.0;
 /// Gaussians on which coefficients and codebooks are compared.
 const TRIAL: usize = 1 << 13;
 
-/// The transform unit of the vectors in `planes`, for a step.
-pub(crate) fn transform(kind: TransformKind, planes: &[&[f32]], step: f32) -> Transform {
-    let dimension = planes.len();
-    let components = Components::of(planes);
+/// The transform unit of `components`, for a step.
+pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32) -> Transform {
+    let dimension = components.rows.len();
     let mean = components
         .mean
         .iter()

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::lattice::Geometry;
 use crate::models;
-use crate::settings::Preset;
+use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
 use splatstream_decoder::block::{CodedBlock, UnitParameters, reconstruct};
 use splatstream_decoder::digest::{UnitDigest, frame_digest, unit_digest};
@@ -47,6 +47,8 @@ pub(crate) struct UnitPlan<'a> {
     pub(crate) sequence: &'a SequenceParameters,
     /// How much to search.
     pub(crate) preset: Preset,
+    /// What may be used.
+    pub(crate) tools: Tools,
 }
 
 /// Codes all refinement units of a frame.
@@ -66,8 +68,9 @@ pub(crate) fn code_frame(frame: &CodedFrame, plan: &UnitPlan<'_>) -> Result<Fram
     for unit in coded {
         digests.push(unit.digest.clone());
         let digest = frame_digest(&digests);
-        let models = cheapest(&unit, previous.as_deref(), plan.parameters.layout.planes());
-        payloads.push(payload(&unit, &models, previous.as_deref(), plan, digest)?);
+        let before = previous.as_deref().filter(|_| plan.tools.table_reuse);
+        let models = cheapest(&unit, before, plan.parameters.layout.planes());
+        payloads.push(payload(&unit, &models, before, plan, digest)?);
         // A unit without Gaussians carries no models, and leaves those before it in force.
         if !unit.blocks.is_empty() {
             previous = Some(models);
@@ -114,8 +117,11 @@ fn code_unit(
         .par_chunks(1 << plan.sequence.block_log2)
         .map(|part| gathered(frame, part, planes, biases))
         .collect();
-    let models =
-        if blocks.is_empty() { Vec::new() } else { models::choose_all(planes, &blocks, biases, plan.preset) };
+    let models = if blocks.is_empty() {
+        Vec::new()
+    } else {
+        models::choose_all(planes, &blocks, biases, plan.preset, plan.tools)
+    };
     let sh_planes = usize::from(plan.sequence.sh_dimension());
     let mut reconstruction = QuantizedFrame::zeroed(indices.len(), sh_planes);
     let lengths: Vec<usize> = blocks.iter().map(CodedBlock::len).collect();

@@ -11,6 +11,7 @@ mod colour;
 mod entropy_cost;
 mod error;
 mod frame;
+mod importance;
 mod lattice;
 mod models;
 mod pca;
@@ -21,6 +22,6 @@ mod stream;
 mod vq;
 
 pub use error::Error;
-pub use settings::{Preset, Quality, Settings, ShChoice, Steps};
+pub use settings::{Importance, Preset, Quality, Settings, ShChoice, Steps, Tools};
 pub use source::FrameSource;
 pub use stream::{Progress, Report, encode};

@@ -2,7 +2,7 @@
 
 use crate::clusters::{Clustering, cluster};
 use crate::entropy_cost::Histogram;
-use crate::settings::Preset;
+use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
 use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context::{self, DeltaNeighbours, Neighbours, is_serial};
@@ -41,11 +41,14 @@ pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block:
 }
 
 /// The sources worth trying for a plane, the most promising first.
-fn candidates(info: PlaneInfo, preset: Preset) -> Vec<Source> {
+fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
     use Source::{
         Anisotropy, GroupMagnitude, LargestLogScale, LogVolume, MiddleLogScale, NeighbourMagnitude,
         NeighbourSum, Opacity, PositionSpacing, PreviousPlane,
     };
+    if !tools.contexts {
+        return Vec::new();
+    }
     let listed: &[Source] = match (preset, info.attribute, info.place) {
         (Preset::Small, _, _) => &Source::ALL[1..],
         (_, Attribute::Position, _) => &[NeighbourSum],
@@ -195,6 +198,7 @@ pub(crate) fn choose(
     blocks: &[CodedBlock],
     bias: i32,
     preset: Preset,
+    tools: Tools,
 ) -> PlaneModel {
     let total: usize = blocks.iter().map(CodedBlock::len).sum();
     let stride = if total > SAMPLE && preset != Preset::Small { 2 } else { 1 };
@@ -203,7 +207,7 @@ pub(crate) fn choose(
     let direct_log2 = direct_log2(info, &values);
     let tokens = values.iter().map(|&value| split(value, direct_log2).token).collect();
     let view = PlaneView { info, plane, blocks: sample, direct_log2, tokens };
-    let best = view.best(&candidates(info, preset), preset != Preset::Fast && total >= 1024);
+    let best = view.best(&candidates(info, preset, tools), preset != Preset::Fast && total >= 1024);
     let (axes, table_of_context) = best.clustering.simplified(best.axes);
     let mut model =
         PlaneModel { bias, direct_log2: view.direct_log2, axes, tables: Vec::new(), table_of_context };
@@ -232,11 +236,12 @@ pub(crate) fn choose_all(
     blocks: &[CodedBlock],
     biases: &[i32],
     preset: Preset,
+    tools: Tools,
 ) -> Vec<PlaneModel> {
     planes
         .par_iter()
         .enumerate()
-        .map(|(plane, &info)| choose(info, plane, blocks, biases[plane], preset))
+        .map(|(plane, &info)| choose(info, plane, blocks, biases[plane], preset, tools))
         .collect()
 }
 

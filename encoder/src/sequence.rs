@@ -39,6 +39,7 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
     let mut inner = 0.0_f32;
     let mut level = 1;
     let mut degree = 0;
+    let mut antialiased = false;
     let mut source_degree = 0;
     let mut axes_trial = [0.0; 2];
     for number in 0..frames {
@@ -47,6 +48,7 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
         extent = extent.with(&frame);
         source_degree = source_degree.max(frame.sh_degree());
         degree = degree.max(needed_degree(&frame, settings.steps.sh));
+        antialiased |= frame.antialiased();
         if number == 0 {
             inner = inner_side(&frame);
             axes_trial = try_axes(&frame, settings);
@@ -55,7 +57,9 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
     let degree = settings.sh_degree.unwrap_or(degree).min(source_degree);
     let (offset, step, bits) = position_lattice(extent, inner, &settings.steps);
     let [sorted, unsorted] = axes_trial;
-    let parameters = parameters(settings, frames, degree, sorted <= unsorted, (offset, step, bits));
+    let canonical_axes = settings.tools.axis_sort && sorted <= unsorted;
+    let flags = SequenceParameters::flags(canonical_axes, antialiased);
+    let parameters = parameters(settings, frames, degree, flags, (offset, step, bits));
     Ok(Analysis { parameters, level, source_sh_degree: source_degree, axes_trial })
 }
 
@@ -123,7 +127,7 @@ fn parameters(
     settings: &Settings,
     frames: u32,
     sh_degree: u8,
-    canonical_axes: bool,
+    sequence_flags: u8,
     (offset, step, position_bits): ([f32; 3], f32, u8),
 ) -> SequenceParameters {
     let mut refinement_percent = [0; 10];
@@ -137,7 +141,7 @@ fn parameters(
         refinement_percent,
         position_bits,
         block_log2: settings.block_log2,
-        sequence_flags: SequenceParameters::flags(canonical_axes, false),
+        sequence_flags,
         rotation_threshold: [0; 3],
         frame_count: frames,
         ticks_per_second: settings.ticks.0,

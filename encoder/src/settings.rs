@@ -1,5 +1,7 @@
 //! What a user asks for: quality, effort, layers.
 
+use splatstream_render::Camera;
+
 /// How much is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
@@ -75,6 +77,36 @@ pub enum ShChoice {
     VectorQuantised,
 }
 
+/// What puts Gaussians into the first refinements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Importance {
+    /// What the pictures lose without a Gaussian; weighed anew at each refinement, from the last down.
+    Removal,
+    /// Transmittance times alpha, summed over the pixels of all views.
+    Contribution,
+    /// Opacity times volume: the paper's, and the only one that needs no views.
+    Volume,
+}
+
+/// Tools that can be left out, to see what each is worth. Streams are valid with any of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tools {
+    /// Tables chosen by what has been decoded; without them each plane of a unit has one table.
+    pub contexts: bool,
+    /// Axes sorted by size where that is cheaper; without it they stay as they come.
+    pub axis_sort: bool,
+    /// Principal components of spherical harmonics; without them components are the coefficients.
+    pub sh_transform: bool,
+    /// Plane models taken over from the refinement before; without it each refinement carries its own.
+    pub table_reuse: bool,
+}
+
+impl Default for Tools {
+    fn default() -> Self {
+        Self { contexts: true, axis_sort: true, sh_transform: true, table_reuse: true }
+    }
+}
+
 /// Everything a user may choose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -92,6 +124,12 @@ pub struct Settings {
     pub sh: ShChoice,
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     pub keep_invisible: bool,
+    /// What puts Gaussians into the first refinements; none: volume for the fast preset, removal for others.
+    pub importance: Option<Importance>,
+    /// The views that importance is measured in; none: made for the first frame, all around.
+    pub cameras: Vec<Camera>,
+    /// Tools that may be used.
+    pub tools: Tools,
     /// log2 of the Gaussians in an entropy block.
     pub block_log2: u8,
     /// Ticks in a second, and from one frame to the next.
@@ -108,6 +146,9 @@ impl Default for Settings {
             sh_degree: None,
             sh: ShChoice::default(),
             keep_invisible: false,
+            importance: None,
+            cameras: Vec::new(),
+            tools: Tools::default(),
             block_log2: 14,
             ticks: (30, 1),
         }

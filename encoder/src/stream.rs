@@ -4,9 +4,11 @@ use crate::canonical::{canonicalise, visible};
 use crate::colour::{self, ShPlan};
 use crate::error::Error;
 use crate::frame::{CodedFrame, UnitPlan, code_frame};
+use crate::importance::Ranking;
 use crate::lattice::geometry;
+use crate::pca::Components;
 use crate::sequence::analyse;
-use crate::settings::Settings;
+use crate::settings::{Importance, Settings};
 use crate::source::FrameSource;
 use splatstream_decoder::block::UnitParameters;
 use splatstream_decoder::colour::Colour;
@@ -17,7 +19,7 @@ use splatstream_format::syntax::{
     ShMode, TransformKind, UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
-use splatstream_scene::{GaussianFrame, importance};
+use splatstream_scene::GaussianFrame;
 use std::io::Write;
 
 /// Called after every frame with frames done and frames in all.
@@ -48,6 +50,8 @@ pub struct Report {
     pub sh_codebook_entries: u32,
     /// Bits a Gaussian and mean squared error in steps, of coefficients and of codebooks, if compared.
     pub sh_trial: Option<[(f64, f64); 2]>,
+    /// What ordered the Gaussians.
+    pub importance: Option<Importance>,
     /// Reconstruction digest of each frame, all refinements.
     pub digests: Vec<u64>,
 }
@@ -64,7 +68,9 @@ pub fn encode(
 ) -> Result<Report, Error> {
     let analysis = analyse(source, settings)?;
     let sequence = analysis.parameters;
+    let mut ranking = Ranking::new(settings);
     let mut report = Report {
+        importance: Some(ranking.importance()),
         frames: source.len(),
         sh_degree: (analysis.source_sh_degree, sequence.sh_degree),
         position_bits: sequence.position_bits,
@@ -83,14 +89,14 @@ pub fn encode(
         writer.unit(UnitId::of_frame(UnitType::GopHeader, first), &gop.to_bytes()?)?;
         let mut tools = None;
         for number in first..last {
-            let prepared = prepare(source, settings, &sequence, number, &mut report)?;
+            let prepared = prepare(source, settings, &sequence, number, &mut ranking, &mut report)?;
             if tools.is_none() {
-                let made = GopTools::new(&prepared, &sequence, settings, last - first);
+                let made = GopTools::new(&prepared.frame, &sequence, settings, last - first);
                 made.write(&mut writer, &sequence, first, &mut report)?;
                 tools = Some(made);
             }
             if let Some(tools) = &mut tools {
-                write_frame(&mut writer, &prepared, &sequence, tools, settings, number, &mut report)?;
+                write_frame(&mut writer, prepared, &sequence, tools, settings, number, &mut report)?;
             }
             progress(number + 1, source.len());
         }
@@ -100,19 +106,27 @@ pub fn encode(
     Ok(report)
 }
 
-/// A frame in canonical form, SH cut to the sequence's degree.
+/// A frame in canonical form, and its Gaussians, most important first.
+struct Prepared {
+    frame: GaussianFrame,
+    order: Vec<u32>,
+}
+
 fn prepare(
     source: &mut dyn FrameSource,
     settings: &Settings,
     sequence: &SequenceParameters,
     number: u32,
+    ranking: &mut Ranking,
     report: &mut Report,
-) -> Result<GaussianFrame, Error> {
+) -> Result<Prepared, Error> {
     let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
     let shown = visible(&frame, settings.keep_invisible);
     report.invisible += (frame.len() - shown.len()) as u64;
     report.gaussians += shown.len() as u64;
-    Ok(canonicalise(&frame, &shown, sequence.canonical_axes()))
+    let frame = canonicalise(&frame, &shown, sequence.canonical_axes());
+    let order = ranking.order(&frame);
+    Ok(Prepared { frame, order })
 }
 
 /// What the frames of a GOP share.
@@ -140,13 +154,18 @@ fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
 
 impl GopTools {
     fn new(frame: &GaussianFrame, sequence: &SequenceParameters, settings: &Settings, frames: u32) -> Self {
-        let dc = colour::transform(TransformKind::Dc, &dc_planes(frame), sequence.dc_step());
+        let dc = Components::of(&dc_planes(frame));
+        let dc = colour::transform(TransformKind::Dc, &dc, sequence.dc_step());
         let zeros = vec![0.0; frame.len()];
         let mut first_components = None;
         let sh = (sequence.sh_degree > 0).then(|| {
             let planes = sh_planes(frame, sequence, &zeros);
             let step = sequence.sh_step();
-            let mut transform = colour::transform(TransformKind::Sh, &planes, step);
+            let basis = match settings.tools.sh_transform {
+                true => Components::of(&planes),
+                false => Components::identity(planes.len()),
+            };
+            let mut transform = colour::transform(TransformKind::Sh, &basis, step);
             let mut components = colour::components(&transform, &planes, step);
             colour::drop_unused(&mut transform, &mut components);
             let gaussians = frame.len() * frames as usize;
@@ -193,14 +212,15 @@ impl GopTools {
 
 fn write_frame(
     writer: &mut UnitWriter<'_>,
-    frame: &GaussianFrame,
+    prepared: Prepared,
     sequence: &SequenceParameters,
     tools: &mut GopTools,
     settings: &Settings,
     number: u32,
     report: &mut Report,
 ) -> Result<(), Error> {
-    let coded = coded_frame(frame, sequence, tools, number)?;
+    let count = prepared.frame.len() as u32;
+    let coded = coded_frame(prepared, sequence, tools, number)?;
     let coding = tools.sh_coding();
     let layout = Layout::new(tools.dc.header.rank, coding);
     let codebooks = tools.sh.as_ref().map_or(&[][..], |(_, plan)| plan.codebooks.as_slice());
@@ -222,10 +242,11 @@ fn write_frame(
         header: header_of(coding),
         sequence,
         preset: settings.preset,
+        tools: settings.tools,
     };
     let units = code_frame(&coded, &plan)?;
     report.digests.push(units.digest);
-    let header = FrameHeader::intra(0, tools.sh.as_ref().map(|_| 0), frame.len() as u32);
+    let header = FrameHeader::intra(0, tools.sh.as_ref().map(|_| 0), count);
     writer.unit(UnitId::of_frame(UnitType::FrameHeader, number), &header.to_bytes()?)?;
     for (refinement, payload) in (0..).zip(&units.payloads) {
         writer.unit(UnitId::of_refinement(number, refinement), payload)?;
@@ -234,7 +255,7 @@ fn write_frame(
 }
 
 fn coded_frame(
-    frame: &GaussianFrame,
+    Prepared { frame, order }: Prepared,
     sequence: &SequenceParameters,
     tools: &mut GopTools,
     number: u32,
@@ -243,17 +264,17 @@ fn coded_frame(
     let first = tools.first_components.take();
     let sh = first.or_else(|| {
         let (transform, plan) = tools.sh.as_ref()?;
-        let planes = sh_planes(frame, sequence, &zeros);
+        let planes = sh_planes(&frame, sequence, &zeros);
         Some(match plan.codebooks.first() {
             None => colour::components(transform, &planes, sequence.sh_step()),
             Some(book) => vec![colour::indices(transform, &planes, sequence.sh_step(), book)],
         })
     });
     Ok(CodedFrame {
-        geometry: geometry(frame, sequence, number)?,
-        dc: colour::components(&tools.dc, &dc_planes(frame), sequence.dc_step()),
+        geometry: geometry(&frame, sequence, number)?,
+        dc: colour::components(&tools.dc, &dc_planes(&frame), sequence.dc_step()),
         sh: sh.unwrap_or_default(),
-        order: importance::order(&importance::opacity_volume(frame)),
+        order,
     })
 }
 

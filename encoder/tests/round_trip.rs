@@ -9,7 +9,7 @@ use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_po
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Preset, Quality, Settings, ShChoice};
+use splatstream_encoder::{Preset, Quality, Settings, ShChoice, Tools};
 use splatstream_format::Limits;
 use splatstream_scene::GaussianFrame;
 use std::ops::ControlFlow;
@@ -19,8 +19,14 @@ fn settings() -> impl Strategy<Value = Settings> {
     let quality = prop_oneof![Just(Quality::Low), Just(Quality::High), Just(Quality::VisuallyLossless)];
     let sh = prop_oneof![Just(ShChoice::Auto), Just(ShChoice::Coefficients), Just(ShChoice::VectorQuantised)];
     let refinements = prop_oneof![Just(vec![100]), Just(vec![10, 20, 30, 50, 100]), Just(vec![1, 99, 100])];
-    (preset, quality, sh, refinements, 1_u32..4, 6_u8..=8).prop_map(
-        |(preset, quality, sh, refinements, gop, block_log2)| Settings {
+    let tools = any::<[bool; 4]>().prop_map(|[contexts, axis_sort, sh_transform, table_reuse]| Tools {
+        contexts,
+        axis_sort,
+        sh_transform,
+        table_reuse,
+    });
+    (preset, quality, sh, refinements, tools, 1_u32..4, 6_u8..=8).prop_map(
+        |(preset, quality, sh, refinements, tools, gop, block_log2)| Settings {
             preset,
             steps: quality.steps(),
             sh,
@@ -28,6 +34,7 @@ fn settings() -> impl Strategy<Value = Settings> {
             gop,
             block_log2,
             keep_invisible: true,
+            tools,
             ..Settings::default()
         },
     )

@@ -25,7 +25,7 @@ pub use frame_header::{FrameHeader, NO_TRANSFORM};
 pub use gop_header::GopHeader;
 pub use index::{IndexEntry, IndexHeader};
 pub use refinement::{NO_CODEBOOK, RefinementHeader, ShMode};
-pub use sequence_parameters::{MAX_REFINEMENTS, SequenceParameters};
+pub use sequence_parameters::{MAX_REFINEMENTS, SequenceParameters, prefix_length};
 pub use transform::{TransformHeader, TransformKind};
 pub use unit_header::{UnitHeader, UnitId, UnitType};
 

@@ -1,5 +1,13 @@
 //! Pinhole cameras: pose and intrinsics, in the axes of a frame.
 
+mod files;
+mod generated;
+
+pub use files::{CameraError, read_cameras};
+pub use generated::{Up, forward, ring, spiral};
+
+use glam::Vec3;
+
 /// A pinhole camera without distortion. Camera axes are x right, y down, z forward, as a frame's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
@@ -17,4 +25,46 @@ pub struct Camera {
     pub rotation: [[f32; 3]; 3],
     /// Centre of projection in the world.
     pub position: [f32; 3],
+}
+
+impl Camera {
+    /// A camera at `position` that sees `target` in the middle of a picture of `[width, height]` pixels. `down`
+    /// is the direction that shall point down in the picture; `field` is the vertical angle of view, radians.
+    #[must_use]
+    pub fn look_at(
+        name: String,
+        position: Vec3,
+        target: Vec3,
+        down: Vec3,
+        field: f32,
+        [width, height]: [u32; 2],
+    ) -> Self {
+        let ahead = (target - position).normalize_or(Vec3::Z);
+        // Looking along `down`, any right will do.
+        let right = down.cross(ahead).normalize_or(ahead.any_orthonormal_vector());
+        let focal = 0.5 * height as f32 / libm::tanf(0.5 * field);
+        Self {
+            name,
+            width,
+            height,
+            focal: [focal; 2],
+            principal: [0.5 * width as f32, 0.5 * height as f32],
+            rotation: [right, ahead.cross(right), ahead].map(|axis| axis.to_array()),
+            position: position.to_array(),
+        }
+    }
+
+    /// The same view in a picture of `height` rows; the width follows, rounded to the nearest pixel.
+    #[must_use]
+    pub fn scaled_to_height(&self, height: u32) -> Self {
+        let width = (f64::from(self.width) * f64::from(height) / f64::from(self.height)).round().max(1.0);
+        let scale = [width as f32 / self.width as f32, height as f32 / self.height as f32];
+        Self {
+            width: width as u32,
+            height,
+            focal: [0, 1].map(|axis| self.focal[axis] * scale[axis]),
+            principal: [0, 1].map(|axis| self.principal[axis] * scale[axis]),
+            ..self.clone()
+        }
+    }
 }

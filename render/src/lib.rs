@@ -16,4 +16,4 @@ pub mod rasterise;
 
 pub use camera::Camera;
 pub use image::Image;
-pub use rasterise::{Options, Rendering, render};
+pub use rasterise::{Rendering, render};

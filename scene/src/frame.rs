@@ -29,6 +29,7 @@ pub struct Planes {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GaussianFrame {
     sh_degree: u8,
+    antialiased: bool,
     planes: Planes,
 }
 
@@ -145,7 +146,7 @@ impl GaussianFrame {
         if let Some((property, plane)) = planes.named(sh_degree).find(|(_, plane)| plane.len() != rows) {
             return Err(FrameError::Length { property, expected: rows, found: plane.len() });
         }
-        Ok(Self { sh_degree, planes })
+        Ok(Self { sh_degree, antialiased: false, planes })
     }
 
     /// A frame as a reader hands it out: checked, and its rotations at unit length.
@@ -169,6 +170,17 @@ impl GaussianFrame {
     /// Degree of the spherical harmonics, 0 to 3.
     pub fn sh_degree(&self) -> u8 {
         self.sh_degree
+    }
+
+    /// Whether opacities were fitted for a renderer that makes up for its low-pass filter.
+    pub fn antialiased(&self) -> bool {
+        self.antialiased
+    }
+
+    /// The same Gaussians, for a renderer that makes up for its low-pass filter, or for one that does not.
+    #[must_use]
+    pub fn with_antialiased(self, antialiased: bool) -> Self {
+        Self { antialiased, ..self }
     }
 
     /// Centres: x right, y down, z forward.
@@ -217,7 +229,7 @@ impl GaussianFrame {
     /// If an index is not below [`GaussianFrame::len`].
     #[must_use]
     pub fn select(&self, indices: &[u32]) -> Self {
-        Self { sh_degree: self.sh_degree, planes: self.planes.gather(indices) }
+        Self { planes: self.planes.gather(indices), ..*self }
     }
 
     /// Checks that every value is finite and every rotation has a direction.

@@ -35,4 +35,4 @@ pub use error::{SceneError, SceneErrorKind};
 pub use format::{SceneFormat, detect, read_scene};
 pub use frame::{Defect, DefectKind, FrameError, GaussianFrame, Planes};
 pub use limits::ReadLimits;
-pub use sh::{MAX_SH_DEGREE, sh_coefficients};
+pub use sh::{MAX_SH_DEGREE, sh_basis, sh_coefficients};

@@ -20,10 +20,11 @@ pub(crate) fn rest_index(plane: usize, degree: u8) -> usize {
     channel * sh_coefficients(degree) + coefficient
 }
 
-/// The SH basis of bands 1 to 3 in a unit direction, with the signs that Gaussian splatting uses.
+/// The SH basis of bands 1 to 3 in a unit direction, with the signs that Gaussian splatting uses. Degree 1
+/// needs the first 3 values, degree 2 the first 8.
 /// Source: Kerbl et al., "3D Gaussian splatting for real-time radiance field rendering", 2023.
 #[expect(clippy::unreadable_literal, reason = "constants as published")]
-pub(crate) fn sh_basis(direction: [f64; 3]) -> [f64; 15] {
+pub fn sh_basis(direction: [f64; 3]) -> [f64; 15] {
     let [x, y, z] = direction;
     let (xx, yy, zz) = (x * x, y * y, z * z);
     [

@@ -51,7 +51,8 @@ impl Default for WriteOptions {
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     limits.bytes(bytes.len() as u64)?;
     let (shape, streams) = container::read(bytes, limits)?;
-    GaussianFrame::from_read(shape.sh_degree, attributes::unpack(&shape, &streams))
+    let frame = GaussianFrame::from_read(shape.sh_degree, attributes::unpack(&shape, &streams))?;
+    Ok(frame.with_antialiased(shape.antialiased))
 }
 
 /// Writes version 3, which the most viewers read, with the default options.

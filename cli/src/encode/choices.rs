@@ -2,7 +2,7 @@
 
 use crate::numbers::{grouped, percent};
 use serde::Serialize;
-use splatstream_encoder::{Report, Settings, ShChoice};
+use splatstream_encoder::{Importance, Report, Settings, ShChoice};
 
 /// One decision of the encoder.
 #[derive(Debug, Clone, Serialize)]
@@ -29,6 +29,7 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     if report.sh_degree.1 > 0 {
         choices.push(harmonics(report, settings));
     }
+    choices.extend(order(report, settings));
     choices.push(invisible(report, settings));
     choices
 }
@@ -83,6 +84,24 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
     let reasons: Vec<String> = asked.into_iter().chain(trial).collect();
     let why = if reasons.is_empty() { "the only one tried".to_owned() } else { reasons.join("; ") };
     Choice::new("sh coding", choice, why)
+}
+
+fn order(report: &Report, settings: &Settings) -> Option<Choice> {
+    let (choice, why) = match report.importance? {
+        Importance::Removal => {
+            ("removal", "what pictures lose without a Gaussian, weighed anew at each refinement")
+        }
+        Importance::Contribution => {
+            ("contribution", "transmittance times alpha over the pixels of all views")
+        }
+        Importance::Volume => ("volume", "opacity times volume, no views"),
+    };
+    let views = match (report.importance?, settings.cameras.len()) {
+        (Importance::Volume, _) => String::new(),
+        (_, 0) => "; views made all around the scene".to_owned(),
+        (_, count) => format!("; {count} views given"),
+    };
+    Some(Choice::new("order", choice, format!("{why}{views}")))
 }
 
 fn invisible(report: &Report, settings: &Settings) -> Choice {

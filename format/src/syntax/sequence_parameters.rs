@@ -69,6 +69,13 @@ table! {
 
 record_io!(SequenceParameters);
 
+/// The Gaussians that make `percent` of `gaussian_count`, rounded up: at most all of them for 100 or less.
+pub fn prefix_length(percent: u8, gaussian_count: u32) -> u32 {
+    // At most 255 * 2^32: no overflow.
+    let prefix = u64::from(percent).saturating_mul(gaussian_count.into()).div_ceil(100);
+    u32::try_from(prefix).unwrap_or(u32::MAX)
+}
+
 impl SequenceParameters {
     /// 6.4.
     pub fn validate(&self, at: u64) -> Result<()> {
@@ -118,12 +125,10 @@ impl SequenceParameters {
     /// Beyond the last refinement, all.
     pub fn prefix_length(&self, refinement: u8, gaussian_count: u32) -> u32 {
         let percent = match self.refinement_percent.get(usize::from(refinement)) {
-            Some(percent) if refinement < self.refinement_count => u64::from(*percent),
+            Some(percent) if refinement < self.refinement_count => *percent,
             _ => 100,
         };
-        // At most 255 * 2^32: no overflow; at most `gaussian_count` for percentages that `validate` accepts.
-        let prefix = percent.saturating_mul(gaussian_count.into()).div_ceil(100);
-        u32::try_from(prefix).unwrap_or(u32::MAX)
+        prefix_length(percent, gaussian_count)
     }
 
     /// P(r) - P(r-1): how many Gaussians refinement `refinement` adds to a frame of `gaussian_count`.

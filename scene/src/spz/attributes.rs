@@ -104,6 +104,7 @@ pub(crate) fn pack(frame: &GaussianFrame, options: &WriteOptions) -> Result<(Sha
         gaussians: frame.len(),
         sh_degree: frame.sh_degree(),
         fractional_bits,
+        antialiased: frame.antialiased(),
         flip: Flip::default(),
     };
     let streams = [

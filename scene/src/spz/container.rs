@@ -17,6 +17,7 @@ use crate::sh::{MAX_SH_DEGREE, sh_coefficients};
 /// "NGSP" as the first four bytes.
 const MAGIC: u32 = 0x5053_474e;
 const GZIP: [u8; 2] = [0x1f, 0x8b];
+const ANTIALIASED: u8 = 1;
 const HAS_EXTENSIONS: u8 = 2;
 /// The one extension that changes what the attributes mean: a coordinate system.
 const COORDINATE_SYSTEM: u32 = 0xadbe_0003;
@@ -62,6 +63,7 @@ pub(crate) struct Shape {
     pub(crate) gaussians: usize,
     pub(crate) sh_degree: u8,
     pub(crate) fractional_bits: u8,
+    pub(crate) antialiased: bool,
     pub(crate) flip: Flip,
 }
 
@@ -96,6 +98,7 @@ impl Shape {
             gaussians: limits.gaussians(u64::from(header.gaussians))?,
             sh_degree: header.sh_degree,
             fractional_bits: header.fractional_bits,
+            antialiased: header.flags & ANTIALIASED != 0,
             flip: Flip::default(),
         };
         shape.strides().iter().try_for_each(|&stride| limits.bytes(shape.size(stride)).map(|_| ()))?;
@@ -218,7 +221,7 @@ pub(crate) fn write(shape: &Shape, streams: &Streams) -> Result<Vec<u8>, SceneEr
         gaussians,
         sh_degree: shape.sh_degree,
         fractional_bits: shape.fractional_bits,
-        flags: 0,
+        flags: if shape.antialiased { ANTIALIASED } else { 0 },
         reserved: 0,
     };
     let header = header.to_bytes().map_err(|error| SceneError::malformed(0, error.to_string(), NOT_SPZ))?;

@@ -1,0 +1,159 @@
+//! `splatstream render`: frames to pictures.
+
+use crate::cameras::{CameraArgs, Views};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::frames::Opened;
+use crate::numbers::{FrameRange, grouped};
+use crate::output_file::{OutputFile, make_directory};
+use crate::progress::Progress;
+use crate::stream_file::LimitArgs;
+use clap::Args;
+use serde::Serialize;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_render::{Camera, render};
+use splatstream_scene::GaussianFrame;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Draw frames of a stream or of scene files to PNG pictures.
+///
+/// The pictures are those of 3D Gaussian splatting, the same on every machine and with any number of threads.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  splatstream render garden.gss --camera cameras.json -o pictures/ --height 1080\n  \
+    splatstream render talk.gss --camera ring:4 -o pictures/ --op s0,t0,r0 --frames 0..1"
+)]
+pub(crate) struct Render {
+    /// A stream, a scene file, or a directory of frames.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame.
+    #[arg(
+        long,
+        visible_alias = "cameras",
+        value_name = "CAMS.json|ring:N|forward:N",
+        default_value = "ring:8"
+    )]
+    camera: Views,
+    /// A directory for the pictures: VIEW.png, of sequences frame_0000_VIEW.png and so on.
+    #[arg(short, long = "out", value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    cameras: CameraArgs,
+    /// The operating point of a stream; default is everything.
+    #[arg(long, value_name = "sS,tT,rR")]
+    op: Option<OperatingPoint>,
+    /// Frames to draw, A..B: from A up to and without B.
+    #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
+    frames: Option<FrameRange>,
+    /// Make up for the low-pass filter, whatever the scene says: for scenes that were trained so.
+    #[arg(long)]
+    antialiased: bool,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Drawn {
+    output: PathBuf,
+    frames: u32,
+    pictures: Vec<Picture>,
+    /// Of drawing alone.
+    seconds: f64,
+}
+
+/// One picture.
+#[derive(Serialize)]
+struct Picture {
+    file: String,
+    frame: u32,
+    view: String,
+    width: u32,
+    height: u32,
+    seconds: f64,
+}
+
+impl Render {
+    /// Draws every frame from every camera.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        let opened = Opened::open(&self.input)?;
+        let mut frames = opened.frames(&self.limits.limits(), self.op)?;
+        let span = self.frames.unwrap_or(FrameRange::ALL);
+        let expected = frames.expected();
+        let progress = Progress::frames("drawing", span.count_in(expected));
+        let mut drawn = Drawn { output: self.out.clone(), frames: 0, pictures: Vec::new(), seconds: 0.0 };
+        let mut cameras: Vec<Camera> = Vec::new();
+        let mut number = 0;
+        while !span.is_over(number) {
+            let Some(frame) = frames.next()? else { break };
+            if number == 0 {
+                cameras = named(self.cameras.cameras(&self.camera, &frame)?);
+            }
+            if span.contains(number) {
+                let antialiased = frame.antialiased() || self.antialiased;
+                let frame = frame.with_antialiased(antialiased);
+                self.draw(&frame, number, expected > 1, &cameras, &mut drawn)?;
+                progress.at(drawn.frames);
+            }
+            number += 1;
+        }
+        drop(progress);
+        if drawn.frames == 0 {
+            return Err(Failure::Usage(format!("{}: it has no such frame", self.input.display())));
+        }
+        drawn.seconds = drawn.pictures.iter().map(|picture| picture.seconds).sum();
+        console.report(&drawn, || drawn.text())
+    }
+
+    fn draw(
+        &self,
+        frame: &GaussianFrame,
+        number: u32,
+        sequence: bool,
+        cameras: &[Camera],
+        drawn: &mut Drawn,
+    ) -> Result<(), Failure> {
+        make_directory(&self.out)?;
+        for camera in cameras {
+            let start = Instant::now();
+            let rendering = render(frame, camera, [0.0; 3]);
+            let seconds = start.elapsed().as_secs_f64();
+            let view = &camera.name;
+            let file = if sequence { format!("frame_{number:04}_{view}.png") } else { format!("{view}.png") };
+            let path = self.out.join(&file);
+            let failed = |error| Failure::other(format!("{}: cannot write: {error}", path.display()));
+            OutputFile::write(&path, &rendering.colour.to_png().map_err(failed)?)?;
+            let (width, height) = (camera.width, camera.height);
+            drawn.pictures.push(Picture { file, frame: number, view: view.clone(), width, height, seconds });
+        }
+        drawn.frames += 1;
+        Ok(())
+    }
+}
+
+/// Names that make files: one each, without directories.
+fn named(cameras: Vec<Camera>) -> Vec<Camera> {
+    let mut taken = std::collections::BTreeSet::new();
+    let name = |(at, camera): (usize, Camera)| {
+        let stem = Path::new(&camera.name).file_stem().and_then(|stem| stem.to_str()).map(str::to_owned);
+        let name = stem.filter(|stem| !taken.contains(stem)).unwrap_or_else(|| format!("camera_{at:04}"));
+        taken.insert(name.clone());
+        Camera { name, ..camera }
+    };
+    cameras.into_iter().enumerate().map(name).collect()
+}
+
+impl Drawn {
+    fn text(&self) -> String {
+        let count = self.pictures.len() as u64;
+        format!(
+            "{}: {} pictures of {} frames; {:.3} seconds a picture\n",
+            self.output.display(),
+            grouped(count),
+            grouped(self.frames.into()),
+            self.seconds / count.max(1) as f64,
+        )
+    }
+}

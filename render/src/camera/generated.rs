@@ -1,0 +1,121 @@
+//! Cameras for a scene that comes without.
+
+use super::Camera;
+use glam::Vec3;
+use splatstream_scene::GaussianFrame;
+use std::f32::consts::{PI, TAU};
+
+/// Vertical angle of view, radians: 40 degrees.
+const FIELD: f32 = 40.0 / 180.0 * PI;
+
+/// Gaussians fainter than this say nothing of where the scene is: a logit, so that no sigmoid is needed.
+const VISIBLE_LOGIT: f32 = -2.0;
+
+/// The direction that points up in the pictures, along an axis of the frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Up {
+    /// Against y: what trainers of splats write.
+    #[default]
+    MinusY,
+    /// Along y.
+    PlusY,
+    /// Against z.
+    MinusZ,
+    /// Along z.
+    PlusZ,
+}
+
+impl Up {
+    /// Right, up and front: where the first camera of a ring stands.
+    fn axes(self) -> [Vec3; 3] {
+        match self {
+            Self::MinusY => [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z],
+            Self::PlusY => [Vec3::X, Vec3::Y, Vec3::Z],
+            Self::MinusZ => [Vec3::X, Vec3::NEG_Z, Vec3::Y],
+            Self::PlusZ => [Vec3::X, Vec3::Z, Vec3::NEG_Y],
+        }
+    }
+}
+
+/// `count` cameras around the middle of the scene, turning about the vertical, on two heights in turn: 5 and
+/// 30 degrees above.
+pub fn ring(frame: &GaussianFrame, up: Up, count: u32, height: u32) -> Vec<Camera> {
+    let subject = Subject::of(frame, up);
+    let view = |number: u32| {
+        let elevation = if number.is_multiple_of(2) { 5.0 } else { 30.0 } / 180.0 * PI;
+        let turn = TAU * number as f32 / count as f32;
+        subject.seen_from(format!("ring_{number:02}"), turn, elevation, height)
+    };
+    (0..count).map(view).collect()
+}
+
+/// `count` cameras in front of the scene, within 15 degrees to each side and 8 up and down.
+pub fn forward(frame: &GaussianFrame, up: Up, count: u32, height: u32) -> Vec<Camera> {
+    let subject = Subject::of(frame, up);
+    let view = |number: u32| {
+        let around = TAU * number as f32 / count as f32;
+        let turn = libm::cosf(around) * 15.0 / 180.0 * PI;
+        let elevation = libm::sinf(around) * 8.0 / 180.0 * PI;
+        subject.seen_from(format!("forward_{number:02}"), turn, elevation, height)
+    };
+    (0..count).map(view).collect()
+}
+
+/// `count` cameras spread evenly over the part of the sphere between 40 degrees below and 60 above: what a
+/// viewer who walks freely may see. None coincides with a camera of a ring.
+pub fn spiral(frame: &GaussianFrame, up: Up, count: u32, height: u32) -> Vec<Camera> {
+    let subject = Subject::of(frame, up);
+    let (low, high) = (-0.643, 0.866);
+    // The golden angle never comes back to where it was.
+    let golden = PI * (3.0 - 5.0_f32.sqrt());
+    let view = |number: u32| {
+        let share = (number as f32 + 0.5) / count as f32;
+        let elevation = libm::asinf(low + (high - low) * share);
+        subject.seen_from(format!("spiral_{number:02}"), 0.4 + golden * number as f32, elevation, height)
+    };
+    (0..count).map(view).collect()
+}
+
+/// What a camera looks at.
+struct Subject {
+    middle: Vec3,
+    /// Radius of the sphere that a picture holds.
+    radius: f32,
+    /// Right, up and front.
+    axes: [Vec3; 3],
+}
+
+impl Subject {
+    /// The box of what is visible, less 3 % at either end of each axis: stray Gaussians do not push the cameras
+    /// away. Where that box is more than four times as large as that of the inner 60 %, the scene has
+    /// surroundings, and the inner box is the subject.
+    fn of(frame: &GaussianFrame, up: Up) -> Self {
+        let shown = |row: &usize| frame.opacity_logit()[*row] > VISIBLE_LOGIT;
+        let mut rows: Vec<usize> = (0..frame.len()).filter(shown).collect();
+        if rows.is_empty() {
+            rows = (0..frame.len()).collect();
+        }
+        let axes = frame.position().each_ref().map(|plane| {
+            let mut values: Vec<f32> = rows.iter().map(|&row| plane[row]).collect();
+            values.sort_unstable_by(f32::total_cmp);
+            let at = |percent: usize| values.get(values.len() * percent / 100).copied().unwrap_or_default();
+            [3, 20, 80, 97].map(at)
+        });
+        let [low, inner_low, inner_high, high] =
+            [0, 1, 2, 3].map(|part| Vec3::from(axes.map(|axis| axis[part])));
+        let (outer, inner) = ((high - low).length(), (inner_high - inner_low).length());
+        let (low, high) = if outer > 4.0 * inner { (inner_low, inner_high) } else { (low, high) };
+        let radius = 0.5 * (high - low).length();
+        Self { middle: 0.5 * (low + high), radius: if radius > 0.0 { radius } else { 1.0 }, axes: up.axes() }
+    }
+
+    /// A camera `turn` about the vertical from the front and `elevation` above it, radians.
+    fn seen_from(&self, name: String, turn: f32, elevation: f32, height: u32) -> Camera {
+        let [right, up, front] = self.axes;
+        let level = right * libm::sinf(turn) + front * libm::cosf(turn);
+        let towards = level * libm::cosf(elevation) + up * libm::sinf(elevation);
+        let position = self.middle + towards * (self.radius / libm::sinf(0.5 * FIELD));
+        let width = (u64::from(height) * 16 / 9) as u32;
+        Camera::look_at(name, position, self.middle, -up, FIELD, [width.max(1), height])
+    }
+}

@@ -1,0 +1,197 @@
+//! Gaussians to ellipses in the picture, nearest first.
+
+use crate::camera::Camera;
+use glam::{Mat3, Vec3};
+use rayon::prelude::*;
+use splatstream_scene::{GaussianFrame, sh_basis, sh_coefficients};
+use std::f32::consts::LOG2_E;
+
+/// Gaussians nearer to the camera's plane than this are not drawn, scene units.
+const NEAR: f32 = 0.01;
+
+/// Variance that the low-pass filter adds on each axis, square pixels.
+const LOW_PASS: f32 = 0.3;
+
+/// -log2 of the least alpha drawn, 1/255.
+pub(crate) const LOG2_255: f32 = 7.994_353_4;
+
+/// The constant SH basis function, 1 / (2 √π).
+const SH_C0: f32 = 0.282_094_8;
+
+/// Gaussians that a thread projects at once.
+const CHUNK: usize = 4096;
+
+/// An ellipse in the picture. log2 of alpha at an offset from the centre is
+/// `peak + xx·dx² + xy·dx·dy + yy·dy²`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Splat {
+    /// Centre, pixels.
+    pub(crate) centre: [f32; 2],
+    /// Quadratic form.
+    pub(crate) xx: f32,
+    pub(crate) xy: f32,
+    pub(crate) yy: f32,
+    /// log2 of the opacity.
+    pub(crate) peak: f32,
+    /// How far alpha is 1/255 or more, along x and y, pixels.
+    pub(crate) extent: [f32; 2],
+    /// Which Gaussian of the frame.
+    pub(crate) gaussian: u32,
+}
+
+/// The ellipses of a view, nearest first.
+pub(crate) struct Splats(Vec<Splat>);
+
+/// Projects the Gaussians that touch the picture.
+pub(crate) fn project(frame: &GaussianFrame, camera: &Camera) -> Splats {
+    let view = View::new(camera);
+    let starts: Vec<usize> = (0..frame.len()).step_by(CHUNK).collect();
+    let chunks: Vec<Vec<(u64, Splat)>> = starts
+        .par_iter()
+        .map(|&start| {
+            let rows = start..frame.len().min(start + CHUNK);
+            rows.filter_map(|row| view.project(frame, row)).collect()
+        })
+        .collect();
+    let splats: Vec<Splat> = chunks.iter().flatten().map(|(_, splat)| *splat).collect();
+    let keys = chunks.iter().flatten().map(|(key, _)| *key).zip(0_u32..);
+    let mut order: Vec<(u64, u32)> = keys.collect();
+    order.par_sort_unstable();
+    Splats(order.par_iter().map(|&(_, place)| splats[place as usize]).collect())
+}
+
+/// A camera, as projection needs it.
+struct View {
+    to_camera: Mat3,
+    rows: [Vec3; 3],
+    position: Vec3,
+    focal: [f32; 2],
+    principal: [f32; 2],
+    size: [f32; 2],
+    /// Slopes beyond which the Jacobian is not followed: the picture and 15 % on either side.
+    slopes: [(f32, f32); 2],
+}
+
+impl View {
+    fn new(camera: &Camera) -> Self {
+        let to_camera = Mat3::from_cols_array_2d(&camera.rotation).transpose();
+        let size = [camera.width as f32, camera.height as f32];
+        let slopes = [0, 1].map(|axis| {
+            let (focal, principal) = (camera.focal[axis], camera.principal[axis]);
+            let margin = 0.15 * size[axis] / focal;
+            (-(principal / focal + margin), (size[axis] - principal) / focal + margin)
+        });
+        Self {
+            to_camera,
+            rows: camera.rotation.map(Vec3::from),
+            position: camera.position.into(),
+            focal: camera.focal,
+            principal: camera.principal,
+            size,
+            slopes,
+        }
+    }
+
+    /// The ellipse of a Gaussian and its place in depth; none if it cannot be seen.
+    fn project(&self, frame: &GaussianFrame, row: usize) -> Option<(u64, Splat)> {
+        let at = Vec3::from(frame.position().each_ref().map(|plane| plane[row]));
+        let at = self.to_camera * (at - self.position);
+        if at.z.is_nan() || at.z < NEAR {
+            return None;
+        }
+        let opacity = 1.0 / (1.0 + libm::expf(-frame.opacity_logit()[row]));
+        let covariance = self.covariance(frame, row, at);
+        let [a, b, c] = covariance;
+        let (wide, tall) = (a + LOW_PASS, c + LOW_PASS);
+        let determinant = wide * tall - b * b;
+        let opacity = if frame.antialiased() {
+            opacity * ((a * c - b * b).max(0.0) / determinant).sqrt()
+        } else {
+            opacity
+        };
+        let peak = libm::log2f(opacity);
+        // Squared Mahalanobis distance at which alpha is 1/255.
+        let reach = 2.0 / LOG2_E * (peak + LOG2_255);
+        if !(reach > 0.0 && determinant > 0.0) {
+            return None;
+        }
+        let centre = [0, 1].map(|axis| self.focal[axis] * (at[axis] / at.z) + self.principal[axis]);
+        let extent = [(reach * wide).sqrt(), (reach * tall).sqrt()];
+        let touches = |axis: usize| {
+            centre[axis] + extent[axis] >= 0.0 && centre[axis] - extent[axis] <= self.size[axis]
+        };
+        if !(touches(0) && touches(1) && extent[0].is_finite() && extent[1].is_finite()) {
+            return None;
+        }
+        let scale = -0.5 * LOG2_E / determinant;
+        let splat = Splat {
+            centre,
+            xx: scale * tall,
+            xy: -2.0 * scale * b,
+            yy: scale * wide,
+            peak,
+            extent,
+            gaussian: row as u32,
+        };
+        // Positive floats order as their bits; equal depths keep the order of the frame.
+        Some((u64::from(at.z.to_bits()) << 32 | row as u64, splat))
+    }
+
+    /// Covariance of the projection along x, across, and along y, square pixels, without low-pass.
+    fn covariance(&self, frame: &GaussianFrame, row: usize, at: Vec3) -> [f32; 3] {
+        let near = 1.0 / at.z;
+        let [x, y] = [0, 1].map(|axis| {
+            let (least, most) = self.slopes[axis];
+            (at[axis] * near).clamp(least, most)
+        });
+        let across = (self.rows[0] - self.rows[2] * x) * (self.focal[0] * near);
+        let down = (self.rows[1] - self.rows[2] * y) * (self.focal[1] * near);
+        let axes = semi_axes(frame, row);
+        let u = axes.map(|axis| across.dot(axis));
+        let v = axes.map(|axis| down.dot(axis));
+        let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+        [dot(u, u), dot(u, v), dot(v, v)]
+    }
+}
+
+/// The semi-axes of a Gaussian as vectors in the world.
+fn semi_axes(frame: &GaussianFrame, row: usize) -> [Vec3; 3] {
+    let [w, x, y, z] = frame.rotation().each_ref().map(|plane| plane[row]);
+    let scale = 1.0 / (w * w + x * x + y * y + z * z).sqrt();
+    let [w, x, y, z] = [w, x, y, z].map(|part| part * scale);
+    let [a, b, c] = frame.log_scale().each_ref().map(|plane| libm::expf(plane[row]));
+    [
+        Vec3::new(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)) * a,
+        Vec3::new(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)) * b,
+        Vec3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)) * c,
+    ]
+}
+
+impl Splats {
+    /// All of them, nearest first.
+    pub(crate) fn all(&self) -> &[Splat] {
+        &self.0
+    }
+
+    /// Their colours as the camera sees them, at least 0.
+    pub(crate) fn colours(&self, frame: &GaussianFrame, camera: &Camera) -> Vec<[f32; 3]> {
+        let position = Vec3::from(camera.position);
+        let coefficients = sh_coefficients(frame.sh_degree());
+        let colour = |splat: &Splat| {
+            let row = splat.gaussian as usize;
+            let mut colour = frame.dc().each_ref().map(|plane| 0.5 + SH_C0 * plane[row]);
+            if coefficients > 0 {
+                let at = Vec3::from(frame.position().each_ref().map(|plane| plane[row]));
+                let basis = sh_basis((at - position).normalize_or_zero().as_dvec3().to_array());
+                let planes = frame.sh().chunks_exact(3);
+                for (planes, basis) in planes.zip(basis.iter().take(coefficients)) {
+                    for (colour, plane) in colour.iter_mut().zip(planes) {
+                        *colour += *basis as f32 * plane[row];
+                    }
+                }
+            }
+            colour.map(|channel| channel.max(0.0))
+        };
+        self.0.par_iter().with_min_len(CHUNK).map(colour).collect()
+    }
+}

@@ -1,0 +1,121 @@
+//! Which ellipses touch which tiles.
+
+use super::TILE;
+use super::project::{LOG2_255, Splat, Splats};
+use crate::camera::Camera;
+use rayon::prelude::*;
+
+/// The ellipses that touch each row of tiles, nearest first.
+pub(crate) struct TileRows {
+    /// Width and height of the picture, pixels.
+    size: [usize; 2],
+    rows: Vec<Vec<u32>>,
+}
+
+/// The ellipses of each tile of a row, nearest first.
+pub(crate) struct RowEntries {
+    /// Where each tile's entries start, and where the last one's end.
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+}
+
+impl TileRows {
+    /// Sorts the ellipses of a view into rows.
+    pub(crate) fn new(splats: &Splats, camera: &Camera) -> Self {
+        let count = (camera.height as usize).div_ceil(TILE);
+        let mut rows = vec![Vec::new(); count];
+        // Bands of rows, so that threads share no row.
+        let band = count.div_ceil(2 * rayon::current_num_threads()).max(1);
+        rows.par_chunks_mut(band).enumerate().for_each(|(number, rows)| {
+            let first = number * band;
+            for (place, splat) in (0..).zip(splats.all()) {
+                let (top, bottom) = tiles_across(splat.centre[1], splat.extent[1]);
+                let top = top.max(first as i32);
+                for row in top..=bottom.min((first + rows.len()) as i32 - 1) {
+                    rows[row as usize - first].push(place);
+                }
+            }
+        });
+        Self { size: [camera.width as usize, camera.height as usize], rows }
+    }
+
+    /// Width and height of the picture, pixels.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// Rows of tiles.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Sorts the ellipses of a row into its tiles.
+    pub(crate) fn entries(&self, row: usize, splats: &Splats) -> RowEntries {
+        let tiles = self.size[0].div_ceil(TILE);
+        let top = (row * TILE) as f32 + 0.5;
+        let spans: Vec<(i32, i32)> = self.rows[row]
+            .iter()
+            .map(|&place| {
+                let (left, right) = span(&splats.all()[place as usize], top, top + (TILE - 1) as f32);
+                (left.max(0), right.min(tiles as i32 - 1))
+            })
+            .collect();
+        let mut starts = vec![0; tiles + 1];
+        for tile in spans.iter().flat_map(|&(left, right)| left..=right) {
+            starts[tile as usize + 1] += 1;
+        }
+        for tile in 0..tiles {
+            starts[tile + 1] += starts[tile];
+        }
+        let mut next = starts.clone();
+        let mut entries = vec![0; starts[tiles] as usize];
+        for (&place, &(left, right)) in self.rows[row].iter().zip(&spans) {
+            for tile in left..=right {
+                let slot = &mut next[tile as usize];
+                entries[*slot as usize] = place;
+                *slot += 1;
+            }
+        }
+        RowEntries { starts, entries }
+    }
+}
+
+/// First and last tile that a centre and its reach touch on one axis.
+fn tiles_across(centre: f32, extent: f32) -> (i32, i32) {
+    let tile = |at: f32| (at / TILE as f32).floor() as i32;
+    (tile(centre - extent).max(0), tile(centre + extent))
+}
+
+/// First and last tile that an ellipse touches between two lines of pixel centres.
+///
+/// The part of an ellipse in a band is convex: it reaches furthest at its own extreme point, or at the
+/// line nearest to that.
+fn span(splat: &Splat, top: f32, bottom: f32) -> (i32, i32) {
+    let [x, y] = splat.centre;
+    let (least, most) = (top - y, bottom - y);
+    let extreme = -0.5 * splat.xy / splat.yy * splat.extent[0];
+    let reach = |sign: f32| {
+        let dy = (sign * extreme).clamp(least, most);
+        // xx·dx² + xy·dy·dx + yy·dy² + peak + log2 255 = 0
+        let half = 0.5 * splat.xy * dy;
+        let rest = splat.yy * dy * dy + splat.peak + LOG2_255;
+        let root = (half * half - splat.xx * rest).max(0.0).sqrt();
+        (-half - sign * root) / splat.xx
+    };
+    // Rounding may hide a pixel: a little more does no harm, for alpha decides in the end.
+    let slack = 0.05 + 1e-3 * splat.extent[0];
+    let tile = |at: f32| (at / TILE as f32).floor().clamp(-1.0, 1e6) as i32;
+    (tile(x + reach(-1.0) - slack), tile(x + reach(1.0) + slack))
+}
+
+impl RowEntries {
+    /// Tiles in the row.
+    pub(crate) fn tiles(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The ellipses of a tile, nearest first.
+    pub(crate) fn of_tile(&self, column: usize) -> &[u32] {
+        &self.entries[self.starts[column] as usize..self.starts[column + 1] as usize]
+    }
+}
