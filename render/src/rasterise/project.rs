@@ -22,14 +22,17 @@ const SH_C0: f32 = 0.282_094_8;
 const CHUNK: usize = 4096;
 
 /// An ellipse in the picture. log2 of alpha at an offset from the centre is
-/// `peak + xx·dx² + xy·dx·dy + yy·dy²`.
+/// `peak + xx·(dx + skew·dy)² + yy·dy²`.
+///
+/// No term is above 0, so that rounding never makes alpha larger than the opacity, and long thin ellipses keep
+/// their shape far from their centre: `xx·dx² + xy·dx·dy + yy·dy²` would be a small difference of large terms.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Splat {
     /// Centre, pixels.
     pub(crate) centre: [f32; 2],
     /// Quadratic form.
     pub(crate) xx: f32,
-    pub(crate) xy: f32,
+    pub(crate) skew: f32,
     pub(crate) yy: f32,
     /// log2 of the opacity.
     pub(crate) peak: f32,
@@ -100,19 +103,18 @@ impl View {
             return None;
         }
         let opacity = 1.0 / (1.0 + libm::expf(-frame.opacity_logit()[row]));
-        let covariance = self.covariance(frame, row, at);
-        let [a, b, c] = covariance;
-        let (wide, tall) = (a + LOW_PASS, c + LOW_PASS);
-        let determinant = wide * tall - b * b;
+        let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(frame, row, at);
+        let (wide, tall) = (xx + LOW_PASS, yy + LOW_PASS);
+        let determinant = sharp + LOW_PASS * (xx + tall);
         let opacity = if frame.antialiased() {
-            opacity * ((a * c - b * b).max(0.0) / determinant).sqrt()
+            opacity * (sharp / determinant).sqrt()
         } else {
             opacity
         };
         let peak = libm::log2f(opacity);
         // Squared Mahalanobis distance at which alpha is 1/255.
         let reach = 2.0 / LOG2_E * (peak + LOG2_255);
-        if !(reach > 0.0 && determinant > 0.0) {
+        if !(reach > 0.0 && determinant.is_finite()) {
             return None;
         }
         let centre = [0, 1].map(|axis| self.focal[axis] * (at[axis] / at.z) + self.principal[axis]);
@@ -123,12 +125,11 @@ impl View {
         if !(touches(0) && touches(1) && extent[0].is_finite() && extent[1].is_finite()) {
             return None;
         }
-        let scale = -0.5 * LOG2_E / determinant;
         let splat = Splat {
             centre,
-            xx: scale * tall,
-            xy: -2.0 * scale * b,
-            yy: scale * wide,
+            xx: -0.5 * LOG2_E * (tall / determinant),
+            skew: -xy / tall,
+            yy: -0.5 * LOG2_E / tall,
             peak,
             extent,
             gaussian: row as u32,
@@ -137,8 +138,8 @@ impl View {
         Some((u64::from(at.z.to_bits()) << 32 | row as u64, splat))
     }
 
-    /// Covariance of the projection along x, across, and along y, square pixels, without low-pass.
-    fn covariance(&self, frame: &GaussianFrame, row: usize, at: Vec3) -> [f32; 3] {
+    /// Covariance of the projection, without low-pass.
+    fn covariance(&self, frame: &GaussianFrame, row: usize, at: Vec3) -> Covariance {
         let near = 1.0 / at.z;
         let [x, y] = [0, 1].map(|axis| {
             let (least, most) = self.slopes[axis];
@@ -147,11 +148,20 @@ impl View {
         let across = (self.rows[0] - self.rows[2] * x) * (self.focal[0] * near);
         let down = (self.rows[1] - self.rows[2] * y) * (self.focal[1] * near);
         let axes = semi_axes(frame, row);
-        let u = axes.map(|axis| across.dot(axis));
-        let v = axes.map(|axis| down.dot(axis));
-        let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-        [dot(u, u), dot(u, v), dot(v, v)]
+        let u = Vec3::from(axes.map(|axis| across.dot(axis)));
+        let v = Vec3::from(axes.map(|axis| down.dot(axis)));
+        // Lagrange's identity: never negative, where |u|²·|v|² - (u·v)² may lose every digit.
+        let determinant = u.cross(v).length_squared();
+        Covariance { xx: u.length_squared(), xy: u.dot(v), yy: v.length_squared(), determinant }
     }
+}
+
+/// Covariance in the picture, square pixels.
+struct Covariance {
+    xx: f32,
+    xy: f32,
+    yy: f32,
+    determinant: f32,
 }
 
 /// The semi-axes of a Gaussian as vectors in the world.

@@ -93,14 +93,13 @@ fn tiles_across(centre: f32, extent: f32) -> (i32, i32) {
 fn span(splat: &Splat, top: f32, bottom: f32) -> (i32, i32) {
     let [x, y] = splat.centre;
     let (least, most) = (top - y, bottom - y);
-    let extreme = -0.5 * splat.xy / splat.yy * splat.extent[0];
+    // Where along y the ellipse reaches furthest to the right: covariance over variance, times that reach.
+    let extreme = -splat.skew * splat.extent[1] * (splat.extent[1] / splat.extent[0]);
     let reach = |sign: f32| {
         let dy = (sign * extreme).clamp(least, most);
-        // xx·dx² + xy·dy·dx + yy·dy² + peak + log2 255 = 0
-        let half = 0.5 * splat.xy * dy;
+        // xx·(dx + skew·dy)² + yy·dy² + peak + log2 255 = 0
         let rest = splat.yy * dy * dy + splat.peak + LOG2_255;
-        let root = (half * half - splat.xx * rest).max(0.0).sqrt();
-        (-half - sign * root) / splat.xx
+        sign * (-rest / splat.xx).max(0.0).sqrt() - splat.skew * dy
     };
     // Rounding may hide a pixel: a little more does no harm, for alpha decides in the end.
     let slack = 0.05 + 1e-3 * splat.extent[0];

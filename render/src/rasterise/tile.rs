@@ -87,15 +87,14 @@ pub(crate) fn blend_tile(splats: &Splats, entries: &[u32], tile: &mut Tile, blen
 /// Takes the light that a Gaussian stops on one line; returns transmittance times alpha.
 #[inline(always)]
 fn blend_line(splat: &Splat, origin: [f32; 2], line: usize, passing: &mut Lanes) -> Lanes {
-    let dx = origin[0] - splat.centre[0];
     let dy = origin[1] + line as f32 - splat.centre[1];
+    let along = origin[0] - splat.centre[0] + splat.skew * dy;
     let constant = splat.yy * dy * dy + splat.peak;
-    let linear = splat.xy * dy;
     let mut visible = [0.0; TILE];
     // Everything is computed and then chosen: without branches the sixteen pixels go side by side.
     for lane in 0..TILE {
-        let dx = dx + lane as f32;
-        let exponent = (splat.xx * dx + linear) * dx + constant;
+        let along = along + lane as f32;
+        let exponent = splat.xx * (along * along) + constant;
         let before = passing[lane];
         let reached = if exponent >= -LOG2_255 { exponent } else { -LOG2_255 };
         let alpha = exp2(reached);
