@@ -34,12 +34,15 @@ fn covariance(gaussian: &Gaussian, camera: &Camera) -> [f64; 3] {
         let half = 0.5 * f64::from(size) / focal;
         (at / z).clamp(-1.3 * half, 1.3 * half)
     };
-    let jacobian =
-        [[focal / z, 0.0, -focal / z * slope(x, camera.width)], [0.0, focal / z, -focal / z * slope(y, camera.height)]];
+    let jacobian = [
+        [focal / z, 0.0, -focal / z * slope(x, camera.width)],
+        [0.0, focal / z, -focal / z * slope(y, camera.height)],
+    ];
     let rotation = matrix(gaussian.rotation.map(f64::from));
     let scale = gaussian.log_scale.map(|log| f64::from(log).exp());
     let factor = jacobian.map(|row| {
-        [0, 1, 2].map(|k| scale[k] * (row[0] * rotation[0][k] + row[1] * rotation[1][k] + row[2] * rotation[2][k]))
+        [0, 1, 2]
+            .map(|k| scale[k] * (row[0] * rotation[0][k] + row[1] * rotation[1][k] + row[2] * rotation[2][k]))
     });
     let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     [dot(factor[0], factor[0]), dot(factor[0], factor[1]), dot(factor[1], factor[1])]

@@ -15,10 +15,15 @@ fn draw(gaussians: &[Gaussian], camera: &Camera) -> Rendering {
 }
 
 /// Compares every pixel of a picture of one Gaussian with the formula.
-fn agrees_with_the_formula(gaussian: &Gaussian, camera: &Camera, antialiased: bool) -> Result<(), TestCaseError> {
+fn agrees_with_the_formula(
+    gaussian: &Gaussian,
+    camera: &Camera,
+    antialiased: bool,
+) -> Result<(), TestCaseError> {
     let drawn = render(&frame(&[*gaussian]).with_antialiased(antialiased), camera, BLACK);
     for (pixel, &found) in (0..).zip(&drawn.alpha) {
-        let expected = exact::alpha(gaussian, camera, antialiased, [pixel % camera.width, pixel / camera.width]);
+        let expected =
+            exact::alpha(gaussian, camera, antialiased, [pixel % camera.width, pixel / camera.width]);
         // Within rounding of the least alpha, both are right.
         let unsure = (expected / exact::LEAST - 1.0).abs() < 0.01;
         let expected = if expected < exact::LEAST { 0.0 } else { expected.min(0.99) };
@@ -154,7 +159,10 @@ fn gaussians_at_one_depth_are_drawn_in_the_order_of_the_frame() {
         drawn.colour.pixels()[8 * 33 + 16]
     });
     let opacity = exact::opacity(&BALL) as f32;
-    assert!((first[0] - opacity).abs() < 1e-5 && (first[1] - opacity * (1.0 - opacity)).abs() < 1e-5, "{first:?}");
+    assert!(
+        (first[0] - opacity).abs() < 1e-5 && (first[1] - opacity * (1.0 - opacity)).abs() < 1e-5,
+        "{first:?}"
+    );
     assert_eq!((first[0], first[1]), (second[1], second[0]));
 }
 
