@@ -9,10 +9,11 @@ use crate::frame_files::FrameFiles;
 use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
 use crate::output_file::OutputFile;
 use crate::progress::Progress;
+use crate::setting_names::{PresetName, QualityName, ShName, ToolName};
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use splatstream_encoder::{FrameSource, Importance, Preset, Quality, Report, Settings, ShChoice, encode};
+use splatstream_encoder::{FrameSource, Importance, Quality, Report, Settings, encode};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -71,31 +72,9 @@ pub(crate) struct Encode {
     cameras: Option<Views>,
     #[command(flatten)]
     views: CameraArgs,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum PresetName {
-    Fast,
-    Balanced,
-    Small,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum QualityName {
-    Low,
-    Medium,
-    High,
-    VisuallyLossless,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum ShName {
-    /// Whichever costs less on the scene.
-    Auto,
-    /// Transform coefficients.
-    Coefficients,
-    /// Vector quantisation.
-    Vq,
+    /// Tools to leave out, to see what each is worth.
+    #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
+    without: Vec<ToolName>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -171,7 +150,7 @@ impl Encode {
                 self.views.cameras(views, &first)?
             }
         };
-        Ok(Settings {
+        let mut settings = Settings {
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
             psnr: self.psnr,
@@ -184,7 +163,9 @@ impl Encode {
             importance: self.importance.map(Into::into),
             cameras,
             ..Settings::default()
-        })
+        };
+        self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
+        Ok(settings)
     }
 
     /// The encoder counts frames; a user has files.
@@ -233,43 +214,12 @@ impl Encoded {
     }
 }
 
-impl From<PresetName> for Preset {
-    fn from(name: PresetName) -> Self {
-        match name {
-            PresetName::Fast => Self::Fast,
-            PresetName::Balanced => Self::Balanced,
-            PresetName::Small => Self::Small,
-        }
-    }
-}
-
-impl From<QualityName> for Quality {
-    fn from(name: QualityName) -> Self {
-        match name {
-            QualityName::Low => Self::Low,
-            QualityName::Medium => Self::Medium,
-            QualityName::High => Self::High,
-            QualityName::VisuallyLossless => Self::VisuallyLossless,
-        }
-    }
-}
-
 impl From<ImportanceName> for Importance {
     fn from(name: ImportanceName) -> Self {
         match name {
             ImportanceName::Removal => Self::Removal,
             ImportanceName::Contribution => Self::Contribution,
             ImportanceName::Volume => Self::Volume,
-        }
-    }
-}
-
-impl From<ShName> for ShChoice {
-    fn from(name: ShName) -> Self {
-        match name {
-            ShName::Auto => Self::Auto,
-            ShName::Coefficients => Self::Coefficients,
-            ShName::Vq => Self::VectorQuantised,
         }
     }
 }

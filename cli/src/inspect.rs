@@ -3,7 +3,6 @@
 mod costs;
 mod hex;
 mod points;
-mod statistics;
 mod tree;
 mod units;
 

@@ -3,8 +3,10 @@
 //! One file a subcommand; `console` speaks to the user, `failure` says what went wrong and what to do.
 
 mod cameras;
+mod chart;
 mod compare;
 mod console;
+mod costs;
 mod decode;
 mod demo;
 mod encode;
@@ -17,6 +19,8 @@ mod numbers;
 mod output_file;
 mod progress;
 mod render;
+mod setting_names;
+mod statistics;
 mod stream_file;
 mod table;
 mod validate;
@@ -57,6 +61,7 @@ enum Command {
     Extract(extract::Extract),
     Compare(compare::Compare),
     Render(render::Render),
+    Chart(chart::Chart),
 }
 
 fn main() -> ExitCode {
@@ -92,6 +97,7 @@ impl Command {
             Self::Extract(command) => command.run(console),
             Self::Compare(command) => command.run(console),
             Self::Render(command) => command.run(console),
+            Self::Chart(command) => command.run(console),
         }
     }
 }

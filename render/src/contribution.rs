@@ -55,6 +55,9 @@ impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
         let mut shares = Vec::new();
         for column in 0..entries.tiles() {
             let places = entries.of_tile(column);
+            if places.is_empty() {
+                continue;
+            }
             let tile = || Tile::new(self.row, column, rows.size());
             let mut ink = Ink::default();
             if REMOVAL {

@@ -9,7 +9,7 @@ mod psnr;
 mod ssim;
 mod st_lpips;
 
-pub use bjontegaard::{RatePoint, bd_psnr, bd_rate};
+pub use bjontegaard::{RatePoint, bd_psnr, bd_rate, quality_at_rate, rate_at_quality};
 pub use comparison::{Comparison, compare};
 pub use psnr::{LOSSLESS_DB, Mask, YuvPsnr, psnr, psnr_masked, yuv_psnr};
 pub use ssim::{SsimMap, ssim};

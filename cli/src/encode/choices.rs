@@ -2,7 +2,7 @@
 
 use crate::numbers::{grouped, percent};
 use serde::Serialize;
-use splatstream_encoder::{Importance, Report, Settings, ShChoice, Steps};
+use splatstream_encoder::{Importance, Report, Settings, ShChoice, Steps, Tools};
 
 /// One decision of the encoder.
 #[derive(Debug, Clone, Serialize)]
@@ -32,6 +32,7 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     }
     choices.extend(order(report, settings));
     choices.push(invisible(report, settings));
+    choices.extend(left_out(settings));
     choices
 }
 
@@ -48,9 +49,11 @@ fn positions(report: &Report, settings: &Settings) -> Choice {
 fn steps(report: &Report, settings: &Settings) -> Option<Choice> {
     let (decibels, steps) = (settings.psnr?, report.steps?);
     let Steps { log_scale, rotation, opacity, dc, sh, .. } = steps;
-    let choice = format!(
-        "log-scale {log_scale:.3}, rotation {rotation:.4}, opacity {opacity:.3}, dc {dc:.3}, sh {sh:.3}"
-    );
+    let mut choice =
+        format!("log-scale {log_scale:.3}, rotation {rotation:.4}, opacity {opacity:.3}, dc {dc:.3}");
+    if report.sh_degree.1 > 0 {
+        choice += &format!(", sh {sh:.3}");
+    }
     Some(Choice::new(
         "steps",
         choice,
@@ -117,6 +120,19 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
         (_, count) => format!("; {count} views given"),
     };
     Some(Choice::new("order", choice, format!("{why}{views}")))
+}
+
+fn left_out(settings: &Settings) -> Option<Choice> {
+    let Tools { contexts, axis_sort, sh_transform, table_reuse, coarse_tail } = settings.tools;
+    let tools = [
+        (contexts, "contexts"),
+        (axis_sort, "axis-sort"),
+        (sh_transform, "sh-transform"),
+        (table_reuse, "table-reuse"),
+        (coarse_tail, "coarse-tail"),
+    ];
+    let names: Vec<&str> = tools.into_iter().filter(|(used, _)| !used).map(|(_, name)| name).collect();
+    (!names.is_empty()).then(|| Choice::new("left out", names.join(", "), "--without"))
 }
 
 fn invisible(report: &Report, settings: &Settings) -> Choice {

@@ -37,6 +37,22 @@ pub fn bd_psnr(anchor: &[RatePoint], test: &[RatePoint]) -> Option<f64> {
     mean_difference(anchor, test, |point| (libm::log10(point.rate), point.quality))
 }
 
+/// The quality of a curve at a rate: the curve of [`bd_psnr`], of log10(rate). None outside its rates.
+#[must_use]
+pub fn quality_at_rate(curve: &[RatePoint], rate: f64) -> Option<f64> {
+    let points: Vec<_> =
+        undominated(curve).iter().map(|point| (libm::log10(point.rate), point.quality)).collect();
+    Pchip::through(&points)?.at(libm::log10(rate))
+}
+
+/// The rate at which a curve reaches a quality: the curve of [`bd_rate`]. None outside its qualities.
+#[must_use]
+pub fn rate_at_quality(curve: &[RatePoint], quality: f64) -> Option<f64> {
+    let points: Vec<_> =
+        undominated(curve).iter().map(|point| (point.quality, libm::log10(point.rate))).collect();
+    Pchip::through(&points)?.at(quality).map(libm::exp10)
+}
+
 /// The mean of test less anchor, where `axes` makes abscissa and ordinate of a point.
 fn mean_difference(
     anchor: &[RatePoint],
@@ -72,5 +88,19 @@ mod tests {
         let point = |(rate, quality)| RatePoint { rate, quality };
         let points = [(4.0, 30.0), (1.0, 20.0), (2.0, 19.0), (4.0, 31.0), (5.0, 31.0), (6.0, f64::INFINITY)];
         assert_eq!(undominated(&points.map(point)), [(1.0, 20.0), (4.0, 31.0)].map(point));
+    }
+
+    #[test]
+    fn a_curve_goes_through_its_points_and_ends_with_them() {
+        let curve =
+            [(1.0, 20.0), (2.0, 26.0), (8.0, 31.0)].map(|(rate, quality)| RatePoint { rate, quality });
+        for point in curve {
+            assert!((quality_at_rate(&curve, point.rate).unwrap() - point.quality).abs() < 1e-9);
+            assert!((rate_at_quality(&curve, point.quality).unwrap() - point.rate).abs() < 1e-9);
+        }
+        let between = quality_at_rate(&curve, 4.0).unwrap();
+        assert!(between > 26.0 && between < 31.0, "{between}");
+        assert_eq!((quality_at_rate(&curve, 0.9), quality_at_rate(&curve, 8.1)), (None, None));
+        assert_eq!((rate_at_quality(&curve, 19.0), rate_at_quality(&curve[..1], 20.0)), (None, None));
     }
 }

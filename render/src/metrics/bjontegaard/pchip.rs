@@ -48,6 +48,14 @@ impl Pchip {
         self.pieces.last().map_or(0.0, |piece| piece.from + piece.width)
     }
 
+    /// The ordinate at an abscissa; None outside the curve.
+    pub(super) fn at(&self, x: f64) -> Option<f64> {
+        // An end that was summed up may miss the last point by a rounding.
+        let slack = 1e-9 * (self.to() - self.from());
+        let after = self.pieces.iter().find(|piece| x <= piece.from + piece.width + slack);
+        after.filter(|_| x >= self.from()).map(|piece| piece.at(x))
+    }
+
     /// The area under the curve between two abscissae of it.
     pub(super) fn integral(&self, from: f64, to: f64) -> f64 {
         self.pieces.iter().map(|piece| piece.area_until(to) - piece.area_until(from)).sum()
@@ -55,6 +63,15 @@ impl Pchip {
 }
 
 impl Piece {
+    fn at(&self, x: f64) -> f64 {
+        let t = (x - self.from) / self.width;
+        let [start, end] = self.values;
+        let [rise_start, rise_end] = self.rises;
+        let square = 3.0 * (end - start) - 2.0 * rise_start - rise_end;
+        let cube = 2.0 * (start - end) + rise_start + rise_end;
+        start + t * (rise_start + t * (square + t * cube))
+    }
+
     /// The area under the piece left of `to`, which may be outside.
     fn area_until(&self, to: f64) -> f64 {
         let t = ((to - self.from) / self.width).clamp(0.0, 1.0);

@@ -14,44 +14,44 @@ use splatstream_format::{Limits, Result};
 
 /// Bits spent on one attribute over a whole stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct AttributeCost {
+pub(crate) struct AttributeCost {
     /// The attribute.
-    pub(super) attribute: Attribute,
+    pub(crate) attribute: Attribute,
     /// Bits of symbols: the information of the tokens in their tables, and raw bits.
-    pub(super) symbol_bits: f64,
+    pub(crate) symbol_bits: f64,
     /// Bits of plane models.
-    pub(super) model_bits: u64,
+    pub(crate) model_bits: u64,
 }
 
 /// Bytes of one kind of unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct UnitCost {
+pub(crate) struct UnitCost {
     /// The kind.
-    pub(super) unit_type: UnitType,
+    pub(crate) unit_type: UnitType,
     /// How many.
-    pub(super) units: u32,
+    pub(crate) units: u32,
     /// Bytes, headers included.
-    pub(super) bytes: u64,
+    pub(crate) bytes: u64,
 }
 
 /// What a stream spends on what.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Statistics {
+pub(crate) struct Statistics {
     /// Gaussians over all frames.
-    pub(super) gaussians: u64,
+    pub(crate) gaussians: u64,
     /// Bytes of the stream.
-    pub(super) bytes: u64,
+    pub(crate) bytes: u64,
     /// By attribute, in coding order.
-    pub(super) attributes: Vec<AttributeCost>,
+    pub(crate) attributes: Vec<AttributeCost>,
     /// By kind of unit, in order of first appearance.
-    pub(super) units: Vec<UnitCost>,
+    pub(crate) units: Vec<UnitCost>,
 }
 
 /// Adds up the costs of a stream.
 ///
 /// # Errors
 /// As decoding, digests not verified.
-pub(super) fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
+pub(crate) fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
     let cost = |attribute| AttributeCost { attribute, symbol_bits: 0.0, model_bits: 0 };
     let mut statistics = Statistics {
         gaussians: 0,

@@ -1,0 +1,230 @@
+//! The numbers behind every figure and table, as CSV: one file a kind, all scenes in it.
+
+use super::measure::{Point, Run};
+use super::scene_chart::SceneChart;
+use crate::failure::Failure;
+use crate::numbers::bits_per_gaussian;
+use crate::output_file::OutputFile;
+use splatstream_render::metrics::Comparison;
+use std::path::Path;
+
+const FIGURES: [&str; 6] = ["psnr_db", "psnr_masked_db", "yuv_psnr_db", "ssim", "ssim_masked", "st_lpips"];
+
+/// A file and how it is made.
+type CsvFile = (&'static str, fn(&[SceneChart]) -> Vec<Vec<String>>);
+
+const FILES: [CsvFile; 6] = [
+    ("points.csv", points),
+    ("speed.csv", speed),
+    ("refinements.csv", refinements),
+    ("bandwidth.csv", bandwidth),
+    ("costs.csv", costs),
+    ("peers.csv", peers),
+];
+
+/// Writes all files; gives their names.
+pub(super) fn write(scenes: &[SceneChart], out: &Path) -> Result<Vec<String>, Failure> {
+    for (name, rows) in FILES {
+        OutputFile::write(&out.join(name), &csv(&rows(scenes))?)?;
+    }
+    Ok(FILES.iter().map(|(name, _)| (*name).to_owned()).collect())
+}
+
+fn csv(rows: &[Vec<String>]) -> Result<Vec<u8>, Failure> {
+    let failed = |error: String| Failure::other(format!("a table cannot be written as CSV: {error}"));
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.write_record(row).map_err(|error| failed(error.to_string()))?;
+    }
+    writer.into_inner().map_err(|error| failed(error.to_string()))
+}
+
+fn headings(first: &[&str], last: &[&str]) -> Vec<String> {
+    first.iter().chain(last).map(|&name| name.to_owned()).collect()
+}
+
+/// A number, or nothing.
+fn cell(value: Option<f64>) -> String {
+    value.filter(|value| value.is_finite()).map(|value| format!("{value:.6}")).unwrap_or_default()
+}
+
+fn figures(figures: &Comparison) -> [String; 6] {
+    [
+        cell(Some(figures.psnr_db)),
+        cell(figures.psnr_masked_db),
+        cell(Some(figures.yuv_psnr_db)),
+        cell(figures.ssim),
+        cell(figures.ssim_masked),
+        cell(figures.st_lpips),
+    ]
+}
+
+fn points(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let first = [
+        "scene",
+        "group",
+        "variant",
+        "quality",
+        "op",
+        "percent",
+        "frames",
+        "bytes",
+        "gaussians_source",
+        "gaussians_shown",
+        "bpg_source",
+        "bpg_shown",
+        "mbit_s",
+    ];
+    let mut rows = vec![headings(&first, &FIGURES)];
+    for scene in scenes {
+        for run in &scene.runs {
+            rows.extend(run.points.iter().map(|point| point_row(scene, run, point)));
+        }
+    }
+    rows
+}
+
+fn point_row(scene: &SceneChart, run: &Run, point: &Point) -> Vec<String> {
+    let info = &point.info;
+    let mut row = vec![
+        scene.name.clone(),
+        run.group.name().to_owned(),
+        run.variant.clone(),
+        run.quality.clone(),
+        info.point.to_string(),
+        info.percent.to_string(),
+        info.frames.to_string(),
+        info.bytes.to_string(),
+        scene.gaussians.to_string(),
+        info.gaussians.to_string(),
+        cell(Some(scene.rate(point))),
+        cell(Some(bits_per_gaussian(info.bytes, info.gaussians))),
+        cell(Some(scene.bandwidth(point))),
+    ];
+    row.extend(figures(&point.figures));
+    row
+}
+
+fn speed(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let last = [
+        "gaussians",
+        "encode_s",
+        "encode_s_min",
+        "encode_s_max",
+        "decode_s",
+        "decode_s_min",
+        "decode_s_max",
+        "psnr_db_at_baseline_rate",
+        "bd_rate_percent",
+    ];
+    let mut rows = vec![headings(&["scene", "group", "variant", "quality"], &last)];
+    for scene in scenes {
+        let standings = scene.standings();
+        for run in &scene.runs {
+            // Comparisons are of variants: they stand beside the quality at which they were made.
+            let at_quality = standings.iter().filter(|_| run.quality == scene.quality);
+            let standing = at_quality.into_iter().find(|standing| standing.name == run.variant);
+            let mut row = vec![
+                scene.name.clone(),
+                run.group.name().to_owned(),
+                run.variant.clone(),
+                run.quality.clone(),
+            ];
+            row.push(run.gaussians.to_string());
+            for timing in [run.encode, run.decode] {
+                row.extend([timing.median, timing.least, timing.most].map(|seconds| cell(Some(seconds))));
+            }
+            row.push(cell(standing.and_then(|standing| standing.psnr_at_rate)));
+            row.push(cell(standing.and_then(|standing| standing.bd_rate)));
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn refinements(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let first =
+        ["scene", "percent", "unit_bytes_by_frame", "added_bytes", "total_bytes", "gaussians", "bpg_shown"];
+    let mut rows = vec![headings(&first, &FIGURES)];
+    for scene in scenes {
+        for row in scene.refinement_rows() {
+            let units: Vec<String> = row.unit_bytes.iter().map(u64::to_string).collect();
+            let mut cells = vec![scene.name.clone(), row.percent.to_string(), units.join(" ")];
+            cells.extend([row.added_bytes, row.total_bytes, row.gaussians].map(|count| count.to_string()));
+            cells.push(cell(Some(row.bpg)));
+            cells.extend(figures(&row.figures));
+            rows.push(cells);
+        }
+    }
+    rows
+}
+
+fn bandwidth(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let first = [
+        "scene",
+        "mode",
+        "units",
+        "frames",
+        "playback",
+        "percent",
+        "gop_bytes",
+        "mbit_s",
+        "fps",
+        "gaussians",
+    ];
+    let mut rows = vec![headings(&first, &FIGURES)];
+    for scene in scenes {
+        for row in scene.bandwidth_rows() {
+            let mut cells =
+                vec![scene.name.clone(), row.mode, row.units, row.frames, row.playback.to_owned()];
+            cells.extend([row.percent.to_string(), row.gop_bytes.to_string(), cell(Some(row.mbit_s))]);
+            cells.extend([cell(Some(scene.fps)), row.gaussians.to_string()]);
+            cells.extend(figures(&row.figures));
+            rows.push(cells);
+        }
+    }
+    rows
+}
+
+fn costs(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let mut rows = vec![headings(&["scene", "quality", "kind", "part"], &["bpg_coded"])];
+    for scene in scenes {
+        for run in scene.baseline() {
+            let attributes = run.costs.attributes.iter().map(|cost| ("attribute", cost.attribute, cost.bpg));
+            let units = run.costs.units.iter().map(|cost| ("unit", cost.kind, cost.bpg));
+            rows.extend(attributes.chain(units).map(|(kind, part, bpg)| {
+                let names = [scene.name.as_str(), &run.quality, kind, part];
+                headings(&names, &[&cell(Some(bpg))])
+            }));
+        }
+    }
+    rows
+}
+
+fn peers(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let first = [
+        "scene",
+        "peer",
+        "details",
+        "bytes",
+        "frames",
+        "frames_judged",
+        "bpg_source",
+        "encode_gaussians_per_s",
+        "decode_gaussians_per_s",
+        "timing",
+        "command",
+    ];
+    let mut rows = vec![headings(&first, &FIGURES)];
+    for scene in scenes {
+        for peer in &scene.peers {
+            let mut cells = vec![scene.name.clone(), peer.peer.clone(), peer.details.clone()];
+            cells.extend([peer.bytes.to_string(), peer.frames.to_string(), peer.judged.to_string()]);
+            cells.extend([Some(peer.bpg), peer.encode_speed, peer.decode_speed].map(cell));
+            cells.extend([peer.timing.clone(), peer.command.clone()]);
+            cells.extend(figures(&peer.figures));
+            rows.push(cells);
+        }
+    }
+    rows
+}

@@ -1,0 +1,126 @@
+//! What `chart` says on the terminal.
+
+use super::peers::MissingPeer;
+use super::scene_chart::SceneChart;
+use crate::numbers::grouped;
+use crate::table::Table;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+pub(super) struct Summary {
+    page: PathBuf,
+    files: Vec<String>,
+    scenes: Vec<SceneSummary>,
+}
+
+/// The baseline of a scene.
+#[derive(Serialize)]
+struct SceneSummary {
+    scene: String,
+    variant: String,
+    quality: String,
+    frames: usize,
+    gaussians: u64,
+    bytes: u64,
+    bpg: f64,
+    mbit_s: f64,
+    psnr_db: f64,
+    ssim: Option<f64>,
+    st_lpips: Option<f64>,
+    encode_gaussians_per_second: f64,
+    decode_gaussians_per_second: f64,
+    variants: Vec<VariantSummary>,
+    peers: Vec<String>,
+    peers_missing: Vec<String>,
+}
+
+/// A variant beside the baseline.
+#[derive(Serialize)]
+struct VariantSummary {
+    variant: String,
+    group: &'static str,
+    psnr_db_at_baseline_rate: Option<f64>,
+    bd_rate_percent: Option<f64>,
+    encode_gaussians_per_second: f64,
+    decode_gaussians_per_second: f64,
+}
+
+impl Summary {
+    /// The summary of a page in `out`.
+    pub(super) fn new(out: &Path, charts: &[SceneChart], files: Vec<String>) -> Self {
+        let scenes = charts.iter().filter_map(SceneSummary::new).collect();
+        Self { page: out.join("index.html"), files, scenes }
+    }
+
+    /// For people.
+    pub(super) fn text(&self) -> String {
+        let mut table = Table::new([
+            "scene",
+            "bits a Gaussian",
+            "Mbit/s",
+            "PSNR dB",
+            "SSIM",
+            "encoded M/s",
+            "decoded M/s",
+        ]);
+        for scene in &self.scenes {
+            let speed = |speed: f64| format!("{:.2}", speed / 1e6);
+            table.row([
+                scene.scene.clone(),
+                format!("{:.2}", scene.bpg),
+                format!("{:.2}", scene.mbit_s),
+                format!("{:.2}", scene.psnr_db),
+                scene.ssim.map_or_else(|| "none".to_owned(), |ssim| format!("{ssim:.4}")),
+                speed(scene.encode_gaussians_per_second),
+                speed(scene.decode_gaussians_per_second),
+            ]);
+        }
+        let files = grouped(self.files.len() as u64);
+        format!(
+            "{}\nopen {} in a browser; {files} CSV and SVG files are beside it\n",
+            table.text(),
+            self.page.display()
+        )
+    }
+}
+
+impl SceneSummary {
+    fn new(chart: &SceneChart) -> Option<Self> {
+        let run = chart.headline()?;
+        let point = run.full()?;
+        let standings = chart.standings();
+        let own = standings.first()?;
+        let variants = standings.iter().skip(1).map(|standing| VariantSummary {
+            variant: standing.name.clone(),
+            group: standing.group.name(),
+            psnr_db_at_baseline_rate: standing.psnr_at_rate,
+            bd_rate_percent: standing.bd_rate,
+            encode_gaussians_per_second: standing.encode_speed,
+            decode_gaussians_per_second: standing.decode_speed,
+        });
+        Some(Self {
+            scene: chart.name.clone(),
+            variant: run.variant.clone(),
+            quality: run.quality.clone(),
+            frames: chart.frames.0,
+            gaussians: chart.gaussians,
+            bytes: point.info.bytes,
+            bpg: chart.rate(point),
+            mbit_s: chart.bandwidth(point),
+            psnr_db: point.figures.psnr_db,
+            ssim: point.figures.ssim,
+            st_lpips: point.figures.st_lpips,
+            encode_gaussians_per_second: own.encode_speed,
+            decode_gaussians_per_second: own.decode_speed,
+            variants: variants.collect(),
+            peers: chart.peers.iter().map(|peer| peer.peer.clone()).collect(),
+            peers_missing: chart.missing.iter().map(missing_text).collect(),
+        })
+    }
+}
+
+fn missing_text(missing: &MissingPeer) -> String {
+    format!("{}: {}", missing.peer, missing.why)
+}

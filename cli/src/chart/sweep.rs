@@ -1,0 +1,196 @@
+//! What is swept: variants of the encoder's settings, each at every quality.
+//!
+//! A variant is a name, settings and a group. Predictors and layers join the list when the stream carries
+//! them: as variants of groups of their own.
+
+use crate::setting_names::{PresetName, QualityName, ToolName, spelled};
+use clap::{Args, ValueEnum};
+use splatstream_encoder::{Quality, Settings};
+
+/// The options that say what is swept.
+#[derive(Args, Debug, Clone)]
+pub(crate) struct SweepArgs {
+    /// Presets; default is all.
+    #[arg(long, value_enum, value_name = "PRESET,...", value_delimiter = ',')]
+    presets: Vec<PresetName>,
+    /// Qualities, at least two for a curve; default is all.
+    #[arg(long, value_enum, value_name = "QUALITY,...", value_delimiter = ',')]
+    qualities: Vec<QualityName>,
+    /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100.
+    #[arg(long, value_name = "PERCENTS", value_delimiter = ',')]
+    refinements: Vec<u8>,
+    /// Tools of the encoder that are left out one at a time; default is each.
+    #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
+    without: Vec<ToolName>,
+    /// Times that encoding and decoding are timed; the median counts.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
+    repeat: Option<u32>,
+    /// One preset, few points, small pictures, one timing: a look at the page, no measurement.
+    #[arg(long)]
+    pub(super) quick: bool,
+}
+
+/// What variants have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Group {
+    /// What all others are compared with.
+    Baseline,
+    /// Another preset.
+    Preset,
+    /// The baseline less a tool.
+    Without,
+}
+
+impl Group {
+    /// The name in files.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Baseline => "baseline",
+            Self::Preset => "preset",
+            Self::Without => "without",
+        }
+    }
+}
+
+/// Settings under a name.
+#[derive(Debug, Clone)]
+pub(crate) struct Variant {
+    /// What the page calls it.
+    pub(crate) name: String,
+    /// What it is one of.
+    pub(crate) group: Group,
+    /// Whether it orders Gaussians otherwise than the baseline: then refinement levels differ too.
+    reorders: bool,
+    /// The settings; the quality comes from the sweep.
+    settings: Settings,
+}
+
+impl Variant {
+    /// The settings at a quality.
+    pub(crate) fn at(&self, quality: QualityName) -> Settings {
+        Settings { steps: Quality::from(quality).steps(), ..self.settings.clone() }
+    }
+}
+
+/// All variants, the baseline first, and the qualities of each.
+#[derive(Debug, Clone)]
+pub(crate) struct Sweep {
+    /// The variants.
+    pub(crate) variants: Vec<Variant>,
+    /// The qualities, coarsest first.
+    pub(crate) qualities: Vec<QualityName>,
+    /// Shares up to each refinement, percent.
+    pub(crate) refinements: Vec<u8>,
+    /// Times that each run is timed.
+    pub(crate) repeat: u32,
+}
+
+impl SweepArgs {
+    /// The sweep asked for, with the defaults of a full or a quick one.
+    pub(crate) fn sweep(&self, ticks: (u32, u32)) -> Sweep {
+        let quick = self.quick;
+        let presets = given(&self.presets, quick, &[PresetName::Balanced]);
+        let mut qualities = given(&self.qualities, quick, &[QualityName::Low, QualityName::High]);
+        qualities.sort_by_key(|quality| QualityName::value_variants().iter().position(|q| q == quality));
+        let refinements = match (self.refinements.as_slice(), quick) {
+            ([], true) => vec![20, 100],
+            ([], false) => Settings::default().refinements,
+            (asked, _) => asked.to_vec(),
+        };
+        let settings = |preset: PresetName| Settings {
+            preset: preset.into(),
+            refinements: refinements.clone(),
+            ticks,
+            ..Settings::default()
+        };
+        let base = presets.iter().copied().find(|&preset| preset == PresetName::Balanced);
+        let base = base.or(presets.first().copied()).unwrap_or(PresetName::Balanced);
+        let baseline = Variant {
+            name: spelled(base),
+            group: Group::Baseline,
+            reorders: false,
+            settings: settings(base),
+        };
+        let others = presets.iter().filter(|&&preset| preset != base).map(|&preset| Variant {
+            name: spelled(preset),
+            group: Group::Preset,
+            reorders: false,
+            settings: settings(preset),
+        });
+        let tools = given(&self.without, quick, &[ToolName::Contexts]);
+        let without = tools.iter().map(|&tool| {
+            let mut settings = settings(base);
+            tool.leave_out_of(&mut settings);
+            let reorders = tool == ToolName::ViewImportance;
+            Variant { name: format!("without {}", spelled(tool)), group: Group::Without, reorders, settings }
+        });
+        let variants = std::iter::once(baseline).chain(others).chain(without).collect();
+        let repeat = self.repeat.unwrap_or(if quick { 1 } else { 3 });
+        Sweep { variants, qualities, refinements, repeat }
+    }
+}
+
+/// What was asked for, or a default: everything, or a few if in a hurry.
+fn given<T: ValueEnum + PartialEq>(asked: &[T], quick: bool, few: &[T]) -> Vec<T> {
+    let mut values = match (asked, quick) {
+        ([], true) => few.to_vec(),
+        ([], false) => T::value_variants().to_vec(),
+        (asked, _) => asked.to_vec(),
+    };
+    values.dedup();
+    values
+}
+
+impl Sweep {
+    /// The quality at which variants are compared: high, or the finest of the sweep.
+    pub(crate) fn quality(&self) -> QualityName {
+        let high = self.qualities.iter().copied().find(|&quality| quality == QualityName::High);
+        high.or(self.qualities.last().copied()).unwrap_or(QualityName::High)
+    }
+
+    /// Operating points of a run that are looked at: every refinement level where the curve over them is drawn.
+    pub(crate) fn points(&self, variant: &Variant, quality: QualityName) -> usize {
+        let all = variant.group == Group::Baseline || variant.reorders && quality == self.quality();
+        if all { self.refinements.len() } else { 1 }
+    }
+
+    /// Pairs of a variant and a quality.
+    pub(crate) fn runs(&self) -> impl Iterator<Item = (&Variant, QualityName)> {
+        self.variants.iter().flat_map(|variant| self.qualities.iter().map(move |&quality| (variant, quality)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sweep(presets: &[PresetName], quick: bool) -> Sweep {
+        let args = SweepArgs {
+            presets: presets.to_vec(),
+            qualities: Vec::new(),
+            refinements: Vec::new(),
+            without: vec![ToolName::Prune],
+            repeat: None,
+            quick,
+        };
+        args.sweep((30, 1))
+    }
+
+    #[test]
+    fn the_baseline_comes_first_and_every_variant_differs_from_it() {
+        let sweep = sweep(&[PresetName::Small, PresetName::Balanced], false);
+        let names: Vec<&str> = sweep.variants.iter().map(|variant| variant.name.as_str()).collect();
+        assert_eq!(names, ["balanced", "small", "without prune"]);
+        let [baseline, others @ ..] = sweep.variants.as_slice() else { panic!("variants") };
+        assert_eq!(baseline.group, Group::Baseline);
+        assert!(others.iter().all(|variant| variant.settings != baseline.settings));
+        assert_eq!((sweep.quality(), sweep.runs().count()), (QualityName::High, 12));
+    }
+
+    #[test]
+    fn a_quick_sweep_has_two_qualities_and_one_preset() {
+        let sweep = sweep(&[], true);
+        assert_eq!((sweep.variants.len(), sweep.qualities.len(), sweep.repeat), (2, 2, 1));
+        assert_eq!(sweep.refinements, [20, 100]);
+    }
+}

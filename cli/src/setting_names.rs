@@ -1,0 +1,109 @@
+//! How the command line spells what the encoder can be told.
+
+use clap::ValueEnum;
+use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice};
+
+/// How much to search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PresetName {
+    /// One context a plane, no trials.
+    Fast,
+    /// Two contexts a plane, trials on samples.
+    Balanced,
+    /// Everything is tried.
+    Small,
+}
+
+/// How close to the source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QualityName {
+    /// Visible loss.
+    Low,
+    /// Loss visible side by side.
+    Medium,
+    /// Loss hard to see.
+    High,
+    /// No visible loss.
+    VisuallyLossless,
+}
+
+/// How spherical harmonics are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ShName {
+    /// Whichever costs less on the scene.
+    Auto,
+    /// Transform coefficients.
+    Coefficients,
+    /// Vector quantisation.
+    Vq,
+}
+
+/// A tool of the encoder that can be left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ToolName {
+    /// Tables chosen by what has been decoded already.
+    Contexts,
+    /// Axes sorted by size.
+    AxisSort,
+    /// Principal components of spherical harmonics.
+    ShTransform,
+    /// Tables taken over from the refinement before.
+    TableReuse,
+    /// Coarser scale, rotation and colour in the last refinement.
+    CoarseTail,
+    /// Leaving out Gaussians that can never be seen.
+    Prune,
+    /// Importance measured in views; without it, opacity times volume.
+    ViewImportance,
+}
+
+impl ToolName {
+    /// Settings without the tool.
+    pub(crate) fn leave_out_of(self, settings: &mut Settings) {
+        match self {
+            Self::Contexts => settings.tools.contexts = false,
+            Self::AxisSort => settings.tools.axis_sort = false,
+            Self::ShTransform => settings.tools.sh_transform = false,
+            Self::TableReuse => settings.tools.table_reuse = false,
+            Self::CoarseTail => settings.tools.coarse_tail = false,
+            Self::Prune => settings.keep_invisible = true,
+            Self::ViewImportance => settings.importance = Some(Importance::Volume),
+        }
+    }
+}
+
+/// A choice as the command line spells it.
+pub(crate) fn spelled(choice: impl ValueEnum) -> String {
+    choice.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+}
+
+impl From<PresetName> for Preset {
+    fn from(name: PresetName) -> Self {
+        match name {
+            PresetName::Fast => Self::Fast,
+            PresetName::Balanced => Self::Balanced,
+            PresetName::Small => Self::Small,
+        }
+    }
+}
+
+impl From<QualityName> for Quality {
+    fn from(name: QualityName) -> Self {
+        match name {
+            QualityName::Low => Self::Low,
+            QualityName::Medium => Self::Medium,
+            QualityName::High => Self::High,
+            QualityName::VisuallyLossless => Self::VisuallyLossless,
+        }
+    }
+}
+
+impl From<ShName> for ShChoice {
+    fn from(name: ShName) -> Self {
+        match name {
+            ShName::Auto => Self::Auto,
+            ShName::Coefficients => Self::Coefficients,
+            ShName::Vq => Self::VectorQuantised,
+        }
+    }
+}
