@@ -49,6 +49,8 @@ pub(crate) enum ToolName {
     ShTransform,
     /// Tables taken over from the refinement before.
     TableReuse,
+    /// Coarser scale, rotation and colour in the last refinement.
+    CoarseTail,
     /// Leaving out Gaussians that can never be seen.
     Prune,
     /// Importance measured in views; without it, opacity times volume.
@@ -63,6 +65,7 @@ impl ToolName {
             Self::AxisSort => settings.tools.axis_sort = false,
             Self::ShTransform => settings.tools.sh_transform = false,
             Self::TableReuse => settings.tools.table_reuse = false,
+            Self::CoarseTail => settings.tools.coarse_tail = false,
             Self::Prune => settings.keep_invisible = true,
             Self::ViewImportance => settings.importance = Some(Importance::Volume),
         }

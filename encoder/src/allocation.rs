@@ -4,10 +4,9 @@
 //! more. The sum of errors that is allowed then costs least where every attribute's share of it is in proportion
 //! to its n. k is measured by rendering, n by counting symbols, both on the scene at hand.
 
-use crate::canonical::{canonicalise, visible};
 use crate::colour;
 use crate::entropy_cost::entropy_of;
-use crate::lattice::{inner_side, nearest_integer};
+use crate::lattice::{Spacing, inner_side, nearest_integer};
 use crate::pca::Components;
 use crate::settings::{Settings, Steps};
 use splatstream_format::syntax::TransformKind;
@@ -45,10 +44,9 @@ const ATTRIBUTES: [Attribute; 6] = [
     Attribute::Sh,
 ];
 
-/// The steps with which renderings of `frame` have a PSNR of about `decibels`.
-pub(crate) fn fit(frame: &GaussianFrame, settings: &Settings, decibels: f32) -> Steps {
-    let shown = visible(frame, settings.keep_invisible);
-    let scene = Scene::new(canonicalise(frame, &shown, true), settings);
+/// The steps with which renderings of a canonical frame have a PSNR of about `decibels`.
+pub(crate) fn fit(frame: GaussianFrame, spacing: Spacing, settings: &Settings, decibels: f32) -> Steps {
+    let scene = Scene::new(frame, spacing, settings);
     let allowed = libm::pow(10.0, -0.1 * f64::from(decibels));
     let mut steps = settings.steps;
     for _ in 0..ROUNDS {
@@ -91,12 +89,13 @@ impl Attribute {
 /// A frame with its pictures.
 struct Scene {
     frame: GaussianFrame,
+    spacing: Spacing,
     views: Vec<(Camera, Rendering)>,
     inner_side: f32,
 }
 
 impl Scene {
-    fn new(frame: GaussianFrame, settings: &Settings) -> Self {
+    fn new(frame: GaussianFrame, spacing: Spacing, settings: &Settings) -> Self {
         let (count, height) = VIEWS;
         let cameras = match settings.cameras.as_slice() {
             [] => ring(&frame, Up::default(), count, height),
@@ -107,7 +106,7 @@ impl Scene {
             (camera, picture)
         });
         let inner_side = inner_side(&frame);
-        Self { views: views.collect(), inner_side, frame }
+        Self { views: views.collect(), inner_side, spacing, frame }
     }
 
     /// Mean squared error of the pictures with these attributes on their lattices, by the mean of decibels.
@@ -128,16 +127,23 @@ impl Scene {
         let (degree, antialiased) = (frame.sh_degree(), frame.antialiased());
         let mut planes = frame.into_planes();
         let rounded = |planes: &mut [Vec<f32>], step: f32| {
+            for plane in planes {
+                for (row, value) in plane.iter_mut().enumerate() {
+                    *value = self.spacing.nearest(row, (*value / step).clamp(-1e6, 1e6)) as f32 * step;
+                }
+            }
+        };
+        let evenly = |planes: &mut [Vec<f32>], step: f32| {
             for value in planes.iter_mut().flatten() {
                 *value = libm::rintf(*value / step) * step;
             }
         };
         match attribute {
-            Attribute::Position => rounded(&mut planes.position, self.position_step(steps)),
+            Attribute::Position => evenly(&mut planes.position, self.position_step(steps)),
             Attribute::LogScale => rounded(&mut planes.log_scale, steps.log_scale),
-            Attribute::Opacity => rounded(std::slice::from_mut(&mut planes.opacity_logit), steps.opacity),
+            Attribute::Opacity => evenly(std::slice::from_mut(&mut planes.opacity_logit), steps.opacity),
             Attribute::Dc => rounded(&mut planes.dc, steps.dc),
-            Attribute::Sh => planes.sh = rounded_components(&planes.sh, steps.sh),
+            Attribute::Sh => planes.sh = rounded_components(&planes.sh, steps.sh, &self.spacing),
             Attribute::Rotation => {
                 let [w, parts @ ..] = &mut planes.rotation;
                 rounded(parts, steps.rotation);
@@ -194,7 +200,10 @@ impl Scene {
                 let planes: Vec<&[f32]> = sample.sh().iter().map(Vec::as_slice).collect();
                 let basis = Components::of(&planes);
                 let transform = colour::transform(TransformKind::Sh, &basis, steps.sh);
-                colour::components(&transform, &planes, steps.sh).iter().map(|plane| entropy_of(plane)).sum()
+                colour::components(&transform, &planes, steps.sh, &Spacing::default())
+                    .iter()
+                    .map(|plane| entropy_of(plane))
+                    .sum()
             }
         };
         total / rows.len().max(1) as f64
@@ -202,11 +211,11 @@ impl Scene {
 }
 
 /// SH planes whose principal components are on a lattice.
-fn rounded_components(planes: &[Vec<f32>], step: f32) -> Vec<Vec<f32>> {
+fn rounded_components(planes: &[Vec<f32>], step: f32, spacing: &Spacing) -> Vec<Vec<f32>> {
     let slices: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
     let basis = Components::of(&slices);
     let transform = colour::transform(TransformKind::Sh, &basis, step);
-    let components = colour::components(&transform, &slices, step);
+    let components = colour::components(&transform, &slices, step, spacing);
     let plane = |place: usize| {
         let mut plane = vec![basis.mean[place] as f32; slices[place].len()];
         for (row, component) in basis.rows.iter().zip(&components) {

@@ -1,7 +1,7 @@
 //! Colour on its way in: transforms, components, and the choice between coefficients and codebooks.
 
 use crate::entropy_cost::entropy_of;
-use crate::lattice::nearest_integer;
+use crate::lattice::{Spacing, nearest_integer};
 use crate::pca::Components;
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
@@ -42,12 +42,12 @@ pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32)
 /// Gaussians projected at a time: their planes stay in the second-level cache.
 const TILE: usize = 1 << 12;
 
-/// Components in units of the step, turned into `V` by `map`; one plane a component.
+/// Components in units of the step, turned into `V` by `map`, which is given the row as well; one plane a component.
 fn project<V: Send + Sync + Copy>(
     transform: &Transform,
     planes: &[&[f32]],
     step: f32,
-    map: impl Fn(f32) -> V + Sync,
+    map: impl Fn(usize, f32) -> V + Sync,
 ) -> Vec<Vec<V>> {
     let means: Vec<f32> =
         transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
@@ -64,7 +64,7 @@ fn project<V: Send + Sync + Copy>(
                     *sum += weight * (value - mean);
                 }
             }
-            sums.into_iter().map(&map).collect()
+            (start..).zip(sums).map(|(row, sum)| map(row, sum)).collect()
         };
         transform.rows().map(row).collect()
     };
@@ -73,10 +73,15 @@ fn project<V: Send + Sync + Copy>(
     (0..transform.rows().len()).into_par_iter().map(component).collect()
 }
 
-/// Components rounded to the step.
-pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<i32>> {
+/// Components rounded to the step, or to multiples of it.
+pub(crate) fn components(
+    transform: &Transform,
+    planes: &[&[f32]],
+    step: f32,
+    spacing: &Spacing,
+) -> Vec<Vec<i32>> {
     let limit = *COMPONENT_RANGE.end() as f32;
-    project(transform, planes, step, |value| nearest_integer(value.clamp(-limit, limit)))
+    project(transform, planes, step, |row, value| spacing.nearest(row, value.clamp(-limit, limit)))
 }
 
 /// Drops the last components that are 0 for every Gaussian; at least one stays.
@@ -141,7 +146,7 @@ fn sampled_rows(transform: &Transform, planes: &[&[f32]], step: f32, stride: usi
     let sampled: Vec<Vec<f32>> =
         planes.iter().map(|plane| plane.iter().step_by(stride).copied().collect()).collect();
     let sampled: Vec<&[f32]> = sampled.iter().map(Vec::as_slice).collect();
-    vq::rows(&project(transform, &sampled, step, |value| value))
+    vq::rows(&project(transform, &sampled, step, |_, value| value))
 }
 
 /// Bits and squared error a Gaussian of rounding every component.

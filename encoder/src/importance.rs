@@ -1,5 +1,6 @@
 //! Which Gaussians come first.
 
+use crate::lattice::Spacing;
 use crate::settings::{Importance, Preset, Settings};
 use splatstream_format::syntax::prefix_length;
 use splatstream_render::Camera;
@@ -14,6 +15,8 @@ pub(crate) struct Ranking {
     rounds: Vec<u8>,
     cameras: Vec<Camera>,
     preset: Preset,
+    /// The order of the first frame, if it was needed early.
+    foreseen: Option<Vec<u32>>,
 }
 
 impl Ranking {
@@ -30,6 +33,7 @@ impl Ranking {
             rounds: rounds(&settings.refinements, settings.preset),
             cameras: settings.cameras.clone(),
             preset: settings.preset,
+            foreseen: None,
         }
     }
 
@@ -38,9 +42,32 @@ impl Ranking {
         self.importance
     }
 
+    /// Which Gaussians may be coarser: those of the last refinement, if they come last because pictures hardly show
+    /// them.
+    pub(crate) fn spacing(&self, order: &[u32], settings: &Settings) -> Spacing {
+        let last_but_one = settings.refinements.iter().rev().nth(1);
+        match last_but_one {
+            Some(&percent) if settings.tools.coarse_tail && self.importance != Importance::Volume => {
+                let kept = prefix_length(percent, order.len() as u32) as usize;
+                Spacing::of_last(order, order.len() - kept)
+            }
+            _ => Spacing::default(),
+        }
+    }
+
+    /// The order of the first frame, which [`Ranking::order`] will not compute again.
+    pub(crate) fn foresee(&mut self, frame: &GaussianFrame) -> Vec<u32> {
+        let order = self.order(frame);
+        self.foreseen = Some(order.clone());
+        order
+    }
+
     /// The Gaussians of a frame, most important first. Cameras that the settings do not give are made for the
     /// first frame that comes.
     pub(crate) fn order(&mut self, frame: &GaussianFrame) -> Vec<u32> {
+        if let Some(order) = self.foreseen.take() {
+            return order;
+        }
         let volume = importance::opacity_volume(frame);
         if self.importance == Importance::Volume {
             return importance::order(&volume);

@@ -92,6 +92,30 @@ pub(crate) fn nearest_integer(value: f32) -> i32 {
     ((value + SHIFTER) - SHIFTER) as i32
 }
 
+/// Which Gaussians take only every second point of a lattice.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Spacing(Option<Vec<bool>>);
+
+impl Spacing {
+    /// Every second point for the last `coarse` of `order`.
+    pub(crate) fn of_last(order: &[u32], coarse: usize) -> Self {
+        let mut doubled = vec![false; order.len()];
+        for &row in order.iter().rev().take(coarse) {
+            doubled[row as usize] = true;
+        }
+        Self(Some(doubled))
+    }
+
+    /// The nearest point that a Gaussian may take, in steps.
+    #[inline]
+    pub(crate) fn nearest(&self, row: usize, steps: f32) -> i32 {
+        match &self.0 {
+            Some(doubled) if doubled[row] => 2 * nearest_integer(0.5 * steps),
+            _ => nearest_integer(steps),
+        }
+    }
+}
+
 /// Rounds a canonical frame onto the lattices.
 ///
 /// # Errors
@@ -99,6 +123,7 @@ pub(crate) fn nearest_integer(value: f32) -> i32 {
 pub(crate) fn geometry(
     frame: &GaussianFrame,
     sequence: &SequenceParameters,
+    spacing: &Spacing,
     number: u32,
 ) -> Result<Geometry, Error> {
     let last = ((1_u32 << sequence.position_bits) - 1) as f32;
@@ -114,23 +139,32 @@ pub(crate) fn geometry(
     let mut log_scale = [const { Vec::new() }; 3];
     for (plane, values) in log_scale.iter_mut().zip(frame.log_scale()) {
         let lattice = ("log_scale", sequence.log_scale_offset(), sequence.log_scale_step());
-        *plane = rounded(values, lattice, number)?;
+        *plane = rounded(values, lattice, spacing, number)?;
     }
     let lattice = ("opacity", sequence.opacity_offset(), sequence.opacity_step());
-    let opacity = rounded(frame.opacity_logit(), lattice, number)?;
+    let opacity = rounded(frame.opacity_logit(), lattice, &Spacing::default(), number)?;
     let [_, x, y, z] = frame.rotation();
     let shifts = rotation_shifts(&log_scale, sequence);
-    let rotation = [x, y, z].map(|plane| rotation_plane(plane, &shifts, sequence.rotation_step()));
+    let rotation = [x, y, z].map(|plane| rotation_plane(plane, &shifts, sequence.rotation_step(), spacing));
     Ok(Geometry { position, log_scale, opacity, rotation })
 }
 
-fn rounded(values: &[f32], lattice: (&'static str, f32, f32), frame: u32) -> Result<Vec<i32>, Error> {
+fn rounded(
+    values: &[f32],
+    lattice: (&'static str, f32, f32),
+    spacing: &Spacing,
+    frame: u32,
+) -> Result<Vec<i32>, Error> {
     let (attribute, offset, step) = lattice;
     let limit = *ATTRIBUTE_RANGE.end() as f32;
     let outside = |&value: &f32| ((value - offset) / step).abs() > limit;
     match values.iter().position(outside) {
         Some(row) => Err(Error::OutOfLattice { frame, attribute, row, value: values[row], step }),
-        None => Ok(values.par_iter().map(|&value| nearest_integer((value - offset) / step)).collect()),
+        None => Ok(values
+            .par_iter()
+            .enumerate()
+            .map(|(row, &value)| spacing.nearest(row, (value - offset) / step))
+            .collect()),
     }
 }
 
@@ -148,12 +182,13 @@ fn rotation_shifts(log_scale: &[Vec<i32>; 3], sequence: &SequenceParameters) -> 
         .collect()
 }
 
-fn rotation_plane(values: &[f32], shifts: &[Option<u32>], step: f32) -> Vec<i32> {
+fn rotation_plane(values: &[f32], shifts: &[Option<u32>], step: f32, spacing: &Spacing) -> Vec<i32> {
     values
         .iter()
         .zip(shifts)
-        .map(|(&value, shift)| match shift {
-            Some(shift) => nearest_integer(value / (step * (1_u32 << shift) as f32)),
+        .enumerate()
+        .map(|(row, (&value, shift))| match shift {
+            Some(shift) => spacing.nearest(row, value / (step * (1_u32 << shift) as f32)),
             None => 0,
         })
         .collect()

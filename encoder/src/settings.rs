@@ -57,10 +57,10 @@ impl Quality {
             sh,
         };
         match self {
-            Self::Low => steps(11.0, 0.34, 0.06, 0.5, 0.2, 0.24),
-            Self::Medium => steps(12.0, 0.22, 0.036, 0.28, 0.14, 0.14),
-            Self::High => steps(13.25, 0.13, 0.022, 0.15, 0.08, 0.09),
-            Self::VisuallyLossless => steps(15.0, 0.055, 0.01, 0.06, 0.035, 0.03),
+            Self::Low => steps(11.1, 0.31, 0.055, 0.46, 0.185, 0.22),
+            Self::Medium => steps(12.1, 0.2, 0.033, 0.26, 0.13, 0.125),
+            Self::High => steps(13.4, 0.12, 0.02, 0.14, 0.074, 0.08),
+            Self::VisuallyLossless => steps(15.1, 0.05, 0.009, 0.055, 0.032, 0.027),
         }
     }
 }
@@ -99,11 +99,14 @@ pub struct Tools {
     pub sh_transform: bool,
     /// Plane models taken over from the refinement before; without it each refinement carries its own.
     pub table_reuse: bool,
+    /// Every second point of the lattices only, for the scale, rotation and colour of the last refinement, where the
+    /// order goes by what pictures show.
+    pub coarse_tail: bool,
 }
 
 impl Default for Tools {
     fn default() -> Self {
-        Self { contexts: true, axis_sort: true, sh_transform: true, table_reuse: true }
+        Self { contexts: true, axis_sort: true, sh_transform: true, table_reuse: true, coarse_tail: true }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::colour::{self, ShPlan};
 use crate::error::Error;
 use crate::frame::{CodedFrame, UnitPlan, code_frame};
 use crate::importance::Ranking;
-use crate::lattice::geometry;
+use crate::lattice::{Spacing, geometry};
 use crate::pca::Components;
 use crate::sequence::analyse;
 use crate::settings::{Importance, Settings, Steps};
@@ -69,11 +69,11 @@ pub fn encode(
     sink: &mut dyn Write,
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
-    let fitted = fitted(source, settings)?;
+    let mut ranking = Ranking::new(settings);
+    let fitted = fitted(source, settings, &mut ranking)?;
     let settings = &fitted;
     let analysis = analyse(source, settings)?;
     let sequence = analysis.parameters;
-    let mut ranking = Ranking::new(settings);
     let mut report = Report {
         steps: Some(settings.steps),
         importance: Some(ranking.importance()),
@@ -97,7 +97,7 @@ pub fn encode(
         for number in first..last {
             let prepared = prepare(source, settings, &sequence, number, &mut ranking, &mut report)?;
             if tools.is_none() {
-                let made = GopTools::new(&prepared.frame, &sequence, settings, last - first);
+                let made = GopTools::new(&prepared, &sequence, settings, last - first);
                 made.write(&mut writer, &sequence, first, &mut report)?;
                 tools = Some(made);
             }
@@ -113,13 +113,21 @@ pub fn encode(
 }
 
 /// The settings with steps that reach the quality asked for on the first frame.
-fn fitted(source: &mut dyn FrameSource, settings: &Settings) -> Result<Settings, Error> {
+fn fitted(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    ranking: &mut Ranking,
+) -> Result<Settings, Error> {
     let mut settings = settings.clone();
     if let Some(decibels) = settings.psnr
         && !source.is_empty()
     {
         let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
-        settings.steps = allocation::fit(&first, &settings, decibels);
+        let shown = visible(&first, settings.keep_invisible);
+        let frame = canonicalise(&first, &shown, true);
+        let order = ranking.foresee(&frame);
+        let spacing = ranking.spacing(&order, &settings);
+        settings.steps = allocation::fit(frame, spacing, &settings, decibels);
     }
     Ok(settings)
 }
@@ -128,6 +136,7 @@ fn fitted(source: &mut dyn FrameSource, settings: &Settings) -> Result<Settings,
 struct Prepared {
     frame: GaussianFrame,
     order: Vec<u32>,
+    spacing: Spacing,
 }
 
 fn prepare(
@@ -144,7 +153,8 @@ fn prepare(
     report.gaussians += shown.len() as u64;
     let frame = canonicalise(&frame, &shown, sequence.canonical_axes());
     let order = ranking.order(&frame);
-    Ok(Prepared { frame, order })
+    let spacing = ranking.spacing(&order, settings);
+    Ok(Prepared { frame, order, spacing })
 }
 
 /// What the frames of a GOP share.
@@ -171,7 +181,8 @@ fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
 }
 
 impl GopTools {
-    fn new(frame: &GaussianFrame, sequence: &SequenceParameters, settings: &Settings, frames: u32) -> Self {
+    fn new(prepared: &Prepared, sequence: &SequenceParameters, settings: &Settings, frames: u32) -> Self {
+        let Prepared { frame, spacing, .. } = prepared;
         let dc = Components::of(&dc_planes(frame));
         let dc = colour::transform(TransformKind::Dc, &dc, sequence.dc_step());
         let zeros = vec![0.0; frame.len()];
@@ -184,7 +195,7 @@ impl GopTools {
                 false => Components::identity(planes.len()),
             };
             let mut transform = colour::transform(TransformKind::Sh, &basis, step);
-            let mut components = colour::components(&transform, &planes, step);
+            let mut components = colour::components(&transform, &planes, step, spacing);
             colour::drop_unused(&mut transform, &mut components);
             let gaussians = frame.len() * frames as usize;
             let plan = colour::plan_sh(&transform, &planes, step, gaussians, settings.sh, settings.preset);
@@ -273,7 +284,7 @@ fn write_frame(
 }
 
 fn coded_frame(
-    Prepared { frame, order }: Prepared,
+    Prepared { frame, order, spacing }: Prepared,
     sequence: &SequenceParameters,
     tools: &mut GopTools,
     number: u32,
@@ -284,13 +295,13 @@ fn coded_frame(
         let (transform, plan) = tools.sh.as_ref()?;
         let planes = sh_planes(&frame, sequence, &zeros);
         Some(match plan.codebooks.first() {
-            None => colour::components(transform, &planes, sequence.sh_step()),
+            None => colour::components(transform, &planes, sequence.sh_step(), &spacing),
             Some(book) => vec![colour::indices(transform, &planes, sequence.sh_step(), book)],
         })
     });
     Ok(CodedFrame {
-        geometry: geometry(&frame, sequence, number)?,
-        dc: colour::components(&tools.dc, &dc_planes(&frame), sequence.dc_step()),
+        geometry: geometry(&frame, sequence, &spacing, number)?,
+        dc: colour::components(&tools.dc, &dc_planes(&frame), sequence.dc_step(), &spacing),
         sh: sh.unwrap_or_default(),
         order,
     })

@@ -9,8 +9,9 @@ use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_po
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Preset, Quality, Settings, ShChoice, Tools};
+use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice, Tools};
 use splatstream_format::Limits;
+use splatstream_render::camera::Up;
 use splatstream_scene::GaussianFrame;
 use std::ops::ControlFlow;
 
@@ -19,14 +20,24 @@ fn settings() -> impl Strategy<Value = Settings> {
     let quality = prop_oneof![Just(Quality::Low), Just(Quality::High), Just(Quality::VisuallyLossless)];
     let sh = prop_oneof![Just(ShChoice::Auto), Just(ShChoice::Coefficients), Just(ShChoice::VectorQuantised)];
     let refinements = prop_oneof![Just(vec![100]), Just(vec![10, 20, 30, 50, 100]), Just(vec![1, 99, 100])];
-    let tools = any::<[bool; 4]>().prop_map(|[contexts, axis_sort, sh_transform, table_reuse]| Tools {
-        contexts,
-        axis_sort,
-        sh_transform,
-        table_reuse,
-    });
-    (preset, quality, sh, refinements, tools, 1_u32..4, 6_u8..=8).prop_map(
-        |(preset, quality, sh, refinements, tools, gop, block_log2)| Settings {
+    let tools =
+        any::<[bool; 5]>().prop_map(|[contexts, axis_sort, sh_transform, table_reuse, coarse_tail]| Tools {
+            contexts,
+            axis_sort,
+            sh_transform,
+            table_reuse,
+            coarse_tail,
+        });
+    let importance = prop_oneof![
+        Just(None),
+        Just(Some(Importance::Removal)),
+        Just(Some(Importance::Contribution)),
+        Just(Some(Importance::Volume))
+    ];
+    // Two small pictures: what they show does not matter here.
+    let cameras = splatstream_render::camera::ring(&frame_of(&[1.0, -1.0, 0.5], 20, 0), Up::default(), 2, 32);
+    (preset, quality, sh, refinements, tools, importance, 1_u32..4, 6_u8..=8).prop_map(
+        move |(preset, quality, sh, refinements, tools, importance, gop, block_log2)| Settings {
             preset,
             steps: quality.steps(),
             sh,
@@ -35,6 +46,8 @@ fn settings() -> impl Strategy<Value = Settings> {
             block_log2,
             keep_invisible: true,
             tools,
+            importance,
+            cameras: cameras.clone(),
             ..Settings::default()
         },
     )

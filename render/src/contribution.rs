@@ -1,7 +1,7 @@
 //! How much each Gaussian matters to a set of views.
 
 use crate::camera::Camera;
-use crate::rasterise::{Blend, Ink, Lanes, TILE, Tile, View, blend_tile};
+use crate::rasterise::{Blend, Ink, Lanes, Shapes, TILE, Tile, View, blend_tile};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_scene::GaussianFrame;
@@ -25,14 +25,15 @@ pub fn removal(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
 
 fn sums<const REMOVAL: bool>(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
     let mut sums = vec![0.0; frame.len()];
+    let shapes = Shapes::of(frame);
     for camera in cameras {
-        let view = &View::new(frame, camera);
+        let view = &View::new(frame, &shapes, camera);
         let rows = (0..view.rows.len()).into_par_iter().with_max_len(1);
         let shares: Vec<Vec<(u32, f32)>> =
             rows.map(|row| pulp::Arch::new().dispatch(RowShares::<REMOVAL> { view, row })).collect();
         // In the order of the rows, whoever computed them.
         for &(place, share) in shares.iter().flatten() {
-            sums[view.splats.all()[place as usize].gaussian as usize] += f64::from(share);
+            sums[view.splats[place as usize].gaussian as usize] += f64::from(share);
         }
     }
     sums
@@ -49,13 +50,16 @@ impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let View { splats, colours, rows } = self.view;
+        let View { splats, rows } = self.view;
         let entries = rows.entries(self.row, splats);
         let mut shares = Vec::new();
         for column in 0..entries.tiles() {
             let places = entries.of_tile(column);
+            if places.is_empty() {
+                continue;
+            }
             let tile = || Tile::new(self.row, column, rows.size());
-            let mut ink = Ink::new(colours);
+            let mut ink = Ink::default();
             if REMOVAL {
                 blend_tile(splats, places, &mut tile(), &mut ink);
             }
@@ -69,7 +73,7 @@ impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
 /// Sums what a Gaussian is to a tile.
 struct Counter<'a, const REMOVAL: bool> {
     /// For removal: the light of the Gaussians that are still to come.
-    ink: Ink<'a>,
+    ink: Ink,
     lanes: Lanes,
     places: &'a [u32],
     shares: &'a mut Vec<(u32, f32)>,
@@ -77,14 +81,13 @@ struct Counter<'a, const REMOVAL: bool> {
 
 impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
     #[inline(always)]
-    fn line(&mut self, splat: usize, line: usize, visible: &Lanes, passing: &Lanes) {
+    fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes) {
         if !REMOVAL {
             for (sum, visible) in self.lanes.iter_mut().zip(visible) {
                 *sum += visible;
             }
             return;
         }
-        let colour = self.ink.colour(splat);
         for (behind, colour) in self.ink.light[line].iter_mut().zip(colour) {
             for lane in 0..TILE {
                 let own = visible[lane] * colour;

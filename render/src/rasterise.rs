@@ -11,7 +11,8 @@ mod tile;
 
 use crate::camera::Camera;
 use crate::image::Image;
-use project::{Splats, project};
+pub(crate) use project::Shapes;
+use project::{Splat, project};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::TileRows;
@@ -36,7 +37,7 @@ pub struct Rendering {
 /// Gaussians nearer than 0.01 in front of the camera, or with a projection that is not finite, are left out.
 /// Gaussians at one depth are drawn in the order of the frame.
 pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> Rendering {
-    let view = View::new(frame, camera);
+    let view = View::new(frame, &Shapes::of(frame), camera);
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut pixels = vec![[0.0; 3]; width * height];
     let mut alpha = vec![0.0; width * height];
@@ -50,20 +51,17 @@ pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> R
 /// A frame as one camera sees it, before blending.
 pub(crate) struct View {
     /// Ellipses, nearest first.
-    pub(crate) splats: Splats,
-    /// Their colours.
-    pub(crate) colours: Vec<[f32; 3]>,
+    pub(crate) splats: Vec<Splat>,
     /// Which of them touch which tiles.
     pub(crate) rows: TileRows,
 }
 
 impl View {
     /// Projects and sorts.
-    pub(crate) fn new(frame: &GaussianFrame, camera: &Camera) -> Self {
-        let splats = project(frame, camera);
-        let colours = splats.colours(frame, camera);
+    pub(crate) fn new(frame: &GaussianFrame, shapes: &Shapes, camera: &Camera) -> Self {
+        let splats = project(frame, shapes, camera);
         let rows = TileRows::new(&splats, camera);
-        Self { splats, colours, rows }
+        Self { splats, rows }
     }
 }
 
@@ -81,12 +79,12 @@ impl WithSimd for DrawRow<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let View { splats, colours, rows } = self.view;
+        let View { splats, rows } = self.view;
         let entries = rows.entries(self.row, splats);
         let [width, _] = rows.size();
         for column in 0..entries.tiles() {
             let mut tile = Tile::new(self.row, column, rows.size());
-            let mut ink = Ink::new(colours);
+            let mut ink = Ink::default();
             blend_tile(splats, entries.of_tile(column), &mut tile, &mut ink);
             let left = column * TILE;
             let lines = self.pixels.chunks_mut(width).zip(self.alpha.chunks_mut(width));
@@ -101,30 +99,17 @@ impl WithSimd for DrawRow<'_> {
     }
 }
 
-/// Collects the colour of a tile.
-pub(crate) struct Ink<'a> {
-    colours: &'a [[f32; 3]],
+/// Collects the colour of a tile: at first it has no light.
+#[derive(Default)]
+pub(crate) struct Ink {
     /// Red, green and blue of each line.
     pub(crate) light: [[Lanes; 3]; TILE],
 }
 
-impl<'a> Ink<'a> {
-    /// A tile without light.
-    pub(crate) fn new(colours: &'a [[f32; 3]]) -> Self {
-        Self { colours, light: [[[0.0; TILE]; 3]; TILE] }
-    }
-
-    /// Colour of an ellipse.
+impl Blend for Ink {
     #[inline(always)]
-    pub(crate) fn colour(&self, splat: usize) -> [f32; 3] {
-        self.colours[splat]
-    }
-}
-
-impl Blend for Ink<'_> {
-    #[inline(always)]
-    fn line(&mut self, splat: usize, line: usize, visible: &Lanes, _passing: &Lanes) {
-        for (light, colour) in self.light[line].iter_mut().zip(self.colours[splat]) {
+    fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, _passing: &Lanes) {
+        for (light, colour) in self.light[line].iter_mut().zip(colour) {
             for (light, visible) in light.iter_mut().zip(visible) {
                 *light += visible * colour;
             }

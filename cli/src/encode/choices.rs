@@ -49,9 +49,11 @@ fn positions(report: &Report, settings: &Settings) -> Choice {
 fn steps(report: &Report, settings: &Settings) -> Option<Choice> {
     let (decibels, steps) = (settings.psnr?, report.steps?);
     let Steps { log_scale, rotation, opacity, dc, sh, .. } = steps;
-    let choice = format!(
-        "log-scale {log_scale:.3}, rotation {rotation:.4}, opacity {opacity:.3}, dc {dc:.3}, sh {sh:.3}"
-    );
+    let mut choice =
+        format!("log-scale {log_scale:.3}, rotation {rotation:.4}, opacity {opacity:.3}, dc {dc:.3}");
+    if report.sh_degree.1 > 0 {
+        choice += &format!(", sh {sh:.3}");
+    }
     Some(Choice::new(
         "steps",
         choice,
@@ -121,12 +123,13 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
 }
 
 fn left_out(settings: &Settings) -> Option<Choice> {
-    let Tools { contexts, axis_sort, sh_transform, table_reuse } = settings.tools;
+    let Tools { contexts, axis_sort, sh_transform, table_reuse, coarse_tail } = settings.tools;
     let tools = [
         (contexts, "contexts"),
         (axis_sort, "axis-sort"),
         (sh_transform, "sh-transform"),
         (table_reuse, "table-reuse"),
+        (coarse_tail, "coarse-tail"),
     ];
     let names: Vec<&str> = tools.into_iter().filter(|(used, _)| !used).map(|(_, name)| name).collect();
     (!names.is_empty()).then(|| Choice::new("left out", names.join(", "), "--without"))

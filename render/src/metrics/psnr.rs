@@ -83,7 +83,7 @@ impl YuvPsnr {
     /// (6 Y + U + V) / 8, dB, of the three figures, each at most [`LOSSLESS_DB`]: grey pictures that differ in
     /// luma only would be infinitely good otherwise.
     ///
-    /// Source: the weights of the common test conditions of HEVC, which are in use for point clouds too.
+    /// Source: the weights customary for video since the development of HEVC.
     #[must_use]
     pub fn weighted(&self) -> f64 {
         let [y, u, v] = [self.y, self.u, self.v].map(|figure| figure.min(LOSSLESS_DB));

@@ -58,8 +58,8 @@ impl StLpips {
         weights::read(path)
     }
 
-    /// The distance of two pictures: 0 for equal ones, about 0.1 for ones that people tell apart easily. None if
-    /// a side is shorter than 21 pixels. Equal for any number of threads and on every machine.
+    /// The distance of two pictures: 0 for equal ones, without a unit or an upper limit. None if a side is
+    /// shorter than 21 pixels. Equal for any number of threads and on every machine.
     ///
     /// # Panics
     /// If the sizes differ.
@@ -91,7 +91,7 @@ impl StLpips {
     /// The distance of two pictures, from their features.
     ///
     /// # Panics
-    /// If the sizes of the pictures differed.
+    /// If the sizes of the features differ.
     #[must_use]
     pub fn feature_distance(&self, reference: &Features, image: &Features) -> f64 {
         let layers = reference.layers.iter().zip(&image.layers).zip(&self.layers);

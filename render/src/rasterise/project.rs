@@ -22,46 +22,72 @@ const SH_C0: f32 = 0.282_094_8;
 const CHUNK: usize = 4096;
 
 /// An ellipse in the picture. log2 of alpha at an offset from the centre is
-/// `peak + xx·dx² + xy·dx·dy + yy·dy²`.
+/// `peak + xx·(dx + skew·dy)² + yy·dy²`.
+///
+/// No term is above 0, so that rounding never makes alpha larger than the opacity, and long thin ellipses keep
+/// their shape far from their centre: `xx·dx² + xy·dx·dy + yy·dy²` would be a small difference of large terms.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Splat {
     /// Centre, pixels.
     pub(crate) centre: [f32; 2],
     /// Quadratic form.
     pub(crate) xx: f32,
-    pub(crate) xy: f32,
+    pub(crate) skew: f32,
     pub(crate) yy: f32,
     /// log2 of the opacity.
     pub(crate) peak: f32,
     /// How far alpha is 1/255 or more, along x and y, pixels.
     pub(crate) extent: [f32; 2],
+    /// Red, green and blue as the camera sees them, at least 0.
+    pub(crate) colour: [f32; 3],
     /// Which Gaussian of the frame.
     pub(crate) gaussian: u32,
 }
 
-/// The ellipses of a view, nearest first.
-pub(crate) struct Splats(Vec<Splat>);
+/// What is the same in all views of a frame.
+pub(crate) struct Shapes {
+    /// The semi-axes of each Gaussian as vectors in the world.
+    axes: Vec<[Vec3; 3]>,
+    /// Opacity of each Gaussian.
+    opacity: Vec<f32>,
+}
 
-/// Projects the Gaussians that touch the picture.
-pub(crate) fn project(frame: &GaussianFrame, camera: &Camera) -> Splats {
-    let view = View::new(camera);
+impl Shapes {
+    pub(crate) fn of(frame: &GaussianFrame) -> Self {
+        let rows = (0..frame.len()).into_par_iter().with_min_len(CHUNK);
+        let axes = rows.map(|row| semi_axes(frame, row)).collect();
+        let logits = frame.opacity_logit().par_iter().with_min_len(CHUNK);
+        Self { axes, opacity: logits.map(|logit| 1.0 / (1.0 + libm::expf(-logit))).collect() }
+    }
+}
+
+/// The ellipses of the Gaussians that touch the picture, nearest first.
+pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, camera: &Camera) -> Vec<Splat> {
+    let view = View::new(frame, shapes, camera);
     let starts: Vec<usize> = (0..frame.len()).step_by(CHUNK).collect();
-    let chunks: Vec<Vec<(u64, Splat)>> = starts
+    let chunks: Vec<Vec<(f32, Splat)>> = starts
         .par_iter()
         .map(|&start| {
             let rows = start..frame.len().min(start + CHUNK);
-            rows.filter_map(|row| view.project(frame, row)).collect()
+            rows.filter_map(|row| view.project(row)).collect()
         })
         .collect();
-    let splats: Vec<Splat> = chunks.iter().flatten().map(|(_, splat)| *splat).collect();
-    let keys = chunks.iter().flatten().map(|(key, _)| *key).zip(0_u32..);
-    let mut order: Vec<(u64, u32)> = keys.collect();
-    order.par_sort_unstable();
-    Splats(order.par_iter().map(|&(_, place)| splats[place as usize]).collect())
+    // Positive floats order as their bits; equal depths keep the order of the frame.
+    let key = |((depth, _), place): (&(f32, Splat), usize)| u64::from(depth.to_bits()) << 32 | place as u64;
+    let places = starts.iter().zip(&chunks).flat_map(|(&start, chunk)| chunk.iter().zip(start..));
+    let mut keys: Vec<u64> = places.map(key).collect();
+    keys.par_sort_unstable();
+    let splat = |key: &u64| {
+        let place = *key as u32 as usize;
+        chunks[place / CHUNK][place % CHUNK].1
+    };
+    keys.par_iter().map(splat).collect()
 }
 
-/// A camera, as projection needs it.
-struct View {
+/// A frame and a camera, as projection needs them.
+struct View<'a> {
+    frame: &'a GaussianFrame,
+    shapes: &'a Shapes,
     to_camera: Mat3,
     rows: [Vec3; 3],
     position: Vec3,
@@ -72,8 +98,8 @@ struct View {
     slopes: [(f32, f32); 2],
 }
 
-impl View {
-    fn new(camera: &Camera) -> Self {
+impl<'a> View<'a> {
+    fn new(frame: &'a GaussianFrame, shapes: &'a Shapes, camera: &Camera) -> Self {
         let to_camera = Mat3::from_cols_array_2d(&camera.rotation).transpose();
         let size = [camera.width as f32, camera.height as f32];
         let slopes = [0, 1].map(|axis| {
@@ -82,6 +108,8 @@ impl View {
             (-(principal / focal + margin), (size[axis] - principal) / focal + margin)
         });
         Self {
+            frame,
+            shapes,
             to_camera,
             rows: camera.rotation.map(Vec3::from),
             position: camera.position.into(),
@@ -92,27 +120,22 @@ impl View {
         }
     }
 
-    /// The ellipse of a Gaussian and its place in depth; none if it cannot be seen.
-    fn project(&self, frame: &GaussianFrame, row: usize) -> Option<(u64, Splat)> {
-        let at = Vec3::from(frame.position().each_ref().map(|plane| plane[row]));
-        let at = self.to_camera * (at - self.position);
+    /// Depth and ellipse of a Gaussian; none if it cannot be seen.
+    fn project(&self, row: usize) -> Option<(f32, Splat)> {
+        let offset = Vec3::from(self.frame.position().each_ref().map(|plane| plane[row])) - self.position;
+        let at = self.to_camera * offset;
         if at.z.is_nan() || at.z < NEAR {
             return None;
         }
-        let opacity = 1.0 / (1.0 + libm::expf(-frame.opacity_logit()[row]));
-        let covariance = self.covariance(frame, row, at);
-        let [a, b, c] = covariance;
-        let (wide, tall) = (a + LOW_PASS, c + LOW_PASS);
-        let determinant = wide * tall - b * b;
-        let opacity = if frame.antialiased() {
-            opacity * ((a * c - b * b).max(0.0) / determinant).sqrt()
-        } else {
-            opacity
-        };
+        let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(row, at);
+        let (wide, tall) = (xx + LOW_PASS, yy + LOW_PASS);
+        let determinant = sharp + LOW_PASS * (xx + tall);
+        let kept = if self.frame.antialiased() { (sharp / determinant).sqrt() } else { 1.0 };
+        let opacity = self.shapes.opacity[row] * kept;
         let peak = libm::log2f(opacity);
         // Squared Mahalanobis distance at which alpha is 1/255.
         let reach = 2.0 / LOG2_E * (peak + LOG2_255);
-        if !(reach > 0.0 && determinant > 0.0) {
+        if !(reach > 0.0 && determinant.is_finite()) {
             return None;
         }
         let centre = [0, 1].map(|axis| self.focal[axis] * (at[axis] / at.z) + self.principal[axis]);
@@ -123,22 +146,21 @@ impl View {
         if !(touches(0) && touches(1) && extent[0].is_finite() && extent[1].is_finite()) {
             return None;
         }
-        let scale = -0.5 * LOG2_E / determinant;
         let splat = Splat {
             centre,
-            xx: scale * tall,
-            xy: -2.0 * scale * b,
-            yy: scale * wide,
+            xx: -0.5 * LOG2_E * (tall / determinant),
+            skew: -xy / tall,
+            yy: -0.5 * LOG2_E / tall,
             peak,
             extent,
+            colour: self.colour(row, offset),
             gaussian: row as u32,
         };
-        // Positive floats order as their bits; equal depths keep the order of the frame.
-        Some((u64::from(at.z.to_bits()) << 32 | row as u64, splat))
+        Some((at.z, splat))
     }
 
-    /// Covariance of the projection along x, across, and along y, square pixels, without low-pass.
-    fn covariance(&self, frame: &GaussianFrame, row: usize, at: Vec3) -> [f32; 3] {
+    /// Covariance of the projection, without low-pass.
+    fn covariance(&self, row: usize, at: Vec3) -> Covariance {
         let near = 1.0 / at.z;
         let [x, y] = [0, 1].map(|axis| {
             let (least, most) = self.slopes[axis];
@@ -146,12 +168,37 @@ impl View {
         });
         let across = (self.rows[0] - self.rows[2] * x) * (self.focal[0] * near);
         let down = (self.rows[1] - self.rows[2] * y) * (self.focal[1] * near);
-        let axes = semi_axes(frame, row);
-        let u = axes.map(|axis| across.dot(axis));
-        let v = axes.map(|axis| down.dot(axis));
-        let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-        [dot(u, u), dot(u, v), dot(v, v)]
+        let axes = self.shapes.axes[row];
+        let u = Vec3::from(axes.map(|axis| across.dot(axis)));
+        let v = Vec3::from(axes.map(|axis| down.dot(axis)));
+        // Lagrange's identity: never negative, where |u|²·|v|² - (u·v)² may lose every digit.
+        let determinant = u.cross(v).length_squared();
+        Covariance { xx: u.length_squared(), xy: u.dot(v), yy: v.length_squared(), determinant }
     }
+
+    /// Colour of a Gaussian that lies at `offset` from the camera.
+    fn colour(&self, row: usize, offset: Vec3) -> [f32; 3] {
+        let mut colour = self.frame.dc().each_ref().map(|plane| 0.5 + SH_C0 * plane[row]);
+        let coefficients = sh_coefficients(self.frame.sh_degree());
+        if coefficients > 0 {
+            let basis = sh_basis(offset.normalize_or_zero().as_dvec3().to_array());
+            let planes = self.frame.sh().chunks_exact(3);
+            for (planes, basis) in planes.zip(basis.iter().take(coefficients)) {
+                for (colour, plane) in colour.iter_mut().zip(planes) {
+                    *colour += *basis as f32 * plane[row];
+                }
+            }
+        }
+        colour.map(|channel| channel.max(0.0))
+    }
+}
+
+/// Covariance in the picture, square pixels.
+struct Covariance {
+    xx: f32,
+    xy: f32,
+    yy: f32,
+    determinant: f32,
 }
 
 /// The semi-axes of a Gaussian as vectors in the world.
@@ -165,33 +212,4 @@ fn semi_axes(frame: &GaussianFrame, row: usize) -> [Vec3; 3] {
         Vec3::new(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)) * b,
         Vec3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)) * c,
     ]
-}
-
-impl Splats {
-    /// All of them, nearest first.
-    pub(crate) fn all(&self) -> &[Splat] {
-        &self.0
-    }
-
-    /// Their colours as the camera sees them, at least 0.
-    pub(crate) fn colours(&self, frame: &GaussianFrame, camera: &Camera) -> Vec<[f32; 3]> {
-        let position = Vec3::from(camera.position);
-        let coefficients = sh_coefficients(frame.sh_degree());
-        let colour = |splat: &Splat| {
-            let row = splat.gaussian as usize;
-            let mut colour = frame.dc().each_ref().map(|plane| 0.5 + SH_C0 * plane[row]);
-            if coefficients > 0 {
-                let at = Vec3::from(frame.position().each_ref().map(|plane| plane[row]));
-                let basis = sh_basis((at - position).normalize_or_zero().as_dvec3().to_array());
-                let planes = frame.sh().chunks_exact(3);
-                for (planes, basis) in planes.zip(basis.iter().take(coefficients)) {
-                    for (colour, plane) in colour.iter_mut().zip(planes) {
-                        *colour += *basis as f32 * plane[row];
-                    }
-                }
-            }
-            colour.map(|channel| channel.max(0.0))
-        };
-        self.0.par_iter().with_min_len(CHUNK).map(colour).collect()
-    }
 }

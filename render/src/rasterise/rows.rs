@@ -1,7 +1,7 @@
 //! Which ellipses touch which tiles.
 
 use super::TILE;
-use super::project::{LOG2_255, Splat, Splats};
+use super::project::{LOG2_255, Splat};
 use crate::camera::Camera;
 use rayon::prelude::*;
 
@@ -21,14 +21,14 @@ pub(crate) struct RowEntries {
 
 impl TileRows {
     /// Sorts the ellipses of a view into rows.
-    pub(crate) fn new(splats: &Splats, camera: &Camera) -> Self {
+    pub(crate) fn new(splats: &[Splat], camera: &Camera) -> Self {
         let count = (camera.height as usize).div_ceil(TILE);
         let mut rows = vec![Vec::new(); count];
         // Bands of rows, so that threads share no row.
         let band = count.div_ceil(2 * rayon::current_num_threads()).max(1);
         rows.par_chunks_mut(band).enumerate().for_each(|(number, rows)| {
             let first = number * band;
-            for (place, splat) in (0..).zip(splats.all()) {
+            for (place, splat) in (0..).zip(splats) {
                 let (top, bottom) = tiles_across(splat.centre[1], splat.extent[1]);
                 let top = top.max(first as i32);
                 for row in top..=bottom.min((first + rows.len()) as i32 - 1) {
@@ -50,13 +50,14 @@ impl TileRows {
     }
 
     /// Sorts the ellipses of a row into its tiles.
-    pub(crate) fn entries(&self, row: usize, splats: &Splats) -> RowEntries {
+    #[inline(always)]
+    pub(crate) fn entries(&self, row: usize, splats: &[Splat]) -> RowEntries {
         let tiles = self.size[0].div_ceil(TILE);
         let top = (row * TILE) as f32 + 0.5;
         let spans: Vec<(i32, i32)> = self.rows[row]
             .iter()
             .map(|&place| {
-                let (left, right) = span(&splats.all()[place as usize], top, top + (TILE - 1) as f32);
+                let (left, right) = span(&splats[place as usize], top, top + (TILE - 1) as f32);
                 (left.max(0), right.min(tiles as i32 - 1))
             })
             .collect();
@@ -90,17 +91,17 @@ fn tiles_across(centre: f32, extent: f32) -> (i32, i32) {
 ///
 /// The part of an ellipse in a band is convex: it reaches furthest at its own extreme point, or at the
 /// line nearest to that.
+#[inline(always)]
 fn span(splat: &Splat, top: f32, bottom: f32) -> (i32, i32) {
     let [x, y] = splat.centre;
     let (least, most) = (top - y, bottom - y);
-    let extreme = -0.5 * splat.xy / splat.yy * splat.extent[0];
+    // Where along y the ellipse reaches furthest to the right: covariance over variance, times that reach.
+    let extreme = -splat.skew * splat.extent[1] * (splat.extent[1] / splat.extent[0]);
     let reach = |sign: f32| {
         let dy = (sign * extreme).clamp(least, most);
-        // xx·dx² + xy·dy·dx + yy·dy² + peak + log2 255 = 0
-        let half = 0.5 * splat.xy * dy;
+        // xx·(dx + skew·dy)² + yy·dy² + peak + log2 255 = 0
         let rest = splat.yy * dy * dy + splat.peak + LOG2_255;
-        let root = (half * half - splat.xx * rest).max(0.0).sqrt();
-        (-half - sign * root) / splat.xx
+        sign * (-rest / splat.xx).max(0.0).sqrt() - splat.skew * dy
     };
     // Rounding may hide a pixel: a little more does no harm, for alpha decides in the end.
     let slack = 0.05 + 1e-3 * splat.extent[0];

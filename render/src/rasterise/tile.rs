@@ -1,7 +1,7 @@
 //! Front-to-back blending of one tile, sixteen pixels at a time.
 
 use super::TILE;
-use super::project::{LOG2_255, Splat, Splats};
+use super::project::{LOG2_255, Splat};
 
 /// The most that one Gaussian may cover.
 const MAX_ALPHA: f32 = 0.99;
@@ -14,9 +14,8 @@ pub(crate) type Lanes = [f32; TILE];
 
 /// Receives what a Gaussian adds to the picture.
 pub(crate) trait Blend {
-    /// `visible` is transmittance times alpha of each pixel of a line of the tile; `splat` counts from the
-    /// nearest.
-    fn line(&mut self, splat: usize, line: usize, visible: &Lanes, passing: &Lanes);
+    /// `visible` is transmittance times alpha of each pixel of a line of the tile.
+    fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes);
 
     /// The Gaussian at this place of the tile's entries has added all its lines.
     fn done(&mut self, _entry: usize) {}
@@ -60,13 +59,12 @@ impl Tile {
 
 /// Blends the ellipses at `entries`, nearest first, until no light passes.
 #[inline(always)]
-pub(crate) fn blend_tile(splats: &Splats, entries: &[u32], tile: &mut Tile, blend: &mut impl Blend) {
-    let all = splats.all();
+pub(crate) fn blend_tile(splats: &[Splat], entries: &[u32], tile: &mut Tile, blend: &mut impl Blend) {
     for (entry, &place) in entries.iter().enumerate() {
         if entry % TILE == TILE - 1 && tile.finished() {
             break;
         }
-        let splat = &all[place as usize];
+        let splat = &splats[place as usize];
         let middle = splat.centre[1] - tile.origin[1];
         let first = (middle - splat.extent[1]).ceil().max(0.0) as usize;
         let last = (middle + splat.extent[1]).floor().min((TILE - 1) as f32);
@@ -77,7 +75,7 @@ pub(crate) fn blend_tile(splats: &Splats, entries: &[u32], tile: &mut Tile, blen
         for line in first..=last as usize {
             if tile.alive[line] {
                 let visible = blend_line(splat, tile.origin, line, &mut tile.passing[line]);
-                blend.line(place as usize, line, &visible, &tile.passing[line]);
+                blend.line(splat.colour, line, &visible, &tile.passing[line]);
             }
         }
         blend.done(entry);
@@ -87,15 +85,14 @@ pub(crate) fn blend_tile(splats: &Splats, entries: &[u32], tile: &mut Tile, blen
 /// Takes the light that a Gaussian stops on one line; returns transmittance times alpha.
 #[inline(always)]
 fn blend_line(splat: &Splat, origin: [f32; 2], line: usize, passing: &mut Lanes) -> Lanes {
-    let dx = origin[0] - splat.centre[0];
     let dy = origin[1] + line as f32 - splat.centre[1];
+    let along = origin[0] - splat.centre[0] + splat.skew * dy;
     let constant = splat.yy * dy * dy + splat.peak;
-    let linear = splat.xy * dy;
     let mut visible = [0.0; TILE];
     // Everything is computed and then chosen: without branches the sixteen pixels go side by side.
     for lane in 0..TILE {
-        let dx = dx + lane as f32;
-        let exponent = (splat.xx * dx + linear) * dx + constant;
+        let along = along + lane as f32;
+        let exponent = splat.xx * (along * along) + constant;
         let before = passing[lane];
         let reached = if exponent >= -LOG2_255 { exponent } else { -LOG2_255 };
         let alpha = exp2(reached);

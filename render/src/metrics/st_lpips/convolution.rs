@@ -3,10 +3,10 @@
 use super::maps::{Maps, blur_taps};
 use rayon::prelude::*;
 
-/// Pixels that are computed at once: three registers of eight.
-const LANES: usize = 24;
+/// Pixels that are computed at once: two registers of eight.
+const LANES: usize = 16;
 /// Channels that are computed at once: with [`LANES`] as many sums as the registers of AVX2 hold beside operands.
-const GROUP: usize = 4;
+const GROUP: usize = 6;
 /// Products in a row before the sums are stored: the operands of this many stay in the cache.
 const DEPTH: usize = 256;
 
@@ -15,9 +15,12 @@ const DEPTH: usize = 256;
 pub(super) struct Convolution {
     inputs: usize,
     side: usize,
-    /// For each group of outputs, each input, row and column of the kernel: the weight of each output.
+    outputs: usize,
+    /// For each group of outputs, each input, row and column of the kernel: the weight of each output. Zeros
+    /// fill the last group.
     weights: Vec<[f32; GROUP]>,
-    bias: Vec<f32>,
+    /// For each group, what is added to each output.
+    bias: Vec<[f32; GROUP]>,
 }
 
 /// Where the kernel is laid on: the pixels of `maps` whose first row and column these are.
@@ -109,14 +112,21 @@ impl Convolution {
     /// From the weights of each output, input, row and column of the kernel.
     ///
     /// # Panics
-    /// If outputs are no multiple of four, or the numbers of values do not fit one another.
-    pub(super) fn new([outputs, inputs, side]: [usize; 3], weights: &[f32], bias: Vec<f32>) -> Self {
+    /// If the numbers of values do not fit one another.
+    pub(super) fn new([outputs, inputs, side]: [usize; 3], weights: &[f32], bias: &[f32]) -> Self {
         let depth = inputs * side * side;
-        assert!(outputs.is_multiple_of(GROUP) && bias.len() == outputs && weights.len() == outputs * depth);
-        let group = |group: &[f32]| -> Vec<[f32; GROUP]> {
-            (0..depth).map(|place| std::array::from_fn(|output| group[output * depth + place])).collect()
+        assert!(bias.len() == outputs && weights.len() == outputs * depth, "a kernel lacks values");
+        let filled = |values: &[f32], output: usize, step: usize, place: usize| {
+            values.get(output * step + place).copied().unwrap_or(0.0)
         };
-        Self { inputs, side, weights: weights.chunks(GROUP * depth).flat_map(group).collect(), bias }
+        let group = |group: &[f32]| -> Vec<[f32; GROUP]> {
+            (0..depth)
+                .map(|place| std::array::from_fn(|output| filled(group, output, depth, place)))
+                .collect()
+        };
+        let weights = weights.chunks(GROUP * depth).flat_map(group).collect();
+        let bias = bias.chunks(GROUP).map(|group| std::array::from_fn(|output| filled(group, output, 1, 0)));
+        Self { inputs, side, outputs, weights, bias: bias.collect() }
     }
 
     /// Rows, and columns, of the kernel.
@@ -130,7 +140,7 @@ impl Convolution {
         let row = |row| pulp::Arch::new().dispatch(Row { convolution: self, windows, row });
         let rows: Vec<Vec<[f32; LANES]>> = (0..height).into_par_iter().with_max_len(1).map(row).collect();
         let tiles = width.div_ceil(LANES);
-        Maps::zero(self.bias.len(), height, width).fill(|channel, map| {
+        Maps::zero(self.outputs, height, width).fill(|channel, map| {
             for (to, from) in map.chunks_mut(width).zip(&rows) {
                 let from = &from[channel / GROUP * GROUP * tiles..];
                 let tiles = from.iter().skip(channel % GROUP).step_by(GROUP);
@@ -146,10 +156,10 @@ impl Convolution {
     fn row(&self, windows: &Windows, row: usize) -> Vec<[f32; LANES]> {
         let tiles = windows.columns.len().div_ceil(LANES);
         let depth = self.inputs * self.side * self.side;
-        let start = |group: &[f32]| -> Vec<[f32; LANES]> {
-            (0..tiles).flat_map(|_| group.iter().map(|&bias| [bias; LANES])).collect()
-        };
-        let mut sums: Vec<[f32; LANES]> = self.bias.chunks(GROUP).flat_map(start).collect();
+        let mut sums: Vec<[f32; LANES]> = Vec::with_capacity(self.bias.len() * tiles * GROUP);
+        for group in &self.bias {
+            sums.extend((0..tiles).flat_map(|_| group.map(|bias| [bias; LANES])));
+        }
         let mut gathered = vec![[0.0; LANES]; tiles * DEPTH.min(depth)];
         for from in (0..depth).step_by(DEPTH) {
             let depths = from..(from + DEPTH).min(depth);

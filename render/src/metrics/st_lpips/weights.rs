@@ -67,7 +67,7 @@ fn read_archive(file: File) -> Result<StLpips, WeightsError> {
         let weights = array(&mut archive, format!("{name}.weight"), &[outputs, inputs, side, side])?;
         let bias = array(&mut archive, format!("{name}.bias"), &[outputs])?;
         let channel_weights = array(&mut archive, format!("lin{index}.model.1.weight"), &[1, outputs, 1, 1])?;
-        Ok(Layer { convolution: Convolution::new(size, &weights, bias), channel_weights })
+        Ok(Layer { convolution: Convolution::new(size, &weights, &bias), channel_weights })
     };
     let layers = [layer(0)?, layer(1)?, layer(2)?, layer(3)?, layer(4)?];
     Ok(StLpips { shift, scale, layers })
