@@ -43,7 +43,7 @@ pub(crate) fn frame(gaussians: &[Gaussian]) -> GaussianFrame {
         }
         planes.opacity_logit.push(gaussian.opacity_logit);
     }
-    GaussianFrame::from_planes(0, planes).unwrap()
+    GaussianFrame::from_planes(0, planes).expect("planes of one length")
 }
 
 /// A camera in the origin that looks along z.
