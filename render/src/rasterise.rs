@@ -37,13 +37,18 @@ pub struct Rendering {
 /// Gaussians nearer than 0.01 in front of the camera, or with a projection that is not finite, are left out.
 /// Gaussians at one depth are drawn in the order of the frame.
 pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> Rendering {
+    draw(frame, camera, background, pulp::Arch::new())
+}
+
+/// Draws with the instructions of `arch`, which change nothing but the time.
+fn draw(frame: &GaussianFrame, camera: &Camera, background: [f32; 3], arch: pulp::Arch) -> Rendering {
     let view = View::new(frame, &Shapes::of(frame), camera);
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut pixels = vec![[0.0; 3]; width * height];
     let mut alpha = vec![0.0; width * height];
     let bands = pixels.par_chunks_mut(width * TILE).zip(alpha.par_chunks_mut(width * TILE));
     bands.enumerate().with_max_len(1).for_each(|(row, (pixels, alpha))| {
-        pulp::Arch::new().dispatch(DrawRow { view: &view, row, pixels, alpha, background });
+        arch.dispatch(DrawRow { view: &view, row, pixels, alpha, background });
     });
     Rendering { colour: Image::new(width, pixels), alpha }
 }
@@ -113,6 +118,22 @@ impl Blend for Ink {
             for (light, visible) in light.iter_mut().zip(visible) {
                 *light += visible * colour;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Up, ring};
+    use splatstream_scene::builtin::BuiltinScene;
+
+    #[test]
+    fn vector_instructions_draw_the_same_bits_as_plain_ones() {
+        let frame = BuiltinScene { gaussians: 5_000, ..BuiltinScene::default() }.frame(0);
+        for camera in ring(&frame, Up::default(), 2, 133) {
+            let plain = draw(&frame, &camera, [0.5; 3], pulp::Arch::Scalar);
+            assert_eq!(render(&frame, &camera, [0.5; 3]), plain);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::TILE;
 use super::project::{LOG2_255, Splat};
+use std::f32::consts::LN_2;
 
 /// The most that one Gaussian may cover.
 const MAX_ALPHA: f32 = 0.99;
@@ -116,9 +117,10 @@ fn exp2(x: f32) -> f32 {
     const ROUND: f32 = 12_582_912.0;
     let rounded = x + ROUND;
     let part = x - (rounded - ROUND);
+    // Value and slope at 0 are exact; the rest makes the largest relative error least, 1.1e-7 before rounding.
     let polynomial =
-        ((((1.339_887_4e-3 * part + 9.618_437e-3) * part + 5.550_332_5e-2) * part + 2.402_264_7e-1) * part
-            + 6.931_472e-1)
+        ((((1.330_060_5e-3 * part + 9.669_691e-3) * part + 5.550_558_5e-2) * part + 2.402_228_3e-1) * part
+            + LN_2)
             * part
             + 1.0;
     f32::from_bits(polynomial.to_bits().wrapping_add(rounded.to_bits() << 23))
@@ -129,12 +131,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exp2_is_right_to_a_millionth_where_alpha_lies() {
+    fn exp2_is_right_to_the_last_two_bits_where_alpha_lies() {
         for step in 0..=80_000 {
             let x = -8.0 + step as f32 * 1e-4;
             let exact = libm::exp2(f64::from(x));
             let error = (f64::from(exp2(x)) / exact - 1.0).abs();
-            assert!(error < 1e-6, "{x}: {error:e}");
+            assert!(error < 2.4e-7, "{x}: {error:e}");
         }
     }
 }

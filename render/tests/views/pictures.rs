@@ -193,3 +193,19 @@ fn the_number_of_threads_does_not_matter() {
     assert_eq!(pictures[0], pictures[1]);
     assert_eq!(pictures[0], pictures[2]);
 }
+
+/// CRC-32 of the bits of all colours and alphas, lowest byte first.
+fn checksum(drawn: &Rendering) -> u32 {
+    let values = drawn.colour.pixels().iter().flatten().chain(&drawn.alpha);
+    crc32fast::hash(&values.flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
+}
+
+#[test]
+fn the_picture_has_the_same_bits_on_every_machine() {
+    let scene = BuiltinScene { gaussians: 2_000, ..BuiltinScene::default() }.frame(0);
+    let camera = splatstream_render::camera::ring(&scene, Default::default(), 2, 72).remove(1);
+    let checksums = [false, true].map(|antialiased| {
+        checksum(&render(&scene.clone().with_antialiased(antialiased), &camera, [0.1, 0.2, 0.3]))
+    });
+    assert_eq!(checksums, [923_592_192, 4_010_468_725]);
+}
