@@ -73,7 +73,7 @@ def _blocks(values):
 
 
 def _vectors(vectors, random, move):
-    """Vectors of a code book move by half the distance to the nearest other, root mean square; else each value moves."""
+    """Vectors of a code book move by half the distance to the nearest other, on average; else each value moves."""
     distinct, where = np.unique(vectors, axis=0, return_inverse=True)
     if len(distinct) > REPEATED * len(vectors) or len(distinct) == 1:
         return move(vectors)

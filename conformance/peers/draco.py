@@ -22,10 +22,13 @@ LEVEL = 10
 def rates(scene):
     if scene.sequence:
         return []
-    options = "positions %d bits, others %d" + (", SH %d" if scene.degree else "")
-    width = 3 if scene.degree else 2
-    return [Rate("Draco", options % (point + (point[1] - SH_LESS,))[:width], dict(zip(("position_bits", "bits"), point)))
-            for point in POINTS]
+    points = []
+    for position_bits, bits in POINTS:
+        options = "positions %d bits, others %d" % (position_bits, bits)
+        if scene.degree:
+            options += ", SH %d" % (bits - SH_LESS)
+        points.append(Rate("Draco", options, {"position_bits": position_bits, "bits": bits}))
+    return points
 
 
 def code(rate, scene, decoded, tools):
