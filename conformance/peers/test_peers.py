@@ -14,6 +14,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import dither
 import draco
+import measure
 import ply
 import run
 import spz
@@ -166,6 +167,11 @@ class Reports(unittest.TestCase):
             run.ready("spz", Tools())
         with self.assertRaises(Missing):
             run.ready("nothing", Tools())
+
+    def test_what_runs_for_too_long_is_missing(self):
+        with self.assertRaisesRegex(Missing, "stopped after 1 s"):
+            measure.run([sys.executable, "-c", "while True: pass"], limit=1)
+        self.assertEqual(measure.run([sys.executable, "-c", "print(1)"], limit=1), "1\n")
 
     def test_every_peer_has_the_interface(self):
         for name in run.PEERS:
