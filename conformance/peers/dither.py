@@ -8,6 +8,8 @@ FEW = 4096      # a column with at most this many values, each of them common, s
 BLOCK = 256     # compressed PLY has a grid for every 256 Gaussians
 WINDOW = 64     # neighbours over which a fine grid's step is looked for
 NOISE = 4e-7    # of the largest magnitude: closer values are the same value in float32
+REPEATED = 0.75 # of the Gaussians: with fewer distinct SH vectors than this, SH came from a vector quantiser
+ROWS = 1024     # vectors compared with all others at a time
 SPLAT_ROTATION = 1 / 128
 
 
@@ -23,7 +25,7 @@ def dithered(gaussians, seed, known=None):
         gaussians,
         position=_single(move(gaussians.position)),
         colour=_single(move(gaussians.colour)),
-        sh=_single(move(gaussians.sh)) if gaussians.degree else gaussians.sh,
+        sh=_single(_vectors(gaussians.sh, random, move)) if gaussians.degree else gaussians.sh,
         opacity=_single(_logit(move(_sigmoid(gaussians.opacity)))),
         scale=_single(move(gaussians.scale)),
         rotation=_single(_rotation(gaussians.rotation, random, (known or {}).get("rotation"))),
@@ -68,6 +70,27 @@ def _blocks(values):
         if len(gaps):
             smallest[begin:begin + BLOCK] = gaps.min()
     return smallest
+
+
+def _vectors(vectors, random, move):
+    """Vectors of a code book move by half the distance to the nearest other, on average; else each value moves."""
+    distinct, where = np.unique(vectors, axis=0, return_inverse=True)
+    if len(distinct) > REPEATED * len(vectors) or len(distinct) == 1:
+        return move(vectors)
+    side = _nearest(distinct) / 2 * np.sqrt(12 / vectors.shape[1])
+    return vectors + (random.random(vectors.shape) - 0.5) * side[where.ravel(), None]
+
+
+def _nearest(vectors):
+    """Of every vector, the distance to the nearest other."""
+    squares = (vectors ** 2).sum(1)
+    nearest = np.empty(len(vectors))
+    for begin in range(0, len(vectors), ROWS):
+        some = vectors[begin:begin + ROWS]
+        squared = squares[begin:begin + ROWS, None] + squares - 2 * (some @ vectors.T)
+        squared[np.arange(len(some)), np.arange(begin, begin + len(some))] = np.inf
+        nearest[begin:begin + ROWS] = squared.min(1)
+    return np.sqrt(np.maximum(nearest, 0))
 
 
 def _rotation(rotation, random, cell):

@@ -1,7 +1,8 @@
 """Draco: one point cloud, positions by its own quantiser, the other attributes as integers of `bits`.
 
-Draco has no notion of a Gaussian. Its quantiser is that of the command line for generic attributes, over the range
-of the values; rotations go as their three smaller components and which one is left out, opacity after the sigmoid.
+Draco has no notion of a Gaussian, and DracoPy quantises nothing but positions. What it does to them is done to the
+others here: even steps over the range of the values; SH, as in SPZ, over -1 to 1 and with fewer bits. Rotations go as
+their three smaller components and which one is left out, opacity after the sigmoid.
 """
 
 from dataclasses import dataclass
@@ -14,14 +15,20 @@ from measure import Coded, Package, Rate, in_process
 PACKAGES = [Package("pip", "DracoPy", "2.2.0")]
 POINTS = ((10, 6), (12, 7), (14, 8), (15, 9), (16, 10))
 OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
+SH_LESS = 3  # bits
 LEVEL = 10
 
 
 def rates(scene):
     if scene.sequence:
         return []
-    return [Rate("Draco", "positions %d bits, others %d" % point, dict(zip(("position_bits", "bits"), point)))
-            for point in POINTS]
+    points = []
+    for position_bits, bits in POINTS:
+        options = "positions %d bits, others %d" % (position_bits, bits)
+        if scene.degree:
+            options += ", SH %d" % (bits - SH_LESS)
+        points.append(Rate("Draco", options, {"position_bits": position_bits, "bits": bits}))
+    return points
 
 
 def code(rate, scene, decoded, tools):
@@ -37,14 +44,14 @@ def code(rate, scene, decoded, tools):
                               generic_attributes=attributes), ranges
 
     def decode():
-        return _gaussians(DracoPy.decode(coded), ranges, bits)
+        return _gaussians(DracoPy.decode(coded), ranges)
 
     (coded, ranges), encode_s = in_process(encode, tools.repeat)
     back, decode_s = in_process(decode, tools.repeat)
     ply.write(decoded[0], back)
     side = sum(r.size for r in ranges.values())
     call = "DracoPy.encode(positions, quantization_bits=%(position_bits)d, compression_level=10, " \
-           "generic_attributes={scale, rotation, largest, opacity, colour, sh: %(bits)d bits})" % rate.settings
+           "generic_attributes={scale, rotation, largest, opacity, colour, sh: integers})" % rate.settings
     return Coded(len(coded) + side, len(back), encode_s, decode_s, "in-process", call)
 
 
@@ -54,14 +61,19 @@ class Range:
 
     low: np.float32
     high: np.float32
+    bits: int
     size = 8
 
-    def quantised(self, values, bits):
-        steps = (values - self.low) * ((2 ** bits - 1) / max(self.high - self.low, 1e-20))
-        return np.ascontiguousarray(np.rint(steps), np.uint8 if bits <= 8 else np.uint16)
+    @property
+    def step(self):
+        return max(self.high - self.low, 1e-20) / (2 ** self.bits - 1)
 
-    def values(self, steps, bits):
-        return (self.low + steps * ((self.high - self.low) / (2 ** bits - 1))).astype("<f4")
+    def quantised(self, values):
+        steps = np.rint((np.clip(values, self.low, self.high) - self.low) / self.step)
+        return np.ascontiguousarray(steps, np.uint8 if self.bits <= 8 else np.uint16)
+
+    def values(self, steps):
+        return (self.low + steps * self.step).astype("<f4")
 
 
 def _attributes(gaussians, bits):
@@ -73,15 +85,17 @@ def _attributes(gaussians, bits):
               "colour": gaussians.colour}
     if gaussians.degree:
         floats["sh"] = gaussians.sh
-    ranges = {name: Range(values.min(), values.max()) for name, values in floats.items()}
-    attributes = {name: ranges[name].quantised(values, bits) for name, values in floats.items()}
+    ranges = {name: Range(values.min(), values.max(), bits) for name, values in floats.items()}
+    if gaussians.degree:
+        ranges["sh"] = Range(np.float32(-1), np.float32(1), bits - SH_LESS)
+    attributes = {name: ranges[name].quantised(values) for name, values in floats.items()}
     attributes["largest"] = largest.astype(np.uint8)[:, None]
     return attributes, ranges
 
 
-def _gaussians(cloud, ranges, bits):
+def _gaussians(cloud, ranges):
     column = lambda name: cloud.get_attribute_by_name(name)["data"].reshape(len(cloud.points), -1)
-    values = {name: ranges[name].values(column(name), bits) for name in ranges}
+    values = {name: ranges[name].values(column(name)) for name in ranges}
     rows, largest = np.arange(len(cloud.points)), column("largest")[:, 0]
     rotation = np.zeros((len(rows), 4), "<f4")
     rotation[rows[:, None], OTHERS[largest]] = values["rotation"]

@@ -10,6 +10,7 @@ Seconds are CPU seconds of all threads: on a machine that others use too, they a
 import os
 import resource
 import shlex
+import signal
 import statistics
 import subprocess
 import time
@@ -78,13 +79,17 @@ def process(command, repeat=1):
 
 
 def run(command, stdin=None, limit=None):
-    """What a command prints; one that fails or takes more than `limit` seconds is Missing."""
+    """What a command prints; one that fails or takes more than `limit` CPU seconds is Missing."""
+    def bounded():
+        if limit:
+            resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+
     try:
-        done = subprocess.run([str(word) for word in command], input=stdin, capture_output=True, timeout=limit)
+        done = subprocess.run([str(word) for word in command], input=stdin, capture_output=True, preexec_fn=bounded)
     except FileNotFoundError:
         raise Missing("%s is not on this machine" % command[0]) from None
-    except subprocess.TimeoutExpired:
-        raise Missing("stopped after %d s" % limit) from None
+    if limit and done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        raise Missing("stopped after %d s" % limit)
     if done.returncode:
         tail = (done.stderr or done.stdout).decode(errors="replace").strip().splitlines()[-3:]
         raise Missing("%s: exit %d: %s" % (os.path.basename(str(command[0])), done.returncode, " / ".join(tail)))

@@ -31,7 +31,7 @@ def parse():
     parser.add_argument("--peers", default=",".join(PEERS), help="default: %(default)s")
     parser.add_argument("--only", default="", metavar="TEXT", help="only points whose options contain this")
     parser.add_argument("--repeat", type=int, default=3, help="times are medians of so many runs")
-    parser.add_argument("--limit", type=float, default=1800, metavar="SECONDS", help="for one point of a peer on Node")
+    parser.add_argument("--limit", type=int, default=1800, metavar="SECONDS", help="CPU seconds of a peer on Node")
     parser.add_argument("--dither", action="store_true", help="also code NAME_d, off the grid it was stored on")
     parser.add_argument("--splatstream", metavar="PATH", help="check that our reader agrees with every reference")
     parser.add_argument("--cache", default=os.path.join(ROOT, "target", "peers"), help="what is installed, and scratch")

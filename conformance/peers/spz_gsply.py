@@ -9,8 +9,9 @@ PACKAGES = [Package("pip", "gsply", "0.4.6"), Package("pip", "zstandard", "0.25.
 
 
 def rates(scene):
-    """gsply has no choice of SH bits."""
-    return [Rate("SPZ v%d (gsply)" % version, "defaults", {"version": version})
+    """gsply always spends 8 bits on SH."""
+    options = "SH 8 bits" if scene.degree else "defaults"
+    return [Rate("SPZ v%d (gsply)" % version, options, {"version": version})
             for version in ((4,) if scene.sequence else (3, 4))]
 
 

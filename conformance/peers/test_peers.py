@@ -14,6 +14,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import dither
 import draco
+import measure
 import ply
 import run
 import spz
@@ -89,6 +90,15 @@ class Dither(unittest.TestCase):
         below, above = dither.cells(values)
         self.assertLess(np.median(np.abs((below + above) / np.repeat(steps, 256) * 2047 - 1)), 0.01)
 
+    def test_vectors_of_a_code_book_stay_nearest_to_it(self):
+        random = np.random.Generator(np.random.PCG64(3))
+        book = random.normal(size=(200, 24))
+        label = random.integers(0, 200, 5000)
+        moved = dither._vectors(book[label], random, None)
+        nearest = ((moved[:, None] - book) ** 2).sum(2).argmin(1)
+        self.assertGreater((nearest == label).mean(), 0.99)
+        self.assertGreater(np.abs(moved - book[label]).mean(), 0.1)
+
     def test_what_was_never_quantised_stays(self):
         values = np.random.Generator(np.random.PCG64(3)).normal(size=20000)
         below, above = dither.cells(values)
@@ -102,10 +112,11 @@ class Layouts(unittest.TestCase):
 
     def test_draco_attributes_come_back(self):
         before = gaussians(degree=1)
+        before.sh = np.clip(before.sh, -1, 1)
         attributes, ranges = draco._attributes(before, 16)
         cloud = type("Cloud", (), {"points": before.position,
                                    "get_attribute_by_name": lambda self, name: {"data": attributes[name]}})()
-        after = draco._gaussians(cloud, ranges, 16)
+        after = draco._gaussians(cloud, ranges)
         alike = np.abs((after.rotation * before.rotation).sum(1))
         np.testing.assert_allclose(alike, 1, atol=1e-4)
         for name in ("position", "scale", "colour", "sh"):
@@ -156,6 +167,11 @@ class Reports(unittest.TestCase):
             run.ready("spz", Tools())
         with self.assertRaises(Missing):
             run.ready("nothing", Tools())
+
+    def test_what_runs_for_too_long_is_missing(self):
+        with self.assertRaisesRegex(Missing, "stopped after 1 s"):
+            measure.run([sys.executable, "-c", "while True: pass"], limit=1)
+        self.assertEqual(measure.run([sys.executable, "-c", "print(1)"], limit=1), "1\n")
 
     def test_every_peer_has_the_interface(self):
         for name in run.PEERS:

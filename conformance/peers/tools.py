@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import venv
 
 from measure import Package, run
@@ -28,8 +29,7 @@ class Tools:
         self.cache = os.path.abspath(cache)
         self.repeat = repeat
         self.limit = limit
-        self.work = os.path.join(self.cache, "work")
-        os.makedirs(self.work, exist_ok=True)
+        self.work = tempfile.TemporaryDirectory(prefix="work-", dir=self.cache)
 
     def install(self, package):
         if package.registry == "pip":
@@ -54,7 +54,7 @@ class Tools:
         return json.loads(out.splitlines()[-1])
 
     def scratch(self, name):
-        return os.path.join(self.work, name)
+        return os.path.join(self.work.name, name)
 
     def _folder(self, package):
         return os.path.join(self.cache, "npm", "%s@%s" % (package.name.replace("/", "+"), package.version))
