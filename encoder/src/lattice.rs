@@ -203,7 +203,8 @@ mod tests {
     fn the_lattice_holds_the_extent_with_the_step_asked_for() {
         let extent = Extent { low: [-1.0, 0.0, 2.0], high: [3.0, 1.0, 2.5] };
         let (offset, step, bits) = position_lattice(extent, 2.0, &Quality::High.steps());
-        assert_eq!((offset, step, bits), ([-1.0, 0.0, 2.0], 2.0 / 16384.0, 16));
+        // The sides of the box have 4 * 2^13.4 / 2 = 21,618 cells.
+        assert_eq!((offset, step, bits), ([-1.0, 0.0, 2.0], 2.0 / libm::exp2f(13.4), 15));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use splatstream_decoder::position::morton;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::canonical::canonicalise;
-use splatstream_encoder::{Preset, Quality, Settings, ShChoice};
+use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice};
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::{GaussianFrame, Planes, importance, sh_coefficients};
 use std::ops::ControlFlow;
@@ -178,9 +178,34 @@ proptest! {
         sh in prop_oneof![Just(ShChoice::Coefficients), Just(ShChoice::VectorQuantised)],
         seed: u64,
     ) {
-        let settings =
-            Settings { preset, sh, steps: quality.steps(), keep_invisible: true, block_log2: 7, ..Settings::default() };
+        let settings = Settings {
+            preset,
+            sh,
+            steps: quality.steps(),
+            importance: Some(Importance::Volume),
+            keep_invisible: true,
+            block_log2: 7,
+            ..Settings::default()
+        };
         check(kind, count, sh_degree, &settings, seed)?;
+    }
+}
+
+#[test]
+fn what_pictures_hardly_show_takes_every_second_point_of_its_lattices() {
+    let settings = Settings {
+        refinements: vec![50, 100],
+        importance: Some(Importance::Contribution),
+        keep_invisible: true,
+        ..Settings::default()
+    };
+    let (bytes, _) = encoded(vec![frame(Kind::Plain, 400, 0, 3)], &settings);
+    let (frames, _) = decoded(&bytes, &strict());
+    let planes = &frames[0].planes;
+    for plane in planes.log_scale.iter().chain(&planes.rotation) {
+        let odd = |values: &[i32]| values.iter().filter(|value| *value % 2 != 0).count();
+        assert!(odd(&plane[..200]) > 20, "the first half takes every point");
+        assert_eq!(odd(&plane[200..]), 0);
     }
 }
 

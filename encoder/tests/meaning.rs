@@ -6,7 +6,7 @@ mod common;
 use common::{encoded, strict};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Quality, Settings};
+use splatstream_encoder::{Quality, Settings, Tools};
 use splatstream_scene::{GaussianFrame, ReadLimits, ply};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -73,8 +73,12 @@ fn rows_of(ply: &[u8]) -> Vec<Row> {
 /// Encoded and decoded without visible loss; the rows in the order of x, as in the source.
 fn through_a_stream(rows: &[Row]) -> (GaussianFrame, Vec<Row>) {
     let frame = ply::read(&ply_of(rows), &ReadLimits::default()).unwrap();
-    let settings =
-        Settings { steps: Quality::VisuallyLossless.steps(), keep_invisible: true, ..Settings::default() };
+    let settings = Settings {
+        steps: Quality::VisuallyLossless.steps(),
+        tools: Tools { coarse_tail: false, ..Tools::default() },
+        keep_invisible: true,
+        ..Settings::default()
+    };
     let (bytes, _) = encoded(vec![frame], &settings);
     let mut output = None;
     decode_stream(&bytes, &strict(), |sequence, frame| {
