@@ -7,7 +7,7 @@ use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Preset, Quality, Settings, encode};
+use splatstream_encoder::{Preset, Settings, Steps, encode};
 use splatstream_format::Limits;
 use splatstream_format::inspect::{Element, inspect};
 use splatstream_format::syntax::SequenceParameters;
@@ -42,12 +42,11 @@ fn scene() -> GaussianFrame {
 }
 
 fn stream() -> Vec<u8> {
-    let settings = Settings {
-        preset: Preset::Fast,
-        steps: Quality::Low.steps(),
-        refinements: vec![50, 100],
-        ..Settings::default()
-    };
+    // Steps of its own: the annex does not change with what a quality is.
+    let steps =
+        Steps { position_bits: 12.0, log_scale: 0.25, rotation: 0.04, opacity: 0.8, dc: 0.1, sh: 0.4 };
+    let settings =
+        Settings { preset: Preset::Fast, steps, refinements: vec![50, 100], ..Settings::default() };
     let mut bytes = Vec::new();
     encode(&mut vec![scene()], &settings, &mut bytes, &mut |_, _| {}).unwrap();
     bytes
