@@ -104,8 +104,8 @@ fn peers(scene: &SceneChart, metric: &Metric) -> Vec<Series> {
                 Some(Dot { at: (point.bpg, value), label, hint })
             })
             .collect();
-        let line = if dots.len() > 1 { Line::Dashed } else { Line::None };
-        Series { style: PEER_STYLES[place % PEER_STYLES.len()], line, dots }
+        // Their options are not steps of one scale: a line would promise what lies between.
+        Series { style: PEER_STYLES[place % PEER_STYLES.len()], line: Line::None, dots }
     };
     names.iter().enumerate().map(one).collect()
 }

@@ -35,7 +35,7 @@ fn results(chart: &SceneChart) -> Markup {
     let anchor = chart.anchor();
     let ours = |peer: &PeerPoint| match bytes_for_the_same(&anchor, peer.rate_point()) {
         Some(percent) => format!("{percent:.0} %"),
-        None => "PSNR outside our qualities".to_owned(),
+        None => "outside our range".to_owned(),
     };
     let measured = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), speed);
     let body = html! {

@@ -48,7 +48,7 @@ fn rates(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
         h3 { "Quality against rate" }
         (how_to_read(
             "each coloured curve is one quality, its points the refinement levels, so the further right, the more \
-             Gaussians were received; the dashed black curve joins the qualities with all Gaussians, a dashed coloured one shows a quality with \
+             Gaussians were received; the dashed curve in the colour of the text joins the qualities with all Gaussians, a dashed coloured one shows a quality with \
              Gaussians in another order; up and to \
              the left is better, but for ST-LPIPS down and to the left."
         ))

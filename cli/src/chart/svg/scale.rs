@@ -26,7 +26,7 @@ impl Scale {
             return Self { logarithmic: true, values: (low / room, high * room), places };
         }
         let room = if high > low { 0.07 * (high - low) } else { 0.05 * high.abs().max(0.1) };
-        let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        let floor = if low > 0.0 { 0.0 } else { f64::NEG_INFINITY };
         Self { logarithmic: false, values: ((low - room).max(floor), high + room), places }
     }
 
