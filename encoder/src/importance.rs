@@ -5,7 +5,7 @@ use crate::settings::{Importance, Preset, Settings};
 use splatstream_format::syntax::prefix_length;
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
-use splatstream_render::contribution::{contribution, removal};
+use splatstream_render::contribution::{contribution, worth};
 use splatstream_scene::{GaussianFrame, importance};
 
 /// Orders the frames of a sequence, most important Gaussian first.
@@ -73,7 +73,7 @@ impl Ranking {
             return importance::order(&volume);
         }
         if self.cameras.is_empty() {
-            let (count, height) = if self.preset == Preset::Small { (24, 360) } else { (12, 270) };
+            let (count, height) = if self.preset == Preset::Small { (24, 360) } else { (10, 270) };
             self.cameras = spiral(frame, Up::default(), count, height);
         }
         match self.importance {
@@ -84,13 +84,16 @@ impl Ranking {
 
     /// From the last to the first: what pictures miss least goes, the rest is weighed anew without it.
     ///
-    /// One look at the whole frame would keep none of two Gaussians that hide each other's loss.
+    /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
+    /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what
+    /// goes at the same time, the contribution alone none of how alike things look.
     fn eliminate(&self, frame: &GaussianFrame, volume: &[f64]) -> Vec<u32> {
         let mut kept = all(frame);
         let mut gone: Vec<u32> = Vec::new();
         for &percent in &self.rounds {
-            let losses = removal(&frame.select(&kept), &self.cameras);
-            kept = ranked(&losses, volume, &kept);
+            let worth = worth(&frame.select(&kept), &self.cameras);
+            let scores: Vec<f64> = worth.iter().map(|w| (w.contribution * w.loss).sqrt()).collect();
+            kept = ranked(&scores, volume, &kept);
             let going = kept.split_off(prefix_length(percent, frame.len() as u32) as usize);
             gone = going.into_iter().chain(gone).collect();
         }

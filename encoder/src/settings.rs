@@ -80,7 +80,8 @@ pub enum ShChoice {
 /// What puts Gaussians into the first refinements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Importance {
-    /// What the pictures lose without a Gaussian; weighed anew at each refinement, from the last down.
+    /// The geometric mean of contribution and of what the pictures lose without a Gaussian; weighed anew at each
+    /// refinement, from the last down.
     Removal,
     /// Transmittance times alpha, summed over the pixels of all views.
     Contribution,

@@ -11,7 +11,16 @@ use splatstream_scene::GaussianFrame;
 ///
 /// Equal on every machine and for any number of threads. A Gaussian that no view sees has 0.
 pub fn contribution(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
-    sums::<false>(frame, cameras)
+    sums::<false>(frame, cameras).into_iter().map(|worth| worth.contribution).collect()
+}
+
+/// What a Gaussian is to a set of views.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Worth {
+    /// What it gives: see [`contribution`].
+    pub contribution: f64,
+    /// What the pictures lose without it: see [`removal`].
+    pub loss: f64,
 }
 
 /// What the pictures lose without each Gaussian: the squared change of colour if that one alone is taken away and
@@ -20,33 +29,49 @@ pub fn contribution(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
 /// With transmittance T in front of it, alpha a, its colour c and the light R that is composited behind it, the colour
 /// of a pixel changes by T·a·c − R·a / (1 − a). Equal on every machine and for any number of threads.
 pub fn removal(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
+    worth(frame, cameras).into_iter().map(|worth| worth.loss).collect()
+}
+
+/// Both measures of each Gaussian, for the price of [`removal`].
+pub fn worth(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     sums::<true>(frame, cameras)
 }
 
-fn sums<const REMOVAL: bool>(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
-    let mut sums = vec![0.0; frame.len()];
+/// `loss` stays 0 without `REMOVAL`.
+fn sums<const REMOVAL: bool>(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
+    let mut sums = vec![Worth::default(); frame.len()];
     let shapes = Shapes::of(frame);
     for camera in cameras {
         let view = &View::new(frame, &shapes, camera);
         let rows = (0..view.rows.len()).into_par_iter().with_max_len(1);
-        let shares: Vec<Vec<(u32, f32)>> =
+        let shares: Vec<Vec<Share>> =
             rows.map(|row| pulp::Arch::new().dispatch(RowShares::<REMOVAL> { view, row })).collect();
         // In the order of the rows, whoever computed them.
-        for &(place, share) in shares.iter().flatten() {
-            sums[view.splats[place as usize].gaussian as usize] += f64::from(share);
+        for share in shares.iter().flatten() {
+            let sum = &mut sums[view.splats[share.place as usize].gaussian as usize];
+            sum.contribution += f64::from(share.contribution);
+            sum.loss += f64::from(share.loss);
         }
     }
     sums
 }
 
-/// What each ellipse is to the tiles of a row: its place in the view, and a sum over the pixels of a tile.
+/// What an ellipse is to a tile: sums over its pixels.
+struct Share {
+    /// Which ellipse of the view.
+    place: u32,
+    contribution: f32,
+    loss: f32,
+}
+
+/// What each ellipse is to the tiles of a row.
 struct RowShares<'a, const REMOVAL: bool> {
     view: &'a View,
     row: usize,
 }
 
 impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
-    type Output = Vec<(u32, f32)>;
+    type Output = Vec<Share>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
@@ -63,7 +88,13 @@ impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
             if REMOVAL {
                 blend_tile(splats, places, &mut tile(), &mut ink);
             }
-            let mut counter = Counter::<REMOVAL> { ink, lanes: [0.0; TILE], places, shares: &mut shares };
+            let mut counter = Counter::<REMOVAL> {
+                ink,
+                given: [0.0; TILE],
+                lost: [0.0; TILE],
+                places,
+                shares: &mut shares,
+            };
             blend_tile(splats, places, &mut tile(), &mut counter);
         }
         shares
@@ -74,18 +105,19 @@ impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
 struct Counter<'a, const REMOVAL: bool> {
     /// For removal: the light of the Gaussians that are still to come.
     ink: Ink,
-    lanes: Lanes,
+    given: Lanes,
+    lost: Lanes,
     places: &'a [u32],
-    shares: &'a mut Vec<(u32, f32)>,
+    shares: &'a mut Vec<Share>,
 }
 
 impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
     #[inline(always)]
     fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes) {
+        for (sum, visible) in self.given.iter_mut().zip(visible) {
+            *sum += visible;
+        }
         if !REMOVAL {
-            for (sum, visible) in self.lanes.iter_mut().zip(visible) {
-                *sum += visible;
-            }
             return;
         }
         for (behind, colour) in self.ink.light[line].iter_mut().zip(colour) {
@@ -95,17 +127,19 @@ impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
                 // What passes is T (1 - a): a pixel that is done has a negative sign there, and nothing visible.
                 let change =
                     own - behind[lane] * (visible[lane] / passing[lane].abs().max(f32::MIN_POSITIVE));
-                self.lanes[lane] += change * change;
+                self.lost[lane] += change * change;
             }
         }
     }
 
     #[inline(always)]
     fn done(&mut self, entry: usize) {
-        let share: f32 = self.lanes.iter().sum();
-        if share > 0.0 {
-            self.shares.push((self.places[entry], share));
+        let contribution: f32 = self.given.iter().sum();
+        if contribution > 0.0 {
+            let loss = self.lost.iter().sum();
+            self.shares.push(Share { place: self.places[entry], contribution, loss });
         }
-        self.lanes = [0.0; TILE];
+        self.given = [0.0; TILE];
+        self.lost = [0.0; TILE];
     }
 }
