@@ -79,7 +79,7 @@ pub(crate) struct Encode {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum ImportanceName {
-    /// What pictures lose without a Gaussian, weighed anew at each refinement.
+    /// What pictures gain by a Gaussian and lose without it, weighed anew at each refinement.
     Removal,
     /// Transmittance times alpha over the pixels of all views.
     Contribution,

@@ -106,9 +106,10 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
 
 fn order(report: &Report, settings: &Settings) -> Option<Choice> {
     let (choice, why) = match report.importance? {
-        Importance::Removal => {
-            ("removal", "what pictures lose without a Gaussian, weighed anew at each refinement")
-        }
+        Importance::Removal => (
+            "removal",
+            "what pictures gain by a Gaussian and lose without it, weighed anew at each refinement",
+        ),
         Importance::Contribution => {
             ("contribution", "transmittance times alpha over the pixels of all views")
         }
