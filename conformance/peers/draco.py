@@ -3,6 +3,9 @@
 Draco has no notion of a Gaussian, and DracoPy quantises nothing but positions. What it does to them is done to the
 others here: even steps over the range of the values; SH, as in SPZ, over -1 to 1 and with fewer bits. Rotations go as
 their three smaller components and which one is left out, opacity after the sigmoid.
+
+Its kd-tree gives every component the bits of the widest, which SH cannot afford; its sequential mode keeps the order it
+is given, here Morton's.
 """
 
 from dataclasses import dataclass
@@ -17,17 +20,19 @@ POINTS = ((10, 6), (12, 7), (14, 8), (15, 9), (16, 10))
 OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 SH_LESS = 3  # bits
 LEVEL = 10
+MORTON_BITS = 16
 
 
 def rates(scene):
     if scene.sequence:
         return []
     points = []
-    for position_bits, bits in POINTS:
-        options = "positions %d bits, others %d" % (position_bits, bits)
-        if scene.degree:
-            options += ", SH %d" % (bits - SH_LESS)
-        points.append(Rate("Draco", options, {"position_bits": position_bits, "bits": bits}))
+    for mode in ("sequential",) if scene.degree else ("kd-tree", "sequential"):
+        for position_bits, bits in POINTS:
+            options = "%s, positions %d bits, others %d" % (mode, position_bits, bits)
+            if scene.degree:
+                options += ", SH %d" % (bits - SH_LESS)
+            points.append(Rate("Draco", options, {"mode": mode, "position_bits": position_bits, "bits": bits}))
     return points
 
 
@@ -35,13 +40,13 @@ def code(rate, scene, decoded, tools):
     import DracoPy
 
     (gaussians,) = scene.frames()
-    bits = rate.settings["bits"]
+    flags = {"quantization_bits": rate.settings["position_bits"], "compression_level": LEVEL,
+             "preserve_order": rate.settings["mode"] == "sequential"}
 
     def encode():
-        attributes, ranges = _attributes(gaussians, bits)
-        position_bits = rate.settings["position_bits"]
-        return DracoPy.encode(gaussians.position, quantization_bits=position_bits, compression_level=LEVEL,
-                              generic_attributes=attributes), ranges
+        ordered = _in_morton_order(gaussians) if flags["preserve_order"] else gaussians
+        attributes, ranges = _attributes(ordered, rate.settings["bits"])
+        return DracoPy.encode(ordered.position, generic_attributes=attributes, **flags), ranges
 
     def decode():
         return _gaussians(DracoPy.decode(coded), ranges)
@@ -50,8 +55,8 @@ def code(rate, scene, decoded, tools):
     back, decode_s = in_process(decode, tools.repeat)
     ply.write(decoded[0], back)
     side = sum(r.size for r in ranges.values())
-    call = "DracoPy.encode(positions, quantization_bits=%(position_bits)d, compression_level=10, " \
-           "generic_attributes={scale, rotation, largest, opacity, colour, sh: integers})" % rate.settings
+    call = "DracoPy.encode(positions, generic_attributes={scale, rotation, largest, opacity, colour, sh}, %s)" \
+        % ", ".join("%s=%s" % flag for flag in flags.items())
     return Coded(len(coded) + side, len(back), encode_s, decode_s, "in-process", call)
 
 
@@ -91,6 +96,17 @@ def _attributes(gaussians, bits):
     attributes = {name: ranges[name].quantised(values) for name, values in floats.items()}
     attributes["largest"] = largest.astype(np.uint8)[:, None]
     return attributes, ranges
+
+
+def _in_morton_order(gaussians):
+    position = gaussians.position - gaussians.position.min(0)
+    cell = (position * ((2 ** MORTON_BITS - 1) / max(position.max(), 1e-20))).astype(np.int64)
+    key = np.zeros(len(cell), np.int64)
+    for bit in range(MORTON_BITS):
+        for axis in range(3):
+            key |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
+    order = np.argsort(key, kind="stable")
+    return ply.Gaussians(*(column[order] for column in vars(gaussians).values()))
 
 
 def _gaussians(cloud, ranges):

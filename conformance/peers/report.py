@@ -44,6 +44,11 @@ class Report:
         _replace(self.missing, {"peer": peer, "scene": scene, "why": why}, ["peer", "scene", "why"])
         self._save()
 
+    def forget(self, peer, scene, options=""):
+        """What is tried again is no longer missing."""
+        self.missing = [row for row in self.missing
+                        if (row["peer"], row["scene"]) != (peer, scene) or not row["why"].startswith(options)]
+
     def print_table(self):
         gaussians = {scene["scene"]: scene["gaussians"] for scene in self.scenes}
         row = "%-15s %-14s %-41s %10s %7s %9s %9s"

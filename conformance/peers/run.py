@@ -19,7 +19,10 @@ def main():
     installed.enter(os.path.abspath(arguments.cache))
     one_core()
     report = Report(arguments.out)
-    measure(arguments, report)
+    try:
+        measure(arguments, report)
+    except Missing as why:
+        sys.exit("no reference: %s" % why)
     report.print_table()
     return 0 if report.results else 1
 
@@ -42,6 +45,7 @@ def measure(arguments, report):
     tools = installed.Tools(arguments.cache, arguments.repeat, arguments.limit)
     scenes = prepare(arguments, tools, report)
     for name in arguments.peers.split(","):
+        report.forget(name, None)
         try:
             peer = ready(name, tools)
         except Missing as why:
@@ -55,9 +59,7 @@ def measure(arguments, report):
 
 def prepare(arguments, tools, report):
     import scene as reference  # needs numpy: only now are we where it is installed
-    import transform
 
-    tools.install(transform.TRANSFORM)
     scenes = []
     for source in arguments.scenes:
         for dithered in (False, True) if arguments.dither else (False,):
@@ -79,6 +81,7 @@ def ready(name, tools):
 
 
 def record(peer, rate, scene, tools, report):
+    report.forget(rate.peer, scene.name, rate.options)
     place, decoded = report.places(rate, scene)
     try:
         coded = peer.code(rate, scene, decoded, tools)

@@ -11,6 +11,7 @@ from measure import run
 
 CLOSE = 1e-5  # rounding of two float32 readers, in units of the scene
 
+
 @dataclass
 class Scene:
     name: str
@@ -76,6 +77,7 @@ def _frames(source):
 def _read(path, tools):
     if ply.is_standard(path):
         return ply.read(path)
+    tools.install(transform.TRANSFORM)
     gaussians = transform.to_gaussians(path, tools)
     expected = transform.count(path, tools)
     if len(gaussians) != expected:

@@ -157,6 +157,9 @@ class Reports(unittest.TestCase):
                    self.report)
         self.assertEqual(self.saved()["missing"], [{"peer": "Thing", "scene": "a", "why": "best: no such codec"}])
         self.assertEqual(self.saved()["results"], [])
+        peer = type("Peer", (), {"PACKAGES": [], "code": lambda *_: Coded(5, 10, 0.1, 0.2, "in-process", "thing()")})
+        run.record(peer, Rate("Thing", "best"), self.scene, None, self.report)
+        self.assertEqual(self.saved()["missing"], [])
 
     def test_a_peer_that_cannot_be_installed_is_missing(self):
         class Tools:
