@@ -16,6 +16,7 @@ mod sweep;
 mod tables;
 
 use crate::cameras::{CameraArgs, Views};
+use crate::compare::pictures::read_weights;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::parse_frame_rate;
@@ -29,7 +30,7 @@ use peers::Peers;
 use scene_chart::SceneChart;
 use scenes::Scene;
 use splatstream_render::metrics::StLpips;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use summary::Summary;
 use sweep::{Sweep, SweepArgs};
 
@@ -162,10 +163,6 @@ impl Chart {
         OutputFile::write(&self.out.join("index.html"), page.html().as_bytes())?;
         Ok(Summary::new(&self.out, charts, files))
     }
-}
-
-fn read_weights(path: &Path) -> Result<StLpips, Failure> {
-    StLpips::read(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
 }
 
 /// The command as it was given, for people to repeat.

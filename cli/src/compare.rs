@@ -3,7 +3,7 @@
 pub(crate) mod errors;
 mod grid;
 pub(crate) mod matching;
-mod pictures;
+pub(crate) mod pictures;
 
 use crate::console::Console;
 use crate::failure::Failure;

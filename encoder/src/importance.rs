@@ -26,10 +26,12 @@ impl Ranking {
             Preset::Fast => Importance::Volume,
             Preset::Balanced | Preset::Small => Importance::Removal,
         };
-        let alone = settings.refinements.len() == 1;
-        let importance = settings.importance.filter(|_| !alone).unwrap_or(by_preset);
+        let importance = match settings.refinements.len() {
+            1 => Importance::Volume,
+            _ => settings.importance.unwrap_or(by_preset),
+        };
         Self {
-            importance: if alone { Importance::Volume } else { importance },
+            importance,
             rounds: rounds(&settings.refinements, settings.preset),
             cameras: settings.cameras.clone(),
             preset: settings.preset,
