@@ -44,6 +44,9 @@ pub(crate) struct Decode {
     /// Format of the files; default is that of the file's name, or ply.
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// Show only the Gaussians of the operating point's units, not what is carried over from the intra frame.
+    #[arg(long)]
+    subset: bool,
     /// Do not compare frames with the digests in the stream.
     #[arg(long)]
     no_verify: bool,
@@ -138,6 +141,7 @@ impl Decode {
             verify: !self.no_verify,
             operating_point: self.op.unwrap_or(OperatingPoint::ALL),
             tolerant: !self.strict,
+            subset: self.subset,
         }
     }
 
@@ -189,7 +193,7 @@ impl<'a> Decoding<'a> {
         let number = frame.number;
         if self.frames.contains(number) {
             self.count(&frame);
-            let gaussians = to_gaussians(frame.planes, sequence);
+            let gaussians = to_gaussians(frame.into_shown(), sequence);
             let start = Instant::now();
             self.failed = self.target.and_then(|target| target.write(number, &gaussians).err());
             self.writing += start.elapsed();

@@ -108,9 +108,9 @@ impl Demo {
         let options = Options { operating_point: info.point, ..Options::default() };
         let start = Instant::now();
         let summary = decode_stream(stream, &options, |sequence, frame| {
-            let gaussians = to_gaussians(frame.planes, sequence);
-            let start = Instant::now();
             let path = frame_path(&directory, frame.number as usize);
+            let gaussians = to_gaussians(frame.into_shown(), sequence);
+            let start = Instant::now();
             failed = OutputFile::write(&path, &ply::write(&gaussians)).err();
             writing += start.elapsed();
             if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -139,7 +139,7 @@ impl Demo {
             if frame.number == 0
                 && let Some(original) = source.first()
             {
-                compare_frames(original, &to_gaussians(frame.planes, sequence), Match::Auto, &mut sums);
+                compare_frames(original, &to_gaussians(frame.into_shown(), sequence), Match::Auto, &mut sums);
             }
             ControlFlow::Continue(())
         });

@@ -81,7 +81,7 @@ impl Frames<'_> {
                 let decoded = next_decoded(units, decoder).map_err(|error| file.fault(error))?;
                 Ok(decoded
                     .zip(decoder.sequence())
-                    .map(|(frame, sequence)| to_gaussians(frame.planes, sequence)))
+                    .map(|(frame, sequence)| to_gaussians(frame.into_shown(), sequence)))
             }
             Self::Files { files, next } => {
                 if *next >= files.len() {

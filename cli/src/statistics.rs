@@ -60,24 +60,27 @@ pub(crate) fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statist
         units: Vec::new(),
     };
     let mut state = State::default();
-    for unit in Stream::open(bytes, limits)?.units() {
+    let stream = Stream::open(bytes, limits)?;
+    let profile = stream.header().profile();
+    for unit in stream.units() {
         let unit = unit?;
         statistics.count(&unit.header);
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
-                state.sequence = Some(SequenceParameters::parse_payload(unit.payload, unit.payload_at)?);
+                state.sequence =
+                    Some(SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?);
             }
             UnitType::GopHeader => {
-                let header = GopHeader::parse_payload(unit.payload, unit.payload_at)?;
+                let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile)?;
                 state.gop = Some(Gop::new(header, unit.header.frame));
             }
             UnitType::FrameHeader => {
-                state.frame = Some(FrameHeader::parse_payload(unit.payload, unit.payload_at)?);
+                state.frame = Some(FrameHeader::parse_payload(unit.payload, unit.payload_at, profile)?);
                 state.models = None;
             }
             UnitType::Transform | UnitType::Codebook => {
                 if let (Some(gop), Some(sequence)) = (&mut state.gop, &state.sequence) {
-                    gop.tool(&unit, sequence, limits)?;
+                    gop.tool(&unit, sequence, profile, limits)?;
                 }
             }
             UnitType::Refinement => state.refinement(&unit, limits, &mut statistics)?,

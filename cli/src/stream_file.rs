@@ -47,9 +47,10 @@ impl StreamFile {
 
     /// The sequence parameters, if the stream starts as it should.
     pub(crate) fn sequence(&self, limits: &Limits) -> Option<SequenceParameters> {
-        let unit = Stream::open(&self.bytes, limits).ok()?.units().next()?.ok()?;
+        let stream = Stream::open(&self.bytes, limits).ok()?;
+        let (unit, profile) = (stream.units().next()?.ok()?, stream.header().profile());
         (unit.header.unit_type() == UnitType::SequenceParameters)
-            .then(|| SequenceParameters::parse_payload(unit.payload, unit.payload_at).ok())?
+            .then(|| SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile).ok())?
     }
 
     /// Refuses an operating point that the stream cannot have: it would silently be another one.

@@ -97,12 +97,12 @@ pub fn decode_block(
     out: &mut FrameSlice<'_>,
 ) -> Result<()> {
     let count = out.planes.first().map_or(0, |plane| plane.len());
-    let block = decode_coded(bytes, at, count, unit, decoders)?;
+    let block = decode_coded(bytes, at, count, unit.layout, unit.lanes_log2, decoders)?;
     let biases: Vec<i32> = decoders.iter().map(PlaneDecoder::bias).collect();
     reconstruct(&block, unit, &biases, at, out)
 }
 
-/// Clause 8.4: the coded values of a block, its entropy state checked.
+/// Clause 8.4: the coded values of a block of `count` values a plane, its entropy state checked.
 ///
 /// # Errors
 /// Malformed. No range is checked: [`reconstruct`] does that.
@@ -110,12 +110,13 @@ pub fn decode_coded(
     bytes: &[u8],
     at: u64,
     count: usize,
-    unit: &UnitParameters<'_>,
+    layout: &Layout,
+    lanes_log2: u8,
     decoders: &[PlaneDecoder],
 ) -> Result<CodedBlock> {
-    let mut reader = BlockReader::open(bytes, at, unit.lanes_log2)?;
+    let mut reader = BlockReader::open(bytes, at, lanes_log2)?;
     let mut block = CodedBlock::new(vec![0; count]);
-    for (plane, (&info, decoder)) in unit.layout.planes().iter().zip(decoders).enumerate() {
+    for (plane, (&info, decoder)) in layout.planes().iter().zip(decoders).enumerate() {
         let coded = read_plane(&mut reader, decoder, plane, info, &mut block);
         block.push(info, coded);
         keep_for_contexts(&mut block, info, decoder.bias());
@@ -132,7 +133,7 @@ fn read_plane(
     block: &mut CodedBlock,
 ) -> Vec<i32> {
     let [first, second] = decoder.axes();
-    if info.attribute == Attribute::Position {
+    if info.is_position() {
         read_deltas(reader, decoder, &mut block.deltas);
         return Vec::new();
     }
@@ -260,7 +261,8 @@ pub fn reconstruct(
             }
             Attribute::Dc => dc_components.push(attribute::unbias(coded, bias)),
             Attribute::Sh => sh_components.push(attribute::unbias(coded, bias)),
-            Attribute::Position | Attribute::LogScale | Attribute::Opacity => {}
+            // Known already; the others are in no refinement.
+            _ => {}
         }
     }
     let colour = out.planes.get_mut(DC..).unwrap_or_default();

@@ -52,7 +52,7 @@ impl Colour<'_> {
     }
 
     /// Clause 7.8. Adds up the codebook entries of the stages; the sum is clamped.
-    fn entries(&self, indices: &[Vec<i32>], rank: usize, at: u64) -> Result<Vec<Vec<i32>>> {
+    pub(crate) fn entries(&self, indices: &[Vec<i32>], rank: usize, at: u64) -> Result<Vec<Vec<i32>>> {
         let count = indices.first().map_or(0, Vec::len);
         let mut components = vec![vec![0_i32; count]; rank];
         for (stage, codebook) in indices.iter().zip(self.codebooks.iter().flatten()) {
@@ -96,6 +96,30 @@ pub fn inverse(
     out: &mut [&mut [i32]],
     at: u64,
 ) -> Result<()> {
+    transformed(transform, components, out, at, |_, mean, change| mean.wrapping_add(change))
+}
+
+/// out_j += Round(sum over k of basis[k][j] * component_k, 6): a residual on top of what `out` holds.
+///
+/// # Errors
+/// As [`inverse`].
+pub fn add_inverse(
+    transform: &Transform,
+    components: &[Vec<i32>],
+    out: &mut [&mut [i32]],
+    at: u64,
+) -> Result<()> {
+    transformed(transform, components, out, at, |predicted, _, change| predicted.wrapping_add(change))
+}
+
+/// Writes what `join` makes of the value in `out`, the mean and the transformed components.
+fn transformed(
+    transform: &Transform,
+    components: &[Vec<i32>],
+    out: &mut [&mut [i32]],
+    at: u64,
+    join: impl Fn(i32, i32, i32) -> i32,
+) -> Result<()> {
     let dimension = usize::from(transform.header.dimension);
     for plane in components {
         in_range(plane, &COMPONENT_RANGE, "component", "7.7", at)?;
@@ -112,7 +136,7 @@ pub fn inverse(
         for (axis, (plane, &mean)) in out.iter_mut().zip(&transform.mean).enumerate() {
             let sums = tile_sums(transform, axis, dimension, &tile);
             for (slot, sum) in plane.get_mut(start..).unwrap_or_default().iter_mut().zip(sums) {
-                *slot = mean.wrapping_add(sum.wrapping_add(32) >> 6);
+                *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
             }
         }
         start = start.wrapping_add(TILE);

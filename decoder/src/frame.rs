@@ -100,12 +100,29 @@ impl QuantizedFrame {
         self.signed_planes_mut().for_each(|plane| plane.truncate(count));
     }
 
+    /// Keeps the Gaussians whose flag is set.
+    pub fn retain(&mut self, keep: &[bool]) {
+        self.position.iter_mut().for_each(|plane| crate::home::retain(plane, keep));
+        self.signed_planes_mut().for_each(|plane| crate::home::retain(plane, keep));
+    }
+
+    /// Appends the Gaussians of another frame with as many SH planes.
+    pub fn append(&mut self, other: &Self) {
+        for (plane, more) in self.position.iter_mut().zip(&other.position) {
+            plane.extend_from_slice(more);
+        }
+        for (plane, more) in self.signed_planes_mut().zip(other.signed_planes()) {
+            plane.extend_from_slice(more);
+        }
+    }
+
     /// The planes after the positions, in canonical order: log-scale, opacity, rotation, dc, sh.
     pub fn signed_planes(&self) -> impl Iterator<Item = &Vec<i32>> {
         self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation).chain(&self.dc).chain(&self.sh)
     }
 
-    fn signed_planes_mut(&mut self) -> impl Iterator<Item = &mut Vec<i32>> {
+    /// The same, to be changed.
+    pub fn signed_planes_mut(&mut self) -> impl Iterator<Item = &mut Vec<i32>> {
         self.log_scale
             .iter_mut()
             .chain([&mut self.opacity])

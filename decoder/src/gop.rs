@@ -4,7 +4,7 @@ use crate::colour::Colour;
 use crate::layout::ShCoding;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{
-    CodebookHeader, FrameHeader, GopHeader, RefinementHeader, SequenceParameters, Table, TransformHeader,
+    CodebookHeader, FrameHeader, GopHeader, Profile, SequenceParameters, ShHeader, Table, TransformHeader,
     TransformKind, UnitType,
 };
 use splatstream_format::unit::Unit;
@@ -19,9 +19,18 @@ pub struct Gop {
     pub first_frame: u32,
     dc: [Option<Transform>; 16],
     sh: [Option<Transform>; 16],
-    codebooks: [Option<Codebook>; 16],
+    codebooks: [Option<Defined>; 16],
     codebook_values: u64,
 }
+
+/// A codebook and the temporal layer that defined it.
+#[derive(Debug, Clone)]
+struct Defined {
+    codebook: Codebook,
+    temporal_layer: u8,
+}
+
+const DEFINED_ONCE: &str = "an identifier is defined once in a GOP";
 
 /// The transforms of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +58,13 @@ impl Gop {
     ///
     /// # Errors
     /// What clauses 6.7 and 6.8 refuse, an identifier defined twice, more codebook values than the limits.
-    pub fn tool(&mut self, unit: &Unit<'_>, sequence: &SequenceParameters, limits: &Limits) -> Result<()> {
+    pub fn tool(
+        &mut self,
+        unit: &Unit<'_>,
+        sequence: &SequenceParameters,
+        profile: Profile,
+        limits: &Limits,
+    ) -> Result<()> {
         if unit.header.unit_type() == UnitType::Transform {
             let (header, rest) = TransformHeader::parse(unit.payload, unit.payload_at, sequence)?;
             let slots = match header.kind() {
@@ -61,12 +76,25 @@ impl Gop {
             return Ok(());
         }
         let (header, rest) = CodebookHeader::parse(unit.payload, unit.payload_at)?;
-        let slot = undefined(&mut self.codebooks, header.codebook_id, unit, "6.8")?;
-        self.codebook_values = self.codebook_values.saturating_add(u64::from(header.value_count()));
+        let known = defined(&self.codebooks, header.codebook_id);
+        let layer = unit.header.temporal_layer;
+        if known.is_some_and(|known| profile == Profile::Intra || known.temporal_layer != layer) {
+            let rule = match profile {
+                Profile::Intra => DEFINED_ONCE,
+                Profile::Dynamic => "a codebook is replaced in the temporal layer that defined it",
+            };
+            return Err(Error::new(unit.payload_at, "6.8", ErrorKind::Constraint { rule }));
+        }
+        let replaced = known.map_or(0, |known| u64::from(known.codebook.header.value_count()));
+        let values = self.codebook_values.saturating_sub(replaced);
+        self.codebook_values = values.saturating_add(u64::from(header.value_count()));
         let most = u64::from(limits.max_codebook_values);
         let at = place(&CodebookHeader::TABLE, unit.payload_at, "entry_count_minus1", 0);
         Limits::check(at, "max_codebook_values", self.codebook_values, most)?;
-        *slot = Some(Codebook::parse_behind(header, rest, unit.payload_at)?);
+        let codebook = Codebook::parse_behind(header, rest, unit.payload_at)?;
+        if let Some(slot) = self.codebooks.get_mut(usize::from(header.codebook_id)) {
+            *slot = Some(Defined { codebook, temporal_layer: layer });
+        }
         Ok(())
     }
 
@@ -88,35 +116,41 @@ impl Gop {
         Ok(Transforms { dc, sh })
     }
 
-    /// What a unit needs to reconstruct colour.
+    /// What a unit of a temporal layer needs to reconstruct colour; `table` is that of its header, at offset `at`.
     ///
     /// # Errors
     /// Invalid if a codebook is not defined or has another number of components than the transform.
     pub fn colour<'a>(
         &'a self,
         transforms: Transforms<'a>,
-        header: &RefinementHeader,
-        at: u64,
+        header: &ShHeader,
+        layer: u8,
+        (table, at): (&Table, u64),
     ) -> Result<Colour<'a>> {
         let rank = transforms.sh.map_or(0, |transform| transform.header.rank);
         if transforms.sh.is_none() && header.sh_mode != 0 {
             let value = i64::from(header.sh_mode);
             let kind = ErrorKind::OutOfRange { element: "sh_mode", value, min: 0, max: 0 };
-            return Err(Error::new(place(&RefinementHeader::TABLE, at, "sh_mode", 0), "6.9", kind));
+            return Err(Error::new(place(table, at, "sh_mode", 0), table.semantics, kind));
         }
         let mode = ShCoding::of(header, rank);
         let mut codebooks = [None; 4];
         for ((slot, id), stage) in codebooks.iter_mut().zip(header.codebooks()).zip(0..) {
-            let at = place(&RefinementHeader::TABLE, at, "codebook_ids", stage);
+            let at = place(table, at, "codebook_ids", stage);
             let undefined = ErrorKind::Undefined { element: "codebook_ids", id: u64::from(id) };
-            let codebook = defined(&self.codebooks, id).ok_or(Error::new(at, "6.9", undefined))?;
+            let known = defined(&self.codebooks, id).ok_or(Error::new(at, table.semantics, undefined))?;
+            let Defined { codebook, temporal_layer } = known;
+            if *temporal_layer > layer {
+                let rule = "a codebook belongs to no higher temporal layer than the units that use it";
+                return Err(Error::new(at, table.semantics, ErrorKind::Constraint { rule }));
+            }
             if codebook.header.component_count != rank {
                 let kind = ErrorKind::Mismatch {
                     element: "component_count",
                     value: u64::from(codebook.header.component_count),
                     expected: u64::from(rank),
                 };
-                return Err(Error::new(at, "6.9", kind));
+                return Err(Error::new(at, table.semantics, kind));
             }
             *slot = Some(codebook);
         }
@@ -143,9 +177,6 @@ fn undefined<'s, T>(
 ) -> Result<&'s mut Option<T>> {
     match slots.get_mut(usize::from(id)) {
         Some(slot) if slot.is_none() => Ok(slot),
-        _ => {
-            let rule = "an identifier is defined once in a GOP";
-            Err(Error::new(unit.payload_at, clause, ErrorKind::Constraint { rule }))
-        }
+        _ => Err(Error::new(unit.payload_at, clause, ErrorKind::Constraint { rule: DEFINED_ONCE })),
     }
 }

@@ -9,7 +9,12 @@
 //! | 7.7, 7.8 colour | [`colour`] |
 //! | 7.9 canonical planes and digest | [`frame`], [`digest`] |
 //! | 7.10 output | [`output`] |
-//! | 7.11 operating points | [`operating_point`] |
+//! | 7.11, 7.19 operating points | [`operating_point`] |
+//! | 7.14 homes and modes | [`home`], [`increment`] |
+//! | 7.15 cells | [`displacement`] |
+//! | 7.16 residuals | [`increment::residual`] |
+//! | 7.17 prediction | [`neighbours`], [`predictor`], [`increment::prediction`] |
+//! | 7.18 carried Gaussians | [`frame_state`] |
 //! | 8.5 contexts | [`context`] |
 //!
 //! The encoder calls the same functions: what it reconstructs is what a decoder reconstructs.
@@ -29,11 +34,18 @@ pub mod block;
 pub mod colour;
 pub mod context;
 pub mod digest;
+pub mod displacement;
 pub mod frame;
+pub mod frame_state;
 pub mod gop;
+pub mod home;
+pub mod increment;
+mod motion;
+pub mod neighbours;
 pub mod operating_point;
 pub mod output;
 pub mod position;
+pub mod predictor;
 pub mod process;
 pub mod stream;
 pub mod unit;

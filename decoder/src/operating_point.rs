@@ -1,10 +1,15 @@
-//! Clause 7.11: operating points, and the stream that holds just one.
+//! Clauses 7.11 and 7.19: operating points, and the stream that holds just one.
+
+mod tally;
+
+pub(crate) use tally::Belonging;
+pub use tally::{OperatingPointInfo, Tally, operating_points};
 
 use core::fmt;
 use core::str::FromStr;
-use splatstream_format::payload::Index;
+use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{
-    EndOfStream, FileHeader, FrameHeader, IndexEntry, SequenceParameters, UnitHeader, UnitType,
+    EndOfStream, FileHeader, IndexEntry, OperatingPointEntry, UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Stream, Unit, write_unit};
 use splatstream_format::{Limits, Result as FormatResult};
@@ -24,7 +29,22 @@ impl OperatingPoint {
     /// Everything in the stream.
     pub const ALL: Self = Self { spatial: u8::MAX, temporal: u8::MAX, refinement: u8::MAX };
 
-    /// Whether a unit belongs to the operating point.
+    /// Clause 7.19: whether a unit of profile Dynamic belongs to the operating point. `anchor` is the number of
+    /// spatial layers if the unit is of the intra frame of a predicted GOP: who plays that GOP has all of the frame.
+    pub fn takes_of(&self, header: &UnitHeader, anchor: Option<u8>) -> bool {
+        let whole = anchor.is_some_and(|layers| self.spatial.saturating_add(1) >= layers);
+        let refinement = if whole { u8::MAX } else { self.refinement };
+        Self { refinement, ..*self }.takes(header)
+    }
+
+    /// Whether an entry of the list is of a point that this one holds.
+    const fn holds(&self, entry: &OperatingPointEntry) -> bool {
+        entry.spatial_layer <= self.spatial
+            && entry.temporal_layer <= self.temporal
+            && entry.refinement <= self.refinement
+    }
+
+    /// Whether a unit of profile Intra belongs to the operating point.
     pub fn takes(&self, header: &UnitHeader) -> bool {
         header.spatial_layer <= self.spatial
             && header.temporal_layer <= self.temporal
@@ -67,86 +87,33 @@ impl FromStr for OperatingPoint {
     }
 }
 
-/// What an operating point costs and shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct OperatingPointInfo {
-    /// The operating point.
-    pub point: OperatingPoint,
-    /// Bytes of the stream that holds just this operating point.
-    pub bytes: u64,
-    /// Gaussians over all frames.
-    pub gaussians: u64,
-    /// Frames.
-    pub frames: u32,
-    /// The share of every frame, percent.
-    pub percent: u8,
-}
-
-/// The operating points of a stream, smallest first, from its headers alone.
-///
-/// # Errors
-/// What delimiting the units or reading sequence parameters and frame headers finds.
-pub fn operating_points(bytes: &[u8], limits: &Limits) -> FormatResult<Vec<OperatingPointInfo>> {
-    let stream = Stream::open(bytes, limits)?;
-    let mut sequence = None;
-    // Gaussians and last refinement of each frame.
-    let mut frames: Vec<(u32, Option<u8>)> = Vec::new();
-    for unit in stream.units() {
-        let unit = unit?;
-        match unit.header.unit_type() {
-            UnitType::SequenceParameters => {
-                sequence = Some(SequenceParameters::parse_payload(unit.payload, unit.payload_at)?);
-            }
-            UnitType::FrameHeader => {
-                let header = FrameHeader::parse_payload(unit.payload, unit.payload_at)?;
-                frames.push((header.gaussian_count, None));
-            }
-            UnitType::Refinement => {
-                if let Some((_, last)) = frames.last_mut() {
-                    *last = Some(unit.header.refinement);
-                }
-            }
-            _ => {}
-        }
-    }
-    let Some(sequence) = sequence else { return Ok(Vec::new()) };
-    let info = |refinement| {
-        let point = OperatingPoint { spatial: 0, temporal: 0, refinement };
-        let shown = |&(count, last): &(u32, Option<u8>)| {
-            last.map_or(0, |last| u64::from(sequence.prefix_length(refinement.min(last), count)))
-        };
-        let place = usize::from(refinement);
-        Ok(OperatingPointInfo {
-            point,
-            bytes: u64::try_from(extract(bytes, point, limits)?.len()).unwrap_or(u64::MAX),
-            gaussians: frames.iter().map(shown).fold(0, u64::saturating_add),
-            frames: u32::try_from(frames.len()).unwrap_or(u32::MAX),
-            percent: sequence.refinement_percent.get(place).copied().unwrap_or(100),
-        })
-    };
-    (0..sequence.refinement_count).map(info).collect()
-}
-
-/// The stream that holds just the units of an operating point; index and end are made anew.
+/// The stream that holds just the units of an operating point; index, operating points and end are made anew.
 ///
 /// # Errors
 /// What delimiting the units finds; a damaged unit is an error.
 pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatResult<Vec<u8>> {
     let stream = Stream::open(bytes, limits)?;
     let mut out = bytes.get(..FileHeader::SIZE).unwrap_or_default().to_vec();
+    let mut belonging = Belonging::new(stream.header().profile());
     let mut units = 0_u32;
     let mut frames = 0_u32;
     let mut entries = Vec::new();
     let mut index_offset = 0;
     for unit in stream.units() {
         let unit = unit?;
+        belonging.follow(&unit);
         let here = u64::try_from(out.len()).unwrap_or(u64::MAX);
         match unit.header.unit_type() {
-            _ if !point.takes(&unit.header) => continue,
+            _ if !belonging.takes(point, &unit.header) => continue,
             UnitType::Index => {
                 index_offset = here;
                 let index = Index { entries: core::mem::take(&mut entries) };
                 write_unit(&mut out, unit.header.id(), &index.to_bytes()?)?;
+            }
+            UnitType::OperatingPoints => {
+                let mut points = OperatingPoints::parse(unit.payload, unit.payload_at)?;
+                points.entries.retain(|entry| point.holds(entry));
+                write_unit(&mut out, unit.header.id(), &points.to_bytes()?)?;
             }
             UnitType::End => {
                 let end = EndOfStream { frame_count: frames, unit_count: units, index_offset };

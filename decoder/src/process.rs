@@ -1,17 +1,21 @@
 //! Clause 7.1: the state of a decoder and what each unit does to it.
 
-use crate::digest::{UnitDigest, frame_digest, unit_digest};
 use crate::frame::QuantizedFrame;
 use crate::gop::Gop;
-use crate::operating_point::OperatingPoint;
-use crate::unit::{CodedUnit, decode_units};
-use splatstream_format::payload::{Index, Refinement};
+use crate::operating_point::{OperatingPoint, Tally};
+use layered::{LayeredFrame, References};
+use refined::RefinedFrame;
+use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{
-    EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, RefinementHeader,
+    EndOfStream, FileHeader, FrameHeader, FrameType, GopHeader, IndexEntry, IndexHeader, PlaceInGop, Profile,
     SequenceParameters, Table, UnitHeader, UnitType,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
+
+mod assembly;
+mod layered;
+mod refined;
 
 /// How to decode.
 #[derive(Debug, Clone, Copy)]
@@ -24,12 +28,15 @@ pub struct Options {
     pub operating_point: OperatingPoint,
     /// Show a frame of which a refinement unit is damaged at the refinement before, instead of giving up.
     pub tolerant: bool,
+    /// Show only what the units of the operating point hold, not what is carried over from the intra frame: the
+    /// paper's subset. Makes no difference in profile Intra.
+    pub subset: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
         let operating_point = OperatingPoint::ALL;
-        Self { limits: Limits::default(), verify: true, operating_point, tolerant: false }
+        Self { limits: Limits::default(), verify: true, operating_point, tolerant: false, subset: false }
     }
 }
 
@@ -38,38 +45,102 @@ impl Default for Options {
 pub struct DecodedFrame {
     /// Display index.
     pub number: u32,
-    /// The integer planes.
+    /// How it is coded.
+    pub frame_type: FrameType,
+    /// The integer planes that are shown.
     pub planes: QuantizedFrame,
-    /// Refinement units decoded.
+    /// Refinement units decoded; in an intra frame with spatial layers, those of the layer shown.
     pub refinements: u8,
-    /// Digest of the planes, clause 7.9; none if it was not asked for.
+    /// Spatial layer shown.
+    pub spatial_layer: u8,
+    /// Gaussians at the end of `planes` that are carried over from the intra frame (7.18).
+    pub carried: usize,
+    /// Digest of the decoded planes, clause 7.9; none if it was not asked for, or nothing was decoded.
     pub digest: Option<u64>,
+    /// Digest of the carried planes, clause 7.18, under the same conditions.
+    pub carried_digest: Option<u64>,
+    /// What is added before output.
+    pub compensation: Compensation,
     /// Bytes of the frame's units that were decoded, headers included.
     pub bytes: u64,
     /// Why the refinement after the last decoded one was lost, if it was.
     pub lost: Option<Error>,
 }
 
+/// Clause 7.18: what fills the holes that missing refinements leave.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Compensation {
+    /// Added to each log-scale, steps.
+    pub log_scale: i8,
+    /// Added to the opacity, steps.
+    pub opacity: i8,
+    /// Which Gaussians, from the first on; those without a flag stay as they are.
+    pub applies: Vec<bool>,
+}
+
+impl DecodedFrame {
+    /// A frame of which nothing is there.
+    fn empty(number: u32, frame_type: FrameType) -> Self {
+        Self {
+            number,
+            frame_type,
+            planes: QuantizedFrame::default(),
+            refinements: 0,
+            spatial_layer: 0,
+            carried: 0,
+            digest: None,
+            carried_digest: None,
+            compensation: Compensation::default(),
+            bytes: 0,
+            lost: None,
+        }
+    }
+
+    /// The planes that clause 7.10 makes output of: compensated.
+    pub fn into_shown(self) -> QuantizedFrame {
+        let Self { mut planes, compensation, .. } = self;
+        compensation.apply(&mut planes);
+        planes
+    }
+}
+
+impl Compensation {
+    fn apply(&self, planes: &mut QuantizedFrame) {
+        let range = crate::attribute::ATTRIBUTE_RANGE;
+        let shift = |plane: &mut Vec<i32>, by: i8| {
+            for (value, _) in plane.iter_mut().zip(&self.applies).filter(|(_, applies)| **applies) {
+                *value = value.wrapping_add(by.into()).clamp(*range.start(), *range.end());
+            }
+        };
+        planes.log_scale.iter_mut().for_each(|plane| shift(plane, self.log_scale));
+        shift(&mut planes.opacity, self.opacity);
+    }
+}
+
 /// A frame whose units are still arriving.
 struct PendingFrame<'a> {
+    /// Absolute offset of the frame_header unit.
+    at: u64,
     number: u32,
     header: FrameHeader,
-    units: Vec<PendingUnit<'a>>,
+    place: PlaceInGop,
+    units: FrameUnits<'a>,
     bytes: u64,
     lost: Option<Error>,
     /// Whether a refinement unit stood in the stream, decoded or not.
     has_unit: bool,
 }
 
-struct PendingUnit<'a> {
-    refinement: Refinement<'a>,
-    payload_at: u64,
-    bytes: u64,
+/// The units of a frame by profile.
+enum FrameUnits<'a> {
+    Refined(RefinedFrame<'a>),
+    Layered(LayeredFrame<'a>),
 }
 
 /// Decodes a stream unit by unit.
 pub struct Decoder<'a> {
     options: Options,
+    profile: Profile,
     level: u8,
     /// Whether the units before the first GOP header are not known (B.3).
     starts_inside: bool,
@@ -78,11 +149,22 @@ pub struct Decoder<'a> {
     frame: Option<PendingFrame<'a>>,
     /// A frame that was complete when the unit after it turned out wrong.
     finished: Option<DecodedFrame>,
+    /// Frames of this GOP that later ones refer to, profile Dynamic.
+    references: References,
+    /// The least display index of the next frame.
     frames: u32,
+    /// Frame headers so far.
+    frame_headers: u32,
     units: u32,
     /// First frame and offset of every GOP header so far: what an index shall hold.
     gops: Vec<(u32, u64)>,
     index_offset: Option<u64>,
+    /// Whether operating_points have come.
+    listed: bool,
+    /// Whether some frame has lost a unit.
+    has_lost_any: bool,
+    /// What the units so far add to the operating points.
+    tally: Tally,
     ended: bool,
 }
 
@@ -91,16 +173,22 @@ impl<'a> Decoder<'a> {
     pub fn new(file: &FileHeader, options: Options) -> Self {
         Self {
             options,
+            profile: file.profile(),
             level: file.level,
             starts_inside: false,
             sequence: None,
             gop: None,
             frame: None,
             finished: None,
+            references: References::default(),
             frames: 0,
+            frame_headers: 0,
             units: 0,
             gops: Vec::new(),
             index_offset: None,
+            listed: false,
+            has_lost_any: false,
+            tally: Tally::new(file.profile()),
             ended: false,
         }
     }
@@ -129,22 +217,26 @@ impl<'a> Decoder<'a> {
     pub fn unit(&mut self, unit: &Unit<'a>) -> Result<Option<DecodedFrame>> {
         let header = &unit.header;
         let unit_type = header.unit_type();
-        if !unit_type.is_known() {
+        if !unit_type.is_known_in(self.profile) {
             self.units = self.units.wrapping_add(1);
             return Ok(None);
         }
-        let repeatable = unit_type == UnitType::SequenceParameters;
-        let indexed = self.index_offset.is_some() && unit_type != UnitType::End;
-        let surplus = unit_type == UnitType::FrameHeader && self.frames_left() == 0;
-        if self.ended || surplus || !repeatable && (self.sequence.is_none() || indexed) {
-            return Err(unexpected(unit));
+        // In profile Intra a unit that is passed over still has to stand in its place.
+        if self.profile == Profile::Dynamic && !self.belongs(header) {
+            self.pass_over(header);
+            return Ok(None);
         }
+        self.check_phase(unit)?;
+        self.tally.unit(unit);
         let done = match unit_type {
             UnitType::SequenceParameters => self.sequence_parameters(unit).map(|()| None),
             UnitType::GopHeader => self.closing(unit, Self::gop_header),
+            UnitType::Codebook if self.profile == Profile::Dynamic => self.closing(unit, Self::gop_tool),
             UnitType::Transform | UnitType::Codebook => self.gop_tool(unit).map(|()| None),
             UnitType::FrameHeader => self.closing(unit, Self::frame_header),
             UnitType::Refinement => self.refinement(unit).map(|()| None),
+            UnitType::Increment => self.increment(unit).map(|()| None),
+            UnitType::OperatingPoints => self.closing(unit, Self::operating_points),
             UnitType::Index => self.closing(unit, Self::index),
             UnitType::End => self.closing(unit, Self::end),
             UnitType::Reserved(_) | UnitType::User(_) => Ok(None),
@@ -153,16 +245,66 @@ impl<'a> Decoder<'a> {
         done
     }
 
+    /// Clause 7.1.2: whether the unit may stand here.
+    fn check_phase(&self, unit: &Unit<'a>) -> Result<()> {
+        let unit_type = unit.header.unit_type();
+        let repeatable = unit_type == UnitType::SequenceParameters;
+        let indexed = self.index_offset.is_some() && unit_type != UnitType::End;
+        let listed = self.listed && !matches!(unit_type, UnitType::Index | UnitType::End);
+        let surplus = unit_type == UnitType::FrameHeader && self.frames_left() == 0;
+        let early = self.sequence.is_none() || indexed || listed;
+        let foreign = self.profile == Profile::Dynamic && unit_type == UnitType::Refinement;
+        if self.ended || surplus || foreign || !repeatable && early {
+            return Err(unexpected(unit));
+        }
+        if unit_type == UnitType::Increment { Ok(()) } else { self.check_layers(unit) }
+    }
+
+    /// 6.3: the layers of a unit against those of the sequence.
+    fn check_layers(&self, unit: &Unit<'a>) -> Result<()> {
+        let Some((sequence, _)) = &self.sequence else { return Ok(()) };
+        unit.header.validate_layers(unit.at, sequence)
+    }
+
+    /// Whether a unit belongs to the operating point (7.11, 7.19).
+    fn belongs(&self, header: &UnitHeader) -> bool {
+        if self.profile == Profile::Intra {
+            return self.options.operating_point.takes(header);
+        }
+        let predicted = self.gop.as_ref().is_some_and(|gop| gop.header.is_predicted());
+        let is_anchor = |frame: &PendingFrame<'_>| {
+            predicted && frame.place.reference.is_none() && frame.number == header.frame
+        };
+        let layers = self.sequence().map_or(1, |sequence| sequence.spatial_layer_count);
+        let anchor = self.frame.as_ref().is_some_and(is_anchor).then_some(layers);
+        self.options.operating_point.takes_of(header, anchor)
+    }
+
+    /// Counts a unit that does not belong to the operating point.
+    fn pass_over(&mut self, header: &UnitHeader) {
+        self.units = self.units.wrapping_add(1);
+        let headers = u32::from(header.unit_type() == UnitType::FrameHeader);
+        self.frame_headers = self.frame_headers.wrapping_add(headers);
+        let own = self.profile == Profile::Intra;
+        if let Some(frame) = self.frame.as_mut().filter(|frame| own || frame.number == header.frame) {
+            frame.has_unit |= header.unit_type().has_refinement();
+        }
+    }
+
     /// Takes note of a unit whose payload is damaged.
     ///
     /// # Errors
     /// The damage itself, unless the decoder is tolerant and the unit is a refinement.
     pub fn damaged(&mut self, header: &UnitHeader, error: Error) -> Result<()> {
+        if !self.belongs(header) {
+            self.pass_over(header);
+            return Ok(());
+        }
         self.units = self.units.wrapping_add(1);
         match &mut self.frame {
-            Some(frame) if header.unit_type() == UnitType::Refinement => {
+            Some(frame) if header.unit_type().has_refinement() => {
                 frame.has_unit = true;
-                if !self.options.operating_point.takes(header) || frame.lost.is_some() {
+                if frame.lost.is_some() || frame.is_beyond(header) {
                     return Ok(());
                 }
                 frame.lost = Some(error);
@@ -203,7 +345,7 @@ impl<'a> Decoder<'a> {
     }
 
     fn sequence_parameters(&mut self, unit: &Unit<'a>) -> Result<()> {
-        let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at)?;
+        let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at, self.profile)?;
         match &self.sequence {
             None => {
                 self.sequence = Some((sequence, unit.payload));
@@ -224,11 +366,14 @@ impl<'a> Decoder<'a> {
             self.frames = unit.header.frame;
         }
         same(frame_at(unit), "6.5", "frame", unit.header.frame, self.frames)?;
-        let header = GopHeader::parse_payload(unit.payload, unit.payload_at)?;
+        let header = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
+        let layers = self.sequence().map_or(1, |sequence| sequence.temporal_layer_count);
+        header.validate_layers(unit.payload_at, layers)?;
         let expected = self.gop.as_ref().map_or(0, |gop| gop.header.gop_index.wrapping_add(1));
         let expected = if starts_here { header.gop_index } else { expected };
         same(unit.payload_at, "6.5", "gop_index", header.gop_index, expected)?;
         header.validate_from(unit.payload_at, self.frames)?;
+        self.references = References::default();
         self.gops.push((self.frames, unit.at));
         self.gop = Some(Gop::new(header, self.frames));
         Ok(())
@@ -240,72 +385,116 @@ impl<'a> Decoder<'a> {
         gop.header.gop_frame_count.wrapping_sub(self.frames.wrapping_sub(gop.first_frame))
     }
 
-    /// Checks that the GOP has the frames it announced.
-    fn close_gop(&self, at: u64) -> Result<()> {
+    /// Checks that the GOP has the frames it announced: all of them, or of a predicted one the first.
+    fn close_gop(&mut self, at: u64) -> Result<()> {
         let Some(gop) = &self.gop else { return Ok(()) };
         let frames = self.frames.wrapping_sub(gop.first_frame);
-        same(at, "6.5", "gop_frame_count", gop.header.gop_frame_count, frames)
+        let announced = gop.header.gop_frame_count;
+        if gop.header.is_predicted() && frames > 0 {
+            self.frames = gop.first_frame.wrapping_add(announced);
+            return Ok(());
+        }
+        same(at, "6.5", "gop_frame_count", announced, frames)
     }
 
     fn gop_tool(&mut self, unit: &Unit<'a>) -> Result<()> {
         let (Some(gop), Some((sequence, _)), None) = (&mut self.gop, &self.sequence, &self.frame) else {
             return Err(unexpected(unit));
         };
+        if unit.header.unit_type() == UnitType::Transform && self.frames != gop.first_frame {
+            return Err(unexpected(unit));
+        }
         same(frame_at(unit), "6.3", "frame", unit.header.frame, gop.first_frame)?;
-        gop.tool(unit, sequence, &self.options.limits)
+        gop.tool(unit, sequence, self.profile, &self.options.limits)
     }
 
     fn frame_header(&mut self, unit: &Unit<'a>) -> Result<()> {
-        let Some(gop) = &self.gop else { return Err(unexpected(unit)) };
-        same(frame_at(unit), "6.6", "frame", unit.header.frame, self.frames)?;
-        let header = FrameHeader::parse_payload(unit.payload, unit.payload_at)?;
+        let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else {
+            return Err(unexpected(unit));
+        };
+        let number = unit.header.frame;
+        let place = gop.header.place(number.wrapping_sub(gop.first_frame));
+        let first = place.reference.is_none() || self.frames == gop.first_frame;
+        if first || number < self.frames || number.wrapping_sub(self.frames) >= self.frames_left() {
+            same(frame_at(unit), "6.6", "frame", number, self.frames)?;
+        }
+        let temporal = element_at(&UnitHeader::TABLE, unit.at, "temporal_layer");
+        same(temporal, "6.6", "temporal_layer", unit.header.temporal_layer, place.temporal_layer)?;
+        let spatial_layer =
+            if place.reference.is_some() { sequence.spatial_layer_count.wrapping_sub(1) } else { 0 };
+        let spatial = element_at(&UnitHeader::TABLE, unit.at, "spatial_layer");
+        same(spatial, "6.6", "spatial_layer", unit.header.spatial_layer, spatial_layer)?;
+        let header = FrameHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
+        header.validate_place(unit.payload_at, &place)?;
         gop.transforms(&header, unit.payload_at)?;
         let most = self.options.limits.max_gaussians.min(Limits::gaussians_of_level(self.level));
         header.within(unit.payload_at, &Limits { max_gaussians: most, ..self.options.limits })?;
+        let units = match self.profile {
+            Profile::Intra => FrameUnits::Refined(RefinedFrame::new()),
+            Profile::Dynamic => {
+                let reference = place.reference.and_then(|place| gop.first_frame.checked_add(place));
+                FrameUnits::Layered(LayeredFrame::new(reference, &self.references, sequence))
+            }
+        };
         let bytes = unit_bytes(unit);
-        let number = unit.header.frame;
-        let units = Vec::new();
-        self.frame = Some(PendingFrame { number, header, units, bytes, lost: None, has_unit: false });
-        self.frames = self.frames.wrapping_add(1);
+        let (at, lost) = (unit.at, None);
+        self.frame = Some(PendingFrame { at, number, header, place, units, bytes, lost, has_unit: false });
+        self.frames = number.wrapping_add(1);
+        self.frame_headers = self.frame_headers.wrapping_add(1);
         Ok(())
     }
 
-    fn refinement(&mut self, unit: &Unit<'a>) -> Result<()> {
-        let takes = self.options.operating_point.takes(&unit.header);
+    /// Step 1 of clauses 7.1.3 and 7.13.3: whether a unit of the frame is looked at.
+    fn arrives(&mut self, unit: &Unit<'a>) -> Result<bool> {
+        let takes = self.profile == Profile::Dynamic || self.options.operating_point.takes(&unit.header);
         let Some(frame) = &mut self.frame else { return Err(unexpected(unit)) };
         frame.has_unit = true;
-        if !takes || frame.lost.is_some() {
-            return Ok(());
-        }
-        let number = frame.number;
-        if unit.header.frame != number && self.has_lost()? {
-            return Ok(());
-        }
-        same(frame_at(unit), "6.9", "frame", unit.header.frame, number)?;
-        let (Some(frame), Some((sequence, _)), Some(gop)) = (&mut self.frame, &self.sequence, &self.gop)
-        else {
-            return Err(unexpected(unit));
-        };
-        let expected = frame.units.len();
-        let parsed = if usize::from(unit.header.refinement) != expected
-            || unit.header.refinement >= sequence.refinement_count
-        {
-            Err(unexpected(unit))
-        } else {
-            parse_refinement(unit, sequence, &frame.header, gop)
-        };
-        match parsed {
-            Ok(refinement) => {
-                let bytes = unit_bytes(unit);
-                frame.units.push(PendingUnit { refinement, payload_at: unit.payload_at, bytes });
-                Ok(())
-            }
-            Err(error) if self.options.tolerant => {
-                frame.lost = Some(error);
-                Ok(())
-            }
+        Ok(takes && frame.lost.is_none() && !frame.is_beyond(&unit.header))
+    }
+
+    /// Step 3: what is fatal unless the frame has lost a unit already, so that this one is passed over.
+    fn stands(&mut self, unit: &Unit<'a>) -> Result<bool> {
+        match self.check_stand(unit) {
+            Ok(()) => Ok(true),
+            Err(_) if self.has_lost()? => Ok(false),
             Err(error) => Err(error),
         }
+    }
+
+    fn check_stand(&self, unit: &Unit<'a>) -> Result<()> {
+        let (Some(frame), Some((sequence, _))) = (&self.frame, &self.sequence) else { return Ok(()) };
+        self.check_layers(unit)?;
+        same(frame_at(unit), "7.1", "frame", unit.header.frame, frame.number)?;
+        let at = |element| element_at(&UnitHeader::TABLE, unit.at, element);
+        let place = &frame.place;
+        same(
+            at("temporal_layer"),
+            "7.13",
+            "temporal_layer",
+            unit.header.temporal_layer,
+            place.temporal_layer,
+        )?;
+        if place.reference.is_some() {
+            let top = sequence.spatial_layer_count.wrapping_sub(1);
+            same(at("spatial_layer"), "7.13", "spatial_layer", unit.header.spatial_layer, top)?;
+        }
+        Ok(())
+    }
+
+    /// Whether everything from the start of the stream on has been decoded.
+    fn is_whole(&self) -> bool {
+        let point = self.options.operating_point;
+        !self.starts_inside && !self.has_lost_any && point == OperatingPoint::ALL
+    }
+
+    fn operating_points(&mut self, unit: &Unit<'a>) -> Result<()> {
+        self.close_gop(unit.at)?;
+        let points = OperatingPoints::parse(unit.payload, unit.payload_at)?;
+        if self.is_whole() {
+            self.tally.check(&points, unit.payload_at)?;
+        }
+        self.listed = true;
+        Ok(())
     }
 
     fn index(&mut self, unit: &Unit<'a>) -> Result<()> {
@@ -333,7 +522,7 @@ impl<'a> Decoder<'a> {
         self.close_gop(unit.at)?;
         let end = EndOfStream::parse_payload(unit.payload, unit.payload_at)?;
         let expected = EndOfStream {
-            frame_count: self.frames,
+            frame_count: self.frame_headers,
             unit_count: self.units,
             index_offset: self.index_offset.unwrap_or(0),
         };
@@ -360,106 +549,42 @@ impl<'a> Decoder<'a> {
             }
             frame.lost = Some(error);
         }
-        self.decode(&frame)
+        let decoded = match &frame.units {
+            FrameUnits::Refined(refined) => self.decode_refined(&frame, refined),
+            FrameUnits::Layered(layered) => self.close_layered(&frame, layered, at),
+        }?;
+        self.has_lost_any |= decoded.as_ref().is_some_and(|decoded| decoded.lost.is_some());
+        Ok(decoded)
     }
 
     /// Decodes the pending frame as far as it is there: whether a unit of it is lost, so that later ones are not
     /// looked at. Blocks are not decoded when they arrive; an error that ends decoding asks for it.
     fn has_lost(&mut self) -> Result<bool> {
-        let decoded = self.frame.as_ref().map_or(Ok(None), |frame| self.decode(frame))?;
+        let Some(frame) = &self.frame else { return Ok(false) };
+        let decoded = match &frame.units {
+            FrameUnits::Refined(refined) => self.decode_refined(frame, refined)?,
+            FrameUnits::Layered(layered) => {
+                self.decode_layered(frame, layered, None)?.map(|(decoded, ..)| decoded)
+            }
+        };
         if let (Some(frame), Some(decoded)) = (&mut self.frame, decoded) {
-            frame.units.truncate(usize::from(decoded.refinements));
+            if let FrameUnits::Refined(refined) = &mut frame.units {
+                refined.truncate(decoded.refinements);
+            }
             frame.lost = decoded.lost;
         }
         Ok(self.frame.as_ref().is_some_and(|frame| frame.lost.is_some()))
     }
-
-    fn decode(&self, frame: &PendingFrame<'a>) -> Result<Option<DecodedFrame>> {
-        let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else { return Ok(None) };
-        let coded: Vec<CodedUnit<'_, '_>> = frame
-            .units
-            .iter()
-            .map(|unit| CodedUnit { refinement: &unit.refinement, payload_at: unit.payload_at })
-            .collect();
-        let tools = gop.transforms(&frame.header, 0)?;
-        let (planes, results) = decode_units(&coded, gop, tools, sequence);
-        self.assemble(frame, planes, results).map(Some)
-    }
-
-    /// Checks the units of a frame, and cuts the planes before the first that failed.
-    fn assemble(
-        &self,
-        frame: &PendingFrame<'a>,
-        planes: QuantizedFrame,
-        results: Vec<Result<usize>>,
-    ) -> Result<DecodedFrame> {
-        let mut decoded = DecodedFrame {
-            number: frame.number,
-            planes,
-            refinements: 0,
-            digest: None,
-            bytes: frame.bytes,
-            lost: frame.lost,
-        };
-        let mut digests: Vec<UnitDigest> = Vec::new();
-        let mut gaussians = 0_usize;
-        for (unit, result) in frame.units.iter().zip(results) {
-            let checked = result.and_then(|count| {
-                let end = gaussians.wrapping_add(count);
-                let digest = self.check_digest(unit, &decoded.planes, gaussians..end, &mut digests)?;
-                Ok((end, digest))
-            });
-            match checked {
-                Ok((end, digest)) => {
-                    gaussians = end;
-                    decoded.digest = digest;
-                    decoded.refinements = decoded.refinements.wrapping_add(1);
-                    decoded.bytes = decoded.bytes.wrapping_add(unit.bytes);
-                }
-                Err(error) if self.options.tolerant => {
-                    decoded.lost = Some(error);
-                    break;
-                }
-                Err(error) => return Err(error),
-            }
-        }
-        decoded.planes.truncate(gaussians);
-        Ok(decoded)
-    }
-
-    fn check_digest(
-        &self,
-        unit: &PendingUnit<'_>,
-        planes: &QuantizedFrame,
-        gaussians: core::ops::Range<usize>,
-        digests: &mut Vec<UnitDigest>,
-    ) -> Result<Option<u64>> {
-        if !self.options.verify {
-            return Ok(None);
-        }
-        digests.push(unit_digest(planes, gaussians));
-        let computed = frame_digest(digests);
-        let stored = unit.refinement.header.refinement_digest;
-        if computed != stored {
-            return Err(Error::new(unit.payload_at, "7.9", ErrorKind::Digest { stored, computed }));
-        }
-        Ok(Some(computed))
-    }
 }
 
-fn parse_refinement<'a>(
-    unit: &Unit<'a>,
-    sequence: &SequenceParameters,
-    frame: &FrameHeader,
-    gop: &Gop,
-) -> Result<Refinement<'a>> {
-    let at = unit.payload_at;
-    let (header, rest) = RefinementHeader::parse(unit.payload, at, sequence)?;
-    let expected = sequence.refinement_length(unit.header.refinement, frame.gaussian_count);
-    let count_at = element_at(&RefinementHeader::TABLE, at, "gaussian_count");
-    same(count_at, "6.9", "gaussian_count", header.gaussian_count, expected)?;
-    gop.colour(gop.transforms(frame, at)?, &header, at)?;
-    Refinement::parse_behind(header, rest, at, sequence)
+impl PendingFrame<'_> {
+    /// Whether a unit is passed over because the reference frame is shown at a lower refinement.
+    fn is_beyond(&self, header: &UnitHeader) -> bool {
+        match &self.units {
+            FrameUnits::Refined(_) => false,
+            FrameUnits::Layered(layered) => layered.is_beyond(header.refinement),
+        }
+    }
 }
 
 fn unexpected(unit: &Unit<'_>) -> Error {

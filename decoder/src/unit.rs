@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use splatstream_format::entropy::model::{ModelTrace, PlaneModel, read_models};
 use splatstream_format::entropy::reader::PlaneDecoder;
 use splatstream_format::payload::Refinement;
-use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::syntax::{RefinementHeader, SequenceParameters};
 use splatstream_format::{Error, Result};
 
 /// A refinement unit whose payload has been divided.
@@ -43,7 +43,8 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
         trace: &mut impl ModelTrace,
     ) -> Result<Self> {
         let refinement = unit.refinement;
-        let colour = gop.colour(transforms, &refinement.header, unit.payload_at)?;
+        let colour =
+            gop.colour(transforms, &refinement.header.sh(), 0, (&RefinementHeader::TABLE, unit.payload_at))?;
         let layout = Layout::new(transforms.dc.header.rank, colour.mode);
         let models = if refinement.header.gaussian_count == 0 {
             Vec::new()
@@ -96,10 +97,10 @@ impl<'g, 'r, 'a> PreparedUnit<'g, 'r, 'a> {
     /// # Errors
     /// As decoding.
     pub fn coded_blocks(&self, sequence: &SequenceParameters) -> Result<Vec<CodedBlock>> {
-        let (parameters, decoders) = (self.parameters(sequence), self.decoders());
+        let (lanes_log2, decoders) = (self.unit.refinement.header.lanes_log2, self.decoders());
         self.blocks(sequence)
             .into_iter()
-            .map(|(bytes, at, count)| decode_coded(bytes, at, count, &parameters, &decoders))
+            .map(|(bytes, at, count)| decode_coded(bytes, at, count, &self.layout, lanes_log2, &decoders))
             .collect()
     }
 }

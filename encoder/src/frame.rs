@@ -161,6 +161,7 @@ fn gathered(frame: &CodedFrame, part: &[(u64, u32)], planes: &[PlaneInfo], biase
             Attribute::Rotation => pick(&geometry.rotation[place]),
             Attribute::Dc => pick(&frame.dc[place]),
             Attribute::Sh => pick(&frame.sh[place]),
+            _ => Vec::new(),
         };
         values.iter_mut().for_each(|value| *value -= bias);
         block.push(info, values);
@@ -187,6 +188,7 @@ fn biases(frame: &CodedFrame, planes: &[PlaneInfo]) -> Vec<i32> {
             (_, Attribute::Rotation) => sum(&geometry.rotation[place]),
             (_, Attribute::Dc) => sum(&frame.dc[place]),
             (_, Attribute::Sh) => sum(&frame.sh[place]),
+            _ => 0,
         };
         (2 * total + count).div_euclid(2 * count) as i32
     };
@@ -214,7 +216,7 @@ fn cheapest(unit: &CodedUnit, previous: Option<&[PlaneModel]>, planes: &[PlaneIn
     unit.models.par_iter().enumerate().map(choose).collect()
 }
 
-fn table_bits(model: &PlaneModel) -> f64 {
+pub(crate) fn table_bits(model: &PlaneModel) -> f64 {
     let mut bits = BitWriter::new();
     model.tables.iter().for_each(|table| table.write(&mut bits));
     bits.len_bits() as f64
@@ -255,6 +257,6 @@ fn payload(
 }
 
 /// As many states as cost less than a tenth of a bit a Gaussian.
-fn lanes_log2(block_gaussians: usize) -> u8 {
+pub(crate) fn lanes_log2(block_gaussians: usize) -> u8 {
     (block_gaussians / 512).checked_ilog2().unwrap_or(0).min(5) as u8
 }

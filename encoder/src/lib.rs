@@ -16,6 +16,7 @@ mod importance;
 mod lattice;
 mod models;
 mod pca;
+mod section;
 mod sequence;
 mod settings;
 mod source;

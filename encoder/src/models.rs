@@ -6,7 +6,7 @@ use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
 use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context::{self, DeltaNeighbours, Neighbours, is_serial};
-use splatstream_decoder::layout::{Attribute, PlaneInfo, is_available};
+use splatstream_decoder::layout::{Attribute, PlaneInfo, Section, is_available};
 use splatstream_format::entropy::frequencies::Frequencies;
 use splatstream_format::entropy::model::{AxisLookup, ContextAxis, PlaneModel, Source};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
@@ -33,7 +33,7 @@ pub(crate) fn unsigned_values<'a>(
 
 /// The contexts of a plane of one block under a model.
 pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u8> {
-    if info.attribute == Attribute::Position {
+    if info.is_position() {
         return context::delta_contexts(&model.axes, &block.deltas);
     }
     let values = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
@@ -51,6 +51,7 @@ fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
     }
     let listed: &[Source] = match (preset, info.attribute, info.place) {
         (Preset::Small, _, _) => &Source::ALL[1..],
+        _ if info.section == Section::Updates => &[GroupMagnitude, NeighbourMagnitude, PreviousPlane],
         (_, Attribute::Position, _) => &[NeighbourSum],
         (_, Attribute::LogScale, 0) => &[NeighbourSum, PositionSpacing],
         (_, Attribute::LogScale, 1) => &[LargestLogScale, NeighbourSum],
@@ -60,6 +61,10 @@ fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
         (_, Attribute::Dc, _) => &[NeighbourSum, GroupMagnitude, Opacity],
         (_, Attribute::Sh, 0) => &[NeighbourMagnitude, Opacity, LargestLogScale],
         (_, Attribute::Sh, _) => &[GroupMagnitude, Opacity, LargestLogScale],
+        (_, Attribute::Cell | Attribute::Mode, _) => &[NeighbourSum],
+        (_, Attribute::Stale | Attribute::Predictor, _) => &[NeighbourSum],
+        (_, Attribute::Translation | Attribute::Turn, _) => &[NeighbourMagnitude, GroupMagnitude],
+        (_, Attribute::Move, _) => &[NeighbourMagnitude, GroupMagnitude, NeighbourSum],
     };
     let few = if preset == Preset::Fast { 1 } else { listed.len() };
     listed.iter().copied().filter(|&source| is_available(info, source)).take(few).collect()
@@ -67,7 +72,7 @@ fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
 
 /// The values of a source for one block, serial or not.
 fn source_values(source: Source, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<i32> {
-    if info.attribute == Attribute::Position {
+    if info.is_position() {
         let mut neighbours = DeltaNeighbours::default();
         let step = |&delta: &u64| {
             let value = neighbours.value();

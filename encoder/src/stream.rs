@@ -16,8 +16,8 @@ use splatstream_decoder::colour::Colour;
 use splatstream_decoder::layout::{Layout, ShCoding};
 use splatstream_format::payload::{Index, Transform};
 use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, RefinementHeader, SequenceParameters,
-    ShMode, TransformKind, UnitId, UnitType,
+    EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, Profile, RefinementHeader,
+    SequenceParameters, ShMode, TransformKind, UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_scene::GaussianFrame;
@@ -85,7 +85,7 @@ pub fn encode(
         ..Report::default()
     };
     let mut writer = UnitWriter { sink, offset: 0, units: 0 };
-    writer.bytes(&write_file_header(analysis.level)?)?;
+    writer.bytes(&write_file_header(Profile::Intra, analysis.level)?)?;
     writer.unit(UnitId::stream(UnitType::SequenceParameters), &sequence.to_bytes()?)?;
     let mut index = Vec::new();
     for (gop_index, first) in (0..source.len()).step_by(settings.gop as usize).enumerate() {
@@ -307,7 +307,7 @@ fn coded_frame(
     })
 }
 
-fn header_of(coding: ShCoding) -> RefinementHeader {
+pub(crate) fn header_of(coding: ShCoding) -> RefinementHeader {
     let (mode, stages) = match coding {
         ShCoding::None => (ShMode::None, 0),
         ShCoding::Coefficients { .. } => (ShMode::Coefficients, 0),

@@ -5,8 +5,8 @@
 
 use crate::payload::{Codebook, Index, Transform, write_refinement};
 use crate::syntax::{
-    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, MAX_ID, NO_CODEBOOK, RefinementHeader,
-    SequenceParameters, ShMode, TransformHeader, TransformKind, UnitId, UnitType, after,
+    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, MAX_ID, NO_CODEBOOK, Profile,
+    RefinementHeader, SequenceParameters, ShMode, TransformHeader, TransformKind, UnitId, UnitType, after,
 };
 use crate::unit::{write_file_header, write_unit};
 use arbitrary::{Arbitrary, Result, Unstructured};
@@ -74,7 +74,8 @@ impl<'a> Arbitrary<'a> for ArbitraryStream {
 impl ArbitraryStream {
     /// The bytes of the stream.
     pub fn to_bytes(&self) -> crate::Result<Vec<u8>> {
-        let mut out = Output { bytes: write_file_header(self.level)?, frame_count: 0, unit_count: 0 };
+        let mut out =
+            Output { bytes: write_file_header(Profile::Intra, self.level)?, frame_count: 0, unit_count: 0 };
         out.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
         let mut entries = Vec::new();
         for (gop_index, gop) in (0..).zip(&self.gops) {

@@ -5,6 +5,7 @@
 //! 8.5. A [block](reader) holds the symbols of up to 2^16 Gaussians and decodes by itself.
 
 pub mod frequencies;
+pub mod in_force;
 pub mod layout;
 pub mod model;
 pub mod reader;

@@ -3,16 +3,20 @@
 //! The rows of the syntax tables give names, widths and meanings, so that what is printed cannot drift from
 //! what is read. A damaged stream gives the elements up to the damage, and the first error.
 
-use crate::payload::{Codebook, Index, Refinement, Transform, VARIABLE_ROWS, VariableRow, leb128};
+use crate::payload::{
+    Codebook, Index, OperatingPoints, Refinement, Transform, VARIABLE_ROWS, VariableRow, leb128,
+};
 use crate::syntax::{
     CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader,
-    RefinementHeader, Row, SequenceParameters, Table, TransformHeader, UnitHeader, UnitType, after,
+    OperatingPointEntry, OperatingPointsHeader, Profile, RefinementHeader, Row, SequenceParameters, Table,
+    TransformHeader, UnitHeader, UnitType, after,
 };
 use crate::unit::{Delivery, Unit, Units};
 use crate::{Error, ErrorKind, Limits, Result};
 use section::Coding;
 use std::borrow::Cow;
 
+mod increment;
 mod section;
 mod value;
 
@@ -38,14 +42,22 @@ pub struct Element {
 /// Visits every element of a stream in order, and gives the first error. Behind a damaged payload it goes on
 /// with the next unit.
 pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) -> Option<Error> {
-    let mut inspector =
-        Inspector { visit, limits: *limits, sequence: None, coding: Coding::default(), first: None };
+    let mut inspector = Inspector {
+        visit,
+        // The units of a damaged file header are shown whatever layers they name.
+        profile: Profile::Dynamic,
+        limits: *limits,
+        sequence: None,
+        coding: Coding::default(),
+        first: None,
+    };
     inspector.stream(bytes);
     inspector.first
 }
 
 struct Inspector<'v> {
     visit: &'v mut dyn FnMut(Element),
+    profile: Profile,
     limits: Limits,
     sequence: Option<SequenceParameters>,
     coding: Coding,
@@ -55,14 +67,18 @@ struct Inspector<'v> {
 impl Inspector<'_> {
     fn stream(&mut self, bytes: &[u8]) {
         self.fixed(&FileHeader::TABLE, bytes, 0);
-        if let Err(error) = FileHeader::parse(bytes) {
-            self.note(Err(error));
-            // Units describe themselves, but not those of another file format.
-            if matches!(error.kind, ErrorKind::Signature | ErrorKind::Truncated { .. }) {
-                return;
+        let header = FileHeader::parse(bytes);
+        match header {
+            Ok((header, _)) => self.profile = header.profile(),
+            Err(error) => {
+                self.note(Err(error));
+                // Units describe themselves, but not those of another file format.
+                if matches!(error.kind, ErrorKind::Signature | ErrorKind::Truncated { .. }) {
+                    return;
+                }
             }
         }
-        let mut units = Units::starting_at(bytes, after(0, FileHeader::SIZE), &self.limits);
+        let mut units = Units::starting_at(bytes, after(0, FileHeader::SIZE), self.profile, &self.limits);
         loop {
             let at = units.position();
             if units.is_open() {
@@ -87,28 +103,31 @@ impl Inspector<'_> {
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
                 self.fixed(&SequenceParameters::TABLE, payload, at);
-                self.sequence = Some(SequenceParameters::parse_payload(payload, at)?);
+                self.sequence = Some(SequenceParameters::parse_payload(payload, at, self.profile)?);
             }
             UnitType::GopHeader => {
                 self.fixed(&GopHeader::TABLE, payload, at);
-                self.coding = Coding::default();
-                GopHeader::parse_payload(payload, at)?.validate_from(at, unit.header.frame)?;
+                let header = GopHeader::parse_payload(payload, at, self.profile)?;
+                self.coding = Coding::of_gop(header, unit.header.frame);
+                header.validate_from(at, unit.header.frame)?;
             }
             UnitType::FrameHeader => {
                 self.fixed(&FrameHeader::TABLE, payload, at);
-                let header = FrameHeader::parse_payload(payload, at)?;
-                self.coding.start_frame(&header);
+                let header = FrameHeader::parse_payload(payload, at, self.profile)?;
+                self.coding.start_frame(&header, unit.header.frame);
                 header.within(at, &self.limits)?;
             }
             UnitType::Transform => self.transform(payload, at)?,
             UnitType::Codebook => self.codebook(payload, at)?,
             UnitType::Refinement => self.refinement(payload, at)?,
+            UnitType::Increment if self.profile == Profile::Dynamic => self.increment(unit)?,
+            UnitType::OperatingPoints => self.operating_points(payload, at)?,
             UnitType::Index => self.index(payload, at)?,
             UnitType::End => {
                 self.fixed(&EndOfStream::TABLE, payload, at);
                 EndOfStream::parse_payload(payload, at)?;
             }
-            unknown @ (UnitType::Reserved(_) | UnitType::User(_)) => {
+            unknown @ (UnitType::Increment | UnitType::Reserved(_) | UnitType::User(_)) => {
                 let value = format!("{} bytes", payload.len());
                 let meaning = "skipped by decoders of this version";
                 self.show(at, payload.len(), "payload".into(), value, meaning, "5.3", unknown.name());
@@ -146,21 +165,21 @@ impl Inspector<'_> {
         let parsed = Refinement::parse(payload, at, &sequence, &self.limits);
         let mut rest = payload.get(RefinementHeader::SIZE..).unwrap_or_default();
         let place = |rest: &[u8]| after(at, payload.len().saturating_sub(rest.len()));
-        let model_length = self.number("model_length", None, &mut rest, place)?;
+        let model_length = self.number("refinement", "model_length", None, &mut rest, place)?;
         let model = usize::try_from(model_length).ok().and_then(|length| rest.split_at_checked(length));
         let Some((model, after_model)) = model else {
             return parsed.map(drop);
         };
-        self.models(&parsed, model, place(rest));
+        self.refinement_models(&parsed, model, place(rest));
         rest = after_model;
         // The count of a header that was refused is not to be trusted.
         let Refinement { header, blocks, .. } = parsed?;
         let lanes_log2 = header.lanes_log2;
         for block in 0..blocks.len() {
-            self.number("block_length", Some(block), &mut rest, place)?;
+            self.number("refinement", "block_length", Some(block), &mut rest, place)?;
         }
         for (place, (block, at)) in blocks.into_iter().enumerate() {
-            self.block(place, block, at, lanes_log2);
+            self.block("refinement", place, block, at, lanes_log2);
         }
         Ok(())
     }
@@ -176,19 +195,33 @@ impl Inspector<'_> {
         Index::parse(payload, at).map(drop)
     }
 
-    /// One LEB128 element of a refinement; `rest` moves behind it.
+    fn operating_points(&mut self, payload: &[u8], at: u64) -> Result<()> {
+        self.fixed(&OperatingPointsHeader::TABLE, payload, at);
+        let entries = payload.get(OperatingPointsHeader::SIZE..).unwrap_or_default();
+        let mut entry_at = after(at, OperatingPointsHeader::SIZE);
+        for entry in entries.chunks(OperatingPointEntry::SIZE) {
+            self.fixed(&OperatingPointEntry::TABLE, entry, entry_at);
+            entry_at = after(entry_at, OperatingPointEntry::SIZE);
+        }
+        OperatingPoints::parse(payload, at).map(drop)
+    }
+
+    /// One LEB128 element of a record; `rest` moves behind it.
     fn number(
         &mut self,
+        record: &'static str,
         name: &'static str,
         place: Option<usize>,
         rest: &mut &[u8],
         at: impl Fn(&[u8]) -> u64,
     ) -> Result<u32> {
         let start = at(rest);
-        let (value, behind) = leb128(rest, start, name, RefinementHeader::TABLE.syntax)?;
+        let row = variable_row(record, name);
+        let syntax = row.map_or(RefinementHeader::TABLE.syntax, |row| row.clause);
+        let (value, behind) = leb128(rest, start, name, syntax)?;
         let bytes = rest.len().saturating_sub(behind.len());
         *rest = behind;
-        if let Some(row) = variable_row("refinement", name) {
+        if let Some(row) = row {
             let name = place.map_or(name.into(), |place| format!("{name}[{place}]").into());
             self.show(start, bytes, name, value.to_string(), row.meaning, row.clause, row.record);
         }

@@ -13,6 +13,8 @@ pub struct Limits {
     pub max_units: u32,
     /// Values (entries times components) held by the codebooks of one GOP.
     pub max_codebook_values: u32,
+    /// Cells that a predicted frame moves.
+    pub max_cells: u32,
 }
 
 impl Default for Limits {
@@ -23,6 +25,7 @@ impl Default for Limits {
             max_payload: 1 << 30,
             max_units: 1 << 24,
             max_codebook_values: 1 << 23,
+            max_cells: 1 << 20,
         }
     }
 }

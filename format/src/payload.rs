@@ -1,4 +1,4 @@
-//! Clauses 5.7 to 5.10: payloads whose extent depends on their elements, divided into sections.
+//! Clauses 5.7 to 5.10 and 5.14: payloads whose extent depends on their elements, divided into sections.
 //!
 //! The fixed record in front is deku's ([`crate::syntax`]), the division behind it nom's. A section cannot be
 //! read past its end, and what is left over is an error.
@@ -8,14 +8,18 @@ use crate::{Class, Error, ErrorKind, Result};
 use nom::{IResult, Offset, Parser};
 
 mod codebook;
+mod increment;
 mod index;
 mod number;
+mod operating_points;
 mod refinement;
 mod transform;
 
 pub use codebook::Codebook;
+pub use increment::{CodedSection, Increment, SectionBytes, write_increment};
 pub use index::Index;
 pub use number::{leb128, write_leb128};
+pub use operating_points::OperatingPoints;
 pub use refinement::{Refinement, write_refinement};
 pub use transform::Transform;
 
@@ -45,7 +49,7 @@ const fn row(
 }
 
 /// The rows behind the fixed part of the records, in the order of clause 5.
-pub const VARIABLE_ROWS: [VariableRow; 8] = [
+pub const VARIABLE_ROWS: [VariableRow; 15] = [
     row("5.7", "transform", "mean", "i32[dimension]", "output of components 0, step/64"),
     row("5.7", "transform", "basis", "i16[rank*dimension]", "weights, Q12, component by component"),
     row(
@@ -60,6 +64,13 @@ pub const VARIABLE_ROWS: [VariableRow; 8] = [
     row("5.9", "refinement", "block_length", "leb128[block_count]", "bytes of each block"),
     row("5.9", "refinement", "blocks", "u8[...]", "entropy-coded Gaussians"),
     row("5.10", "index", "entries", "index_entry[entry_count]", "one for each group"),
+    row("5.14", "increment", "sections", "section[...]", "sections with a count above 0"),
+    row("5.15", "section", "lanes_log2", "u8", "log2 of the entropy states of a block, 0 to 5"),
+    row("5.15", "section", "model_length", "leb128", "bytes of models"),
+    row("5.15", "section", "models", "u8[model_length]", "the models of the planes"),
+    row("5.15", "section", "block_length", "leb128[block_count]", "bytes of each block"),
+    row("5.15", "section", "blocks", "u8[...]", "entropy-coded values"),
+    row("5.16", "operating_points", "entries", "operating_point[point_count]", "one for each point"),
 ];
 
 /// What nom carries: the bytes from the offending element on stand for its offset.

@@ -12,20 +12,26 @@ mod end;
 mod file_header;
 mod frame_header;
 mod gop_header;
+mod increment;
 mod index;
+mod operating_points;
 mod refinement;
 mod sequence_parameters;
+mod sh_header;
 mod transform;
 mod unit_header;
 
 pub use codebook::CodebookHeader;
 pub use end::EndOfStream;
-pub use file_header::{FileHeader, SIGNATURE};
-pub use frame_header::{FrameHeader, NO_TRANSFORM};
-pub use gop_header::GopHeader;
+pub use file_header::{FileHeader, Profile, SIGNATURE};
+pub use frame_header::{FrameHeader, FrameType, NO_TRANSFORM};
+pub use gop_header::{GopHeader, PlaceInGop};
+pub use increment::{IncrementHeader, MAX_NEIGHBOURS, NO_PREDICTOR};
 pub use index::{IndexEntry, IndexHeader};
-pub use refinement::{NO_CODEBOOK, RefinementHeader, ShMode};
-pub use sequence_parameters::{MAX_REFINEMENTS, SequenceParameters, prefix_length};
+pub use operating_points::{OperatingPointEntry, OperatingPointsHeader};
+pub use refinement::RefinementHeader;
+pub use sequence_parameters::{MAX_LAYERS, MAX_REFINEMENTS, SequenceParameters, prefix_length};
+pub use sh_header::{NO_CODEBOOK, ShHeader, ShMode};
 pub use transform::{TransformHeader, TransformKind};
 pub use unit_header::{UnitHeader, UnitId, UnitType};
 
@@ -63,7 +69,7 @@ pub struct Table {
 }
 
 /// Every fixed record, in the order of clause 5.
-pub const TABLES: [Table; 11] = [
+pub const TABLES: [Table; 14] = [
     FileHeader::TABLE,
     UnitHeader::TABLE,
     SequenceParameters::TABLE,
@@ -75,6 +81,9 @@ pub const TABLES: [Table; 11] = [
     IndexHeader::TABLE,
     IndexEntry::TABLE,
     EndOfStream::TABLE,
+    IncrementHeader::TABLE,
+    OperatingPointsHeader::TABLE,
+    OperatingPointEntry::TABLE,
 ];
 
 /// Declares a record as its specification table: clauses, names, types, meaning.
@@ -156,6 +165,34 @@ macro_rules! record_io {
     };
 }
 pub(crate) use record_io;
+
+/// The same for a record whose ranges depend on the profile.
+macro_rules! record_io_in_profile {
+    ($Record:ident) => {
+        impl $Record {
+            /// Reads and checks a payload of a stream of a profile, at offset `at`, that is this record and nothing
+            /// more.
+            pub fn parse_payload(
+                payload: &[u8],
+                at: u64,
+                profile: $crate::syntax::Profile,
+            ) -> $crate::Result<Self> {
+                let (record, rest): (Self, _) = $crate::syntax::decode(&Self::TABLE, payload, at)?;
+                record.validate(at, profile)?;
+                $crate::syntax::nothing_after(&Self::TABLE, rest, $crate::syntax::after(at, Self::SIZE))?;
+                Ok(record)
+            }
+
+            /// The bytes of the record; refused where [`Self::parse_payload`] would refuse them in every profile.
+            /// Offsets of errors count from the start of the record.
+            pub fn to_bytes(&self) -> $crate::Result<Vec<u8>> {
+                self.validate(0, $crate::syntax::Profile::Dynamic)?;
+                $crate::syntax::encode(&Self::TABLE, self)
+            }
+        }
+    };
+}
+pub(crate) use record_io_in_profile;
 
 /// The bytes of a record without any check of its values, and the bytes after it.
 pub(crate) fn decode<'a, T: DekuContainerRead<'a>>(

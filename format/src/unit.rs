@@ -1,6 +1,6 @@
 //! Annex B: a stream is a file header and units, back to back, up to the end unit.
 
-use crate::syntax::{FileHeader, UnitHeader, UnitId, UnitType, after};
+use crate::syntax::{FileHeader, Profile, UnitHeader, UnitId, UnitType, after};
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// What a stream is made of.
@@ -56,6 +56,7 @@ pub enum Delivery<'a> {
 pub struct Units<'a> {
     rest: &'a [u8],
     at: u64,
+    profile: Profile,
     limits: Limits,
     unit_count: u32,
     state: State,
@@ -85,20 +86,20 @@ impl<'a> Stream<'a> {
 
     /// The units from the first on.
     pub fn units(&self) -> Units<'a> {
-        Units::starting_at(self.bytes, after(0, FileHeader::SIZE), &self.limits)
+        self.units_from(after(0, FileHeader::SIZE))
     }
 
     /// The units from the one at an absolute offset on, as an index gives it.
     pub fn units_from(&self, offset: u64) -> Units<'a> {
-        Units::starting_at(self.bytes, offset, &self.limits)
+        Units::starting_at(self.bytes, offset, self.header.profile(), &self.limits)
     }
 }
 
 impl<'a> Units<'a> {
     /// The units of a stream from an offset on. Past the end of the stream there are none.
-    pub(crate) fn starting_at(stream: &'a [u8], at: u64, limits: &Limits) -> Self {
+    pub(crate) fn starting_at(stream: &'a [u8], at: u64, profile: Profile, limits: &Limits) -> Self {
         let rest = usize::try_from(at).ok().and_then(|start| stream.get(start..)).unwrap_or_default();
-        Self { rest, at, limits: *limits, unit_count: 0, state: State::Open }
+        Self { rest, at, profile, limits: *limits, unit_count: 0, state: State::Open }
     }
 
     /// Absolute offset of the next unit.
@@ -138,7 +139,7 @@ impl<'a> Units<'a> {
         if self.rest.is_empty() {
             return Err(Error::new(at, CLAUSE, ErrorKind::Truncated { element: "unit_header" }));
         }
-        let (header, rest) = UnitHeader::parse(self.rest, at)?;
+        let (header, rest) = UnitHeader::parse(self.rest, at, self.profile)?;
         let units = u64::from(self.unit_count).saturating_add(1);
         Limits::check(at, "max_units", units, self.limits.max_units.into())?;
         header.within(at, &self.limits)?;
@@ -152,7 +153,7 @@ impl<'a> Units<'a> {
         if header.unit_type() == UnitType::End {
             self.state = State::Ended;
         }
-        Ok(match header.check_payload(at, payload) {
+        Ok(match header.check_payload(at, payload, self.profile) {
             Ok(()) => Delivery::Intact(Unit { at, header, payload, payload_at }),
             Err(error) => Delivery::Damaged(Damaged { at, header, error }),
         })
@@ -182,9 +183,9 @@ impl<'a> Iterator for Units<'a> {
 
 impl core::iter::FusedIterator for Units<'_> {}
 
-/// The first bytes of a stream of profile Intra.
-pub fn write_file_header(level: u8) -> Result<Vec<u8>> {
-    FileHeader::new(level)?.to_bytes()
+/// The first bytes of a stream.
+pub fn write_file_header(profile: Profile, level: u8) -> Result<Vec<u8>> {
+    FileHeader::new(profile, level)?.to_bytes()
 }
 
 /// Appends a unit with its check sums. Nothing is appended where a reader would refuse the header; offsets of

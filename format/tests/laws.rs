@@ -11,7 +11,7 @@ use proptest::{collection::vec, prop_assert, prop_assert_eq, proptest};
 use splatstream_format::arbitrary_stream::{self as random, ArbitraryStream};
 use splatstream_format::payload::{Codebook, Index, Refinement, Transform, leb128, write_leb128};
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader,
+    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, Profile,
     SequenceParameters, TransformKind, UnitHeader, UnitType,
 };
 use splatstream_format::unit::Stream;
@@ -52,10 +52,10 @@ fn near(seed: &[u8]) -> Vec<u8> {
 
 reading_and_writing_refuse_alike! {
     file_headers FileHeader(|raw: &[u8]| FileHeader::parse(raw).map(|(record, _)| record));
-    unit_headers UnitHeader(|raw: &[u8]| UnitHeader::parse(raw, 0).map(|(record, _)| record));
-    sequence_parameters SequenceParameters(|raw: &[u8]| SequenceParameters::parse_payload(raw, 0));
-    gop_headers GopHeader(|raw: &[u8]| GopHeader::parse_payload(raw, 0));
-    frame_headers FrameHeader(|raw: &[u8]| FrameHeader::parse_payload(raw, 0));
+    unit_headers UnitHeader(|raw: &[u8]| UnitHeader::parse(raw, 0, Profile::Dynamic).map(|(record, _)| record));
+    sequence_parameters SequenceParameters(|raw: &[u8]| SequenceParameters::parse_payload(raw, 0, Profile::Intra));
+    gop_headers GopHeader(|raw: &[u8]| GopHeader::parse_payload(raw, 0, Profile::Intra));
+    frame_headers FrameHeader(|raw: &[u8]| FrameHeader::parse_payload(raw, 0, Profile::Intra));
     codebook_headers CodebookHeader(|raw: &[u8]| CodebookHeader::parse_payload(raw, 0));
     index_headers IndexHeader(|raw: &[u8]| IndexHeader::parse_payload(raw, 0));
     index_entries IndexEntry(|raw: &[u8]| IndexEntry::parse_payload(raw, 0));
@@ -67,7 +67,7 @@ proptest! {
     fn sequence_parameters_come_back(seed in vec(any::<u8>(), 0..200), at in 0..u64::MAX / 2) {
         let sequence = made(&seed, random::sequence_parameters);
         let bytes = sequence.to_bytes().unwrap();
-        prop_assert_eq!(SequenceParameters::parse_payload(&bytes, at), Ok(sequence));
+        prop_assert_eq!(SequenceParameters::parse_payload(&bytes, at, Profile::Intra), Ok(sequence));
     }
 
     #[test]

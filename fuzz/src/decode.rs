@@ -20,7 +20,7 @@ const SIGNATURE: &[u8] = b"\x89GSS";
 
 /// Strict: the first fault ends decoding. Digests are not compared, as no edit could make them right again.
 const STRICT: Options =
-    Options { limits: LIMITS, verify: false, operating_point: OperatingPoint::ALL, tolerant: false };
+    Options { limits: LIMITS, verify: false, operating_point: OperatingPoint::ALL, tolerant: false, subset: false };
 const TOLERANT: Options = Options { tolerant: true, ..STRICT };
 const VERIFIED: Options = Options { verify: true, ..STRICT };
 

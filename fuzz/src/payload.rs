@@ -7,7 +7,7 @@ use splatstream_format::arbitrary_stream::{ArbitraryGop, ArbitraryStream, sequen
 use splatstream_format::entropy::layout::{Layout, ShCoding};
 use splatstream_format::entropy::model::{read_models, write_models};
 use splatstream_format::payload::{Codebook, Index, Refinement, Transform};
-use splatstream_format::syntax::{SequenceParameters, UnitType};
+use splatstream_format::syntax::{Profile, SequenceParameters, UnitType};
 use splatstream_format::unit::{Stream, Unit};
 
 /// Bytes that sequence parameters are made of, for parsers that need some.
@@ -76,7 +76,7 @@ fn comes_back(stream: &ArbitraryStream) {
     let units: Vec<Unit<'_>> = opened.units().collect::<Result<_, _>>().expect("units lie back to back");
     let mut units = Payloads { units: units.iter() };
     let sequence = units.next(UnitType::SequenceParameters);
-    assert_eq!(SequenceParameters::parse_payload(sequence.payload, sequence.payload_at), Ok(stream.sequence));
+    assert_eq!(SequenceParameters::parse_payload(sequence.payload, sequence.payload_at, Profile::Intra), Ok(stream.sequence));
     stream.gops.iter().for_each(|gop| units.gop(gop, &stream.sequence));
     if stream.has_index {
         let index = units.next(UnitType::Index);

@@ -170,7 +170,7 @@ fn decoded(stream: &[u8], repeat: u32) -> Result<Timing, Failure> {
     for _ in 0..repeat {
         let start = Instant::now();
         let summary = decode_stream(stream, &Options::default(), |sequence, frame| {
-            black_box(to_gaussians(frame.planes, sequence));
+            black_box(to_gaussians(frame.into_shown(), sequence));
             ControlFlow::Continue(())
         });
         seconds.push(start.elapsed().as_secs_f64());
@@ -186,7 +186,7 @@ fn point(stream: &[u8], info: OperatingPointInfo, judge: &mut Judge<'_>) -> Resu
     let summary = decode_stream(stream, &options, |sequence, frame| {
         let parameters = sequence.to_bytes().unwrap_or_default();
         let key = (parameters, frame.number, frame.digest.unwrap_or_default());
-        let gaussians = to_gaussians(frame.planes, sequence);
+        let gaussians = to_gaussians(frame.into_shown(), sequence);
         let views = judge.views_of(key, &gaussians);
         let shown = gaussians.len() as u64;
         frames.push(FramePoint { gaussians: shown, refinement_bytes: 0, bytes: 0, views });

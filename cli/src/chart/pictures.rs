@@ -91,7 +91,7 @@ fn drawn(stream: &[u8], point: &Point, camera: &splatstream_render::Camera) -> O
     let mut image = None;
     let options = Options { operating_point: point.info.point, ..Options::default() };
     decode_stream(stream, &options, |sequence, frame| {
-        image = Some(render(&to_gaussians(frame.planes, sequence), camera, BACKGROUND).colour);
+        image = Some(render(&to_gaussians(frame.into_shown(), sequence), camera, BACKGROUND).colour);
         ControlFlow::Break(())
     });
     image

@@ -11,7 +11,7 @@ pub(crate) mod sample;
 pub(crate) mod scene;
 
 use splatstream_format::payload::Index;
-use splatstream_format::syntax::{EndOfStream, IndexEntry, UnitId, UnitType};
+use splatstream_format::syntax::{EndOfStream, IndexEntry, Profile, UnitId, UnitType};
 use splatstream_format::unit::{write_file_header, write_unit};
 
 /// Bytes of file_header, and of unit_header.
@@ -61,7 +61,7 @@ impl Part {
 impl Script {
     /// The bytes of the stream.
     pub(crate) fn bytes(&self) -> Vec<u8> {
-        let mut bytes = write_file_header(self.level).unwrap();
+        let mut bytes = write_file_header(Profile::Intra, self.level).unwrap();
         for part in 0..self.parts.len() {
             bytes.extend(self.part_bytes(part));
         }

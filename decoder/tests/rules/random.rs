@@ -132,6 +132,7 @@ proptest! {
                 Attribute::Rotation => gaussian.rotation[place],
                 Attribute::Dc => gaussian.dc[place],
                 Attribute::Sh => gaussian.sh[place],
+                _ => unreachable!("not in a refinement"),
             }
         };
         let values: Vec<Vec<i64>> =

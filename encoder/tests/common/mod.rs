@@ -2,7 +2,6 @@
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_encoder::{Report, Settings, encode};
@@ -52,7 +51,7 @@ pub(crate) fn decoded(bytes: &[u8], options: &Options) -> (Vec<DecodedFrame>, Su
 /// Strict options with limits that suit small streams.
 pub(crate) fn strict() -> Options {
     let limits = Limits { max_gaussians: 1 << 20, ..Limits::default() };
-    Options { limits, tolerant: false, verify: true, operating_point: OperatingPoint::ALL }
+    Options { limits, ..Options::default() }
 }
 
 /// The planes of every frame of a stream that must be right.

@@ -9,7 +9,7 @@ use splatstream_format::entropy::layout::{Attribute, Layout};
 use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::entropy::token::{Alphabet, join, unzigzag};
 use splatstream_format::payload::Refinement;
-use splatstream_format::syntax::{FrameHeader, GopHeader, SequenceParameters, UnitType};
+use splatstream_format::syntax::{FrameHeader, GopHeader, Profile, SequenceParameters, UnitType};
 use splatstream_format::unit::Stream;
 use std::fmt::Write as _;
 
@@ -26,13 +26,17 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
         let (payload, at) = (unit.payload, unit.payload_at);
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
-                sequence = Some(SequenceParameters::parse_payload(payload, at).unwrap())
+                sequence = Some(SequenceParameters::parse_payload(payload, at, Profile::Intra).unwrap())
             }
-            UnitType::GopHeader => gop = Some(Gop::new(GopHeader::parse_payload(payload, at).unwrap(), 0)),
-            UnitType::FrameHeader => frame = Some(FrameHeader::parse_payload(payload, at).unwrap()),
+            UnitType::GopHeader => {
+                gop = Some(Gop::new(GopHeader::parse_payload(payload, at, Profile::Intra).unwrap(), 0))
+            }
+            UnitType::FrameHeader => {
+                frame = Some(FrameHeader::parse_payload(payload, at, Profile::Intra).unwrap())
+            }
             UnitType::Transform => {
                 let (Some(gop), Some(sequence)) = (&mut gop, &sequence) else { panic!("order") };
-                gop.tool(&unit, sequence, &limits).unwrap();
+                gop.tool(&unit, sequence, Profile::Intra, &limits).unwrap();
             }
             UnitType::Refinement => {
                 let (Some(gop), Some(sequence), Some(frame)) = (&gop, &sequence, &frame) else {

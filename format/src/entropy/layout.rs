@@ -1,8 +1,8 @@
-//! Clauses 8.1 and 8.5: which planes a refinement unit codes, in which order, and which contexts each may use.
+//! Clauses 8.1 and 8.5: which planes a unit codes, in which order, and which contexts each may use.
 
 use super::model::{PlaneModel, Source};
 use super::token::Alphabet;
-use crate::syntax::{RefinementHeader, ShMode};
+use crate::syntax::{ShHeader, ShMode};
 use crate::{Error, ErrorKind, Result};
 
 /// What a coded plane belongs to, in coding order.
@@ -20,12 +20,39 @@ pub enum Attribute {
     Dc,
     /// One plane a component of the sh transform, or a stage of vector quantisation.
     Sh,
+    /// Morton deltas of the cells that a frame moves, one plane.
+    Cell,
+    /// Whether what a cell carries is out of date, one plane.
+    Stale,
+    /// Translation of a cell: three planes.
+    Translation,
+    /// Turn of a cell: three planes.
+    Turn,
+    /// What becomes of a parent, one plane.
+    Mode,
+    /// Position residual of a parent: three planes.
+    Move,
+    /// Predictor of a run of new Gaussians, one plane.
+    Predictor,
 }
 
 impl Attribute {
-    /// Every attribute in coding order.
-    pub const ALL: [Self; 6] =
-        [Self::Position, Self::LogScale, Self::Opacity, Self::Rotation, Self::Dc, Self::Sh];
+    /// Every attribute: those of a Gaussian in coding order, then what increments code besides.
+    pub const ALL: [Self; 13] = [
+        Self::Position,
+        Self::LogScale,
+        Self::Opacity,
+        Self::Rotation,
+        Self::Dc,
+        Self::Sh,
+        Self::Cell,
+        Self::Stale,
+        Self::Translation,
+        Self::Turn,
+        Self::Mode,
+        Self::Move,
+        Self::Predictor,
+    ];
 
     /// The name used in reports.
     pub const fn name(self) -> &'static str {
@@ -36,6 +63,60 @@ impl Attribute {
             Self::Rotation => "rotation",
             Self::Dc => "dc",
             Self::Sh => "sh",
+            Self::Cell => "cell",
+            Self::Stale => "stale",
+            Self::Translation => "translation",
+            Self::Turn => "turn",
+            Self::Mode => "mode",
+            Self::Move => "move",
+            Self::Predictor => "predictor",
+        }
+    }
+}
+
+/// The sections of an increment (5.14), in stream order. A refinement has one, which is [`Section::New`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Section {
+    /// Motion of cells.
+    Cells,
+    /// What becomes of each parent.
+    Modes,
+    /// Position residuals of parents.
+    Moves,
+    /// Attribute residuals of parents.
+    Updates,
+    /// Predictors of the new Gaussians.
+    Predictors,
+    /// The new Gaussians.
+    New,
+}
+
+impl Section {
+    /// Every section, in stream order.
+    pub const ALL: [Self; 6] =
+        [Self::Cells, Self::Modes, Self::Moves, Self::Updates, Self::Predictors, Self::New];
+
+    /// The name in the table of clause 8.1.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cells => "cells",
+            Self::Modes => "modes",
+            Self::Moves => "moves",
+            Self::Updates => "updates",
+            Self::Predictors => "predictors",
+            Self::New => "new",
+        }
+    }
+
+    /// The place in stream order.
+    pub const fn place(self) -> usize {
+        match self {
+            Self::Cells => 0,
+            Self::Modes => 1,
+            Self::Moves => 2,
+            Self::Updates => 3,
+            Self::Predictors => 4,
+            Self::New => 5,
         }
     }
 }
@@ -58,8 +139,8 @@ pub enum ShCoding {
 }
 
 impl ShCoding {
-    /// What a refinement header says, for an sh transform of `rank` components.
-    pub fn of(header: &RefinementHeader, rank: u8) -> Self {
+    /// What a header says, for an sh transform of `rank` components.
+    pub fn of(header: &ShHeader, rank: u8) -> Self {
         match header.mode() {
             Some(ShMode::Coefficients) => Self::Coefficients { rank },
             Some(ShMode::VectorQuantised) => Self::VectorQuantised { stages: header.vq_stage_count },
@@ -71,6 +152,8 @@ impl ShCoding {
 /// One coded plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlaneInfo {
+    /// The section it stands in.
+    pub section: Section,
     /// What the plane belongs to.
     pub attribute: Attribute,
     /// Its place among the planes of the attribute.
@@ -79,30 +162,66 @@ pub struct PlaneInfo {
     pub alphabet: Alphabet,
 }
 
-/// The coded planes of a refinement unit, in order; the first is the position.
+impl PlaneInfo {
+    /// Whether the values are Morton deltas.
+    pub const fn is_position(&self) -> bool {
+        matches!(self.alphabet, Alphabet::Position)
+    }
+}
+
+/// The coded planes of a refinement or of a section, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
     planes: Vec<PlaneInfo>,
 }
 
 impl Layout {
-    /// The planes for a dc transform of `dc_rank` components and the given SH coding.
+    /// The planes of new Gaussians for a dc transform of `dc_rank` components and the given SH coding: those of
+    /// a refinement, and of the section `new` of an increment.
     pub fn new(dc_rank: u8, sh: ShCoding) -> Self {
-        let mut planes =
-            vec![PlaneInfo { attribute: Attribute::Position, place: 0, alphabet: Alphabet::Position }];
-        let mut add = |attribute, count, alphabet| {
-            planes.extend((0..count).map(|place| PlaneInfo { attribute, place, alphabet }));
-        };
-        add(Attribute::LogScale, 3, Alphabet::Attribute);
-        add(Attribute::Opacity, 1, Alphabet::Attribute);
-        add(Attribute::Rotation, 3, Alphabet::Attribute);
-        add(Attribute::Dc, dc_rank, Alphabet::Attribute);
+        let mut layout = Self { planes: Vec::new() };
+        layout.add(Section::New, Attribute::Position, 1, Alphabet::Position);
+        layout.add_attributes(Section::New, dc_rank, sh);
+        layout
+    }
+
+    /// The planes of a section of an increment.
+    pub fn of_section(section: Section, dc_rank: u8, sh: ShCoding) -> Self {
+        let mut layout = Self { planes: Vec::new() };
+        match section {
+            Section::Cells => {
+                layout.add(section, Attribute::Cell, 1, Alphabet::Position);
+                layout.add(section, Attribute::Stale, 1, Alphabet::Attribute);
+                layout.add(section, Attribute::Translation, 3, Alphabet::Attribute);
+                layout.add(section, Attribute::Turn, 3, Alphabet::Attribute);
+            }
+            Section::Modes => layout.add(section, Attribute::Mode, 1, Alphabet::Attribute),
+            Section::Moves => layout.add(section, Attribute::Move, 3, Alphabet::Attribute),
+            Section::Updates => layout.add_attributes(section, dc_rank, sh),
+            Section::Predictors => layout.add(section, Attribute::Predictor, 1, Alphabet::Attribute),
+            Section::New => return Self::new(dc_rank, sh),
+        }
+        layout
+    }
+
+    fn add(&mut self, section: Section, attribute: Attribute, count: u8, alphabet: Alphabet) {
+        self.planes.extend((0..count).map(|place| PlaneInfo { section, attribute, place, alphabet }));
+    }
+
+    fn add_attributes(&mut self, section: Section, dc_rank: u8, sh: ShCoding) {
+        self.add(section, Attribute::LogScale, 3, Alphabet::Attribute);
+        self.add(section, Attribute::Opacity, 1, Alphabet::Attribute);
+        self.add(section, Attribute::Rotation, 3, Alphabet::Attribute);
+        self.add(section, Attribute::Dc, dc_rank, Alphabet::Attribute);
         match sh {
             ShCoding::None => {}
-            ShCoding::Coefficients { rank } => add(Attribute::Sh, rank, Alphabet::Attribute),
-            ShCoding::VectorQuantised { stages } => add(Attribute::Sh, stages, Alphabet::Index),
+            ShCoding::Coefficients { rank } => {
+                self.add(section, Attribute::Sh, rank, Alphabet::Attribute);
+            }
+            ShCoding::VectorQuantised { stages } => {
+                self.add(section, Attribute::Sh, stages, Alphabet::Index);
+            }
         }
-        Self { planes }
     }
 
     /// The planes in coding order.
@@ -144,19 +263,31 @@ impl Layout {
 
 /// The availability column of the table of clause 8.5.
 pub fn is_available(plane: PlaneInfo, source: Source) -> bool {
-    use Attribute::{LogScale, Opacity, Position, Rotation};
-    let PlaneInfo { attribute, place, alphabet } = plane;
-    if attribute == Position {
+    use Attribute::{LogScale, Opacity, Rotation};
+    let PlaneInfo { section, attribute, place, alphabet } = plane;
+    if alphabet == Alphabet::Position {
         return matches!(source, Source::None | Source::NeighbourSum);
     }
     match source {
-        Source::None | Source::PositionSpacing => true,
+        Source::None => true,
         Source::NeighbourSum | Source::NeighbourMagnitude => alphabet == Alphabet::Attribute,
-        Source::PreviousPlane => attribute != LogScale && alphabet == Alphabet::Attribute || place > 0,
+        Source::PreviousPlane => place > 0 || follows_signed(plane),
         Source::GroupMagnitude => place > 0,
+        // What is known of a whole Gaussian, which the other sections do not code.
+        _ if section != Section::New => false,
+        Source::PositionSpacing => true,
         Source::LargestLogScale => attribute != LogScale || place > 0,
         Source::MiddleLogScale => attribute != LogScale || place > 1,
         Source::LogVolume | Source::Anisotropy => attribute >= Opacity,
         Source::Opacity => attribute >= Rotation,
     }
+}
+
+/// Whether the first plane of an attribute stands behind a plane of its section whose values can be a context.
+fn follows_signed(plane: PlaneInfo) -> bool {
+    let first = matches!(
+        plane.attribute,
+        Attribute::LogScale | Attribute::Stale | Attribute::Mode | Attribute::Move | Attribute::Predictor
+    );
+    !first && plane.alphabet == Alphabet::Attribute
 }

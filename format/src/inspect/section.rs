@@ -2,21 +2,33 @@
 
 use super::{Element, Inspector, variable_row};
 use crate::Result;
+use crate::entropy::in_force::ModelsInForce;
 use crate::entropy::layout::{Layout, PlaneInfo, ShCoding};
 use crate::entropy::model::{ModelTrace, PlaneModel, Source, read_models};
 use crate::payload::{Refinement, leb128};
-use crate::syntax::{FrameHeader, TransformHeader, TransformKind, after};
+use crate::syntax::{FrameHeader, GopHeader, TransformHeader, TransformKind, after};
 
 /// What the models of a unit depend on: the ranks of the transforms, and the models before.
 #[derive(Default)]
 pub(super) struct Coding {
+    gop: Option<(GopHeader, u32)>,
     dc_ranks: [u8; 16],
     sh_ranks: [u8; 16],
-    frame_ranks: (u8, u8),
+    pub(super) frame_ranks: (u8, u8),
     before: Option<(Layout, Vec<PlaneModel>)>,
+    /// Display index of the frame, and the models in force for its next unit of refinement 0.
+    frame: (u32, ModelsInForce),
+    /// The models in force for the next unit of a higher refinement.
+    current: ModelsInForce,
+    /// What `frame` was when earlier frames of the group ended.
+    earlier: Vec<(u32, ModelsInForce)>,
 }
 
 impl Coding {
+    pub(super) fn of_gop(header: GopHeader, first: u32) -> Self {
+        Self { gop: Some((header, first)), ..Self::default() }
+    }
+
     pub(super) fn define(&mut self, header: &TransformHeader) {
         let ranks = match header.kind() {
             Some(TransformKind::Sh) => &mut self.sh_ranks,
@@ -27,11 +39,37 @@ impl Coding {
         }
     }
 
-    pub(super) fn start_frame(&mut self, header: &FrameHeader) {
+    pub(super) fn start_frame(&mut self, header: &FrameHeader, number: u32) {
         let rank = |ranks: &[u8; 16], id: u8| ranks.get(usize::from(id)).copied().unwrap_or(0);
         self.frame_ranks =
             (rank(&self.dc_ranks, header.dc_transform_id), rank(&self.sh_ranks, header.sh_transform_id));
         self.before = None;
+        let reference = self.gop.and_then(|(gop, first)| {
+            let place = gop.place(number.checked_sub(first)?);
+            first.checked_add(place.reference?)
+        });
+        let inherited = self.models_of(reference);
+        let ended = core::mem::replace(&mut self.frame, (number, inherited));
+        self.earlier.push(ended);
+    }
+
+    fn models_of(&self, reference: Option<u32>) -> ModelsInForce {
+        let frames = self.earlier.iter().chain([&self.frame]);
+        let found = reference.and_then(|wanted| frames.rev().find(|(number, _)| *number == wanted));
+        found.map(|(_, models)| models.clone()).unwrap_or_default()
+    }
+
+    /// The models in force for a unit.
+    pub(super) fn in_force(&self, refinement: u8) -> &ModelsInForce {
+        if refinement == 0 { &self.frame.1 } else { &self.current }
+    }
+
+    /// Takes the models in force after a unit.
+    pub(super) fn follow(&mut self, refinement: u8, models: ModelsInForce) {
+        if refinement == 0 {
+            self.frame.1 = models.clone();
+        }
+        self.current = models;
     }
 }
 
@@ -55,8 +93,9 @@ impl ModelElement {
     }
 }
 
+/// The elements of a model section as they are read.
 #[derive(Default)]
-struct Elements {
+pub(super) struct Elements {
     list: Vec<ModelElement>,
     planes: usize,
 }
@@ -71,19 +110,31 @@ impl ModelTrace for Elements {
 }
 
 impl Inspector<'_> {
-    /// The elements of a model section; one element for all of it where it cannot be read.
-    pub(super) fn models(&mut self, refinement: &Result<Refinement<'_>>, model: &[u8], at: u64) {
+    /// The elements of the models of a refinement.
+    pub(super) fn refinement_models(&mut self, refinement: &Result<Refinement<'_>>, model: &[u8], at: u64) {
         let mut elements = Elements::default();
         let read = match refinement {
             Ok(refinement) => self.read(refinement, model, at, &mut elements),
             Err(error) => Err(*error),
         };
+        self.models("refinement", &elements, read.as_ref(), model, at);
+    }
+
+    /// The elements of a model section; one element for all of it where it cannot be read.
+    pub(super) fn models(
+        &mut self,
+        record: &str,
+        elements: &Elements,
+        read: core::result::Result<&Layout, &crate::Error>,
+        model: &[u8],
+        at: u64,
+    ) {
         match read {
             Ok(layout) if !model.is_empty() => self.show_models(&elements.list, layout.planes(), model, at),
-            Ok(_) => self.variable("refinement", "models", at, 0, "0 bytes".into()),
+            Ok(_) => self.variable(record, "models", at, 0, "0 bytes".into()),
             Err(error) => {
                 let value = format!("{} bytes, not readable: {}", model.len(), error.kind);
-                self.variable("refinement", "models", at, model.len(), value);
+                self.variable(record, "models", at, model.len(), value);
             }
         }
     }
@@ -96,7 +147,7 @@ impl Inspector<'_> {
         trace: &mut Elements,
     ) -> Result<Layout> {
         let (dc, sh) = self.coding.frame_ranks;
-        let layout = Layout::new(dc, ShCoding::of(&refinement.header, sh));
+        let layout = Layout::new(dc, ShCoding::of(&refinement.header.sh(), sh));
         if refinement.header.gaussian_count > 0 {
             let before = self.coding.before.as_ref().map(|(layout, models)| (layout, models.as_slice()));
             let reusable = layout.reusable(before);
@@ -139,7 +190,7 @@ impl Inspector<'_> {
     }
 
     /// The sections of a block; one element for all of it where it cannot be divided.
-    pub(super) fn block(&mut self, place: usize, block: &[u8], at: u64, lanes_log2: u8) {
+    pub(super) fn block(&mut self, record: &str, place: usize, block: &[u8], at: u64, lanes_log2: u8) {
         let states = 4_usize.wrapping_shl(u32::from(lanes_log2));
         let divided = leb128(block, at, "word_count", "5.13").ok().and_then(|(word_count, rest)| {
             let words = usize::try_from(word_count).ok()?.checked_mul(2)?;
@@ -147,7 +198,7 @@ impl Inspector<'_> {
             Some((word_count, block.len().saturating_sub(rest.len()), words, raw))
         });
         let Some((word_count, head, words, raw)) = divided else {
-            if let Some(row) = variable_row("refinement", "blocks") {
+            if let Some(row) = variable_row(record, "blocks") {
                 let (name, value) = (format!("blocks[{place}]"), format!("{} bytes", block.len()));
                 self.show(at, block.len(), name.into(), value, row.meaning, row.clause, row.record);
             }

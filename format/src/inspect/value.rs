@@ -1,6 +1,6 @@
 //! Values of elements in words.
 
-use crate::syntax::{Row, ShMode, TransformKind, UnitType};
+use crate::syntax::{FrameType, Profile, Row, ShMode, TransformKind, UnitType};
 
 /// The value of an element from its bytes, with what it stands for where it is a code.
 pub(super) fn of_row(record: &str, row: &Row, raw: &[u8]) -> String {
@@ -32,11 +32,14 @@ fn one(row: &Row, number: u64) -> String {
     if row.type_name.starts_with("f32") {
         return u32::try_from(number).map(f32::from_bits).unwrap_or_default().to_string();
     }
+    if row.type_name == "i8" {
+        return u8::try_from(number).map(u8::cast_signed).unwrap_or_default().to_string();
+    }
     match row.name {
         "signature" => format!("{number:02X}"),
         "header_crc" | "payload_crc" => format!("{number:#010x}"),
         "header_check" => format!("{number:#06x}"),
-        "refinement_digest" => format!("{number:#018x}"),
+        "refinement_digest" | "carried_digest" => format!("{number:#018x}"),
         _ => number.to_string(),
     }
 }
@@ -45,22 +48,21 @@ fn one(row: &Row, number: u64) -> String {
 fn named(record: &str, element: &str, number: u64) -> Option<&'static str> {
     let code = u8::try_from(number).ok()?;
     match (record, element) {
-        ("file_header", "profile") => (code == 0).then_some("Intra"),
+        ("file_header", "profile") => Profile::from_code(code).map(Profile::name),
         ("unit_header", "unit_type") => Some(UnitType::from_code(code).name()),
         ("unit_header", "unit_flags") => flags(code, &["critical"]),
         ("sequence_parameters", "sequence_flags") => {
             flags(code, &["canonical_axes", "antialiased", "canonical_axes and antialiased"])
         }
-        ("gop_header", "gop_structure") => (code == 0).then_some("all intra"),
-        ("frame_header", "frame_type") => match code {
-            0 => Some("I"),
-            1 => Some("P"),
-            2 => Some("B"),
+        ("gop_header", "gop_structure") => match code {
+            0 => Some("all intra"),
+            1 => Some("predicted"),
             _ => None,
         },
+        ("frame_header", "frame_type") => FrameType::from_code(code).map(FrameType::name),
         ("frame_header", "sh_transform_id") => (code == crate::syntax::NO_TRANSFORM).then_some("none"),
         ("transform", "transform_kind") => TransformKind::from_code(code).map(TransformKind::name),
-        ("refinement", "sh_mode") => ShMode::from_code(code).map(ShMode::name),
+        ("refinement" | "increment", "sh_mode") => ShMode::from_code(code).map(ShMode::name),
         _ => None,
     }
 }

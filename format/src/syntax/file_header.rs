@@ -8,8 +8,6 @@ pub const SIGNATURE: [u8; 8] = [0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A];
 
 /// The version that this crate writes.
 const VERSION: (u8, u8) = (1, 0);
-/// The profile of version 1.0.
-const PROFILE_INTRA: u8 = 0;
 /// Levels of annex A.
 const LEVELS: core::ops::RangeInclusive<u8> = 1..=4;
 /// `header_crc` itself, which it does not cover.
@@ -24,7 +22,7 @@ table! {
         version_major: u8,
         /// 0; a greater minor version adds only units that can be skipped
         version_minor: u8,
-        /// 0 is Intra
+        /// 0 is Intra, 1 is Dynamic
         profile: u8,
         /// 1 to 4, annex A
         level: u8,
@@ -33,15 +31,56 @@ table! {
     }
 }
 
+/// The tools that a stream uses, annex A.1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Profile {
+    /// 0: intra frames with refinements.
+    Intra,
+    /// 1: spatial layers, predicted frames, temporal layers.
+    Dynamic,
+}
+
+impl Profile {
+    /// The code in the stream.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Intra => 0,
+            Self::Dynamic => 1,
+        }
+    }
+
+    /// The profile of a code; others are reserved.
+    pub const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Intra),
+            1 => Some(Self::Dynamic),
+            _ => None,
+        }
+    }
+
+    /// The name used in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Intra => "Intra",
+            Self::Dynamic => "Dynamic",
+        }
+    }
+}
+
 impl FileHeader {
-    /// The header of a stream of this version, profile Intra.
-    pub fn new(level: u8) -> Result<Self> {
+    /// The profile; that of a header that was refused is Intra.
+    pub fn profile(&self) -> Profile {
+        Profile::from_code(self.profile).unwrap_or(Profile::Intra)
+    }
+
+    /// The header of a stream of this version.
+    pub fn new(profile: Profile, level: u8) -> Result<Self> {
         let (version_major, version_minor) = VERSION;
         let header = Self {
             signature: SIGNATURE,
             version_major,
             version_minor,
-            profile: PROFILE_INTRA,
+            profile: profile.code(),
             level,
             header_crc: 0,
         };
@@ -76,7 +115,7 @@ impl FileHeader {
         check.well_formed(self.signature == SIGNATURE, "signature", ErrorKind::Signature)?;
         check.check_sum("header_crc", self.header_crc, self.covered_crc()?)?;
         check.known(self.version_major == VERSION.0, "version_major", self.version_major)?;
-        check.known(self.profile == PROFILE_INTRA, "profile", self.profile)?;
+        check.known(Profile::from_code(self.profile).is_some(), "profile", self.profile)?;
         check.known(LEVELS.contains(&self.level), "level", self.level)
     }
 

@@ -1,10 +1,12 @@
 //! 5.4 sequence_parameters: what holds for every frame of a stream.
 
-use super::{record_io, table};
+use super::{Profile, record_io_in_profile, table};
 use crate::Result;
 
 /// The most refinements of a frame.
 pub const MAX_REFINEMENTS: u8 = 10;
+/// The most spatial layers, and the most temporal layers.
+pub const MAX_LAYERS: u8 = 4;
 
 /// Bits of `sequence_flags`.
 const CANONICAL_AXES: u8 = 1;
@@ -24,9 +26,9 @@ table! {
     "5.4" "6.4" sequence_parameters SequenceParameters {
         /// degree of the spherical harmonics, 0 to 3
         sh_degree: u8,
-        /// 1 in profile Intra
+        /// spatial layers, 1 to 4; 1 in profile Intra
         spatial_layer_count: u8,
-        /// 1 in profile Intra
+        /// temporal layers, 1 to 4; 1 in profile Intra
         temporal_layer_count: u8,
         /// refinements of a frame, 1 to 10
         refinement_count: u8,
@@ -67,7 +69,7 @@ table! {
     }
 }
 
-record_io!(SequenceParameters);
+record_io_in_profile!(SequenceParameters);
 
 /// The Gaussians that make `percent` of `gaussian_count`, rounded up: at most all of them for 100 or less.
 pub fn prefix_length(percent: u8, gaussian_count: u32) -> u32 {
@@ -78,11 +80,12 @@ pub fn prefix_length(percent: u8, gaussian_count: u32) -> u32 {
 
 impl SequenceParameters {
     /// 6.4.
-    pub fn validate(&self, at: u64) -> Result<()> {
+    pub fn validate(&self, at: u64, profile: Profile) -> Result<()> {
         let check = Self::TABLE.check(at);
+        let layers = if profile == Profile::Intra { 1 } else { MAX_LAYERS };
         check.range("sh_degree", self.sh_degree, 0, 3)?;
-        check.range("spatial_layer_count", self.spatial_layer_count, 1, 1)?;
-        check.range("temporal_layer_count", self.temporal_layer_count, 1, 1)?;
+        check.range("spatial_layer_count", self.spatial_layer_count, 1, layers)?;
+        check.range("temporal_layer_count", self.temporal_layer_count, 1, layers)?;
         check.range("refinement_count", self.refinement_count, 1, MAX_REFINEMENTS)?;
         self.validate_percents(at)?;
         check.range("position_bits", self.position_bits, 1, 20)?;

@@ -1,6 +1,6 @@
 //! 5.3 unit_header: what a unit is, how long, and whether it arrived whole.
 
-use super::{decode, encode, table};
+use super::{Profile, SequenceParameters, decode, encode, table};
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// Bit 0 of `unit_flags`: a decoder that does not know the unit cannot go on without it.
@@ -51,7 +51,11 @@ pub enum UnitType {
     Index,
     /// 8: the last unit.
     End,
-    /// 0 (forbidden) and 9 to 127: later versions.
+    /// 10: what one refinement of one layer changes and adds, profile Dynamic.
+    Increment,
+    /// 11: what the operating points cost.
+    OperatingPoints,
+    /// 0 (forbidden), 9 and 12 to 127: later versions.
     Reserved(u8),
     /// 128 to 255: private data.
     User(u8),
@@ -69,8 +73,10 @@ impl UnitType {
             6 => Self::Refinement,
             7 => Self::Index,
             8 => Self::End,
+            10 => Self::Increment,
+            11 => Self::OperatingPoints,
             128.. => Self::User(code),
-            0 | 9..=127 => Self::Reserved(code),
+            0 | 9 | 12..=127 => Self::Reserved(code),
         }
     }
 
@@ -85,6 +91,8 @@ impl UnitType {
             Self::Refinement => 6,
             Self::Index => 7,
             Self::End => 8,
+            Self::Increment => 10,
+            Self::OperatingPoints => 11,
             Self::Reserved(code) | Self::User(code) => code,
         }
     }
@@ -100,6 +108,8 @@ impl UnitType {
             Self::Refinement => "refinement",
             Self::Index => "index",
             Self::End => "end",
+            Self::Increment => "increment",
+            Self::OperatingPoints => "operating_points",
             Self::Reserved(0) => "forbidden",
             Self::Reserved(_) => "reserved",
             Self::User(_) => "user",
@@ -111,14 +121,34 @@ impl UnitType {
         !matches!(self, Self::Reserved(_) | Self::User(_))
     }
 
+    /// Whether a decoder of streams of a profile knows the payload; to profile Intra increments are unknown.
+    pub fn is_known_in(self, profile: Profile) -> bool {
+        self.is_known() && !(profile == Profile::Intra && self == Self::Increment)
+    }
+
     /// Whether a writer marks the unit critical.
     pub const fn is_critical(self) -> bool {
-        self.is_known() && !matches!(self, Self::Index)
+        self.is_known() && !matches!(self, Self::Index | Self::OperatingPoints)
     }
 
     /// Whether the unit belongs to one group, so that `frame` has a meaning.
     const fn has_frame(self) -> bool {
-        !matches!(self, Self::SequenceParameters | Self::Index | Self::End)
+        !matches!(self, Self::SequenceParameters | Self::Index | Self::End | Self::OperatingPoints)
+    }
+
+    /// Whether the unit carries a refinement.
+    pub const fn has_refinement(self) -> bool {
+        matches!(self, Self::Refinement | Self::Increment)
+    }
+
+    /// The highest spatial and temporal layer that a unit of this type may name in a profile.
+    const fn highest_layers(self, profile: Profile) -> (u8, u8) {
+        let highest = super::MAX_LAYERS - 1;
+        match (profile, self) {
+            (Profile::Dynamic, Self::FrameHeader | Self::Increment) => (highest, highest),
+            (Profile::Dynamic, Self::Codebook) => (0, highest),
+            _ => (0, 0),
+        }
     }
 }
 
@@ -152,6 +182,11 @@ impl UnitId {
     pub const fn of_refinement(frame: u32, refinement: u8) -> Self {
         Self { refinement, ..Self::of_frame(UnitType::Refinement, frame) }
     }
+
+    /// The same on other layers.
+    pub const fn on_layers(self, spatial_layer: u8, temporal_layer: u8) -> Self {
+        Self { spatial_layer, temporal_layer, ..self }
+    }
 }
 
 impl UnitHeader {
@@ -176,21 +211,21 @@ impl UnitHeader {
             "unit_type",
             header.unit_type,
         )?;
-        header.validate(0)?;
+        header.validate(0, Profile::Dynamic)?;
         Ok(header)
     }
 
     /// Reads and checks the header at the start of `bytes`; gives the bytes after it.
-    pub fn parse(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
+    pub fn parse(bytes: &[u8], at: u64, profile: Profile) -> Result<(Self, &[u8])> {
         let (header, rest): (Self, _) =
             decode(&Self::TABLE, bytes, at).map_err(crate::unit::cut_is_truncated)?;
-        header.validate(at)?;
+        header.validate(at, profile)?;
         Ok((header, rest))
     }
 
     /// The bytes of the header; refused where [`Self::parse`] would refuse them.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        self.validate(0)?;
+        self.validate(0, Profile::Dynamic)?;
         encode(&Self::TABLE, self)
     }
 
@@ -216,21 +251,30 @@ impl UnitHeader {
     }
 
     /// 6.3. The check sum comes first: behind a wrong one no element can be trusted.
-    pub fn validate(&self, at: u64) -> Result<()> {
+    pub fn validate(&self, at: u64, profile: Profile) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.check_sum("header_check", self.header_check.into(), self.covered_check()?.into())?;
         check.well_formed(self.unit_type != 0, "unit_type", ErrorKind::Number { element: "unit_type" })?;
         check.reserved_bits("unit_flags", 0, self.unit_flags & !CRITICAL)?;
         check.reserved_bits("reserved_zero", 0, self.reserved_zero)?;
         let unit_type = self.unit_type();
-        if !unit_type.is_known() {
+        if !unit_type.is_known_in(profile) {
             return check.known(!self.is_critical(), "unit_type", self.unit_type);
         }
-        let refinements = if unit_type == UnitType::Refinement { super::MAX_REFINEMENTS } else { 1 };
-        check.range("spatial_layer", self.spatial_layer, 0, 0)?;
-        check.range("temporal_layer", self.temporal_layer, 0, 0)?;
+        let refinements = if unit_type.has_refinement() { super::MAX_REFINEMENTS } else { 1 };
+        let (spatial, temporal) = unit_type.highest_layers(profile);
+        check.range("spatial_layer", self.spatial_layer, 0, spatial)?;
+        check.range("temporal_layer", self.temporal_layer, 0, temporal)?;
         check.range("refinement", self.refinement, 0, refinements.saturating_sub(1))?;
         check.range("frame", self.frame, 0, if unit_type.has_frame() { u32::MAX } else { 0 })
+    }
+
+    /// 6.3: the layers are layers of the sequence.
+    pub fn validate_layers(&self, at: u64, sequence: &SequenceParameters) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        let last = |count: u8| count.saturating_sub(1);
+        check.range("spatial_layer", self.spatial_layer, 0, last(sequence.spatial_layer_count))?;
+        check.range("temporal_layer", self.temporal_layer, 0, last(sequence.temporal_layer_count))
     }
 
     /// A.2: the payload is not longer than agreed.
@@ -240,8 +284,8 @@ impl UnitHeader {
     }
 
     /// 6.3: a payload that is read has the check sum of the header; that of an unknown unit is not read.
-    pub(crate) fn check_payload(&self, at: u64, payload: &[u8]) -> Result<()> {
-        if !self.unit_type().is_known() {
+    pub(crate) fn check_payload(&self, at: u64, payload: &[u8], profile: Profile) -> Result<()> {
+        if !self.unit_type().is_known_in(profile) {
             return Ok(());
         }
         Self::TABLE.check(at).check_sum("payload_crc", self.payload_crc, crc32fast::hash(payload))

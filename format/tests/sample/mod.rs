@@ -6,7 +6,7 @@ pub(crate) mod case;
 
 use splatstream_format::payload::{Codebook, Index, Transform, write_refinement};
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, RefinementHeader,
+    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, Profile, RefinementHeader,
     SequenceParameters, TransformHeader, UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
@@ -109,7 +109,7 @@ pub(crate) fn unit_at(units: &Units, place: usize) -> u64 {
 
 /// The stream of these units, with check sums that fit.
 pub(crate) fn stream(units: &Units) -> Vec<u8> {
-    let mut bytes = write_file_header(2).unwrap();
+    let mut bytes = write_file_header(Profile::Intra, 2).unwrap();
     for (id, payload) in units {
         write_unit(&mut bytes, *id, payload).unwrap();
     }

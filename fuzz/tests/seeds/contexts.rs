@@ -9,7 +9,7 @@ use splatstream_format::entropy::layout::{Layout, PlaneInfo, ShCoding, is_availa
 use splatstream_format::entropy::model::{ContextAxis, PlaneModel, Source, write_models};
 use splatstream_format::payload::{Transform, write_refinement};
 use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, GopHeader, NO_CODEBOOK, RefinementHeader, SequenceParameters, ShMode,
+    EndOfStream, FrameHeader, GopHeader, NO_CODEBOOK, Profile, RefinementHeader, SequenceParameters, ShMode,
     TransformHeader, TransformKind, UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
@@ -48,7 +48,7 @@ pub(crate) fn stream(sequence: &SequenceParameters) -> Vec<u8> {
         (UnitId::of_refinement(0, 0), write_refinement(&header, sequence, &model, &blocks)),
     ];
     let end = EndOfStream { frame_count: 1, unit_count: units.len() as u32, index_offset: 0 };
-    let mut out = write_file_header(1).unwrap();
+    let mut out = write_file_header(Profile::Intra, 1).unwrap();
     for (id, payload) in units.into_iter().chain([(UnitId::stream(UnitType::End), end.to_bytes())]) {
         write_unit(&mut out, id, &payload.unwrap()).unwrap();
     }

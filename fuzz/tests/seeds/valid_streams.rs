@@ -4,7 +4,7 @@ use crate::contexts;
 use splatstream_encoder::{Preset, Quality, Settings, ShChoice, Steps, encode};
 use splatstream_format::Limits;
 use splatstream_format::payload::{Refinement, Transform};
-use splatstream_format::syntax::{SequenceParameters, ShMode, UnitType};
+use splatstream_format::syntax::{Profile, SequenceParameters, ShMode, UnitType};
 use splatstream_format::unit::Stream;
 use splatstream_scene::builtin::{BuiltinScene, Tracking};
 
@@ -77,7 +77,7 @@ fn model_section(bytes: &[u8]) -> Vec<u8> {
     let units: Vec<_> = Stream::open(bytes, &limits).unwrap().units().map(Result::unwrap).collect();
     let of_type = |unit_type| units.iter().filter(move |unit| unit.header.unit_type() == unit_type);
     let first = of_type(UnitType::SequenceParameters).next().unwrap();
-    let sequence = SequenceParameters::parse_payload(first.payload, first.payload_at).unwrap();
+    let sequence = SequenceParameters::parse_payload(first.payload, first.payload_at, Profile::Intra).unwrap();
     let ranks: Vec<u8> = of_type(UnitType::Transform)
         .map(|unit| Transform::parse(unit.payload, unit.payload_at, &sequence).unwrap().header.rank)
         .collect();

@@ -1,0 +1,256 @@
+//! Clause 7.15: cells that move, and the Gaussians that move with them.
+//!
+//! A fine position is in lattice step / 64, a fine rotation in rotation_step / 64.
+
+use crate::motion::{Motion, UNIT_MAX};
+use crate::position::morton;
+use rayon::prelude::*;
+
+/// Gaussians displaced by one task.
+const RUN: usize = 4096;
+
+/// The square root, rounded down. Clause 7.15.
+pub fn isqrt(value: u64) -> u64 {
+    value.isqrt()
+}
+
+/// U: the integer that stands for 1 in units of rotation_step, min(32767, floor(1 / rotation_step + 1 / 2)).
+/// Clause 7.15.
+///
+/// `rotation_step` is the bit pattern of the element, a binary32 of 2^-40 to 1.
+pub fn rotation_unit(rotation_step: u32) -> i64 {
+    // The step is mantissa / 2^shift; below 2^-76, where the unit is long 32767, the shift is cut.
+    let mantissa = u128::from(rotation_step & 0x7F_FFFF | 0x80_0000);
+    let shift = 150_u32.saturating_sub(rotation_step >> 23 & 0xFF).min(100);
+    let unit = 2_u128.wrapping_shl(shift).wrapping_add(mantissa).checked_div(mantissa << 1).unwrap_or(0);
+    i64::try_from(unit).unwrap_or(UNIT_MAX).min(UNIT_MAX)
+}
+
+/// A cell of the lattice and its motion. Clause 7.15.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cell {
+    /// Cell coordinates x, y, z: lattice coordinates divided by 2^cell_log2.
+    pub coordinates: [u32; 3],
+    /// True if Gaussians carried over from the reference frame are left out here.
+    pub stale: bool,
+    /// Shift in lattice step / 8; -2^20 to 2^20.
+    pub translation: [i32; 3],
+    /// Vector part of a unit quaternion of positive real part, times 2^14; -8192 to 8192.
+    pub turn: [i32; 3],
+}
+
+/// The cells of a frame that move; what lies in no other stays. Clause 7.15.
+#[derive(Debug, Clone, Default)]
+pub struct CellField {
+    cell_log2: u8,
+    position_bits: u8,
+    unit: i64,
+    /// Morton codes of the cells, rising; the cells in the same order.
+    codes: Vec<u64>,
+    cells: Vec<Cell>,
+}
+
+impl CellField {
+    /// A field of cells, each with the Morton code of its coordinates, codes strictly rising.
+    ///
+    /// `cell_log2` is 0 to position_bits, `position_bits` at most 20, `unit` that of [`rotation_unit`].
+    pub fn new(cell_log2: u8, position_bits: u8, unit: i64, cells: Vec<(u64, Cell)>) -> Self {
+        let (codes, cells) = cells.into_iter().unzip();
+        Self { cell_log2, position_bits, unit, codes, cells }
+    }
+
+    /// True if nothing moves.
+    pub fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
+    /// The listed cell in which a fine position lies.
+    pub fn find(&self, position_fine: [i32; 3]) -> Option<&Cell> {
+        self.at(self.coordinates(position_fine))
+    }
+
+    /// Fine position and fine rotation of a Gaussian after the motion of a cell.
+    pub fn displace(
+        &self,
+        cell: &Cell,
+        position_fine: [i32; 3],
+        rotation_fine: [i32; 3],
+    ) -> ([i32; 3], [i32; 3]) {
+        let motion = self.motion(cell);
+        (motion.position(position_fine, self.position_max()), motion.rotation(rotation_fine, self.unit))
+    }
+
+    /// Displaces every Gaussian by its cell, and tells of each if that cell is stale.
+    ///
+    /// The planes hold fine positions and fine rotations and have the same length.
+    pub fn displace_planes(&self, position: &mut [Vec<i32>; 3], rotation: &mut [Vec<i32>; 3]) -> Vec<bool> {
+        let [x, y, z] = position;
+        let [a, b, c] = rotation;
+        let mut stale = vec![false; x.len()];
+        if self.is_empty() {
+            return stale;
+        }
+        stale
+            .par_chunks_mut(RUN)
+            .zip(x.par_chunks_mut(RUN).zip(y.par_chunks_mut(RUN)).zip(z.par_chunks_mut(RUN)))
+            .zip(a.par_chunks_mut(RUN).zip(b.par_chunks_mut(RUN)).zip(c.par_chunks_mut(RUN)))
+            .for_each(|((stale, ((x, y), z)), ((a, b), c))| self.displace_run(stale, [x, y, z], [a, b, c]));
+        stale
+    }
+
+    /// Neighbours in a list mostly share a cell, so the cell of the one before is kept.
+    fn displace_run(&self, stale: &mut [bool], position: [&mut [i32]; 3], rotation: [&mut [i32]; 3]) {
+        let ([xs, ys, zs], [r0, r1, r2]) = (position, rotation);
+        let positions = xs.iter_mut().zip(ys).zip(zs);
+        let rotations = r0.iter_mut().zip(r1).zip(r2);
+        let mut last = None;
+        let mut found = None;
+        for ((stale, ((x, y), z)), ((a, b), c)) in stale.iter_mut().zip(positions).zip(rotations) {
+            let coordinates = self.coordinates([*x, *y, *z]);
+            if last != Some(coordinates) {
+                last = Some(coordinates);
+                found = self.at(coordinates).map(|cell| (cell.stale, self.motion(cell)));
+            }
+            let Some((is_stale, motion)) = &found else { continue };
+            *stale = *is_stale;
+            [*x, *y, *z] = motion.position([*x, *y, *z], self.position_max());
+            [*a, *b, *c] = motion.rotation([*a, *b, *c], self.unit);
+        }
+    }
+
+    fn coordinates(&self, position_fine: [i32; 3]) -> [u32; 3] {
+        let cell_log2 = u32::from(self.cell_log2);
+        position_fine.map(|fine| (fine.saturating_add(32) >> 6).wrapping_shr(cell_log2) as u32)
+    }
+
+    fn at(&self, coordinates: [u32; 3]) -> Option<&Cell> {
+        let [x, y, z] = coordinates;
+        let place = self.codes.binary_search(&morton(x, y, z)).ok()?;
+        // A Morton code has 21 bits of a coordinate: what is far outside the lattice is in no cell.
+        self.cells.get(place).filter(|cell| cell.coordinates == coordinates)
+    }
+
+    /// The largest fine position.
+    fn position_max(&self) -> i64 {
+        (1_i64.wrapping_shl(u32::from(self.position_bits)).wrapping_sub(1)) << 6
+    }
+
+    fn motion(&self, cell: &Cell) -> Motion {
+        Motion::of(cell, self.cell_log2)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::arithmetic_side_effects, reason = "an overflow is a failed test")]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Fine position and fine rotation.
+    type Gaussian = ([i32; 3], [i32; 3]);
+
+    const TOP: i32 = ((1 << 20) - 1) * 64;
+
+    fn field(cells: Vec<Cell>) -> CellField {
+        let code = |cell: &Cell| morton(cell.coordinates[0], cell.coordinates[1], cell.coordinates[2]);
+        let mut cells: Vec<(u64, Cell)> = cells.into_iter().map(|cell| (code(&cell), cell)).collect();
+        cells.sort_by_key(|&(code, _)| code);
+        cells.dedup_by_key(|&mut (code, _)| code);
+        CellField::new(17, 20, 128, cells)
+    }
+
+    fn turned(turn: [i32; 3]) -> CellField {
+        field(vec![Cell { coordinates: [3; 3], turn, ..Cell::default() }])
+    }
+
+    /// A fine position at an offset from the middle of cell 3, 3, 3.
+    fn beside([x, y, z]: [i32; 3]) -> [i32; 3] {
+        [x, y, z].map(|offset| ((7 << 16) << 6) + offset)
+    }
+
+    fn steps(bits: f32) -> i64 {
+        rotation_unit(bits.to_bits())
+    }
+
+    #[test]
+    fn the_unit_is_the_nearest_integer_to_the_inverse_of_the_step() {
+        // 0.4 as a binary32 is a little more than 2 / 5.
+        assert_eq!([steps(1.0), steps(0.4), steps(0.4_f32.next_down()), steps(0.007_812_5)], [1, 2, 3, 128]);
+        assert_eq!(
+            [steps(1.0 / 32_766.0), steps(1.0 / 32_767.0), steps(1.0 / 32_768.0)],
+            [32_766, 32_767, 32_767]
+        );
+        assert_eq!([steps(f32::from_bits(0x2B80_0000)), steps(0.0)], [32_767, 32_767]);
+    }
+
+    #[test]
+    fn a_third_of_a_turn_about_the_diagonal_exchanges_the_axes() {
+        let field = turned([8192; 3]);
+        let (position, rotation) = field.displace(&field.cells[0], beside([100, 200, -300]), [0; 3]);
+        assert_eq!((position, rotation), (beside([-300, 100, 200]), [64 * 64; 3]));
+    }
+
+    #[test]
+    fn a_quarter_turn_about_z_takes_x_to_y() {
+        let field = turned([0, 0, 11_585]);
+        let ([x, y, z], _) = field.displace(&field.cells[0], beside([6400, 0, 640]), [0; 3]);
+        let [middle_x, end_y, same_z] = beside([0, 6400, 640]);
+        assert!(x.abs_diff(middle_x) <= 1 && y.abs_diff(end_y) <= 1 && z == same_z, "{x} {y} {z}");
+    }
+
+    #[test]
+    fn a_rotation_keeps_its_real_part_positive() {
+        // Two thirds of a turn about the diagonal are a third of a turn back.
+        let field = turned([8192; 3]);
+        let (_, rotation) = field.displace(&field.cells[0], beside([0; 3]), [64 * 64; 3]);
+        assert_eq!(rotation, [-64 * 64; 3]);
+        let (_, rotation) = field.displace(&field.cells[0], beside([0; 3]), [5000; 3]);
+        assert!(rotation.iter().all(|&part| part < 0), "{rotation:?}");
+    }
+
+    fn small_cells() -> impl Strategy<Value = Vec<Cell>> {
+        let parts = ([0_u32..8, 0..8, 0..8], any::<bool>(), [-9000..9000, -9000..9000, -9000..9000]);
+        let turn = [-8192..=8192, -8192..=8192, -8192..=8192];
+        let cell = (parts, turn).prop_map(|((coordinates, stale, translation), turn)| Cell {
+            coordinates,
+            stale,
+            translation,
+            turn,
+        });
+        proptest::collection::vec(cell, 0..64)
+    }
+
+    proptest! {
+        #[test]
+        fn without_a_turn_a_cell_only_shifts(
+            fine in [0..=TOP, 0..=TOP, 0..=TOP], rotation in [-4096..=4096, -4096..=4096, -4096..=4096],
+            translation in [-1_048_576..=1_048_576, -1_048_576..=1_048_576, -1_048_576..=1_048_576],
+        ) {
+            let field = field(vec![Cell { coordinates: [3; 3], translation, ..Cell::default() }]);
+            let (position, same) = field.displace(&field.cells[0], fine, rotation);
+            prop_assert_eq!(same, rotation);
+            for axis in 0..3 {
+                prop_assert_eq!(position[axis], (fine[axis] + 8 * translation[axis]).clamp(0, TOP));
+            }
+        }
+
+        #[test]
+        fn planes_move_as_their_gaussians_do(
+            cells in small_cells(),
+            fine in proptest::collection::vec(([0..=TOP, 0..=TOP, 0..=TOP], [-9000..9000, -9000..9000, -9000..9000]), 0..40),
+        ) {
+            let field = field(cells);
+            let plane = |of: fn(&Gaussian) -> i32| fine.iter().map(of).collect::<Vec<_>>();
+            let mut position = [plane(|g| g.0[0]), plane(|g| g.0[1]), plane(|g| g.0[2])];
+            let mut rotation = [plane(|g| g.1[0]), plane(|g| g.1[1]), plane(|g| g.1[2])];
+            let stale = field.displace_planes(&mut position, &mut rotation);
+            for (at, &(before, turn)) in fine.iter().enumerate() {
+                let cell = field.find(before);
+                let (moved, turned) = cell.map_or((before, turn), |cell| field.displace(cell, before, turn));
+                prop_assert_eq!(stale[at], cell.is_some_and(|cell| cell.stale));
+                prop_assert_eq!([position[0][at], position[1][at], position[2][at]], moved);
+                prop_assert_eq!([rotation[0][at], rotation[1][at], rotation[2][at]], turned);
+            }
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! Clause 7.16: residuals on top of a prediction, attribute by attribute.
+
+use crate::attribute::{ATTRIBUTE_RANGE, in_range, rotation_shift};
+use crate::colour::{Colour, add_inverse};
+use crate::home::{FINE, FRACTION_BITS, Home};
+use crate::layout::ShCoding;
+use core::ops::RangeInclusive;
+use splatstream_format::payload::Transform;
+use splatstream_format::{Error, ErrorKind, Result};
+
+/// The values of a fine rotation.
+const ROTATION_FINE_RANGE: RangeInclusive<i32> = -32_767 * FINE..=32_767 * FINE;
+/// The values of colour on the output lattice.
+const COLOUR_RANGE: RangeInclusive<i32> = -(1 << 30)..=1 << 30;
+
+/// How a unit codes attributes.
+#[derive(Debug, Clone, Copy)]
+pub struct AttributeCoding<'a> {
+    /// attribute_shift: low bits not coded of log_scale, opacity, rotation, dc, sh.
+    pub shift: [u8; 5],
+    /// Whether the axes are sorted.
+    pub canonical_axes: bool,
+    /// rotation_threshold of the sequence.
+    pub rotation_thresholds: [u8; 3],
+    /// How components become colour.
+    pub colour: Colour<'a>,
+}
+
+/// The attributes of a run of Gaussians: predictions at first, then what the residuals make of them.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Attributes {
+    /// Log-scales.
+    pub log_scale: [Vec<i32>; 3],
+    /// Opacity.
+    pub opacity: Vec<i32>,
+    /// Quaternion x, y, z in rotation_step / 64.
+    pub rotation_fine: [Vec<i32>; 3],
+    /// Red, green, blue.
+    pub dc: [Vec<i32>; 3],
+    /// SH planes.
+    pub sh: Vec<Vec<i32>>,
+}
+
+/// The value planes of a section that codes attributes, in plane order without the position.
+#[derive(Debug, Clone, Copy)]
+pub struct AttributeValues<'v>(pub &'v [Vec<i32>]);
+
+/// Places of the attributes among the planes.
+const OPACITY: usize = 3;
+const ROTATION: usize = 4;
+const DC: usize = 7;
+
+impl<'v> AttributeValues<'v> {
+    fn planes(self, from: usize, to: usize) -> &'v [Vec<i32>] {
+        self.0.get(from..to.min(self.0.len())).unwrap_or_default()
+    }
+}
+
+impl Attributes {
+    /// What predictor `none` gives for `count` Gaussians: 0, and the means of the transforms.
+    pub fn unpredicted(count: usize, colour: &Colour<'_>, sh_planes: usize) -> Self {
+        let zeros = || [(); 3].map(|()| vec![0; count]);
+        let mean = |transform: &Transform, plane: usize| transform.mean.get(plane).copied().unwrap_or(0);
+        let sh = match (colour.mode, colour.sh) {
+            (ShCoding::None, _) | (_, None) => vec![vec![0; count]; sh_planes],
+            (_, Some(sh)) => (0..sh_planes).map(|plane| vec![mean(sh, plane); count]).collect(),
+        };
+        Self {
+            log_scale: zeros(),
+            opacity: vec![0; count],
+            rotation_fine: zeros(),
+            dc: [0, 1, 2].map(|plane| vec![mean(colour.dc, plane); count]),
+            sh,
+        }
+    }
+
+    /// The attributes of some Gaussians of a home, which predict themselves.
+    pub fn of_home(home: &Home, rows: &[u32]) -> Self {
+        let pick = |plane: &Vec<i32>| -> Vec<i32> {
+            let value = |&row: &u32| usize::try_from(row).ok().and_then(|row| plane.get(row)).copied();
+            rows.iter().map(|row| value(row).unwrap_or(0)).collect()
+        };
+        let planes = &home.planes;
+        Self {
+            log_scale: planes.log_scale.each_ref().map(pick),
+            opacity: pick(&planes.opacity),
+            rotation_fine: home.rotation_fine.each_ref().map(pick),
+            dc: planes.dc.each_ref().map(pick),
+            sh: planes.sh.iter().map(pick).collect(),
+        }
+    }
+
+    /// Writes the attributes to the Gaussians of a home they were taken from; [`Home::settle`] has to follow.
+    pub fn write_to(&self, home: &mut Home, rows: &[u32]) {
+        let write = |plane: &mut Vec<i32>, values: &[i32]| {
+            for (&row, &value) in rows.iter().zip(values) {
+                if let Some(slot) = usize::try_from(row).ok().and_then(|row| plane.get_mut(row)) {
+                    *slot = value;
+                }
+            }
+        };
+        let planes = &mut home.planes;
+        let to = planes.log_scale.iter_mut().chain([&mut planes.opacity]).chain(&mut home.rotation_fine);
+        let to = to.chain(&mut planes.dc).chain(&mut planes.sh);
+        let from = self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation_fine);
+        let from = from.chain(&self.dc).chain(&self.sh);
+        to.zip(from).for_each(|(plane, values)| write(plane, values));
+    }
+
+    /// Adds the residuals of all attributes.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range.
+    pub fn add(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
+        self.add_log_scales(values, coding, at)?;
+        self.add_opacity(values, coding, at)?;
+        self.add_rotation(values, coding, at)?;
+        self.add_dc(values, coding, at)?;
+        self.add_sh(values, coding, at)
+    }
+
+    /// Residuals of the largest log-scale and of the two differences.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range, or canonical axes are not sorted.
+    pub fn add_log_scales(
+        &mut self,
+        values: AttributeValues<'_>,
+        coding: &AttributeCoding<'_>,
+        at: u64,
+    ) -> Result<()> {
+        let residuals = shifted(values.planes(0, OPACITY), coding.shift[0]);
+        for plane in &residuals {
+            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.16", at)?;
+        }
+        let [first, second, third] = residuals.as_slice() else { return Ok(()) };
+        let [largest, middle, smallest] = &mut self.log_scale;
+        let mut least = 0;
+        for (((a, b), c), ((&u, &v), &w)) in largest
+            .iter_mut()
+            .zip(middle.iter_mut())
+            .zip(smallest.iter_mut())
+            .zip(first.iter().zip(second).zip(third))
+        {
+            let differences = [a.wrapping_sub(*b).wrapping_add(v), b.wrapping_sub(*c).wrapping_add(w)];
+            let [to_middle, to_smallest] = differences;
+            *a = a.wrapping_add(u);
+            *b = a.wrapping_sub(to_middle);
+            *c = b.wrapping_sub(to_smallest);
+            least = least.min(to_middle).min(to_smallest);
+        }
+        for plane in &self.log_scale {
+            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.16", at)?;
+        }
+        if coding.canonical_axes && least < 0 {
+            let rule = "canonical axes are sorted from largest to smallest";
+            return Err(Error::new(at, "7.16", ErrorKind::Constraint { rule }));
+        }
+        Ok(())
+    }
+
+    /// Residuals of the opacity.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range.
+    pub fn add_opacity(
+        &mut self,
+        values: AttributeValues<'_>,
+        coding: &AttributeCoding<'_>,
+        at: u64,
+    ) -> Result<()> {
+        for residual in shifted(values.planes(OPACITY, ROTATION), coding.shift[1]) {
+            add(&mut self.opacity, &residual);
+        }
+        in_range(&self.opacity, &ATTRIBUTE_RANGE, "opacity", "7.16", at)
+    }
+
+    /// Residuals of the rotation, coarser where the log-scales say so.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range.
+    pub fn add_rotation(
+        &mut self,
+        values: AttributeValues<'_>,
+        coding: &AttributeCoding<'_>,
+        at: u64,
+    ) -> Result<()> {
+        let [largest, _, smallest] = &self.log_scale;
+        for (plane, residual) in self.rotation_fine.iter_mut().zip(values.planes(ROTATION, DC)) {
+            in_range(residual, &ATTRIBUTE_RANGE, "rotation", "7.16", at)?;
+            for ((slot, &value), (&a, &c)) in plane.iter_mut().zip(residual).zip(largest.iter().zip(smallest))
+            {
+                let coarser = rotation_shift(a.wrapping_sub(c), coding.rotation_thresholds);
+                let bits = coarser.wrapping_add(u32::from(coding.shift[2])).wrapping_add(FRACTION_BITS);
+                // At most 2^15 * 2^(3 + 7 + 6): the sum with a fine rotation stays below 2^31 only after a clamp.
+                let change = i64::from(value).wrapping_shl(bits);
+                let sum = i64::from(*slot).wrapping_add(change);
+                *slot = i32::try_from(sum).unwrap_or(i32::MAX);
+            }
+            in_range(plane, &ROTATION_FINE_RANGE, "rotation", "7.16", at)?;
+        }
+        Ok(())
+    }
+
+    /// Residuals of dc, in components.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range.
+    pub fn add_dc(
+        &mut self,
+        values: AttributeValues<'_>,
+        coding: &AttributeCoding<'_>,
+        at: u64,
+    ) -> Result<()> {
+        let components = shifted(values.planes(DC, sh_place(&coding.colour)), coding.shift[3]);
+        let mut out: Vec<&mut [i32]> = self.dc.iter_mut().map(Vec::as_mut_slice).collect();
+        add_inverse(coding.colour.dc, &components, &mut out, at)?;
+        self.dc.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "dc", "7.16", at))
+    }
+
+    /// Residuals of sh, in components or as entries of codebooks.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range.
+    pub fn add_sh(
+        &mut self,
+        values: AttributeValues<'_>,
+        coding: &AttributeCoding<'_>,
+        at: u64,
+    ) -> Result<()> {
+        let planes = values.planes(sh_place(&coding.colour), values.0.len());
+        let Some(transform) = coding.colour.sh else { return Ok(()) };
+        let components = match coding.colour.mode {
+            ShCoding::None => return Ok(()),
+            ShCoding::Coefficients { .. } => shifted(planes, coding.shift[4]),
+            ShCoding::VectorQuantised { .. } => {
+                let entries = coding.colour.entries(planes, usize::from(transform.header.rank), at)?;
+                shifted(&entries, coding.shift[4])
+            }
+        };
+        let mut out: Vec<&mut [i32]> = self.sh.iter_mut().map(Vec::as_mut_slice).collect();
+        add_inverse(transform, &components, &mut out, at)?;
+        self.sh.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "sh", "7.16", at))
+    }
+}
+
+/// The first sh plane.
+fn sh_place(colour: &Colour<'_>) -> usize {
+    DC.saturating_add(usize::from(colour.dc.header.rank))
+}
+
+/// Values times 2^shift: below 2^17 * 2^7.
+fn shifted(planes: &[Vec<i32>], shift: u8) -> Vec<Vec<i32>> {
+    let shift = u32::from(shift);
+    planes.iter().map(|plane| plane.iter().map(|value| value.wrapping_shl(shift)).collect()).collect()
+}
+
+fn add(plane: &mut [i32], residual: &[i32]) {
+    for (slot, &value) in plane.iter_mut().zip(residual) {
+        *slot = slot.wrapping_add(value);
+    }
+}

@@ -1,0 +1,156 @@
+//! Clauses 8.1 to 8.6 for increments: the sections of a unit to the values of its planes.
+
+use crate::attribute;
+use crate::block::{CodedBlock, decode_coded};
+use rayon::prelude::*;
+use splatstream_format::Result;
+use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
+use splatstream_format::entropy::layout::{Layout, Section, ShCoding};
+use splatstream_format::entropy::model::{ModelTrace, read_models};
+use splatstream_format::entropy::reader::PlaneDecoder;
+use splatstream_format::payload::{CodedSection, Increment};
+use splatstream_format::syntax::SequenceParameters;
+
+/// The values of a section, bias added, the blocks one behind the other.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct SectionValues {
+    /// Of the plane of the position alphabet: the deltas. Empty if the section has none.
+    pub deltas: Vec<u64>,
+    /// Of every other plane, in plane order.
+    pub planes: Vec<Vec<i32>>,
+    /// Values of a plane in each block but the last, where deltas start anew.
+    pub block: usize,
+}
+
+/// The values of an increment.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct UnitValues {
+    sections: [SectionValues; 6],
+}
+
+impl UnitValues {
+    /// The values of a section; none of a section that is absent.
+    pub fn section(&self, section: Section) -> &SectionValues {
+        // There is a place for each.
+        const ABSENT: &SectionValues = &SectionValues { deltas: Vec::new(), planes: Vec::new(), block: 0 };
+        self.sections.get(section.place()).unwrap_or(ABSENT)
+    }
+
+    /// Puts the values of a section in its place.
+    pub fn set(&mut self, section: Section, values: SectionValues) {
+        if let Some(slot) = self.sections.get_mut(section.place()) {
+            *slot = values;
+        }
+    }
+
+    /// The values of one plane of a section, counted without that of the position alphabet.
+    pub fn plane(&self, section: Section, plane: usize) -> &[i32] {
+        self.section(section).planes.get(plane).map(Vec::as_slice).unwrap_or_default()
+    }
+}
+
+/// Planes, models and what is in force after a unit.
+pub struct PreparedIncrement<'r, 'a> {
+    increment: &'r Increment<'a>,
+    models: Vec<SectionModels>,
+}
+
+impl<'r, 'a> PreparedIncrement<'r, 'a> {
+    /// Reads the models of all sections; `in_force` are those before the unit, and become those after it.
+    ///
+    /// # Errors
+    /// Malformed or invalid by clauses 5.12 and 6.12.
+    pub fn new(
+        increment: &'r Increment<'a>,
+        dc_rank: u8,
+        sh: ShCoding,
+        in_force: &mut ModelsInForce,
+        trace: &mut impl ModelTrace,
+    ) -> Result<Self> {
+        let mut models = Vec::with_capacity(increment.sections.len());
+        for coded in &increment.sections {
+            let layout = Layout::of_section(coded.section, dc_rank, sh);
+            let reusable = in_force.reusable(coded.section, &layout);
+            let read = read_models(coded.model, coded.model_at, &layout.alphabets(), &reusable, trace)?;
+            layout.check(&read, coded.model_at)?;
+            models.push(SectionModels { layout, models: read });
+        }
+        for (coded, models) in increment.sections.iter().zip(&models) {
+            in_force.replace(coded.section, models.clone());
+        }
+        Ok(Self { increment, models })
+    }
+
+    /// The sections with their planes and models.
+    pub fn sections(&self) -> impl Iterator<Item = (&CodedSection<'a>, &SectionModels)> {
+        self.increment.sections.iter().zip(&self.models)
+    }
+
+    /// Distinct tables of all planes.
+    pub fn tables(&self) -> usize {
+        let models = self.models.iter().flat_map(|section| &section.models);
+        models.map(|model| model.tables.len()).fold(0, usize::wrapping_add)
+    }
+
+    /// Decodes the blocks of all sections.
+    ///
+    /// # Errors
+    /// Malformed; of several faults, that of the first block.
+    pub fn decode(&self, sequence: &SequenceParameters) -> Result<UnitValues> {
+        let mut values = UnitValues::default();
+        for (coded, models) in self.sections() {
+            values.set(coded.section, joined(&self.blocks(coded, models, sequence)?, models, sequence));
+        }
+        Ok(values)
+    }
+
+    /// The coded values of the blocks of a section.
+    ///
+    /// # Errors
+    /// As [`PreparedIncrement::decode`].
+    pub fn blocks(
+        &self,
+        coded: &CodedSection<'a>,
+        models: &SectionModels,
+        sequence: &SequenceParameters,
+    ) -> Result<Vec<CodedBlock>> {
+        let decoders: Vec<PlaneDecoder> = models.models.iter().map(PlaneDecoder::new).collect();
+        let size = block_size(sequence);
+        let last = coded.blocks.len().saturating_sub(1);
+        let total = usize::try_from(coded.count).unwrap_or(usize::MAX);
+        let decoded: Vec<Result<CodedBlock>> = coded
+            .blocks
+            .par_iter()
+            .enumerate()
+            .map(|(place, &(bytes, at))| {
+                let before = place.wrapping_mul(size);
+                let count = if place == last { total.wrapping_sub(before) } else { size };
+                decode_coded(bytes, at, count, &models.layout, coded.lanes_log2, &decoders)
+            })
+            .collect();
+        decoded.into_iter().collect()
+    }
+}
+
+/// Values of a plane in a whole block.
+fn block_size(sequence: &SequenceParameters) -> usize {
+    1_usize.wrapping_shl(u32::from(sequence.block_log2))
+}
+
+/// The blocks of a section one behind the other, biases added.
+fn joined(blocks: &[CodedBlock], models: &SectionModels, sequence: &SequenceParameters) -> SectionValues {
+    let has_deltas = models.layout.planes().first().is_some_and(|plane| plane.is_position());
+    let first = usize::from(has_deltas);
+    let deltas = match has_deltas {
+        true => blocks.iter().flat_map(|block| block.deltas.iter().copied()).collect(),
+        false => Vec::new(),
+    };
+    let planes = models.models.iter().enumerate().skip(first).map(|(plane, model)| {
+        let of_block = |block: &CodedBlock| {
+            let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+            attribute::unbias(coded, model.bias)
+        };
+        blocks.iter().flat_map(of_block).collect()
+    });
+    SectionValues { deltas, planes: planes.collect(), block: block_size(sequence) }
+}

@@ -1,0 +1,187 @@
+//! Clause 7.17: the predictors of new Gaussians, and what their neighbours weigh.
+
+use crate::neighbours::Neighbour;
+use splatstream_format::{Error, ErrorKind, Result};
+
+/// Neighbours of a Gaussian, at most. Clause 7.17.
+pub const NEIGHBOURS_MAX: usize = 16;
+
+/// round(4096 exp(-x / 32)): the weight of a neighbour at a distance x of 0 to 255. Clause 7.17.
+pub const EXP: [u16; 256] = [
+    4096, 3970, 3848, 3729, 3615, 3503, 3396, 3291, 3190, 3092, 2997, 2904, 2815, 2729, 2645, 2563, 2484,
+    2408, 2334, 2262, 2192, 2125, 2060, 1996, 1935, 1875, 1818, 1762, 1707, 1655, 1604, 1555, 1507, 1460,
+    1416, 1372, 1330, 1289, 1249, 1211, 1174, 1137, 1102, 1069, 1036, 1004, 973, 943, 914, 886, 859, 832,
+    807, 782, 758, 734, 712, 690, 669, 648, 628, 609, 590, 572, 554, 537, 521, 505, 489, 474, 460, 445, 432,
+    418, 406, 393, 381, 369, 358, 347, 336, 326, 316, 306, 297, 288, 279, 270, 262, 254, 246, 238, 231, 224,
+    217, 210, 204, 198, 192, 186, 180, 174, 169, 164, 159, 154, 149, 145, 140, 136, 132, 128, 124, 120, 116,
+    113, 109, 106, 103, 99, 96, 93, 90, 88, 85, 82, 80, 77, 75, 73, 70, 68, 66, 64, 62, 60, 58, 57, 55, 53,
+    52, 50, 48, 47, 46, 44, 43, 41, 40, 39, 38, 37, 35, 34, 33, 32, 31, 30, 29, 28, 28, 27, 26, 25, 24, 24,
+    23, 22, 21, 21, 20, 20, 19, 18, 18, 17, 17, 16, 16, 15, 15, 14, 14, 13, 13, 13, 12, 12, 12, 11, 11, 10,
+    10, 10, 10, 9, 9, 9, 8, 8, 8, 8, 7, 7, 7, 7, 7, 6, 6, 6, 6, 6, 5, 5, 5, 5, 5, 5, 5, 4, 4, 4, 4, 4, 4, 4,
+    4, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1,
+];
+
+/// How a block of new Gaussians is predicted: the element predictor. Clause 7.17.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Predictor {
+    /// Not at all.
+    #[default]
+    None,
+    /// By neighbours, weighted by distance.
+    Knn,
+    /// By neighbours, weighted by distance and by the attributes known already.
+    Bilateral,
+}
+
+impl Predictor {
+    /// The predictor of a code; `at` goes into the error.
+    ///
+    /// # Errors
+    /// Reserved if the code is 3; Invalid if it is another that has no meaning.
+    pub fn from_code(code: i32, at: u64) -> Result<Self> {
+        let element = "predictor";
+        let kind = match code {
+            0 => return Ok(Self::None),
+            1 => return Ok(Self::Knn),
+            2 => return Ok(Self::Bilateral),
+            3 => ErrorKind::Reserved { element, value: 3 },
+            _ => ErrorKind::OutOfRange { element, value: code.into(), min: 0, max: 2 },
+        };
+        Err(Error::new(at, "7.17", kind))
+    }
+
+    /// The code of the predictor, 0 to 2.
+    pub fn code(self) -> i32 {
+        match self {
+            Self::None => 0,
+            Self::Knn => 1,
+            Self::Bilateral => 2,
+        }
+    }
+}
+
+/// Weights of neighbours by the inverse of their squared distance; 1 to 2^16. Clause 7.17.
+///
+/// A nearest neighbour at distance 0 has all the weight. Neighbours that are not there have weight 0.
+pub fn knn_weights(neighbours: &[Neighbour]) -> [i64; NEIGHBOURS_MAX] {
+    let mut weights = [0; NEIGHBOURS_MAX];
+    let nearest = neighbours.first().map_or(0, |neighbour| neighbour.distance);
+    let weighed = neighbours.get(..if nearest == 0 { 1 } else { NEIGHBOURS_MAX }).unwrap_or(neighbours);
+    let scale = nearest.saturating_add(1).saturating_mul(1 << 16);
+    for (weight, neighbour) in weights.iter_mut().zip(weighed) {
+        *weight = scale.checked_div(neighbour.distance.saturating_add(1)).unwrap_or(0).max(1) as i64;
+    }
+    weights
+}
+
+/// Weights of neighbours by distance and by squared difference of attributes; 1 to 4096. Clause 7.17.
+///
+/// `features` are the differences summed so far, in squared steps, one a neighbour. Neighbours that are not
+/// there have weight 0.
+pub fn bilateral_weights(
+    neighbours: &[Neighbour],
+    spatial: u8,
+    feature: u8,
+    features: &[u64],
+) -> [i64; NEIGHBOURS_MAX] {
+    let near = spatial_terms(neighbours, spatial);
+    let mut weights = [0; NEIGHBOURS_MAX];
+    for (((weight, _), near), &difference) in weights.iter_mut().zip(neighbours).zip(near).zip(features) {
+        *weight = bilateral_weight(near, difference, feature);
+    }
+    weights
+}
+
+/// What distance adds to the place in [`EXP`] of each neighbour; 0 to 255.
+pub(crate) fn spatial_terms(neighbours: &[Neighbour], spatial: u8) -> [u64; NEIGHBOURS_MAX] {
+    let mut terms = [0; NEIGHBOURS_MAX];
+    let last = neighbours.last().map_or(0, |neighbour| neighbour.distance).saturating_add(1);
+    for (term, neighbour) in terms.iter_mut().zip(neighbours) {
+        *term = neighbour.distance.saturating_mul(spatial.into()).checked_div(last).unwrap_or(0);
+    }
+    terms
+}
+
+/// The weight of a neighbour from its spatial term and its difference in squared steps.
+#[inline(always)]
+pub(crate) fn bilateral_weight(near: u64, difference: u64, feature: u8) -> i64 {
+    let like = (difference.saturating_mul(feature.into()) >> 6).min(255);
+    let place = near.saturating_add(like).min(255) as usize;
+    EXP.get(place).copied().unwrap_or(1).into()
+}
+
+/// floor((2 sum of w x + W) / (2 W)), W the sum of the weights: the mean, halves towards positive infinity.
+/// Clause 7.17.
+///
+/// Of weights up to 2^16 and at most 16 values the sum stays below 2^52. Without weight the mean is 0.
+pub fn weighted_mean(weights: &[i64], values: impl Iterator<Item = i32>) -> i32 {
+    let terms = weights.iter().zip(values).map(|(&weight, value)| weight.wrapping_mul(value.into()));
+    let total = weights.iter().copied().fold(0, i64::wrapping_add);
+    let doubled = terms.fold(0, i64::wrapping_add).wrapping_mul(2).wrapping_add(total);
+    doubled.checked_div_euclid(total.wrapping_mul(2)).unwrap_or(0) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn at(distances: &[u64]) -> Vec<Neighbour> {
+        distances.iter().zip(0..).map(|(&distance, index)| Neighbour { distance, index }).collect()
+    }
+
+    #[test]
+    fn the_table_is_that_of_its_formula() {
+        for (x, &weight) in (0_u8..=255).zip(&EXP) {
+            assert_eq!(f64::from(weight), (4096.0 * (-f64::from(x) / 32.0).exp()).round(), "{x}");
+        }
+    }
+
+    #[test]
+    fn a_code_reads_as_it_is_written() {
+        for code in 0..3 {
+            assert_eq!(Predictor::from_code(code, 0).map(Predictor::code), Ok(code));
+        }
+        let kind = |code| Predictor::from_code(code, 0).map_err(|error| error.kind);
+        assert_eq!(kind(3), Err(ErrorKind::Reserved { element: "predictor", value: 3 }));
+        assert!(matches!(kind(-1), Err(ErrorKind::OutOfRange { value: -1, .. })));
+    }
+
+    #[test]
+    fn a_mean_is_rounded_to_the_nearest_and_up_at_halves() {
+        let two = |values: [i32; 2]| weighted_mean(&[1, 1], values.into_iter());
+        assert_eq!([two([1, 2]), two([-1, -2]), two([-1, 0]), two([-3, -3])], [2, -1, 0, -3]);
+        assert_eq!(weighted_mean(&[2, 1], [-4, -5].into_iter()), -4);
+        assert_eq!(weighted_mean(&[1, 2], [-4, -5].into_iter()), -5);
+        assert_eq!(weighted_mean(&[], core::iter::empty()), 0);
+    }
+
+    #[test]
+    fn near_neighbours_weigh_more() {
+        assert_eq!(knn_weights(&at(&[1, 3, 1 << 40]))[..4], [1 << 16, 1 << 15, 1, 0]);
+        assert_eq!(bilateral_weights(&at(&[0, 9]), 32, 0, &[0; 2])[..3], [4096, EXP[28].into(), 0]);
+    }
+
+    #[test]
+    fn a_neighbour_at_the_point_itself_has_all_the_weight() {
+        assert_eq!(knn_weights(&at(&[0, 0, 1]))[..3], [1 << 16, 0, 0]);
+        assert_eq!(knn_weights(&[]), [0; NEIGHBOURS_MAX]);
+    }
+
+    #[test]
+    fn a_neighbour_that_is_far_or_unlike_still_has_weight_1() {
+        let unlike = bilateral_weights(&at(&[0, 3 << 40]), 255, 255, &[u64::MAX, 0]);
+        assert_eq!(unlike[..2], [1, 1]);
+    }
+
+    proptest! {
+        #[test]
+        fn a_mean_lies_between_its_values(
+            terms in proptest::collection::vec((1_i64..=65_536, any::<i32>()), 1..=16),
+        ) {
+            let (weights, values): (Vec<i64>, Vec<i32>) = terms.into_iter().unzip();
+            let mean = weighted_mean(&weights, values.iter().copied());
+            prop_assert!(values.iter().min() <= Some(&mean) && Some(&mean) <= values.iter().max());
+        }
+    }
+}

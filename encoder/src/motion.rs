@@ -1,0 +1,141 @@
+//! How the cells of a frame move.
+//!
+//! [`Tree`] fits a rigid motion to ever smaller cells, each as a correction of the larger cell's, so that a cell
+//! with few pairs, or none, moves with what is around it. [`listing`](mod@listing) decides what of that is worth
+//! its bits, and the cell size with the fewest bits of cells and moves together is taken.
+//! [`follow`](follow::follow) puts this to use before there are pairs.
+
+pub(crate) mod follow;
+mod listing;
+mod rigid;
+pub(crate) mod stale;
+mod tree;
+
+use listing::{Coded, Listing, list_bits, listing};
+use rigid::{Point, Vector};
+use splatstream_decoder::position::morton;
+use tree::{Tree, centre};
+
+/// Coded units of translation in a lattice step.
+const TRANSLATION: f64 = 8.0;
+
+/// One, as turns are coded.
+const TURN: f64 = 16_384.0;
+
+/// Units of a fine position in a lattice step.
+const FINE: f64 = 64.0;
+
+/// A Gaussian this near its target on every axis, lattice steps, needs no move. Beyond half a step rounding would
+/// move it; a little more saves many moves and costs little error.
+const DEAD_ZONE: f64 = 0.75;
+
+/// No cell size is tried with fewer pairs than this in a cell: a list of such cells costs more than the moves.
+const PAIRS_IN_CELL: usize = 4;
+
+/// Cells that a cell of a scene becomes when sizes are halved: scenes are made of surfaces.
+const PARTS: usize = 4;
+
+/// Sizes with more pairs than this in a cell, on average, say nothing about smaller ones.
+const PAIRS_IN_COARSE_CELL: usize = 128;
+
+/// A Gaussian of the reference and where the target has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pair {
+    /// Fine position in the reference, 1/64 of a lattice step.
+    pub(crate) from: [i32; 3],
+    /// Position in the target, lattice steps.
+    pub(crate) to: [f32; 3],
+}
+
+/// A listed cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Cell {
+    /// Morton code of its place, in cells.
+    pub(crate) code: u64,
+    /// What is carried in it is not shown.
+    pub(crate) stale: bool,
+    /// Translation in eighths of a lattice step.
+    pub(crate) translation: [i32; 3],
+    /// Vector part of the turn's quaternion, Q14.
+    pub(crate) turn: [i32; 3],
+}
+
+/// Cells of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CellMotion {
+    /// The side of a cell is 2 to this, lattice steps.
+    pub(crate) cell_log2: u8,
+    /// In Morton order.
+    pub(crate) cells: Vec<Cell>,
+    /// Estimated bits of the cells, and of modes and moves of the pairs.
+    pub(crate) bits: [f64; 2],
+}
+
+fn lattice(fine: [i32; 3]) -> Vector {
+    fine.map(|value| f64::from(value) / FINE)
+}
+
+/// The cells that bring the Gaussians of a reference nearest to their pairs, for the fewest bits.
+///
+/// `unmatched` are those without a pair: who has nothing newer is shown them where these cells bring them.
+pub(crate) fn cell_motion(pairs: &[Pair], unmatched: &[[i32; 3]], position_bits: u8) -> CellMotion {
+    let point = |pair: &Pair| Point { from: lattice(pair.from), to: pair.to.map(f64::from) };
+    let points: Vec<Point> = pairs.iter().map(point).collect();
+    let others: Vec<Vector> = unmatched.iter().copied().map(lattice).collect();
+    let mut tree = Tree::new(&points, &others, position_bits);
+    let mut best: Option<(f64, CellMotion)> = None;
+    loop {
+        let Listing { cells, bits, astray } = listing(&tree);
+        let cost = bits[0] + bits[1] + astray;
+        let better = best.as_ref().is_none_or(|&(least, _)| cost < least);
+        if better {
+            best = Some((cost, CellMotion { cell_log2: tree.cell_log2 as u8, cells, bits }));
+        }
+        let nodes = tree.nodes.len();
+        let past_best = !better && nodes * PAIRS_IN_COARSE_CELL > points.len();
+        if past_best || tree.cell_log2 == 0 || nodes * PARTS * PAIRS_IN_CELL > points.len() {
+            break;
+        }
+        tree.split();
+    }
+    let none = CellMotion { cell_log2: position_bits, cells: Vec::new(), bits: [0.0; 2] };
+    best.map_or(none, |(_, motion)| motion)
+}
+
+impl CellMotion {
+    /// The place, in cells, of the cell that holds a fine position, and the place's Morton code.
+    fn cell(&self, fine: [i32; 3]) -> ([u32; 3], u64) {
+        let place = fine.map(|value| ((value + 32) >> 6 >> self.cell_log2).max(0) as u32);
+        (place, morton(place[0], place[1], place[2]))
+    }
+
+    /// Where a Gaussian of the reference is carried, lattice steps: the decoder's within its rounding.
+    pub(crate) fn displaced(&self, fine: [i32; 3]) -> [f32; 3] {
+        let (place, code) = self.cell(fine);
+        let coded = match self.cells.binary_search_by_key(&code, |cell| cell.code) {
+            Ok(found) => {
+                let Cell { translation, turn, .. } = self.cells[found];
+                Coded { translation, turn }
+            }
+            Err(_) => Coded::STILL,
+        };
+        coded.apply(centre(place, u32::from(self.cell_log2)), lattice(fine)).map(|value| value as f32)
+    }
+
+    /// With these cells, by code, marked stale; cells that were not listed are added and do not move.
+    pub(crate) fn with_stale(mut self, codes: &[u64]) -> Self {
+        for &code in codes {
+            match self.cells.binary_search_by_key(&code, |cell| cell.code) {
+                Ok(found) => self.cells[found].stale = true,
+                Err(place) => {
+                    self.cells.insert(place, Cell { code, stale: true, translation: [0; 3], turn: [0; 3] });
+                }
+            }
+        }
+        self.bits[0] = list_bits(&self.cells);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,103 @@
+//! Matching where things move further than their own size.
+
+use super::rigid::{Point, Vector};
+use super::tree::Tree;
+use crate::matching::{CLOSE, Cloud, LIMIT, Link, Matching, Measure, Reach, by_index, features, links};
+
+/// A round of guessing: the share of Gaussians that it looks at, one in so many, and how far it looks, as a part of
+/// the scene's side. Few and large ones are hard to mistake for each other, even far from where they were.
+const ROUNDS: [(usize, f32); 2] = [(32, 1.0 / 12.0), (8, 1.0 / 48.0)];
+
+/// How often pairs that are hardly mistaken are sought, and improve the guess, before others are.
+const SURE: usize = 2;
+
+/// Pairs that a cell of a guess rests on, at least, on average.
+const PAIRS_IN_CELL: usize = 16;
+
+/// Below this many Gaussians on either side a guess rests on nothing.
+const FEWEST: usize = 256;
+
+/// How far from where it is expected a Gaussian may be: three times its size, or as far as rounding alone may put it.
+const REACH: Reach = Reach { scales: 3.0, least: 4.0 };
+
+/// Pairs by row, then by place and attributes about where a guess of the motion expects them.
+pub(crate) fn follow(
+    reference: &Cloud<'_>,
+    target: &Cloud<'_>,
+    measure: &Measure,
+    position_bits: u8,
+) -> Matching {
+    let mut matching = by_index(reference, target, measure);
+    let (free, wanted) = (matching.free(), matching.wanted(target.len()));
+    if free.is_empty() || wanted.is_empty() {
+        return matching;
+    }
+    let mut guess = reference.position.map(<[f32]>::to_vec);
+    if free.len().min(wanted.len()) >= FEWEST {
+        let side = side(target);
+        for (part, reach) in ROUNDS {
+            let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
+            let reach = Reach { scales: 0.0, least: reach * side };
+            let (from, to) = (largest(reference, &free, part), largest(target, &wanted, part));
+            let found = links(&features(&expected, &from, measure), &features(target, &to, measure), reach);
+            guess = expected_places(reference, &points(reference, target, &found), position_bits);
+        }
+        let mut found = Vec::new();
+        for _ in 0..SURE {
+            let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
+            found.extend(matching.add_nearest(&expected, target, measure, REACH, CLOSE));
+            guess = expected_places(reference, &points(reference, target, &found), position_bits);
+        }
+    }
+    let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
+    matching.add_nearest(&expected, target, measure, REACH, LIMIT);
+    matching
+}
+
+/// Where Gaussians were and where they are now.
+fn points(reference: &Cloud<'_>, target: &Cloud<'_>, links: &[Link]) -> Vec<Point> {
+    let point = |link: &Link| Point {
+        from: reference.at(link.from).map(f64::from),
+        to: target.at(link.to).map(f64::from),
+    };
+    links.iter().map(point).collect()
+}
+
+/// Where the reference's Gaussians are if they move as the points about them.
+fn expected_places(reference: &Cloud<'_>, points: &[Point], position_bits: u8) -> [Vec<f32>; 3] {
+    let all: Vec<Vector> =
+        (0..reference.len() as u32).map(|place| reference.at(place).map(f64::from)).collect();
+    let mut tree = Tree::new(points, &all, position_bits);
+    while tree.cell_log2 > 0 && tree.nodes.len() * PAIRS_IN_CELL < points.len() {
+        tree.split();
+    }
+    let mut places = [0, 1, 2].map(|_: usize| vec![0.0; all.len()]);
+    for node in &tree.nodes {
+        for &(position, place) in &tree.others[node.others.clone()] {
+            let moved = node.motion.apply(position);
+            for (plane, value) in places.iter_mut().zip(moved) {
+                plane[place as usize] = value as f32;
+            }
+        }
+    }
+    places
+}
+
+/// One in `part` of these, those that cover most.
+fn largest(cloud: &Cloud<'_>, places: &[u32], part: usize) -> Vec<u32> {
+    let mut ranked: Vec<(f32, u32)> = places.iter().map(|&place| (-cloud.coverage(place), place)).collect();
+    ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let kept = (places.len() / part).max(FEWEST).min(places.len());
+    ranked[..kept].iter().map(|&(_, place)| place).collect()
+}
+
+/// The largest side of the box that holds the inner 90 % on each axis, lattice steps.
+fn side(cloud: &Cloud<'_>) -> f32 {
+    let of_axis = |plane: &[f32]| {
+        let mut values = plane.to_vec();
+        let last = values.len().saturating_sub(1);
+        let mut at = |percent: usize| *values.select_nth_unstable_by(last * percent / 100, f32::total_cmp).1;
+        at(95) - at(5)
+    };
+    cloud.position.map(of_axis).into_iter().fold(0.0, f32::max)
+}

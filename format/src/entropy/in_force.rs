@@ -1,0 +1,40 @@
+//! Clause 6.12: the plane models that `reuse` refers to in an increment.
+
+use super::layout::{Layout, Section};
+use super::model::PlaneModel;
+use std::sync::Arc;
+
+/// The planes of a section and their models.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SectionModels {
+    /// The planes.
+    pub layout: Layout,
+    /// One model a plane.
+    pub models: Vec<PlaneModel>,
+}
+
+/// For each section of an increment, the models of the last unit that had it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ModelsInForce {
+    sections: [Option<Arc<SectionModels>>; 6],
+}
+
+impl ModelsInForce {
+    /// For each plane of a section the model that `reuse` stands for, if there is one.
+    pub fn reusable(&self, section: Section, layout: &Layout) -> Vec<Option<&PlaneModel>> {
+        let known = self.get(section).map(|known| (&known.layout, known.models.as_slice()));
+        layout.reusable(known)
+    }
+
+    /// The models of a section.
+    pub fn get(&self, section: Section) -> Option<&SectionModels> {
+        self.sections.get(section.place()).and_then(Option::as_deref)
+    }
+
+    /// Takes the models of a section that a unit has.
+    pub fn replace(&mut self, section: Section, models: SectionModels) {
+        if let Some(slot) = self.sections.get_mut(section.place()) {
+            *slot = Some(Arc::new(models));
+        }
+    }
+}
