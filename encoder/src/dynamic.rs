@@ -1,0 +1,351 @@
+//! Streams of profile Dynamic: intra frames in spatial layers, predicted frames, temporal layers.
+
+mod align;
+mod anchor;
+mod predicted;
+mod predictors;
+mod survivors;
+mod unit;
+
+use crate::canonical::{canonicalise, visible};
+use crate::colour;
+use crate::error::Error;
+use crate::importance::Ranking;
+use crate::lattice::geometry;
+use crate::matching::{Cloud, Matching, Measure, shares_little};
+use crate::section::SectionPlan;
+use crate::settings::{Settings, Structure};
+use crate::source::FrameSource;
+use crate::stream::{FrameReport, GopTools, Prepared, Progress, Report, UnitWriter, sh_planes};
+use align::Namings;
+use anchor::{AnchorTarget, code_anchor};
+use predicted::{Predicted, ReferenceCloud};
+use predictors::Chooser;
+use splatstream_decoder::colour::Colour;
+use splatstream_decoder::frame_state::FrameState;
+use splatstream_decoder::layout::ShCoding;
+use splatstream_format::syntax::{
+    FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, PlaceInGop, SequenceParameters, UnitId,
+    UnitType,
+};
+use splatstream_scene::GaussianFrame;
+use survivors::Survivors;
+use unit::{UnitCoder, sh_header};
+
+/// Rows of the same Gaussian may differ by this many steps in attributes that motion leaves alone.
+const SAME: f32 = 1.5;
+
+/// A unit ready to be written.
+pub(crate) struct CodedUnit {
+    spatial_layer: u8,
+    refinement: u8,
+    header: IncrementHeader,
+    payload: Vec<u8>,
+    /// New Gaussians by predictor.
+    predicted: [u64; 3],
+}
+
+/// A coded frame that others refer to.
+pub(crate) struct Reference {
+    state: FrameState,
+    /// The row in its file of each Gaussian, home by home.
+    rows: Vec<Vec<u32>>,
+    /// Rows of the file.
+    row_count: u32,
+}
+
+/// A frame to be coded.
+pub(crate) struct Target {
+    /// Canonical, without what is never seen.
+    frame: GaussianFrame,
+    /// Positions in lattice steps.
+    position: [Vec<f32>; 3],
+    rows: Vec<u32>,
+    row_count: u32,
+}
+
+impl Target {
+    fn cloud(&self) -> Cloud<'_> {
+        Cloud {
+            position: self.position.each_ref().map(Vec::as_slice),
+            log_scale: self.frame.log_scale().each_ref().map(Vec::as_slice),
+            opacity: self.frame.opacity_logit(),
+            dc: self.frame.dc().each_ref().map(Vec::as_slice),
+            row: &self.rows,
+            row_count: self.row_count,
+        }
+    }
+}
+
+/// Codes frames one after the other.
+pub(crate) struct Dynamic<'a, 'w> {
+    pub(crate) source: &'a mut dyn FrameSource,
+    pub(crate) settings: &'a Settings,
+    pub(crate) sequence: SequenceParameters,
+    pub(crate) ranking: &'a mut Ranking,
+    pub(crate) writer: &'a mut UnitWriter<'w>,
+    pub(crate) report: &'a mut Report,
+    pub(crate) index: Vec<IndexEntry>,
+}
+
+/// A GOP while its frames are being coded.
+struct Gop {
+    header: GopHeader,
+    tools: GopTools,
+    /// The last frame of each temporal layer and its number.
+    references: Vec<Option<(u32, Reference)>>,
+}
+
+impl Dynamic<'_, '_> {
+    /// Codes all frames.
+    ///
+    /// # Errors
+    /// As [`encode`](crate::encode).
+    pub(crate) fn run(&mut self, progress: Progress<'_>) -> Result<(), Error> {
+        let mut first = 0;
+        let frames = self.source.len();
+        while first < frames {
+            let last = frames.min(first + self.settings.gop.min(1024));
+            let end = self.cut(first, last)?;
+            self.gop(first, end, progress)?;
+            first = end;
+        }
+        Ok(())
+    }
+
+    /// The end of a GOP: before `last` where a frame shares little with the one before.
+    fn cut(&mut self, first: u32, last: u32) -> Result<u32, Error> {
+        if self.layers() == 0 {
+            return Ok(last);
+        }
+        let mut before = self.target(first)?;
+        for number in first + 1..last {
+            let target = self.target(number)?;
+            if shares_little(&self.continued(&before, &target)) {
+                return Ok(number);
+            }
+            before = target;
+        }
+        Ok(last)
+    }
+
+    /// Temporal layers; 0 where no frame refers to another.
+    fn layers(&self) -> u8 {
+        match self.settings.structure {
+            Structure::Intra => 0,
+            Structure::Predicted { layers } => layers,
+        }
+    }
+
+    fn measure(&self) -> Measure {
+        Measure { position_step: self.sequence.position_step(), steps: self.settings.steps, same: SAME }
+    }
+
+    fn continued(&self, before: &Target, target: &Target) -> Matching {
+        let bits = self.sequence.position_bits;
+        crate::motion::follow::follow(&before.cloud(), &target.cloud(), &self.measure(), bits)
+    }
+
+    fn target(&mut self, number: u32) -> Result<Target, Error> {
+        let frame = self.source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
+        let rows = visible(&frame, self.settings.keep_invisible);
+        let row_count = frame.len() as u32;
+        let frame = canonicalise(&frame, &rows, true);
+        let step = self.sequence.position_step();
+        let offset = self.sequence.position_offset();
+        let position = [0, 1, 2].map(|axis: usize| {
+            frame.position()[axis].iter().map(|&value| (value - offset[axis]) / step).collect()
+        });
+        Ok(Target { frame, position, rows, row_count })
+    }
+
+    fn gop(&mut self, first: u32, end: u32, progress: Progress<'_>) -> Result<(), Error> {
+        let gop_index = self.index.len() as u32;
+        self.index.push(IndexEntry { frame: first, reserved_zero: 0, offset: self.writer.offset });
+        let header = match self.layers() {
+            0 => GopHeader::intra(gop_index, end - first),
+            layers => GopHeader::predicted(gop_index, end - first, layers - 1),
+        };
+        self.writer.unit(UnitId::of_frame(UnitType::GopHeader, first), &header.to_bytes()?)?;
+        let mut gop: Option<Gop> = None;
+        for number in first..end {
+            let target = self.target(number)?;
+            self.report.invisible += u64::from(target.row_count) - target.frame.len() as u64;
+            self.report.gaussians += target.frame.len() as u64;
+            let place = header.place(number - first);
+            match (&mut gop, place.reference) {
+                (Some(gop), Some(reference)) => {
+                    self.predicted(gop, number, &place, first + reference, &target)?
+                }
+                (Some(gop), None) => self.intra(gop, number, target)?,
+                (None, _) => {
+                    let tools = self.tools(&target, first, end - first)?;
+                    let references = (0..self.layers().max(1)).map(|_| None).collect();
+                    let mut made = Gop { header, tools, references };
+                    self.intra(&mut made, number, target)?;
+                    gop = Some(made);
+                }
+            }
+            progress(number + 1, self.source.len());
+        }
+        Ok(())
+    }
+
+    /// Transforms and codebooks, made for the first frame.
+    fn tools(&mut self, target: &Target, first: u32, frames: u32) -> Result<GopTools, Error> {
+        let prepared = Prepared {
+            frame: target.frame.clone(),
+            order: Vec::new(),
+            spacing: crate::lattice::Spacing::default(),
+        };
+        let mut tools = GopTools::new(&prepared, &self.sequence, self.settings, frames);
+        tools.keep_zero();
+        tools.write(self.writer, &self.sequence, first, self.report)?;
+        Ok(tools)
+    }
+
+    fn intra(&mut self, gop: &mut Gop, number: u32, target: Target) -> Result<(), Error> {
+        let order = self.ranking.order(&target.frame);
+        let spacing = self.ranking.spacing(&order, self.settings);
+        let geometry = geometry(&target.frame, &self.sequence, &spacing, number)?;
+        let dc: Vec<&[f32]> = target.frame.dc().iter().map(Vec::as_slice).collect();
+        let dc = colour::components(&gop.tools.dc, &dc, self.sequence.dc_step(), &spacing);
+        let zeros = vec![0.0; target.frame.len()];
+        let planes = sh_planes(&target.frame, &self.sequence, &zeros);
+        let step = self.sequence.sh_step();
+        let sh =
+            gop.tools.sh.as_ref().map_or_else(Vec::new, |(transform, plan)| match plan.codebooks.first() {
+                None => colour::components(transform, &planes, step, &spacing),
+                Some(book) => vec![colour::indices(transform, &planes, step, book)],
+            });
+        let coder = self.coder(gop, true);
+        let anchor = AnchorTarget {
+            geometry: &geometry,
+            dc: &dc,
+            sh: &sh,
+            order: &order,
+            rows: &target.rows,
+            row_count: target.row_count,
+        };
+        let (units, reference) = code_anchor(&coder, &anchor, Chooser(self.settings.predictors))?;
+        let place = PlaceInGop { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
+        self.write_frame(gop, number, &place, target.frame.len(), &units)?;
+        gop.keep(0, number, reference);
+        Ok(())
+    }
+
+    fn predicted(
+        &mut self,
+        gop: &mut Gop,
+        number: u32,
+        place: &PlaceInGop,
+        reference: u32,
+        target: &Target,
+    ) -> Result<(), Error> {
+        let found = gop.references.iter().flatten().find(|(number, _)| *number == reference);
+        let Some((_, reference)) = found else { return Ok(()) };
+        let measure = self.measure();
+        let cloud = ReferenceCloud::new(reference, &self.sequence);
+        let mut matching = cloud.matching(target, &measure, self.sequence.position_bits);
+        if !self.settings.tools.survivors {
+            matching.target_of.iter_mut().for_each(|partner| *partner = None);
+        }
+        let predicted = Predicted {
+            coder: self.coder(gop, false),
+            reference,
+            target,
+            matching,
+            survivors: Survivors {
+                target,
+                sequence: &self.sequence,
+                steps: &self.settings.steps,
+                dc: &gop.tools.dc,
+                sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
+                namings: Namings::new(),
+            },
+            measure,
+            tools: self.settings.tools,
+            number,
+        };
+        let (units, coded) = predicted.code(Chooser(self.settings.predictors))?;
+        self.write_frame(gop, number, place, target.frame.len(), &units)?;
+        if place.temporal_layer + 1 < self.layers().max(2) {
+            gop.keep(place.temporal_layer, number, coded);
+        }
+        Ok(())
+    }
+
+    /// How the units of a frame are coded. Residuals are coefficients, also where intra frames have codebooks.
+    fn coder<'g>(&'g self, gop: &'g Gop, intra: bool) -> UnitCoder<'g> {
+        let sh = gop.tools.sh.as_ref();
+        let coding = match (sh, intra) {
+            (Some((transform, _)), false) => ShCoding::Coefficients { rank: transform.header.rank },
+            _ => gop.tools.sh_coding(),
+        };
+        let books = sh.map_or(&[][..], |(_, plan)| plan.codebooks.as_slice());
+        let ids: Vec<u8> = books.iter().map(|book| book.header.codebook_id).collect();
+        let ids = if matches!(coding, ShCoding::VectorQuantised { .. }) { ids.as_slice() } else { &[] };
+        UnitCoder {
+            sequence: &self.sequence,
+            colour: Colour {
+                dc: &gop.tools.dc,
+                sh: sh.map(|(transform, _)| transform),
+                mode: coding,
+                codebooks: [books.first(), books.get(1), books.get(2), books.get(3)],
+            },
+            sh: sh_header(coding, ids),
+            plan: SectionPlan {
+                block_log2: self.sequence.block_log2,
+                preset: self.settings.preset,
+                tools: self.settings.tools,
+            },
+            intra,
+        }
+    }
+
+    fn write_frame(
+        &mut self,
+        gop: &Gop,
+        number: u32,
+        place: &PlaceInGop,
+        gaussians: usize,
+        units: &[CodedUnit],
+    ) -> Result<(), Error> {
+        let sh = gop.tools.sh.as_ref().map(|_| 0);
+        let header = FrameHeader::new(place.frame_type, 0, sh, gaussians as u32);
+        let top = self.sequence.spatial_layer_count - 1;
+        let spatial = if place.reference.is_some() { top } else { 0 };
+        let start = self.writer.offset;
+        let id = UnitId::of_frame(UnitType::FrameHeader, number).on_layers(spatial, place.temporal_layer);
+        self.writer.unit(id, &header.to_bytes()?)?;
+        let mut frame = FrameReport {
+            frame_type: place.frame_type,
+            gaussians: gaussians as u32,
+            ..FrameReport::default()
+        };
+        for unit in units {
+            let id = UnitId { refinement: unit.refinement, ..UnitId::of_frame(UnitType::Increment, number) };
+            let id = id.on_layers(unit.spatial_layer, place.temporal_layer);
+            self.writer.unit(id, &unit.payload)?;
+            frame.add(&unit.header, unit.predicted);
+        }
+        frame.bytes = self.writer.offset - start;
+        self.report.coded.push(frame);
+        self.report.digests.push(units.last().map_or(0, |unit| unit.header.refinement_digest));
+        Ok(())
+    }
+}
+
+impl Gop {
+    fn keep(&mut self, layer: u8, number: u32, reference: Reference) {
+        if !self.header.is_predicted() {
+            return;
+        }
+        for (place, slot) in self.references.iter_mut().enumerate().skip(usize::from(layer)) {
+            if place > usize::from(layer) {
+                *slot = None;
+            }
+        }
+        self.references[usize::from(layer)] = Some((number, reference));
+    }
+}
