@@ -20,6 +20,8 @@ pub struct FrameState {
     pub fields: Vec<Arc<CellField>>,
     /// What is carried of each home, where it has been shown.
     pub carried: Vec<Option<Home>>,
+    /// What was added before output.
+    pub compensation: Compensation,
     /// The plane models in force for unit 0 of a frame that refers to this one.
     pub models: ModelsInForce,
 }
