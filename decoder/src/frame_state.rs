@@ -12,6 +12,8 @@ use std::sync::Arc;
 /// A frame as later ones refer to it.
 #[derive(Debug, Clone)]
 pub struct FrameState {
+    /// Its display index.
+    pub number: u32,
     /// The homes, from 0 on, as far as they were decoded.
     pub homes: Vec<Home>,
     /// The homes of the intra frame of the GOP.

@@ -55,6 +55,8 @@ pub struct DecodedFrame {
     pub spatial_layer: u8,
     /// Gaussians at the end of `planes` that are carried over from the intra frame (7.18).
     pub carried: usize,
+    /// The frame that is shown in place of this one, of which nothing could be decoded (7.20.3).
+    pub frozen: Option<u32>,
     /// Digest of the decoded planes, clause 7.9; none if it was not asked for, or nothing was decoded.
     pub digest: Option<u64>,
     /// Digest of the carried planes, clause 7.18, under the same conditions.
@@ -88,6 +90,7 @@ impl DecodedFrame {
             refinements: 0,
             spatial_layer: 0,
             carried: 0,
+            frozen: None,
             digest: None,
             carried_digest: None,
             compensation: Compensation::default(),

@@ -281,6 +281,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let (planes, exact) = reference.state.shown(sh_planes, self.options.subset);
         decoded.carried = planes.len().wrapping_sub(exact);
         decoded.planes = planes;
+        decoded.frozen = Some(reference.state.number);
         decoded.compensation = reference.state.compensation.clone();
         Assembled { decoded, level: 0, state: Arc::clone(&reference.state), fault: None }
     }
@@ -301,9 +302,15 @@ impl<'d, 'a> Assembly<'d, 'a> {
             }
         };
         let digest = (self.options.verify && !self.digests.is_empty()).then_some(self.last).flatten();
-        let (carried, compensation) = (Vec::new(), Compensation::default());
-        let models = self.first_models;
-        let mut state = FrameState { homes: self.homes, anchor, fields, carried, compensation, models };
+        let mut state = FrameState {
+            number: self.frame.number,
+            homes: self.homes,
+            anchor,
+            fields,
+            carried: Vec::new(),
+            compensation: Compensation::default(),
+            models: self.first_models,
+        };
         let mut fault = None;
         if let (Some(reference), false) = (self.reference, self.options.subset) {
             state.carry_from(&reference.state, refinements);
