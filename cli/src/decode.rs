@@ -3,8 +3,8 @@
 mod report;
 mod target;
 
-use crate::console::Console;
 use crate::completeness::complete_points;
+use crate::console::Console;
 use crate::failure::{Failure, StreamFault};
 use crate::numbers::FrameRange;
 use crate::progress::Progress;

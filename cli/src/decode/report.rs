@@ -111,7 +111,8 @@ fn shows(sequence: &SequenceParameters, frame: &DecodedFrame) -> String {
         text += &format!(" of spatial layer {}", frame.spatial_layer);
     }
     if frame.carried > 0 {
-        text += &format!(" and {} Gaussians carried over from the intra frame", grouped(frame.carried as u64));
+        text +=
+            &format!(" and {} Gaussians carried over from the intra frame", grouped(frame.carried as u64));
     }
     text
 }
