@@ -74,6 +74,7 @@ class IncrementWriter:
 
     def choose_fixed(self, parent_count):
         rng, u, seq = self.rng, self.u, self.seq
+        self.size = self.tamper("size", self.size, self)
         u.parent_count = parent_count
         u.position_shift = rng.choice([0, 0, 0, min(1, seq.position_bits - 1), rng.randint(0, seq.position_bits - 1)])
         u.attribute_shift = [rng.choice([0, 0, 1, 2, rng.randint(0, 7)]) for _ in range(5)]
@@ -296,6 +297,7 @@ class IncrementWriter:
         encoder = SectionEncoder(self.rng, planes, v, self.block_size(), 2 ** lanes_log2, in_force, available)
         models, blocks = encoder.run()
         models, blocks = self.tamper("coded", (models, blocks), self)
+        lanes_log2 = self.tamper("lanes", lanes_log2, self)
         return (bytes([lanes_log2]) + leb(len(models)) + models
                 + b"".join(leb(len(block)) for block in blocks) + b"".join(blocks))
 
