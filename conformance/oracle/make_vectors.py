@@ -8,15 +8,18 @@ import random
 import struct
 import sys
 
+import constants as c
+import points
 from decode import report
 from decoding import Decoder
 from errors import StreamError
 from extraction import extract
 from homes import canonical_planes
 from output import float_planes
+from synth import Synth
 from synth_dynamic import valid_stream
 from synth_faults import FAULTS, faulty_stream
-from synth_mutations import MUTATIONS, mutated
+from synth_mutations import MUTATIONS, mutated, stream_of, units_of
 
 SUBSET_FIELDS = ("frame", "gaussians", "shown")
 
@@ -46,7 +49,7 @@ def whole_record(data):
     return decoder, record
 
 
-def point_records(data, sequence, extractions):
+def point_records(data, sequence):
     """For each operating point below the highest one of the sequence; a repeated result names the first one."""
     result, seen = {}, {}
     for s in range(sequence.spatial_layer_count):
@@ -55,8 +58,7 @@ def point_records(data, sequence, extractions):
                 decoder = Decoder(data, (s, t, r)).decode()
                 record = report(decoder)
                 record["subset"] = subset_records(decoder)
-                if extractions:
-                    record["extraction"] = sha256(extract(data, (s, t, r)))
+                record["extraction"] = sha256(extract(data, (s, t, r)))
                 name, text = "s%d,t%d,r%d" % (s, t, r), json.dumps(record)
                 result[name] = seen.get(text, record)
                 seen.setdefault(text, name)
@@ -71,6 +73,45 @@ def write(folder, name, data, record):
         f.write("\n")
 
 
+def intra_with_points(seed):
+    """A stream of profile 0 with an operating_points unit (6.16) before its index or end unit."""
+    head, units = units_of(Synth(seed).stream())
+    decoder = Decoder(stream_of(head, units)).decode()
+    entries = b""
+    for r in range(decoder.sequence.refinement_count):
+        point = (0, 0, r)
+        gaussians = sum(points.intra_gaussians(frame, decoder.sequence, point) for frame in decoder.frames)
+        entries += struct.pack("<4BIQQ", *point, 0, decoder.ledger.frame_count(point, decoder.sequence), gaussians,
+                               decoder.ledger.byte_count(point, decoder.sequence))
+    new = units[0].copy()
+    new.kind, new.flags, new.frame = c.UT_POINTS, 0, 0
+    new.payload = struct.pack("<HH", decoder.sequence.refinement_count, 0) + entries
+    place = next(i for i, u in enumerate(units) if u.kind in (c.UT_INDEX, c.UT_END))
+    return stream_of(head, units[:place] + [new] + units[place:])
+
+
+def intra_records(data):
+    """The record of a stream of profile 0, with what its operating points give."""
+    decoder = Decoder(data).decode()
+    record = report(decoder)
+    record["points"] = {}
+    for r in range(decoder.sequence.refinement_count):
+        entry = report(Decoder(data, (0, 0, r)).decode())
+        entry["extraction"] = sha256(extract(data, (0, 0, r)))
+        record["points"]["s0,t0,r%d" % r] = entry
+    return record
+
+
+def write_intra(folder, count):
+    seed, written = 500, 0
+    while written < count:
+        data = intra_with_points(seed)
+        if len(data) < 8192:
+            write(folder, "intra-points-%03d" % seed, data, intra_records(data))
+            written += 1
+        seed += 1
+
+
 def small_enough(data, rng):
     return len(data) < 8192 or rng.random() < 0.15
 
@@ -81,9 +122,9 @@ def write_valid(folder, count):
         data = valid_stream(seed)
         if small_enough(data, rng) and len(data) < 20000:
             decoder, record = whole_record(data)
-            points = decoder.sequence.spatial_layer_count * decoder.sequence.temporal_layer_count
-            if points * decoder.sequence.refinement_count <= 48:
-                record["points"] = point_records(data, decoder.sequence, True)
+            sequence = decoder.sequence
+            if sequence.spatial_layer_count * sequence.temporal_layer_count * sequence.refinement_count <= 48:
+                record["points"] = point_records(data, sequence)
                 write(folder, "dyn-%03d" % seed, data, record)
                 written += 1
         seed += 1
@@ -125,6 +166,7 @@ def main():
         path = os.path.join(folder, name)
         os.makedirs(path, exist_ok=True)
         maker(path, count)
+    write_intra(os.path.join(folder, "valid"), 4)
 
 
 if __name__ == "__main__":

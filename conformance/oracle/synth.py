@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Writes random conforming streams that use every tool of version 1.0: synth.py SEED OUT.gss
+"""Writes random conforming streams that use every tool of version 1.0: synth.py SEED OUT.gss [0 | 1]
+
+The last argument is the profile, 0 if there is none; streams of profile 1 are made in synth_dynamic.py.
 
 The values have no meaning: tokens are drawn from random tables. It serves to reach the paths that
 streams of an ordinary encoder leave out (position_shift, rotation thresholds, VQ stages, 16-bit
@@ -233,6 +235,16 @@ class Synth:
         return context.e, rans(symbols, lanes) + raw.bytes()
 
 
+def main():
+    seed, path = int(sys.argv[1]), sys.argv[2]
+    if sys.argv[3:] == ["1"]:
+        from synth_dynamic import valid_stream
+        data = valid_stream(seed)
+    else:
+        data = Synth(seed).stream()
+    with open(path, "wb") as f:
+        f.write(data)
+
+
 if __name__ == "__main__":
-    with open(sys.argv[2], "wb") as f:
-        f.write(Synth(int(sys.argv[1])).stream())
+    main()

@@ -21,7 +21,7 @@ class DynamicSynth:
     def __init__(self, seed, tamper=None, most=None):
         self.rng = random.Random(seed)
         self.tamper = tamper
-        self.most = most or self.rng.choice([6, 20, 20, 40, 90])         # Gaussians of a frame, about
+        self.most = most or self.rng.choice([6, 20, 20, 40, 90, 150])         # Gaussians of a frame, about
         self.out = bytearray()
         self.live = Decoder(self.out)
         self.writers = []                           # (offset of the unit, IncrementWriter)
@@ -98,7 +98,7 @@ class DynamicSynth:
                         + threshold)
         self.parameters = payload + struct.pack(
             "<III11f", rng.choice([0, total]), rng.choice([1, 30, 90000]), rng.choice([0, 1, 3003]), 1.5, -0.0, 2.25,
-            0.001, -5.0, 0.01, rng.choice([1.0, 0.02, 0.003, 1e-6, 0.7]), 1.0, 0.1, 0.02, 0.03)
+            0.001, -5.0, 0.01, rng.choice([1.0, 0.02, 0.003, 0.0005, 0.0001, 1e-6, 0.7]), 1.0, 0.1, 0.02, 0.03)
         return self.parameters
 
     def present(self, structure, depth, count):
@@ -117,11 +117,12 @@ class DynamicSynth:
     def definitions(self):
         rng, planes = self.rng, self.seq.sh_planes
         self.sh_ranks = {}
+        means = ([0, 5000, -777, 2 ** 30], [0, 5000, -777, 2 ** 29])
         for kind, dimension in ((0, 3), (1, planes)):
             for identifier in rng.sample(range(16), rng.randint(1, 2) if dimension else 0):
                 rank = rng.randint(1, min(dimension, 3 if kind == 0 else 5))
                 payload = bytes([identifier, kind, dimension, rank])
-                payload += b"".join(struct.pack("<i", rng.choice([0, 5000, -777, 2 ** 29])) for _ in range(dimension))
+                payload += b"".join(struct.pack("<i", rng.choice(means[kind])) for _ in range(dimension))
                 payload += b"".join(struct.pack("<h", rng.choice([4096, -4096, 0, rng.randint(-4096, 4096)]))
                                     for _ in range(rank * dimension))
                 self.put(c.UT_TRANSFORM, payload, frame=self.first)

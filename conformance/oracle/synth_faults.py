@@ -124,6 +124,20 @@ def small_lattice(v, w):
     return w.seq.position_bits <= 14
 
 
+def full_dc(v, w):
+    """Component 0 as large as it may be, the others 0."""
+    for k in range(w.context.dc_transform.rank):
+        v[8 + k][0] = 8191 >> w.u.attribute_shift[3] if k == 0 else 0
+    return v
+
+
+def dc_at_limit(v, w):
+    """dc[0] of the first new Gaussian is 2^30 without its component, and cannot have more (SS-RC-005)."""
+    t = w.context.dc_transform
+    none = w.u.predictor_block_log2 == 255 or w.v["predictors"][0][0] == 0
+    return none and t.mean[0] == 2 ** 30 and t.basis[0] > 100
+
+
 FAULTS = [
     ("parent-count", "MISMATCH", "fixed", always, element("parent_count", lambda u, w: u.parent_count + 1)),
     ("parent-count-limit", "OVER_LIMIT", "fixed", always, element("parent_count", 2 ** 24 + 1)),
@@ -178,6 +192,7 @@ FAULTS = [
     ("opacity-out", "OUT_OF_RANGE", "updates", always, entry(3, -40000)),
     ("rotation-out", "OUT_OF_RANGE", "new", always, entry(6, -33000)),
     ("dc-component", "OUT_OF_RANGE", "new", always, entry(8, 8192)),
+    ("dc-output", "OUT_OF_RANGE", "new", dc_at_limit, full_dc),
     ("dc-component-shifted", "OUT_OF_RANGE", "updates", lambda v, w: w.u.attribute_shift[3] > 0,
      lambda v, w: entry(7, -(8191 >> w.u.attribute_shift[3]) - 2)(v, w)),
     ("sh-index", "OUT_OF_RANGE", "new", lambda v, w: w.u.sh_mode == 2, entry(-1, 60000, -1)),

@@ -8,8 +8,8 @@ import struct
 
 import models as pm
 from cells import Cell, Cells
-from constants import NONE_ID, TURN_MAX
-from conventions import ceil_div
+from constants import NONE_ID, OUTPUT_MAX, TURN_MAX
+from conventions import Round, ceil_div
 from encoding import SectionEncoder, leb
 from homes import (MOVE, MOVE_AND_UPDATE, REMOVE, SKIP, UPDATE, canonical, moved, position_limit, survivors)
 from increment import Increment
@@ -209,12 +209,15 @@ class IncrementWriter:
     def choose_opacity(self, p, shift):
         reach = self.rng.choice([0, 1, 6, 60])
         v = self.rng.randint(-reach, reach)
+        if self.rng.random() < 0.01:
+            v = (self.rng.choice([-32767, 32767]) - p) >> shift
         return [v if abs(p + (v << shift)) <= 32767 else 0]
 
     def choose_rotation(self, p, shift):
         result = []
+        wild = self.rng.random() < 0.01
         for k in range(3):
-            reach = self.rng.choice([0, 1, 3, 30])
+            reach = 30000 if wild else self.rng.choice([0, 1, 3, 30])
             v = self.rng.randint(-reach, reach)     # at most three coarser by 7.6
             result.append(v if abs(p[k] + (v << (3 + shift + 6))) <= 32767 * 64 else 0)
         return result
@@ -224,7 +227,13 @@ class IncrementWriter:
         return [self.rng.randint(-reach, reach) for _ in range(rank)]
 
     def choose_dc(self, p, shift):
-        return self.choose_components(self.context.dc_transform.rank, shift)
+        transform = self.context.dc_transform
+        v = self.choose_components(transform.rank, shift)
+        for j in range(3):                          # SS-RC-005
+            total = sum(transform.basis[k * 3 + j] * (v[k] << shift) for k in range(transform.rank))
+            if abs(p[j] + Round(total, 6)) > OUTPUT_MAX:
+                return [0] * transform.rank
+        return v
 
     def choose_sh(self, p, shift):
         if self.u.sh_mode == 0:
