@@ -13,11 +13,12 @@ use crate::colour;
 use crate::error::Error;
 use crate::importance::Ranking;
 use crate::lattice::geometry;
-use crate::matching::{Cloud, Measure, shares_little};
+use crate::matching::{Cloud, Matching, Measure, shares_little};
 use crate::section::SectionPlan;
-use crate::settings::{Settings, Structure};
+use crate::settings::{Settings, ShChoice, Structure};
 use crate::source::FrameSource;
 use crate::stream::{FrameReport, GopTools, Prepared, Progress, Report, UnitWriter, sh_planes};
+use crate::vq;
 use align::Namings;
 use anchor::{AnchorTarget, code_anchor};
 use predicted::{Predicted, ReferenceCloud};
@@ -25,6 +26,7 @@ use predictors::Chooser;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::frame_state::FrameState;
 use splatstream_decoder::layout::ShCoding;
+use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::{
     FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, PlaceInGop, SequenceParameters,
     UnitHeader, UnitId, UnitType,
@@ -36,6 +38,12 @@ use wanted::Wanted;
 
 /// Frames of a predicted GOP, at most (6.5).
 const MOST_FRAMES: u32 = 1024;
+
+/// Pairs on which coefficients and a codebook of SH residuals are compared, and on which the codebook is trained.
+const TRIAL: usize = 1 << 13;
+
+/// Entries of a codebook of SH residuals, at most: it is carried with each frame.
+const RESIDUAL_ENTRIES: usize = 256;
 
 /// Rows of the same Gaussian may differ by this many steps in attributes that motion leaves alone.
 const SAME: f32 = 1.5;
@@ -95,6 +103,8 @@ pub(crate) struct Dynamic<'a, 'w> {
 
 /// A GOP while its frames are being coded.
 struct Gop {
+    /// Display index of its first frame.
+    first: u32,
     header: GopHeader,
     tools: GopTools,
     /// The last frame of each temporal layer and its number.
@@ -148,6 +158,7 @@ impl Dynamic<'_, '_> {
         let target = self.target(first)?;
         let tools = self.tools(&target, last - first);
         let mut gop = Gop {
+            first,
             header: self.header(last - first),
             units: tools.units(&self.sequence, first)?,
             tools,
@@ -215,10 +226,15 @@ impl Dynamic<'_, '_> {
                 None => colour::components(transform, &planes, step, &spacing),
                 Some(book) => vec![colour::indices(transform, &planes, step, book)],
             });
-        let coder = self.coder(gop, true);
+        let coder = self.coder(gop, None);
         let wanted = Wanted::new(&geometry, &dc, &sh, &coder.colour, planes.len())?;
-        let anchor =
-            AnchorTarget { wanted: &wanted, order: &order, rows: &target.rows, row_count: target.row_count };
+        let anchor = AnchorTarget {
+            number,
+            wanted: &wanted,
+            order: &order,
+            rows: &target.rows,
+            row_count: target.row_count,
+        };
         let (units, reference) = code_anchor(&coder, &anchor, Chooser(self.settings.predictors))?;
         let place = PlaceInGop { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
         self.write_frame(gop, number, &place, (target.frame.len(), target.row_count), &units)?;
@@ -246,24 +262,32 @@ impl Dynamic<'_, '_> {
         if !self.settings.tools.survivors {
             matching.target_of.iter_mut().for_each(|partner| *partner = None);
         }
+        let mut survivors = Survivors {
+            target,
+            sequence: &self.sequence,
+            steps: &self.settings.steps,
+            dc: &gop.tools.dc,
+            sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
+            namings: Namings::new(),
+            book: None,
+        };
+        let book = self.residual_book(gop, &survivors, reference, &matching, place.temporal_layer);
+        survivors.book = book.as_ref();
         let predicted = Predicted {
-            coder: self.coder(gop, false),
+            coder: self.coder(gop, Some(book.as_ref())),
             reference,
             target,
             matching,
-            survivors: Survivors {
-                target,
-                sequence: &self.sequence,
-                steps: &self.settings.steps,
-                dc: &gop.tools.dc,
-                sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
-                namings: Namings::new(),
-            },
+            survivors,
             measure,
             tools: self.settings.tools,
             number,
         };
         let (units, coded) = predicted.code(Chooser(self.settings.predictors))?;
+        if let Some(book) = &book {
+            let id = UnitId::of_frame(UnitType::Codebook, gop.first).on_layers(0, place.temporal_layer);
+            gop.units.push((id, book.to_bytes()?));
+        }
         self.write_frame(gop, number, place, (target.frame.len(), target.row_count), &units)?;
         if place.temporal_layer + 1 < self.layers().max(2) {
             gop.keep(place.temporal_layer, number, coded);
@@ -271,31 +295,63 @@ impl Dynamic<'_, '_> {
         Ok(true)
     }
 
-    /// How the units of a frame are coded. Residuals are coefficients, also where intra frames have codebooks.
-    fn coder<'g>(&'g self, gop: &'g Gop, intra: bool) -> UnitCoder<'g> {
+    /// The codebook of the SH residuals of a frame, where a codebook serves them better than coefficients. Only a
+    /// GOP whose intra frames have codebooks has them: a new Gaussian takes an entry of each.
+    fn residual_book(
+        &self,
+        gop: &Gop,
+        survivors: &Survivors<'_>,
+        reference: &Reference,
+        matching: &Matching,
+        temporal_layer: u8,
+    ) -> Option<Codebook> {
+        let (transform, plan) = gop.tools.sh.as_ref()?;
+        plan.codebooks.first()?;
+        let rank = usize::from(transform.header.rank);
+        let pairs = matching.target_of.iter().flatten().count();
+        let rows = survivors.sh_rows(&reference.state.homes, &matching.target_of, pairs / TRIAL);
+        let forced = self.settings.sh == ShChoice::VectorQuantised;
+        let entries = vq::entry_count(pairs, false).min(RESIDUAL_ENTRIES);
+        if rows.len() < 4 * rank || !forced && !colour::compare(&rows, rank, pairs, entries).1 {
+            return None;
+        }
+        let mut book = vq::train(&rows, rank, entries.min(rows.len() / rank));
+        book.entries[..rank].fill(0);
+        // Each temporal layer has a codebook of its own, which only its frames replace.
+        book.header.codebook_id = 1 + temporal_layer;
+        Some(book)
+    }
+
+    /// How the units of a frame are coded: an intra frame, or one with or without a codebook of SH residuals.
+    fn coder<'g>(&'g self, gop: &'g Gop, predicted: Option<Option<&'g Codebook>>) -> UnitCoder<'g> {
         let sh = gop.tools.sh.as_ref();
-        let coding = match (sh, intra) {
-            (Some((transform, _)), false) => ShCoding::Coefficients { rank: transform.header.rank },
+        let whole = sh.and_then(|(_, plan)| plan.codebooks.first());
+        let residual = predicted.flatten();
+        let coding = match (sh, predicted) {
+            (Some((transform, _)), Some(None)) => ShCoding::Coefficients { rank: transform.header.rank },
+            (Some(_), Some(Some(_))) => ShCoding::VectorQuantised { stages: 2 },
             _ => gop.tools.sh_coding(),
         };
-        let books = sh.map_or(&[][..], |(_, plan)| plan.codebooks.as_slice());
-        let ids: Vec<u8> = books.iter().map(|book| book.header.codebook_id).collect();
-        let ids = if matches!(coding, ShCoding::VectorQuantised { .. }) { ids.as_slice() } else { &[] };
+        let books = match coding {
+            ShCoding::VectorQuantised { .. } => [whole, residual, None, None],
+            _ => [None; 4],
+        };
+        let ids: Vec<u8> = books.iter().flatten().map(|book| book.header.codebook_id).collect();
         UnitCoder {
             sequence: &self.sequence,
             colour: Colour {
                 dc: &gop.tools.dc,
                 sh: sh.map(|(transform, _)| transform),
                 mode: coding,
-                codebooks: [books.first(), books.get(1), books.get(2), books.get(3)],
+                codebooks: books,
             },
-            sh: sh_header(coding, ids),
+            sh: sh_header(coding, &ids),
             plan: SectionPlan {
                 block_log2: self.sequence.block_log2,
                 preset: self.settings.preset,
                 tools: self.settings.tools,
             },
-            intra,
+            intra: predicted.is_none(),
         }
     }
 

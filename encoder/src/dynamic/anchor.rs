@@ -14,6 +14,7 @@ use splatstream_decoder::increment::residual::{Attributes, Stage};
 use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::position::morton;
+use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::syntax::prefix_length;
 use std::sync::Arc;
@@ -30,6 +31,7 @@ const fn shares(layers: u8) -> &'static [u8] {
 
 /// A frame on the finest lattices, in the order of its source.
 pub(crate) struct AnchorTarget<'a> {
+    pub(crate) number: u32,
     pub(crate) wanted: &'a Wanted,
     /// Most important first.
     pub(crate) order: &'a [u32],
@@ -80,6 +82,8 @@ pub(crate) fn code_anchor(
         rows: rows.collect(),
         row_count: target.row_count,
         state: FrameState {
+            number: target.number,
+            compensation: Compensation::default(),
             anchor: Arc::new(homes.clone()),
             carried: homes.iter().cloned().map(Some).collect(),
             homes,

@@ -14,6 +14,8 @@ use crate::motion::follow::follow;
 use crate::motion::stale::{Held, stale_cells};
 use crate::motion::{CellMotion, Pair, cell_motion};
 use crate::settings::Tools;
+use crate::vq;
+use rayon::prelude::*;
 use splatstream_decoder::digest::{UnitDigest, frame_digest, unit_digest};
 use splatstream_decoder::displacement::{CellField, rotation_unit};
 use splatstream_decoder::frame::QuantizedFrame;
@@ -23,6 +25,7 @@ use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::increment::{Situation, field};
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::position::morton;
+use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::importance;
@@ -235,11 +238,30 @@ impl Predicted<'_> {
                 let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
                 colour::components(transform, &planes, sequence.sh_step(), &spacing)
             }
+            (ShCoding::VectorQuantised { .. }, Some(transform)) => {
+                let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
+                let rows = colour::sampled_rows(transform, &planes, sequence.sh_step(), 1);
+                self.stages(&rows, usize::from(transform.header.rank))
+            }
             _ => Vec::new(),
         };
         let planes = usize::from(sequence.sh_dimension());
         let wanted = Wanted::new(&geometry, &dc, &sh, &self.coder.colour, planes)?;
         Ok(Fresh { places, wanted, of_home })
+    }
+
+    /// Codebook indices of whole SH values: the nearest entry, and what refines it.
+    fn stages(&self, rows: &[f32], rank: usize) -> Vec<Vec<i32>> {
+        let [Some(whole), Some(residual), ..] = self.coder.colour.codebooks else { return Vec::new() };
+        let pair = |row: &[f32]| {
+            let first = vq::nearest_entry(whole, row);
+            let entry = whole.entries[first as usize * rank..].iter();
+            let left: Vec<f32> =
+                row.iter().zip(entry).map(|(part, &value)| part - f32::from(value)).collect();
+            (first, vq::nearest_entry(residual, &left))
+        };
+        let (first, second) = rows.par_chunks_exact(rank.max(1)).map(pair).unzip();
+        vec![first, second]
     }
 
     /// Gaussians of each home that continue.
@@ -352,7 +374,8 @@ impl Predicted<'_> {
         fields.push(field);
         let anchor = Arc::clone(&before.anchor);
         let carried = carried.into_iter().map(Some).collect();
-        let state = FrameState { homes, anchor, fields, carried, models };
+        let (number, compensation) = (self.number, Compensation::default());
+        let state = FrameState { number, homes, anchor, fields, carried, compensation, models };
         Ok((units, Reference { state, rows, row_count: self.target.row_count }))
     }
 }
