@@ -13,7 +13,9 @@ use crate::setting_names::{PresetName, QualityName, ShName, ToolName};
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use splatstream_encoder::{FrameSource, Importance, Quality, Report, Settings, encode};
+use splatstream_encoder::{
+    FrameSource, Importance, PredictorChoice, Quality, Report, Settings, Structure, encode,
+};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -45,9 +47,19 @@ pub(crate) struct Encode {
     #[arg(long, value_name = "N", default_value_t = Settings::default().gop)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     gop: u32,
-    /// Spatial layers by height in lines; this version has one.
-    #[arg(long, value_name = "HEIGHTS", default_value = "1080", value_parser = parse_layers)]
-    layers: String,
+    /// Spatial layers by the height in lines that each is meant for, 1 to 4 rising numbers; default is 540,720,1080
+    /// for a sequence and one layer for a single frame.
+    #[arg(long, value_name = "HEIGHTS", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..))]
+    layers: Vec<u32>,
+    /// Temporal layers, 1 to 4: 1 is I P P P, 2 is I B P B P, more are dyadic.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=4))]
+    temporal_layers: u8,
+    /// Code every frame by itself.
+    #[arg(long, conflicts_with = "temporal_layers")]
+    all_intra: bool,
+    /// How new Gaussians are predicted from those of the reference or of lower layers.
+    #[arg(long, value_enum, default_value_t = PredictorName::Bits)]
+    predictors: PredictorName,
     /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100.
     #[arg(long, value_name = "PERCENTS", value_delimiter = ',', default_value = "10,20,30,50,100")]
     refinements: Vec<u8>,
@@ -92,11 +104,24 @@ fn parse_psnr(text: &str) -> Result<f32, String> {
     decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
 }
 
-fn parse_layers(text: &str) -> Result<String, String> {
-    if text == "1080" {
-        return Ok(text.to_owned());
+#[derive(Clone, Copy, ValueEnum)]
+enum PredictorName {
+    /// Not at all.
+    None,
+    /// Where it saves bits, chosen for runs of Gaussians.
+    Bits,
+    /// By the smallest sum of residuals, for each Gaussian: the paper's choice.
+    L1,
+}
+
+impl From<PredictorName> for PredictorChoice {
+    fn from(name: PredictorName) -> Self {
+        match name {
+            PredictorName::None => Self::None,
+            PredictorName::Bits => Self::Bits,
+            PredictorName::L1 => Self::Difference,
+        }
     }
-    Err("this version writes one layer, 1080; more layers come with a later version".to_owned())
 }
 
 /// What `--json` prints.
@@ -150,7 +175,21 @@ impl Encode {
                 self.views.cameras(views, &first)?
             }
         };
+        let sequence = source.len() > 1;
+        let layers = match self.layers.as_slice() {
+            [] if sequence && !self.all_intra => 3,
+            [] => 1,
+            layers if layers.is_sorted_by(|a, b| a < b) && layers.len() <= 4 => layers.len() as u8,
+            _ => return Err(Failure::Usage("--layers takes 1 to 4 rising heights, as 540,720,1080".into())),
+        };
+        let structure = match sequence && !self.all_intra {
+            true => Structure::Predicted { layers: self.temporal_layers },
+            false => Structure::Intra,
+        };
         let mut settings = Settings {
+            structure,
+            spatial_layers: layers,
+            predictors: self.predictors.into(),
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
             psnr: self.psnr,

@@ -51,6 +51,10 @@ pub(crate) enum ToolName {
     TableReuse,
     /// Coarser scale, rotation and colour in the last refinement.
     CoarseTail,
+    /// Cells that move what is in them, in predicted frames.
+    CellMotion,
+    /// Gaussians that continue those of the reference, in predicted frames.
+    Survivors,
     /// Leaving out Gaussians that can never be seen.
     Prune,
     /// Importance measured in views; without it, opacity times volume.
@@ -66,6 +70,8 @@ impl ToolName {
             Self::ShTransform => settings.tools.sh_transform = false,
             Self::TableReuse => settings.tools.table_reuse = false,
             Self::CoarseTail => settings.tools.coarse_tail = false,
+            Self::CellMotion => settings.tools.cell_motion = false,
+            Self::Survivors => settings.tools.survivors = false,
             Self::Prune => settings.keep_invisible = true,
             Self::ViewImportance => settings.importance = Some(Importance::Volume),
         }

@@ -19,7 +19,7 @@ pub fn visible(frame: &GaussianFrame, keep_invisible: bool) -> Vec<u32> {
 }
 
 /// The quaternion that turns the axes 0, 1, 2 into `order`, up to the signs of axes.
-fn permutation(order: [usize; 3]) -> [f32; 4] {
+pub(crate) fn permutation(order: [usize; 3]) -> [f32; 4] {
     const HALF: f32 = 0.5;
     const ROOT_HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
     match order {
@@ -33,7 +33,7 @@ fn permutation(order: [usize; 3]) -> [f32; 4] {
 }
 
 /// Hamilton product, w first.
-fn product(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+pub(crate) fn product(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     [
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],

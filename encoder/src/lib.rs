@@ -9,12 +9,15 @@ mod allocation;
 pub mod canonical;
 mod clusters;
 mod colour;
+mod dynamic;
 mod entropy_cost;
 mod error;
 mod frame;
 mod importance;
 mod lattice;
+mod matching;
 mod models;
+mod motion;
 mod pca;
 mod section;
 mod sequence;
@@ -24,6 +27,8 @@ mod stream;
 mod vq;
 
 pub use error::Error;
-pub use settings::{Importance, Preset, Quality, Settings, ShChoice, Steps, Tools};
+pub use settings::{
+    Importance, PredictorChoice, Preset, Quality, Settings, ShChoice, Steps, Structure, Tools,
+};
 pub use source::FrameSource;
-pub use stream::{Progress, Report, encode};
+pub use stream::{FrameReport, Progress, Report, encode};

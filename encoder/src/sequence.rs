@@ -4,10 +4,10 @@ use crate::canonical::{canonicalise, visible};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
 use crate::lattice::{Extent, inner_side, nearest_integer, position_lattice};
-use crate::settings::Settings;
+use crate::settings::{Settings, Structure};
 use crate::source::FrameSource;
 use splatstream_format::Limits;
-use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::syntax::{Profile, SequenceParameters};
 use splatstream_scene::{GaussianFrame, sh_coefficients};
 
 /// Gaussians on which sorted and unsorted axes are compared.
@@ -57,7 +57,9 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
     let degree = settings.sh_degree.unwrap_or(degree).min(source_degree);
     let (offset, step, bits) = position_lattice(extent, inner, &settings.steps);
     let [sorted, unsorted] = axes_trial;
-    let canonical_axes = settings.tools.axis_sort && sorted <= unsorted;
+    // A Gaussian that changes keeps the names of its axes, so that predicted frames are not sorted.
+    let sorts = settings.tools.axis_sort && settings.profile() == Profile::Intra;
+    let canonical_axes = sorts && sorted <= unsorted;
     let flags = SequenceParameters::flags(canonical_axes, antialiased);
     let parameters = parameters(settings, frames, degree, flags, (offset, step, bits));
     Ok(Analysis { parameters, level, source_sh_degree: source_degree, axes_trial })
@@ -88,6 +90,14 @@ fn check(settings: &Settings) -> Result<(), Error> {
     }
     if settings.gop == 0 {
         return setting("gop", "0".into(), "1 or more");
+    }
+    if !(1..=4).contains(&settings.spatial_layers) {
+        return setting("spatial_layers", settings.spatial_layers.to_string(), "1 to 4");
+    }
+    if let Structure::Predicted { layers } = settings.structure
+        && !(1..=4).contains(&layers)
+    {
+        return setting("temporal layers", layers.to_string(), "1 to 4");
     }
     if !(6..=16).contains(&settings.block_log2) {
         return setting("block_log2", settings.block_log2.to_string(), "6 to 16");
@@ -141,8 +151,11 @@ fn parameters(
     let steps = &settings.steps;
     SequenceParameters {
         sh_degree,
-        spatial_layer_count: 1,
-        temporal_layer_count: 1,
+        spatial_layer_count: settings.spatial_layers,
+        temporal_layer_count: match settings.structure {
+            Structure::Intra => 1,
+            Structure::Predicted { layers } => layers,
+        },
         refinement_count: settings.refinements.len() as u8,
         refinement_percent,
         position_bits,

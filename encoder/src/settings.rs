@@ -1,5 +1,6 @@
 //! What a user asks for: quality, effort, layers.
 
+use splatstream_format::syntax::Profile;
 use splatstream_render::Camera;
 
 /// How much is searched.
@@ -89,6 +90,32 @@ pub enum Importance {
     Volume,
 }
 
+/// What frames refer to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Structure {
+    /// To nothing: every frame is an intra frame.
+    #[default]
+    Intra,
+    /// To earlier frames of the GOP, with this many temporal layers, 1 to 4: 1 is I P P P, 2 is I B P B P, more are
+    /// dyadic.
+    Predicted {
+        /// Temporal layers.
+        layers: u8,
+    },
+}
+
+/// How the predictor of new Gaussians is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PredictorChoice {
+    /// New Gaussians are not predicted.
+    None,
+    /// By estimated bits, for runs of Gaussians, where prediction pays at all.
+    #[default]
+    Bits,
+    /// By the sum of absolute residuals, for each Gaussian: the paper's.
+    Difference,
+}
+
 /// Tools that can be left out, to see what each is worth. Streams are valid with any of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tools {
@@ -103,11 +130,23 @@ pub struct Tools {
     /// Every second point of the lattices only, for the scale, rotation and colour of the last refinement, where the
     /// order goes by what pictures show.
     pub coarse_tail: bool,
+    /// Predicted frames: cells that move what is in them; without it only residuals move Gaussians.
+    pub cell_motion: bool,
+    /// Predicted frames: Gaussians continue those of the reference; without it every Gaussian is new.
+    pub survivors: bool,
 }
 
 impl Default for Tools {
     fn default() -> Self {
-        Self { contexts: true, axis_sort: true, sh_transform: true, table_reuse: true, coarse_tail: true }
+        Self {
+            contexts: true,
+            axis_sort: true,
+            sh_transform: true,
+            table_reuse: true,
+            coarse_tail: true,
+            cell_motion: true,
+            survivors: true,
+        }
     }
 }
 
@@ -122,6 +161,12 @@ pub struct Settings {
     pub psnr: Option<f32>,
     /// Frames in a GOP.
     pub gop: u32,
+    /// What the frames of a GOP refer to.
+    pub structure: Structure,
+    /// Spatial layers, 1 to 4.
+    pub spatial_layers: u8,
+    /// How new Gaussians are predicted, where frames refer to others or there are spatial layers.
+    pub predictors: PredictorChoice,
     /// Refinement percentages, increasing, the last 100; at most 10.
     pub refinements: Vec<u8>,
     /// Highest SH degree kept; none keeps what the scene needs.
@@ -142,6 +187,16 @@ pub struct Settings {
     pub ticks: (u32, u32),
 }
 
+impl Settings {
+    /// The profile that the layers and the structure take.
+    pub(crate) fn profile(&self) -> Profile {
+        match (self.structure, self.spatial_layers) {
+            (Structure::Intra, 1) => Profile::Intra,
+            _ => Profile::Dynamic,
+        }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -149,6 +204,9 @@ impl Default for Settings {
             steps: Quality::default().steps(),
             psnr: None,
             gop: 16,
+            structure: Structure::default(),
+            spatial_layers: 1,
+            predictors: PredictorChoice::default(),
             refinements: vec![10, 20, 30, 50, 100],
             sh_degree: None,
             sh: ShChoice::default(),

@@ -3,6 +3,7 @@
 use crate::allocation;
 use crate::canonical::{canonicalise, visible};
 use crate::colour::{self, ShPlan};
+use crate::dynamic::Dynamic;
 use crate::error::Error;
 use crate::frame::{CodedFrame, UnitPlan, code_frame};
 use crate::importance::Ranking;
@@ -14,12 +15,13 @@ use crate::source::FrameSource;
 use splatstream_decoder::block::UnitParameters;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::layout::{Layout, ShCoding};
+use splatstream_decoder::operating_point::Tally;
 use splatstream_format::payload::{Index, Transform};
 use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, Profile, RefinementHeader,
-    SequenceParameters, ShMode, TransformKind, UnitId, UnitType,
+    EndOfStream, FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, NO_CODEBOOK, Profile,
+    RefinementHeader, SequenceParameters, ShMode, TransformKind, UnitHeader, UnitId, UnitType,
 };
-use splatstream_format::unit::{write_file_header, write_unit};
+use splatstream_format::unit::{Unit, write_file_header, write_unit};
 use splatstream_scene::GaussianFrame;
 use std::io::Write;
 
@@ -57,6 +59,63 @@ pub struct Report {
     pub importance: Option<Importance>,
     /// Reconstruction digest of each frame, all refinements.
     pub digests: Vec<u64>,
+    /// What each frame of a stream of profile Dynamic is made of.
+    pub coded: Vec<FrameReport>,
+}
+
+/// What a frame of profile Dynamic is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameReport {
+    /// How it is coded.
+    pub frame_type: FrameType,
+    /// Bytes of its units, headers included.
+    pub bytes: u64,
+    /// Gaussians of the frame.
+    pub gaussians: u32,
+    /// Cells that move or are stale.
+    pub cells: u32,
+    /// Parents: Gaussians of the reference, or of lower spatial layers.
+    pub parents: u32,
+    /// Parents with a position residual.
+    pub moved: u32,
+    /// Parents with attribute residuals.
+    pub updated: u32,
+    /// Parents that are removed.
+    pub removed: u32,
+    /// Gaussians that are new.
+    pub new: u32,
+    /// New Gaussians by predictor: none, knn, bilateral.
+    pub predicted: [u64; 3],
+}
+
+impl Default for FrameReport {
+    fn default() -> Self {
+        Self {
+            frame_type: FrameType::Intra,
+            bytes: 0,
+            gaussians: 0,
+            cells: 0,
+            parents: 0,
+            moved: 0,
+            updated: 0,
+            removed: 0,
+            new: 0,
+            predicted: [0; 3],
+        }
+    }
+}
+
+impl FrameReport {
+    /// Adds a unit.
+    pub(crate) fn add(&mut self, header: &IncrementHeader, predicted: [u64; 3]) {
+        self.cells += header.cell_count;
+        self.parents += header.parent_count;
+        self.moved += header.move_count;
+        self.updated += header.update_count;
+        self.removed += header.remove_count;
+        self.new += header.new_count;
+        self.predicted.iter_mut().zip(predicted).for_each(|(sum, count)| *sum += count);
+    }
 }
 
 /// Encodes all frames of `source` to `sink`.
@@ -84,10 +143,23 @@ pub fn encode(
         canonical_axes: (sequence.canonical_axes(), analysis.axes_trial),
         ..Report::default()
     };
-    let mut writer = UnitWriter { sink, offset: 0, units: 0 };
-    writer.bytes(&write_file_header(Profile::Intra, analysis.level)?)?;
+    let profile = settings.profile();
+    let mut writer = UnitWriter { sink, offset: 0, units: 0, tally: Tally::new(profile) };
+    writer.bytes(&write_file_header(profile, analysis.level)?)?;
     writer.unit(UnitId::stream(UnitType::SequenceParameters), &sequence.to_bytes()?)?;
     let mut index = Vec::new();
+    if profile == Profile::Dynamic {
+        let (ranking, writer) = (&mut ranking, &mut writer);
+        let report = &mut report;
+        let mut dynamic = Dynamic { source, settings, sequence, ranking, writer, report, index };
+        dynamic.run(progress)?;
+        index = dynamic.index;
+        let points = writer.tally.list().to_bytes()?;
+        writer.unit(UnitId::stream(UnitType::OperatingPoints), &points)?;
+        finish(writer, index, source.len())?;
+        report.bytes = writer.offset;
+        return Ok(core::mem::take(report));
+    }
     for (gop_index, first) in (0..source.len()).step_by(settings.gop as usize).enumerate() {
         let last = source.len().min(first + settings.gop);
         index.push(IndexEntry { frame: first, reserved_zero: 0, offset: writer.offset });
@@ -98,7 +170,12 @@ pub fn encode(
             let prepared = prepare(source, settings, &sequence, number, &mut ranking, &mut report)?;
             if tools.is_none() {
                 let made = GopTools::new(&prepared, &sequence, settings, last - first);
-                made.write(&mut writer, &sequence, first, &mut report)?;
+                for (id, payload) in made.units(&sequence, first)? {
+                    writer.unit(id, &payload)?;
+                }
+                if first == 0 {
+                    made.report(&mut report);
+                }
                 tools = Some(made);
             }
             if let Some(tools) = &mut tools {
@@ -133,13 +210,13 @@ fn fitted(
 }
 
 /// A frame in canonical form, and its Gaussians, most important first.
-struct Prepared {
-    frame: GaussianFrame,
-    order: Vec<u32>,
-    spacing: Spacing,
+pub(crate) struct Prepared {
+    pub(crate) frame: GaussianFrame,
+    pub(crate) order: Vec<u32>,
+    pub(crate) spacing: Spacing,
 }
 
-fn prepare(
+pub(crate) fn prepare(
     source: &mut dyn FrameSource,
     settings: &Settings,
     sequence: &SequenceParameters,
@@ -158,15 +235,15 @@ fn prepare(
 }
 
 /// What the frames of a GOP share.
-struct GopTools {
-    dc: Transform,
-    sh: Option<(Transform, ShPlan)>,
+pub(crate) struct GopTools {
+    pub(crate) dc: Transform,
+    pub(crate) sh: Option<(Transform, ShPlan)>,
     /// SH components of the first frame, which were needed to find the rank.
     first_components: Option<Vec<Vec<i32>>>,
 }
 
 /// The SH planes that the sequence carries; a frame of a lower degree has fewer.
-fn sh_planes<'a>(
+pub(crate) fn sh_planes<'a>(
     frame: &'a GaussianFrame,
     sequence: &SequenceParameters,
     zeros: &'a [f32],
@@ -176,12 +253,17 @@ fn sh_planes<'a>(
         .collect()
 }
 
-fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
+pub(crate) fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
     frame.dc().iter().map(Vec::as_slice).collect()
 }
 
 impl GopTools {
-    fn new(prepared: &Prepared, sequence: &SequenceParameters, settings: &Settings, frames: u32) -> Self {
+    pub(crate) fn new(
+        prepared: &Prepared,
+        sequence: &SequenceParameters,
+        settings: &Settings,
+        frames: u32,
+    ) -> Self {
         let Prepared { frame, spacing, .. } = prepared;
         let dc = Components::of(&dc_planes(frame));
         let dc = colour::transform(TransformKind::Dc, &dc, sequence.dc_step());
@@ -205,30 +287,47 @@ impl GopTools {
         Self { dc, sh, first_components }
     }
 
-    fn write(
+    /// The units that define them, for the GOP that starts with a frame.
+    ///
+    /// # Errors
+    /// A transform or codebook that a decoder would refuse.
+    pub(crate) fn units(
         &self,
-        writer: &mut UnitWriter<'_>,
         sequence: &SequenceParameters,
         frame: u32,
-        report: &mut Report,
-    ) -> Result<(), Error> {
+    ) -> Result<Vec<(UnitId, Vec<u8>)>, Error> {
         let transform_id = UnitId::of_frame(UnitType::Transform, frame);
-        writer.unit(transform_id, &self.dc.to_bytes(sequence)?)?;
-        let Some((transform, plan)) = &self.sh else { return Ok(()) };
-        writer.unit(transform_id, &transform.to_bytes(sequence)?)?;
+        let mut units = vec![(transform_id, self.dc.to_bytes(sequence)?)];
+        let Some((transform, plan)) = &self.sh else { return Ok(units) };
+        units.push((transform_id, transform.to_bytes(sequence)?));
         for codebook in &plan.codebooks {
-            writer.unit(UnitId::of_frame(UnitType::Codebook, frame), &codebook.to_bytes()?)?;
+            units.push((UnitId::of_frame(UnitType::Codebook, frame), codebook.to_bytes()?));
         }
-        if frame == 0 {
+        Ok(units)
+    }
+
+    /// Tells how SH is coded.
+    pub(crate) fn report(&self, report: &mut Report) {
+        if let Some((transform, plan)) = &self.sh {
             report.sh_rank = transform.header.rank;
             report.sh_trial = plan.trial;
             report.sh_codebook_entries =
                 plan.codebooks.first().map_or(0, |book| u32::from(book.header.entry_count_minus1) + 1);
         }
-        Ok(())
     }
 
-    fn sh_coding(&self) -> ShCoding {
+    /// Makes entry 0 of every codebook zero, so that it can stand for "as before".
+    pub(crate) fn keep_zero(&mut self) {
+        if let Some((transform, plan)) = &mut self.sh {
+            let rank = usize::from(transform.header.rank);
+            for book in &mut plan.codebooks {
+                book.entries[..rank].fill(0);
+            }
+        }
+        self.first_components = None;
+    }
+
+    pub(crate) fn sh_coding(&self) -> ShCoding {
         match &self.sh {
             None => ShCoding::None,
             Some((transform, plan)) if plan.codebooks.is_empty() => {
@@ -328,7 +427,7 @@ pub(crate) fn header_of(coding: ShCoding) -> RefinementHeader {
     }
 }
 
-fn finish(writer: &mut UnitWriter<'_>, index: Vec<IndexEntry>, frames: u32) -> Result<(), Error> {
+pub(crate) fn finish(writer: &mut UnitWriter<'_>, index: Vec<IndexEntry>, frames: u32) -> Result<(), Error> {
     let index_offset = writer.offset;
     writer.unit(UnitId::stream(UnitType::Index), &Index { entries: index }.to_bytes()?)?;
     let end = EndOfStream { frame_count: frames, unit_count: writer.units, index_offset };
@@ -336,10 +435,12 @@ fn finish(writer: &mut UnitWriter<'_>, index: Vec<IndexEntry>, frames: u32) -> R
 }
 
 /// Counts bytes and units on their way out.
-struct UnitWriter<'a> {
+pub(crate) struct UnitWriter<'a> {
     sink: &'a mut dyn Write,
-    offset: u64,
+    pub(crate) offset: u64,
     units: u32,
+    /// What the units add to the operating points.
+    pub(crate) tally: Tally,
 }
 
 impl UnitWriter<'_> {
@@ -349,10 +450,12 @@ impl UnitWriter<'_> {
         Ok(())
     }
 
-    fn unit(&mut self, id: UnitId, payload: &[u8]) -> Result<(), Error> {
+    pub(crate) fn unit(&mut self, id: UnitId, payload: &[u8]) -> Result<(), Error> {
         let mut unit = Vec::with_capacity(payload.len() + 20);
         write_unit(&mut unit, id, payload)?;
         self.units += 1;
+        let (header, _) = UnitHeader::parse(&unit, 0, Profile::Dynamic)?;
+        self.tally.unit(&Unit { at: 0, header, payload, payload_at: 0 });
         self.bytes(&unit)
     }
 }

@@ -124,13 +124,16 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
 }
 
 fn left_out(settings: &Settings) -> Option<Choice> {
-    let Tools { contexts, axis_sort, sh_transform, table_reuse, coarse_tail } = settings.tools;
+    let Tools { contexts, axis_sort, sh_transform, table_reuse, coarse_tail, cell_motion, survivors } =
+        settings.tools;
     let tools = [
         (contexts, "contexts"),
         (axis_sort, "axis-sort"),
         (sh_transform, "sh-transform"),
         (table_reuse, "table-reuse"),
         (coarse_tail, "coarse-tail"),
+        (cell_motion, "cell-motion"),
+        (survivors, "survivors"),
     ];
     let names: Vec<&str> = tools.into_iter().filter(|(used, _)| !used).map(|(_, name)| name).collect();
     (!names.is_empty()).then(|| Choice::new("left out", names.join(", "), "--without"))

@@ -88,12 +88,12 @@ pub struct Tally {
 
 impl Tally {
     /// For a stream of a profile.
-    pub(crate) fn new(profile: Profile) -> Self {
+    pub fn new(profile: Profile) -> Self {
         Self { belonging: Some(Belonging::new(profile)), sequence: None, pieces: Vec::new() }
     }
 
     /// Takes note of a unit.
-    pub(crate) fn unit(&mut self, unit: &Unit<'_>) {
+    pub fn unit(&mut self, unit: &Unit<'_>) {
         let Some(belonging) = &mut self.belonging else { return };
         belonging.follow(unit);
         let (payload, at) = (unit.payload, unit.payload_at);

@@ -1,0 +1,156 @@
+//! Predicted frames: what becomes of each Gaussian of the reference.
+
+use super::Target;
+use super::align::{Namings, Pose};
+use crate::settings::Steps;
+use crate::vq;
+use rayon::prelude::*;
+use splatstream_decoder::home::{FINE, Home};
+use splatstream_format::payload::{Codebook, Transform};
+use splatstream_format::syntax::SequenceParameters;
+
+/// Largest difference, in steps, that is left as it is. A Gaussian that moves smoothly keeps the error of its intra
+/// frame, up to half a step; sending each change as soon as it rounds to a step costs three times the bits.
+const LEFT: f32 = 0.75;
+
+/// What becomes of a parent.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Fate {
+    /// The value of its mode.
+    pub(crate) mode: i32,
+    /// Position residual, if the mode has one.
+    pub(crate) moved: [i32; 3],
+    /// Residuals of log-scales, opacity, rotation, dc and sh, if the mode has them.
+    pub(crate) updated: Vec<i32>,
+}
+
+/// Removed: nothing continues it.
+const REMOVED: i32 = 4;
+
+/// What survivors are measured with.
+pub(crate) struct Survivors<'a> {
+    pub(crate) target: &'a Target,
+    pub(crate) sequence: &'a SequenceParameters,
+    pub(crate) steps: &'a Steps,
+    pub(crate) dc: &'a Transform,
+    pub(crate) sh: Option<&'a Transform>,
+    pub(crate) namings: Namings,
+    /// The codebook of SH residuals, if they are vector quantised: the second stage, behind that of whole values.
+    pub(crate) book: Option<&'a Codebook>,
+}
+
+impl Survivors<'_> {
+    /// The fates of the Gaussians of a home, already displaced. `coarse`: pictures hardly show them, their steps are
+    /// twice as large.
+    pub(crate) fn fates(&self, home: &Home, partner: &[Option<u32>], coarse: bool) -> Vec<Fate> {
+        let removed = || Fate { mode: REMOVED, ..Fate::default() };
+        partner
+            .par_iter()
+            .enumerate()
+            .map(|(row, partner)| partner.map_or_else(removed, |place| self.fate(home, row, place, coarse)))
+            .collect()
+    }
+
+    fn fate(&self, home: &Home, row: usize, place: u32, coarse: bool) -> Fate {
+        let place = place as usize;
+        let left = if coarse { 2.0 * LEFT } else { LEFT };
+        let keep = |difference: f32| -> i32 {
+            if difference.abs() <= left { 0 } else { crate::lattice::nearest_integer(difference) }
+        };
+        let fine = |value: i32| value as f32 / FINE as f32;
+        let last = ((1 << self.sequence.position_bits) - 1) * FINE;
+        let moved = [0, 1, 2].map(|axis: usize| {
+            let now = home.position_fine[axis][row];
+            let steps = keep(self.target.position[axis][place] - fine(now));
+            // A fraction of a step is left between the outermost point and the end of the lattice.
+            steps.clamp(-(now / FINE), (last - now) / FINE)
+        });
+        let updated = self.residuals(home, row, place, &keep);
+        let mode = i32::from(moved != [0; 3]) + 2 * i32::from(updated.iter().any(|&value| value != 0));
+        Fate { mode, moved, updated }
+    }
+
+    /// Residuals of the attributes, each 0 where the difference is left.
+    fn residuals(&self, home: &Home, row: usize, place: usize, keep: &impl Fn(f32) -> i32) -> Vec<i32> {
+        let (scale_step, turn_step) = (self.sequence.log_scale_step(), self.sequence.rotation_step());
+        let planes = &home.planes;
+        let now = planes.log_scale.each_ref().map(|plane| plane[row]);
+        let turn = home.rotation_fine.each_ref().map(|plane| plane[row] as f32 / FINE as f32);
+        let pose = self.pose(place, now, turn);
+        let round = now[0] == now[1] && now[1] == now[2];
+        let wanted = [0, 1, 2].map(|axis: usize| {
+            let exact = (pose.log_scale[axis] - self.sequence.log_scale_offset()) / scale_step;
+            now[axis] + keep(exact - now[axis] as f32)
+        });
+        let mut residuals = Vec::with_capacity(10 + planes.sh.len());
+        residuals.extend(super::anchor::scale_residuals(now, wanted, 0));
+        let opacity = (self.target.frame.opacity_logit()[place] - self.sequence.opacity_offset())
+            / self.sequence.opacity_step();
+        residuals.push(keep(opacity - planes.opacity[row] as f32));
+        residuals.extend([0, 1, 2].map(|axis: usize| {
+            if round { 0 } else { keep(pose.rotation[axis + 1] / turn_step - turn[axis]) }
+        }));
+        let dc = |plane: usize| {
+            self.target.frame.dc()[plane][place] / self.sequence.dc_step()
+                - planes.dc[plane][row] as f32 / 64.0
+        };
+        residuals.extend(projected(self.dc, &[dc(0), dc(1), dc(2)]).map(keep));
+        if let Some(transform) = self.sh {
+            let sh = |plane: usize| {
+                let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[place]);
+                wanted / self.sequence.sh_step() - planes.sh[plane][row] as f32 / 64.0
+            };
+            let differences: Vec<f32> = (0..planes.sh.len()).map(sh).collect();
+            match self.book {
+                None => residuals.extend(projected(transform, &differences).map(keep)),
+                Some(book) => {
+                    let components: Vec<f32> = projected(transform, &differences).collect();
+                    residuals.extend([0, vq::nearest_entry(book, &components)]);
+                }
+            }
+        }
+        residuals
+    }
+
+    /// SH residuals as components, of every `stride`-th pair: rows of the transform's rank.
+    pub(crate) fn sh_rows(&self, homes: &[Home], partner: &[Option<u32>], stride: usize) -> Vec<f32> {
+        let Some(transform) = self.sh else { return Vec::new() };
+        let places = homes.iter().flat_map(|home| (0..home.len()).map(move |row| (home, row)));
+        let pairs =
+            places.zip(partner).filter_map(|((home, row), place)| Some((home, row, (*place)? as usize)));
+        let differences = |(home, row, place): (&Home, usize, usize)| -> Vec<f32> {
+            let plane = |(plane, values): (usize, &Vec<i32>)| {
+                let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[place]);
+                wanted / self.sequence.sh_step() - values[row] as f32 / 64.0
+            };
+            home.planes.sh.iter().enumerate().map(plane).collect()
+        };
+        pairs
+            .step_by(stride.max(1))
+            .flat_map(|pair| projected(transform, &differences(pair)).collect::<Vec<_>>())
+            .collect()
+    }
+
+    /// The target written like its reference.
+    fn pose(&self, place: usize, now: [i32; 3], turn: [f32; 3]) -> Pose {
+        let frame = &self.target.frame;
+        let target = Pose {
+            log_scale: frame.log_scale().each_ref().map(|plane| plane[place]),
+            rotation: frame.rotation().each_ref().map(|plane| plane[place]),
+        };
+        let (scale_step, turn_step) = (self.sequence.log_scale_step(), self.sequence.rotation_step());
+        let [x, y, z] = turn.map(|part| part * turn_step);
+        let w = (1.0 - (x * x + y * y + z * z)).max(0.0).sqrt();
+        let log_scale = now.map(|q| self.sequence.log_scale_offset() + scale_step * q as f32);
+        let reference = Pose { log_scale, rotation: [w, x, y, z] };
+        self.namings.nearest(target, reference, (self.steps.log_scale, self.steps.rotation))
+    }
+}
+
+/// Differences in steps as components of a transform.
+fn projected<'t>(transform: &'t Transform, differences: &'t [f32]) -> impl Iterator<Item = f32> + 't {
+    const UNIT: f32 = 4096.0;
+    transform.rows().map(move |row| {
+        row.iter().zip(differences).map(|(&weight, difference)| f32::from(weight) / UNIT * difference).sum()
+    })
+}

@@ -1,0 +1,137 @@
+//! Codes one increment: values chosen elsewhere are applied as a decoder applies them, then entropy coded.
+
+use crate::error::Error;
+use crate::section::{SectionPlan, code_section};
+use splatstream_decoder::colour::Colour;
+use splatstream_decoder::home::Home;
+use splatstream_decoder::increment::residual::AttributeCoding;
+use splatstream_decoder::increment::values::UnitValues;
+use splatstream_decoder::increment::{Applied, Situation, Unit, apply};
+use splatstream_decoder::layout::{Layout, Section, ShCoding};
+use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::payload::{SectionBytes, write_increment};
+use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR, SequenceParameters, ShHeader, ShMode};
+
+/// What the units of a frame have in common.
+#[derive(Clone, Copy)]
+pub(crate) struct UnitCoder<'a> {
+    pub(crate) sequence: &'a SequenceParameters,
+    pub(crate) colour: Colour<'a>,
+    pub(crate) sh: ShHeader,
+    pub(crate) plan: SectionPlan,
+    /// Whether the frame is an intra frame.
+    pub(crate) intra: bool,
+}
+
+/// A unit before it is coded.
+#[derive(Debug, Clone)]
+pub(crate) struct Draft {
+    pub(crate) header: IncrementHeader,
+    pub(crate) values: UnitValues,
+}
+
+impl UnitCoder<'_> {
+    /// A header without counts and digests.
+    pub(crate) fn blank(&self) -> IncrementHeader {
+        IncrementHeader {
+            refinement_digest: 0,
+            carried_digest: 0,
+            parent_count: 0,
+            cell_count: 0,
+            move_count: 0,
+            update_count: 0,
+            remove_count: 0,
+            new_count: 0,
+            position_shift: 0,
+            attribute_shift: [0; 5],
+            cell_log2: 0,
+            predictor_block_log2: NO_PREDICTOR,
+            neighbour_count: 8,
+            bilateral_spatial: 0,
+            bilateral_feature: 0,
+            sh_mode: self.sh.sh_mode,
+            vq_stage_count: self.sh.vq_stage_count,
+            codebook_ids: self.sh.codebook_ids,
+            compensation_log_scale: 0,
+            compensation_opacity: 0,
+        }
+    }
+
+    /// How attributes are coded with some shifts.
+    pub(crate) fn coding(&self, shift: [u8; 5]) -> AttributeCoding<'_> {
+        AttributeCoding {
+            shift,
+            canonical_axes: self.sequence.canonical_axes(),
+            rotation_thresholds: self.sequence.rotation_threshold,
+            colour: self.colour,
+        }
+    }
+
+    /// How a decoder sees a draft.
+    pub(crate) fn unit<'d>(&'d self, draft: &'d Draft) -> Unit<'d> {
+        Unit {
+            header: &draft.header,
+            values: &draft.values,
+            coding: self.coding(draft.header.attribute_shift),
+            sequence: self.sequence,
+            intra: self.intra,
+            at: 0,
+        }
+    }
+
+    /// What a decoder makes of a draft.
+    ///
+    /// # Errors
+    /// What the decoder's own checks refuse.
+    pub(crate) fn apply(
+        &self,
+        draft: &Draft,
+        parents: Home,
+        situation: &Situation<'_>,
+    ) -> Result<Applied, Error> {
+        Ok(apply(&self.unit(draft), parents, situation)?)
+    }
+
+    /// Codes the sections of a draft; `models` become those in force after it.
+    ///
+    /// # Errors
+    /// A value that no token codes.
+    pub(crate) fn sections(
+        &self,
+        draft: &Draft,
+        models: &mut ModelsInForce,
+    ) -> Result<Vec<SectionBytes>, Error> {
+        let code = |section: Section, models: &mut ModelsInForce| {
+            let layout = Layout::of_section(section, self.colour.dc.header.rank, self.colour.mode);
+            code_section(section, &layout, draft.values.section(section), &self.plan, models)
+        };
+        let present = Section::ALL.into_iter().filter(|&section| draft.header.count(section) > 0);
+        present.map(|section| code(section, models)).collect()
+    }
+
+    /// The payload of a unit.
+    ///
+    /// # Errors
+    /// A header that a decoder would refuse.
+    pub(crate) fn payload(
+        &self,
+        header: &IncrementHeader,
+        sections: &[SectionBytes],
+    ) -> Result<Vec<u8>, Error> {
+        Ok(write_increment(header, self.sequence, sections)?)
+    }
+}
+
+/// The elements that say how SH is coded.
+pub(crate) fn sh_header(coding: ShCoding, codebooks: &[u8]) -> ShHeader {
+    let mut codebook_ids = [splatstream_format::syntax::NO_CODEBOOK; 4];
+    for (slot, &id) in codebook_ids.iter_mut().zip(codebooks) {
+        *slot = id;
+    }
+    let (mode, stages) = match coding {
+        ShCoding::None => (ShMode::None, 0),
+        ShCoding::Coefficients { .. } => (ShMode::Coefficients, 0),
+        ShCoding::VectorQuantised { stages } => (ShMode::VectorQuantised, stages),
+    };
+    ShHeader { sh_mode: mode.code(), vq_stage_count: stages, codebook_ids }
+}
