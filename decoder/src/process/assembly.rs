@@ -301,7 +301,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
                 (decoded.refinements, Arc::clone(&reference.state.anchor), fields)
             }
         };
-        let digest = (self.options.verify && !self.digests.is_empty()).then_some(self.last).flatten();
+        let digest = self.last.filter(|_| self.options.verify);
         let mut state = FrameState {
             number: self.frame.number,
             homes: self.homes,
