@@ -33,7 +33,10 @@ pub(crate) fn text(points: &[Complete]) -> String {
         let span = if run.len() > 1 { format!("{} to {}", first.op, last.op) } else { first.op.clone() };
         let label = if place == 0 { "complete" } else { "" };
         let frames = match first.last_frame {
-            Some(last) => format!("{} frames, up to frame {last}", grouped(first.frames.into())),
+            Some(last) => {
+                let plural = if first.frames == 1 { "" } else { "s" };
+                format!("{} frame{plural}, up to frame {last}", grouped(first.frames.into()))
+            }
             None => "no frame".to_owned(),
         };
         text += &format!("  {label:<12} {frames}: {span}\n");

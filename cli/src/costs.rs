@@ -140,8 +140,9 @@ fn attributes(statistics: &Statistics) -> Vec<OfAttribute> {
         if parts.is_empty() && !is_of_gaussian(attribute) {
             continue;
         }
-        let symbols = parts.iter().map(|cost| cost.symbol_bits).sum();
-        let models = parts.iter().map(|cost| cost.model_bits as f64).sum();
+        // The sum of nothing is the negative zero; nobody wants to read that.
+        let symbols = parts.iter().map(|cost| cost.symbol_bits).sum::<f64>() + 0.0;
+        let models = parts.iter().map(|cost| cost.model_bits).sum::<u64>() as f64;
         rows.push(OfAttribute::new(attribute, symbols, models, statistics.gaussians));
     }
     rows

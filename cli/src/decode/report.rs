@@ -91,7 +91,8 @@ impl Shown {
         if types.into_iter().skip(1).all(|name| count(name) == 0) {
             return String::new();
         }
-        let counts: Vec<String> = types.into_iter().map(|name| format!("{} {name}", count(name))).collect();
+        let there = types.into_iter().filter(|name| count(name) > 0);
+        let counts: Vec<String> = there.map(|name| format!("{} {name}", count(name))).collect();
         format!(" ({})", counts.join(", "))
     }
 }
