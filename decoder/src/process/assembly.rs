@@ -29,8 +29,11 @@ pub(super) struct Assembly<'d, 'a> {
     transforms: Transforms<'d>,
     frame: &'d PendingFrame<'a>,
     reference: Option<&'d Reference>,
-    /// The homes of the last layer that is complete.
+    /// The homes of the last layer that has as many as the lowest, and which it is.
     complete: Vec<Home>,
+    complete_layer: u8,
+    /// The homes of the layer below the one in progress, if it has fewer.
+    incomplete: Option<Vec<Home>>,
     /// The homes of the layer in progress, and their digests.
     homes: Vec<Home>,
     digests: Vec<UnitDigest>,
@@ -77,6 +80,8 @@ impl<'d, 'a> Assembly<'d, 'a> {
             frame,
             reference,
             complete: Vec::new(),
+            complete_layer: 0,
+            incomplete: None,
             homes: Vec::new(),
             digests: Vec::new(),
             spatial_layer: 0,
@@ -144,9 +149,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
     /// Applies a unit to its parents and checks what comes out.
     fn unit(&mut self, pending: &PendingIncrement<'a>, values: &UnitValues, predicts: bool) -> Result<()> {
         if pending.spatial_layer != self.spatial_layer && self.is_intra() {
-            self.complete = core::mem::take(&mut self.homes);
-            self.last_complete = self.last.take();
-            self.digests.clear();
+            self.next_layer();
         }
         self.spatial_layer = pending.spatial_layer;
         let header = &pending.increment.header;
@@ -178,12 +181,24 @@ impl<'d, 'a> Assembly<'d, 'a> {
         Ok(())
     }
 
+    /// The layer in progress becomes the one that parents come from. It is shown only if it is complete.
+    fn next_layer(&mut self) {
+        let homes = core::mem::take(&mut self.homes);
+        let last = self.last.take();
+        self.digests.clear();
+        if homes.len() < self.width {
+            self.incomplete = Some(homes);
+        } else {
+            (self.complete, self.complete_layer, self.last_complete) = (homes, self.spatial_layer, last);
+        }
+    }
+
     /// Clause 7.14: the Gaussians that a unit may change, displaced.
     fn parents(&mut self, unit: &Unit<'_>, refinement: usize, predicts: bool) -> Result<Home> {
         let sh_planes = usize::from(self.sequence.sh_dimension());
         let of = |homes: &[Home]| homes.get(refinement).cloned().unwrap_or_else(|| Home::empty(sh_planes));
         let parents = match self.reference {
-            None => of(&self.complete),
+            None => of(self.incomplete.as_ref().unwrap_or(&self.complete)),
             Some(reference) => {
                 if refinement == 0 {
                     self.field = Arc::new(field(unit, rotation_unit(self.sequence.rotation_step))?);
@@ -257,7 +272,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         if self.homes.len() < self.width && self.is_intra() {
             self.homes = core::mem::take(&mut self.complete);
             self.last = self.last_complete.take();
-            self.spatial_layer = self.spatial_layer.wrapping_sub(1);
+            self.spatial_layer = self.complete_layer;
         }
         let decoded = DecodedFrame {
             spatial_layer: self.spatial_layer,
@@ -281,6 +296,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let (planes, exact) = reference.state.shown(sh_planes, self.options.subset);
         decoded.carried = planes.len().wrapping_sub(exact);
         decoded.planes = planes;
+        decoded.compensation = reference.compensation.clone();
         Assembled { decoded, level: 0, state: Arc::clone(&reference.state), fault: None }
     }
 

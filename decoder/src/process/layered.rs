@@ -1,7 +1,7 @@
 //! Frames of profile Dynamic: increments in layers, references, what is carried. Clauses 7.13, 7.18, 7.20.
 
 use super::assembly::Assembly;
-use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, unexpected, unit_bytes};
+use super::{Compensation, DecodedFrame, Decoder, FrameUnits, PendingFrame, unexpected, unit_bytes};
 use crate::frame_state::FrameState;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
@@ -16,6 +16,8 @@ pub(super) struct Reference {
     /// Refinements that frames which refer to this one can have; 0: none can be decoded.
     pub(super) level: u8,
     pub(super) state: Arc<FrameState>,
+    /// What was added where it was shown: a frozen frame shows it again.
+    pub(super) compensation: Compensation,
 }
 
 /// The last frame of each temporal layer.
@@ -170,7 +172,8 @@ impl<'a> Decoder<'a> {
         at: Option<u64>,
     ) -> Result<Option<DecodedFrame>> {
         let Some((decoded, level, state)) = self.decode_layered(frame, layered, at)? else { return Ok(None) };
-        let reference = Reference { number: frame.number, level, state };
+        let compensation = decoded.compensation.clone();
+        let reference = Reference { number: frame.number, level, state, compensation };
         self.references.store(frame.place.temporal_layer, reference);
         Ok(Some(decoded))
     }
@@ -185,16 +188,17 @@ impl<'a> Decoder<'a> {
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return Ok(None) };
         let reference = layered.reference.and_then(|number| self.references.find(number));
         let mut lost = frame.lost;
-        if let (0, None, Some(at)) = (layered.level, lost, at) {
-            let id = layered.reference.unwrap_or(0).into();
-            lost = Some(Error::new(at, "7.20", ErrorKind::Undefined { element: "reference frame", id }));
-        }
         let mut assembly = Assembly::new(self.options, sequence, gop, frame, reference)?;
         if let Err(error) = assembly.units(&layered.units) {
             lost = Some(error);
         }
         let finished = assembly.finish();
         lost = lost.or(finished.fault);
+        // SS-LO-005: a frozen frame that no error of its own explains.
+        if let (0, Some(reference), None, Some(at)) = (finished.level, layered.reference, lost, at) {
+            let kind = ErrorKind::Undefined { element: "reference frame", id: reference.into() };
+            lost = Some(Error::new(at, "7.20", kind));
+        }
         match lost {
             Some(error) if !self.options.tolerant => Err(error),
             _ => Ok(Some((DecodedFrame { lost, ..finished.decoded }, finished.level, finished.state))),
