@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::dynamic::{Whole, decoded_at, predicted, range, scene};
+use common::dynamic::{Whole, decoded_at, predicted, scene, units_of_frames};
 use common::encoded;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::process::DecodedFrame;
@@ -132,13 +132,7 @@ fn the_operating_points_unit_says_what_is_decoded_at_each_point() {
             let exact: usize = frames.iter().map(|frame| frame.planes.len() - frame.carried).sum();
             assert_eq!(entry.gaussian_count, exact as u64, "{what}: {point}");
             let small = extract(&bytes, *point, &limits).unwrap();
-            let counted = |code: u8| (2..=6).contains(&code) || code == 10;
-            let bytes: usize = common::dynamic::units(&small)
-                .iter()
-                .filter(|unit| counted(unit.header.unit_type))
-                .map(|unit| range(unit).len())
-                .sum();
-            assert_eq!(entry.byte_count, bytes as u64, "{what}: {point}");
+            assert_eq!(entry.byte_count, units_of_frames(&small), "{what}: {point}");
         }
     }
 }

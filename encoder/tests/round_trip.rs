@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::dynamic::units_of_frames;
 use common::{builtin, decoded, encoded, frame_of, planes, strict};
 use proptest::prelude::*;
 use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_points};
@@ -87,7 +88,7 @@ proptest! {
         let limits = Limits::default();
         for info in operating_points(&bytes, &limits).unwrap() {
             let small = extract(&bytes, info.point, &limits).unwrap();
-            prop_assert_eq!(small.len() as u64, info.bytes);
+            prop_assert_eq!(units_of_frames(&small), info.bytes);
             prop_assert_eq!(&extract(&small, info.point, &limits).unwrap(), &small);
             let options = Options { operating_point: info.point, ..strict() };
             let (at_point, summary) = decoded(&bytes, &options);

@@ -65,6 +65,13 @@ pub(crate) fn range(unit: &Unit<'_>) -> core::ops::Range<usize> {
     at..at + UnitHeader::SIZE + unit.payload.len()
 }
 
+/// Bytes of the units that operating points choose from: those of GOPs and frames.
+pub(crate) fn units_of_frames(bytes: &[u8]) -> u64 {
+    let counted = |code: u8| (2..=6).contains(&code) || code == UnitType::Increment.code();
+    let counted = units(bytes).into_iter().filter(|unit| counted(unit.header.unit_type));
+    counted.map(|unit| range(&unit).len() as u64).sum()
+}
+
 /// What becomes of a unit on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Arrival {
