@@ -42,9 +42,7 @@ fn three_hundred_predicted_frames_do_not_drift() {
             let what = format!("{layers} layers, frame {}", frame.number);
             assert_close(source, &frame.planes, &whole.sequence, Bounds::PREDICTED, &what);
         }
-        let error = |number: usize| {
-            mean_error(&frames[number], &whole.all()[number].planes, &whole.sequence)
-        };
+        let error = |number: usize| mean_error(&frames[number], &whole.all()[number].planes, &whole.sequence);
         let (first, last) = ((1..11).map(error).sum::<f32>(), (290..300).map(error).sum::<f32>());
         assert!(last < 1.25 * first, "{layers} layers: error of ten frames {first} became {last}");
     }

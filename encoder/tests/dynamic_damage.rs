@@ -52,7 +52,10 @@ fn every_truncation_shows_the_frames_before_it_and_an_advertised_part_of_the_one
             assert_remains(&frames, &expected, &what);
             let (complete, summary) = decoded(&bytes[..length], &strict());
             assert_eq!(summary.end.map(|error| error.class()), Some(Class::Truncated), "{what}");
-            assert!(complete.len() + 1 >= frames.len() && complete == whole.all()[..complete.len()], "{what}");
+            assert!(
+                complete.len() + 1 >= frames.len() && complete == whole.all()[..complete.len()],
+                "{what}"
+            );
         }
     }
 }
@@ -93,7 +96,7 @@ fn random_damages_are_detected_or_harmless() {
         let whole = Whole::new(&bytes);
         let pictures = advertised(&whole);
         let mut random = Random(seed);
-        for round in 0..400 {
+        for round in 0..250 {
             let mut damaged = random.mutated(&bytes);
             if round % 2 == 1 && !damaged.is_empty() {
                 damaged = random.mutated(&damaged);
@@ -111,7 +114,7 @@ fn units_made_wrong_on_purpose_never_panic() {
     for spatial_layers in [1, 2] {
         let bytes = small_stream(spatial_layers);
         let whole = Whole::new(&bytes);
-        for _ in 0..1000 {
+        for _ in 0..500 {
             let damaged = with_right_check_sums(&bytes, &whole, &mut random);
             for verify in [true, false] {
                 for tolerant in [true, false] {

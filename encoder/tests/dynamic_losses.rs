@@ -127,7 +127,8 @@ fn with_compensation(bytes: &[u8], values: [i8; 2]) -> Vec<u8> {
         let at = range.start + UnitHeader::SIZE + table.offset("compensation_log_scale");
         out[at..at + 2].copy_from_slice(&values.map(i8::cast_unsigned));
         let header = UnitHeader::new(unit.header.id(), &out[range.start + UnitHeader::SIZE..range.end]);
-        out[range.start..range.start + UnitHeader::SIZE].copy_from_slice(&header.unwrap().to_bytes().unwrap());
+        out[range.start..range.start + UnitHeader::SIZE]
+            .copy_from_slice(&header.unwrap().to_bytes().unwrap());
     }
     out
 }
@@ -152,7 +153,9 @@ fn a_strict_decoder_stops_where_a_tolerant_one_reports_the_first_loss() {
 
 #[test]
 fn decoding_starts_at_any_gop_header() {
-    for structure in [Structure::Intra, Structure::Predicted { layers: 1 }, Structure::Predicted { layers: 3 }] {
+    for structure in
+        [Structure::Intra, Structure::Predicted { layers: 1 }, Structure::Predicted { layers: 3 }]
+    {
         let settings = Settings { structure, gop: 3, spatial_layers: 2, ..predicted(1) };
         let (bytes, _) = encoded(scene(120, 8, 0, Tracking::Tracked), &settings);
         let whole = Whole::new(&bytes);

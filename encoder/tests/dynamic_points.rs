@@ -18,8 +18,14 @@ use splatstream_scene::builtin::Tracking;
 fn streams() -> Vec<(String, Vec<u8>)> {
     let intra = Structure::Intra;
     let temporal = |layers| Structure::Predicted { layers };
-    let structures =
-        [(1, temporal(1)), (1, temporal(2)), (2, temporal(3)), (3, intra), (4, temporal(4)), (2, temporal(1))];
+    let structures = [
+        (1, temporal(1)),
+        (1, temporal(2)),
+        (2, temporal(3)),
+        (3, intra),
+        (4, temporal(4)),
+        (2, temporal(1)),
+    ];
     let encode = |(spatial_layers, structure): (u8, Structure)| {
         let settings = Settings { gop: 5, spatial_layers, structure, ..predicted(1) };
         let frames = scene(120, 7, 1, Tracking::Untracked);
@@ -122,7 +128,8 @@ fn the_operating_points_unit_says_what_is_decoded_at_each_point() {
     let limits = Limits::default();
     for (what, bytes) in streams() {
         let whole = Whole::new(&bytes);
-        let of_type = |kind: UnitType| whole.units.iter().find(|unit| unit.header.unit_type() == kind).unwrap();
+        let of_type =
+            |kind: UnitType| whole.units.iter().find(|unit| unit.header.unit_type() == kind).unwrap();
         let unit = of_type(UnitType::OperatingPoints);
         let list = OperatingPoints::parse(unit.payload, unit.payload_at).unwrap();
         assert_eq!(list.entries.len(), whole.points.len(), "{what}");

@@ -46,7 +46,8 @@ fn still(gaussians: u32, sh_degree: u8) -> GaussianFrame {
 #[test]
 fn an_empty_frame_is_shown_empty_and_others_are_not() {
     let (full, empty) = (still(100, 1), still(100, 1).select(&[]));
-    for order in [vec![&full, &empty, &full, &full], vec![&empty, &empty, &full], vec![&full, &full, &empty]] {
+    for order in [vec![&full, &empty, &full, &full], vec![&empty, &empty, &full], vec![&full, &full, &empty]]
+    {
         let frames: Vec<GaussianFrame> = order.into_iter().cloned().collect();
         close(&frames, "an empty frame");
     }
@@ -94,9 +95,7 @@ fn one_point_that_moves_across_the_lattice_is_found_again() {
 #[ignore = "a translation of a cell above 8191 steps makes a stream that no decoder accepts"]
 fn a_scene_that_jumps_further_than_its_size_is_found_again() {
     let frame = still(300, 0);
-    let at = |t: f32| {
-        changed(&frame, |planes| planes.position[0].iter_mut().for_each(|x| *x += 15.0 * t))
-    };
+    let at = |t: f32| changed(&frame, |planes| planes.position[0].iter_mut().for_each(|x| *x += 15.0 * t));
     let tools = Tools { coarse_tail: false, ..Tools::default() };
     let settings = Settings { steps: Quality::High.steps(), tools, ..predicted(1) };
     close_with(&[at(0.0), at(1.0), at(0.0)], &settings, "a jump");
@@ -269,7 +268,11 @@ fn percentages_of_counts_that_they_do_not_divide_round_up() {
         for (refinement, percent) in (0..).zip(refinements) {
             for frame in &whole.at(0, 0, refinement)[1..] {
                 let exact = frame.planes.len() - frame.carried;
-                assert_eq!(exact, (usize::from(percent) * count as usize).div_ceil(100), "{count} Gaussians, {percent} %");
+                assert_eq!(
+                    exact,
+                    (usize::from(percent) * count as usize).div_ceil(100),
+                    "{count} Gaussians, {percent} %"
+                );
             }
         }
     }

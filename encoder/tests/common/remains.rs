@@ -18,7 +18,11 @@ pub(crate) struct Remains {
 }
 
 /// What is left of every frame whose frame_header arrives. `cut`: the data ends behind what arrives.
-pub(crate) fn remains(whole: &Whole<'_>, arrival: impl Fn(&UnitHeader) -> Arrival, cut: bool) -> Vec<Remains> {
+pub(crate) fn remains(
+    whole: &Whole<'_>,
+    arrival: impl Fn(&UnitHeader) -> Arrival,
+    cut: bool,
+) -> Vec<Remains> {
     let mut frames: Vec<Remains> = Vec::new();
     for number in whole.all().iter().map(|frame| frame.number) {
         let of_frame = |unit_type: UnitType| {
@@ -49,7 +53,10 @@ pub(crate) fn remains(whole: &Whole<'_>, arrival: impl Fn(&UnitHeader) -> Arriva
 }
 
 /// Decodes the units of a frame in order: those decoded, and whether an error is found.
-fn decode(units: &[(UnitHeader, Arrival)], follows: impl Fn(&[(u8, u8)], (u8, u8)) -> bool) -> (Vec<(u8, u8)>, bool) {
+fn decode(
+    units: &[(UnitHeader, Arrival)],
+    follows: impl Fn(&[(u8, u8)], (u8, u8)) -> bool,
+) -> (Vec<(u8, u8)>, bool) {
     let mut done: Vec<(u8, u8)> = Vec::new();
     for (header, arrival) in units {
         let unit = (header.spatial_layer, header.refinement);
@@ -93,7 +100,12 @@ fn intra_at(whole: &Whole<'_>, number: u32, layer: u8, refinement: u8) -> Quanti
     shown(whole, number, layer, refinement)
 }
 
-fn predicted(whole: &Whole<'_>, number: u32, units: &[(UnitHeader, Arrival)], reference: Option<&Remains>) -> Remains {
+fn predicted(
+    whole: &Whole<'_>,
+    number: u32,
+    units: &[(UnitHeader, Arrival)],
+    reference: Option<&Remains>,
+) -> Remains {
     let level = reference.map_or(0, |reference| reference.level);
     let looked_at: Vec<_> = units.iter().copied().filter(|(header, _)| header.refinement < level).collect();
     let (done, own) =
