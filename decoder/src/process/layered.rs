@@ -1,7 +1,7 @@
 //! Frames of profile Dynamic: increments in layers, references, what is carried. Clauses 7.13, 7.18, 7.20.
 
 use super::assembly::Assembly;
-use super::{Compensation, DecodedFrame, Decoder, FrameUnits, PendingFrame, unexpected, unit_bytes};
+use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, unexpected, unit_bytes};
 use crate::frame_state::FrameState;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
@@ -16,8 +16,6 @@ pub(super) struct Reference {
     /// Refinements that frames which refer to this one can have; 0: none can be decoded.
     pub(super) level: u8,
     pub(super) state: Arc<FrameState>,
-    /// What was added where it was shown: a frozen frame shows it again.
-    pub(super) compensation: Compensation,
 }
 
 /// The last frame of each temporal layer.
@@ -172,8 +170,7 @@ impl<'a> Decoder<'a> {
         at: Option<u64>,
     ) -> Result<Option<DecodedFrame>> {
         let Some((decoded, level, state)) = self.decode_layered(frame, layered, at)? else { return Ok(None) };
-        let compensation = decoded.compensation.clone();
-        let reference = Reference { number: frame.number, level, state, compensation };
+        let reference = Reference { number: frame.number, level, state };
         self.references.store(frame.place.temporal_layer, reference);
         Ok(Some(decoded))
     }
