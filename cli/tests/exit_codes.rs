@@ -125,7 +125,7 @@ fn invalid_is_11() {
 #[test]
 fn unsupported_is_12() {
     let said = verdict(12, |bytes| {
-        bytes[10] = 1;
+        bytes[10] = 2;
         let crc = crc32fast::hash(&bytes[..12]);
         bytes[12..16].copy_from_slice(&crc.to_le_bytes());
     });

@@ -12,6 +12,8 @@ use std::sync::Arc;
 /// A frame as later ones refer to it.
 #[derive(Debug, Clone)]
 pub struct FrameState {
+    /// Its display index.
+    pub number: u32,
     /// The homes, from 0 on, as far as they were decoded.
     pub homes: Vec<Home>,
     /// The homes of the intra frame of the GOP.
@@ -20,6 +22,8 @@ pub struct FrameState {
     pub fields: Vec<Arc<CellField>>,
     /// What is carried of each home, where it has been shown.
     pub carried: Vec<Option<Home>>,
+    /// What was added before output.
+    pub compensation: Compensation,
     /// The plane models in force for unit 0 of a frame that refers to this one.
     pub models: ModelsInForce,
 }

@@ -3,7 +3,7 @@
 mod tally;
 
 pub(crate) use tally::Belonging;
-pub use tally::{OperatingPointInfo, Tally, operating_points};
+pub use tally::{OperatingPointInfo, Tally, all_points, operating_points};
 
 use core::fmt;
 use core::str::FromStr;

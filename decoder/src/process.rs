@@ -55,6 +55,8 @@ pub struct DecodedFrame {
     pub spatial_layer: u8,
     /// Gaussians at the end of `planes` that are carried over from the intra frame (7.18).
     pub carried: usize,
+    /// The frame that is shown in place of this one, of which nothing could be decoded (7.20.3).
+    pub frozen: Option<u32>,
     /// Digest of the decoded planes, clause 7.9; none if it was not asked for, or nothing was decoded.
     pub digest: Option<u64>,
     /// Digest of the carried planes, clause 7.18, under the same conditions.
@@ -88,6 +90,7 @@ impl DecodedFrame {
             refinements: 0,
             spatial_layer: 0,
             carried: 0,
+            frozen: None,
             digest: None,
             carried_digest: None,
             compensation: Compensation::default(),
@@ -221,8 +224,7 @@ impl<'a> Decoder<'a> {
             self.units = self.units.wrapping_add(1);
             return Ok(None);
         }
-        // In profile Intra a unit that is passed over still has to stand in its place.
-        if self.profile == Profile::Dynamic && !self.belongs(header) {
+        if self.is_passed_over(header) {
             self.pass_over(header);
             return Ok(None);
         }
@@ -271,24 +273,38 @@ impl<'a> Decoder<'a> {
         if self.profile == Profile::Intra {
             return self.options.operating_point.takes(header);
         }
-        let predicted = self.gop.as_ref().is_some_and(|gop| gop.header.is_predicted());
-        let is_anchor = |frame: &PendingFrame<'_>| {
-            predicted && frame.place.reference.is_none() && frame.number == header.frame
-        };
+        let is_anchor = |gop: &Gop| gop.header.is_predicted() && gop.first_frame == header.frame;
         let layers = self.sequence().map_or(1, |sequence| sequence.spatial_layer_count);
-        let anchor = self.frame.as_ref().is_some_and(is_anchor).then_some(layers);
+        let anchor = self.gop.as_ref().is_some_and(is_anchor).then_some(layers);
         self.options.operating_point.takes_of(header, anchor)
     }
 
-    /// Counts a unit that does not belong to the operating point.
+    /// 7.13.2: whether a unit is passed over before its payload and its place are looked at. In profile Intra a unit
+    /// that does not belong to the operating point still has to stand in its place.
+    fn is_passed_over(&self, header: &UnitHeader) -> bool {
+        let layered =
+            matches!(header.unit_type(), UnitType::FrameHeader | UnitType::Codebook | UnitType::Increment);
+        let in_gops = self.gop.is_some() && !self.listed && self.index_offset.is_none() && !self.ended;
+        self.profile == Profile::Dynamic && layered && in_gops && !self.belongs(header)
+    }
+
+    /// Counts a unit of profile Dynamic that does not belong to the operating point.
     fn pass_over(&mut self, header: &UnitHeader) {
         self.units = self.units.wrapping_add(1);
         let headers = u32::from(header.unit_type() == UnitType::FrameHeader);
         self.frame_headers = self.frame_headers.wrapping_add(headers);
-        let own = self.profile == Profile::Intra;
-        if let Some(frame) = self.frame.as_mut().filter(|frame| own || frame.number == header.frame) {
-            frame.has_unit |= header.unit_type().has_refinement();
+        if let Some(frame) = self.frame.as_mut().filter(|frame| frame.number == header.frame) {
+            frame.has_unit |= header.unit_type() == UnitType::Increment;
         }
+    }
+
+    /// Whether units of a type make up the frames of the profile.
+    fn is_of_frame(&self, unit_type: UnitType) -> bool {
+        unit_type
+            == match self.profile {
+                Profile::Intra => UnitType::Refinement,
+                Profile::Dynamic => UnitType::Increment,
+            }
     }
 
     /// Takes note of a unit whose payload is damaged.
@@ -296,15 +312,16 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// The damage itself, unless the decoder is tolerant and the unit is a refinement.
     pub fn damaged(&mut self, header: &UnitHeader, error: Error) -> Result<()> {
-        if !self.belongs(header) {
+        if self.is_passed_over(header) {
             self.pass_over(header);
             return Ok(());
         }
         self.units = self.units.wrapping_add(1);
+        let (takes, of_frame) = (self.belongs(header), self.is_of_frame(header.unit_type()));
         match &mut self.frame {
-            Some(frame) if header.unit_type().has_refinement() => {
+            Some(frame) if of_frame => {
                 frame.has_unit = true;
-                if frame.lost.is_some() || frame.is_beyond(header) {
+                if !takes || frame.lost.is_some() || frame.is_beyond(header) {
                     return Ok(());
                 }
                 frame.lost = Some(error);
@@ -464,16 +481,11 @@ impl<'a> Decoder<'a> {
     fn check_stand(&self, unit: &Unit<'a>) -> Result<()> {
         let (Some(frame), Some((sequence, _))) = (&self.frame, &self.sequence) else { return Ok(()) };
         self.check_layers(unit)?;
-        same(frame_at(unit), "7.1", "frame", unit.header.frame, frame.number)?;
+        let clause = if self.profile == Profile::Intra { "6.9" } else { "7.1" };
+        same(frame_at(unit), clause, "frame", unit.header.frame, frame.number)?;
         let at = |element| element_at(&UnitHeader::TABLE, unit.at, element);
-        let place = &frame.place;
-        same(
-            at("temporal_layer"),
-            "7.13",
-            "temporal_layer",
-            unit.header.temporal_layer,
-            place.temporal_layer,
-        )?;
+        let (place, layer) = (&frame.place, unit.header.temporal_layer);
+        same(at("temporal_layer"), "7.13", "temporal_layer", layer, place.temporal_layer)?;
         if place.reference.is_some() {
             let top = sequence.spatial_layer_count.wrapping_sub(1);
             same(at("spatial_layer"), "7.13", "spatial_layer", unit.header.spatial_layer, top)?;

@@ -25,19 +25,44 @@ pub fn decode_stream(
     mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
     let mut summary = Summary::default();
-    summary.end = run(bytes, options, &mut summary.frames, &mut on_frame).err();
+    summary.end = run(bytes, options, None, &mut summary.frames, &mut on_frame).err();
+    summary
+}
+
+/// The same from the group on whose header stands at the absolute offset `gop`, as an index gives it (B.3).
+///
+/// What stands before it is not looked at, but for the first unit if that is the sequence parameters.
+pub fn decode_stream_inside(
+    bytes: &[u8],
+    gop: u64,
+    options: &Options,
+    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+) -> Summary {
+    let mut summary = Summary::default();
+    summary.end = run(bytes, options, Some(gop), &mut summary.frames, &mut on_frame).err();
     summary
 }
 
 fn run(
     bytes: &[u8],
     options: &Options,
+    gop: Option<u64>,
     frames: &mut u32,
     on_frame: &mut impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Result<()> {
     let stream = Stream::open(bytes, &options.limits)?;
-    let mut decoder = Decoder::new(stream.header(), *options);
     let mut units = stream.units();
+    let mut decoder = match gop {
+        None => Decoder::new(stream.header(), *options),
+        Some(gop) => {
+            let mut decoder = Decoder::starting_inside(stream.header(), *options);
+            if let Some(first) = units.next() {
+                decoder.unit(&first?)?;
+            }
+            units = stream.units_from(gop);
+            decoder
+        }
+    };
     let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame)
     {
         (Some(sequence), Some(frame)) => {

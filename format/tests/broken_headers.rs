@@ -31,7 +31,7 @@ fn the_sample_is_accepted() {
 #[test]
 fn a_broken_file_header_is_refused() {
     let seal = |bytes: &mut Vec<u8>| sample::seal_file_header(bytes);
-    let cases: [(bool, Case); 9] = [
+    let cases: [(bool, Case); 10] = [
         (true, case(0, |b| b[0] = 0x88, "SIGNATURE", "5.2", 0)),
         // What a text-mode transfer makes of it.
         (true, case(0, |b| b.retain(|byte| *byte != 0x0D), "SIGNATURE", "5.2", 0)),
@@ -40,7 +40,9 @@ fn a_broken_file_header_is_refused() {
         (false, case(0, |b| b[8] = 2, "CHECK_SUM", "5.2", 12)),
         (true, case(0, |b| b[8] = 2, "RESERVED", "6.2", 8)),
         (true, case(0, |b| put(b, 8, [0, 0, 1, 9]), "RESERVED", "6.2", 8)),
-        (true, case(0, |b| put(b, 10, [1, 9]), "RESERVED", "6.2", 10)),
+        (true, case(0, |b| put(b, 10, [2, 9]), "RESERVED", "6.2", 10)),
+        // Profile 1 is known, so that the level is looked at.
+        (true, case(0, |b| put(b, 10, [1, 9]), "RESERVED", "6.2", 11)),
         (true, case(0, |b| b[11] = 0, "RESERVED", "6.2", 11)),
         (true, case(0, |b| b[11] = 5, "RESERVED", "6.2", 11)),
     ];

@@ -178,7 +178,7 @@ fn a_payload_that_is_too_long_or_too_short_is_refused() {
     // The last element of each payload: its name is in the error, its first byte is the offset.
     let last = [
         (SEQUENCE, "5.4", 72),
-        (GOP, "5.5", 9),
+        (GOP, "5.5", 10),
         (DC, "5.7", 16),
         (SH, "5.7", 40),
         (CODEBOOK, "5.8", 5),

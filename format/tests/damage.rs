@@ -140,7 +140,10 @@ fn a_unit_that_a_reader_refuses_is_not_written() {
         UnitId::stream(UnitType::User(1)),
         UnitId::of_frame(UnitType::End, 1),
         UnitId::of_refinement(0, 10),
-        UnitId { spatial_layer: 1, ..UnitId::of_frame(UnitType::FrameHeader, 0) },
+        UnitId { spatial_layer: 4, ..UnitId::of_frame(UnitType::FrameHeader, 0) },
+        UnitId { temporal_layer: 4, ..UnitId::of_frame(UnitType::Increment, 0) },
+        UnitId { spatial_layer: 1, ..UnitId::of_frame(UnitType::Codebook, 0) },
+        UnitId { temporal_layer: 1, ..UnitId::of_frame(UnitType::GopHeader, 0) },
         UnitId { refinement: 1, ..UnitId::of_frame(UnitType::FrameHeader, 0) },
     ] {
         assert!(write_unit(&mut out, id, &[]).is_err(), "{id:?}");

@@ -9,7 +9,9 @@ use deku::{DekuContainerRead, DekuContainerWrite};
 use proptest::prelude::{ProptestConfig, any};
 use proptest::{collection::vec, prop_assert, prop_assert_eq, proptest};
 use splatstream_format::arbitrary_stream::{self as random, ArbitraryStream};
-use splatstream_format::payload::{Codebook, Index, Refinement, Transform, leb128, write_leb128};
+use splatstream_format::payload::{
+    Codebook, Increment, Index, OperatingPoints, Refinement, Transform, leb128, write_leb128,
+};
 use splatstream_format::syntax::{
     CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, Profile,
     SequenceParameters, TransformKind, UnitHeader, UnitType,
@@ -53,9 +55,9 @@ fn near(seed: &[u8]) -> Vec<u8> {
 reading_and_writing_refuse_alike! {
     file_headers FileHeader(|raw: &[u8]| FileHeader::parse(raw).map(|(record, _)| record));
     unit_headers UnitHeader(|raw: &[u8]| UnitHeader::parse(raw, 0, Profile::Dynamic).map(|(record, _)| record));
-    sequence_parameters SequenceParameters(|raw: &[u8]| SequenceParameters::parse_payload(raw, 0, Profile::Intra));
-    gop_headers GopHeader(|raw: &[u8]| GopHeader::parse_payload(raw, 0, Profile::Intra));
-    frame_headers FrameHeader(|raw: &[u8]| FrameHeader::parse_payload(raw, 0, Profile::Intra));
+    sequence_parameters SequenceParameters(|raw: &[u8]| SequenceParameters::parse_payload(raw, 0, Profile::Dynamic));
+    gop_headers GopHeader(|raw: &[u8]| GopHeader::parse_payload(raw, 0, Profile::Dynamic));
+    frame_headers FrameHeader(|raw: &[u8]| FrameHeader::parse_payload(raw, 0, Profile::Dynamic));
     codebook_headers CodebookHeader(|raw: &[u8]| CodebookHeader::parse_payload(raw, 0));
     index_headers IndexHeader(|raw: &[u8]| IndexHeader::parse_payload(raw, 0));
     index_entries IndexEntry(|raw: &[u8]| IndexEntry::parse_payload(raw, 0));
@@ -150,7 +152,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_without_a_panic(bytes in vec(any::<u8>(), 0..400), unit_type in 1_u8..10) {
+    fn any_bytes_are_read_without_a_panic(bytes in vec(any::<u8>(), 0..400), unit_type in 1_u8..=11) {
         inspect(&bytes, &Limits::default(), &mut |_| ());
         let sequence = sample::sequence();
         let limits = Limits::default();
@@ -158,10 +160,12 @@ proptest! {
         let _ = Codebook::parse(&bytes, 0, &limits);
         let _ = Refinement::parse(&bytes, u64::MAX, &sequence, &limits);
         let _ = Index::parse(&bytes, u64::MAX);
+        let _ = Increment::parse(&bytes, u64::MAX, &sequence, &limits);
+        let _ = OperatingPoints::parse(&bytes, u64::MAX);
         // Behind a good beginning.
         let mut units = sample::units();
         let id = splatstream_format::syntax::UnitId::stream(UnitType::from_code(unit_type));
-        if unit_type < 9 {
+        if unit_type != 9 {
             units.insert(6, (id, bytes));
             inspect(&sample::stream(&units), &limits, &mut |_| ());
         }
@@ -175,11 +179,11 @@ fn every_code_of_a_unit_is_one_type() {
         assert_eq!(unit_type.code(), code);
         let name = match code {
             0 => "forbidden",
-            1..=8 => unit_type.name(),
-            9..=127 => "reserved",
+            1..=8 | 10..=11 => unit_type.name(),
+            9 | 12..=127 => "reserved",
             128.. => "user",
         };
-        assert_eq!((unit_type.name(), unit_type.is_known()), (name, (1..=8).contains(&code)));
+        assert_eq!((unit_type.name(), unit_type.is_known()), (name, matches!(code, 1..=8 | 10..=11)));
     }
 }
 

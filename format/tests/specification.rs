@@ -83,7 +83,7 @@ fn rows_and_sizes_agree() {
         ("index", 4),
         ("index_entry", 16),
         ("end", 16),
-        ("increment", 62),
+        ("increment", 59),
         ("operating_points", 4),
         ("operating_point", 24),
     ];

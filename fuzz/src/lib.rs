@@ -16,8 +16,13 @@ pub mod units;
 use splatstream_format::Limits;
 
 /// Small, so that an input which keeps within them is cheap.
-pub const LIMITS: Limits =
-    Limits { max_gaussians: 1 << 12, max_payload: 1 << 18, max_units: 1 << 9, max_codebook_values: 1 << 16 };
+pub const LIMITS: Limits = Limits {
+    max_gaussians: 1 << 12,
+    max_payload: 1 << 18,
+    max_units: 1 << 9,
+    max_codebook_values: 1 << 16,
+    max_cells: 1 << 12,
+};
 
 /// Runs a target on the files named as arguments of the program.
 ///

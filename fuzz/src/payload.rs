@@ -76,7 +76,10 @@ fn comes_back(stream: &ArbitraryStream) {
     let units: Vec<Unit<'_>> = opened.units().collect::<Result<_, _>>().expect("units lie back to back");
     let mut units = Payloads { units: units.iter() };
     let sequence = units.next(UnitType::SequenceParameters);
-    assert_eq!(SequenceParameters::parse_payload(sequence.payload, sequence.payload_at, Profile::Intra), Ok(stream.sequence));
+    assert_eq!(
+        SequenceParameters::parse_payload(sequence.payload, sequence.payload_at, Profile::Intra),
+        Ok(stream.sequence)
+    );
     stream.gops.iter().for_each(|gop| units.gop(gop, &stream.sequence));
     if stream.has_index {
         let index = units.next(UnitType::Index);

@@ -123,18 +123,7 @@ impl Tally {
 
     /// Every operating point of the sequence, lowest first.
     pub fn points(&self) -> Vec<OperatingPoint> {
-        let Some(sequence) = &self.sequence else { return Vec::new() };
-        let mut points = Vec::new();
-        for spatial in 0..sequence.spatial_layer_count {
-            // Below the highest spatial layer there are no predicted frames.
-            let has_all = spatial.saturating_add(1) == sequence.spatial_layer_count;
-            for temporal in 0..if has_all { sequence.temporal_layer_count } else { 1 } {
-                for refinement in 0..sequence.refinement_count {
-                    points.push(OperatingPoint { spatial, temporal, refinement });
-                }
-            }
-        }
-        points
+        self.sequence.as_ref().map(all_points).unwrap_or_default()
     }
 
     /// What a point costs and shows.
@@ -220,6 +209,21 @@ impl Tally {
         }
         Ok(())
     }
+}
+
+/// Every operating point of a sequence, lowest first.
+pub fn all_points(sequence: &SequenceParameters) -> Vec<OperatingPoint> {
+    let mut points = Vec::new();
+    for spatial in 0..sequence.spatial_layer_count {
+        // Below the highest spatial layer there are no predicted frames.
+        let has_all = spatial.saturating_add(1) == sequence.spatial_layer_count;
+        for temporal in 0..if has_all { sequence.temporal_layer_count } else { 1 } {
+            for refinement in 0..sequence.refinement_count {
+                points.push(OperatingPoint { spatial, temporal, refinement });
+            }
+        }
+    }
+    points
 }
 
 fn size(bytes: usize) -> u64 {

@@ -1,7 +1,7 @@
 //! One frame of profile Dynamic, unit by unit: clauses 7.13, 7.14 and 7.18.
 
 use super::layered::{PendingIncrement, Reference};
-use super::{DecodedFrame, Options, PendingFrame, element_at};
+use super::{Compensation, DecodedFrame, Options, PendingFrame, element_at};
 use crate::digest::{UnitDigest, frame_digest, unit_digest};
 use crate::displacement::{CellField, rotation_unit};
 use crate::frame::QuantizedFrame;
@@ -281,6 +281,8 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let (planes, exact) = reference.state.shown(sh_planes, self.options.subset);
         decoded.carried = planes.len().wrapping_sub(exact);
         decoded.planes = planes;
+        decoded.frozen = Some(reference.state.number);
+        decoded.compensation = reference.state.compensation.clone();
         Assembled { decoded, level: 0, state: Arc::clone(&reference.state), fault: None }
     }
 
@@ -300,8 +302,15 @@ impl<'d, 'a> Assembly<'d, 'a> {
             }
         };
         let digest = (self.options.verify && !self.digests.is_empty()).then_some(self.last).flatten();
-        let mut state =
-            FrameState { homes: self.homes, anchor, fields, carried: Vec::new(), models: self.first_models };
+        let mut state = FrameState {
+            number: self.frame.number,
+            homes: self.homes,
+            anchor,
+            fields,
+            carried: Vec::new(),
+            compensation: Compensation::default(),
+            models: self.first_models,
+        };
         let mut fault = None;
         if let (Some(reference), false) = (self.reference, self.options.subset) {
             state.carry_from(&reference.state, refinements);
@@ -316,11 +325,12 @@ impl<'d, 'a> Assembly<'d, 'a> {
                 fault = Some(Error::new(at, "7.18", ErrorKind::Digest { stored, computed }));
             }
         }
-        decoded.compensation = self
+        state.compensation = self
             .last
             .filter(|_| usize::from(decoded.refinements) < refinements)
             .map(|(header, _)| state.compensation(&header, self.options.subset || self.reference.is_none()))
             .unwrap_or_default();
+        decoded.compensation = state.compensation.clone();
         let (planes, exact) = state.shown(usize::from(self.sequence.sh_dimension()), self.options.subset);
         decoded.carried = planes.len().wrapping_sub(exact);
         decoded.planes = planes;

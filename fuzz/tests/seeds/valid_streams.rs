@@ -77,7 +77,8 @@ fn model_section(bytes: &[u8]) -> Vec<u8> {
     let units: Vec<_> = Stream::open(bytes, &limits).unwrap().units().map(Result::unwrap).collect();
     let of_type = |unit_type| units.iter().filter(move |unit| unit.header.unit_type() == unit_type);
     let first = of_type(UnitType::SequenceParameters).next().unwrap();
-    let sequence = SequenceParameters::parse_payload(first.payload, first.payload_at, Profile::Intra).unwrap();
+    let sequence =
+        SequenceParameters::parse_payload(first.payload, first.payload_at, Profile::Intra).unwrap();
     let ranks: Vec<u8> = of_type(UnitType::Transform)
         .map(|unit| Transform::parse(unit.payload, unit.payload_at, &sequence).unwrap().header.rank)
         .collect();
@@ -85,7 +86,7 @@ fn model_section(bytes: &[u8]) -> Vec<u8> {
     let refinement = Refinement::parse(unit.payload, unit.payload_at, &sequence, &limits).unwrap();
     let header = &refinement.header;
     // As `splatstream_fuzz::payload` takes them apart.
-    let sh = match header.mode() {
+    let sh = match header.sh().mode() {
         Some(ShMode::VectorQuantised) => header.vq_stage_count + 2,
         _ => ranks.get(1).map_or(0, |rank| rank - 1),
     };
