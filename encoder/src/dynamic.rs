@@ -15,7 +15,7 @@ use crate::importance::Ranking;
 use crate::lattice::geometry;
 use crate::matching::{Cloud, Matching, Measure, shares_little};
 use crate::section::SectionPlan;
-use crate::settings::{Settings, ShChoice, Structure};
+use crate::settings::{Importance, Settings, ShChoice, Structure};
 use crate::source::FrameSource;
 use crate::stream::{FrameReport, GopTools, Prepared, Progress, Report, UnitWriter, sh_planes};
 use crate::vq;
@@ -273,7 +273,8 @@ impl Dynamic<'_, '_> {
         };
         let book = self.residual_book(gop, &survivors, reference, &matching, place.temporal_layer);
         survivors.book = book.as_ref();
-        let predicted = Predicted {
+        let by_pictures = self.ranking.importance() != Importance::Volume;
+        let mut predicted = Predicted {
             coder: self.coder(gop, Some(book.as_ref())),
             reference,
             target,
@@ -281,6 +282,7 @@ impl Dynamic<'_, '_> {
             survivors,
             measure,
             tools: self.settings.tools,
+            coarse_tail: self.settings.tools.coarse_tail && by_pictures,
             number,
         };
         let (units, coded) = predicted.code(Chooser(self.settings.predictors))?;

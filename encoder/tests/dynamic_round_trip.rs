@@ -130,7 +130,6 @@ fn lower_layers_are_coarser_and_have_fewer_gaussians() {
 
 /// Gaussians at the far end of the lattice, which middles of coarse cells lie beyond.
 #[test]
-#[ignore = "refining a lower layer moves a position beyond the lattice"]
 fn the_last_point_of_the_lattice_is_reached_through_every_number_of_layers() {
     let mut frames = scene(100, 1, 0, Tracking::Tracked);
     let mut planes = frames.remove(0).into_planes();

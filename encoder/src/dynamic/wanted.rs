@@ -81,10 +81,14 @@ impl Wanted {
         self.opacity.len()
     }
 
-    /// What brings positions near those wanted, in steps of 2^shift.
-    pub(crate) fn moves(&self, home: &Home, shift: u8) -> Vec<Vec<i32>> {
+    /// What brings positions near those wanted, in steps of 2^shift, and not beyond the last lattice point.
+    pub(crate) fn moves(&self, home: &Home, shift: u8, last: i32) -> Vec<Vec<i32>> {
+        let step = |wanted: u32, now: u32| {
+            let now = now as i32;
+            nearest(wanted as i32 - now, shift).min((last - now) >> shift)
+        };
         let of_axis = |(wanted, now): (&Vec<u32>, &Vec<u32>)| {
-            wanted.iter().zip(now).map(|(&w, &n)| nearest(w as i32 - n as i32, shift)).collect()
+            wanted.iter().zip(now).map(|(&wanted, &now)| step(wanted, now)).collect()
         };
         self.position.iter().zip(&home.planes.position).map(of_axis).collect()
     }
