@@ -18,6 +18,7 @@ use pictures::{PictureArgs, PictureErrors, Pictures};
 use serde::Serialize;
 use splatstream_encoder::canonical::canonicalise;
 use splatstream_scene::GaussianFrame;
+use std::cmp::Ordering;
 use std::path::PathBuf;
 
 /// Compare two scenes or streams: the error of each attribute and, with cameras, of pictures.
@@ -82,13 +83,17 @@ impl Compare {
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();
         let mut pictures = self.pictures.start()?;
-        loop {
-            let (a, b) =
-                (next(&mut frames_a, &mut report.frames_a)?, next(&mut frames_b, &mut report.frames_b)?);
-            match (a, b) {
-                (Some(a), Some(b)) => self.frame(&a, &b, &mut report, &mut sums, &mut pictures)?,
-                (None, None) => break,
-                _ => {}
+        let mut a = next(&mut frames_a, &mut report.frames_a)?;
+        let mut b = next(&mut frames_b, &mut report.frames_b)?;
+        while let Some(order) = order(a.as_ref(), b.as_ref()) {
+            if let (Ordering::Equal, Some((number, a)), Some((_, b))) = (order, &a, &b) {
+                self.frame(*number, [a, b], &mut report, &mut sums, &mut pictures)?;
+            }
+            if order.is_le() {
+                a = next(&mut frames_a, &mut report.frames_a)?;
+            }
+            if order.is_ge() {
+                b = next(&mut frames_b, &mut report.frames_b)?;
             }
             progress.at(report.frames_a.max(report.frames_b));
         }
@@ -117,14 +122,14 @@ impl Compare {
 
     fn frame(
         &self,
-        a: &GaussianFrame,
-        b: &GaussianFrame,
+        number: u32,
+        [a, b]: [&GaussianFrame; 2],
         report: &mut Report,
         sums: &mut ErrorSums,
         pictures: &mut Pictures<'_>,
     ) -> Result<(), Failure> {
         if self.matching == Match::Order && a.len() != b.len() {
-            let (number, a, b) = (report.frames, a.len(), b.len());
+            let (a, b) = (a.len(), b.len());
             return Err(Failure::Usage(format!(
                 "frame {number}: --match order needs equal counts, A has {a} Gaussians and B {b}; \
                  use --match nearest"
@@ -157,7 +162,17 @@ fn canonical(frame: &GaussianFrame) -> GaussianFrame {
     canonicalise(frame, &all, true)
 }
 
-fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<GaussianFrame>, Failure> {
+/// Which of two frames comes first in display order; none if there is no frame.
+fn order(a: Option<&(u32, GaussianFrame)>, b: Option<&(u32, GaussianFrame)>) -> Option<Ordering> {
+    match (a, b) {
+        (None, None) => None,
+        (Some(_), None) => Some(Ordering::Less),
+        (None, Some(_)) => Some(Ordering::Greater),
+        (Some((a, _)), Some((b, _))) => Some(a.cmp(b)),
+    }
+}
+
+fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<(u32, GaussianFrame)>, Failure> {
     let frame = frames.next()?;
     *count += u32::from(frame.is_some());
     Ok(frame)

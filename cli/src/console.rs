@@ -18,6 +18,11 @@ impl Console {
         Self { json }
     }
 
+    /// Whether results are printed as JSON.
+    pub(crate) const fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// Prints the result of a command, in the form asked for; no text prints nothing.
     pub(crate) fn report(
         &self,

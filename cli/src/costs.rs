@@ -1,9 +1,11 @@
 //! Where the bits of a stream go, per Gaussian: what `inspect --stats` prints and `chart` draws.
 
 use crate::numbers::{bits_per_gaussian, percent};
-use crate::statistics::{AttributeCost, Statistics, UnitCost, stream_statistics};
+use crate::statistics::{FrameTypeCost, SectionCost, Statistics, UnitCost, stream_statistics};
 use serde::Serialize;
 use splatstream_format::Limits;
+use splatstream_format::entropy::layout::Attribute;
+use splatstream_format::syntax::Profile;
 
 /// What a stream spends on what.
 #[derive(Debug, Clone, Serialize)]
@@ -16,6 +18,10 @@ pub(crate) struct Costs {
     pub(crate) bpg: f64,
     /// By attribute, in coding order.
     pub(crate) attributes: Vec<OfAttribute>,
+    /// By section of increments and attribute, in coding order; empty in profile Intra.
+    pub(crate) sections: Vec<OfSection>,
+    /// By type of frame.
+    pub(crate) frame_types: Vec<OfFrames>,
     /// By kind of unit, in order of first appearance.
     pub(crate) units: Vec<OfUnits>,
 }
@@ -30,6 +36,38 @@ pub(crate) struct OfAttribute {
     /// Of plane models.
     pub(crate) models_bpg: f64,
     /// Bits a Gaussian.
+    pub(crate) bpg: f64,
+}
+
+/// Bits of one attribute in one section.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct OfSection {
+    /// The section.
+    pub(crate) section: &'static str,
+    /// Cells, parents, predictors or Gaussians that it codes.
+    pub(crate) entries: u64,
+    /// Bits an entry.
+    pub(crate) bits_per_entry: f64,
+    /// Of all Gaussians of the stream.
+    #[serde(flatten)]
+    pub(crate) cost: OfAttribute,
+}
+
+/// What frames of one type cost.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct OfFrames {
+    /// I, P or B.
+    #[serde(rename = "type")]
+    pub(crate) kind: &'static str,
+    /// How many.
+    pub(crate) frames: u32,
+    /// Bytes of their units.
+    pub(crate) bytes: u64,
+    /// Their Gaussians.
+    pub(crate) gaussians: u64,
+    /// Share of the stream.
+    pub(crate) percent: f64,
+    /// Bits a Gaussian of these frames.
     pub(crate) bpg: f64,
 }
 
@@ -60,12 +98,6 @@ impl Costs {
 
     fn new(statistics: &Statistics) -> Self {
         let gaussians = statistics.gaussians;
-        let attribute = |cost: &AttributeCost| {
-            let of_one = |bits: f64| bits / gaussians.max(1) as f64;
-            let (symbols_bpg, models_bpg) = (of_one(cost.symbol_bits), of_one(cost.model_bits as f64));
-            let bpg = symbols_bpg + models_bpg;
-            OfAttribute { attribute: cost.attribute.name(), symbols_bpg, models_bpg, bpg }
-        };
         let units = |cost: &UnitCost| OfUnits {
             kind: cost.unit_type.name(),
             units: cost.units,
@@ -73,12 +105,65 @@ impl Costs {
             percent: percent(cost.bytes, statistics.bytes),
             bpg: bits_per_gaussian(cost.bytes, gaussians),
         };
+        let frames = |cost: &FrameTypeCost| OfFrames {
+            kind: cost.frame_type.name(),
+            frames: cost.frames,
+            bytes: cost.bytes,
+            gaussians: cost.gaussians,
+            percent: percent(cost.bytes, statistics.bytes),
+            bpg: bits_per_gaussian(cost.bytes, cost.gaussians),
+        };
+        let of_section = |cost| OfSection::new(cost, gaussians);
+        let sections = match statistics.profile {
+            Profile::Intra => Vec::new(),
+            Profile::Dynamic => statistics.sections.iter().map(of_section).collect(),
+        };
         Self {
             bytes: statistics.bytes,
             gaussians,
             bpg: bits_per_gaussian(statistics.bytes, gaussians),
-            attributes: statistics.attributes.iter().map(attribute).collect(),
+            attributes: attributes(statistics),
+            sections,
+            frame_types: statistics.frame_types.iter().map(frames).collect(),
             units: statistics.units.iter().map(units).collect(),
+        }
+    }
+}
+
+/// Each attribute over all sections: those of a Gaussian, and what else occurs.
+fn attributes(statistics: &Statistics) -> Vec<OfAttribute> {
+    let is_of_gaussian = |attribute: Attribute| attribute <= Attribute::Sh;
+    let mut rows = Vec::new();
+    for attribute in Attribute::ALL {
+        let parts: Vec<&SectionCost> =
+            statistics.sections.iter().filter(|cost| cost.attribute == attribute).collect();
+        if parts.is_empty() && !is_of_gaussian(attribute) {
+            continue;
+        }
+        // The sum of nothing is the negative zero; nobody wants to read that.
+        let symbols = parts.iter().map(|cost| cost.symbol_bits).sum::<f64>() + 0.0;
+        let models = parts.iter().map(|cost| cost.model_bits).sum::<u64>() as f64;
+        rows.push(OfAttribute::new(attribute, symbols, models, statistics.gaussians));
+    }
+    rows
+}
+
+impl OfAttribute {
+    fn new(attribute: Attribute, symbols: f64, models: f64, gaussians: u64) -> Self {
+        let of_one = |bits: f64| bits / gaussians.max(1) as f64;
+        let (symbols_bpg, models_bpg) = (of_one(symbols), of_one(models));
+        Self { attribute: attribute.name(), symbols_bpg, models_bpg, bpg: symbols_bpg + models_bpg }
+    }
+}
+
+impl OfSection {
+    fn new(cost: &SectionCost, gaussians: u64) -> Self {
+        let models = cost.model_bits as f64;
+        Self {
+            section: cost.section.name(),
+            entries: cost.entries,
+            bits_per_entry: (cost.symbol_bits + models) / cost.entries.max(1) as f64,
+            cost: OfAttribute::new(cost.attribute, cost.symbol_bits, models, gaussians),
         }
     }
 }

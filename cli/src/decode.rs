@@ -1,18 +1,21 @@
 //! `splatstream decode`: a stream to frames in files.
 
+mod report;
 mod target;
 
+use crate::completeness::complete_points;
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault};
-use crate::numbers::{FrameRange, grouped, hex_digest};
+use crate::numbers::FrameRange;
 use crate::progress::Progress;
+use crate::seek::{Seek, group_of};
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
-use serde::Serialize;
+use report::{Report, Shown};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
-use splatstream_decoder::stream::decode_stream;
+use splatstream_decoder::stream::{Summary, decode_stream, decode_stream_inside};
 use splatstream_format::Error;
 use splatstream_format::syntax::SequenceParameters;
 use std::ops::ControlFlow;
@@ -23,10 +26,13 @@ use target::{Format, Target};
 /// Decode a stream to files of Gaussians.
 ///
 /// Every frame is compared with the digest in the stream. Of a frame with a damaged refinement, the
-/// refinements before it are written; the report says so, and the exit code is that of the first error.
+/// refinements before it are written, with what is carried over from the intra frame; a frame of which nothing
+/// is there shows the frame it refers to again. The report says so, and the exit code is that of the first error.
+/// With --frames, decoding starts at the group that holds the first frame, if the stream has an index.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream decode talk.gss -o frames/\n  \
     splatstream decode talk.gss -o poster.ply --op s0,t0,r2 --frames 0..1\n  \
+    splatstream decode talk.gss -o frames/ --frames 300..310\n  \
     splatstream decode talk.gss --dry-run --json")]
 pub(crate) struct Decode {
     /// The stream.
@@ -60,33 +66,6 @@ pub(crate) struct Decode {
     limits: LimitArgs,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    output: Option<PathBuf>,
-    frames: u32,
-    gaussians: u64,
-    bytes: u64,
-    seconds: f64,
-    seconds_total: f64,
-    gaussians_per_second: f64,
-    verified: bool,
-    digests: Vec<Option<String>>,
-    refinements: Vec<u8>,
-    lost: Vec<Lost>,
-    error: Option<StreamFault>,
-}
-
-/// A frame that is not all there.
-#[derive(Serialize)]
-struct Lost {
-    frame: u32,
-    /// Refinements that are there.
-    refinements: u8,
-    #[serde(flatten)]
-    fault: StreamFault,
-}
-
 /// What has come out of the stream so far.
 struct Decoding<'a> {
     frames: FrameRange,
@@ -96,9 +75,7 @@ struct Decoding<'a> {
     /// Gaussians of the frames before the first one asked for: decoded too.
     passed: u64,
     bytes: u64,
-    digests: Vec<Option<String>>,
-    refinements: Vec<u8>,
-    lost: Vec<Lost>,
+    shown: Shown,
     first_error: Option<Error>,
     failed: Option<Failure>,
     /// Time in which files were made and written.
@@ -113,21 +90,23 @@ impl Decode {
         stream.check_point(options.operating_point, &options.limits)?;
         let frames = self.frames.unwrap_or(FrameRange::ALL);
         let announced = stream.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
+        if announced > 0 && frames.count_in(announced) == 0 {
+            let path = stream.path.display();
+            return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));
+        }
         let target = self.target(frames.count_in(announced))?;
         let mut decoding = Decoding::new(frames, target.as_ref(), announced);
         let start = Instant::now();
-        let summary =
-            decode_stream(&stream.bytes, &options, |sequence, frame| decoding.take(sequence, frame));
+        let seek = group_of(&stream, frames.first, &options.limits);
+        let summary = decoding.run(&stream.bytes, seek, &options);
         let total = start.elapsed();
         if let Some(failure) = decoding.failed.take() {
             return Err(failure);
         }
         let first_error = decoding.first_error.or(summary.end);
-        let report = self.report(decoding, summary.end, total);
-        if announced > 0 && frames.count_in(announced) == 0 {
-            let path = stream.path.display();
-            return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));
-        }
+        let mut report = self.report(decoding, summary.end, total);
+        report.seek = seek;
+        report.complete = summary.end.map(|end| complete_points(&stream.bytes, &options.limits, end));
         // Of a file that is no stream there is nothing to tell people but the error.
         console.report(&report, || {
             if report.frames > 0 || first_error.is_none() { report.text() } else { String::new() }
@@ -155,17 +134,18 @@ impl Decode {
         let decoded = decoding.gaussians + decoding.passed;
         Report {
             output: self.out.clone(),
-            frames: decoding.digests.len() as u32,
+            frames: decoding.shown.digests.len() as u32,
             gaussians: decoding.gaussians,
             bytes: decoding.bytes,
             seconds,
             seconds_total: total.as_secs_f64(),
             gaussians_per_second: decoded as f64 / seconds.max(f64::MIN_POSITIVE),
             verified: !self.no_verify,
-            digests: decoding.digests,
-            refinements: decoding.refinements,
-            lost: decoding.lost,
+            subset: self.subset,
+            seek: None,
+            shown: decoding.shown,
             error: end.map(StreamFault::from),
+            complete: None,
         }
     }
 }
@@ -179,12 +159,19 @@ impl<'a> Decoding<'a> {
             gaussians: 0,
             passed: 0,
             bytes: 0,
-            digests: Vec::new(),
-            refinements: Vec::new(),
-            lost: Vec::new(),
+            shown: Shown::default(),
             first_error: None,
             failed: None,
             writing: Duration::ZERO,
+        }
+    }
+
+    /// Decodes all of a stream, or from a group on.
+    fn run(&mut self, bytes: &[u8], seek: Option<Seek>, options: &Options) -> Summary {
+        let take = |sequence: &SequenceParameters, frame| self.take(sequence, frame);
+        match seek {
+            None => decode_stream(bytes, options, take),
+            Some(Seek { byte, .. }) => decode_stream_inside(bytes, byte, options, take),
         }
     }
 
@@ -192,7 +179,7 @@ impl<'a> Decoding<'a> {
     fn take(&mut self, sequence: &SequenceParameters, frame: DecodedFrame) -> ControlFlow<()> {
         let number = frame.number;
         if self.frames.contains(number) {
-            self.count(&frame);
+            self.count(sequence, &frame);
             let gaussians = to_gaussians(frame.into_shown(), sequence);
             let start = Instant::now();
             self.failed = self.target.and_then(|target| target.write(number, &gaussians).err());
@@ -207,46 +194,10 @@ impl<'a> Decoding<'a> {
         ControlFlow::Continue(())
     }
 
-    fn count(&mut self, frame: &DecodedFrame) {
+    fn count(&mut self, sequence: &SequenceParameters, frame: &DecodedFrame) {
         self.gaussians += frame.planes.len() as u64;
         self.bytes += frame.bytes;
-        self.digests.push(frame.digest.map(hex_digest));
-        self.refinements.push(frame.refinements);
-        if let Some(error) = frame.lost {
-            self.first_error = self.first_error.or(Some(error));
-            let fault = StreamFault::from(error);
-            self.lost.push(Lost { frame: frame.number, refinements: frame.refinements, fault });
-        }
-    }
-}
-
-impl Report {
-    fn text(&self) -> String {
-        let place = match &self.output {
-            Some(path) => path.display().to_string(),
-            None => "nothing written (--dry-run)".to_owned(),
-        };
-        let digests =
-            if self.verified { "agree with the frames shown" } else { "not compared (--no-verify)" };
-        let mut text = format!(
-            "{place}\n  frames       {}\n  Gaussians    {}\n  decoding     {:.3} s, {} Gaussians a second\n  \
-             in all       {:.3} s\n  digests      {digests}\n",
-            grouped(self.frames.into()),
-            grouped(self.gaussians),
-            self.seconds,
-            grouped(self.gaussians_per_second as u64),
-            self.seconds_total,
-        );
-        if self.error.is_some() {
-            let last = self.refinements.last().copied().unwrap_or(0);
-            text += &format!("  stopped early; the last frame has {last} refinements\n");
-        }
-        for lost in &self.lost {
-            text += &format!(
-                "  frame {} stops after {} refinements: {}\n",
-                lost.frame, lost.refinements, lost.fault
-            );
-        }
-        text
+        self.shown.take(sequence, frame);
+        self.first_error = self.first_error.or(frame.lost);
     }
 }

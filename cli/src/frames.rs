@@ -74,14 +74,15 @@ impl Frames<'_> {
         }
     }
 
-    /// The next frame.
-    pub(crate) fn next(&mut self) -> Result<Option<GaussianFrame>, Failure> {
+    /// The next frame and its display index. A stream may lack frames, in particular at an operating point.
+    pub(crate) fn next(&mut self) -> Result<Option<(u32, GaussianFrame)>, Failure> {
         match self {
             Self::Stream { file, units, decoder, .. } => {
                 let decoded = next_decoded(units, decoder).map_err(|error| file.fault(error))?;
-                Ok(decoded
-                    .zip(decoder.sequence())
-                    .map(|(frame, sequence)| to_gaussians(frame.into_shown(), sequence)))
+                let shown = |(frame, sequence): (DecodedFrame, &_)| {
+                    (frame.number, to_gaussians(frame.into_shown(), sequence))
+                };
+                Ok(decoded.zip(decoder.sequence()).map(shown))
             }
             Self::Files { files, next } => {
                 if *next >= files.len() {
@@ -89,7 +90,7 @@ impl Frames<'_> {
                 }
                 let frame = files.frame(*next).map_err(|error| Failure::other(error.to_string()))?;
                 *next += 1;
-                Ok(Some(frame))
+                Ok(Some((*next - 1, frame)))
             }
         }
     }

@@ -1,6 +1,7 @@
 //! `splatstream inspect`: what is in a stream, where, and which clause says so.
 
 mod costs;
+mod deps;
 mod hex;
 mod points;
 mod tree;
@@ -19,6 +20,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream inspect talk.gss | less\n  \
     splatstream inspect talk.gss --units\n  splatstream inspect talk.gss --ops --json\n  \
+    splatstream inspect talk.gss --deps --dot | dot -Tsvg > talk.svg\n  \
     splatstream inspect talk.gss --hex 3")]
 pub(crate) struct Inspect {
     /// The stream.
@@ -26,6 +28,9 @@ pub(crate) struct Inspect {
     input: PathBuf,
     #[command(flatten)]
     view: View,
+    /// With --deps: as a graph for Graphviz.
+    #[arg(long, requires = "deps")]
+    dot: bool,
     #[command(flatten)]
     limits: LimitArgs,
 }
@@ -42,6 +47,9 @@ struct View {
     /// The operating points: bytes, Gaussians and bits a Gaussian of each.
     #[arg(long)]
     ops: bool,
+    /// The units of each group and frame, and what each needs to be decoded.
+    #[arg(long)]
+    deps: bool,
     /// What each attribute and each kind of unit costs.
     #[arg(long)]
     stats: bool,
@@ -58,6 +66,7 @@ impl Inspect {
         let error = match &self.view {
             View { units: true, .. } => units::show(&stream, &limits, console),
             View { ops: true, .. } => points::show(&stream, &limits, console),
+            View { deps: true, .. } => deps::show(&stream, self.dot, &limits, console),
             View { stats: true, .. } => costs::show(&stream, &limits, console),
             View { hex: Some(unit), .. } => hex::show(&stream, *unit, &limits, console),
             View { .. } => tree::show(&stream, &limits, console),

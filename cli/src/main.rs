@@ -5,6 +5,7 @@
 mod cameras;
 mod chart;
 mod compare;
+mod completeness;
 mod console;
 mod costs;
 mod decode;
@@ -19,9 +20,11 @@ mod numbers;
 mod output_file;
 mod progress;
 mod render;
+mod seek;
 mod setting_names;
 mod statistics;
 mod stream_file;
+mod structure;
 mod table;
 mod validate;
 

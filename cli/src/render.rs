@@ -85,10 +85,10 @@ impl Render {
         let progress = Progress::frames("drawing", span.count_in(expected));
         let mut drawn = Drawn { output: self.out.clone(), frames: 0, pictures: Vec::new(), seconds: 0.0 };
         let mut cameras: Vec<Camera> = Vec::new();
-        let mut number = 0;
-        while !span.is_over(number) {
-            let Some(frame) = frames.next()? else { break };
-            if number == 0 {
+        let mut next = 0;
+        while !span.is_over(next) {
+            let Some((number, frame)) = frames.next()? else { break };
+            if next == 0 {
                 cameras = named(self.cameras.cameras(&self.camera, &frame)?);
             }
             if span.contains(number) {
@@ -97,7 +97,7 @@ impl Render {
                 self.draw(&frame, number, expected > 1, &cameras, &mut drawn)?;
                 progress.at(drawn.frames);
             }
-            number += 1;
+            next = number.saturating_add(1);
         }
         drop(progress);
         if drawn.frames == 0 {

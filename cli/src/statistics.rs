@@ -1,22 +1,33 @@
-//! What each attribute of a stream costs. From decoding its symbols again.
+//! What each part of a stream costs. From decoding its symbols again.
 
+mod frames;
+mod increments;
+mod symbols;
+
+use frames::FrameCosts;
+use increments::Increments;
 use splatstream_decoder::block::CodedBlock;
-use splatstream_decoder::context::{delta_contexts, plane_contexts};
 use splatstream_decoder::gop::Gop;
 use splatstream_decoder::unit::{CodedUnit, PreparedUnit};
-use splatstream_format::entropy::layout::{Attribute, Layout, PlaneInfo};
-use splatstream_format::entropy::model::{ModelTrace, PlaneModel};
-use splatstream_format::entropy::token::{Alphabet, split, zigzag};
+use splatstream_format::entropy::layout::{Attribute, Layout, Section};
+use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::payload::Refinement;
-use splatstream_format::syntax::{FrameHeader, GopHeader, SequenceParameters, UnitHeader, UnitType};
-use splatstream_format::unit::Stream;
+use splatstream_format::syntax::{
+    FrameHeader, FrameType, GopHeader, Profile, SequenceParameters, UnitHeader, UnitType,
+};
+use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Limits, Result};
+use symbols::{BitsOfPlanes, symbol_bits};
 
-/// Bits spent on one attribute over a whole stream.
+/// Bits spent on one attribute in one section over a whole stream; a refinement unit is one section.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct AttributeCost {
+pub(crate) struct SectionCost {
+    /// The section.
+    pub(crate) section: Section,
     /// The attribute.
     pub(crate) attribute: Attribute,
+    /// Entries: cells, parents, predictors, Gaussians.
+    pub(crate) entries: u64,
     /// Bits of symbols: the information of the tokens in their tables, and raw bits.
     pub(crate) symbol_bits: f64,
     /// Bits of plane models.
@@ -34,17 +45,34 @@ pub(crate) struct UnitCost {
     pub(crate) bytes: u64,
 }
 
+/// What frames of one type cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct FrameTypeCost {
+    /// The type.
+    pub(crate) frame_type: FrameType,
+    /// How many.
+    pub(crate) frames: u32,
+    /// Bytes of their units, headers included.
+    pub(crate) bytes: u64,
+    /// Their Gaussians; what is carried over is not counted.
+    pub(crate) gaussians: u64,
+}
+
 /// What a stream spends on what.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Statistics {
+    /// The profile of the stream.
+    pub(crate) profile: Profile,
     /// Gaussians over all frames.
     pub(crate) gaussians: u64,
     /// Bytes of the stream.
     pub(crate) bytes: u64,
-    /// By attribute, in coding order.
-    pub(crate) attributes: Vec<AttributeCost>,
+    /// By section and attribute, in coding order; those that occur.
+    pub(crate) sections: Vec<SectionCost>,
     /// By kind of unit, in order of first appearance.
     pub(crate) units: Vec<UnitCost>,
+    /// By type of frame; those that occur.
+    pub(crate) frame_types: Vec<FrameTypeCost>,
 }
 
 /// Adds up the costs of a stream.
@@ -52,41 +80,26 @@ pub(crate) struct Statistics {
 /// # Errors
 /// As decoding, digests not verified.
 pub(crate) fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
-    let cost = |attribute| AttributeCost { attribute, symbol_bits: 0.0, model_bits: 0 };
-    let mut statistics = Statistics {
-        gaussians: 0,
-        bytes: u64::try_from(bytes.len()).unwrap_or(u64::MAX),
-        attributes: Attribute::ALL.map(cost).to_vec(),
-        units: Vec::new(),
-    };
-    let mut state = State::default();
     let stream = Stream::open(bytes, limits)?;
     let profile = stream.header().profile();
+    let mut statistics = Statistics {
+        profile,
+        gaussians: 0,
+        bytes: u64::try_from(bytes.len()).unwrap_or(u64::MAX),
+        sections: Vec::new(),
+        units: Vec::new(),
+        frame_types: Vec::new(),
+    };
+    let (mut state, mut frames) = (State::default(), FrameCosts::default());
     for unit in stream.units() {
         let unit = unit?;
         statistics.count(&unit.header);
-        match unit.header.unit_type() {
-            UnitType::SequenceParameters => {
-                state.sequence =
-                    Some(SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?);
-            }
-            UnitType::GopHeader => {
-                let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile)?;
-                state.gop = Some(Gop::new(header, unit.header.frame));
-            }
-            UnitType::FrameHeader => {
-                state.frame = Some(FrameHeader::parse_payload(unit.payload, unit.payload_at, profile)?);
-                state.models = None;
-            }
-            UnitType::Transform | UnitType::Codebook => {
-                if let (Some(gop), Some(sequence)) = (&mut state.gop, &state.sequence) {
-                    gop.tool(&unit, sequence, profile, limits)?;
-                }
-            }
-            UnitType::Refinement => state.refinement(&unit, limits, &mut statistics)?,
-            _ => {}
-        }
+        state.unit(&unit, profile, limits, &mut statistics)?;
+        frames.unit(&unit, profile, state.sequence.as_ref())?;
     }
+    statistics.frame_types = frames.finish();
+    statistics.gaussians = statistics.frame_types.iter().map(|cost| cost.gaussians).sum();
+    statistics.sections.sort_by_key(|cost| (cost.section, cost.attribute));
     Ok(statistics)
 }
 
@@ -96,15 +109,54 @@ struct State {
     gop: Option<Gop>,
     frame: Option<FrameHeader>,
     models: Option<(Layout, Vec<PlaneModel>)>,
+    increments: Increments,
 }
 
 impl State {
-    fn refinement(
+    fn unit(
         &mut self,
-        unit: &splatstream_format::unit::Unit<'_>,
+        unit: &Unit<'_>,
+        profile: Profile,
         limits: &Limits,
         statistics: &mut Statistics,
     ) -> Result<()> {
+        match unit.header.unit_type() {
+            UnitType::SequenceParameters => {
+                let parsed = SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
+                self.sequence = Some(parsed);
+            }
+            UnitType::GopHeader => {
+                let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile)?;
+                self.increments = Increments::default();
+                self.gop = Some(Gop::new(header, unit.header.frame));
+            }
+            UnitType::FrameHeader => {
+                self.frame = Some(FrameHeader::parse_payload(unit.payload, unit.payload_at, profile)?);
+                self.models = None;
+                if let Some(gop) = &self.gop {
+                    self.increments.start_frame(unit.header.frame, gop);
+                }
+            }
+            UnitType::Transform | UnitType::Codebook => {
+                if let (Some(gop), Some(sequence)) = (&mut self.gop, &self.sequence) {
+                    gop.tool(unit, sequence, profile, limits)?;
+                }
+            }
+            UnitType::Refinement if profile == Profile::Intra => {
+                self.refinement(unit, limits, statistics)?;
+            }
+            UnitType::Increment if profile == Profile::Dynamic => {
+                if let (Some(sequence), Some(gop), Some(frame)) = (&self.sequence, &self.gop, &self.frame) {
+                    let tools = gop.transforms(frame, unit.payload_at)?;
+                    self.increments.unit(unit, sequence, tools, limits, statistics)?;
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn refinement(&mut self, unit: &Unit<'_>, limits: &Limits, statistics: &mut Statistics) -> Result<()> {
         let (Some(sequence), Some(gop), Some(frame)) = (&self.sequence, &self.gop, &self.frame) else {
             return Ok(());
         };
@@ -114,18 +166,9 @@ impl State {
         let mut trace = BitsOfPlanes::default();
         let before = self.models.as_ref().map(|(layout, models)| (layout, models.as_slice()));
         let prepared = PreparedUnit::new(coded, gop, transforms, before, &mut trace)?;
-        let gaussians = u64::from(refinement.header.gaussian_count);
-        statistics.gaussians = statistics.gaussians.saturating_add(gaussians);
         let blocks = prepared.coded_blocks(sequence)?;
-        let planes = prepared.layout.planes().iter().zip(&prepared.models).zip(&trace.bits);
-        for (plane, ((&info, model), &model_bits)) in planes.enumerate() {
-            let of_attribute = |cost: &&mut AttributeCost| cost.attribute == info.attribute;
-            if let Some(cost) = statistics.attributes.iter_mut().find(of_attribute) {
-                cost.model_bits = cost.model_bits.saturating_add(model_bits);
-                cost.symbol_bits +=
-                    blocks.iter().map(|block| symbol_bits(model, info, plane, block)).sum::<f64>();
-            }
-        }
+        let planes = Planes { layout: &prepared.layout, models: &prepared.models, blocks: &blocks };
+        statistics.add(refinement.header.gaussian_count, &planes, &trace.bits);
         if !prepared.models.is_empty() {
             self.models = Some((prepared.layout.clone(), prepared.models.clone()));
         }
@@ -133,11 +176,17 @@ impl State {
     }
 }
 
+/// The planes of a section of a unit, decoded.
+struct Planes<'a> {
+    layout: &'a Layout,
+    models: &'a [PlaneModel],
+    blocks: &'a [CodedBlock],
+}
+
 impl Statistics {
     fn count(&mut self, header: &UnitHeader) {
         let unit_type = header.unit_type();
-        let size =
-            u64::try_from(UnitHeader::SIZE).unwrap_or(0).saturating_add(u64::from(header.payload_length));
+        let size = UnitHeader::SIZE as u64 + u64::from(header.payload_length);
         match self.units.iter_mut().find(|cost| cost.unit_type == unit_type) {
             Some(cost) => {
                 cost.units = cost.units.saturating_add(1);
@@ -146,49 +195,28 @@ impl Statistics {
             None => self.units.push(UnitCost { unit_type, units: 1, bytes: size }),
         }
     }
-}
 
-/// Adds up the bits of each plane's model: every model begins with its reuse flag.
-#[derive(Default)]
-struct BitsOfPlanes {
-    bits: Vec<u64>,
-}
-
-impl ModelTrace for BitsOfPlanes {
-    fn element(&mut self, name: &'static str, _: u64, bits: u64, _: i64) {
-        if name == "reuse" {
-            self.bits.push(0);
-        }
-        if let Some(last) = self.bits.last_mut() {
-            *last = last.saturating_add(bits);
+    /// Adds what the planes of a section of so many entries cost.
+    fn add(&mut self, entries: u32, planes: &Planes<'_>, model_bits: &[u64]) {
+        let all = planes.layout.planes().iter().zip(planes.models).zip(model_bits);
+        for (plane, ((&info, model), &model_bits)) in all.enumerate() {
+            let place = self.place(info.section, info.attribute);
+            let Some(cost) = self.sections.get_mut(place) else { continue };
+            // The planes of an attribute have as many values; they are counted with the first.
+            cost.entries += if info.place == 0 { u64::from(entries) } else { 0 };
+            cost.model_bits = cost.model_bits.saturating_add(model_bits);
+            let bits = planes.blocks.iter().map(|block| symbol_bits(model, info, plane, block));
+            cost.symbol_bits += bits.sum::<f64>();
         }
     }
-}
 
-/// The information of a plane's symbols: 12 - log2(frequency) bits a token, and the raw bits.
-fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> f64 {
-    let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-    let (contexts, values): (Vec<u8>, Vec<u64>) = match info.alphabet {
-        Alphabet::Position => (delta_contexts(&model.axes, &block.deltas), block.deltas.clone()),
-        Alphabet::Attribute | Alphabet::Index => {
-            let unsigned = |&value: &i32| match info.alphabet {
-                Alphabet::Index => u64::from(value.cast_unsigned()),
-                _ => u64::from(zigzag(value)),
-            };
-            (plane_contexts(&model.axes, plane, block, coded), coded.iter().map(unsigned).collect())
-        }
-    };
-    let cost = |(place, &value): (usize, &u64)| {
-        let token = split(value, model.direct_log2);
-        let context = usize::from(contexts.get(place).copied().unwrap_or(0));
-        let frequency = model
-            .table_of_context
-            .get(context)
-            .and_then(|&table| model.tables.get(usize::from(table)))
-            .and_then(|table| table.of_token().get(usize::from(token.token)))
-            .copied()
-            .unwrap_or(1);
-        12.0 - f64::from(frequency.max(1)).log2() + f64::from(token.raw_bits)
-    };
-    values.iter().enumerate().map(cost).sum()
+    fn place(&mut self, section: Section, attribute: Attribute) -> usize {
+        let known =
+            self.sections.iter().position(|cost| (cost.section, cost.attribute) == (section, attribute));
+        known.unwrap_or_else(|| {
+            let (entries, symbol_bits, model_bits) = (0, 0.0, 0);
+            self.sections.push(SectionCost { section, attribute, entries, symbol_bits, model_bits });
+            self.sections.len() - 1
+        })
+    }
 }

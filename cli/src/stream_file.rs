@@ -59,13 +59,20 @@ impl StreamFile {
             return Ok(());
         };
         let has = |value: u8, count: u8| value == u8::MAX || value < count;
+        let path = self.path.display();
         if has(point.spatial, sequence.spatial_layer_count)
             && has(point.temporal, sequence.temporal_layer_count)
             && has(point.refinement, sequence.refinement_count)
         {
-            return Ok(());
+            if point.temporal == 0 || point.spatial.saturating_add(1) >= sequence.spatial_layer_count {
+                return Ok(());
+            }
+            let (top, base) = (sequence.spatial_layer_count.saturating_sub(1), point.spatial);
+            return Err(Failure::Usage(format!(
+                "{path}: there is no operating point {point}: predicted frames are of spatial layer {top} alone, so that \
+                 s{base} goes with t0; `splatstream inspect --ops {path}` lists the points"
+            )));
         }
-        let path = self.path.display();
         let last = OperatingPoint {
             spatial: sequence.spatial_layer_count.saturating_sub(1),
             temporal: sequence.temporal_layer_count.saturating_sub(1),

@@ -3,9 +3,19 @@
 SIGNATURE = bytes([0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A])
 VERSION_MAJOR = 1
 PROFILE_INTRA = 0
+PROFILE_DYNAMIC = 1
 FILE_HEADER_BYTES = 16
 UNIT_HEADER_BYTES = 20
 MAX_REFINEMENTS = 10
+MAX_LAYERS = 4
+MAX_PREDICTED_FRAMES = 1024
+MAX_CELLS = 2 ** 20
+MAX_NEIGHBOURS = 16
+MAX_ATTRIBUTE_SHIFT = 7
+FINE_BITS = 6
+TRANSLATION_MAX = 2 ** 20
+TURN_MAX = 8192
+OUTPUT_MAX = 2 ** 30
 MAX_ID = 15
 NONE_ID = 255
 MAX_STAGES = 4
@@ -23,7 +33,17 @@ MAX_TOKEN = 255
 # 6.3: unit types
 UT_SEQUENCE, UT_GOP, UT_FRAME, UT_TRANSFORM = 1, 2, 3, 4
 UT_CODEBOOK, UT_REFINEMENT, UT_INDEX, UT_END = 5, 6, 7, 8
-KNOWN_UNIT_TYPES = range(1, 9)
+UT_INCREMENT, UT_POINTS = 10, 11
+
+
+def known_unit_types(profile):
+    """6.3: type 10 is known in profile 1 only."""
+    known = tuple(range(1, 9)) + (UT_POINTS,)
+    return known + (UT_INCREMENT,) if profile == PROFILE_DYNAMIC else known
+
+
+# 6.6: frame types
+TYPE_I, TYPE_P, TYPE_B = 0, 1, 2
 
 # A.2
 MAX_GAUSSIANS = {1: 2 ** 18, 2: 2 ** 20, 3: 2 ** 22, 4: 2 ** 24}

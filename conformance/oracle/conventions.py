@@ -23,6 +23,19 @@ def clamp(a, lo, hi):
     return max(lo, min(hi, a))
 
 
+def tz(a):
+    """Number of trailing zero bits of a >= 1."""
+    return (a & -a).bit_length() - 1
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a, b):
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
 # ---- 4.3 byte descriptors ----
 
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i8": "b", "i16": "h", "i32": "i", "f32": "f"}
@@ -34,6 +47,7 @@ class ByteReader:
 
     def __init__(self, data, start, end):
         self.data = data
+        self.start = start
         self.pos = start
         self.end = end
 

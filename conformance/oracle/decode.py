@@ -5,15 +5,20 @@ Exit code: that of the class of the verdict (9.1), 0 if the stream is accepted, 
 """
 
 import argparse
+import hashlib
 import json
 import re
 import sys
 import time
 
 from decoding import Decoder
+from dynamic import DynamicFrame
 from errors import EXIT_CODE
 from extraction import extract
+from homes import canonical_planes
 from output import write_frame
+from points import EVERYTHING
+from reconstruction import i32le
 
 
 def operating_point(text):
@@ -24,16 +29,39 @@ def operating_point(text):
     return tuple(int(number) for number in match.groups())
 
 
-def report(decoder):
+def report(decoder, subset=False):
     verdict = decoder.errors[0] if decoder.errors else None
     result = {"outcome": "reject" if verdict else "accept"}
     if verdict:
         result.update(verdict.as_dict())
-    result["frames"] = [{"frame": f.number, "gaussians": f.gaussians, "refinements": f.refinements,
-                         "digest": "%016x" % f.digest()} for f in decoder.frames]
+    result["frames"] = [frame_record(f, subset) for f in decoder.frames]
     if len(decoder.errors) > 1:
         result["errors"] = [error.as_dict() for error in decoder.errors]
     return result
+
+
+def hexadecimal(digest):
+    return None if digest is None else "%016x" % digest
+
+
+def frame_record(frame, subset):
+    if not isinstance(frame, DynamicFrame):
+        return {"frame": frame.number, "gaussians": frame.gaussians, "refinements": frame.refinements,
+                "digest": hexadecimal(frame.digest())}
+    at = frame.shown_at()
+    shown = frame.shown(subset)
+    digest, carried_digest = frame.shown_digests()
+    planes = canonical_planes(shown.gaussians, frame.plane_count)
+    return {"frame": frame.number, "type": "IPB"[frame.frame_type], "lost": frame.lost,
+            "spatial_layer": at[0] if at else None, "refinements": at[1] + 1 if at else 0,
+            "gaussians": len(shown.gaussians), "exact": shown.exact, "carried": shown.carried,
+            "digest": hexadecimal(digest), "carried_digest": hexadecimal(carried_digest),
+            "shown": sha256_of_planes(planes)}
+
+
+def sha256_of_planes(planes):
+    """SHA-256 of the planes as they are written by --out, one after the other."""
+    return hashlib.sha256(b"".join(i32le(plane) for plane in planes)).hexdigest()
 
 
 def main():
@@ -45,25 +73,27 @@ def main():
     parser.add_argument("--json", action="store_true", help="print the result as JSON (always done)")
     parser.add_argument("--inside", action="store_true", help="the input starts at a later GOP (B.3)")
     parser.add_argument("--extract", metavar="FILE", help="write the extraction at --op (7.11)")
+    parser.add_argument("--subset", action="store_true", help="profile 1: show exact Gaussians only (7.18.2)")
     parser.add_argument("--time", action="store_true", help="print the speed on stderr")
     options = parser.parse_args()
     with open(options.input, "rb") as f:
         data = f.read()
-    op_r = options.op[2] if options.op else None
     begin = time.time()
-    decoder = Decoder(data, op_r, options.inside).decode()
+    decoder = Decoder(data, options.op, options.inside).decode()
     seconds = time.time() - begin
-    result = report(decoder)
+    result = report(decoder, options.subset)
     print(json.dumps(result))
     if options.time:
-        count = sum(f.gaussians for f in decoder.frames)
+        count = sum(f["gaussians"] for f in result["frames"])
         print("%.2f s, %.0f Gaussians/s" % (seconds, count / seconds), file=sys.stderr)
     if options.out:
         for frame in decoder.frames:
-            write_frame(options.out, frame, decoder.sequence, options.float)
+            planes = (canonical_planes(frame.shown(options.subset).gaussians, frame.plane_count)
+                      if isinstance(frame, DynamicFrame) else frame.planes)
+            write_frame(options.out, frame.number, planes, decoder.sequence, options.float)
     if options.extract and not decoder.errors:
         with open(options.extract, "wb") as f:
-            f.write(extract(data, op_r))
+            f.write(extract(data, options.op or EVERYTHING))
     return EXIT_CODE[result["class"]] if decoder.errors else 0
 
 

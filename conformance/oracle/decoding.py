@@ -1,57 +1,41 @@
-"""Clause 7.1: state, order of units, refinement units of a frame, confined and fatal errors; 9.3."""
+"""Clauses 7.1 and 7.13: state, order of units, confined and fatal errors; 9.3."""
 
 import constants as c
-import models as plane_models
-import reconstruction
+import points
 import semantics
 from conventions import ByteReader, crc32
+from dynamic import DynamicFrame, Gop
 from errors import StreamError, require
-from parsing import BlockDecoder
+from increment import Context, Increment
+from intra import Frame, decode_refinement
+from semantics_dynamic import parse_points
 
-START, SEQUENCE, GOP, FRAME, INDEXED, ENDED = "START", "SEQUENCE", "GOP", "FRAME", "INDEXED", "ENDED"
+START, SEQUENCE, GOP, FRAME, BETWEEN = "START", "SEQUENCE", "GOP", "FRAME", "BETWEEN"
+LISTED, INDEXED, ENDED = "LISTED", "INDEXED", "ENDED"
 
-# 7.1.2: phases in which a unit of known type is allowed
+# 7.1.2: phases in which a unit of known type is allowed; in profile 1 also those of ALLOWED_DYNAMIC
 ALLOWED = {
-    c.UT_SEQUENCE: (START, SEQUENCE, GOP, FRAME, INDEXED),
-    c.UT_GOP: (SEQUENCE, GOP, FRAME),
+    c.UT_SEQUENCE: (START, SEQUENCE, GOP, FRAME, BETWEEN, LISTED, INDEXED),
+    c.UT_GOP: (SEQUENCE, GOP, FRAME, BETWEEN),
     c.UT_TRANSFORM: (GOP,),
     c.UT_CODEBOOK: (GOP,),
-    c.UT_FRAME: (GOP, FRAME),
+    c.UT_FRAME: (GOP, FRAME, BETWEEN),
     c.UT_REFINEMENT: (FRAME,),
-    c.UT_INDEX: (SEQUENCE, GOP, FRAME),
-    c.UT_END: (SEQUENCE, GOP, FRAME, INDEXED),
+    c.UT_POINTS: (SEQUENCE, GOP, FRAME, BETWEEN),
+    c.UT_INDEX: (SEQUENCE, GOP, FRAME, BETWEEN, LISTED),
+    c.UT_END: (SEQUENCE, GOP, FRAME, BETWEEN, LISTED, INDEXED),
 }
-ENDS_FRAME = (c.UT_GOP, c.UT_FRAME, c.UT_INDEX, c.UT_END)
-
-
-class Frame:
-    """A frame in progress or output: canonical planes and unit digests of its refinements."""
-
-    def __init__(self, number, header, plane_count):
-        self.number = number
-        self.header = header
-        self.planes = [[] for _ in range(plane_count)]
-        self.digests = []                           # D[r]
-        self.units_seen = 0                         # refinement units that stood, of whatever fate
-
-    @property
-    def refinements(self):
-        return len(self.digests)
-
-    @property
-    def gaussians(self):
-        return len(self.planes[0])
-
-    def digest(self):
-        return reconstruction.frame_digest(self.digests)
+ALLOWED_DYNAMIC = dict(ALLOWED)
+ALLOWED_DYNAMIC.update({c.UT_CODEBOOK: (GOP, FRAME, BETWEEN), c.UT_REFINEMENT: (), c.UT_INCREMENT: (FRAME,)})
+CLOSES_GOP = (c.UT_GOP, c.UT_POINTS, c.UT_INDEX, c.UT_END)
 
 
 class Decoder:
     """Decodes a stream; afterwards `frames` and `errors` (first one: the verdict) tell the result."""
 
-    def __init__(self, data, op_r=None, inside=False):
+    def __init__(self, data, point=None, inside=False):
         self.data = data
-        self.op_r = c.MAX_REFINEMENTS - 1 if op_r is None else op_r
+        self.point = points.EVERYTHING if point is None else point
         self.inside = inside                        # B.3: units before some gop_header were left out
         self.frames = []
         self.errors = []
@@ -63,24 +47,30 @@ class Decoder:
         self.next_gop = None if inside else 0
         self.next_frame = None if inside else 0
         self.frames_left = 0
-        self.next_refinement = 0
-        self.dropping = False
-        self.models = None
         self.frame = None
-        # what the end and index units are compared with
+        self.gop = None                             # in profile 1
+        # what the operating_points, index and end units are compared with
         self.unit_count = 0
         self.frame_count = 0
+        self.gop_frames = 0
         self.gops = []
+        self.gop_header_frame = None
         self.index_offset = 0
+        self.ledger = points.Ledger()
+        self.used_all = True                        # every unit belonged to the operating point
 
     def undefine(self):
         self.dc_transform, self.sh_transform, self.codebook = {}, {}, {}
+
+    @property
+    def dynamic(self):
+        return self.file_header.profile == c.PROFILE_DYNAMIC
 
     # ---- 9.3 ----
 
     def decode(self):
         try:
-            self.file_header = semantics.parse_file_header(self.data)
+            self.start()
             pos = c.FILE_HEADER_BYTES
             while self.phase != ENDED:
                 pos = self.unit(pos)
@@ -90,20 +80,45 @@ class Decoder:
             self.end_frame()
         return self
 
+    def start(self):
+        self.file_header = semantics.parse_file_header(self.data)
+
     def unit(self, pos):
         """9.3 step 2; returns the offset of the next unit."""
-        unit = semantics.parse_unit_header(self.data, pos, self.unit_count)        # 2.1 to 2.8
-        passed_over = False
-        if unit.known and unit.unit_type == c.UT_REFINEMENT and self.phase == FRAME:
-            self.frame.units_seen += 1
-            passed_over = unit.refinement > self.op_r or self.dropping
-        if unit.known and not passed_over:                                         # 2.9
-            if unit.unit_type == c.UT_REFINEMENT and self.phase == FRAME:
-                self.refinement_unit(unit)
+        unit = semantics.parse_unit_header(self.data, pos, self.unit_count, self.file_header.profile)   # 2.1 to 2.8
+        frame_unit = unit.known and self.phase == FRAME and unit.unit_type == (
+            c.UT_INCREMENT if self.dynamic else c.UT_REFINEMENT)
+        if unit.known and not self.passed_over(unit, frame_unit):                  # 2.9
+            if frame_unit:
+                self.frame.units_seen += 1
+                self.frame_unit(unit)
             else:
                 self.other_unit(unit)
         self.unit_count += 1
+        if unit.known and unit.unit_type == c.UT_FRAME:
+            self.frame_count += 1
+        self.ledger.add(unit, self.gop)
         return unit.end
+
+    def passed_over(self, unit, frame_unit):
+        """SS-BS-011, step 1 of 7.1.3 and of 7.13.3"""
+        if self.dynamic:
+            layered = unit.unit_type in (c.UT_FRAME, c.UT_CODEBOOK, c.UT_INCREMENT)
+            if layered and self.phase in (GOP, FRAME, BETWEEN):
+                if not points.belongs(unit, self.point, self.sequence, self.gop):
+                    self.used_all = False
+                    if frame_unit and unit.frame == self.frame.number:
+                        self.frame.units_seen += 1
+                    return True
+            over = frame_unit and self.frame.passes_over(unit.refinement)
+        else:
+            over = frame_unit and unit.refinement > self.point[2]
+            if over:
+                self.used_all = False
+            over = over or (frame_unit and self.frame.dropping)
+        if over:
+            self.frame.units_seen += 1
+        return over
 
     def check_payload_crc(self, unit):
         payload = self.data[unit.payload_start:unit.end]
@@ -116,37 +131,71 @@ class Decoder:
         self.check_payload_crc(unit)                                               # 2.10
         self.check_place(unit)                                                     # 2.11
         {c.UT_SEQUENCE: self.on_sequence, c.UT_GOP: self.on_gop, c.UT_FRAME: self.on_frame,
-         c.UT_TRANSFORM: self.on_transform, c.UT_CODEBOOK: self.on_codebook,
+         c.UT_TRANSFORM: self.on_transform, c.UT_CODEBOOK: self.on_codebook, c.UT_POINTS: self.on_points,
          c.UT_INDEX: self.on_index, c.UT_END: self.on_end}[unit.unit_type](unit)   # 2.12
 
     def check_place(self, unit):
-        """9.3 step 2.11, SS-BS-001 to SS-BS-003, SS-BS-006"""
+        """9.3 step 2.11: SS-BS-001 to SS-BS-003, SS-UH-007, SS-BS-006, SS-LO-005, SS-BS-010, SS-BS-009"""
         kind = unit.unit_type
-        allowed = self.phase in ALLOWED[kind]
-        if kind == c.UT_FRAME and self.phase == FRAME and self.frames_left == 0:
+        allowed = self.phase in (ALLOWED_DYNAMIC if self.dynamic else ALLOWED).get(kind, ())
+        if kind == c.UT_FRAME and self.phase in (FRAME, BETWEEN) and self.frames_left == 0:
             allowed = False
         require(allowed, "UNEXPECTED_UNIT", "7.1.2", unit.start)
-        if kind in ENDS_FRAME:
-            if self.frame is not None and self.frame.units_seen == 0:
-                self.errors.append(StreamError("CONSTRAINT", "7.1.3", unit.start))
+        self.check_layers(unit)
+        if kind in CLOSES_GOP or kind == c.UT_FRAME or (kind == c.UT_CODEBOOK and self.dynamic):
+            if self.frame is not None:
+                if self.frame.units_seen == 0:
+                    self.confined(StreamError("CONSTRAINT", "7.1.3", unit.start))
+                elif self.frame.without_reference():
+                    self.confined(StreamError("UNDEFINED", "7.20", unit.start))
             self.end_frame()
-        if kind in (c.UT_GOP, c.UT_INDEX, c.UT_END):
-            require(self.frames_left == 0, "MISMATCH", "7.1.2", unit.start)
+        if kind in CLOSES_GOP:
+            complete = self.phase != GOP if self.gop is not None and self.gop.predicted else self.frames_left == 0
+            require(complete, "MISMATCH", "7.1.2", unit.start)
         if kind == c.UT_GOP and self.next_frame is not None:
-            require(unit.frame == self.next_frame, "MISMATCH", "6.5", unit.at("frame"))
-        if kind in (c.UT_TRANSFORM, c.UT_CODEBOOK, c.UT_FRAME):
-            # in phase GOP no frame of the GOP has come, so next_frame is the first frame of the GOP
-            require(unit.frame == self.next_frame, "MISMATCH", "7.1.2", unit.at("frame"))
+            require(unit.frame == self.next_frame + self.frames_left, "MISMATCH", "6.5", unit.at("frame"))
+        if kind in (c.UT_TRANSFORM, c.UT_CODEBOOK):
+            require(unit.frame == self.gop_header_frame, "MISMATCH", "7.1.2", unit.at("frame"))
+        if kind == c.UT_FRAME:
+            later = self.gop is not None and self.gop.predicted and self.phase != GOP
+            last = self.next_frame + self.frames_left - 1 if later else self.next_frame
+            require(self.next_frame <= unit.frame <= last, "MISMATCH", "7.1.2", unit.at("frame"))
+            if self.dynamic:                                                       # SS-BS-009
+                frame_type, layer, _ = self.gop.order(unit.frame)
+                require(unit.temporal_layer == layer, "MISMATCH", "7.13", unit.at("temporal_layer"))
+                spatial = 0 if frame_type == c.TYPE_I else self.sequence.top
+                require(unit.spatial_layer == spatial, "MISMATCH", "7.13", unit.at("spatial_layer"))
+
+    def check_layers(self, unit):
+        """The second part of SS-UH-007"""
+        if self.dynamic and self.sequence is not None:
+            for element, count in (("spatial_layer", self.sequence.spatial_layer_count),
+                                   ("temporal_layer", self.sequence.temporal_layer_count)):
+                require(getattr(unit, element) < count, "OUT_OF_RANGE", "6.3", unit.at(element))
 
     def end_frame(self):
         if self.frame is not None:
+            self.check_carried(self.frame)
             self.frames.append(self.frame)
             self.frame = None
+
+    def check_carried(self, frame):
+        """SS-DG-007: the digest of what the frame carries where it is shown."""
+        at = frame.shown_at() if self.file_header.profile == 1 else None
+        if at is not None:
+            header = frame.increments[at]
+            if header.carried_digest != frame.carried_digest(at[1], frame.carried_lists):
+                self.errors.append(StreamError("DIGEST", "7.18", header.at("carried_digest")))
+
+    def confined(self, error):
+        self.errors.append(error)
+        self.frame.dropping = True
+        self.frame.erroneous = True
 
     # ---- effects of 7.1.2 ----
 
     def on_sequence(self, unit):
-        sequence = semantics.parse_sequence_parameters(self.payload_reader(unit))
+        sequence = semantics.parse_sequence_parameters(self.payload_reader(unit), self.file_header.profile)
         payload = self.data[unit.payload_start:unit.end]
         if self.phase == START:
             self.sequence, self.sequence_payload = sequence, payload
@@ -155,12 +204,16 @@ class Decoder:
             require(payload == self.sequence_payload, "CONSTRAINT", "6.4", unit.payload_start)
 
     def on_gop(self, unit):
-        gop = semantics.parse_gop_header(self.payload_reader(unit), unit, self.next_gop)
+        gop = semantics.parse_gop_header(self.payload_reader(unit), unit, self.next_gop, self.file_header.profile,
+                                         self.sequence.temporal_layer_count)
         self.gops.append((unit.frame, unit.start))
+        self.gop_frames += gop.gop_frame_count
+        self.gop_header_frame = unit.frame
         self.undefine()
         self.frames_left = gop.gop_frame_count
         self.next_gop = gop.gop_index + 1
         self.next_frame = unit.frame
+        self.gop = Gop(gop, unit.frame) if self.dynamic else None
         self.phase = GOP
 
     def on_transform(self, unit):
@@ -170,20 +223,30 @@ class Decoder:
         target[transform.transform_id] = transform
 
     def on_codebook(self, unit):
-        book = semantics.parse_codebook(self.payload_reader(unit), self.codebook)
+        book = semantics.parse_codebook(self.payload_reader(unit), self.codebook,
+                                        unit.temporal_layer if self.dynamic else None)
         self.codebook[book.codebook_id] = book
+        if self.phase == FRAME:
+            self.phase = BETWEEN
 
     def on_frame(self, unit):
-        header = semantics.parse_frame_header(self.payload_reader(unit), self.dc_transform,
-                                              self.sh_transform, self.file_header.level)
-        self.frames_left -= 1
-        self.next_frame += 1
-        self.frame_count += 1
-        self.next_refinement = 0
-        self.dropping = False
-        self.models = None
-        self.frame = Frame(unit.frame, header, 13 + self.sequence.sh_planes)
+        frame_type = self.gop.order(unit.frame)[0] if self.dynamic else None
+        header = semantics.parse_frame_header(self.payload_reader(unit), self.dc_transform, self.sh_transform,
+                                              self.file_header.level, frame_type)
+        self.frames_left -= unit.frame + 1 - self.next_frame
+        self.next_frame = unit.frame + 1
+        if self.dynamic:
+            self.frame = DynamicFrame(unit.frame, header, self.gop, self.sequence)
+            self.gop.frames[unit.frame - self.gop.first_frame] = self.frame
+        else:
+            self.frame = Frame(unit.frame, header, 13 + self.sequence.sh_planes)
         self.phase = FRAME
+
+    def on_points(self, unit):
+        entries = parse_points(self.payload_reader(unit))
+        if not self.inside and self.used_all and not self.errors:
+            points.check_points(entries, self.ledger, self.frames, self.sequence, self.file_header.profile)
+        self.phase = LISTED
 
     def on_index(self, unit):
         semantics.parse_index(self.payload_reader(unit), None if self.inside else self.gops)
@@ -191,66 +254,58 @@ class Decoder:
         self.phase = INDEXED
 
     def on_end(self, unit):
-        semantics.parse_end(self.payload_reader(unit), self.sequence, self.frame_count,
+        semantics.parse_end(self.payload_reader(unit), self.sequence, self.frame_count, self.gop_frames,
                             self.unit_count, self.index_offset, self.inside)
         self.phase = ENDED
 
-    # ---- 7.1.3 ----
+    # ---- 7.1.3 and 7.13.3 ----
 
-    def refinement_unit(self, unit):
-        """Steps 2 to 6; step 1 is in unit()."""
+    def frame_unit(self, unit):
+        """Steps 2 to 6; step 1 is in passed_over()."""
         try:
             self.check_payload_crc(unit)                                           # step 2
         except StreamError as error:
             return self.confined(error)
-        require(unit.frame == self.frame.number, "MISMATCH", "7.1.2", unit.at("frame"))   # step 3, fatal
+        self.check_layers(unit)                                                    # step 3, fatal
+        require(unit.frame == self.frame.number, "MISMATCH", "7.1.2", unit.at("frame"))
+        if self.dynamic:
+            require(unit.temporal_layer == self.frame.layer, "MISMATCH", "7.13", unit.at("temporal_layer"))
+            good = self.frame.intra or unit.spatial_layer == self.sequence.top
+            require(good, "MISMATCH", "7.13", unit.at("spatial_layer"))
         try:
-            r = unit.refinement
-            expected = r == self.next_refinement and r < self.sequence.refinement_count
-            require(expected, "UNEXPECTED_UNIT", "7.1.3", unit.at("refinement"))   # step 4
-            planes, digests, models = self.decode_refinement(unit)                 # step 5
+            if self.dynamic:
+                self.increment_unit(unit)
+            else:
+                self.refinement_unit(unit)
         except StreamError as error:
             return self.confined(error)
-        for whole, part in zip(self.frame.planes, planes):                         # step 6
-            whole.extend(part)
-        self.frame.digests.append(digests)
-        self.next_refinement += 1
-        if models is not None:
-            self.models = models
 
-    def confined(self, error):
-        self.errors.append(error)
-        self.dropping = True
+    def refinement_unit(self, unit):
+        """Steps 4 to 6 of 7.1.3"""
+        frame, r = self.frame, unit.refinement
+        expected = r == frame.refinements and r < self.sequence.refinement_count
+        require(expected, "UNEXPECTED_UNIT", "7.1.3", unit.at("refinement"))
+        header = frame.header
+        frame.append(*decode_refinement(self.payload_reader(unit), unit, frame, self.sequence,
+                                        self.dc_transform[header.dc_transform_id],
+                                        self.sh_transform.get(header.sh_transform_id), self.codebook))
 
-    def decode_refinement(self, unit):
-        """Canonical planes, digests and models (None without Gaussians) of a refinement unit."""
-        seq, header, r = self.sequence, self.frame.header, unit.refinement
-        n_total = header.gaussian_count
-        expected = (reconstruction.prefix_count(seq, n_total, r)
-                    - reconstruction.prefix_count(seq, n_total, r - 1))
-        dc_transform = self.dc_transform[header.dc_transform_id]
-        sh_transform = self.sh_transform.get(header.sh_transform_id)
-        body = semantics.parse_refinement(self.payload_reader(unit), seq, header, expected,
-                                          sh_transform, self.codebook)
-        planes = [[] for _ in self.frame.planes]
-        by_identity = None
-        if body.gaussian_count > 0:
-            coded = plane_models.coded_planes(dc_transform.rank, body.sh_mode,
-                                              sh_transform.rank if sh_transform else 0,
-                                              body.vq_stage_count)
-            models = plane_models.parse_models(body.models_section, coded, self.models)
-            by_identity = {p.identity(): m for p, m in zip(coded, models)}
-            left = body.gaussian_count
-            for section in body.block_sections:
-                n = min(left, 2 ** seq.block_log2)
-                left -= n
-                block_at = section.pos
-                e = BlockDecoder(section, coded, models, 2 ** body.lanes_log2, n).decode()
-                block = reconstruction.BlockValues(e, coded, models, body, seq, dc_transform,
-                                                   sh_transform, self.codebook, block_at)
-                for whole, part in zip(planes, block.canonical()):
-                    whole.extend(part)
-        digests = reconstruction.unit_digests(planes)
-        digest = reconstruction.frame_digest(self.frame.digests + [digests])
-        require(digest == body.refinement_digest, "DIGEST", "7.9", body.at("refinement_digest"))
-        return planes, digests, by_identity
+    def increment_unit(self, unit):
+        """Steps 4 to 6 of 7.13.3"""
+        frame, s, r = self.frame, unit.spatial_layer, unit.refinement
+        require(frame.expects(s, r), "UNEXPECTED_UNIT", "7.13", unit.at("refinement"))
+        increment = Increment(unit, frame, self.context())
+        increment.decode(self.payload_reader(unit), self.file_header.level, frame.models_in_force(s, r))
+        header = increment.header
+        digest = frame.refinement_digest(s, r, increment.home)                     # SS-IN-008
+        require(header.refinement_digest == digest, "DIGEST", "7.18", header.at("refinement_digest"))
+        carried_lists = frame.carried_lists
+        if r == 0 and not frame.intra:
+            carried_lists = frame.carried(increment.cells)
+        frame.accept(s, r, increment, carried_lists)
+
+    def context(self):
+        """Definitions that the frame in progress uses."""
+        header = self.frame.header
+        return Context(self.sequence, self.dc_transform[header.dc_transform_id],
+                       self.sh_transform.get(header.sh_transform_id), self.codebook)

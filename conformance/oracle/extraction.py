@@ -1,10 +1,13 @@
-"""Clause 7.11: extraction, for a conforming stream."""
+"""Clause 7.11: extraction, for a conforming stream; in profile 1 with 7.19."""
 
 import struct
 
 import constants as c
-from conventions import crc32
-from semantics import parse_unit_header
+from conventions import ByteReader, crc32
+from dynamic import Gop
+from points import belongs
+from semantics import parse_file_header, parse_gop_header, parse_sequence_parameters, parse_unit_header
+from semantics_dynamic import parse_points
 
 
 def rewritten(data, unit, payload):
@@ -14,26 +17,40 @@ def rewritten(data, unit, payload):
     return head + struct.pack("<H", crc32(head + tail) & 0xFFFF) + tail + payload
 
 
-def extract(data, op_r):
+def extract(data, point):
+    """The bytes of the extraction at an operating point (op_s, op_t, op_r)."""
+    profile = parse_file_header(data).profile
     out = bytearray(data[:c.FILE_HEADER_BYTES])
     gops, frame_count, unit_count, index_offset = [], 0, 0, 0
+    seq, gop = None, None
     pos = c.FILE_HEADER_BYTES
     while True:
-        unit = parse_unit_header(data, pos, 0)
+        unit = parse_unit_header(data, pos, 0, profile)
         pos = unit.end
+        kind = unit.unit_type
         whole = data[unit.start:unit.end]
-        if unit.unit_type == c.UT_END:
+        reader = ByteReader(data, unit.payload_start, unit.end)
+        if kind == c.UT_END:
             out += rewritten(data, unit, struct.pack("<IIQ", frame_count, unit_count, index_offset))
             return bytes(out)
-        if op_r is not None and unit.refinement > op_r:
-            continue
-        if unit.unit_type == c.UT_GOP:
+        if kind == c.UT_SEQUENCE:
+            seq = parse_sequence_parameters(reader, profile)
+        if kind == c.UT_GOP:
             gops.append((unit.frame, len(out)))
-        if unit.unit_type == c.UT_FRAME:
-            frame_count += 1
-        if unit.unit_type == c.UT_INDEX:
+            header = parse_gop_header(reader, unit, None, profile, seq.temporal_layer_count)
+            gop = Gop(header, unit.frame) if profile == c.PROFILE_DYNAMIC else None
+        if kind == c.UT_POINTS:
+            kept = b"".join(data[entry.at("spatial_layer"):entry.at("spatial_layer") + 24]
+                            for entry in parse_points(reader)
+                            if all(a <= b for a, b in zip(entry.point, point)))
+            whole = rewritten(data, unit, struct.pack("<HH", len(kept) // 24, 0) + kept)
+        elif kind == c.UT_INDEX:
             index_offset = len(out)
             entries = b"".join(struct.pack("<IIQ", frame, 0, offset) for frame, offset in gops)
             whole = rewritten(data, unit, struct.pack("<I", len(gops)) + entries)
+        elif not belongs(unit, point, seq, gop):
+            continue
+        if kind == c.UT_FRAME:
+            frame_count += 1
         out += whole
         unit_count += 1

@@ -27,10 +27,34 @@ class Plane:
 
 
 def coded_planes(dc_rank, sh_mode, sh_rank, vq_stage_count):
+    """The planes of a refinement unit; those of section new are the same."""
+    return planes_of_rows([("position", 1, "position")]
+                          + attribute_rows(dc_rank, sh_mode, sh_rank, vq_stage_count))
+
+
+def section_planes(name, dc_rank, sh_mode, sh_rank, vq_stage_count):
+    """The planes of a section of an increment."""
+    if name == "new":
+        return coded_planes(dc_rank, sh_mode, sh_rank, vq_stage_count)
+    if name == "updates":
+        return planes_of_rows(attribute_rows(dc_rank, sh_mode, sh_rank, vq_stage_count))
+    return planes_of_rows({
+        "cells": [("cell", 1, "position"), ("stale", 1, "signed"),
+                  ("translation", 3, "signed"), ("turn", 3, "signed")],
+        "modes": [("mode", 1, "signed")],
+        "moves": [("move", 3, "signed")],
+        "predictors": [("predictor", 1, "signed")],
+    }[name])
+
+
+def attribute_rows(dc_rank, sh_mode, sh_rank, vq_stage_count):
     sh_count = {0: 0, 1: sh_rank, 2: vq_stage_count}[sh_mode]
     sh_alphabet = "index" if sh_mode == 2 else "signed"
-    rows = [("position", 1, "position"), ("log_scale", 3, "signed"), ("opacity", 1, "signed"),
-            ("rotation", 3, "signed"), ("dc", dc_rank, "signed"), ("sh", sh_count, sh_alphabet)]
+    return [("log_scale", 3, "signed"), ("opacity", 1, "signed"), ("rotation", 3, "signed"),
+            ("dc", dc_rank, "signed"), ("sh", sh_count, sh_alphabet)]
+
+
+def planes_of_rows(rows):
     planes = []
     for attribute, count, alphabet in rows:
         for place in range(count):
@@ -70,6 +94,22 @@ def source_available(source, plane):
     raise AssertionError("sources of 11 and more do not get here")
 
 
+def source_available_in_section(source, plane):
+    """SS-EC-007: the sections cells, modes, moves, updates and predictors."""
+    first_index = plane.alphabet == "index" and plane.place == 0
+    if source == 0:
+        return True
+    if source == 1:
+        return plane.alphabet != "index"
+    if source == 2:
+        return plane.alphabet == "signed"
+    if source == 3:
+        return plane.number > 0 and plane.attribute != "stale" and not first_index
+    if source == 4:
+        return plane.place >= 1
+    return False
+
+
 # ---- 5.12 plane_model ----
 
 
@@ -91,8 +131,8 @@ class Table:
         assert total == FREQ_SUM
 
 
-def parse_models(section, planes, previous):
-    """`previous`: identity -> PlaneModel of the last unit of the frame with Gaussians, or None."""
+def parse_models(section, planes, previous, available=source_available):
+    """`previous`: identity -> PlaneModel that `reuse` may name (SS-PM-001, SS-PM-010), or None."""
     bits = BitReader(section.data, section.pos, section.end, "6.12")
     models = []
     for plane in planes:
@@ -106,7 +146,7 @@ def parse_models(section, planes, previous):
     bits.check_end()
     for plane, model in zip(planes, models):                       # SS-PM-003
         for source in (model.source_a, model.source_b):
-            require(source_available(source, plane), "CONSTRAINT", "6.12", bits.byte())
+            require(available(source, plane), "CONSTRAINT", "6.12", bits.byte())
     return models
 
 
@@ -130,10 +170,9 @@ def parse_plane_model(bits, plane):
         model.source_b = parse_source(bits)
         if model.source_b != 0:
             count = bits.u(4) + 1
-            contexts = (len(model.thresholds_a) + 1) * (count + 1)     # SS-PM-005
-            require(contexts <= MAX_CONTEXTS, "CONSTRAINT", "6.12", bits.byte())
             model.thresholds_b = parse_thresholds(bits, count)
     context_count = (len(model.thresholds_a) + 1) * (len(model.thresholds_b) + 1)
+    require(context_count <= MAX_CONTEXTS, "CONSTRAINT", "6.12", bits.byte())      # SS-PM-005
     model.tables = parse_tables(bits, context_count, plane.largest_token(model.direct_log2))
     return model
 

@@ -55,12 +55,12 @@ def rotations(step, planes):
     return result
 
 
-def write_frame(folder, frame, seq, with_floats):
+def write_frame(folder, number, planes, seq, with_floats):
     os.makedirs(folder, exist_ok=True)
-    for p, plane in enumerate(frame.planes):
-        with open(os.path.join(folder, "f%04d.p%02d.i32le" % (frame.number, p)), "wb") as f:
+    for p, plane in enumerate(planes):
+        with open(os.path.join(folder, "f%04d.p%02d.i32le" % (number, p)), "wb") as f:
             f.write(i32le(plane))
     if with_floats:
-        for name, values in float_planes(seq, frame.planes).items():
-            with open(os.path.join(folder, "f%04d.%s.f32" % (frame.number, name)), "wb") as f:
+        for name, values in float_planes(seq, planes).items():
+            with open(os.path.join(folder, "f%04d.%s.f32" % (number, name)), "wb") as f:
                 f.write(struct.pack("<%df" % len(values), *values))

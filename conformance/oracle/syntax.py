@@ -54,7 +54,8 @@ GOP_HEADER = [
     ("gop_index", "u32", 1, "6.5"),
     ("gop_frame_count", "u32", 1, "6.5"),
     ("gop_structure", "u8", 1, "6.5"),
-    ("reserved_zero", "u8", 3, "6.5"),
+    ("temporal_depth", "u8", 1, "6.5"),
+    ("reserved_zero", "u8", 2, "6.5"),
 ]
 
 FRAME_HEADER = [
@@ -101,6 +102,44 @@ END = [
     ("frame_count", "u32", 1, "6.11"),
     ("unit_count", "u32", 1, "6.11"),
     ("index_offset", "u64", 1, "6.11"),
+]
+
+INCREMENT_FIXED = [
+    ("refinement_digest", "u64", 1, "6.14"),
+    ("carried_digest", "u64", 1, "6.14"),
+    ("parent_count", "u32", 1, "6.14"),
+    ("cell_count", "u32", 1, "6.14"),
+    ("move_count", "u32", 1, "6.14"),
+    ("update_count", "u32", 1, "6.14"),
+    ("remove_count", "u32", 1, "6.14"),
+    ("new_count", "u32", 1, "6.14"),
+    ("position_shift", "u8", 1, "6.14"),
+    ("attribute_shift", "u8", 5, "6.14"),
+    ("cell_log2", "u8", 1, "6.14"),
+    ("predictor_block_log2", "u8", 1, "6.14"),
+    ("neighbour_count", "u8", 1, "6.14"),
+    ("bilateral_spatial", "u8", 1, "6.14"),
+    ("bilateral_feature", "u8", 1, "6.14"),
+    ("sh_mode", "u8", 1, "6.14"),
+    ("vq_stage_count", "u8", 1, "6.14"),
+    ("codebook_ids", "u8", 4, "6.14"),
+    ("compensation_log_scale", "i8", 1, "6.14"),
+    ("compensation_opacity", "i8", 1, "6.14"),
+]
+
+POINTS_FIXED = [
+    ("point_count", "u16", 1, "6.16"),
+    ("reserved_zero", "u16", 1, "6.16"),
+]
+
+OPERATING_POINT = [
+    ("spatial_layer", "u8", 1, "6.16"),
+    ("temporal_layer", "u8", 1, "6.16"),
+    ("refinement", "u8", 1, "6.16"),
+    ("reserved_zero", "u8", 1, "6.16"),
+    ("frame_count", "u32", 1, "6.16"),
+    ("gaussian_count", "u64", 1, "6.16"),
+    ("byte_count", "u64", 1, "6.16"),
 ]
 
 

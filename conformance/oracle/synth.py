@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Writes random conforming streams that use every tool of version 1.0: synth.py SEED OUT.gss
+"""Writes random conforming streams that use every tool of version 1.0: synth.py SEED OUT.gss [0 | 1]
+
+The last argument is the profile, 0 if there is none; streams of profile 1 are made in synth_dynamic.py.
 
 The values have no meaning: tokens are drawn from random tables. It serves to reach the paths that
 streams of an ordinary encoder leave out (position_shift, rotation thresholds, VQ stages, 16-bit
@@ -12,46 +14,11 @@ import sys
 
 import models as pm
 from constants import SIGNATURE
-from conventions import ByteReader, crc32, unzigzag
+from conventions import ByteReader, crc32
+from encoding import Bits, leb, rans, unit
 from parsing import BlockDecoder
 from reconstruction import BlockValues, frame_digest, prefix_count, unit_digests
 from semantics import parse_codebook, parse_sequence_parameters, parse_transform
-
-
-class Bits:
-    def __init__(self):
-        self.value, self.count = 0, 0
-
-    def u(self, value, n):
-        assert 0 <= value < 1 << n
-        self.value |= value << self.count
-        self.count += n
-
-    def ue(self, value):
-        z = (value + 1).bit_length() - 1
-        self.u(0, z)
-        self.u(1, 1)
-        self.u(value + 1 - 2 ** z, z)
-
-    def se(self, value):
-        self.ue(2 * value - 1 if value > 0 else -2 * value)
-
-    def bytes(self):
-        return self.value.to_bytes((self.count + 7) // 8, "little")
-
-
-def leb(value):
-    out = bytearray()
-    while value > 127:
-        out.append(value & 127 | 128)
-        value >>= 7
-    return bytes(out + bytes([value]))
-
-
-def unit(kind, payload, frame=0, refinement=0, flags=None):
-    head = bytes([kind, (0 if kind == 7 else 1) if flags is None else flags, 0, 0, refinement, 0])
-    tail = struct.pack("<III", frame, len(payload), crc32(payload))
-    return head + struct.pack("<H", crc32(head + tail) & 0xFFFF) + tail + payload
 
 
 class Synth:
@@ -265,17 +232,19 @@ class Synth:
         context.lanes, context.symbol = lanes, symbol
         for plane, model in zip(planes, models):
             context.decode_plane(plane, model)
-        x, words = [65536] * lanes, []
-        for lane, freq, cum in reversed(symbols):
-            if x[lane] >= freq << 20:
-                words.append(x[lane] & 0xFFFF)
-                x[lane] >>= 16
-            x[lane] = ((x[lane] // freq) << 12) + x[lane] % freq + cum
-        words.reverse()
-        block = leb(len(words)) + struct.pack("<%dI" % lanes, *x) + struct.pack("<%dH" % len(words), *words)
-        return context.e, block + raw.bytes()
+        return context.e, rans(symbols, lanes) + raw.bytes()
+
+
+def main():
+    seed, path = int(sys.argv[1]), sys.argv[2]
+    if sys.argv[3:] == ["1"]:
+        from synth_dynamic import valid_stream
+        data = valid_stream(seed)
+    else:
+        data = Synth(seed).stream()
+    with open(path, "wb") as f:
+        f.write(data)
 
 
 if __name__ == "__main__":
-    with open(sys.argv[2], "wb") as f:
-        f.write(Synth(int(sys.argv[1])).stream())
+    main()

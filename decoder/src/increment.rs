@@ -9,4 +9,4 @@ pub mod values;
 
 mod apply;
 
-pub use apply::{Applied, Situation, Unit, apply, field};
+pub use apply::{Applied, Situation, Unit, apply, field, reference_set};

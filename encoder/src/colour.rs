@@ -123,26 +123,38 @@ pub(crate) fn plan_sh(
     }
     let rank = usize::from(transform.header.rank);
     let rows = sampled_rows(transform, planes, step, (count / (2 * TRIAL)).max(1));
-    let (training, test) = vq::halves(&rows, rank);
     let entries = vq::entry_count(gaussians_of_gop, choice == ShChoice::VectorQuantised);
-    let book = vq::train(&training, rank, entries.min(training.len() / rank / 4).max(1));
-    let (indices, error) = vq::assign(&book, &test, rank);
-    let tested = (test.len() / rank).max(1) as f64;
-    let carried = vq::bits_of(&book, rank) / gaussians_of_gop.max(1) as f64;
-    let by_vq = (entropy_of(&indices) / tested + carried, error / tested);
-    let by_coefficients = coefficient_cost(&test, rank);
-    const BIT: f64 = 2.0 * core::f64::consts::LN_2 / 12.0;
-    let cost = |(bits, error): (f64, f64)| error + BIT * bits;
-    let trial = Some([by_coefficients, by_vq]);
-    if choice == ShChoice::Auto && cost(by_coefficients) <= cost(by_vq) {
+    let (trial, pays) = compare(&rows, rank, gaussians_of_gop, entries);
+    let trial = Some(trial);
+    if choice == ShChoice::Auto && !pays {
         return ShPlan { trial, ..coefficients };
     }
     let all = sampled_rows(transform, planes, step, (count / (vq::TRAINING_PER_ENTRY * entries)).max(1));
     ShPlan { codebooks: vec![vq::train(&all, rank, entries.min(count))], trial }
 }
 
+/// Bits a Gaussian and squared error of coefficients and of a codebook, on the rows of a sample that the codebook was
+/// not trained on; and whether the codebook has the lower cost. Its entries are shared by `gaussians`.
+pub(crate) fn compare(
+    rows: &[f32],
+    rank: usize,
+    gaussians: usize,
+    entries: usize,
+) -> ([(f64, f64); 2], bool) {
+    let (training, test) = vq::halves(rows, rank);
+    let book = vq::train(&training, rank, entries.min(training.len() / rank / 4).max(1));
+    let (indices, error) = vq::assign(&book, &test, rank);
+    let tested = (test.len() / rank).max(1) as f64;
+    let carried = vq::bits_of(&book, rank) / gaussians.max(1) as f64;
+    let by_vq = (entropy_of(&indices) / tested + carried, error / tested);
+    let by_coefficients = coefficient_cost(&test, rank);
+    const BIT: f64 = 2.0 * core::f64::consts::LN_2 / 12.0;
+    let cost = |(bits, error): (f64, f64)| error + BIT * bits;
+    ([by_coefficients, by_vq], cost(by_vq) < cost(by_coefficients))
+}
+
 /// The components of every `stride`-th Gaussian, one behind the other.
-fn sampled_rows(transform: &Transform, planes: &[&[f32]], step: f32, stride: usize) -> Vec<f32> {
+pub(crate) fn sampled_rows(transform: &Transform, planes: &[&[f32]], step: f32, stride: usize) -> Vec<f32> {
     let sampled: Vec<Vec<f32>> =
         planes.iter().map(|plane| plane.iter().step_by(stride).copied().collect()).collect();
     let sampled: Vec<&[f32]> = sampled.iter().map(Vec::as_slice).collect();

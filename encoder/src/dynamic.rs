@@ -6,6 +6,7 @@ mod predicted;
 mod predictors;
 mod survivors;
 mod unit;
+mod wanted;
 
 use crate::canonical::{canonicalise, visible};
 use crate::colour;
@@ -14,9 +15,10 @@ use crate::importance::Ranking;
 use crate::lattice::geometry;
 use crate::matching::{Cloud, Matching, Measure, shares_little};
 use crate::section::SectionPlan;
-use crate::settings::{Settings, Structure};
+use crate::settings::{Settings, ShChoice, Structure};
 use crate::source::FrameSource;
 use crate::stream::{FrameReport, GopTools, Prepared, Progress, Report, UnitWriter, sh_planes};
+use crate::vq;
 use align::Namings;
 use anchor::{AnchorTarget, code_anchor};
 use predicted::{Predicted, ReferenceCloud};
@@ -24,13 +26,24 @@ use predictors::Chooser;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::frame_state::FrameState;
 use splatstream_decoder::layout::ShCoding;
+use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::{
-    FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, PlaceInGop, SequenceParameters, UnitId,
-    UnitType,
+    FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, PlaceInGop, SequenceParameters,
+    UnitHeader, UnitId, UnitType,
 };
 use splatstream_scene::GaussianFrame;
 use survivors::Survivors;
 use unit::{UnitCoder, sh_header};
+use wanted::Wanted;
+
+/// Frames of a predicted GOP, at most (6.5).
+const MOST_FRAMES: u32 = 1024;
+
+/// Pairs on which coefficients and a codebook of SH residuals are compared, and on which the codebook is trained.
+const TRIAL: usize = 1 << 13;
+
+/// Entries of a codebook of SH residuals, at most: it is carried with each frame.
+const RESIDUAL_ENTRIES: usize = 256;
 
 /// Rows of the same Gaussian may differ by this many steps in attributes that motion leaves alone.
 const SAME: f32 = 1.5;
@@ -90,10 +103,14 @@ pub(crate) struct Dynamic<'a, 'w> {
 
 /// A GOP while its frames are being coded.
 struct Gop {
+    /// Display index of its first frame.
+    first: u32,
     header: GopHeader,
     tools: GopTools,
     /// The last frame of each temporal layer and its number.
     references: Vec<Option<(u32, Reference)>>,
+    /// The units after the GOP header.
+    units: Vec<(UnitId, Vec<u8>)>,
 }
 
 impl Dynamic<'_, '_> {
@@ -105,28 +122,9 @@ impl Dynamic<'_, '_> {
         let mut first = 0;
         let frames = self.source.len();
         while first < frames {
-            let last = frames.min(first + self.settings.gop.min(1024));
-            let end = self.cut(first, last)?;
-            self.gop(first, end, progress)?;
-            first = end;
+            first = self.gop(first, frames.min(first + self.settings.gop.min(MOST_FRAMES)), progress)?;
         }
         Ok(())
-    }
-
-    /// The end of a GOP: before `last` where a frame shares little with the one before.
-    fn cut(&mut self, first: u32, last: u32) -> Result<u32, Error> {
-        if self.layers() == 0 {
-            return Ok(last);
-        }
-        let mut before = self.target(first)?;
-        for number in first + 1..last {
-            let target = self.target(number)?;
-            if shares_little(&self.continued(&before, &target)) {
-                return Ok(number);
-            }
-            before = target;
-        }
-        Ok(last)
     }
 
     /// Temporal layers; 0 where no frame refers to another.
@@ -139,11 +137,6 @@ impl Dynamic<'_, '_> {
 
     fn measure(&self) -> Measure {
         Measure { position_step: self.sequence.position_step(), steps: self.settings.steps, same: SAME }
-    }
-
-    fn continued(&self, before: &Target, target: &Target) -> Matching {
-        let bits = self.sequence.position_bits;
-        crate::motion::follow::follow(&before.cloud(), &target.cloud(), &self.measure(), bits)
     }
 
     fn target(&mut self, number: u32) -> Result<Target, Error> {
@@ -159,40 +152,56 @@ impl Dynamic<'_, '_> {
         Ok(Target { frame, position, rows, row_count })
     }
 
-    fn gop(&mut self, first: u32, end: u32, progress: Progress<'_>) -> Result<(), Error> {
-        let gop_index = self.index.len() as u32;
-        self.index.push(IndexEntry { frame: first, reserved_zero: 0, offset: self.writer.offset });
-        let header = match self.layers() {
-            0 => GopHeader::intra(gop_index, end - first),
-            layers => GopHeader::predicted(gop_index, end - first, layers - 1),
+    /// Codes a GOP of the frames from `first` up to `last` at most, and gives the frame after it: it ends where a
+    /// frame shares little with the one it would refer to.
+    fn gop(&mut self, first: u32, last: u32, progress: Progress<'_>) -> Result<u32, Error> {
+        let target = self.target(first)?;
+        let tools = self.tools(&target, last - first);
+        let mut gop = Gop {
+            first,
+            header: self.header(last - first),
+            units: tools.units(&self.sequence, first)?,
+            tools,
+            references: (0..self.layers().max(1)).map(|_| None).collect(),
         };
-        self.writer.unit(UnitId::of_frame(UnitType::GopHeader, first), &header.to_bytes()?)?;
-        let mut gop: Option<Gop> = None;
-        for number in first..end {
-            let target = self.target(number)?;
-            self.report.invisible += u64::from(target.row_count) - target.frame.len() as u64;
-            self.report.gaussians += target.frame.len() as u64;
-            let place = header.place(number - first);
-            match (&mut gop, place.reference) {
-                (Some(gop), Some(reference)) => {
-                    self.predicted(gop, number, &place, first + reference, &target)?
-                }
-                (Some(gop), None) => self.intra(gop, number, target)?,
-                (None, _) => {
-                    let tools = self.tools(&target, first, end - first)?;
-                    let references = (0..self.layers().max(1)).map(|_| None).collect();
-                    let mut made = Gop { header, tools, references };
-                    self.intra(&mut made, number, target)?;
-                    gop = Some(made);
+        if first == 0 {
+            gop.tools.report(self.report);
+        }
+        self.intra(&mut gop, first, target)?;
+        let mut end = first + 1;
+        progress(end, self.source.len());
+        while end < last {
+            let target = self.target(end)?;
+            let place = gop.header.place(end - first);
+            match place.reference {
+                None => self.intra(&mut gop, end, target)?,
+                Some(reference) => {
+                    if !self.predicted(&mut gop, end, &place, first + reference, &target)? {
+                        break;
+                    }
                 }
             }
-            progress(number + 1, self.source.len());
+            end += 1;
+            progress(end, self.source.len());
         }
-        Ok(())
+        let header = self.header(end - first);
+        self.index.push(IndexEntry { frame: first, reserved_zero: 0, offset: self.writer.offset });
+        self.writer.unit(UnitId::of_frame(UnitType::GopHeader, first), &header.to_bytes()?)?;
+        gop.units.iter().try_for_each(|(id, payload)| self.writer.unit(*id, payload))?;
+        Ok(end)
+    }
+
+    /// The header of a GOP of some frames.
+    fn header(&self, frames: u32) -> GopHeader {
+        let gop_index = self.index.len() as u32;
+        match self.layers() {
+            0 => GopHeader::intra(gop_index, frames),
+            layers => GopHeader::predicted(gop_index, frames, layers - 1),
+        }
     }
 
     /// Transforms and codebooks, made for the first frame.
-    fn tools(&mut self, target: &Target, first: u32, frames: u32) -> Result<GopTools, Error> {
+    fn tools(&self, target: &Target, frames: u32) -> GopTools {
         let prepared = Prepared {
             frame: target.frame.clone(),
             order: Vec::new(),
@@ -200,8 +209,7 @@ impl Dynamic<'_, '_> {
         };
         let mut tools = GopTools::new(&prepared, &self.sequence, self.settings, frames);
         tools.keep_zero();
-        tools.write(self.writer, &self.sequence, first, self.report)?;
-        Ok(tools)
+        tools
     }
 
     fn intra(&mut self, gop: &mut Gop, number: u32, target: Target) -> Result<(), Error> {
@@ -218,22 +226,23 @@ impl Dynamic<'_, '_> {
                 None => colour::components(transform, &planes, step, &spacing),
                 Some(book) => vec![colour::indices(transform, &planes, step, book)],
             });
-        let coder = self.coder(gop, true);
+        let coder = self.coder(gop, None);
+        let wanted = Wanted::new(&geometry, &dc, &sh, &coder.colour, planes.len())?;
         let anchor = AnchorTarget {
-            geometry: &geometry,
-            dc: &dc,
-            sh: &sh,
+            number,
+            wanted: &wanted,
             order: &order,
             rows: &target.rows,
             row_count: target.row_count,
         };
         let (units, reference) = code_anchor(&coder, &anchor, Chooser(self.settings.predictors))?;
         let place = PlaceInGop { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
-        self.write_frame(gop, number, &place, target.frame.len(), &units)?;
+        self.write_frame(gop, number, &place, (target.frame.len(), target.row_count), &units)?;
         gop.keep(0, number, reference);
         Ok(())
     }
 
+    /// Codes a frame that refers to another; false, and nothing done, if it shares too little with it.
     fn predicted(
         &mut self,
         gop: &mut Gop,
@@ -241,83 +250,126 @@ impl Dynamic<'_, '_> {
         place: &PlaceInGop,
         reference: u32,
         target: &Target,
-    ) -> Result<(), Error> {
+    ) -> Result<bool, Error> {
         let found = gop.references.iter().flatten().find(|(number, _)| *number == reference);
-        let Some((_, reference)) = found else { return Ok(()) };
+        let Some((_, reference)) = found else { return Ok(false) };
         let measure = self.measure();
         let cloud = ReferenceCloud::new(reference, &self.sequence);
         let mut matching = cloud.matching(target, &measure, self.sequence.position_bits);
+        if shares_little(&matching) && !target.frame.is_empty() {
+            return Ok(false);
+        }
         if !self.settings.tools.survivors {
             matching.target_of.iter_mut().for_each(|partner| *partner = None);
         }
+        let mut survivors = Survivors {
+            target,
+            sequence: &self.sequence,
+            steps: &self.settings.steps,
+            dc: &gop.tools.dc,
+            sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
+            namings: Namings::new(),
+            book: None,
+        };
+        let book = self.residual_book(gop, &survivors, reference, &matching, place.temporal_layer);
+        survivors.book = book.as_ref();
         let predicted = Predicted {
-            coder: self.coder(gop, false),
+            coder: self.coder(gop, Some(book.as_ref())),
             reference,
             target,
             matching,
-            survivors: Survivors {
-                target,
-                sequence: &self.sequence,
-                steps: &self.settings.steps,
-                dc: &gop.tools.dc,
-                sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
-                namings: Namings::new(),
-            },
+            survivors,
             measure,
             tools: self.settings.tools,
             number,
         };
         let (units, coded) = predicted.code(Chooser(self.settings.predictors))?;
-        self.write_frame(gop, number, place, target.frame.len(), &units)?;
+        if let Some(book) = &book {
+            let id = UnitId::of_frame(UnitType::Codebook, gop.first).on_layers(0, place.temporal_layer);
+            gop.units.push((id, book.to_bytes()?));
+        }
+        self.write_frame(gop, number, place, (target.frame.len(), target.row_count), &units)?;
         if place.temporal_layer + 1 < self.layers().max(2) {
             gop.keep(place.temporal_layer, number, coded);
         }
-        Ok(())
+        Ok(true)
     }
 
-    /// How the units of a frame are coded. Residuals are coefficients, also where intra frames have codebooks.
-    fn coder<'g>(&'g self, gop: &'g Gop, intra: bool) -> UnitCoder<'g> {
+    /// The codebook of the SH residuals of a frame, where a codebook serves them better than coefficients. Only a
+    /// GOP whose intra frames have codebooks has them: a new Gaussian takes an entry of each.
+    fn residual_book(
+        &self,
+        gop: &Gop,
+        survivors: &Survivors<'_>,
+        reference: &Reference,
+        matching: &Matching,
+        temporal_layer: u8,
+    ) -> Option<Codebook> {
+        let (transform, plan) = gop.tools.sh.as_ref()?;
+        plan.codebooks.first()?;
+        let rank = usize::from(transform.header.rank);
+        let pairs = matching.target_of.iter().flatten().count();
+        let rows = survivors.sh_rows(&reference.state.homes, &matching.target_of, pairs / TRIAL);
+        let forced = self.settings.sh == ShChoice::VectorQuantised;
+        let entries = vq::entry_count(pairs, false).min(RESIDUAL_ENTRIES);
+        if rows.len() < 4 * rank || !forced && !colour::compare(&rows, rank, pairs, entries).1 {
+            return None;
+        }
+        let mut book = vq::train(&rows, rank, entries.min(rows.len() / rank));
+        book.entries[..rank].fill(0);
+        // Each temporal layer has a codebook of its own, which only its frames replace.
+        book.header.codebook_id = 1 + temporal_layer;
+        Some(book)
+    }
+
+    /// How the units of a frame are coded: an intra frame, or one with or without a codebook of SH residuals.
+    fn coder<'g>(&'g self, gop: &'g Gop, predicted: Option<Option<&'g Codebook>>) -> UnitCoder<'g> {
         let sh = gop.tools.sh.as_ref();
-        let coding = match (sh, intra) {
-            (Some((transform, _)), false) => ShCoding::Coefficients { rank: transform.header.rank },
+        let whole = sh.and_then(|(_, plan)| plan.codebooks.first());
+        let residual = predicted.flatten();
+        let coding = match (sh, predicted) {
+            (Some((transform, _)), Some(None)) => ShCoding::Coefficients { rank: transform.header.rank },
+            (Some(_), Some(Some(_))) => ShCoding::VectorQuantised { stages: 2 },
             _ => gop.tools.sh_coding(),
         };
-        let books = sh.map_or(&[][..], |(_, plan)| plan.codebooks.as_slice());
-        let ids: Vec<u8> = books.iter().map(|book| book.header.codebook_id).collect();
-        let ids = if matches!(coding, ShCoding::VectorQuantised { .. }) { ids.as_slice() } else { &[] };
+        let books = match coding {
+            ShCoding::VectorQuantised { .. } => [whole, residual, None, None],
+            _ => [None; 4],
+        };
+        let ids: Vec<u8> = books.iter().flatten().map(|book| book.header.codebook_id).collect();
         UnitCoder {
             sequence: &self.sequence,
             colour: Colour {
                 dc: &gop.tools.dc,
                 sh: sh.map(|(transform, _)| transform),
                 mode: coding,
-                codebooks: [books.first(), books.get(1), books.get(2), books.get(3)],
+                codebooks: books,
             },
-            sh: sh_header(coding, ids),
+            sh: sh_header(coding, &ids),
             plan: SectionPlan {
                 block_log2: self.sequence.block_log2,
                 preset: self.settings.preset,
                 tools: self.settings.tools,
             },
-            intra,
+            intra: predicted.is_none(),
         }
     }
 
     fn write_frame(
         &mut self,
-        gop: &Gop,
+        gop: &mut Gop,
         number: u32,
         place: &PlaceInGop,
-        gaussians: usize,
+        (gaussians, row_count): (usize, u32),
         units: &[CodedUnit],
     ) -> Result<(), Error> {
         let sh = gop.tools.sh.as_ref().map(|_| 0);
         let header = FrameHeader::new(place.frame_type, 0, sh, gaussians as u32);
         let top = self.sequence.spatial_layer_count - 1;
         let spatial = if place.reference.is_some() { top } else { 0 };
-        let start = self.writer.offset;
         let id = UnitId::of_frame(UnitType::FrameHeader, number).on_layers(spatial, place.temporal_layer);
-        self.writer.unit(id, &header.to_bytes()?)?;
+        let start = gop.units.len();
+        gop.units.push((id, header.to_bytes()?));
         let mut frame = FrameReport {
             frame_type: place.frame_type,
             gaussians: gaussians as u32,
@@ -326,10 +378,13 @@ impl Dynamic<'_, '_> {
         for unit in units {
             let id = UnitId { refinement: unit.refinement, ..UnitId::of_frame(UnitType::Increment, number) };
             let id = id.on_layers(unit.spatial_layer, place.temporal_layer);
-            self.writer.unit(id, &unit.payload)?;
+            gop.units.push((id, unit.payload.clone()));
             frame.add(&unit.header, unit.predicted);
         }
-        frame.bytes = self.writer.offset - start;
+        let bytes = |(_, payload): &(UnitId, Vec<u8>)| (UnitHeader::SIZE + payload.len()) as u64;
+        frame.bytes = gop.units[start..].iter().map(bytes).sum();
+        self.report.invisible += u64::from(row_count) - gaussians as u64;
+        self.report.gaussians += gaussians as u64;
         self.report.coded.push(frame);
         self.report.digests.push(units.last().map_or(0, |unit| unit.header.refinement_digest));
         Ok(())

@@ -170,7 +170,12 @@ pub fn encode(
             let prepared = prepare(source, settings, &sequence, number, &mut ranking, &mut report)?;
             if tools.is_none() {
                 let made = GopTools::new(&prepared, &sequence, settings, last - first);
-                made.write(&mut writer, &sequence, first, &mut report)?;
+                for (id, payload) in made.units(&sequence, first)? {
+                    writer.unit(id, &payload)?;
+                }
+                if first == 0 {
+                    made.report(&mut report);
+                }
                 tools = Some(made);
             }
             if let Some(tools) = &mut tools {
@@ -282,27 +287,33 @@ impl GopTools {
         Self { dc, sh, first_components }
     }
 
-    pub(crate) fn write(
+    /// The units that define them, for the GOP that starts with a frame.
+    ///
+    /// # Errors
+    /// A transform or codebook that a decoder would refuse.
+    pub(crate) fn units(
         &self,
-        writer: &mut UnitWriter<'_>,
         sequence: &SequenceParameters,
         frame: u32,
-        report: &mut Report,
-    ) -> Result<(), Error> {
+    ) -> Result<Vec<(UnitId, Vec<u8>)>, Error> {
         let transform_id = UnitId::of_frame(UnitType::Transform, frame);
-        writer.unit(transform_id, &self.dc.to_bytes(sequence)?)?;
-        let Some((transform, plan)) = &self.sh else { return Ok(()) };
-        writer.unit(transform_id, &transform.to_bytes(sequence)?)?;
+        let mut units = vec![(transform_id, self.dc.to_bytes(sequence)?)];
+        let Some((transform, plan)) = &self.sh else { return Ok(units) };
+        units.push((transform_id, transform.to_bytes(sequence)?));
         for codebook in &plan.codebooks {
-            writer.unit(UnitId::of_frame(UnitType::Codebook, frame), &codebook.to_bytes()?)?;
+            units.push((UnitId::of_frame(UnitType::Codebook, frame), codebook.to_bytes()?));
         }
-        if frame == 0 {
+        Ok(units)
+    }
+
+    /// Tells how SH is coded.
+    pub(crate) fn report(&self, report: &mut Report) {
+        if let Some((transform, plan)) = &self.sh {
             report.sh_rank = transform.header.rank;
             report.sh_trial = plan.trial;
             report.sh_codebook_entries =
                 plan.codebooks.first().map_or(0, |book| u32::from(book.header.entry_count_minus1) + 1);
         }
-        Ok(())
     }
 
     /// Makes entry 0 of every codebook zero, so that it can stand for "as before".

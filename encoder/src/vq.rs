@@ -46,6 +46,19 @@ pub(crate) fn assign(codebook: &Codebook, rows: &[f32], rank: usize) -> (Vec<i32
     (found.into_iter().map(|(index, _)| index as i32).collect(), error)
 }
 
+/// The nearest entry of one row, ties to the first.
+pub(crate) fn nearest_entry(codebook: &Codebook, row: &[f32]) -> i32 {
+    let square = |entry: &[i16]| -> f32 {
+        entry
+            .iter()
+            .zip(row)
+            .map(|(&value, part)| (f32::from(value) - part) * (f32::from(value) - part))
+            .sum()
+    };
+    let entries = codebook.entries.chunks_exact(row.len().max(1)).map(square).enumerate();
+    entries.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(place, _)| place as i32)
+}
+
 /// Entries compared at a time: their distances stay in registers.
 const LANES: usize = 16;
 

@@ -166,7 +166,15 @@ mod tests {
     }
 
     fn run() -> Run {
-        let costs = Costs { bytes: 0, gaussians: 0, bpg: 0.0, attributes: Vec::new(), units: Vec::new() };
+        let costs = Costs {
+            bytes: 0,
+            gaussians: 0,
+            bpg: 0.0,
+            attributes: Vec::new(),
+            sections: Vec::new(),
+            frame_types: Vec::new(),
+            units: Vec::new(),
+        };
         let timing = Timing { median: 1.0, least: 1.0, most: 1.0 };
         Run {
             variant: "balanced".to_owned(),

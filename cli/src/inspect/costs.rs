@@ -2,7 +2,7 @@
 
 use super::Shown;
 use crate::console::Console;
-use crate::costs::Costs;
+use crate::costs::{Costs, OfAttribute};
 use crate::numbers::grouped;
 use crate::stream_file::StreamFile;
 use crate::table::Table;
@@ -19,15 +19,66 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
 }
 
 fn text(costs: &Costs) -> String {
-    let mut attributes = Table::new(["attribute", "bits a Gaussian", "symbols", "models"]);
-    for cost in &costs.attributes {
-        let bits = [cost.bpg, cost.symbols_bpg, cost.models_bpg].map(|bits| format!("{bits:.3}"));
-        let [all, symbols, models] = bits;
-        attributes.row([cost.attribute.to_owned(), all, symbols, models]);
+    let (bytes, gaussians, bpg) = (grouped(costs.bytes), grouped(costs.gaussians), costs.bpg);
+    let mut parts = vec![format!("{bytes} bytes, {gaussians} Gaussians, {bpg:.2} bits a Gaussian\n")];
+    parts.push(attributes(costs));
+    if !costs.sections.is_empty() {
+        parts.push(sections(costs));
     }
-    let mut units = Table::new(["unit", "units", "bytes", "%", "bits a Gaussian"]);
+    if costs.frame_types.len() > 1 {
+        parts.push(frame_types(costs));
+    }
+    parts.push(units(costs));
+    parts.join("\n")
+}
+
+fn attributes(costs: &Costs) -> String {
+    let mut table = Table::new(["attribute", "bits a Gaussian", "symbols", "models"]);
+    for cost in &costs.attributes {
+        let [all, symbols, models] = bits(cost);
+        table.row([cost.attribute.to_owned(), all, symbols, models]);
+    }
+    table.text()
+}
+
+fn sections(costs: &Costs) -> String {
+    let headings =
+        ["section", "attribute", "entries", "bits an entry", "bits a Gaussian", "symbols", "models"];
+    let mut table = Table::new(headings);
+    for part in &costs.sections {
+        let [all, symbols, models] = bits(&part.cost);
+        table.row([
+            part.section.to_owned(),
+            part.cost.attribute.to_owned(),
+            grouped(part.entries),
+            format!("{:.3}", part.bits_per_entry),
+            all,
+            symbols,
+            models,
+        ]);
+    }
+    table.text()
+}
+
+fn frame_types(costs: &Costs) -> String {
+    let mut table = Table::new(["frame type", "frames", "bytes", "%", "Gaussians", "bits a Gaussian"]);
+    for cost in &costs.frame_types {
+        table.row([
+            cost.kind.to_owned(),
+            grouped(cost.frames.into()),
+            grouped(cost.bytes),
+            format!("{:.2}", cost.percent),
+            grouped(cost.gaussians),
+            format!("{:.3}", cost.bpg),
+        ]);
+    }
+    table.text()
+}
+
+fn units(costs: &Costs) -> String {
+    let mut table = Table::new(["unit", "units", "bytes", "%", "bits a Gaussian"]);
     for cost in &costs.units {
-        units.row([
+        table.row([
             cost.kind.to_owned(),
             grouped(cost.units.into()),
             grouped(cost.bytes),
@@ -35,10 +86,9 @@ fn text(costs: &Costs) -> String {
             format!("{:.3}", cost.bpg),
         ]);
     }
-    let (bytes, gaussians, bpg) = (grouped(costs.bytes), grouped(costs.gaussians), costs.bpg);
-    format!(
-        "{bytes} bytes, {gaussians} Gaussians, {bpg:.2} bits a Gaussian\n\n{}\n{}",
-        attributes.text(),
-        units.text()
-    )
+    table.text()
+}
+
+fn bits(cost: &OfAttribute) -> [String; 3] {
+    [cost.bpg, cost.symbols_bpg, cost.models_bpg].map(|bits| format!("{bits:.3}"))
 }

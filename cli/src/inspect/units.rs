@@ -3,11 +3,15 @@
 use super::{Shown, span};
 use crate::console::Console;
 use crate::failure::StreamFault;
+use crate::numbers::grouped;
 use crate::stream_file::StreamFile;
 use crate::table::Table;
 use serde::Serialize;
-use splatstream_format::syntax::UnitHeader;
-use splatstream_format::unit::{Delivery, Stream};
+use splatstream_format::entropy::layout::Section;
+use splatstream_format::syntax::{
+    FrameHeader, FrameType, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
+};
+use splatstream_format::unit::{Delivery, Stream, Unit};
 use splatstream_format::{Error, Limits};
 
 /// What `--json` prints.
@@ -30,6 +34,29 @@ struct Line {
     refinement: u8,
     critical: bool,
     damaged: bool,
+    /// Of a frame and its units.
+    frame_type: Option<&'static str>,
+    /// Of an increment.
+    increment: Option<Counts>,
+}
+
+/// What an increment does, from its fixed part.
+#[derive(Serialize)]
+struct Counts {
+    parents: u32,
+    cells: u32,
+    moves: u32,
+    updates: u32,
+    removed: u32,
+    new: u32,
+    sections: Vec<&'static str>,
+}
+
+/// What lines need of the units before.
+struct Context {
+    profile: Profile,
+    sequence: Option<SequenceParameters>,
+    frame_type: Option<FrameType>,
 }
 
 /// Lists the units.
@@ -43,16 +70,28 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
 
 /// Adds a line a unit as far as units can be told apart; gives the first error.
 fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<Error> {
-    let mut units = match Stream::open(&stream.bytes, limits) {
-        Ok(opened) => opened.units(),
+    let opened = match Stream::open(&stream.bytes, limits) {
+        Ok(opened) => opened,
         Err(error) => return Some(error),
     };
+    let mut context = Context { profile: opened.header().profile(), sequence: None, frame_type: None };
+    let mut units = opened.units();
     let mut first = None;
     while let Some(delivery) = units.next_unit() {
         match delivery {
-            Ok(Delivery::Intact(unit)) => lines.push(Line::new(lines.len(), unit.at, &unit.header, false)),
+            Ok(Delivery::Intact(unit)) => {
+                let increment = context.take(&unit);
+                let line = Line::new(lines.len(), unit.at, &unit.header);
+                let frame_type = context.frame_type_of(&unit.header);
+                lines.push(Line { frame_type, increment, ..line });
+            }
             Ok(Delivery::Damaged(unit)) => {
-                lines.push(Line::new(lines.len(), unit.at, &unit.header, true));
+                if unit.header.unit_type() == UnitType::FrameHeader {
+                    context.frame_type = None;
+                }
+                let line = Line::new(lines.len(), unit.at, &unit.header);
+                let frame_type = context.frame_type_of(&unit.header);
+                lines.push(Line { damaged: true, frame_type, ..line });
                 first = first.or(Some(unit.error));
             }
             Err(error) => first = first.or(Some(error)),
@@ -62,7 +101,7 @@ fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<E
 }
 
 impl Line {
-    fn new(unit: usize, at: u64, header: &UnitHeader, damaged: bool) -> Self {
+    fn new(unit: usize, at: u64, header: &UnitHeader) -> Self {
         Self {
             unit,
             kind: header.unit_type().name(),
@@ -73,7 +112,74 @@ impl Line {
             temporal_layer: header.temporal_layer,
             refinement: header.refinement,
             critical: header.is_critical(),
-            damaged,
+            damaged: false,
+            frame_type: None,
+            increment: None,
+        }
+    }
+
+    /// What stands behind the columns.
+    fn note(&self) -> String {
+        if self.damaged {
+            return "damaged".to_owned();
+        }
+        let Some(counts) = &self.increment else { return String::new() };
+        let named = [
+            ("parents", counts.parents),
+            ("cells", counts.cells),
+            ("moved", counts.moves),
+            ("updated", counts.updates),
+            ("removed", counts.removed),
+            ("new", counts.new),
+        ];
+        let parts: Vec<String> = named
+            .into_iter()
+            .filter(|(_, count)| *count > 0)
+            .map(|(name, count)| format!("{} {name}", grouped(count.into())))
+            .collect();
+        format!("{}: {}", self.frame_type.unwrap_or("?"), parts.join(", "))
+    }
+}
+
+impl Context {
+    /// Takes note of a unit; gives the counts of an increment.
+    fn take(&mut self, unit: &Unit<'_>) -> Option<Counts> {
+        let (payload, at) = (unit.payload, unit.payload_at);
+        match unit.header.unit_type() {
+            UnitType::SequenceParameters => {
+                self.sequence = SequenceParameters::parse_payload(payload, at, self.profile).ok();
+            }
+            UnitType::FrameHeader => {
+                let header = FrameHeader::parse_payload(payload, at, self.profile).ok();
+                self.frame_type = header.and_then(|header| header.kind());
+            }
+            UnitType::Increment if self.profile == Profile::Dynamic => {
+                let (header, _) = IncrementHeader::parse(payload, at, self.sequence.as_ref()?).ok()?;
+                return Some(Counts::of(&header));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    fn frame_type_of(&self, header: &UnitHeader) -> Option<&'static str> {
+        let unit_type = header.unit_type();
+        let of_frame = unit_type == UnitType::FrameHeader || unit_type.has_refinement();
+        self.frame_type.filter(|_| of_frame).map(FrameType::name)
+    }
+}
+
+impl Counts {
+    fn of(header: &IncrementHeader) -> Self {
+        let present = Section::ALL.into_iter().filter(|&section| header.count(section) > 0);
+        Self {
+            parents: header.parent_count,
+            cells: header.cell_count,
+            moves: header.move_count,
+            updates: header.update_count,
+            removed: header.remove_count,
+            new: header.new_count,
+            sections: present.map(Section::name).collect(),
         }
     }
 }
@@ -90,7 +196,7 @@ impl Listing {
                 line.frame.to_string(),
                 format!("s{},t{}", line.spatial_layer, line.temporal_layer),
                 line.refinement.to_string(),
-                if line.damaged { "damaged".to_owned() } else { String::new() },
+                line.note(),
             ]);
         }
         let mut text = table.text();

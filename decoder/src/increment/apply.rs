@@ -130,7 +130,7 @@ pub fn apply(unit: &Unit<'_>, parents: Home, situation: &Situation<'_>) -> Resul
 }
 
 /// Clause 7.17: everything that new Gaussians may be predicted from, in order.
-fn reference_set(situation: &Situation<'_>, parents: &QuantizedFrame) -> QuantizedFrame {
+pub fn reference_set(situation: &Situation<'_>, parents: &QuantizedFrame) -> QuantizedFrame {
     let [before, behind] = situation.around;
     let mut set = QuantizedFrame::zeroed(0, parents.sh.len());
     for &part in before.iter().chain([&parents]).chain(behind) {

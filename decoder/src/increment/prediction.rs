@@ -3,7 +3,7 @@
 //! Attributes are predicted in coding order, each just before its residual is added, because the bilateral
 //! predictor compares what is known of a Gaussian with its neighbours.
 
-use super::residual::{AttributeCoding, AttributeValues, Attributes};
+use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
 use crate::frame::QuantizedFrame;
 use crate::home::{FINE, canonical};
 use crate::neighbours::{Neighbour, NeighbourSearch};
@@ -73,23 +73,45 @@ impl<'s> Prediction<'s> {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
+        for stage in Stage::ALL {
+            self.predict(stage, attributes);
+            attributes.add_stage(stage, values, coding, at)?;
+            self.learn(stage, attributes);
+        }
+        Ok(())
+    }
+
+    /// Puts the prediction of one attribute in the place of what `attributes` holds for the predicted Gaussians.
+    pub fn predict(&self, stage: Stage, attributes: &mut Attributes) {
         let set = self.set;
-        self.predict(&planes(&set.log_scale), &mut attributes.log_scale, 1);
-        attributes.add_log_scales(values, coding, at)?;
-        self.learn(&planes(&set.log_scale), &attributes.log_scale, |value| value);
-        self.predict(&[&set.opacity], core::slice::from_mut(&mut attributes.opacity), 1);
-        attributes.add_opacity(values, coding, at)?;
-        self.learn(&[&set.opacity], core::slice::from_ref(&attributes.opacity), |value| value);
-        self.predict(&planes(&set.rotation), &mut attributes.rotation_fine, FINE);
-        attributes.add_rotation(values, coding, at)?;
-        let own =
-            attributes.rotation_fine.each_ref().map(|plane| plane.iter().copied().map(canonical).collect());
-        self.learn(&planes(&set.rotation), &own, |value| value);
-        self.predict(&planes(&set.dc), &mut attributes.dc, 1);
-        attributes.add_dc(values, coding, at)?;
-        self.learn(&planes(&set.dc), &attributes.dc, canonical);
-        self.predict(&planes(&set.sh), &mut attributes.sh, 1);
-        attributes.add_sh(values, coding, at)
+        match stage {
+            Stage::LogScale => self.means(&planes(&set.log_scale), &mut attributes.log_scale, 1),
+            Stage::Opacity => {
+                self.means(&[&set.opacity], core::slice::from_mut(&mut attributes.opacity), 1);
+            }
+            Stage::Rotation => self.means(&planes(&set.rotation), &mut attributes.rotation_fine, FINE),
+            Stage::Dc => self.means(&planes(&set.dc), &mut attributes.dc, 1),
+            Stage::Sh => self.means(&planes(&set.sh), &mut attributes.sh, 1),
+        }
+    }
+
+    /// Takes note of one attribute as it is reconstructed.
+    pub fn learn(&mut self, stage: Stage, attributes: &Attributes) {
+        let set = self.set;
+        match stage {
+            Stage::LogScale => self.compare(&planes(&set.log_scale), &attributes.log_scale, |value| value),
+            Stage::Opacity => {
+                self.compare(&[&set.opacity], core::slice::from_ref(&attributes.opacity), |value| value);
+            }
+            Stage::Rotation => {
+                let plane = |plane: &Vec<i32>| plane.iter().copied().map(canonical).collect();
+                let own = attributes.rotation_fine.each_ref().map(plane);
+                self.compare(&planes(&set.rotation), &own, |value| value);
+            }
+            Stage::Dc => self.compare(&planes(&set.dc), &attributes.dc, canonical),
+            // Nothing is predicted after it.
+            Stage::Sh => {}
+        }
     }
 
     /// Neighbours, and their feature distances, of an item.
@@ -100,7 +122,7 @@ impl<'s> Prediction<'s> {
     }
 
     /// Puts the means of the neighbours, times `unit`, in the place of what `out` holds for the items.
-    fn predict(&self, from: &[&Vec<i32>], out: &mut [Vec<i32>], unit: i32) {
+    fn means(&self, from: &[&Vec<i32>], out: &mut [Vec<i32>], unit: i32) {
         let means = |(place, item): (usize, &Item)| -> Vec<i32> {
             let (neighbours, features) = self.of(place);
             let [spatial, feature] = self.falloff;
@@ -126,7 +148,7 @@ impl<'s> Prediction<'s> {
     }
 
     /// Adds the squared differences between the items and their neighbours in some planes.
-    fn learn(&mut self, from: &[&Vec<i32>], own: &[Vec<i32>], lattice: impl Fn(i32) -> i32) {
+    fn compare(&mut self, from: &[&Vec<i32>], own: &[Vec<i32>], lattice: impl Fn(i32) -> i32) {
         let runs = self.neighbours.chunks_exact(self.count.max(1));
         let features = self.features.chunks_exact_mut(self.count.max(1));
         for (item, (neighbours, features)) in self.items.iter().zip(runs.zip(features)) {

@@ -26,6 +26,26 @@ pub struct AttributeCoding<'a> {
     pub colour: Colour<'a>,
 }
 
+/// The attributes in the order in which they are reconstructed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Log-scales.
+    LogScale,
+    /// Opacity.
+    Opacity,
+    /// Rotation.
+    Rotation,
+    /// dc.
+    Dc,
+    /// sh.
+    Sh,
+}
+
+impl Stage {
+    /// Every attribute, in order.
+    pub const ALL: [Self; 5] = [Self::LogScale, Self::Opacity, Self::Rotation, Self::Dc, Self::Sh];
+}
+
 /// The attributes of a run of Gaussians: predictions at first, then what the residuals make of them.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Attributes {
@@ -51,6 +71,17 @@ const ROTATION: usize = 4;
 const DC: usize = 7;
 
 impl<'v> AttributeValues<'v> {
+    /// The planes of an attribute.
+    pub fn of_stage(self, stage: Stage, colour: &Colour<'_>) -> &'v [Vec<i32>] {
+        match stage {
+            Stage::LogScale => self.planes(0, OPACITY),
+            Stage::Opacity => self.planes(OPACITY, ROTATION),
+            Stage::Rotation => self.planes(ROTATION, DC),
+            Stage::Dc => self.planes(DC, sh_place(colour)),
+            Stage::Sh => self.planes(sh_place(colour), self.0.len()),
+        }
+    }
+
     fn planes(self, from: usize, to: usize) -> &'v [Vec<i32>] {
         self.0.get(from..to.min(self.0.len())).unwrap_or_default()
     }
@@ -112,24 +143,40 @@ impl Attributes {
     /// # Errors
     /// Invalid if a value leaves its range.
     pub fn add(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
-        self.add_log_scales(values, coding, at)?;
-        self.add_opacity(values, coding, at)?;
-        self.add_rotation(values, coding, at)?;
-        self.add_dc(values, coding, at)?;
-        self.add_sh(values, coding, at)
+        Stage::ALL.into_iter().try_for_each(|stage| self.add_stage(stage, values, coding, at))
+    }
+
+    /// Adds the residuals of one attribute; those before it in [`Stage::ALL`] have been added.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range.
+    pub fn add_stage(
+        &mut self,
+        stage: Stage,
+        values: AttributeValues<'_>,
+        coding: &AttributeCoding<'_>,
+        at: u64,
+    ) -> Result<()> {
+        match stage {
+            Stage::LogScale => self.add_log_scales(values, coding, at),
+            Stage::Opacity => self.add_opacity(values, coding, at),
+            Stage::Rotation => self.add_rotation(values, coding, at),
+            Stage::Dc => self.add_dc(values, coding, at),
+            Stage::Sh => self.add_sh(values, coding, at),
+        }
     }
 
     /// Residuals of the largest log-scale and of the two differences.
     ///
     /// # Errors
     /// Invalid if a value leaves its range, or canonical axes are not sorted.
-    pub fn add_log_scales(
+    fn add_log_scales(
         &mut self,
         values: AttributeValues<'_>,
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        let residuals = shifted(values.planes(0, OPACITY), coding.shift[0]);
+        let residuals = shifted(values.of_stage(Stage::LogScale, &coding.colour), coding.shift[0]);
         for plane in &residuals {
             in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.16", at)?;
         }
@@ -163,13 +210,13 @@ impl Attributes {
     ///
     /// # Errors
     /// Invalid if a value leaves its range.
-    pub fn add_opacity(
+    fn add_opacity(
         &mut self,
         values: AttributeValues<'_>,
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        for residual in shifted(values.planes(OPACITY, ROTATION), coding.shift[1]) {
+        for residual in shifted(values.of_stage(Stage::Opacity, &coding.colour), coding.shift[1]) {
             add(&mut self.opacity, &residual);
         }
         in_range(&self.opacity, &ATTRIBUTE_RANGE, "opacity", "7.16", at)
@@ -179,14 +226,16 @@ impl Attributes {
     ///
     /// # Errors
     /// Invalid if a value leaves its range.
-    pub fn add_rotation(
+    fn add_rotation(
         &mut self,
         values: AttributeValues<'_>,
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
         let [largest, _, smallest] = &self.log_scale;
-        for (plane, residual) in self.rotation_fine.iter_mut().zip(values.planes(ROTATION, DC)) {
+        for (plane, residual) in
+            self.rotation_fine.iter_mut().zip(values.of_stage(Stage::Rotation, &coding.colour))
+        {
             in_range(residual, &ATTRIBUTE_RANGE, "rotation", "7.16", at)?;
             for ((slot, &value), (&a, &c)) in plane.iter_mut().zip(residual).zip(largest.iter().zip(smallest))
             {
@@ -206,13 +255,8 @@ impl Attributes {
     ///
     /// # Errors
     /// Invalid if a value leaves its range.
-    pub fn add_dc(
-        &mut self,
-        values: AttributeValues<'_>,
-        coding: &AttributeCoding<'_>,
-        at: u64,
-    ) -> Result<()> {
-        let components = shifted(values.planes(DC, sh_place(&coding.colour)), coding.shift[3]);
+    fn add_dc(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
+        let components = shifted(values.of_stage(Stage::Dc, &coding.colour), coding.shift[3]);
         let mut out: Vec<&mut [i32]> = self.dc.iter_mut().map(Vec::as_mut_slice).collect();
         add_inverse(coding.colour.dc, &components, &mut out, at)?;
         self.dc.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "dc", "7.16", at))
@@ -222,13 +266,8 @@ impl Attributes {
     ///
     /// # Errors
     /// Invalid if a value leaves its range.
-    pub fn add_sh(
-        &mut self,
-        values: AttributeValues<'_>,
-        coding: &AttributeCoding<'_>,
-        at: u64,
-    ) -> Result<()> {
-        let planes = values.planes(sh_place(&coding.colour), values.0.len());
+    fn add_sh(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
+        let planes = values.of_stage(Stage::Sh, &coding.colour);
         let Some(transform) = coding.colour.sh else { return Ok(()) };
         let components = match coding.colour.mode {
             ShCoding::None => return Ok(()),

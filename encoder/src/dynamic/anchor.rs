@@ -1,17 +1,20 @@
 //! Intra frames in spatial layers: each layer adds Gaussians and halves the steps of those below it.
 
+use super::predictors::{Chooser, used};
 use super::unit::{Draft, UnitCoder};
+use super::wanted::{Wanted, nearest};
 use super::{CodedUnit, Reference};
 use crate::error::Error;
-use crate::lattice::Geometry;
 use splatstream_decoder::digest::{UnitDigest, frame_digest, unit_digest};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::frame_state::FrameState;
 use splatstream_decoder::home::Home;
 use splatstream_decoder::increment::Situation;
+use splatstream_decoder::increment::residual::{Attributes, Stage};
 use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::position::morton;
+use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::syntax::prefix_length;
 use std::sync::Arc;
@@ -28,10 +31,8 @@ const fn shares(layers: u8) -> &'static [u8] {
 
 /// A frame on the finest lattices, in the order of its source.
 pub(crate) struct AnchorTarget<'a> {
-    pub(crate) geometry: &'a Geometry,
-    pub(crate) dc: &'a [Vec<i32>],
-    /// Components, or codebook indices.
-    pub(crate) sh: &'a [Vec<i32>],
+    pub(crate) number: u32,
+    pub(crate) wanted: &'a Wanted,
     /// Most important first.
     pub(crate) order: &'a [u32],
     /// Row of each Gaussian in its file, and rows of the file.
@@ -46,9 +47,6 @@ struct Anchor<'a> {
     homes: Vec<Home>,
     /// Gaussians of each home, by place in the target.
     members: Vec<Vec<u32>>,
-    /// Components coded so far, by place in the target.
-    dc: Vec<Vec<i32>>,
-    sh: Vec<Vec<i32>>,
     first_models: ModelsInForce,
     models: ModelsInForce,
     units: Vec<CodedUnit>,
@@ -61,19 +59,16 @@ struct Anchor<'a> {
 pub(crate) fn code_anchor(
     coder: &UnitCoder<'_>,
     target: &AnchorTarget<'_>,
-    predictors: super::predictors::Chooser,
+    predictors: Chooser,
 ) -> Result<(Vec<CodedUnit>, Reference), Error> {
     let sequence = coder.sequence;
     let refinements = usize::from(sequence.refinement_count);
     let sh_planes = usize::from(sequence.sh_dimension());
-    let zeros = |planes: &[Vec<i32>]| planes.iter().map(|plane| vec![0; plane.len()]).collect::<Vec<_>>();
     let mut anchor = Anchor {
         coder,
         target,
         homes: vec![Home::empty(sh_planes); refinements],
         members: vec![Vec::new(); refinements],
-        dc: zeros(target.dc),
-        sh: zeros(target.sh),
         first_models: ModelsInForce::default(),
         models: ModelsInForce::default(),
         units: Vec::new(),
@@ -87,6 +82,8 @@ pub(crate) fn code_anchor(
         rows: rows.collect(),
         row_count: target.row_count,
         state: FrameState {
+            number: target.number,
+            compensation: Compensation::default(),
             anchor: Arc::new(homes.clone()),
             carried: homes.iter().cloned().map(Some).collect(),
             homes,
@@ -97,14 +94,9 @@ pub(crate) fn code_anchor(
     Ok((units, reference))
 }
 
-/// x / 2^shift to the nearest integer.
-fn nearest(x: i32, shift: u8) -> i32 {
-    if shift == 0 { x } else { (x + (1 << (shift - 1))) >> shift }
-}
-
 impl Anchor<'_> {
     /// Codes the units of a layer.
-    fn layer(&mut self, layer: u8, predictors: super::predictors::Chooser) -> Result<(), Error> {
+    fn layer(&mut self, layer: u8, predictors: Chooser) -> Result<(), Error> {
         let sequence = self.coder.sequence;
         let layers = sequence.spatial_layer_count;
         let shift = (layers - 1 - layer).min(sequence.position_bits - 1);
@@ -132,22 +124,25 @@ impl Anchor<'_> {
         shift: u8,
         mut added: Vec<u32>,
         digests: &mut Vec<UnitDigest>,
-        predictors: super::predictors::Chooser,
+        predictors: Chooser,
     ) -> Result<(), Error> {
         let home = usize::from(refinement);
         let parents = self.homes[home].clone();
         added.sort_by_key(|&place| (self.code(place, shift), place));
         let mut draft = Draft { header: self.coder.blank(), values: UnitValues::default() };
         draft.header.position_shift = shift;
-        let book = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
-        draft.header.attribute_shift = [shift, shift, shift, shift, if book { 0 } else { shift }];
+        draft.header.attribute_shift = self.shifts(shift);
         self.refine(&mut draft, &parents, home, shift);
-        self.add(&mut draft, &added, shift);
+        let codes: Vec<u64> = added.iter().map(|&place| self.code(place, shift)).collect();
+        let block = 1 << self.coder.sequence.block_log2;
+        draft.header.new_count = added.len() as u32;
+        let deltas = deltas(&codes, block);
+        draft.values.set(Section::New, SectionValues { deltas, planes: Vec::new(), block });
         let lower: Vec<&QuantizedFrame> = self.homes[..home].iter().map(|home| &home.planes).collect();
         let situation = Situation { around: [&lower, &[]], parents_follow: true };
-        let applied = predictors
-            .choose(self.coder, &mut draft, &parents, &situation, &added, |place| self.wanted(place))?;
+        let wanted = self.target.wanted.select(&added);
         let mut models = if refinement == 0 { self.first_models.clone() } else { self.models.clone() };
+        let applied = predictors.choose(self.coder, &mut draft, parents, &situation, &wanted, &models)?;
         let sections = self.coder.sections(&draft, &mut models)?;
         if refinement == 0 {
             self.first_models = models.clone();
@@ -161,7 +156,7 @@ impl Anchor<'_> {
             refinement,
             payload: self.coder.payload(&draft.header, &sections)?,
             header: draft.header,
-            predicted: super::predictors::used(&draft),
+            predicted: used(&draft),
         });
         self.homes[home] = applied.home;
         self.members[home].extend(added);
@@ -169,20 +164,18 @@ impl Anchor<'_> {
     }
 
     fn code(&self, place: u32, shift: u8) -> u64 {
-        let [x, y, z] = self.target.geometry.position.each_ref().map(|plane| plane[place as usize] >> shift);
+        let [x, y, z] = self.target.wanted.position.each_ref().map(|plane| plane[place as usize] >> shift);
         morton(x, y, z)
     }
 
-    /// The integers a Gaussian shall have in the end: log-scales, opacity, rotation.
-    fn wanted(&self, place: u32) -> ([i32; 3], i32, [i32; 3]) {
-        let place = place as usize;
-        let geometry = self.target.geometry;
-        let of = |planes: &[Vec<i32>; 3]| planes.each_ref().map(|plane| plane[place]);
-        (of(&geometry.log_scale), geometry.opacity[place], of(&geometry.rotation))
+    /// attribute_shift of a layer. Entries of codebooks are not shifted: no layer refines them.
+    fn shifts(&self, shift: u8) -> [u8; 5] {
+        let book = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
+        [shift, shift, shift, shift, if book { 0 } else { shift }]
     }
 
     /// Halves the steps of what lower layers have coded.
-    fn refine(&mut self, draft: &mut Draft, parents: &Home, home: usize, shift: u8) {
+    fn refine(&self, draft: &mut Draft, parents: &Home, home: usize, shift: u8) {
         let members = &self.members[home];
         if members.is_empty() {
             return;
@@ -193,64 +186,12 @@ impl Anchor<'_> {
         let block = 1 << self.coder.sequence.block_log2;
         let section = |planes| SectionValues { deltas: Vec::new(), planes, block };
         draft.values.set(Section::Modes, section(vec![vec![3; members.len()]]));
-        let moves = (0..3).map(|axis: usize| {
-            let wanted = &self.target.geometry.position[axis];
-            let now = &parents.planes.position[axis];
-            let residual = |(&place, &now): (&u32, &u32)| wanted[place as usize] as i32 - now as i32;
-            members.iter().zip(now).map(residual).map(|x| nearest(x, shift)).collect()
-        });
-        draft.values.set(Section::Moves, section(moves.collect()));
-        let mut planes: Vec<Vec<i32>> = vec![Vec::with_capacity(members.len()); 7];
-        for (row, &place) in members.iter().enumerate() {
-            let (scales, opacity, rotation) = self.wanted(place);
-            let now = parents.planes.log_scale.each_ref().map(|plane| plane[row]);
-            let residuals = scale_residuals(now, scales, shift);
-            planes.iter_mut().zip(residuals).for_each(|(plane, value)| plane.push(value));
-            planes[3].push(nearest(opacity - parents.planes.opacity[row], shift));
-            for axis in 0..3 {
-                planes[4 + axis].push(nearest(rotation[axis] - parents.planes.rotation[axis][row], shift));
-            }
-        }
-        let members = members.clone();
-        planes.extend(components(self.target.dc, &mut self.dc, &members, shift));
-        match self.coder.colour.mode {
-            ShCoding::None => {}
-            ShCoding::Coefficients { .. } => {
-                planes.extend(components(self.target.sh, &mut self.sh, &members, shift));
-            }
-            // Entry 0 is zero: a codebook refines nothing.
-            ShCoding::VectorQuantised { .. } => {
-                planes.extend(self.target.sh.iter().map(|_| vec![0; members.len()]));
-            }
-        }
-        draft.values.set(Section::Updates, section(planes));
-    }
-
-    /// The values of new Gaussians without prediction.
-    fn add(&mut self, draft: &mut Draft, added: &[u32], shift: u8) {
-        draft.header.new_count = added.len() as u32;
-        let block = 1 << self.coder.sequence.block_log2;
-        let codes: Vec<u64> = added.iter().map(|&place| self.code(place, shift)).collect();
-        let mut planes: Vec<Vec<i32>> = vec![Vec::with_capacity(added.len()); 7];
-        for &place in added {
-            let (scales, opacity, rotation) = self.wanted(place);
-            let residuals = scale_residuals([0; 3], scales, shift);
-            planes.iter_mut().zip(residuals).for_each(|(plane, value)| plane.push(value));
-            planes[3].push(nearest(opacity, shift));
-            (0..3).for_each(|axis| planes[4 + axis].push(nearest(rotation[axis], shift)));
-        }
-        planes.extend(components(self.target.dc, &mut self.dc, added, shift));
-        match self.coder.colour.mode {
-            ShCoding::None => {}
-            ShCoding::Coefficients { .. } => {
-                planes.extend(components(self.target.sh, &mut self.sh, added, shift));
-            }
-            ShCoding::VectorQuantised { .. } => {
-                let pick = |plane: &Vec<i32>| added.iter().map(|&place| plane[place as usize]).collect();
-                planes.extend(self.target.sh.iter().map(pick));
-            }
-        }
-        draft.values.set(Section::New, SectionValues { deltas: deltas(&codes, block), planes, block });
+        let wanted = self.target.wanted.select(members);
+        draft.values.set(Section::Moves, section(wanted.moves(parents, shift)));
+        let rows: Vec<u32> = (0..count).collect();
+        let now = Attributes::of_home(parents, &rows);
+        let residuals = |stage| wanted.residuals(stage, &now, shift, &self.coder.colour, false);
+        draft.values.set(Section::Updates, section(Stage::ALL.into_iter().flat_map(residuals).collect()));
     }
 }
 
@@ -268,18 +209,4 @@ pub(crate) fn scale_residuals(now: [i32; 3], wanted: [i32; 3], shift: u8) -> [i3
     let middle = largest - (now[0] - now[1]) - (second << shift);
     let third = nearest(middle - wanted[2] - (now[1] - now[2]), shift);
     [first, second, third]
-}
-
-/// Residuals of components, which join what is coded of them.
-fn components(wanted: &[Vec<i32>], coded: &mut [Vec<i32>], places: &[u32], shift: u8) -> Vec<Vec<i32>> {
-    let of_plane = |(wanted, coded): (&Vec<i32>, &mut Vec<i32>)| {
-        let mut residual = |&place: &u32| {
-            let place = place as usize;
-            let value = nearest(wanted[place] - coded[place], shift);
-            coded[place] += value << shift;
-            value
-        };
-        places.iter().map(&mut residual).collect()
-    };
-    wanted.iter().zip(coded).map(of_plane).collect()
 }

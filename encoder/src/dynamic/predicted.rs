@@ -4,15 +4,18 @@ use super::anchor::deltas;
 use super::predictors::{Chooser, used};
 use super::survivors::{Fate, Survivors};
 use super::unit::{Draft, UnitCoder};
+use super::wanted::Wanted;
 use super::{CodedUnit, Reference, Target};
 use crate::colour;
 use crate::error::Error;
-use crate::lattice::{Geometry, Spacing, geometry};
+use crate::lattice::{Spacing, geometry};
 use crate::matching::{Cloud, Matching, Measure};
 use crate::motion::follow::follow;
 use crate::motion::stale::{Held, stale_cells};
 use crate::motion::{CellMotion, Pair, cell_motion};
 use crate::settings::Tools;
+use crate::vq;
+use rayon::prelude::*;
 use splatstream_decoder::digest::{UnitDigest, frame_digest, unit_digest};
 use splatstream_decoder::displacement::{CellField, rotation_unit};
 use splatstream_decoder::frame::QuantizedFrame;
@@ -22,6 +25,7 @@ use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::increment::{Situation, field};
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::position::morton;
+use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::importance;
@@ -234,9 +238,30 @@ impl Predicted<'_> {
                 let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
                 colour::components(transform, &planes, sequence.sh_step(), &spacing)
             }
+            (ShCoding::VectorQuantised { .. }, Some(transform)) => {
+                let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
+                let rows = colour::sampled_rows(transform, &planes, sequence.sh_step(), 1);
+                self.stages(&rows, usize::from(transform.header.rank))
+            }
             _ => Vec::new(),
         };
-        Ok(Fresh { places, geometry, dc, sh, of_home })
+        let planes = usize::from(sequence.sh_dimension());
+        let wanted = Wanted::new(&geometry, &dc, &sh, &self.coder.colour, planes)?;
+        Ok(Fresh { places, wanted, of_home })
+    }
+
+    /// Codebook indices of whole SH values: the nearest entry, and what refines it.
+    fn stages(&self, rows: &[f32], rank: usize) -> Vec<Vec<i32>> {
+        let [Some(whole), Some(residual), ..] = self.coder.colour.codebooks else { return Vec::new() };
+        let pair = |row: &[f32]| {
+            let first = vq::nearest_entry(whole, row);
+            let entry = whole.entries[first as usize * rank..].iter();
+            let left: Vec<f32> =
+                row.iter().zip(entry).map(|(part, &value)| part - f32::from(value)).collect();
+            (first, vq::nearest_entry(residual, &left))
+        };
+        let (first, second) = rows.par_chunks_exact(rank.max(1)).map(pair).unzip();
+        vec![first, second]
     }
 
     /// Gaussians of each home that continue.
@@ -273,14 +298,19 @@ impl Predicted<'_> {
         self.set_fates(&mut draft, &fates);
         let mut added = added.to_vec();
         added.sort_by_key(|&place| (fresh.code(place), place));
-        self.add(&mut draft, fresh, &added);
+        let codes: Vec<u64> = added.iter().map(|&place| fresh.code(place)).collect();
+        let block = 1 << self.coder.sequence.block_log2;
+        draft.header.new_count = added.len() as u32;
+        let new = SectionValues { deltas: deltas(&codes, block), planes: Vec::new(), block };
+        draft.values.set(Section::New, new);
         let lower: Vec<&QuantizedFrame> = displaced[..home].iter().map(|home| &home.planes).collect();
         let anchor = self.reference.state.anchor.iter().skip(home + 1).map(|home| &home.planes);
         let news: Vec<QuantizedFrame> = made.iter().map(new_gaussians).collect();
         let behind: Vec<&QuantizedFrame> = anchor.chain(&news).collect();
         let situation = Situation { around: [&lower, &behind], parents_follow: false };
-        let applied = predictors
-            .choose(&self.coder, &mut draft, parents, &situation, &added, |place| fresh.wanted(place))?;
+        let wanted = fresh.wanted.select(&added);
+        let applied =
+            predictors.choose(&self.coder, &mut draft, parents.clone(), &situation, &wanted, models)?;
         let sections = self.coder.sections(&draft, models)?;
         let continued = partners.iter().flatten().map(|&place| self.target.rows[place as usize]);
         let new = added.iter().map(|&place| self.target.rows[fresh.places[place as usize] as usize]);
@@ -307,23 +337,6 @@ impl Predicted<'_> {
             fates.iter().filter(|fate| fate.mode & 2 != 0).map(|fate| fate.updated[plane]).collect()
         };
         draft.values.set(Section::Updates, section((0..width).map(updated).collect()));
-    }
-
-    fn add(&self, draft: &mut Draft, fresh: &Fresh, added: &[u32]) {
-        draft.header.new_count = added.len() as u32;
-        let block = 1 << self.coder.sequence.block_log2;
-        let codes: Vec<u64> = added.iter().map(|&place| fresh.code(place)).collect();
-        let mut planes: Vec<Vec<i32>> = vec![Vec::with_capacity(added.len()); 7];
-        for &place in added {
-            let (scales, opacity, rotation) = fresh.wanted(place);
-            let scales = super::anchor::scale_residuals([0; 3], scales, 0);
-            let values = scales.into_iter().chain([opacity]).chain(rotation);
-            planes.iter_mut().zip(values).for_each(|(plane, value)| plane.push(value));
-        }
-        let pick = |plane: &Vec<i32>| added.iter().map(|&place| plane[place as usize]).collect();
-        planes.extend(fresh.dc.iter().map(pick));
-        planes.extend(fresh.sh.iter().map(pick));
-        draft.values.set(Section::New, SectionValues { deltas: deltas(&codes, block), planes, block });
     }
 
     /// Digests of what each refinement shows, and the payloads.
@@ -361,7 +374,8 @@ impl Predicted<'_> {
         fields.push(field);
         let anchor = Arc::clone(&before.anchor);
         let carried = carried.into_iter().map(Some).collect();
-        let state = FrameState { homes, anchor, fields, carried, models };
+        let (number, compensation) = (self.number, Compensation::default());
+        let state = FrameState { number, homes, anchor, fields, carried, compensation, models };
         Ok((units, Reference { state, rows, row_count: self.target.row_count }))
     }
 }
@@ -378,22 +392,14 @@ fn new_gaussians(made: &Made) -> QuantizedFrame {
 struct Fresh {
     /// Their places in the target.
     places: Vec<u32>,
-    geometry: Geometry,
-    dc: Vec<Vec<i32>>,
-    sh: Vec<Vec<i32>>,
+    wanted: Wanted,
     /// For each home those it gets, as places among the new ones.
     of_home: Vec<Vec<u32>>,
 }
 
 impl Fresh {
     fn code(&self, place: u32) -> u64 {
-        let [x, y, z] = self.geometry.position.each_ref().map(|plane| plane[place as usize]);
+        let [x, y, z] = self.wanted.position.each_ref().map(|plane| plane[place as usize]);
         morton(x, y, z)
-    }
-
-    fn wanted(&self, place: u32) -> ([i32; 3], i32, [i32; 3]) {
-        let place = place as usize;
-        let of = |planes: &[Vec<i32>; 3]| planes.each_ref().map(|plane| plane[place]);
-        (of(&self.geometry.log_scale), self.geometry.opacity[place], of(&self.geometry.rotation))
     }
 }

@@ -1,18 +1,55 @@
-//! Which predictor new Gaussians take.
+//! Which predictor new Gaussians take: by estimated bits, or by the paper's sum of absolute residuals.
 
 use super::unit::{Draft, UnitCoder};
+use super::wanted::Wanted;
 use crate::error::Error;
 use crate::settings::PredictorChoice;
+use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::home::Home;
-use splatstream_decoder::increment::{Applied, Situation};
-use splatstream_decoder::layout::Section;
+use splatstream_decoder::increment::prediction::Prediction;
+use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
+use splatstream_decoder::increment::values::SectionValues;
+use splatstream_decoder::increment::{Applied, Situation, reference_set};
+use splatstream_decoder::layout::{Section, ShCoding};
+use splatstream_decoder::position::refine;
+use splatstream_decoder::predictor::Predictor;
+use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::entropy::token::zigzag;
+use splatstream_format::payload::SectionBytes;
+use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR};
+
+/// log2 of the new Gaussians that share a predictor chosen by bits.
+const RUN_LOG2: u8 = 6;
+
+/// Neighbours of a prediction.
+const NEIGHBOURS: u8 = 8;
+
+/// Weights of the bilateral predictor: e^-1 at the last neighbour, and at 8 squared steps of attribute difference.
+const SPATIAL: u8 = 32;
+const FEATURE: u8 = 255;
+
+/// New Gaussians below which prediction is not tried.
+const FEW: usize = 64;
+
+/// A unit is predicted if that saves a bit for each of so many Gaussians that a decoder has to search.
+const SEARCHED_FOR_A_BIT: usize = 16;
+
+/// Bits that prediction may save a new Gaussian, at most; where even that is too little it is not tried.
+const MOST_SAVED: usize = 10;
+
+/// Values from which on a histogram counts powers of two.
+const DIRECT: u32 = 32;
 
 /// How predictors are chosen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Chooser(pub(crate) PredictorChoice);
 
+/// Residual planes of new Gaussians under one predictor, in plane order.
+type Residuals = Vec<Vec<i32>>;
+
 impl Chooser {
-    /// Gives the new Gaussians of a draft their predictors, and what a decoder makes of it.
+    /// Gives a draft its new Gaussians, each with its predictor, and what a decoder makes of it. Their positions are in
+    /// the draft.
     ///
     /// # Errors
     /// What the decoder's own checks refuse.
@@ -20,26 +57,220 @@ impl Chooser {
         self,
         coder: &UnitCoder<'_>,
         draft: &mut Draft,
+        parents: Home,
+        situation: &Situation<'_>,
+        wanted: &Wanted,
+        models: &ModelsInForce,
+    ) -> Result<Applied, Error> {
+        let plain = unpredicted(coder, wanted, draft.header.position_shift)?;
+        let mut new = draft.values.section(Section::New).clone();
+        new.planes.clone_from(&plain);
+        draft.values.set(Section::New, new);
+        if let Some((predicted, searched)) = self.predict(coder, draft, &parents, situation, wanted, plain)? {
+            // What is estimated knows nothing of contexts, which find much of what neighbours have in common.
+            let pays = self.0 == PredictorChoice::Difference
+                || new_bytes(coder, &predicted, models)? + searched / (8 * SEARCHED_FOR_A_BIT)
+                    < new_bytes(coder, draft, models)?;
+            if pays {
+                *draft = predicted;
+            }
+        }
+        coder.apply(draft, parents, situation)
+    }
+
+    /// A draft with predictors, if they seem to save anything, and the size of the set to search.
+    fn predict(
+        self,
+        coder: &UnitCoder<'_>,
+        draft: &Draft,
         parents: &Home,
         situation: &Situation<'_>,
-        _added: &[u32],
-        _wanted: impl Fn(u32) -> ([i32; 3], i32, [i32; 3]),
-    ) -> Result<Applied, Error> {
-        coder.apply(draft, parents.clone(), situation)
+        wanted: &Wanted,
+        plain: Residuals,
+    ) -> Result<Option<(Draft, usize)>, Error> {
+        // A codebook is made for whole values, not for residuals.
+        let codebook = matches!(coder.colour.mode, ShCoding::VectorQuantised { .. });
+        let tries = self.0 != PredictorChoice::None && wanted.len() >= FEW && !codebook;
+        let set = if tries { self.set(coder, draft, parents, situation)? } else { QuantizedFrame::default() };
+        let SectionValues { deltas, block, .. } = draft.values.section(Section::New).clone();
+        let too_large = set.len() / SEARCHED_FOR_A_BIT > wanted.len() * MOST_SAVED;
+        if set.is_empty() || too_large && self.0 == PredictorChoice::Bits {
+            return Ok(None);
+        }
+        let header = IncrementHeader {
+            predictor_block_log2: 0,
+            neighbour_count: NEIGHBOURS,
+            bilateral_spatial: SPATIAL,
+            bilateral_feature: FEATURE,
+            ..draft.header
+        };
+        let mut all = vec![plain];
+        for predictor in [Predictor::Knn, Predictor::Bilateral] {
+            all.push(predicted(coder, &header, &set, wanted, predictor)?);
+        }
+        let (run_log2, codes) = match self.0 {
+            PredictorChoice::Difference => (0, by_difference(&all)),
+            _ => by_bits(&all),
+        };
+        let run = 1_usize << run_log2;
+        let planes = (0..all[0].len())
+            .map(|plane| (0..wanted.len()).map(|row| all[codes[row / run] as usize][plane][row]).collect())
+            .collect();
+        if codes.iter().all(|&code| code == 0) {
+            return Ok(None);
+        }
+        let header = IncrementHeader { predictor_block_log2: run_log2, ..header };
+        let mut predicted = Draft { header, values: draft.values.clone() };
+        predicted.values.set(Section::New, SectionValues { deltas, planes, block });
+        let codes = SectionValues { deltas: Vec::new(), planes: vec![codes], block };
+        predicted.values.set(Section::Predictors, codes);
+        Ok(Some((predicted, set.len())))
     }
+
+    /// What new Gaussians may be predicted from.
+    fn set(
+        self,
+        coder: &UnitCoder<'_>,
+        draft: &Draft,
+        parents: &Home,
+        situation: &Situation<'_>,
+    ) -> Result<QuantizedFrame, Error> {
+        if !situation.parents_follow {
+            return Ok(reference_set(situation, &parents.planes));
+        }
+        let mut before = draft.clone();
+        before.header.new_count = 0;
+        before.values.set(Section::New, SectionValues::default());
+        let changed = coder.apply(&before, parents.clone(), situation)?;
+        Ok(reference_set(situation, &changed.home.planes))
+    }
+}
+
+/// Bytes of the sections that predictors change.
+fn new_bytes(coder: &UnitCoder<'_>, draft: &Draft, models: &ModelsInForce) -> Result<usize, Error> {
+    let mut only = draft.clone();
+    for section in [Section::Cells, Section::Modes, Section::Moves, Section::Updates] {
+        only.values.set(section, SectionValues::default());
+    }
+    let header = &mut only.header;
+    (header.cell_count, header.parent_count, header.move_count, header.update_count) = (0, 0, 0, 0);
+    let sections = coder.sections(&only, &mut models.clone())?;
+    let bytes =
+        |section: &SectionBytes| section.model.len() + section.blocks.iter().map(Vec::len).sum::<usize>();
+    Ok(sections.iter().map(bytes).sum())
+}
+
+fn sh_planes(coder: &UnitCoder<'_>) -> usize {
+    usize::from(coder.sequence.sh_dimension())
+}
+
+/// Residuals on top of nothing.
+fn unpredicted(coder: &UnitCoder<'_>, wanted: &Wanted, shift: u8) -> Result<Residuals, Error> {
+    let mut now = Attributes::unpredicted(wanted.len(), &coder.colour, sh_planes(coder));
+    let mut planes = Vec::new();
+    for stage in Stage::ALL {
+        planes.extend(wanted.residuals(stage, &now, shift, &coder.colour, true));
+        let coding = coder.coding([shift; 5]);
+        now.add_stage(stage, AttributeValues(&planes), &coding, 0)?;
+    }
+    Ok(planes)
+}
+
+/// Residuals where every Gaussian has the same predictor.
+fn predicted(
+    coder: &UnitCoder<'_>,
+    header: &IncrementHeader,
+    set: &QuantizedFrame,
+    wanted: &Wanted,
+    predictor: Predictor,
+) -> Result<Residuals, Error> {
+    let shift = header.position_shift;
+    let position = wanted
+        .position
+        .each_ref()
+        .map(|plane| -> Vec<u32> { plane.iter().map(|&value| refine(value >> shift, shift)).collect() });
+    let mut now = Attributes::unpredicted(wanted.len(), &coder.colour, sh_planes(coder));
+    let predictors = vec![predictor; wanted.len()];
+    let slices = position.each_ref().map(Vec::as_slice);
+    let mut planes = Vec::new();
+    let mut prediction = Prediction::new(set, slices, &predictors, header);
+    for stage in Stage::ALL {
+        if let Some(prediction) = &prediction {
+            prediction.predict(stage, &mut now);
+        }
+        planes.extend(wanted.residuals(stage, &now, shift, &coder.colour, true));
+        now.add_stage(stage, AttributeValues(&planes), &coder.coding([shift; 5]), 0)?;
+        if let Some(prediction) = &mut prediction {
+            prediction.learn(stage, &now);
+        }
+    }
+    Ok(planes)
+}
+
+/// For each Gaussian the predictor with the smallest sum of absolute residuals; of equal ones the first.
+fn by_difference(all: &[Residuals]) -> Vec<i32> {
+    let count = all[0][0].len();
+    let sum = |residuals: &Residuals, row: usize| -> u64 {
+        residuals.iter().map(|plane| u64::from(plane[row].unsigned_abs())).sum()
+    };
+    let best =
+        |row: usize| (0..all.len()).min_by_key(|&code| (sum(&all[code], row), code)).unwrap_or(0) as i32;
+    (0..count).map(best).collect()
+}
+
+/// For each run the predictor with the fewest estimated bits, if that saves bits in all.
+fn by_bits(all: &[Residuals]) -> (u8, Vec<i32>) {
+    let count = all[0][0].len();
+    let run = 1_usize << RUN_LOG2;
+    let costs: Vec<Vec<f64>> = all.iter().map(|residuals| run_bits(residuals, run)).collect();
+    let codes: Vec<i32> = (0..count.div_ceil(run))
+        .map(|place| {
+            let cost = |&code: &usize| costs[code][place];
+            (0..all.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0) as i32
+        })
+        .collect();
+    // The code of a predictor takes bits, and mixing residuals with values spoils the tables of both.
+    let margin = 4.0;
+    let saved: f64 = codes
+        .iter()
+        .enumerate()
+        .map(|(place, &code)| costs[0][place] - costs[code as usize][place] - margin)
+        .sum();
+    if saved > 0.0 { (RUN_LOG2, codes) } else { (RUN_LOG2, vec![0; codes.len()]) }
+}
+
+/// Zero-order bits of each run.
+fn run_bits(residuals: &Residuals, run: usize) -> Vec<f64> {
+    let count = residuals[0].len();
+    let mut bits = vec![0.0; count.div_ceil(run)];
+    for plane in residuals {
+        let sum: i64 = plane.iter().map(|&value| i64::from(value)).sum();
+        let mean = sum.div_euclid(count.max(1) as i64) as i32;
+        let symbol = |value: i32| -> (usize, u32) {
+            let u = zigzag(value.wrapping_sub(mean));
+            if u < DIRECT { (u as usize, 0) } else { ((DIRECT + u.ilog2()) as usize, u.ilog2()) }
+        };
+        let mut histogram = [0_u32; 64];
+        plane.iter().for_each(|&value| histogram[symbol(value).0] += 1);
+        let cost = histogram.map(|n| libm::log2(count as f64 / f64::from(n.max(1))));
+        for (place, &value) in plane.iter().enumerate() {
+            let (place_in_histogram, raw) = symbol(value);
+            bits[place / run] += cost[place_in_histogram] + f64::from(raw);
+        }
+    }
+    bits
 }
 
 /// New Gaussians by predictor: none, knn, bilateral.
 pub(crate) fn used(draft: &Draft) -> [u64; 3] {
     let mut counts = [0; 3];
     let total = draft.header.new_count as usize;
-    let codes = draft.values.plane(Section::Predictors, 0);
-    if codes.is_empty() {
+    if draft.header.predictor_block_log2 == NO_PREDICTOR {
         counts[0] = total as u64;
         return counts;
     }
     let run = 1_usize << draft.header.predictor_block_log2;
-    for (place, &code) in codes.iter().enumerate() {
+    for (place, &code) in draft.values.plane(Section::Predictors, 0).iter().enumerate() {
         counts[code as usize] += (total - place * run).min(run) as u64;
     }
     counts

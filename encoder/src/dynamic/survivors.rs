@@ -3,9 +3,10 @@
 use super::Target;
 use super::align::{Namings, Pose};
 use crate::settings::Steps;
+use crate::vq;
 use rayon::prelude::*;
 use splatstream_decoder::home::{FINE, Home};
-use splatstream_format::payload::Transform;
+use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::SequenceParameters;
 
 /// Largest difference, in steps, that is left as it is. A Gaussian that moves smoothly keeps the error of its intra
@@ -34,6 +35,8 @@ pub(crate) struct Survivors<'a> {
     pub(crate) dc: &'a Transform,
     pub(crate) sh: Option<&'a Transform>,
     pub(crate) namings: Namings,
+    /// The codebook of SH residuals, if they are vector quantised: the second stage, behind that of whole values.
+    pub(crate) book: Option<&'a Codebook>,
 }
 
 impl Survivors<'_> {
@@ -98,9 +101,34 @@ impl Survivors<'_> {
                 wanted / self.sequence.sh_step() - planes.sh[plane][row] as f32 / 64.0
             };
             let differences: Vec<f32> = (0..planes.sh.len()).map(sh).collect();
-            residuals.extend(projected(transform, &differences).map(keep));
+            match self.book {
+                None => residuals.extend(projected(transform, &differences).map(keep)),
+                Some(book) => {
+                    let components: Vec<f32> = projected(transform, &differences).collect();
+                    residuals.extend([0, vq::nearest_entry(book, &components)]);
+                }
+            }
         }
         residuals
+    }
+
+    /// SH residuals as components, of every `stride`-th pair: rows of the transform's rank.
+    pub(crate) fn sh_rows(&self, homes: &[Home], partner: &[Option<u32>], stride: usize) -> Vec<f32> {
+        let Some(transform) = self.sh else { return Vec::new() };
+        let places = homes.iter().flat_map(|home| (0..home.len()).map(move |row| (home, row)));
+        let pairs =
+            places.zip(partner).filter_map(|((home, row), place)| Some((home, row, (*place)? as usize)));
+        let differences = |(home, row, place): (&Home, usize, usize)| -> Vec<f32> {
+            let plane = |(plane, values): (usize, &Vec<i32>)| {
+                let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[place]);
+                wanted / self.sequence.sh_step() - values[row] as f32 / 64.0
+            };
+            home.planes.sh.iter().enumerate().map(plane).collect()
+        };
+        pairs
+            .step_by(stride.max(1))
+            .flat_map(|pair| projected(transform, &differences(pair)).collect::<Vec<_>>())
+            .collect()
     }
 
     /// The target written like its reference.

@@ -57,17 +57,22 @@ impl UnitCoder<'_> {
         }
     }
 
+    /// How attributes are coded with some shifts.
+    pub(crate) fn coding(&self, shift: [u8; 5]) -> AttributeCoding<'_> {
+        AttributeCoding {
+            shift,
+            canonical_axes: self.sequence.canonical_axes(),
+            rotation_thresholds: self.sequence.rotation_threshold,
+            colour: self.colour,
+        }
+    }
+
     /// How a decoder sees a draft.
     pub(crate) fn unit<'d>(&'d self, draft: &'d Draft) -> Unit<'d> {
         Unit {
             header: &draft.header,
             values: &draft.values,
-            coding: AttributeCoding {
-                shift: draft.header.attribute_shift,
-                canonical_axes: self.sequence.canonical_axes(),
-                rotation_thresholds: self.sequence.rotation_threshold,
-                colour: self.colour,
-            },
+            coding: self.coding(draft.header.attribute_shift),
             sequence: self.sequence,
             intra: self.intra,
             at: 0,

@@ -1,0 +1,193 @@
+"""Clause 7.17: reference sets, neighbours, and the predictors of new Gaussians."""
+
+import heapq
+from collections import namedtuple
+
+from conventions import Round
+from errors import require
+from homes import canonical
+
+NONE, KNN, BILATERAL, RESERVED = range(4)
+
+# Values of a Gaussian of a reference set (SS-PR-004): position and rotation are canonical
+Reference = namedtuple("Reference", "position q o rotation dc sh")
+
+
+def reference(gaussian):
+    return Reference(canonical(gaussian.position_fine), gaussian.q, gaussian.o,
+                     canonical(gaussian.rotation_fine), gaussian.dc, gaussian.sh)
+
+
+# ---- 7.17.2 ----
+
+
+class Neighbours:
+    """SS-PR-004, by a tree that halves the reference set along one axis after the other."""
+
+    LEAF = 8
+
+    def __init__(self, references):
+        self.references = references
+        self.tree = self.build(list(range(len(references))), 0)
+
+    def build(self, indices, axis):
+        if len(indices) <= self.LEAF:
+            return indices
+        indices.sort(key=lambda g: self.references[g].position[axis])
+        half = len(indices) // 2
+        border = self.references[indices[half]].position[axis]      # below: <= border; above: >= border
+        after = (axis + 1) % 3
+        return (axis, border, self.build(indices[:half], after), self.build(indices[half:], after))
+
+    def find(self, position, neighbour_count):
+        """[(D2, index)] of the neighbours in order."""
+        k = min(neighbour_count, len(self.references))
+        worst_first = []                            # heap of (-D2, -index)
+        self.visit(self.tree, position, k, worst_first)
+        return sorted((-d2, -index) for d2, index in worst_first)
+
+    def visit(self, node, position, k, worst_first):
+        if isinstance(node, list):
+            for index in node:
+                d2 = sum((a - b) * (a - b) for a, b in zip(position, self.references[index].position))
+                if len(worst_first) < k:
+                    heapq.heappush(worst_first, (-d2, -index))
+                else:
+                    heapq.heappushpop(worst_first, (-d2, -index))
+            return
+        axis, border, below, above = node
+        near, far = (below, above) if position[axis] < border else (above, below)
+        self.visit(near, position, k, worst_first)
+        gap = position[axis] - border
+        # equal distances are visited too: there the index decides
+        if len(worst_first) < k or gap * gap <= -worst_first[0][0]:
+            self.visit(far, position, k, worst_first)
+
+
+def check_predictors(section):
+    """SS-PR-002, entry by entry."""
+    for i, value in enumerate(section.values("predictor")[0]):
+        require(value != RESERVED, "RESERVED", "7.17", section.at(i))
+        require(0 <= value < RESERVED, "OUT_OF_RANGE", "7.17", section.at(i))
+
+
+def predictor_of_entries(count, increment, values, references):
+    """The predictor of each new Gaussian; SS-PR-003. `values` are those of section predictors."""
+    if increment.predictor_block_log2 == 255 or not references:
+        return [NONE] * count
+    return [values[i >> increment.predictor_block_log2] for i in range(count)]
+
+
+class NewPredictions:
+    """`predict` of residuals.Residuals for section new."""
+
+    def __init__(self, positions, kinds, references, increment, context):
+        self.kinds = kinds
+        self.references = references
+        self.increment = increment
+        self.context = context
+        self.neighbours = [None] * len(kinds)
+        tree = Neighbours(references) if any(kinds) else None
+        for i, kind in enumerate(kinds):
+            if kind != NONE:
+                self.neighbours[i] = tree.find(positions[i], increment.neighbour_count)
+
+    def __call__(self, attribute, i, values):
+        kind = self.kinds[i]
+        if kind == NONE:
+            return self.none(attribute)
+        if kind == KNN:
+            p = self.knn(attribute, self.neighbours[i])
+        else:
+            p = self.bilateral(attribute, self.neighbours[i], values)
+        return tuple(x << 6 for x in p) if attribute == "rotation" else p
+
+    # ---- 7.16.1 ----
+
+    def none(self, attribute):
+        if attribute == "opacity":
+            return 0
+        if attribute == "dc":
+            return self.context.dc_transform.mean
+        if attribute == "sh":
+            if self.increment.sh_mode == 0:
+                return (0,) * self.context.seq.sh_planes
+            return self.context.sh_transform.mean
+        return (0, 0, 0)
+
+    # ---- 7.17.3 ----
+
+    def knn(self, attribute, neighbours):
+        nearest = neighbours[0][0]
+        if nearest == 0:
+            return self.attribute_of(attribute, neighbours[0][1])
+        weight = [max(1, (2 ** 16 * (nearest + 1)) // (d2 + 1)) for d2, _ in neighbours]
+        return self.means(attribute, weight, neighbours)
+
+    def attribute_of(self, attribute, index):
+        return getattr(self.references[index], {"log_scale": "q", "opacity": "o"}.get(attribute, attribute))
+
+    def means(self, attribute, weight, neighbours):
+        values = [self.attribute_of(attribute, index) for _, index in neighbours]
+        if attribute == "opacity":
+            return mean(weight, values)
+        return tuple(mean(weight, column) for column in zip(*values))
+
+    # ---- 7.17.4 ----
+
+    def bilateral(self, attribute, neighbours, values):
+        farthest = neighbours[-1][0]
+        weight = []
+        for d2, index in neighbours:
+            f = feature_distance(attribute, values, self.references[index])
+            xs = (d2 * self.increment.bilateral_spatial) // (farthest + 1)
+            xf = min(255, (f * self.increment.bilateral_feature) >> 6)
+            weight.append(EXP[min(255, xs + xf)])
+        return self.means(attribute, weight, neighbours)
+
+
+def mean(weight, x):
+    """SS-PR-005"""
+    W = sum(weight)
+    total = sum(w * value for w, value in zip(weight, x))
+    return (2 * total + W) // (2 * W)
+
+
+def feature_distance(attribute, values, neighbour):
+    """f of 7.17.4; `values` are those of the new Gaussian so far."""
+    f = 0
+    if attribute in ("opacity", "rotation", "dc", "sh"):
+        f += squares(values.q, neighbour.q)
+    if attribute in ("rotation", "dc", "sh"):
+        f += (values.o - neighbour.o) * (values.o - neighbour.o)
+    if attribute in ("dc", "sh"):
+        f += squares(canonical(values.rotation_fine), neighbour.rotation)
+    if attribute == "sh":
+        f += squares([Round(x, 6) for x in values.dc], [Round(x, 6) for x in neighbour.dc])
+    return f
+
+
+def squares(a, b):
+    return sum((x - y) * (x - y) for x, y in zip(a, b))
+
+
+# ---- 7.17.5 ----
+
+EXP = [
+    4096, 3970, 3848, 3729, 3615, 3503, 3396, 3291, 3190, 3092, 2997, 2904, 2815, 2729, 2645, 2563,
+    2484, 2408, 2334, 2262, 2192, 2125, 2060, 1996, 1935, 1875, 1818, 1762, 1707, 1655, 1604, 1555,
+    1507, 1460, 1416, 1372, 1330, 1289, 1249, 1211, 1174, 1137, 1102, 1069, 1036, 1004, 973, 943,
+    914, 886, 859, 832, 807, 782, 758, 734, 712, 690, 669, 648, 628, 609, 590, 572,
+    554, 537, 521, 505, 489, 474, 460, 445, 432, 418, 406, 393, 381, 369, 358, 347,
+    336, 326, 316, 306, 297, 288, 279, 270, 262, 254, 246, 238, 231, 224, 217, 210,
+    204, 198, 192, 186, 180, 174, 169, 164, 159, 154, 149, 145, 140, 136, 132, 128,
+    124, 120, 116, 113, 109, 106, 103, 99, 96, 93, 90, 88, 85, 82, 80, 77,
+    75, 73, 70, 68, 66, 64, 62, 60, 58, 57, 55, 53, 52, 50, 48, 47,
+    46, 44, 43, 41, 40, 39, 38, 37, 35, 34, 33, 32, 31, 30, 29, 28,
+    28, 27, 26, 25, 24, 24, 23, 22, 21, 21, 20, 20, 19, 18, 18, 17,
+    17, 16, 16, 15, 15, 14, 14, 13, 13, 13, 12, 12, 12, 11, 11, 10,
+    10, 10, 10, 9, 9, 9, 8, 8, 8, 8, 7, 7, 7, 7, 7, 6,
+    6, 6, 6, 6, 5, 5, 5, 5, 5, 5, 5, 4, 4, 4, 4, 4,
+    4, 4, 4, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1,
+]

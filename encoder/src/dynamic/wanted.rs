@@ -1,0 +1,158 @@
+//! What a run of Gaussians shall become, on the output lattices, and the residuals that bring it there.
+
+use super::anchor::scale_residuals;
+use crate::lattice::Geometry;
+use splatstream_decoder::colour::{Colour, inverse};
+use splatstream_decoder::home::{FINE, Home};
+use splatstream_decoder::increment::residual::{Attributes, Stage};
+use splatstream_decoder::layout::ShCoding;
+use splatstream_format::Result;
+use splatstream_format::payload::Transform;
+
+/// The integers of Gaussians; all planes of one length.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Wanted {
+    pub(crate) position: [Vec<u32>; 3],
+    log_scale: [Vec<i32>; 3],
+    opacity: Vec<i32>,
+    rotation: [Vec<i32>; 3],
+    /// Steps / 64.
+    dc: [Vec<i32>; 3],
+    sh: Vec<Vec<i32>>,
+    /// Codebook indices, where SH is vector quantised.
+    indices: Vec<Vec<i32>>,
+}
+
+impl Wanted {
+    /// Of geometry and colour components as coded without prediction.
+    ///
+    /// # Errors
+    /// Components out of range.
+    pub(crate) fn new(
+        geometry: &Geometry,
+        dc: &[Vec<i32>],
+        sh: &[Vec<i32>],
+        colour: &Colour<'_>,
+        sh_planes: usize,
+    ) -> Result<Self> {
+        let count = geometry.opacity.len();
+        let mut dc_out = [(); 3].map(|()| vec![0; count]);
+        inverse(colour.dc, dc, &mut dc_out.each_mut().map(Vec::as_mut_slice), 0)?;
+        let mut sh_out = vec![vec![0; count]; sh_planes];
+        let mut indices = Vec::new();
+        match (colour.mode, colour.sh) {
+            (ShCoding::Coefficients { .. }, Some(transform)) => {
+                let mut out: Vec<&mut [i32]> = sh_out.iter_mut().map(Vec::as_mut_slice).collect();
+                inverse(transform, sh, &mut out, 0)?;
+            }
+            (ShCoding::VectorQuantised { .. }, _) => indices = sh.to_vec(),
+            _ => {}
+        }
+        Ok(Self {
+            position: geometry.position.clone(),
+            log_scale: geometry.log_scale.clone(),
+            opacity: geometry.opacity.clone(),
+            rotation: geometry.rotation.clone(),
+            dc: dc_out,
+            sh: sh_out,
+            indices,
+        })
+    }
+
+    /// Some of the Gaussians.
+    pub(crate) fn select(&self, rows: &[u32]) -> Self {
+        let pick = |plane: &Vec<i32>| -> Vec<i32> { rows.iter().map(|&row| plane[row as usize]).collect() };
+        Self {
+            position: self
+                .position
+                .each_ref()
+                .map(|plane| rows.iter().map(|&row| plane[row as usize]).collect()),
+            log_scale: self.log_scale.each_ref().map(pick),
+            opacity: pick(&self.opacity),
+            rotation: self.rotation.each_ref().map(pick),
+            dc: self.dc.each_ref().map(pick),
+            sh: self.sh.iter().map(pick).collect(),
+            indices: self.indices.iter().map(pick).collect(),
+        }
+    }
+
+    /// Gaussians.
+    pub(crate) fn len(&self) -> usize {
+        self.opacity.len()
+    }
+
+    /// What brings positions near those wanted, in steps of 2^shift.
+    pub(crate) fn moves(&self, home: &Home, shift: u8) -> Vec<Vec<i32>> {
+        let of_axis = |(wanted, now): (&Vec<u32>, &Vec<u32>)| {
+            wanted.iter().zip(now).map(|(&w, &n)| nearest(w as i32 - n as i32, shift)).collect()
+        };
+        self.position.iter().zip(&home.planes.position).map(of_axis).collect()
+    }
+
+    /// The residual planes of one attribute on top of what is known or predicted. `is_new`: for new Gaussians, which
+    /// have a codebook index where others keep their SH.
+    pub(crate) fn residuals(
+        &self,
+        stage: Stage,
+        now: &Attributes,
+        shift: u8,
+        colour: &Colour<'_>,
+        is_new: bool,
+    ) -> Vec<Vec<i32>> {
+        match stage {
+            Stage::LogScale => self.scale_planes(now, shift),
+            Stage::Opacity => vec![differences(&self.opacity, &now.opacity, shift)],
+            Stage::Rotation => {
+                let fine = |(wanted, now): (&Vec<i32>, &Vec<i32>)| {
+                    let shift = shift + FINE.ilog2() as u8;
+                    wanted.iter().zip(now).map(|(&w, &n)| nearest(w * FINE - n, shift)).collect()
+                };
+                self.rotation.iter().zip(&now.rotation_fine).map(fine).collect()
+            }
+            Stage::Dc => components(colour.dc, &self.dc, &now.dc, shift),
+            Stage::Sh => match (colour.mode, colour.sh) {
+                (ShCoding::Coefficients { .. }, Some(transform)) => {
+                    components(transform, &self.sh, &now.sh, shift)
+                }
+                (ShCoding::VectorQuantised { .. }, _) if is_new => self.indices.clone(),
+                // Entry 0 is zero.
+                (ShCoding::VectorQuantised { stages }, _) => vec![vec![0; self.len()]; usize::from(stages)],
+                _ => Vec::new(),
+            },
+        }
+    }
+
+    fn scale_planes(&self, now: &Attributes, shift: u8) -> Vec<Vec<i32>> {
+        let at = |planes: &[Vec<i32>; 3], row: usize| planes.each_ref().map(|plane| plane[row]);
+        let mut planes = vec![Vec::with_capacity(self.len()); 3];
+        for row in 0..self.len() {
+            let residuals = scale_residuals(at(&now.log_scale, row), at(&self.log_scale, row), shift);
+            planes.iter_mut().zip(residuals).for_each(|(plane, value)| plane.push(value));
+        }
+        planes
+    }
+}
+
+/// x / 2^shift to the nearest integer, halves up.
+pub(crate) fn nearest(x: i32, shift: u8) -> i32 {
+    if shift == 0 { x } else { (x + (1 << (shift - 1))) >> shift }
+}
+
+fn differences(wanted: &[i32], now: &[i32], shift: u8) -> Vec<i32> {
+    wanted.iter().zip(now).map(|(&wanted, &now)| nearest(wanted - now, shift)).collect()
+}
+
+/// Colour differences as components of a transform, in steps of 2^shift.
+fn components(transform: &Transform, wanted: &[Vec<i32>], now: &[Vec<i32>], shift: u8) -> Vec<Vec<i32>> {
+    let count = wanted.first().map_or(0, Vec::len);
+    // Basis in Q12, colours in 1/64: one step is 2^18.
+    let unit = 1_i64 << (18 + shift);
+    let row_sum = |weights: &[i16], row: usize| -> i32 {
+        let term = |(&weight, (wanted, now)): (&i16, (&Vec<i32>, &Vec<i32>))| {
+            i64::from(weight) * (i64::from(wanted[row]) - i64::from(now[row]))
+        };
+        let sum: i64 = weights.iter().zip(wanted.iter().zip(now)).map(term).sum();
+        (sum + unit / 2).div_euclid(unit) as i32
+    };
+    transform.rows().map(|weights| (0..count).map(|row| row_sum(weights, row)).collect()).collect()
+}
