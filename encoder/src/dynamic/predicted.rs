@@ -4,7 +4,7 @@ use super::anchor::deltas;
 use super::predictors::{Chooser, used};
 use super::survivors::{Fate, Survivors};
 use super::unit::{Draft, UnitCoder};
-use super::wanted::Wanted;
+use super::wanted::{ColourTarget, Wanted};
 use super::{CodedUnit, Reference, Target};
 use crate::colour;
 use crate::error::Error;
@@ -250,22 +250,23 @@ impl Predicted<'_> {
         let spacing = Spacing::default();
         let geometry = geometry(&frame, sequence, &spacing, self.number)?;
         let dc: Vec<&[f32]> = frame.dc().iter().map(Vec::as_slice).collect();
-        let dc = colour::components(self.survivors.dc, &dc, sequence.dc_step(), &spacing);
+        let dc_components = colour::components(self.survivors.dc, &dc, sequence.dc_step(), &spacing);
         let zeros = vec![0.0; frame.len()];
+        let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
+        let step = sequence.sh_step();
         let sh = match (self.coder.colour.mode, self.survivors.sh) {
             (ShCoding::Coefficients { .. }, Some(transform)) => {
-                let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
-                colour::components(transform, &planes, sequence.sh_step(), &spacing)
+                colour::components(transform, &planes, step, &spacing)
             }
             (ShCoding::VectorQuantised { .. }, Some(transform)) => {
-                let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
-                let rows = colour::sampled_rows(transform, &planes, sequence.sh_step(), 1);
+                let rows = colour::sampled_rows(transform, &planes, step, 1);
                 self.stages(&rows, usize::from(transform.header.rank))
             }
             _ => Vec::new(),
         };
-        let planes = usize::from(sequence.sh_dimension());
-        let wanted = Wanted::new(&geometry, &dc, &sh, &self.coder.colour, planes)?;
+        let dc = ColourTarget { planes: &dc, step: sequence.dc_step(), components: &dc_components };
+        let sh = ColourTarget { planes: &planes, step, components: &sh };
+        let wanted = Wanted::new(&geometry, &dc, &sh, &self.coder.colour, &spacing)?;
         Ok(Fresh { places, wanted, of_home })
     }
 

@@ -12,7 +12,7 @@ use splatstream_format::syntax::SequenceParameters;
 
 /// Largest difference, in steps, that is left as it is. A Gaussian that moves smoothly keeps the error of its intra
 /// frame, up to half a step; sending each change as soon as it rounds to a step costs three times the bits.
-const LEFT: f32 = 0.75;
+pub(crate) const LEFT: f32 = 0.75;
 
 /// The largest move that the attribute alphabet carries is 2^16 - 1 steps.
 const REACH: f32 = 65_000.0;
