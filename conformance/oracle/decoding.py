@@ -175,8 +175,17 @@ class Decoder:
 
     def end_frame(self):
         if self.frame is not None:
+            self.check_carried(self.frame)
             self.frames.append(self.frame)
             self.frame = None
+
+    def check_carried(self, frame):
+        """SS-DG-007: the digest of what the frame carries where it is shown."""
+        at = frame.shown_at() if self.file_header.profile == 1 else None
+        if at is not None:
+            header = frame.increments[at]
+            if header.carried_digest != frame.carried_digest(at[1], frame.carried_lists):
+                self.errors.append(StreamError("DIGEST", "7.18", header.at("carried_digest")))
 
     def confined(self, error):
         self.errors.append(error)
@@ -293,8 +302,6 @@ class Decoder:
         carried_lists = frame.carried_lists
         if r == 0 and not frame.intra:
             carried_lists = frame.carried(increment.cells)
-        digest = frame.carried_digest(r, carried_lists)
-        require(header.carried_digest == digest, "DIGEST", "7.18", header.at("carried_digest"))
         frame.accept(s, r, increment, carried_lists)
 
     def context(self):

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Writes vectors of profile 1: make_vectors.py FOLDER [VALID INVALID]; the fields of the records are in README.md."""
+"""Writes vectors of profile 1: make_vectors.py FOLDER [VALID INVALID]
+
+The fields of the records are explained in RECORDS.md."""
 
 import hashlib
 import json
@@ -112,15 +114,16 @@ def write_intra(folder, count):
         seed += 1
 
 
-def small_enough(data, rng):
-    return len(data) < 8192 or rng.random() < 0.15
-
-
 def write_valid(folder, count):
-    seed, written, rng = 0, 0, random.Random(1)
+    seed, written = 0, 0
     while written < count:
-        data = valid_stream(seed)
-        if small_enough(data, rng) and len(data) < 20000:
+        if written % 8 == 7:                        # sections of several blocks
+            data, limit = valid_stream(seed, most=220), 20000
+        elif written % 2 == 1:
+            data, limit = valid_stream(seed, most=12, deep=True), 10000
+        else:
+            data, limit = valid_stream(seed), 8192
+        if len(data) < limit:
             decoder, record = whole_record(data)
             sequence = decoder.sequence
             if sequence.spatial_layer_count * sequence.temporal_layer_count * sequence.refinement_count <= 48:
@@ -131,10 +134,11 @@ def write_valid(folder, count):
 
 
 def write_invalid(folder, count):
-    """All faults and mutations in turn, until there are enough."""
+    """All faults and mutations in turn, until there are enough; without a number, each of them once."""
     rows = [("fault", fault) for fault in FAULTS] + [("mutation", mutation) for mutation in MUTATIONS]
     random.Random(2).shuffle(rows)
     written, seed = 0, 10000
+    count = count or len(rows)
     while written < count:
         kind, row = rows[written % len(rows)]
         data, name = None, "%s-%03d" % (row[0], written)
@@ -143,7 +147,9 @@ def write_invalid(folder, count):
             if kind == "fault":
                 data, seed = faulty_stream(row, seed)
             else:
-                data = mutated(row, valid_stream(seed), seed)
+                losses = row[0].startswith(("increment-", "several-", "reference-"))
+                stream = valid_stream(seed, most=12, deep=True) if losses else valid_stream(seed)
+                data = mutated(row, stream, seed)
             if data is not None and not Decoder(data).decode().errors:
                 data = None                         # noise where it does not matter
         decoder, record = whole_record(data)
@@ -161,7 +167,7 @@ def write_invalid(folder, count):
 
 def main():
     folder = sys.argv[1]
-    counts = [int(x) for x in sys.argv[2:4]] or [60, 60]
+    counts = [int(x) for x in sys.argv[2:4]] or [60, 0]
     for name, maker, count in (("valid", write_valid, counts[0]), ("invalid", write_invalid, counts[1])):
         path = os.path.join(folder, name)
         os.makedirs(path, exist_ok=True)

@@ -19,7 +19,7 @@ def belongs(unit, point, seq, gop):
 
 
 class Ledger:
-    """The units of types 2 to 6 and 10 of a stream, for SS-PL-002."""
+    """The units of known type among 2 to 6 and 10 of a stream, for SS-PL-002."""
 
     def __init__(self):
         self.units = []                             # (unit, GOP or None)

@@ -18,10 +18,12 @@ from synth_increment import IncrementWriter
 class DynamicSynth:
     """stream() gives the bytes. tamper(stage, value, writer) may change what increments hold (synth_faults.py)."""
 
-    def __init__(self, seed, tamper=None, most=None):
+    def __init__(self, seed, tamper=None, most=None, deep=False):
+        """most: Gaussians of a frame, about; deep: one GOP of temporal_depth 2 or 3 in a small sequence."""
         self.rng = random.Random(seed)
         self.tamper = tamper
-        self.most = most or self.rng.choice([6, 20, 20, 40, 90, 150])         # Gaussians of a frame, about
+        self.deep = deep
+        self.most = most or self.rng.choice([6, 20, 20, 40, 90, 150])
         self.out = bytearray()
         self.live = Decoder(self.out)
         self.writers = []                           # (offset of the unit, IncrementWriter)
@@ -79,6 +81,10 @@ class DynamicSynth:
         rng = self.rng
         self.temporal_layers = rng.choice([1, 1, 2, 3, 4])
         self.gops = []
+        if self.deep:
+            self.temporal_layers = 4
+            self.gops = [(1, rng.choice([2, 3, 3]), rng.randint(9, 14))]
+            return
         for _ in range(rng.choice([1, 1, 2, 2, 3])):
             if rng.random() < 0.25:
                 self.gops.append((0, 0, rng.randint(1, 2)))
@@ -89,10 +95,13 @@ class DynamicSynth:
     def sequence(self):
         rng = self.rng
         count = rng.choice([1, 2, 2, 3, 3, 4, 5]) if rng.random() < 0.95 else 10
+        spatial, sh_degree = rng.choice([1, 1, 2, 2, 3, 4]), rng.choice([0, 0, 1, 1, 1, 2, 3])
+        if self.deep:
+            count, spatial, sh_degree = rng.randint(2, 4), rng.choice([1, 1, 2]), rng.choice([0, 0, 1])
         percent = sorted(rng.sample(range(1, 100), count - 1)) + [100]
         threshold = sorted([rng.choice([0, 0, 2, 5, 40, 100, 255]) for _ in range(3)], reverse=True)
         total = sum(gop[2] for gop in self.gops)
-        payload = bytes([rng.choice([0, 0, 1, 1, 1, 2, 3]), rng.choice([1, 1, 2, 2, 3, 4]), self.temporal_layers, count]
+        payload = bytes([sh_degree, spatial, self.temporal_layers, count]
                         + percent + [0] * (10 - count)
                         + [rng.choice([1, 3, 6, 10, 12, 14, 16, 20]), rng.choice([6, 6, 6, 7, 16]), rng.randint(0, 3)]
                         + threshold)
@@ -160,7 +169,8 @@ class DynamicSynth:
         reference = live.gop.frames.get(place)
         intra = frame_type == c.TYPE_I
         if intra:
-            total = rng.choice([0, 1, self.most // 2, self.most, self.most, self.most + rng.randint(0, 70)])
+            total = rng.choice([0, 1, self.most] if not live.gop.predicted else [1] + [self.most] * 4)
+            total = rng.choice([total, self.most // 2, self.most, self.most, self.most + rng.randint(0, 70)])
             sizes = None
         else:
             sizes = self.plan_sizes(reference)
@@ -217,7 +227,7 @@ class DynamicSynth:
         for r in range(units):
             if r < level and not frame.dropping:
                 self.increment(number, seq.top, r, sizes[r], layers)
-            elif rng.random() < 0.2 or r == 0:      # passed over by every decoder (SS-LO-003)
+            elif rng.random() < 0.5 or r == 0:      # passed over by every decoder (SS-LO-003)
                 self.garbage(number, seq.top, r, layers["temporal"])
 
     def garbage(self, number, s, r, temporal):

@@ -1,7 +1,8 @@
 //! Random streams that obey the syntax: one generator for the property tests and for fuzzing.
 //!
 //! Valid by construction up to the sections: every header, order, count and check sum is right, and the bytes
-//! inside models and blocks are arbitrary. What finds an error there has passed everything before.
+//! inside models and blocks are arbitrary. What finds an error there has passed everything before. Those of profile
+//! Intra are here, those of profile Dynamic in [`dynamic`].
 
 use crate::payload::{Codebook, Index, Transform, write_refinement};
 use crate::syntax::{
@@ -10,6 +11,10 @@ use crate::syntax::{
 };
 use crate::unit::{write_file_header, write_unit};
 use arbitrary::{Arbitrary, Result, Unstructured};
+
+mod coded;
+pub mod dynamic;
+mod increments;
 
 /// Most Gaussians of a frame: enough for several blocks.
 const MAX_GAUSSIANS: u32 = 2000;

@@ -101,6 +101,9 @@ impl Tally {
             let parsed = SequenceParameters::parse_payload(payload, at, belonging.profile);
             self.sequence = self.sequence.or(parsed.ok());
         }
+        if !unit.header.unit_type().is_known_in(belonging.profile) {
+            return;
+        }
         let gaussians = match (unit.header.unit_type(), &self.sequence) {
             (UnitType::Refinement, Some(sequence)) => {
                 RefinementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.gaussian_count)

@@ -29,8 +29,10 @@ pub(super) struct Assembly<'d, 'a> {
     transforms: Transforms<'d>,
     frame: &'d PendingFrame<'a>,
     reference: Option<&'d Reference>,
-    /// The homes of the last layer that is complete.
-    complete: Vec<Home>,
+    /// The layer below the one in progress: its homes are the parents there.
+    below: Layer,
+    /// The last complete layer, if it is neither of these.
+    complete: Option<Layer>,
     /// The homes of the layer in progress, and their digests.
     homes: Vec<Home>,
     digests: Vec<UnitDigest>,
@@ -44,10 +46,17 @@ pub(super) struct Assembly<'d, 'a> {
     /// Models in force for unit 0 of the next layer or frame, and for the next unit of a higher refinement.
     first_models: ModelsInForce,
     models: ModelsInForce,
-    /// Header fields of the last unit decoded, in each layer, that count where the frame is shown.
+    /// Header and offset of the last unit decoded.
     last: Option<(IncrementHeader, u64)>,
-    last_complete: Option<(IncrementHeader, u64)>,
     bytes: u64,
+}
+
+/// A spatial layer of an intra frame.
+#[derive(Debug, Default)]
+struct Layer {
+    spatial_layer: u8,
+    homes: Vec<Home>,
+    last: Option<(IncrementHeader, u64)>,
 }
 
 /// A frame put together.
@@ -76,7 +85,8 @@ impl<'d, 'a> Assembly<'d, 'a> {
             transforms: gop.transforms(&frame.header, frame.at)?,
             frame,
             reference,
-            complete: Vec::new(),
+            below: Layer::default(),
+            complete: None,
             homes: Vec::new(),
             digests: Vec::new(),
             spatial_layer: 0,
@@ -87,7 +97,6 @@ impl<'d, 'a> Assembly<'d, 'a> {
             first_models: models,
             models: ModelsInForce::default(),
             last: None,
-            last_complete: None,
             bytes: frame.bytes,
         })
     }
@@ -144,8 +153,12 @@ impl<'d, 'a> Assembly<'d, 'a> {
     /// Applies a unit to its parents and checks what comes out.
     fn unit(&mut self, pending: &PendingIncrement<'a>, values: &UnitValues, predicts: bool) -> Result<()> {
         if pending.spatial_layer != self.spatial_layer && self.is_intra() {
-            self.complete = core::mem::take(&mut self.homes);
-            self.last_complete = self.last.take();
+            let homes = core::mem::take(&mut self.homes);
+            let done = Layer { spatial_layer: self.spatial_layer, homes, last: self.last.take() };
+            let before = core::mem::replace(&mut self.below, done);
+            if before.homes.len() == self.width {
+                self.complete = Some(before);
+            }
             self.digests.clear();
         }
         self.spatial_layer = pending.spatial_layer;
@@ -183,7 +196,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let sh_planes = usize::from(self.sequence.sh_dimension());
         let of = |homes: &[Home]| homes.get(refinement).cloned().unwrap_or_else(|| Home::empty(sh_planes));
         let parents = match self.reference {
-            None => of(&self.complete),
+            None => of(&self.below.homes),
             Some(reference) => {
                 if refinement == 0 {
                     self.field = Arc::new(field(unit, rotation_unit(self.sequence.rotation_step))?);
@@ -255,9 +268,10 @@ impl<'d, 'a> Assembly<'d, 'a> {
     /// Clause 7.20: what is shown of the frame, and what is kept.
     pub(super) fn finish(mut self) -> Assembled {
         if self.homes.len() < self.width && self.is_intra() {
-            self.homes = core::mem::take(&mut self.complete);
-            self.last = self.last_complete.take();
-            self.spatial_layer = self.spatial_layer.wrapping_sub(1);
+            let below = core::mem::take(&mut self.below);
+            let complete =
+                if below.homes.len() == self.width { below } else { self.complete.take().unwrap_or(below) };
+            Layer { spatial_layer: self.spatial_layer, homes: self.homes, last: self.last } = complete;
         }
         let decoded = DecodedFrame {
             spatial_layer: self.spatial_layer,

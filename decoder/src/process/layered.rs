@@ -185,16 +185,17 @@ impl<'a> Decoder<'a> {
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return Ok(None) };
         let reference = layered.reference.and_then(|number| self.references.find(number));
         let mut lost = frame.lost;
-        if let (0, None, Some(at)) = (layered.level, lost, at) {
-            let id = layered.reference.unwrap_or(0).into();
-            lost = Some(Error::new(at, "7.20", ErrorKind::Undefined { element: "reference frame", id }));
-        }
         let mut assembly = Assembly::new(self.options, sequence, gop, frame, reference)?;
         if let Err(error) = assembly.units(&layered.units) {
             lost = Some(error);
         }
         let finished = assembly.finish();
         lost = lost.or(finished.fault);
+        // SS-LO-005: a frozen frame that no error of its own explains.
+        if let (0, Some(reference), None, Some(at)) = (finished.level, layered.reference, lost, at) {
+            let kind = ErrorKind::Undefined { element: "reference frame", id: reference.into() };
+            lost = Some(Error::new(at, "7.20", kind));
+        }
         match lost {
             Some(error) if !self.options.tolerant => Err(error),
             _ => Ok(Some((DecodedFrame { lost, ..finished.decoded }, finished.level, finished.state))),

@@ -1,6 +1,10 @@
 //! Small frames, and streams decoded to what a test compares.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
+pub(crate) mod closeness;
+pub(crate) mod dynamic;
+pub(crate) mod remains;
+
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::{Summary, decode_stream};

@@ -28,7 +28,10 @@ impl Inspector<'_> {
             let read =
                 read_models(coded.model, coded.model_at, &layout.alphabets(), &reusable, &mut elements);
             here = self.section(payload, at, here, coded, &elements, read.as_ref().map(|_| &layout))?;
-            models.replace(coded.section, SectionModels { layout, models: read? });
+            // Like those of a refinement, models that cannot be read are shown as such.
+            if let Ok(read) = read {
+                models.replace(coded.section, SectionModels { layout, models: read });
+            }
         }
         self.coding.follow(unit.header.refinement, models);
         Ok(())
