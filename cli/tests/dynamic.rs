@@ -387,3 +387,20 @@ fn frames_are_compared_and_drawn_by_their_display_index() {
         .collect();
     assert_eq!(frames, [4, 5]);
 }
+
+/// Valid streams have units that decoders pass over, whose payload may be anything.
+#[test]
+fn every_view_shows_every_valid_vector() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/vectors/dynamic/valid");
+    let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut shown = 0;
+    for path in paths.filter(|path| path.extension().is_some_and(|extension| extension == "gss")) {
+        for view in ["--tree", "--units", "--deps", "--stats"] {
+            succeed(&["inspect", text(&path), view]);
+        }
+        let points = succeed(&["inspect", text(&path), "--ops"]);
+        assert!(!points.contains("other figures"), "{}: {points}", path.display());
+        shown += 1;
+    }
+    assert!(shown >= 60, "{shown} vectors");
+}

@@ -67,7 +67,8 @@ fn decoding_an_extracted_stream_is_decoding_at_its_operating_point() {
     let directory = directory();
     let stream = write_stream(directory.path());
     // In each of the two groups an intra frame; below the highest spatial layer no other.
-    for (op, frames) in [("s0,t0,r0", 2), ("s0,t0,r2", 2), ("s2,t0,r4", 2), ("s2,t1,r1", 3), ("s2,t1,r4", 3)] {
+    for (op, frames) in [("s0,t0,r0", 2), ("s0,t0,r2", 2), ("s2,t0,r4", 2), ("s2,t1,r1", 3), ("s2,t1,r4", 3)]
+    {
         let part = directory.path().join("part.gss");
         succeed(&["extract", text(&stream), "--op", op, "-o", text(&part)]);
         succeed(&["validate", text(&part)]);
