@@ -1,6 +1,7 @@
 //! What operating points cost and show, from the headers of units alone.
 
 use super::OperatingPoint;
+use splatstream_format::levels::Levels;
 use splatstream_format::payload::OperatingPoints;
 use splatstream_format::syntax::{
     GopHeader, IncrementHeader, OperatingPointEntry, OperatingPointsHeader, Profile, RefinementHeader,
@@ -83,13 +84,14 @@ struct Piece {
 pub struct Tally {
     belonging: Option<Belonging>,
     sequence: Option<SequenceParameters>,
+    levels: Levels,
     pieces: Vec<Piece>,
 }
 
 impl Tally {
     /// For a stream of a profile.
     pub fn new(profile: Profile) -> Self {
-        Self { belonging: Some(Belonging::new(profile)), sequence: None, pieces: Vec::new() }
+        Self { belonging: Some(Belonging::new(profile)), ..Self::default() }
     }
 
     /// Takes note of a unit.
@@ -104,10 +106,16 @@ impl Tally {
         if !unit.header.unit_type().is_known_in(belonging.profile) {
             return;
         }
+        if let Some(levels) = levels_of(unit, belonging.profile, self.sequence.as_ref()) {
+            self.levels = levels;
+        }
+        // The payload of a unit that is passed over shows nothing, whatever it says.
+        let is_decoded = self.levels.takes(&unit.header);
         let gaussians = match (unit.header.unit_type(), &self.sequence) {
             (UnitType::Refinement, Some(sequence)) => {
                 RefinementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.gaussian_count)
             }
+            (UnitType::Increment, _) if !is_decoded => 0,
             (UnitType::Increment, Some(sequence)) => {
                 IncrementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.home_count())
             }
@@ -212,6 +220,16 @@ impl Tally {
         }
         Ok(())
     }
+}
+
+/// The levels of the frames of a group, if its header is what the unit is.
+fn levels_of(unit: &Unit<'_>, profile: Profile, sequence: Option<&SequenceParameters>) -> Option<Levels> {
+    if unit.header.unit_type() != UnitType::GopHeader {
+        return None;
+    }
+    let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile).ok()?;
+    let refinements = sequence.map_or(0, |sequence| sequence.refinement_count);
+    Some(Levels::of_gop(header, unit.header.frame, refinements))
 }
 
 /// Every operating point of a sequence, lowest first.
