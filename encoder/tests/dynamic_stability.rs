@@ -142,7 +142,9 @@ fn axes_named_otherwise_in_every_frame_update_nothing() {
             }
         })
     };
-    let report = close(&[rename(0), rename(1), rename(2)], "renamed");
+    let tools = Tools { coarse_tail: false, ..Tools::default() };
+    let settings = Settings { predictors: PredictorChoice::None, tools, ..predicted(1) };
+    let report = close_with(&[rename(0), rename(1), rename(2)], &settings, "renamed");
     for frame in &report.coded[1..] {
         assert_eq!((frame.new, frame.removed, frame.moved, frame.updated), (0, 0, 0, 0));
     }
