@@ -8,6 +8,7 @@ use splatstream_format::syntax::{
 };
 use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
+use std::collections::BTreeMap;
 
 /// What an operating point costs and shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,13 +30,13 @@ pub struct OperatingPointInfo {
 pub(crate) struct Belonging {
     profile: Profile,
     spatial_layers: u8,
-    /// The first frame of the GOP, if it is a predicted one.
-    anchor: Option<u32>,
+    /// The GOP and its first frame, if it is a predicted one.
+    gop: Option<(GopHeader, u32)>,
 }
 
 impl Belonging {
     pub(crate) const fn new(profile: Profile) -> Self {
-        Self { profile, spatial_layers: 1, anchor: None }
+        Self { profile, spatial_layers: 1, gop: None }
     }
 
     /// Takes note of sequence parameters and GOP headers.
@@ -47,8 +48,8 @@ impl Belonging {
             }
             UnitType::GopHeader => {
                 let parsed = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile);
-                let predicted = parsed.is_ok_and(|gop| gop.is_predicted());
-                self.anchor = predicted.then_some(unit.header.frame);
+                let predicted = parsed.ok().filter(GopHeader::is_predicted);
+                self.gop = predicted.map(|gop| (gop, unit.header.frame));
             }
             _ => {}
         }
@@ -56,7 +57,13 @@ impl Belonging {
 
     /// Whether an increment is of the intra frame of a predicted GOP.
     fn is_anchor(&self, header: &UnitHeader) -> bool {
-        header.unit_type() == UnitType::Increment && self.anchor == Some(header.frame)
+        header.unit_type() == UnitType::Increment && self.gop.is_some_and(|(_, first)| first == header.frame)
+    }
+
+    /// The frame that a frame refers to.
+    fn reference(&self, header: &UnitHeader) -> Option<u32> {
+        let (gop, first) = self.gop?;
+        gop.place(header.frame.wrapping_sub(first)).reference.map(|place| first.wrapping_add(place))
     }
 
     /// Whether a unit belongs to an operating point.
@@ -73,6 +80,8 @@ impl Belonging {
 struct Piece {
     header: UnitHeader,
     anchor: bool,
+    /// The frame that its frame refers to.
+    reference: Option<u32>,
     bytes: u64,
     /// Gaussians of its home after the unit; of a refinement, those it adds.
     gaussians: u32,
@@ -119,6 +128,7 @@ impl Tally {
         self.pieces.push(Piece {
             header: unit.header,
             anchor: belonging.is_anchor(&unit.header),
+            reference: belonging.reference(&unit.header),
             bytes,
             gaussians,
         });
@@ -146,6 +156,7 @@ impl Tally {
         };
         // Gaussians and units of each layer of the frame.
         let mut frame: [(u64, u32); 4] = [(0, 0); 4];
+        let mut levels = Levels::default();
         for piece in self.pieces.iter().filter(takes) {
             info.bytes = info.bytes.saturating_add(piece.bytes);
             match piece.header.unit_type() {
@@ -153,7 +164,7 @@ impl Tally {
                     info.frames = info.frames.saturating_add(1);
                     info.gaussians = info.gaussians.saturating_add(shown(&core::mem::take(&mut frame)));
                 }
-                UnitType::Refinement | UnitType::Increment => {
+                UnitType::Refinement | UnitType::Increment if levels.admits(piece) => {
                     if let Some((sum, units)) = frame.get_mut(usize::from(piece.header.spatial_layer)) {
                         *sum = sum.saturating_add(piece.gaussians.into());
                         *units = units.saturating_add(1);
@@ -211,6 +222,29 @@ impl Tally {
             at = at.saturating_add(size(OperatingPointEntry::SIZE));
         }
         Ok(())
+    }
+}
+
+/// Clause 7.20: how far the frames of a GOP are decoded; what is above the level of its reference is not.
+#[derive(Debug, Clone, Default)]
+struct Levels {
+    of_frame: BTreeMap<u32, u8>,
+}
+
+impl Levels {
+    /// Whether an increment is decoded; it then raises the level of its frame.
+    fn admits(&mut self, piece: &Piece) -> bool {
+        let UnitHeader { frame, refinement, .. } = piece.header;
+        let Some(reference) = piece.reference else {
+            // What refers to an intra frame needs all of it.
+            self.of_frame.insert(frame, u8::MAX);
+            return true;
+        };
+        let decoded = self.of_frame.get(&reference).is_some_and(|&level| refinement < level);
+        if decoded {
+            self.of_frame.insert(frame, refinement.saturating_add(1));
+        }
+        decoded
     }
 }
 
