@@ -5,7 +5,7 @@ use crate::crafted::{Part, Script};
 use crate::random::plans;
 use crate::stream::expect::{ALL, point, points};
 use crate::stream::scene::Scene;
-use crate::stream::shown::{Receiver, belongs};
+use crate::stream::shown::belongs;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::process::Options;
 use splatstream_format::Limits;
