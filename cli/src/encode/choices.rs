@@ -2,7 +2,10 @@
 
 use crate::numbers::{grouped, percent};
 use serde::Serialize;
-use splatstream_encoder::{Importance, Report, Settings, ShChoice, Steps, Tools};
+use splatstream_encoder::{
+    FrameReport, Importance, PredictorChoice, Report, Settings, ShChoice, Steps, Structure, Tools,
+};
+use splatstream_format::syntax::FrameType;
 
 /// One decision of the encoder.
 #[derive(Debug, Clone, Serialize)]
@@ -31,6 +34,9 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
         choices.push(harmonics(report, settings));
     }
     choices.extend(order(report, settings));
+    choices.extend(layers(report, settings));
+    choices.extend(survivors(report));
+    choices.extend(predictors(report, settings));
     choices.push(invisible(report, settings));
     choices.extend(left_out(settings));
     choices
@@ -121,6 +127,71 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
         (_, count) => format!("; {count} views given"),
     };
     Some(Choice::new("order", choice, format!("{why}{views}")))
+}
+
+/// Layers of a stream of profile Dynamic, and what its frames cost by type.
+fn layers(report: &Report, settings: &Settings) -> Option<Choice> {
+    if report.coded.is_empty() {
+        return None;
+    }
+    let temporal = match settings.structure {
+        Structure::Intra => "every frame by itself".to_owned(),
+        Structure::Predicted { layers } => format!("{layers} temporal"),
+    };
+    let of_type = |frame_type: FrameType| {
+        let frames = report.coded.iter().filter(|frame| frame.frame_type == frame_type);
+        let (bytes, gaussians) = frames
+            .fold((0, 0), |(bytes, gaussians), f| (bytes + f.bytes, gaussians + u64::from(f.gaussians)));
+        (gaussians > 0).then(|| {
+            format!(
+                "{} frames take {:.2} bits a Gaussian",
+                frame_type.name(),
+                bytes as f64 * 8.0 / gaussians as f64
+            )
+        })
+    };
+    let types = [FrameType::Intra, FrameType::Predicted, FrameType::Enhancement];
+    let costs: Vec<String> = types.into_iter().filter_map(of_type).collect();
+    Some(Choice::new("layers", format!("{} spatial, {temporal}", settings.spatial_layers), costs.join(", ")))
+}
+
+/// What became of the Gaussians of references.
+fn survivors(report: &Report) -> Option<Choice> {
+    let frames = || report.coded.iter().filter(|frame| frame.frame_type != FrameType::Intra);
+    let sum = |count: fn(&FrameReport) -> u32| frames().map(|frame| u64::from(count(frame))).sum::<u64>();
+    let parents = sum(|frame| frame.parents);
+    if parents == 0 {
+        return None;
+    }
+    let share = |count: u64| percent(count, parents);
+    let choice = format!(
+        "{:.1} % moved, {:.1} % updated, {:.1} % removed, {:.1} % new",
+        share(sum(|frame| frame.moved)),
+        share(sum(|frame| frame.updated)),
+        share(sum(|frame| frame.removed)),
+        share(sum(|frame| frame.new)),
+    );
+    let cells = sum(|frame| frame.cells) / frames().count().max(1) as u64;
+    let why = format!("{} cells a frame move the rest where it belongs, or it stays", grouped(cells));
+    Some(Choice::new("survivors", choice, why))
+}
+
+fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
+    let count = |place: usize| report.coded.iter().map(|frame| frame.predicted[place]).sum::<u64>();
+    let [none, knn, bilateral] = [0, 1, 2].map(count);
+    let all = none + knn + bilateral;
+    if all == 0 {
+        return None;
+    }
+    let share = |count: u64| percent(count, all);
+    let choice =
+        format!("none {:.1} %, knn {:.1} %, bilateral {:.1} %", share(none), share(knn), share(bilateral));
+    let why = match settings.predictors {
+        PredictorChoice::None => "--predictors none",
+        PredictorChoice::Bits => "of new Gaussians; a unit is predicted where that makes it smaller",
+        PredictorChoice::Difference => "of new Gaussians; the smallest sum of residuals, --predictors l1",
+    };
+    Some(Choice::new("predictors", choice, why))
 }
 
 fn left_out(settings: &Settings) -> Option<Choice> {
