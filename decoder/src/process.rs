@@ -166,6 +166,8 @@ pub struct Decoder<'a> {
     listed: bool,
     /// Whether some frame has lost a unit.
     has_lost_any: bool,
+    /// Whether some unit did not belong to the operating point.
+    has_passed_over: bool,
     /// What the units so far add to the operating points.
     tally: Tally,
     ended: bool,
@@ -191,6 +193,7 @@ impl<'a> Decoder<'a> {
             index_offset: None,
             listed: false,
             has_lost_any: false,
+            has_passed_over: false,
             tally: Tally::new(file.profile()),
             ended: false,
         }
@@ -254,7 +257,8 @@ impl<'a> Decoder<'a> {
         let indexed = self.index_offset.is_some() && unit_type != UnitType::End;
         let listed = self.listed && !matches!(unit_type, UnitType::Index | UnitType::End);
         let surplus = unit_type == UnitType::FrameHeader && self.frames_left() == 0;
-        let early = self.sequence.is_none() || indexed || listed;
+        let orphan = matches!(unit_type, UnitType::Transform | UnitType::Codebook) && self.gop.is_none();
+        let early = self.sequence.is_none() || indexed || listed || orphan;
         let foreign = self.profile == Profile::Dynamic && unit_type == UnitType::Refinement;
         if self.ended || surplus || foreign || !repeatable && early {
             return Err(unexpected(unit));
@@ -290,6 +294,7 @@ impl<'a> Decoder<'a> {
 
     /// Counts a unit of profile Dynamic that does not belong to the operating point.
     fn pass_over(&mut self, header: &UnitHeader) {
+        self.has_passed_over = true;
         self.units = self.units.wrapping_add(1);
         let headers = u32::from(header.unit_type() == UnitType::FrameHeader);
         self.frame_headers = self.frame_headers.wrapping_add(headers);
@@ -318,6 +323,7 @@ impl<'a> Decoder<'a> {
         }
         self.units = self.units.wrapping_add(1);
         let (takes, of_frame) = (self.belongs(header), self.is_of_frame(header.unit_type()));
+        self.has_passed_over |= !takes;
         match &mut self.frame {
             Some(frame) if of_frame => {
                 frame.has_unit = true;
@@ -444,8 +450,7 @@ impl<'a> Decoder<'a> {
         let header = FrameHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
         header.validate_place(unit.payload_at, &place)?;
         gop.transforms(&header, unit.payload_at)?;
-        let most = self.options.limits.max_gaussians.min(Limits::gaussians_of_level(self.level));
-        header.within(unit.payload_at, &Limits { max_gaussians: most, ..self.options.limits })?;
+        header.within(unit.payload_at, &self.limits())?;
         let units = match self.profile {
             Profile::Intra => FrameUnits::Refined(RefinedFrame::new()),
             Profile::Dynamic => {
@@ -461,9 +466,16 @@ impl<'a> Decoder<'a> {
         Ok(())
     }
 
+    /// A.2: what was agreed, and no more than the level of the stream has.
+    fn limits(&self) -> Limits {
+        let most = self.options.limits.max_gaussians.min(Limits::gaussians_of_level(self.level));
+        Limits { max_gaussians: most, ..self.options.limits }
+    }
+
     /// Step 1 of clauses 7.1.3 and 7.13.3: whether a unit of the frame is looked at.
     fn arrives(&mut self, unit: &Unit<'a>) -> Result<bool> {
         let takes = self.profile == Profile::Dynamic || self.options.operating_point.takes(&unit.header);
+        self.has_passed_over |= !takes;
         let Some(frame) = &mut self.frame else { return Err(unexpected(unit)) };
         frame.has_unit = true;
         Ok(takes && frame.lost.is_none() && !frame.is_beyond(&unit.header))
@@ -495,8 +507,7 @@ impl<'a> Decoder<'a> {
 
     /// Whether everything from the start of the stream on has been decoded.
     fn is_whole(&self) -> bool {
-        let point = self.options.operating_point;
-        !self.starts_inside && !self.has_lost_any && point == OperatingPoint::ALL
+        !self.starts_inside && !self.has_lost_any && !self.has_passed_over
     }
 
     fn operating_points(&mut self, unit: &Unit<'a>) -> Result<()> {

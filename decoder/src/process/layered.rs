@@ -122,6 +122,7 @@ impl<'a> Decoder<'a> {
         if !self.arrives(unit)? || !self.stands(unit)? {
             return Ok(());
         }
+        let limits = self.limits();
         let (Some(frame), Some((sequence, _)), Some(gop)) = (&mut self.frame, &self.sequence, &self.gop)
         else {
             return Err(unexpected(unit));
@@ -137,7 +138,7 @@ impl<'a> Decoder<'a> {
                 let table = (&IncrementHeader::TABLE, unit.payload_at);
                 gop.colour(transforms, &header.sh(), unit.header.temporal_layer, table).map(drop)
             };
-            parse(unit, sequence, counts, &self.options.limits, check)
+            parse(unit, sequence, counts, &limits, check)
         } else {
             Err(unexpected(unit))
         };

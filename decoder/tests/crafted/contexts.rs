@@ -24,7 +24,8 @@ impl BlockValues {
     pub(crate) fn new(planes: &[PlaneInfo], deltas: &[u64], values: &[Vec<i64>], biases: &[i64]) -> Self {
         let v = |attribute: Attribute, place: u8| {
             let is_it = |plane: &PlaneInfo| plane.attribute == attribute && plane.place == place;
-            values[planes.iter().position(is_it).unwrap()].clone()
+            // Sections without the attribute have no source that asks for it.
+            planes.iter().position(is_it).map_or_else(Vec::new, |plane| values[plane].clone())
         };
         let less = |a: &[i64], b: &[i64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>();
         let largest = v(Attribute::LogScale, 0);
@@ -58,12 +59,12 @@ impl BlockValues {
     fn source(&self, code: u8, p: usize, i: usize) -> i64 {
         let before = |n: usize| i.checked_sub(n).map_or(0, |j| self.coded[p][j]);
         let length_before = |n: usize| i.checked_sub(n).map_or(0, |j| bit_length(self.deltas[j]));
-        let attribute = self.planes[p].attribute;
+        let PlaneInfo { attribute, alphabet, .. } = self.planes[p];
         match code {
-            1 if attribute == Attribute::Position => 2 * length_before(1) + length_before(2),
+            1 if alphabet == Alphabet::Position => 2 * length_before(1) + length_before(2),
             1 => before(1) + before(2) + before(3) + before(4),
             2 => before(1).abs() + before(2).abs() + before(3).abs() + before(4).abs(),
-            3 => self.coded[p - 1][i],
+            3 => p.checked_sub(1).and_then(|p| self.coded[p].get(i)).copied().unwrap_or(0),
             4 => {
                 let group = (0..p).filter(|&g| self.planes[g].attribute == attribute);
                 group.map(|g| self.coded[g][i].abs()).sum()

@@ -4,6 +4,7 @@
 //! made. Whatever a test does not set is what the specification asks for, by the definitions in [`reference`]
 //! and [`contexts`], which follow its text and share no code with the decoder.
 
+pub(crate) mod coding;
 pub(crate) mod contexts;
 pub(crate) mod expect;
 pub(crate) mod reference;
@@ -34,6 +35,7 @@ pub(crate) enum Part {
 /// A stream, unit by unit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Script {
+    pub(crate) profile: Profile,
     pub(crate) level: u8,
     pub(crate) parts: Vec<Part>,
 }
@@ -61,7 +63,7 @@ impl Part {
 impl Script {
     /// The bytes of the stream.
     pub(crate) fn bytes(&self) -> Vec<u8> {
-        let mut bytes = write_file_header(Profile::Intra, self.level).unwrap();
+        let mut bytes = write_file_header(self.profile, self.level).unwrap();
         for part in 0..self.parts.len() {
             bytes.extend(self.part_bytes(part));
         }
@@ -111,7 +113,10 @@ impl Script {
 
     /// Flips a bit of the payload without a new check sum.
     pub(crate) fn damage(&mut self, kind: UnitType, n: usize) {
-        let place = self.find(kind, n);
+        self.damage_part(self.find(kind, n));
+    }
+
+    pub(crate) fn damage_part(&mut self, place: usize) {
         let mut bytes = self.part_bytes(place);
         let last = bytes.len() - 1;
         bytes[last] ^= 1;

@@ -1,17 +1,15 @@
 //! Values of sequence, tools, frames and Gaussians, and the units that carry them.
 
-use super::contexts::BlockValues;
+use super::coding::{Coding, Row};
 use super::reference::{canonical_planes, frame_digest, plane_digests, prefix};
 use super::{Part, Script};
 use splatstream_format::entropy::frequencies::Frequencies;
 use splatstream_format::entropy::layout::{Layout, PlaneInfo, ShCoding};
 use splatstream_format::entropy::model::{ContextAxis, PlaneModel, write_models};
-use splatstream_format::entropy::token::split;
-use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 use splatstream_format::payload::{Codebook, Transform, write_leb128};
 use splatstream_format::syntax::{
-    CodebookHeader, FrameHeader, GopHeader, NO_TRANSFORM, SequenceParameters, TransformHeader, UnitId,
-    UnitType,
+    CodebookHeader, FrameHeader, GopHeader, NO_TRANSFORM, Profile, SequenceParameters, TransformHeader,
+    UnitId, UnitType,
 };
 use std::collections::BTreeMap;
 
@@ -139,45 +137,18 @@ impl Unit {
         Layout::new(tools.dc.header.rank, self.sh_coding(tools))
     }
 
-    fn shape(&self, plane: usize) -> Shape {
-        self.shapes.get(&plane).cloned().unwrap_or_default()
+    /// The values of the Gaussians, entry by entry.
+    pub(crate) fn rows(&self) -> Vec<Row> {
+        self.gaussians.iter().map(Gaussian::row).collect()
     }
 
-    /// The values of a run of Gaussians plane by plane.
-    fn block_values(&self, planes: &[PlaneInfo], run: &[Gaussian]) -> BlockValues {
-        let biases: Vec<i64> = (0..planes.len()).map(|plane| self.shape(plane).bias.into()).collect();
-        self.values_with(planes, run, &biases)
-    }
-
-    fn values_with(&self, planes: &[PlaneInfo], run: &[Gaussian], biases: &[i64]) -> BlockValues {
-        let rows: Vec<Vec<i64>> = run.iter().map(Gaussian::signed).collect();
-        let mut values = vec![Vec::new()];
-        values.extend((1..planes.len()).map(|plane| rows.iter().map(|row| row[plane - 1]).collect()));
-        let deltas: Vec<u64> = run.iter().map(|gaussian| gaussian.delta).collect();
-        BlockValues::new(planes, &deltas, &values, biases)
+    fn coding<'c>(&'c self, planes: &'c [PlaneInfo], rows: &'c [Row], block_log2: u8) -> Coding<'c> {
+        Coding { planes, rows, shapes: &self.shapes, lanes_log2: self.lanes_log2, block_log2 }
     }
 
     /// A model for each plane whose tables fit the values.
     pub(crate) fn models(&self, planes: &[PlaneInfo], block_log2: u8) -> Vec<PlaneModel> {
-        let runs: Vec<BlockValues> =
-            self.gaussians.chunks(1 << block_log2).map(|run| self.block_values(planes, run)).collect();
-        let model = |plane: usize| {
-            let Shape { bias, direct_log2, axes, tables } = self.shape(plane);
-            let (tables, table_of_context) = tables.unwrap_or_else(|| {
-                let contexts = axes[0].contexts() * axes[1].contexts();
-                let mut counts = vec![vec![0_u64; 256]; contexts];
-                for run in &runs {
-                    for i in 0..run.deltas.len() {
-                        let context = usize::from(run.context(&axes, plane, i));
-                        counts[context][usize::from(split(run.unsigned(plane, i), direct_log2).token)] += 1;
-                    }
-                }
-                let tables = counts.iter().map(|counts| Frequencies::from_counts(counts)).collect();
-                (tables, (0..contexts as u8).collect())
-            });
-            PlaneModel { bias, direct_log2, axes, tables, table_of_context }
-        };
-        (0..planes.len()).map(model).collect()
+        self.coding(planes, &self.rows(), block_log2).models()
     }
 
     /// The blocks coded with models.
@@ -187,19 +158,7 @@ impl Unit {
         models: &[PlaneModel],
         block_log2: u8,
     ) -> Vec<Vec<u8>> {
-        let biases: Vec<i64> = models.iter().map(|model| model.bias.into()).collect();
-        let block = |run: &[Gaussian]| {
-            let values = self.values_with(planes, run, &biases);
-            let mut writer = BlockWriter::new(self.lanes_log2);
-            for (plane, model) in models.iter().enumerate() {
-                let contexts: Vec<u8> =
-                    (0..run.len()).map(|i| values.context(&model.axes, plane, i)).collect();
-                let symbols = (0..run.len()).map(|i| values.unsigned(plane, i));
-                writer.plane(&PlaneEncoder::new(model), &contexts, symbols).unwrap();
-            }
-            writer.finish()
-        };
-        self.gaussians.chunks(1 << block_log2).map(block).collect()
+        self.coding(planes, &self.rows(), block_log2).blocks(models)
     }
 
     /// The payload, and models for a unit after this one to reuse.
@@ -248,10 +207,11 @@ impl Unit {
 }
 
 impl Gaussian {
-    /// The values after the delta, in plane order.
-    fn signed(&self) -> Vec<i64> {
+    /// The values in plane order.
+    pub(crate) fn row(&self) -> Row {
         let (dc, sh) = (self.dc.iter().copied(), self.sh.iter().copied());
-        self.log_scale.into_iter().chain([self.opacity]).chain(self.rotation).chain(dc).chain(sh).collect()
+        let signed = self.log_scale.into_iter().chain([self.opacity]).chain(self.rotation);
+        Row { delta: Some(self.delta), signed: signed.chain(dc).chain(sh).collect() }
     }
 }
 
@@ -301,7 +261,7 @@ impl Scene {
         }
         parts.extend(self.index.then_some(Part::Index));
         parts.push(Part::End);
-        Script { level: self.level, parts }
+        Script { profile: Profile::Intra, level: self.level, parts }
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {

@@ -2,7 +2,7 @@
 
 use crate::crafted::expect::{assert_refused, decode, decode_tolerant, fatal};
 use crate::crafted::{Part, Script, sample};
-use splatstream_format::syntax::{GopHeader, UnitId, UnitType};
+use splatstream_format::syntax::{GopHeader, Profile, UnitId, UnitType};
 
 const TYPES: [UnitType; 9] = [
     UnitType::SequenceParameters,
@@ -95,7 +95,7 @@ fn a_unit_may_stand_where_the_table_of_phases_allows_it_and_nowhere_else() {
             };
             let place = parts.len();
             parts.push(unit);
-            let script = Script { level: 1, parts };
+            let script = Script { profile: Profile::Intra, level: 1, parts };
             let bytes = script.bytes();
             let error = decode(&bytes).verdict();
             let found = error.map(|error| error.kind.code());
@@ -122,7 +122,7 @@ fn nothing_stands_after_the_end_unit() {
         let mut parts = prefix(10, 1);
         let unit = next(unit_type, &parts);
         parts.extend([Part::End, unit]);
-        let script = Script { level: 1, parts };
+        let script = Script { profile: Profile::Intra, level: 1, parts };
         let error = decode(&script.bytes()).verdict().unwrap();
         assert_eq!((error.kind.code(), error.at), ("TRAILING_BYTES", script.at(11)), "{unit_type:?}");
     }

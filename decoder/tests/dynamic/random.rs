@@ -1,0 +1,54 @@
+//! Scenes by dice: every mode, shift, layer, predictor and structure, at every operating point.
+
+use crate::stream::draw::Plan;
+use crate::stream::expect::assert_decodes;
+use splatstream_format::syntax::GopHeader;
+
+pub(crate) fn plans() -> Vec<Plan> {
+    let plan = |seed, layers, percents: &[u8], sh, gaussians, gops: &[(GopHeader, &[u32])]| Plan {
+        seed,
+        layers,
+        percents: percents.to_vec(),
+        sh,
+        gaussians,
+        gops: gops.iter().map(|(header, places)| (*header, places.to_vec())).collect(),
+        short: seed % 2 == 1,
+    };
+    let all = |count: u32, depth: u8| (GopHeader::predicted(0, count, depth), (0..count).collect::<Vec<_>>());
+    let (p3, places3) = all(4, 0);
+    let (b1, places5) = all(5, 1);
+    let (b2, places6) = all(6, 2);
+    let (b3, places9) = all(9, 3);
+    let second = |header: GopHeader| GopHeader { gop_index: 1, ..header };
+    vec![
+        plan(2, (1, 1), &[20, 50, 100], true, 20, &[(p3, &places3)]),
+        plan(3, (2, 2), &[30, 100], false, 40, &[(b1, &places5), (second(p3), &places3)]),
+        plan(4, (2, 3), &[10, 40, 70, 100], true, 30, &[(b2, &places6)]),
+        plan(5, (3, 4), &[50, 60, 100], true, 90, &[(b3, &places9)]),
+        plan(6, (1, 4), &[100], true, 200, &[(b3, &[0, 1, 4, 6, 8])]),
+        plan(
+            7,
+            (4, 1),
+            &[1, 2, 100],
+            false,
+            150,
+            &[(GopHeader::intra(0, 2), &[0, 1]), (second(p3), &[0, 1])],
+        ),
+        plan(8, (2, 2), &[50, 100], true, 0, &[(b1, &places5)]),
+        plan(
+            9,
+            (1, 1),
+            &[40, 100],
+            true,
+            5,
+            &[(GopHeader::predicted(0, 1, 0), &[0]), (second(p3), &places3)],
+        ),
+    ]
+}
+
+#[test]
+fn scenes_by_dice_decode_to_the_frames_of_the_reference_at_every_operating_point() {
+    for plan in plans() {
+        assert_decodes(&format!("seed {}", plan.seed), &plan.scene());
+    }
+}
