@@ -133,10 +133,7 @@ impl State {
             }
             UnitType::GopHeader => {
                 let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile)?;
-                self.increments = Increments::default();
-                let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
-                self.levels = Levels::of_gop(header, unit.header.frame, refinements);
-                self.gop = Some(Gop::new(header, unit.header.frame));
+                self.start_gop(header, unit.header.frame);
             }
             UnitType::FrameHeader => {
                 self.frame = Some(FrameHeader::parse_payload(unit.payload, unit.payload_at, profile)?);
@@ -165,6 +162,13 @@ impl State {
             _ => {}
         }
         Ok(true)
+    }
+
+    fn start_gop(&mut self, header: GopHeader, first: u32) {
+        let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
+        self.levels = Levels::of_gop(header, first, refinements);
+        self.increments = Increments::default();
+        self.gop = Some(Gop::new(header, first));
     }
 
     fn refinement(&mut self, unit: &Unit<'_>, limits: &Limits, statistics: &mut Statistics) -> Result<()> {

@@ -1,5 +1,7 @@
 //! Streams of profile Dynamic: layers, predicted frames, operating points, losses, cuts.
 
+#![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
+
 mod common;
 
 use common::{UNIT_HEADER, directory, fail, fixture, json, run, seal, succeed, text};

@@ -3,7 +3,7 @@
 use crate::process::{DecodedFrame, Decoder, Options};
 use core::ops::ControlFlow;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_format::unit::{Delivery, Stream};
+use splatstream_format::unit::{Delivery, Stream, Units};
 use splatstream_format::{Error, Result};
 
 /// How decoding a stream went.
@@ -43,6 +43,16 @@ pub fn decode_stream_inside(
     summary
 }
 
+/// A decoder and the units that it takes, from the first on or from the group at an offset on.
+fn start<'a>(stream: &Stream<'a>, options: &Options, gop: Option<u64>) -> Result<(Decoder<'a>, Units<'a>)> {
+    let Some(gop) = gop else { return Ok((Decoder::new(stream.header(), *options), stream.units())) };
+    let mut decoder = Decoder::starting_inside(stream.header(), *options);
+    if let Some(first) = stream.units().next() {
+        decoder.unit(&first?)?;
+    }
+    Ok((decoder, stream.units_from(gop)))
+}
+
 fn run(
     bytes: &[u8],
     options: &Options,
@@ -51,18 +61,7 @@ fn run(
     on_frame: &mut impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Result<()> {
     let stream = Stream::open(bytes, &options.limits)?;
-    let mut units = stream.units();
-    let mut decoder = match gop {
-        None => Decoder::new(stream.header(), *options),
-        Some(gop) => {
-            let mut decoder = Decoder::starting_inside(stream.header(), *options);
-            if let Some(first) = units.next() {
-                decoder.unit(&first?)?;
-            }
-            units = stream.units_from(gop);
-            decoder
-        }
-    };
+    let (mut decoder, mut units) = start(&stream, options, gop)?;
     let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame)
     {
         (Some(sequence), Some(frame)) => {

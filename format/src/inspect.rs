@@ -125,14 +125,7 @@ impl Inspector<'_> {
             UnitType::Transform => self.transform(payload, at)?,
             UnitType::Codebook => self.codebook(payload, at)?,
             UnitType::Refinement => self.refinement(payload, at)?,
-            UnitType::Increment if self.profile == Profile::Dynamic => {
-                if self.levels.takes(&unit.header) {
-                    return self.increment(unit);
-                }
-                let value = format!("{} bytes", payload.len());
-                let meaning = "passed over: the reference frame has fewer refinements";
-                self.show(at, payload.len(), "payload".into(), value, meaning, "7.13.3", "increment");
-            }
+            UnitType::Increment if self.profile == Profile::Dynamic => self.increment(unit)?,
             UnitType::OperatingPoints => self.operating_points(payload, at)?,
             UnitType::Index => self.index(payload, at)?,
             UnitType::End => {

@@ -14,6 +14,12 @@ impl Inspector<'_> {
     /// The elements of an increment; its sections only where all of them can be divided.
     pub(super) fn increment(&mut self, unit: &Unit<'_>) -> Result<()> {
         let (payload, at) = (unit.payload, unit.payload_at);
+        if !self.levels.takes(&unit.header) {
+            let value = format!("{} bytes", payload.len());
+            let meaning = "passed over: the reference frame has fewer refinements";
+            self.show(at, payload.len(), "payload".into(), value, meaning, "7.13.3", "increment");
+            return Ok(());
+        }
         self.fixed(&IncrementHeader::TABLE, payload, at);
         let sequence = self.sequence_at(at)?;
         let increment = Increment::parse(payload, at, &sequence, &self.limits)?;
