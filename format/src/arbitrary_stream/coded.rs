@@ -9,6 +9,8 @@ use crate::payload::SectionBytes;
 
 /// log2 of the values that have tokens of their own, which are all that occur.
 const DIRECT_LOG2: u8 = 4;
+/// The largest of these values.
+const MOST_DELTA: u64 = 15;
 /// The code of a Gaussian that is removed.
 const REMOVED: i32 = 4;
 
@@ -45,12 +47,13 @@ impl Values {
             .collect()
     }
 
-    /// A value that the processes mostly accept.
-    fn of_plane(&mut self, plane: PlaneInfo) -> i32 {
+    /// A value that the processes mostly accept; deltas are at most `delta`.
+    fn of_plane(&mut self, plane: PlaneInfo, delta: i32) -> i32 {
         match plane.attribute {
-            Attribute::Cell => self.between(1, 15),
-            Attribute::Position => self.between(0, 15),
-            Attribute::Stale => self.between(0, 1),
+            Attribute::Cell => self.between(1, delta.max(1)),
+            Attribute::Position => self.between(0, delta),
+            // Positions lie near the origin, beyond which nothing may move.
+            Attribute::Stale | Attribute::Move => self.between(0, 1),
             Attribute::Predictor => self.between(0, 2),
             _ if plane.alphabet == Alphabet::Index => 0,
             _ => self.between(-2, 2),
@@ -58,14 +61,18 @@ impl Values {
     }
 }
 
-/// A section of `count` values a plane; `modes` are those of the section of that name.
+/// A section of `count` values a plane, positions of `axis_bits` on each axis; `modes` are those of the section of
+/// that name.
 pub(super) fn coded(
     layout: &Layout,
-    count: u32,
+    (count, axis_bits): (u32, u8),
     modes: &[i32],
     block_log2: u8,
     values: &mut Values,
 ) -> SectionBytes {
+    let points = 1_u64.checked_shl(u32::from(axis_bits).saturating_mul(3)).unwrap_or(u64::MAX);
+    let room = points.saturating_sub(1).checked_div(count.into()).unwrap_or(0).min(MOST_DELTA);
+    let delta = i32::try_from(room).unwrap_or(0);
     let lanes_log2 = u8::try_from(values.below(6)).unwrap_or(0);
     let model = flat();
     let models = vec![model.clone(); layout.planes().len()];
@@ -77,7 +84,7 @@ pub(super) fn coded(
         for &plane in layout.planes() {
             let of_plane = |_| match (plane.section, modes.next()) {
                 (Section::Modes, Some(mode)) => mode,
-                _ => values.of_plane(plane),
+                _ => values.of_plane(plane, delta),
             };
             let length = usize::try_from(count.saturating_sub(start).min(size)).unwrap_or(0);
             let numbers: Vec<u64> = (0..length).map(of_plane).map(|value| unsigned(plane, value)).collect();

@@ -75,9 +75,13 @@ impl<'a> Arbitrary<'a> for DynamicStream {
     fn arbitrary(u: &mut Unstructured<'a>) -> Result<Self> {
         let spatial_layer_count = u.int_in_range(1..=MAX_LAYERS)?;
         let temporal_layer_count = u.int_in_range(1..=MAX_LAYERS)?;
-        let sequence =
+        let mut sequence =
             SequenceParameters { spatial_layer_count, temporal_layer_count, ..sequence_parameters(u)? };
-        let gop_count = u.int_in_range(0..=2)?;
+        // Few values happen to be sorted.
+        if u.ratio(7_u8, 8_u8)? {
+            sequence.sequence_flags = SequenceParameters::flags(false, sequence.antialiased());
+        }
+        let gop_count = if u.ratio(1_u8, 16_u8)? { 0 } else { u.int_in_range(1..=2)? };
         let gops = (0..gop_count).map(|index| gop(u, index, &sequence)).collect::<Result<_>>()?;
         let points = if u.arbitrary()? { Some(points(u)?) } else { None };
         Ok(Self { level: u.int_in_range(1..=4)?, sequence, gops, points, has_index: u.arbitrary()? })

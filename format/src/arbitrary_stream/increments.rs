@@ -158,14 +158,17 @@ impl Maker<'_> {
         let count = |bit: i32| modes.iter().filter(|&&mode| mode != 4 && mode & bit != 0).count();
         header.move_count = u32::try_from(count(1)).unwrap_or(u32::MAX);
         header.update_count = u32::try_from(count(2)).unwrap_or(u32::MAX);
-        let is_coded = u.ratio(4_u8, 5_u8)?;
+        let is_coded = u.ratio(19_u8, 20_u8)?;
         let present = Section::ALL.into_iter().filter(|&section| header.count(section) > 0);
         let sections = present
             .map(|section| {
                 if is_coded {
                     let sh = ShCoding::of(&header.sh(), self.tools.sh_rank().unwrap_or(0));
                     let layout = Layout::of_section(section, self.tools.dc.1, sh);
-                    let count = header.count(section);
+                    let low_bits =
+                        if section == Section::Cells { header.cell_log2 } else { header.position_shift };
+                    let axis_bits = self.sequence.position_bits.saturating_sub(low_bits).max(1);
+                    let count = (header.count(section), axis_bits);
                     Ok(coded(&layout, count, &modes, self.sequence.block_log2, &mut values))
                 } else {
                     self.bytes(u, header.count(section))
@@ -201,6 +204,10 @@ impl Maker<'_> {
         for shift in &mut attribute_shift {
             *shift = u.int_in_range(0..=7)?;
         }
+        // Large ones put everything outside the lattice.
+        let bits = self.sequence.position_bits;
+        let most_shift = if u.ratio(1_u8, 4_u8)? { bits.saturating_sub(1) } else { 0 };
+        let position_shift = u.int_in_range(0..=most_shift)?;
         let predictor_block_log2 = if u.arbitrary()? { u.int_in_range(0..=16)? } else { NO_PREDICTOR };
         Ok(IncrementHeader {
             refinement_digest: u.arbitrary()?,
@@ -211,9 +218,9 @@ impl Maker<'_> {
             update_count: 0,
             remove_count: 0,
             new_count: 0,
-            position_shift: u.int_in_range(0..=self.sequence.position_bits.saturating_sub(1))?,
+            position_shift,
             attribute_shift,
-            cell_log2: u.int_in_range(0..=self.sequence.position_bits)?,
+            cell_log2: u.int_in_range(0..=bits)?,
             predictor_block_log2,
             neighbour_count: u.int_in_range(1..=MAX_NEIGHBOURS)?,
             bilateral_spatial: u.arbitrary()?,
