@@ -8,6 +8,13 @@ mod crafted;
 
 mod stream;
 
+mod cells;
+mod contexts;
+mod headers;
 mod losses;
+mod models;
 mod points;
+mod prediction;
 mod random;
+mod structure;
+mod values;
