@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fuzzes one target on the stable toolchain, without cargo-fuzz.
-# usage: fuzz/smoke.sh TARGET [SECONDS]        TARGET: units, payload, decode, scene
+# usage: fuzz/smoke.sh TARGET [SECONDS]        TARGET: units, payload, decode, increments, scene
 set -euo pipefail
 target=$1
 seconds=${2:-20}

@@ -61,6 +61,10 @@ struct View {
 impl Inspect {
     /// Shows one view; the first error of the stream comes after what can be shown.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        // What an argument requires is not asked for where it conflicts with one that is there.
+        if self.dot && !self.view.deps {
+            return Err(Failure::Usage("--dot is a form of --deps: give both".to_owned()));
+        }
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
         let error = match &self.view {

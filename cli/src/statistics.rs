@@ -11,6 +11,7 @@ use splatstream_decoder::gop::Gop;
 use splatstream_decoder::unit::{CodedUnit, PreparedUnit};
 use splatstream_format::entropy::layout::{Attribute, Layout, Section};
 use splatstream_format::entropy::model::PlaneModel;
+use splatstream_format::levels::Levels;
 use splatstream_format::payload::Refinement;
 use splatstream_format::syntax::{
     FrameHeader, FrameType, GopHeader, Profile, SequenceParameters, UnitHeader, UnitType,
@@ -94,8 +95,11 @@ pub(crate) fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statist
     for unit in stream.units() {
         let unit = unit?;
         statistics.count(&unit.header);
-        state.unit(&unit, profile, limits, &mut statistics)?;
-        frames.unit(&unit, profile, state.sequence.as_ref())?;
+        if !unit.header.unit_type().is_known_in(profile) {
+            continue;
+        }
+        let is_decoded = state.unit(&unit, profile, limits, &mut statistics)?;
+        frames.unit(&unit, profile, state.sequence.as_ref(), is_decoded)?;
     }
     statistics.frame_types = frames.finish();
     statistics.gaussians = statistics.frame_types.iter().map(|cost| cost.gaussians).sum();
@@ -110,16 +114,18 @@ struct State {
     frame: Option<FrameHeader>,
     models: Option<(Layout, Vec<PlaneModel>)>,
     increments: Increments,
+    levels: Levels,
 }
 
 impl State {
+    /// Adds what a unit costs; gives whether it is decoded and not passed over.
     fn unit(
         &mut self,
         unit: &Unit<'_>,
         profile: Profile,
         limits: &Limits,
         statistics: &mut Statistics,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
                 let parsed = SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
@@ -128,6 +134,8 @@ impl State {
             UnitType::GopHeader => {
                 let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile)?;
                 self.increments = Increments::default();
+                let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
+                self.levels = Levels::of_gop(header, unit.header.frame, refinements);
                 self.gop = Some(Gop::new(header, unit.header.frame));
             }
             UnitType::FrameHeader => {
@@ -146,6 +154,9 @@ impl State {
                 self.refinement(unit, limits, statistics)?;
             }
             UnitType::Increment if profile == Profile::Dynamic => {
+                if !self.levels.takes(&unit.header) {
+                    return Ok(false);
+                }
                 if let (Some(sequence), Some(gop), Some(frame)) = (&self.sequence, &self.gop, &self.frame) {
                     let tools = gop.transforms(frame, unit.payload_at)?;
                     self.increments.unit(unit, sequence, tools, limits, statistics)?;
@@ -153,7 +164,7 @@ impl State {
             }
             _ => {}
         }
-        Ok(())
+        Ok(true)
     }
 
     fn refinement(&mut self, unit: &Unit<'_>, limits: &Limits, statistics: &mut Statistics) -> Result<()> {

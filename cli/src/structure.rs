@@ -181,12 +181,12 @@ impl Structure {
                 let transforms = self.definitions.transforms(&header);
                 self.frame(&unit.header, place, transforms);
             }
-            UnitType::Refinement | UnitType::Increment => {
-                let codebooks = self.codebooks_of(unit)?;
+            unit_type if is_of_frame(unit_type, profile) => {
+                let codebooks = self.codebooks_of(unit);
                 self.layer_unit(unit.header, place, codebooks);
             }
             UnitType::OperatingPoints | UnitType::Index | UnitType::End => self.end_frame(),
-            UnitType::Reserved(_) | UnitType::User(_) => {}
+            _ => {}
         }
         Ok(())
     }
@@ -205,7 +205,7 @@ impl Structure {
                 self.add_tool(header, place);
                 Ok(())
             }
-            UnitType::Refinement | UnitType::Increment => {
+            unit_type if is_of_frame(unit_type, self.profile.unwrap_or(Profile::Intra)) => {
                 self.layer_unit(*header, place, Vec::new());
                 Ok(())
             }
@@ -263,20 +263,32 @@ impl Structure {
         }
     }
 
-    fn codebooks_of(&self, unit: &Unit<'_>) -> Result<Vec<usize>, Error> {
-        let Some(sequence) = &self.sequence else { return Ok(Vec::new()) };
+    /// The codebook units that a unit uses; none where its header cannot be read, which is no error in a unit that
+    /// decoders pass over.
+    fn codebooks_of(&self, unit: &Unit<'_>) -> Vec<usize> {
+        let Some(sequence) = &self.sequence else { return Vec::new() };
         let (payload, at) = (unit.payload, unit.payload_at);
-        let sh: ShHeader = if unit.header.unit_type() == UnitType::Increment {
-            IncrementHeader::parse(payload, at, sequence)?.0.sh()
-        } else {
-            RefinementHeader::parse(payload, at, sequence)?.0.sh()
+        let sh: Result<ShHeader, Error> = match unit.header.unit_type() {
+            UnitType::Increment => {
+                IncrementHeader::parse(payload, at, sequence).map(|(header, _)| header.sh())
+            }
+            _ => RefinementHeader::parse(payload, at, sequence).map(|(header, _)| header.sh()),
         };
+        let Ok(sh) = sh else { return Vec::new() };
         let mut units: Vec<usize> = sh
             .codebooks()
             .filter_map(|id| self.definitions.codebooks.get(usize::from(id)).copied().flatten())
             .collect();
         units.dedup();
-        Ok(units)
+        units
+    }
+}
+
+/// Whether units of a type make up the frames of a profile.
+fn is_of_frame(unit_type: UnitType, profile: Profile) -> bool {
+    match profile {
+        Profile::Intra => unit_type == UnitType::Refinement,
+        Profile::Dynamic => unit_type == UnitType::Increment,
     }
 }
 

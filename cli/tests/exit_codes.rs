@@ -2,15 +2,14 @@
 
 mod common;
 
-use common::{directory, fail, fixture, json, run, text};
+use common::{UNIT_HEADER, directory, fail, fixture, json, payload_length, run, seal, text};
 use serde_json::Value;
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// Bytes of file_header and unit_header.
+/// Bytes of file_header.
 const FILE_HEADER: usize = 16;
-const UNIT_HEADER: usize = 20;
 
 /// The committed stream with a change.
 fn changed(change: impl FnOnce(&mut Vec<u8>)) -> (TempDir, PathBuf) {
@@ -29,21 +28,6 @@ fn unit(bytes: &[u8], unit_type: u8) -> usize {
         at += UNIT_HEADER + payload_length(bytes, at);
     }
     at
-}
-
-fn payload_length(bytes: &[u8], at: usize) -> usize {
-    let length: [u8; 4] = bytes[at + 12..at + 16].try_into().expect("four bytes");
-    u32::from_le_bytes(length) as usize
-}
-
-/// Makes both check sums of a unit right again: the change is then seen behind them.
-fn seal(bytes: &mut [u8], at: usize) {
-    let payload = at + UNIT_HEADER..at + UNIT_HEADER + payload_length(bytes, at);
-    let crc = crc32fast::hash(&bytes[payload]);
-    bytes[at + 16..at + 20].copy_from_slice(&crc.to_le_bytes());
-    let covered = [&bytes[at..at + 6], &bytes[at + 8..at + 20]].concat();
-    let check = crc32fast::hash(&covered).to_le_bytes();
-    bytes[at + 6..at + 8].copy_from_slice(&check[..2]);
 }
 
 /// What `validate --json` says of the committed stream with a change, which shall exit with `code`.
@@ -83,7 +67,7 @@ fn usage_is_2() {
     for (arguments, hint) in [
         (&[][..], "Usage"),
         (&["encode", "a.ply"], "--out"),
-        (&["encode", "a.ply", "-o", "b.gss", "--layers", "540,1080"], "later version"),
+        (&["encode", "a.ply", "-o", "b.gss", "--layers", "540,high"], "--layers"),
         (&["decode", stream], "--out"),
         (&["decode", stream, "--dry-run", "--op", "r3"], "s0,t0,r2"),
         (&["decode", stream, "--dry-run", "--op", "s0,t0,r9"], "--ops"),

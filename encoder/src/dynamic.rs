@@ -15,7 +15,7 @@ use crate::importance::Ranking;
 use crate::lattice::geometry;
 use crate::matching::{Cloud, Matching, Measure, shares_little};
 use crate::section::SectionPlan;
-use crate::settings::{Settings, ShChoice, Structure};
+use crate::settings::{Importance, Settings, ShChoice, Structure};
 use crate::source::FrameSource;
 use crate::stream::{FrameReport, GopTools, Prepared, Progress, Report, UnitWriter, sh_planes};
 use crate::vq;
@@ -34,7 +34,7 @@ use splatstream_format::syntax::{
 use splatstream_scene::GaussianFrame;
 use survivors::Survivors;
 use unit::{UnitCoder, sh_header};
-use wanted::Wanted;
+use wanted::{ColourTarget, Wanted};
 
 /// Frames of a predicted GOP, at most (6.5).
 const MOST_FRAMES: u32 = 1024;
@@ -217,7 +217,8 @@ impl Dynamic<'_, '_> {
         let spacing = self.ranking.spacing(&order, self.settings);
         let geometry = geometry(&target.frame, &self.sequence, &spacing, number)?;
         let dc: Vec<&[f32]> = target.frame.dc().iter().map(Vec::as_slice).collect();
-        let dc = colour::components(&gop.tools.dc, &dc, self.sequence.dc_step(), &spacing);
+        let dc_step = self.sequence.dc_step();
+        let dc_components = colour::components(&gop.tools.dc, &dc, dc_step, &spacing);
         let zeros = vec![0.0; target.frame.len()];
         let planes = sh_planes(&target.frame, &self.sequence, &zeros);
         let step = self.sequence.sh_step();
@@ -227,7 +228,9 @@ impl Dynamic<'_, '_> {
                 Some(book) => vec![colour::indices(transform, &planes, step, book)],
             });
         let coder = self.coder(gop, None);
-        let wanted = Wanted::new(&geometry, &dc, &sh, &coder.colour, planes.len())?;
+        let dc = ColourTarget { planes: &dc, step: dc_step, components: &dc_components };
+        let sh = ColourTarget { planes: &planes, step, components: &sh };
+        let wanted = Wanted::new(&geometry, &dc, &sh, &coder.colour, &spacing)?;
         let anchor = AnchorTarget {
             number,
             wanted: &wanted,
@@ -273,7 +276,8 @@ impl Dynamic<'_, '_> {
         };
         let book = self.residual_book(gop, &survivors, reference, &matching, place.temporal_layer);
         survivors.book = book.as_ref();
-        let predicted = Predicted {
+        let by_pictures = self.ranking.importance() != Importance::Volume;
+        let mut predicted = Predicted {
             coder: self.coder(gop, Some(book.as_ref())),
             reference,
             target,
@@ -281,6 +285,7 @@ impl Dynamic<'_, '_> {
             survivors,
             measure,
             tools: self.settings.tools,
+            coarse_tail: self.settings.tools.coarse_tail && by_pictures,
             number,
         };
         let (units, coded) = predicted.code(Chooser(self.settings.predictors))?;

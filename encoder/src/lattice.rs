@@ -106,6 +106,11 @@ impl Spacing {
         Self(Some(doubled))
     }
 
+    /// Whether a Gaussian takes every second point only.
+    pub(crate) fn is_coarse(&self, row: usize) -> bool {
+        self.0.as_ref().is_some_and(|doubled| doubled[row])
+    }
+
     /// The nearest point that a Gaussian may take, in steps.
     #[inline]
     pub(crate) fn nearest(&self, row: usize, steps: f32) -> i32 {

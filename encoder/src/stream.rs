@@ -278,7 +278,10 @@ impl GopTools {
             };
             let mut transform = colour::transform(TransformKind::Sh, &basis, step);
             let mut components = colour::components(&transform, &planes, step, spacing);
-            colour::drop_unused(&mut transform, &mut components);
+            // What the first frame does not need, another may.
+            if frames == 1 {
+                colour::drop_unused(&mut transform, &mut components);
+            }
             let gaussians = frame.len() * frames as usize;
             let plan = colour::plan_sh(&transform, &planes, step, gaussians, settings.sh, settings.preset);
             first_components = plan.codebooks.is_empty().then_some(components);

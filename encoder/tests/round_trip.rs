@@ -29,6 +29,7 @@ fn settings() -> impl Strategy<Value = Settings> {
             sh_transform,
             table_reuse,
             coarse_tail,
+            ..Tools::default()
         });
     let importance = prop_oneof![
         Just(None),

@@ -3,6 +3,7 @@
 //! The rows of the syntax tables give names, widths and meanings, so that what is printed cannot drift from
 //! what is read. A damaged stream gives the elements up to the damage, and the first error.
 
+use crate::levels::Levels;
 use crate::payload::{
     Codebook, Index, OperatingPoints, Refinement, Transform, VARIABLE_ROWS, VariableRow, leb128,
 };
@@ -49,6 +50,7 @@ pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) ->
         limits: *limits,
         sequence: None,
         coding: Coding::default(),
+        levels: Levels::default(),
         first: None,
     };
     inspector.stream(bytes);
@@ -61,6 +63,7 @@ struct Inspector<'v> {
     limits: Limits,
     sequence: Option<SequenceParameters>,
     coding: Coding,
+    levels: Levels,
     first: Option<Error>,
 }
 
@@ -109,6 +112,8 @@ impl Inspector<'_> {
                 self.fixed(&GopHeader::TABLE, payload, at);
                 let header = GopHeader::parse_payload(payload, at, self.profile)?;
                 self.coding = Coding::of_gop(header, unit.header.frame);
+                let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
+                self.levels = Levels::of_gop(header, unit.header.frame, refinements);
                 header.validate_from(at, unit.header.frame)?;
             }
             UnitType::FrameHeader => {
@@ -120,7 +125,14 @@ impl Inspector<'_> {
             UnitType::Transform => self.transform(payload, at)?,
             UnitType::Codebook => self.codebook(payload, at)?,
             UnitType::Refinement => self.refinement(payload, at)?,
-            UnitType::Increment if self.profile == Profile::Dynamic => self.increment(unit)?,
+            UnitType::Increment if self.profile == Profile::Dynamic => {
+                if self.levels.takes(&unit.header) {
+                    return self.increment(unit);
+                }
+                let value = format!("{} bytes", payload.len());
+                let meaning = "passed over: the reference frame has fewer refinements";
+                self.show(at, payload.len(), "payload".into(), value, meaning, "7.13.3", "increment");
+            }
             UnitType::OperatingPoints => self.operating_points(payload, at)?,
             UnitType::Index => self.index(payload, at)?,
             UnitType::End => {

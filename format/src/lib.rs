@@ -22,6 +22,7 @@ pub mod bits;
 pub mod entropy;
 mod error;
 pub mod inspect;
+pub mod levels;
 mod limits;
 pub mod payload;
 pub mod syntax;

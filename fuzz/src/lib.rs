@@ -7,6 +7,8 @@
 pub mod ceiling;
 pub mod decode;
 pub mod edits;
+pub mod increments;
+pub mod laws;
 pub mod payload;
 pub mod scene;
 pub mod seal;

@@ -2,11 +2,14 @@
 //! edit means does not depend on the encoder.
 
 /// Each uses other parts of the syntax.
-pub const ALL: [&[u8]; 6] = [
+pub const ALL: [&[u8]; 9] = [
     include_bytes!("../seeds/units/plain.bin"),
     include_bytes!("../seeds/units/groups.bin"),
     include_bytes!("../seeds/units/coefficients.bin"),
     include_bytes!("../seeds/units/vectors.bin"),
     include_bytes!("../seeds/units/blocks.bin"),
     include_bytes!("../seeds/units/contexts.bin"),
+    include_bytes!("../seeds/units/predicted.bin"),
+    include_bytes!("../seeds/units/layers.bin"),
+    include_bytes!("../seeds/units/residual-vectors.bin"),
 ];

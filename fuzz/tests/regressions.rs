@@ -3,7 +3,7 @@
 //! `BLESS=1 cargo test --test regressions` turns regressions of `decode` that are edits into the streams they
 //! stand for: those keep their meaning when the streams that edits start from change.
 
-use splatstream_fuzz::{ceiling, decode, payload, scene, seal, units};
+use splatstream_fuzz::{ceiling, decode, increments, payload, scene, seal, units};
 use std::path::{Path, PathBuf};
 
 /// The files of a folder beside this crate's manifest, by name; none if there is no such folder.
@@ -46,6 +46,11 @@ fn streams_decode_or_are_refused() {
     for path in files("seeds", "units") {
         decode::run(&std::fs::read(path).unwrap());
     }
+}
+
+#[test]
+fn increments_come_back_and_decode_or_are_refused() {
+    replay("increments", increments::run);
 }
 
 #[test]

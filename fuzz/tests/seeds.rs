@@ -4,6 +4,7 @@
 use arbitrary::{Arbitrary, Unstructured};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
+use splatstream_format::arbitrary_stream::dynamic::DynamicStream;
 use splatstream_format::arbitrary_stream::{self as random, ArbitraryStream};
 use splatstream_format::payload::Index;
 use splatstream_format::syntax::{IndexEntry, SequenceParameters, TransformKind};
@@ -78,6 +79,18 @@ fn edits_are_seeds_of_decode() {
     };
     bless("decode", &edits(0).chain(edits(1)).chain(edits(4)).collect::<Vec<_>>());
     assert_eq!(saved("decode").len(), 3 * streams::ALL.len());
+}
+
+#[test]
+fn streams_of_profile_dynamic_are_seeds_of_increments() {
+    let seeds: Vec<(String, Vec<u8>)> = (1..=12_u64)
+        .map(|seed| (format!("stream-{seed}"), noise(seed + 300, 200 + 100 * seed as usize)))
+        .collect();
+    bless("increments", &seeds);
+    for (path, bytes) in saved("increments") {
+        let stream = DynamicStream::arbitrary(&mut Unstructured::new(&bytes)).unwrap();
+        assert!(stream.to_bytes().is_ok(), "{}", path.display());
+    }
 }
 
 #[test]

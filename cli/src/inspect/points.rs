@@ -6,11 +6,11 @@ use crate::numbers::{bits_per_gaussian, grouped, hex_digest};
 use crate::stream_file::StreamFile;
 use crate::table::Table;
 use serde::Serialize;
-use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
+use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, Tally};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::payload::OperatingPoints;
-use splatstream_format::syntax::{OperatingPointEntry, UnitType};
+use splatstream_format::syntax::{OperatingPointEntry, SequenceParameters, UnitType};
 use splatstream_format::unit::Stream;
 use splatstream_format::{Error, Limits};
 use std::ops::ControlFlow;
@@ -52,12 +52,11 @@ struct List {
 
 /// Lists the operating points, smallest first.
 pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> Shown {
-    let (infos, list) = match operating_points(&stream.bytes, limits)
-        .and_then(|points| Ok((points, List::of(&stream.bytes, limits)?)))
-    {
+    let (tally, list) = match tally(&stream.bytes, limits) {
         Ok(found) => found,
         Err(error) => return Ok(Some(error)),
     };
+    let infos: Vec<OperatingPointInfo> = tally.points().into_iter().map(|point| tally.info(point)).collect();
     let mut points: Vec<Point> = infos.iter().map(|info| Point::new(info, list.as_ref())).collect();
     let mut error = None;
     if console.is_json() {
@@ -66,29 +65,67 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
             error = error.or(fault);
         }
     }
-    console.report(&points, || text(&points) + &agreement(&points, list.as_ref()))?;
+    console
+        .report(&points, || text(&points) + &list.map(|list| list.agreement(&tally)).unwrap_or_default())?;
     Ok(error)
 }
 
-impl List {
-    fn of(bytes: &[u8], limits: &Limits) -> Result<Option<Self>, Error> {
-        for unit in Stream::open(bytes, limits)?.units() {
-            let unit = unit?;
-            if unit.header.unit_type() == UnitType::OperatingPoints {
-                let entries = OperatingPoints::parse(unit.payload, unit.payload_at)?.entries;
-                return Ok(Some(Self { at: unit.at, entries }));
+/// What the units imply, and what the stream says of them.
+fn tally(bytes: &[u8], limits: &Limits) -> Result<(Tally, Option<List>), Error> {
+    let stream = Stream::open(bytes, limits)?;
+    let profile = stream.header().profile();
+    let (mut tally, mut list) = (Tally::new(profile), None);
+    for unit in stream.units() {
+        let unit = unit?;
+        let (payload, at) = (unit.payload, unit.payload_at);
+        match unit.header.unit_type() {
+            // Without them there are no points.
+            UnitType::SequenceParameters => {
+                SequenceParameters::parse_payload(payload, at, profile)?;
             }
+            UnitType::OperatingPoints => {
+                list = Some(List { at: unit.at, entries: OperatingPoints::parse(payload, at)?.entries });
+            }
+            _ => {}
         }
-        Ok(None)
+        tally.unit(&unit);
     }
+    Ok((tally, list))
+}
 
+impl List {
     /// Whether the list says of a point what the units imply; none if it does not name it.
     fn agrees(&self, info: &OperatingPointInfo) -> Option<bool> {
         let OperatingPoint { spatial, temporal, refinement } = info.point;
         let entry = self.entries.iter().find(|entry| entry.key() == (spatial, temporal, refinement))?;
-        let listed = (entry.frame_count, entry.gaussian_count, entry.byte_count);
-        Some(listed == (info.frames, info.gaussians, info.bytes))
+        Some(says(entry) == (info.frames, info.gaussians, info.bytes))
     }
+
+    /// What the list says beside what the units imply.
+    fn agreement(&self, tally: &Tally) -> String {
+        let is_wrong = |entry: &&OperatingPointEntry| {
+            let info = tally.info(point_of(entry));
+            says(entry) != (info.frames, info.gaussians, info.bytes)
+        };
+        let wrong = self.entries.iter().filter(is_wrong).map(|entry| point_of(entry).to_string());
+        let wrong: Vec<String> = wrong.collect();
+        let text =
+            format!("\nthe operating_points unit at {:#x} lists {} points", self.at, self.entries.len());
+        match wrong.as_slice() {
+            [] => text + ": all agree with the units (clause 6.16)\n",
+            wrong => format!("{text}; other figures than the units (clause 6.16): {}\n", wrong.join(" ")),
+        }
+    }
+}
+
+/// Frames, Gaussians and bytes of an entry.
+fn says(entry: &OperatingPointEntry) -> (u32, u64, u64) {
+    (entry.frame_count, entry.gaussian_count, entry.byte_count)
+}
+
+fn point_of(entry: &OperatingPointEntry) -> OperatingPoint {
+    let (spatial, temporal, refinement) = entry.key();
+    OperatingPoint { spatial, temporal, refinement }
 }
 
 impl Point {
@@ -140,24 +177,4 @@ fn text(points: &[Point]) -> String {
         ]);
     }
     table.text()
-}
-
-/// What the list in the stream says beside what the units say.
-fn agreement(points: &[Point], list: Option<&List>) -> String {
-    let Some(List { at, entries }) = list else { return String::new() };
-    let of = |listed: Option<bool>| points.iter().filter(move |point| point.listed == listed);
-    let wrong: Vec<&str> = of(Some(false)).map(|point| point.op.as_str()).collect();
-    let agreeing = of(Some(true)).count();
-    let unknown = entries.len().saturating_sub(agreeing + wrong.len());
-    let mut text = format!("\nthe operating_points unit at {at:#x} lists {} points", entries.len());
-    if wrong.is_empty() && unknown == 0 {
-        return text + ": all agree with the units (clause 6.16)\n";
-    }
-    if !wrong.is_empty() {
-        text += &format!("; other figures than the units (clause 6.16): {}", wrong.join(" "));
-    }
-    if unknown > 0 {
-        text += &format!("; {unknown} are no operating points of this stream");
-    }
-    text + "\n"
 }

@@ -8,8 +8,9 @@ use crate::stream_file::StreamFile;
 use crate::table::Table;
 use serde::Serialize;
 use splatstream_format::entropy::layout::Section;
+use splatstream_format::levels::Levels;
 use splatstream_format::syntax::{
-    FrameHeader, FrameType, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
+    FrameHeader, FrameType, GopHeader, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Delivery, Stream, Unit};
 use splatstream_format::{Error, Limits};
@@ -57,6 +58,7 @@ struct Context {
     profile: Profile,
     sequence: Option<SequenceParameters>,
     frame_type: Option<FrameType>,
+    levels: Levels,
 }
 
 /// Lists the units.
@@ -74,7 +76,12 @@ fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<E
         Ok(opened) => opened,
         Err(error) => return Some(error),
     };
-    let mut context = Context { profile: opened.header().profile(), sequence: None, frame_type: None };
+    let mut context = Context {
+        profile: opened.header().profile(),
+        sequence: None,
+        frame_type: None,
+        levels: Levels::default(),
+    };
     let mut units = opened.units();
     let mut first = None;
     while let Some(delivery) = units.next_unit() {
@@ -153,7 +160,13 @@ impl Context {
                 let header = FrameHeader::parse_payload(payload, at, self.profile).ok();
                 self.frame_type = header.and_then(|header| header.kind());
             }
-            UnitType::Increment if self.profile == Profile::Dynamic => {
+            UnitType::GopHeader => {
+                let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
+                let header = GopHeader::parse_payload(payload, at, self.profile).ok()?;
+                self.levels = Levels::of_gop(header, unit.header.frame, refinements);
+            }
+            // What is passed over by decoders may hold anything.
+            UnitType::Increment if self.profile == Profile::Dynamic && self.levels.takes(&unit.header) => {
                 let (header, _) = IncrementHeader::parse(payload, at, self.sequence.as_ref()?).ok()?;
                 return Some(Counts::of(&header));
             }

@@ -24,12 +24,13 @@ struct FrameCost {
 }
 
 impl FrameCosts {
-    /// Takes note of a unit.
+    /// Takes note of a unit; the Gaussians of one that is passed over do not count.
     pub(super) fn unit(
         &mut self,
         unit: &Unit<'_>,
         profile: Profile,
         sequence: Option<&SequenceParameters>,
+        is_decoded: bool,
     ) -> Result<()> {
         let (payload, at) = (unit.payload, unit.payload_at);
         let gaussians = match (unit.header.unit_type(), sequence) {
@@ -43,6 +44,7 @@ impl FrameCosts {
             (UnitType::Refinement, Some(sequence)) => {
                 RefinementHeader::parse(payload, at, sequence)?.0.gaussian_count
             }
+            (UnitType::Increment, _) if !is_decoded => 0,
             (UnitType::Increment, Some(sequence)) => {
                 IncrementHeader::parse(payload, at, sequence)?.0.home_count()
             }

@@ -73,3 +73,22 @@ pub(crate) fn write_stream(directory: &Path) -> PathBuf {
 pub(crate) fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/small.gss")
 }
+
+/// Bytes of a unit_header.
+pub(crate) const UNIT_HEADER: usize = 20;
+
+/// Bytes of the payload of the unit at an offset.
+pub(crate) fn payload_length(bytes: &[u8], at: usize) -> usize {
+    let length: [u8; 4] = bytes[at + 12..at + 16].try_into().expect("four bytes");
+    u32::from_le_bytes(length) as usize
+}
+
+/// Makes both check sums of a unit right again: the change is then seen behind them.
+pub(crate) fn seal(bytes: &mut [u8], at: usize) {
+    let payload = at + UNIT_HEADER..at + UNIT_HEADER + payload_length(bytes, at);
+    let crc = crc32fast::hash(&bytes[payload]);
+    bytes[at + 16..at + 20].copy_from_slice(&crc.to_le_bytes());
+    let covered = [&bytes[at..at + 6], &bytes[at + 8..at + 20]].concat();
+    let check = crc32fast::hash(&covered).to_le_bytes();
+    bytes[at + 6..at + 8].copy_from_slice(&check[..2]);
+}

@@ -1,6 +1,7 @@
 //! What operating points cost and show, from the headers of units alone.
 
 use super::OperatingPoint;
+use splatstream_format::levels::Levels;
 use splatstream_format::payload::OperatingPoints;
 use splatstream_format::syntax::{
     GopHeader, IncrementHeader, OperatingPointEntry, OperatingPointsHeader, Profile, RefinementHeader,
@@ -8,7 +9,6 @@ use splatstream_format::syntax::{
 };
 use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
-use std::collections::BTreeMap;
 
 /// What an operating point costs and shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,13 +30,13 @@ pub struct OperatingPointInfo {
 pub(crate) struct Belonging {
     profile: Profile,
     spatial_layers: u8,
-    /// The GOP and its first frame, if it is a predicted one.
-    gop: Option<(GopHeader, u32)>,
+    /// The first frame of the GOP, if it is a predicted one.
+    anchor: Option<u32>,
 }
 
 impl Belonging {
     pub(crate) const fn new(profile: Profile) -> Self {
-        Self { profile, spatial_layers: 1, gop: None }
+        Self { profile, spatial_layers: 1, anchor: None }
     }
 
     /// Takes note of sequence parameters and GOP headers.
@@ -48,8 +48,8 @@ impl Belonging {
             }
             UnitType::GopHeader => {
                 let parsed = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile);
-                let predicted = parsed.ok().filter(GopHeader::is_predicted);
-                self.gop = predicted.map(|gop| (gop, unit.header.frame));
+                let predicted = parsed.is_ok_and(|gop| gop.is_predicted());
+                self.anchor = predicted.then_some(unit.header.frame);
             }
             _ => {}
         }
@@ -57,13 +57,7 @@ impl Belonging {
 
     /// Whether an increment is of the intra frame of a predicted GOP.
     fn is_anchor(&self, header: &UnitHeader) -> bool {
-        header.unit_type() == UnitType::Increment && self.gop.is_some_and(|(_, first)| first == header.frame)
-    }
-
-    /// The frame that a frame refers to.
-    fn reference(&self, header: &UnitHeader) -> Option<u32> {
-        let (gop, first) = self.gop?;
-        gop.place(header.frame.wrapping_sub(first)).reference.map(|place| first.wrapping_add(place))
+        header.unit_type() == UnitType::Increment && self.anchor == Some(header.frame)
     }
 
     /// Whether a unit belongs to an operating point.
@@ -80,8 +74,6 @@ impl Belonging {
 struct Piece {
     header: UnitHeader,
     anchor: bool,
-    /// The frame that its frame refers to.
-    reference: Option<u32>,
     bytes: u64,
     /// Gaussians of its home after the unit; of a refinement, those it adds.
     gaussians: u32,
@@ -92,13 +84,14 @@ struct Piece {
 pub struct Tally {
     belonging: Option<Belonging>,
     sequence: Option<SequenceParameters>,
+    levels: Levels,
     pieces: Vec<Piece>,
 }
 
 impl Tally {
     /// For a stream of a profile.
     pub fn new(profile: Profile) -> Self {
-        Self { belonging: Some(Belonging::new(profile)), sequence: None, pieces: Vec::new() }
+        Self { belonging: Some(Belonging::new(profile)), ..Self::default() }
     }
 
     /// Takes note of a unit.
@@ -113,10 +106,16 @@ impl Tally {
         if !unit.header.unit_type().is_known_in(belonging.profile) {
             return;
         }
+        if let Some(levels) = levels_of(unit, belonging.profile, self.sequence.as_ref()) {
+            self.levels = levels;
+        }
+        // The payload of a unit that is passed over shows nothing, whatever it says.
+        let is_decoded = self.levels.takes(&unit.header);
         let gaussians = match (unit.header.unit_type(), &self.sequence) {
             (UnitType::Refinement, Some(sequence)) => {
                 RefinementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.gaussian_count)
             }
+            (UnitType::Increment, _) if !is_decoded => 0,
             (UnitType::Increment, Some(sequence)) => {
                 IncrementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.home_count())
             }
@@ -128,7 +127,6 @@ impl Tally {
         self.pieces.push(Piece {
             header: unit.header,
             anchor: belonging.is_anchor(&unit.header),
-            reference: belonging.reference(&unit.header),
             bytes,
             gaussians,
         });
@@ -156,7 +154,6 @@ impl Tally {
         };
         // Gaussians and units of each layer of the frame.
         let mut frame: [(u64, u32); 4] = [(0, 0); 4];
-        let mut levels = Levels::default();
         for piece in self.pieces.iter().filter(takes) {
             info.bytes = info.bytes.saturating_add(piece.bytes);
             match piece.header.unit_type() {
@@ -164,7 +161,7 @@ impl Tally {
                     info.frames = info.frames.saturating_add(1);
                     info.gaussians = info.gaussians.saturating_add(shown(&core::mem::take(&mut frame)));
                 }
-                UnitType::Refinement | UnitType::Increment if levels.admits(piece) => {
+                UnitType::Refinement | UnitType::Increment => {
                     if let Some((sum, units)) = frame.get_mut(usize::from(piece.header.spatial_layer)) {
                         *sum = sum.saturating_add(piece.gaussians.into());
                         *units = units.saturating_add(1);
@@ -225,27 +222,14 @@ impl Tally {
     }
 }
 
-/// Clause 7.20: how far the frames of a GOP are decoded; what is above the level of its reference is not.
-#[derive(Debug, Clone, Default)]
-struct Levels {
-    of_frame: BTreeMap<u32, u8>,
-}
-
-impl Levels {
-    /// Whether an increment is decoded; it then raises the level of its frame.
-    fn admits(&mut self, piece: &Piece) -> bool {
-        let UnitHeader { frame, refinement, .. } = piece.header;
-        let Some(reference) = piece.reference else {
-            // What refers to an intra frame needs all of it.
-            self.of_frame.insert(frame, u8::MAX);
-            return true;
-        };
-        let decoded = self.of_frame.get(&reference).is_some_and(|&level| refinement < level);
-        if decoded {
-            self.of_frame.insert(frame, refinement.saturating_add(1));
-        }
-        decoded
+/// The levels of the frames of a group, if its header is what the unit is.
+fn levels_of(unit: &Unit<'_>, profile: Profile, sequence: Option<&SequenceParameters>) -> Option<Levels> {
+    if unit.header.unit_type() != UnitType::GopHeader {
+        return None;
     }
+    let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile).ok()?;
+    let refinements = sequence.map_or(0, |sequence| sequence.refinement_count);
+    Some(Levels::of_gop(header, unit.header.frame, refinements))
 }
 
 /// Every operating point of a sequence, lowest first.

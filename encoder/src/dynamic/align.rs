@@ -1,9 +1,13 @@
 //! The way to write a target Gaussian that is nearest to how its reference is written.
 
+use super::survivors::LEFT;
 use crate::canonical::{permutation, product};
 
 /// The orders of three axes.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 0, 2], [2, 1, 0]];
+
+/// What a difference that has to be sent counts, in squared steps: more than all that are left can.
+const SENT: f32 = 16.0;
 
 /// Log-scales and quaternion (w first) of a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +36,10 @@ impl Namings {
             let log_scale = order.map(|axis| target.log_scale[axis]);
             let rotation = product(target.rotation, turn);
             let rotation = if rotation[0] < 0.0 { rotation.map(|part| -part) } else { rotation };
-            let square = |a: f32, b: f32, step: f32| ((a - b) / step) * ((a - b) / step);
+            let square = |a: f32, b: f32, step: f32| {
+                let steps = ((a - b) / step).abs();
+                steps * steps + if steps > LEFT { SENT } else { 0.0 }
+            };
             let scales: f32 = (0..3).map(|k| square(log_scale[k], reference.log_scale[k], steps.0)).sum();
             let turns: f32 = (1..4).map(|k| square(rotation[k], reference.rotation[k], steps.1)).sum();
             if scales + turns < best.0 {

@@ -187,7 +187,8 @@ impl Anchor<'_> {
         let section = |planes| SectionValues { deltas: Vec::new(), planes, block };
         draft.values.set(Section::Modes, section(vec![vec![3; members.len()]]));
         let wanted = self.target.wanted.select(members);
-        draft.values.set(Section::Moves, section(wanted.moves(parents, shift)));
+        let last = (1 << self.coder.sequence.position_bits) - 1;
+        draft.values.set(Section::Moves, section(wanted.moves(parents, shift, last)));
         let rows: Vec<u32> = (0..count).collect();
         let now = Attributes::of_home(parents, &rows);
         let residuals = |stage| wanted.residuals(stage, &now, shift, &self.coder.colour, false);

@@ -4,7 +4,7 @@ use super::anchor::deltas;
 use super::predictors::{Chooser, used};
 use super::survivors::{Fate, Survivors};
 use super::unit::{Draft, UnitCoder};
-use super::wanted::Wanted;
+use super::wanted::{ColourTarget, Wanted};
 use super::{CodedUnit, Reference, Target};
 use crate::colour;
 use crate::error::Error;
@@ -30,6 +30,9 @@ use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::importance;
 use std::sync::Arc;
+
+/// The largest translation of a cell, steps / 8: the difference of two is below 2^16.
+const MOST_TRANSLATION: i32 = (1 << 15) - 1;
 
 /// The Gaussians of a reference as matching sees them.
 pub(crate) struct ReferenceCloud {
@@ -131,6 +134,8 @@ pub(crate) struct Predicted<'a> {
     pub(crate) survivors: Survivors<'a>,
     pub(crate) measure: Measure,
     pub(crate) tools: Tools,
+    /// Whether the steps of the last home are doubled, as in intra frames.
+    pub(crate) coarse_tail: bool,
     pub(crate) number: u32,
 }
 
@@ -147,7 +152,7 @@ impl Predicted<'_> {
     ///
     /// # Errors
     /// What the decoder's own checks refuse.
-    pub(crate) fn code(&self, predictors: Chooser) -> Result<(Vec<CodedUnit>, Reference), Error> {
+    pub(crate) fn code(&mut self, predictors: Chooser) -> Result<(Vec<CodedUnit>, Reference), Error> {
         let sequence = self.coder.sequence;
         let motion = self.cells()?;
         let (cells, cell_log2) = (self.cell_values(&motion), motion.cell_log2);
@@ -167,6 +172,7 @@ impl Predicted<'_> {
                 home
             })
             .collect();
+        self.let_go(&displaced);
         let fresh = self.fresh(&displaced)?;
         let mut models = self.reference.state.models.clone();
         let mut after_first = models.clone();
@@ -183,13 +189,26 @@ impl Predicted<'_> {
         self.finish(made, field, after_first)
     }
 
+    /// Parts the pairs whose Gaussian cannot be brought to its partner.
+    fn let_go(&mut self, displaced: &[Home]) {
+        let places = displaced.iter().flat_map(|home| (0..home.len()).map(move |row| (home, row)));
+        for ((home, row), partner) in places.zip(&mut self.matching.target_of) {
+            if partner.is_some_and(|place| self.survivors.is_out_of_reach(home, row, place)) {
+                *partner = None;
+            }
+        }
+    }
+
     fn cells(&self) -> Result<CellMotion, Error> {
         if !self.tools.cell_motion {
             return Ok(CellMotion { cell_log2: 0, cells: Vec::new(), bits: [0.0; 2] });
         }
         let cloud = ReferenceCloud::new(self.reference, self.coder.sequence);
         let bits = self.coder.sequence.position_bits;
-        Ok(cloud.motion(self.target, &self.matching, &self.measure, bits))
+        let mut motion = cloud.motion(self.target, &self.matching, &self.measure, bits);
+        // What differs more from cell to cell, no token codes.
+        motion.cells.retain(|cell| cell.translation.iter().all(|part| part.abs() <= MOST_TRANSLATION));
+        Ok(motion)
     }
 
     fn cell_values(&self, motion: &CellMotion) -> SectionValues {
@@ -231,22 +250,23 @@ impl Predicted<'_> {
         let spacing = Spacing::default();
         let geometry = geometry(&frame, sequence, &spacing, self.number)?;
         let dc: Vec<&[f32]> = frame.dc().iter().map(Vec::as_slice).collect();
-        let dc = colour::components(self.survivors.dc, &dc, sequence.dc_step(), &spacing);
+        let dc_components = colour::components(self.survivors.dc, &dc, sequence.dc_step(), &spacing);
         let zeros = vec![0.0; frame.len()];
+        let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
+        let step = sequence.sh_step();
         let sh = match (self.coder.colour.mode, self.survivors.sh) {
             (ShCoding::Coefficients { .. }, Some(transform)) => {
-                let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
-                colour::components(transform, &planes, sequence.sh_step(), &spacing)
+                colour::components(transform, &planes, step, &spacing)
             }
             (ShCoding::VectorQuantised { .. }, Some(transform)) => {
-                let planes = crate::stream::sh_planes(&frame, sequence, &zeros);
-                let rows = colour::sampled_rows(transform, &planes, sequence.sh_step(), 1);
+                let rows = colour::sampled_rows(transform, &planes, step, 1);
                 self.stages(&rows, usize::from(transform.header.rank))
             }
             _ => Vec::new(),
         };
-        let planes = usize::from(sequence.sh_dimension());
-        let wanted = Wanted::new(&geometry, &dc, &sh, &self.coder.colour, planes)?;
+        let dc = ColourTarget { planes: &dc, step: sequence.dc_step(), components: &dc_components };
+        let sh = ColourTarget { planes: &planes, step, components: &sh };
+        let wanted = Wanted::new(&geometry, &dc, &sh, &self.coder.colour, &spacing)?;
         Ok(Fresh { places, wanted, of_home })
     }
 
@@ -293,7 +313,7 @@ impl Predicted<'_> {
         let parents = &displaced[home];
         let partners = &self.matching.target_of[start..start + parents.len()];
         let last = home + 1 == displaced.len();
-        let coarse = last && self.tools.coarse_tail && displaced.len() > 1;
+        let coarse = last && self.coarse_tail && displaced.len() > 1;
         let fates = self.survivors.fates(parents, partners, coarse);
         self.set_fates(&mut draft, &fates);
         let mut added = added.to_vec();

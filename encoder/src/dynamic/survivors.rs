@@ -5,13 +5,22 @@ use super::align::{Namings, Pose};
 use crate::settings::Steps;
 use crate::vq;
 use rayon::prelude::*;
+use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_decoder::home::{FINE, Home};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::SequenceParameters;
 
 /// Largest difference, in steps, that is left as it is. A Gaussian that moves smoothly keeps the error of its intra
 /// frame, up to half a step; sending each change as soon as it rounds to a step costs three times the bits.
-const LEFT: f32 = 0.75;
+pub(crate) const LEFT: f32 = 0.75;
+
+/// The largest move that the attribute alphabet carries is 2^16 - 1 steps.
+const REACH: f32 = 65_000.0;
+
+/// A difference rounded to steps; 0 up to the difference that is left.
+fn kept(difference: f32, left: f32) -> i32 {
+    if difference.abs() <= left { 0 } else { crate::lattice::nearest_integer(difference) }
+}
 
 /// What becomes of a parent.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -53,21 +62,26 @@ impl Survivors<'_> {
 
     fn fate(&self, home: &Home, row: usize, place: u32, coarse: bool) -> Fate {
         let place = place as usize;
-        let left = if coarse { 2.0 * LEFT } else { LEFT };
-        let keep = |difference: f32| -> i32 {
-            if difference.abs() <= left { 0 } else { crate::lattice::nearest_integer(difference) }
-        };
+        let keep = |difference: f32| kept(difference, if coarse { 2.0 * LEFT } else { LEFT });
         let fine = |value: i32| value as f32 / FINE as f32;
         let last = ((1 << self.sequence.position_bits) - 1) * FINE;
         let moved = [0, 1, 2].map(|axis: usize| {
             let now = home.position_fine[axis][row];
-            let steps = keep(self.target.position[axis][place] - fine(now));
+            let steps = kept(self.target.position[axis][place] - fine(now), LEFT);
             // A fraction of a step is left between the outermost point and the end of the lattice.
             steps.clamp(-(now / FINE), (last - now) / FINE)
         });
         let updated = self.residuals(home, row, place, &keep);
         let mode = i32::from(moved != [0; 3]) + 2 * i32::from(updated.iter().any(|&value| value != 0));
         Fate { mode, moved, updated }
+    }
+
+    /// Whether a Gaussian is so far from its partner that no residual brings it there.
+    pub(crate) fn is_out_of_reach(&self, home: &Home, row: usize, place: u32) -> bool {
+        (0..3).any(|axis| {
+            let now = home.position_fine[axis][row] as f32 / FINE as f32;
+            (self.target.position[axis][place as usize] - now).abs() > REACH
+        })
     }
 
     /// Residuals of the attributes, each 0 where the difference is left.
@@ -94,7 +108,8 @@ impl Survivors<'_> {
             self.target.frame.dc()[plane][place] / self.sequence.dc_step()
                 - planes.dc[plane][row] as f32 / 64.0
         };
-        residuals.extend(projected(self.dc, &[dc(0), dc(1), dc(2)]).map(keep));
+        let component = |part: f32| keep(part).clamp(*COMPONENT_RANGE.start(), *COMPONENT_RANGE.end());
+        residuals.extend(projected(self.dc, &[dc(0), dc(1), dc(2)]).map(component));
         if let Some(transform) = self.sh {
             let sh = |plane: usize| {
                 let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[place]);
@@ -102,7 +117,7 @@ impl Survivors<'_> {
             };
             let differences: Vec<f32> = (0..planes.sh.len()).map(sh).collect();
             match self.book {
-                None => residuals.extend(projected(transform, &differences).map(keep)),
+                None => residuals.extend(projected(transform, &differences).map(component)),
                 Some(book) => {
                     let components: Vec<f32> = projected(transform, &differences).collect();
                     residuals.extend([0, vq::nearest_entry(book, &components)]);

@@ -1,7 +1,7 @@
 //! What a run of Gaussians shall become, on the output lattices, and the residuals that bring it there.
 
 use super::anchor::scale_residuals;
-use crate::lattice::Geometry;
+use crate::lattice::{Geometry, Spacing};
 use splatstream_decoder::colour::{Colour, inverse};
 use splatstream_decoder::home::{FINE, Home};
 use splatstream_decoder::increment::residual::{Attributes, Stage};
@@ -23,38 +23,76 @@ pub(crate) struct Wanted {
     indices: Vec<Vec<i32>>,
 }
 
+/// Colours of Gaussians: what they are, and how they are coded without prediction.
+pub(crate) struct ColourTarget<'a> {
+    /// Planes in PLY's domain, and the step.
+    pub(crate) planes: &'a [&'a [f32]],
+    pub(crate) step: f32,
+    /// Components, or codebook indices.
+    pub(crate) components: &'a [Vec<i32>],
+}
+
+impl ColourTarget<'_> {
+    /// The planes in steps / 64. A Gaussian that takes every second point shall become what its components give; any
+    /// other what it is, so that a residual on top of a prediction is rounded once.
+    fn planes(&self, transform: &Transform, spacing: &Spacing) -> Result<Vec<Vec<i32>>> {
+        let count = self.planes.first().map_or(0, |plane| plane.len());
+        let mut coded = vec![vec![0; count]; self.planes.len()];
+        inverse(
+            transform,
+            self.components,
+            &mut coded.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>(),
+            0,
+        )?;
+        let fine = 64.0 / self.step;
+        for (coded, plane) in coded.iter_mut().zip(self.planes) {
+            for (row, (slot, &value)) in coded.iter_mut().zip(*plane).enumerate() {
+                let exact = libm::rintf(value * fine);
+                // Beyond the range of components the coded colour is the nearest.
+                let is_near = (exact - *slot as f32).abs() < NEAR;
+                if !spacing.is_coarse(row) && is_near {
+                    *slot = exact as i32;
+                }
+            }
+        }
+        Ok(coded)
+    }
+}
+
+/// Colours nearer to what components give than this, steps / 64, are within the range of components.
+const NEAR: f32 = 512.0;
+
 impl Wanted {
-    /// Of geometry and colour components as coded without prediction.
+    /// Of geometry and colours. Where SH is vector quantised, `sh` has codebook indices.
     ///
     /// # Errors
     /// Components out of range.
     pub(crate) fn new(
         geometry: &Geometry,
-        dc: &[Vec<i32>],
-        sh: &[Vec<i32>],
+        dc: &ColourTarget<'_>,
+        sh: &ColourTarget<'_>,
         colour: &Colour<'_>,
-        sh_planes: usize,
+        spacing: &Spacing,
     ) -> Result<Self> {
         let count = geometry.opacity.len();
-        let mut dc_out = [(); 3].map(|()| vec![0; count]);
-        inverse(colour.dc, dc, &mut dc_out.each_mut().map(Vec::as_mut_slice), 0)?;
-        let mut sh_out = vec![vec![0; count]; sh_planes];
+        let red_green_blue = dc.planes(colour.dc, spacing)?;
+        let mut planes = red_green_blue.into_iter();
         let mut indices = Vec::new();
-        match (colour.mode, colour.sh) {
-            (ShCoding::Coefficients { .. }, Some(transform)) => {
-                let mut out: Vec<&mut [i32]> = sh_out.iter_mut().map(Vec::as_mut_slice).collect();
-                inverse(transform, sh, &mut out, 0)?;
+        let sh = match (colour.mode, colour.sh) {
+            (ShCoding::Coefficients { .. }, Some(transform)) => sh.planes(transform, spacing)?,
+            (ShCoding::VectorQuantised { .. }, _) => {
+                indices = sh.components.to_vec();
+                vec![vec![0; count]; sh.planes.len()]
             }
-            (ShCoding::VectorQuantised { .. }, _) => indices = sh.to_vec(),
-            _ => {}
-        }
+            _ => vec![vec![0; count]; sh.planes.len()],
+        };
         Ok(Self {
             position: geometry.position.clone(),
             log_scale: geometry.log_scale.clone(),
             opacity: geometry.opacity.clone(),
             rotation: geometry.rotation.clone(),
-            dc: dc_out,
-            sh: sh_out,
+            dc: [(); 3].map(|()| planes.next().unwrap_or_default()),
+            sh,
             indices,
         })
     }
@@ -81,10 +119,14 @@ impl Wanted {
         self.opacity.len()
     }
 
-    /// What brings positions near those wanted, in steps of 2^shift.
-    pub(crate) fn moves(&self, home: &Home, shift: u8) -> Vec<Vec<i32>> {
+    /// What brings positions near those wanted, in steps of 2^shift, and not beyond the last lattice point.
+    pub(crate) fn moves(&self, home: &Home, shift: u8, last: i32) -> Vec<Vec<i32>> {
+        let step = |wanted: u32, now: u32| {
+            let now = now as i32;
+            nearest(wanted as i32 - now, shift).min((last - now) >> shift)
+        };
         let of_axis = |(wanted, now): (&Vec<u32>, &Vec<u32>)| {
-            wanted.iter().zip(now).map(|(&w, &n)| nearest(w as i32 - n as i32, shift)).collect()
+            wanted.iter().zip(now).map(|(&wanted, &now)| step(wanted, now)).collect()
         };
         self.position.iter().zip(&home.planes.position).map(of_axis).collect()
     }

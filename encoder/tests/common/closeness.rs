@@ -7,8 +7,10 @@ use splatstream_scene::GaussianFrame;
 /// The largest errors, steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bounds {
-    /// Of a log-scale, an opacity, a component of a colour transform.
+    /// Of a log-scale or an opacity.
     pub(crate) value: f32,
+    /// Of a component of a colour transform.
+    pub(crate) colour: f32,
     /// Of a position or a part of a rotation. Predicted ones lie between the points of their lattice and are rounded
     /// once more where they are shown.
     pub(crate) place: f32,
@@ -18,9 +20,10 @@ pub(crate) struct Bounds {
 
 impl Bounds {
     /// Of an intra frame: half a step.
-    pub(crate) const INTRA: Self = Self { value: 0.5, place: 0.5, sh: true };
-    /// Of a predicted frame: the encoder leaves up to three quarters of a step.
-    pub(crate) const PREDICTED: Self = Self { value: 0.75, place: 1.25, sh: true };
+    pub(crate) const INTRA: Self = Self { value: 0.5, colour: 0.5, place: 0.5, sh: true };
+    /// Of a predicted frame: the encoder leaves up to three quarters of a step. Colours of new Gaussians are rounded
+    /// before they are predicted and after it.
+    pub(crate) const PREDICTED: Self = Self { value: 0.75, colour: 1.0, place: 1.25, sh: true };
 }
 
 /// What f32 rounds on the way, steps.
@@ -129,8 +132,8 @@ pub(crate) fn assert_close(
                 let rounding = row.position[axis].abs() * 4.0 * f32::EPSILON;
                 within(row.position[axis], decoded.position[axis][i] as f32, bounds.place + rounding)
             }) && within(row.opacity, decoded.opacity[i] as f32, bounds.value)
-                && is_near_in_colour(&row.colour, &decoded.dc, i, bounds.value)
-                && (!bounds.sh || is_near_in_colour(&row.sh, &decoded.sh, i, bounds.value))
+                && is_near_in_colour(&row.colour, &decoded.dc, i, bounds.colour)
+                && (!bounds.sh || is_near_in_colour(&row.sh, &decoded.sh, i, bounds.colour))
                 && is_near_in_shape(row, log_scale, turn, sequence.rotation_step(), bounds)
         };
         let found = (0..rows.len()).find(|&row| !used[row] && is_source(&rows[row]));

@@ -1,7 +1,7 @@
 //! Streams of the encoder, as small as it makes them.
 
 use crate::contexts;
-use splatstream_encoder::{Preset, Quality, Settings, ShChoice, Steps, encode};
+use splatstream_encoder::{PredictorChoice, Preset, Quality, Settings, ShChoice, Steps, Structure, encode};
 use splatstream_format::Limits;
 use splatstream_format::payload::{Refinement, Transform};
 use splatstream_format::syntax::{Profile, SequenceParameters, ShMode, UnitType};
@@ -10,24 +10,47 @@ use splatstream_scene::builtin::{BuiltinScene, Tracking};
 
 /// Name and bytes; each uses other parts of the syntax.
 pub(crate) fn all() -> Vec<(String, Vec<u8>)> {
-    let fast = Settings { preset: Preset::Fast, steps: Quality::Low.steps(), ..Settings::default() };
+    intra().into_iter().chain(dynamic()).collect()
+}
+
+fn fast() -> Settings {
+    Settings { preset: Preset::Fast, steps: Quality::Low.steps(), ..Settings::default() }
+}
+
+fn with_sh(degree: u8, sh: ShChoice) -> Settings {
     // A degree and a step with which the scene's faint harmonics are not left out.
-    let steps = Steps { sh: 0.02, ..fast.steps };
-    let with_sh = |degree, sh| {
-        let refinements = vec![50, 100];
-        Settings { preset: Preset::Balanced, sh_degree: Some(degree), sh, refinements, steps, ..fast.clone() }
-    };
+    let steps = Steps { sh: 0.02, ..fast().steps };
+    let refinements = vec![50, 100];
+    Settings { preset: Preset::Balanced, sh_degree: Some(degree), sh, refinements, steps, ..fast() }
+}
+
+/// Streams of profile Intra.
+fn intra() -> Vec<(String, Vec<u8>)> {
     let settings = [
-        ("plain", 0, 1, Settings { refinements: vec![100], ..fast.clone() }),
-        ("groups", 1, 3, Settings { refinements: vec![30, 100], gop: 2, ..fast.clone() }),
+        ("plain", 0, 1, Settings { refinements: vec![100], ..fast() }),
+        ("groups", 1, 3, Settings { refinements: vec![30, 100], gop: 2, ..fast() }),
         ("coefficients", 3, 1, with_sh(3, ShChoice::Coefficients)),
         ("vectors", 2, 1, with_sh(2, ShChoice::VectorQuantised)),
-        ("blocks", 0, 1, Settings { block_log2: 6, keep_invisible: true, ..fast }),
+        ("blocks", 0, 1, Settings { block_log2: 6, keep_invisible: true, ..fast() }),
     ];
     let encoded =
         settings.into_iter().map(|(name, sh, frames, settings)| (name, stream(sh, frames, &settings)));
     let by_hand = [("contexts", contexts::stream(&one_refinement()))];
     encoded.chain(by_hand).map(|(name, bytes)| (name.to_owned(), bytes)).collect()
+}
+
+/// Streams of profile Dynamic.
+fn dynamic() -> Vec<(String, Vec<u8>)> {
+    let (structure, predictors) = (Structure::Predicted { layers: 2 }, PredictorChoice::Difference);
+    let predicted = Settings { refinements: vec![30, 100], structure, predictors, ..fast() };
+    let settings = [
+        ("predicted", 0, 5, Settings { gop: 4, ..predicted.clone() }),
+        ("layers", 1, 2, Settings { spatial_layers: 2, keep_invisible: true, ..predicted }),
+        ("residual-vectors", 2, 3, Settings { structure, ..with_sh(2, ShChoice::VectorQuantised) }),
+    ];
+    let encoded =
+        settings.map(|(name, sh, frames, settings)| (name.to_owned(), stream(sh, frames, &settings)));
+    encoded.into()
 }
 
 fn stream(sh_degree: u8, frames: u32, settings: &Settings) -> Vec<u8> {
@@ -67,9 +90,9 @@ fn one_refinement() -> SequenceParameters {
     }
 }
 
-/// Model sections of these streams' first units, behind what says which planes they are for.
+/// Model sections of the first units of streams of profile Intra, behind what says which planes they are for.
 pub(crate) fn model_sections() -> Vec<Vec<u8>> {
-    all().iter().map(|(_, bytes)| model_section(bytes)).collect()
+    intra().iter().map(|(_, bytes)| model_section(bytes)).collect()
 }
 
 fn model_section(bytes: &[u8]) -> Vec<u8> {
