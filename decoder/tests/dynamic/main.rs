@@ -16,5 +16,7 @@ mod models;
 mod points;
 mod prediction;
 mod random;
+mod shown;
 mod structure;
 mod values;
+mod verdicts;
