@@ -57,24 +57,27 @@ impl BlockValues {
 
     /// The value of a source, by its code.
     fn source(&self, code: u8, p: usize, i: usize) -> i64 {
-        let before = |n: usize| i.checked_sub(n).map_or(0, |j| self.coded[p][j]);
+        let before = |n: usize| i.checked_sub(n).and_then(|j| self.coded[p].get(j)).copied().unwrap_or(0);
         let length_before = |n: usize| i.checked_sub(n).map_or(0, |j| bit_length(self.deltas[j]));
+        // What a section does not have is 0; a plane there may not use it anyway.
+        let known = |plane: &[i64]| plane.get(i).copied().unwrap_or(0);
+        let length_of = |i: usize| self.deltas.get(i).map_or(0, |&delta| bit_length(delta));
         let PlaneInfo { attribute, alphabet, .. } = self.planes[p];
         match code {
             1 if alphabet == Alphabet::Position => 2 * length_before(1) + length_before(2),
             1 => before(1) + before(2) + before(3) + before(4),
             2 => before(1).abs() + before(2).abs() + before(3).abs() + before(4).abs(),
-            3 => p.checked_sub(1).and_then(|p| self.coded[p].get(i)).copied().unwrap_or(0),
+            3 => p.checked_sub(1).map_or(0, |p| known(&self.coded[p])),
             4 => {
                 let group = (0..p).filter(|&g| self.planes[g].attribute == attribute);
                 group.map(|g| self.coded[g][i].abs()).sum()
             }
-            5 => self.q[0][i],
-            6 => self.q[1][i],
-            7 => self.q[0][i] + self.q[1][i] + self.q[2][i],
-            8 => self.q[0][i] - self.q[2][i],
-            9 => self.o[i],
-            10 => bit_length(self.deltas[i]) + self.deltas.get(i + 1).map_or(0, |&next| bit_length(next)),
+            5 => known(&self.q[0]),
+            6 => known(&self.q[1]),
+            7 => known(&self.q[0]) + known(&self.q[1]) + known(&self.q[2]),
+            8 => known(&self.q[0]) - known(&self.q[2]),
+            9 => known(&self.o),
+            10 => length_of(i) + length_of(i + 1),
             _ => 0,
         }
     }

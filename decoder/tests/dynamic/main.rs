@@ -8,6 +8,15 @@ mod crafted;
 
 mod stream;
 
+mod cells;
+mod contexts;
+mod headers;
 mod losses;
+mod models;
 mod points;
+mod prediction;
 mod random;
+mod shown;
+mod structure;
+mod values;
+mod verdicts;

@@ -8,9 +8,11 @@ use crate::stream::scene::Scene;
 use crate::stream::shown::belongs;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream_inside;
 use splatstream_format::Limits;
 use splatstream_format::payload::OperatingPoints;
 use splatstream_format::syntax::{UnitId, UnitType};
+use std::ops::ControlFlow;
 
 /// Scenes with every list that a stream can have.
 pub(crate) fn listed() -> Vec<Scene> {
@@ -123,5 +125,78 @@ fn the_list_is_checked_by_who_decodes_all_and_changes_nothing() {
                 assert_eq!(verdict(lower), None, "some units do not belong");
             }
         }
+    }
+}
+
+/// Bytes of the fixed part of the list, and of an entry.
+const HEAD: usize = 4;
+const ENTRY: usize = 24;
+
+type Edit = fn(&mut Vec<u8>);
+
+// covers: SS-PL-001, SS-PL-002, SS-ER-006, SS-ER-003
+#[test]
+fn the_list_is_checked_in_the_order_of_9_3() {
+    // Code and place from which the error stands at, from the last check to the first: all later ones are broken too.
+    let ladder: [(&str, usize, Edit); 11] = [
+        ("MISMATCH", HEAD + ENTRY + 16, |list| list[HEAD + ENTRY + 16] ^= 1),
+        ("MISMATCH", HEAD + ENTRY + 4, |list| list[HEAD + ENTRY + 4] ^= 1),
+        ("MISMATCH", HEAD + 8, |list| list[HEAD + 8] ^= 1),
+        ("RESERVED_BITS", HEAD + 2 * ENTRY + 3, |list| list[HEAD + 2 * ENTRY + 3] = 1),
+        ("CONSTRAINT", HEAD + ENTRY, |list| list[HEAD + ENTRY + 2] = 0),
+        ("OUT_OF_RANGE", HEAD + ENTRY + 2, |list| list[HEAD + ENTRY + 2] = 10),
+        ("OUT_OF_RANGE", HEAD + 1, |list| list[HEAD + 1] = 4),
+        ("OUT_OF_RANGE", HEAD, |list| list[HEAD] = 4),
+        ("TRAILING_BYTES", 0, |list| list.push(0)),
+        ("SHORT_SECTION", 0, |list| list[1] = 1),
+        ("RESERVED_BITS", 2, |list| list[3] = 1),
+    ];
+    let base = listed()[1].script();
+    for rungs in 1..=ladder.len() {
+        let mut script = base.clone();
+        let list = script.payload(UnitType::OperatingPoints, 0);
+        ladder[..rungs].iter().for_each(|(.., edit)| edit(list));
+        let start = script.at(script.find(UnitType::OperatingPoints, 0)) + 20;
+        let (code, offset, _) = ladder[rungs - 1];
+        let decoded = decode_with(&script.bytes(), &Options { tolerant: true, ..Options::default() });
+        let error = decoded.end.unwrap();
+        assert_eq!(error.kind.code(), code, "{rungs}: {error}");
+        assert!(offset == 0 || error.at == start + offset as u64, "{rungs}: {error}");
+    }
+    let mut script = base.clone();
+    script.payload(UnitType::OperatingPoints, 0).truncate(3);
+    let error = decode_with(&script.bytes(), &Options::default()).end.unwrap();
+    assert_eq!(error.kind.code(), "SHORT_SECTION");
+}
+
+// covers: SS-PL-002, SS-PL-003
+#[test]
+fn a_list_that_is_wrong_is_no_error_to_who_has_lost_a_unit_or_started_inside() {
+    let scene = &listed()[1];
+    let mut script = scene.script();
+    script.payload(UnitType::OperatingPoints, 0)[HEAD + 4] ^= 1;
+    let tolerant = Options { tolerant: true, ..Options::default() };
+    let mut lossy = script.clone();
+    lossy.damage(UnitType::Increment, 1);
+    let decoded = decode_with(&lossy.bytes(), &tolerant);
+    assert_eq!((decoded.end, decoded.verdict().unwrap().kind.code()), (None, "CHECK_SUM"));
+    let second = script.at(script.find(UnitType::GopHeader, 1));
+    let inside = |bytes: &[u8]| {
+        decode_stream_inside(bytes, second, &Options::default(), |_, _| ControlFlow::Continue(())).end
+    };
+    assert_eq!(inside(&script.bytes()), None);
+    // Its form is looked at all the same.
+    script.payload(UnitType::OperatingPoints, 0)[HEAD] = 4;
+    assert_eq!(inside(&script.bytes()).unwrap().kind.code(), "OUT_OF_RANGE");
+}
+
+// covers: SS-PL-001, SS-PL-002
+#[test]
+fn a_list_may_have_no_entries_or_points_that_no_unit_reaches() {
+    let scene = plans()[1].scene();
+    let lists = [Vec::new(), vec![point(0, 0, 0), point(0, 3, 9), point(3, 0, 0), point(3, 3, 9)]];
+    for list in lists {
+        let scene = Scene { points: Some(list), ..scene.clone() };
+        assert_eq!(decoded_at(&scene.bytes(), ALL).len(), 9);
     }
 }

@@ -2,7 +2,9 @@
 
 use crate::stream::draw::Plan;
 use crate::stream::expect::assert_decodes;
+use crate::stream::scene::Scene;
 use splatstream_format::syntax::GopHeader;
+use std::collections::BTreeSet;
 
 pub(crate) fn plans() -> Vec<Plan> {
     let plan = |seed, layers, percents: &[u8], sh, gaussians, gops: &[(GopHeader, &[u32])]| Plan {
@@ -46,9 +48,37 @@ pub(crate) fn plans() -> Vec<Plan> {
     ]
 }
 
+// covers: SS-PA-001, SS-PA-004, SS-DG-004, SS-DG-005, SS-DG-006, SS-PR-001, SS-PR-004, SS-CA-001, SS-CA-002, SS-CA-003
+// covers: SS-PM-010, SS-OP-006, SS-OP-007, SS-BS-009, SS-BS-010, SS-BS-012, SS-LO-002
 #[test]
 fn scenes_by_dice_decode_to_the_frames_of_the_reference_at_every_operating_point() {
     for plan in plans() {
         assert_decodes(&format!("seed {}", plan.seed), &plan.scene());
     }
+}
+
+/// Modes of a scene, and predictors.
+fn used(scene: &Scene) -> [BTreeSet<i64>; 2] {
+    let units = || scene.gops.iter().flat_map(|gop| &gop.frames).flat_map(|frame| &frame.units);
+    [
+        units().flat_map(|unit| unit.modes.clone()).collect(),
+        units().flat_map(|unit| unit.predictors.clone()).collect(),
+    ]
+}
+
+#[test]
+fn the_dice_fall_on_every_mode_predictor_and_on_sections_of_several_blocks() {
+    let scenes: Vec<Scene> = plans().iter().map(Plan::scene).collect();
+    let all =
+        |which: usize| scenes.iter().flat_map(|scene| used(scene)[which].clone()).collect::<BTreeSet<_>>();
+    assert_eq!((all(0), all(1)), ((0..5).collect(), (0..3).collect()));
+    let units = || {
+        scenes.iter().flat_map(|scene| &scene.gops).flat_map(|gop| &gop.frames).flat_map(|frame| &frame.units)
+    };
+    assert!(units().any(|unit| unit.moves.len() > 64 && unit.updates.len() > 64 && unit.new.len() < 64));
+    assert!(units().any(|unit| unit.new.len() > 128));
+    assert!(units().any(|unit| unit.modes.is_empty() && unit.new.is_empty()));
+    let shifts: BTreeSet<u8> = units().flat_map(|unit| unit.header.attribute_shift).collect();
+    assert_eq!(shifts, (0..4).collect());
+    assert_eq!(units().map(|unit| unit.header.sh_mode).collect::<BTreeSet<_>>(), (0..3).collect());
 }

@@ -10,6 +10,7 @@ pub(crate) mod expect;
 pub(crate) mod frames;
 pub(crate) mod gaussian;
 pub(crate) mod prediction;
+pub(crate) mod sample;
 pub(crate) mod scene;
 mod script;
 pub(crate) mod shown;

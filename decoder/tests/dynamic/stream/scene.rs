@@ -273,7 +273,7 @@ fn cell_rows(cells: &[Cell], block: usize) -> Vec<Row> {
 }
 
 /// 5.14, element by element, whatever their values.
-fn header_bytes(header: &IncrementHeader) -> Vec<u8> {
+pub(crate) fn header_bytes(header: &IncrementHeader) -> Vec<u8> {
     let digests = [header.refinement_digest, header.carried_digest];
     let IncrementHeader { parent_count, cell_count, move_count, update_count, .. } = *header;
     let counts = [parent_count, cell_count, move_count, update_count, header.remove_count, header.new_count];
