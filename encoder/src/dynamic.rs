@@ -2,6 +2,7 @@
 
 mod align;
 mod anchor;
+mod compensation;
 mod predicted;
 mod predictors;
 mod survivors;
@@ -15,12 +16,13 @@ use crate::importance::Ranking;
 use crate::lattice::geometry;
 use crate::matching::{Cloud, Matching, Measure, shares_little};
 use crate::section::SectionPlan;
-use crate::settings::{Importance, Settings, ShChoice, Structure};
+use crate::settings::{Importance, Preset, Settings, ShChoice, Structure};
 use crate::source::FrameSource;
 use crate::stream::{FrameReport, GopTools, Prepared, Progress, Report, UnitWriter, sh_planes};
 use crate::vq;
 use align::Namings;
 use anchor::{AnchorTarget, code_anchor};
+use compensation::Compensator;
 use predicted::{Predicted, ReferenceCloud};
 use predictors::Chooser;
 use splatstream_decoder::colour::Colour;
@@ -231,8 +233,11 @@ impl Dynamic<'_, '_> {
         let dc = ColourTarget { planes: &dc, step: dc_step, components: &dc_components };
         let sh = ColourTarget { planes: &planes, step, components: &sh };
         let wanted = Wanted::new(&geometry, &dc, &sh, &coder.colour, &spacing)?;
+        let compensator = self.compensator(&target.frame);
         let anchor = AnchorTarget {
             number,
+            compensator: compensator.as_ref(),
+            predicted: self.layers() > 0,
             wanted: &wanted,
             order: &order,
             rows: &target.rows,
@@ -298,6 +303,13 @@ impl Dynamic<'_, '_> {
             gop.keep(place.temporal_layer, number, coded);
         }
         Ok(true)
+    }
+
+    /// Prefixes of intra frames are compensated where time is no matter and they are shown at all: in a predicted GOP
+    /// who has all spatial layers has the whole frame.
+    fn compensator(&self, frame: &GaussianFrame) -> Option<Compensator> {
+        let judged = self.settings.preset != Preset::Fast && self.sequence.refinement_count > 1;
+        (judged && !frame.is_empty()).then(|| Compensator::new(frame))
     }
 
     /// The codebook of the SH residuals of a frame, where a codebook serves them better than coefficients. Only a

@@ -1,5 +1,6 @@
 //! Intra frames in spatial layers: each layer adds Gaussians and halves the steps of those below it.
 
+use super::compensation::Compensator;
 use super::predictors::{Chooser, used};
 use super::unit::{Draft, UnitCoder};
 use super::wanted::{Wanted, nearest};
@@ -32,6 +33,10 @@ const fn shares(layers: u8) -> &'static [u8] {
 /// A frame on the finest lattices, in the order of its source.
 pub(crate) struct AnchorTarget<'a> {
     pub(crate) number: u32,
+    /// Judges what is shown of prefixes; none: they are shown as they are.
+    pub(crate) compensator: Option<&'a Compensator>,
+    /// Whether other frames refer to this one.
+    pub(crate) predicted: bool,
     pub(crate) wanted: &'a Wanted,
     /// Most important first.
     pub(crate) order: &'a [u32],
@@ -151,6 +156,8 @@ impl Anchor<'_> {
         digests.push(unit_digest(&applied.home.planes, 0..applied.home.len()));
         draft.header.refinement_digest = frame_digest(digests);
         draft.header.carried_digest = frame_digest(&[]);
+        self.homes[home] = applied.home;
+        self.compensate(&mut draft, layer, refinement);
         self.units.push(CodedUnit {
             spatial_layer: layer,
             refinement,
@@ -158,9 +165,19 @@ impl Anchor<'_> {
             header: draft.header,
             predicted: used(&draft),
         });
-        self.homes[home] = applied.home;
         self.members[home].extend(added);
         Ok(())
+    }
+
+    /// Fills the holes of a prefix that can be shown.
+    fn compensate(&self, draft: &mut Draft, layer: u8, refinement: u8) {
+        let sequence = self.coder.sequence;
+        let is_top = layer + 1 == sequence.spatial_layer_count;
+        let is_prefix = refinement + 1 < sequence.refinement_count && !(is_top && self.target.predicted);
+        let Some(compensator) = self.target.compensator.filter(|_| is_prefix) else { return };
+        let homes = &self.homes[..=usize::from(refinement)];
+        let (log_scale, opacity) = compensator.offsets(homes, sequence);
+        (draft.header.compensation_log_scale, draft.header.compensation_opacity) = (log_scale, opacity);
     }
 
     fn code(&self, place: u32, shift: u8) -> u64 {
