@@ -98,10 +98,7 @@ fn one<'a>(
     let (input, model_length) = number("model_length")(input)?;
     let (input, model) = element("models", take(model_length)).parse(input)?;
     let block_count = length(values.div_ceil(1_u32.wrapping_shl(sequence.block_log2.into())));
-    // Every length takes a byte: no more room is asked for than there are bytes.
-    if block_count > input.len() {
-        return fault(input, ErrorKind::ShortSection { element: "block_length" });
-    }
+    // nom asks for little room before it has seen the lengths.
     let (mut input, lengths) = count(number("block_length"), block_count).parse(input)?;
     let mut blocks = Vec::with_capacity(lengths.len());
     for block_length in lengths {

@@ -97,10 +97,7 @@ fn sections<'a>(
         return fault(section, kind);
     }
     let (input, model) = element("models", take(model_length)).parse(input)?;
-    // Every length takes a byte: no more room is asked for than there are bytes.
-    if block_count > input.len() {
-        return fault(input, ErrorKind::ShortSection { element: "block_length" });
-    }
+    // nom asks for little room before it has seen the lengths.
     let (mut input, lengths) = count(number("block_length"), block_count).parse(input)?;
     let mut blocks = Vec::with_capacity(lengths.len());
     for block_length in lengths {
