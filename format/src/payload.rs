@@ -5,6 +5,7 @@
 
 use crate::syntax::{Table, after, nothing_after};
 use crate::{Class, Error, ErrorKind, Result};
+use nom::multi::count;
 use nom::{IResult, Offset, Parser};
 
 mod codebook;
@@ -137,6 +138,20 @@ fn located(table: &Table, section: &[u8], at: u64, error: nom::Err<Fault<'_>>) -
         }
         // Only `complete` parsers are used: this one does not occur.
         nom::Err::Incomplete(_) => Error::new(at, table.syntax, short),
+    }
+}
+
+/// The lengths of the blocks of a section. nom asks for little room before it has seen them.
+fn block_lengths(block_count: usize, input: &[u8]) -> Parsed<'_, Vec<u32>> {
+    let element = "block_length";
+    let lengths = count(number::number(element), block_count).parse(input);
+    let short = ErrorKind::ShortSection { element };
+    match lengths {
+        // Every length takes a byte: where there are too few, all of them are missed.
+        Err(nom::Err::Failure(Fault { kind, .. })) if kind == Some(short) && block_count > input.len() => {
+            fault(input, short)
+        }
+        lengths => lengths,
     }
 }
 

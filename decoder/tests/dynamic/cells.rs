@@ -14,7 +14,7 @@ const PLACES: [[i64; 3]; 8] =
 /// Gaussians at places, which a frame displaces by cells of a size; all are kept.
 fn displaced(places: &[[i64; 3]], cell_log2: u8, cells: Vec<Cell>) -> Scene {
     let mut places = places.to_vec();
-    places.sort_by_key(|&place| morton(place, 10));
+    places.sort_by_key(|&place| morton(place, 20));
     let intra = Unit { new: placed(&places), ..Unit::default() };
     let mut moved = Unit { cells, modes: vec![0; places.len()], ..Unit::default() };
     moved.header.cell_log2 = cell_log2;
@@ -23,7 +23,11 @@ fn displaced(places: &[[i64; 3]], cell_log2: u8, cells: Vec<Cell>) -> Scene {
 
 /// The cells in which the places lie, all with one motion.
 fn around(places: &[[i64; 3]], cell_log2: u8, motion: Cell) -> Vec<Cell> {
-    let bits = 10_u8.saturating_sub(cell_log2).max(1);
+    cells_of(10, places, cell_log2, motion)
+}
+
+fn cells_of(position_bits: u8, places: &[[i64; 3]], cell_log2: u8, motion: Cell) -> Vec<Cell> {
+    let bits = position_bits.saturating_sub(cell_log2).max(1);
     let code = |place: &[i64; 3]| morton(place.map(|x| x >> cell_log2), bits);
     let mut codes: Vec<u64> = places.iter().map(code).collect();
     codes.sort_unstable();
@@ -51,6 +55,20 @@ fn cells_of_every_size_turn_and_shift_as_the_reference_does() {
                 &format!("{cell_log2} {turn:?} {translation:?}"),
                 &displaced(&PLACES, cell_log2, cells),
             );
+        }
+    }
+}
+
+// covers: SS-MO-001, SS-MO-004
+#[test]
+fn lattices_of_one_bit_and_of_twenty_have_cells_too() {
+    for (bits, sizes) in [(1_u8, vec![0, 1]), (20, vec![0, 1, 9, 19, 20])] {
+        let places = PLACES.map(|place| place.map(|x| if bits == 1 { x & 1 } else { x * 1024 + x }));
+        for cell_log2 in sizes {
+            let motion = Cell { turn: [-700, 8192, 41], translation: [30_000, -3, 5], ..Cell::default() };
+            let mut scene = displaced(&places, cell_log2, cells_of(bits, &places, cell_log2, motion));
+            scene.sequence.position_bits = bits;
+            assert_decodes(&format!("{bits} {cell_log2}"), &scene);
         }
     }
 }

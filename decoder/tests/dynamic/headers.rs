@@ -183,6 +183,18 @@ fn a_payload_has_the_sections_of_its_counts_and_nothing_more() {
             confined("long model_length", "SHORT_SECTION", at)
                 .script(|s| s.put(Increment, 2, FIXED + 1, [0xFF, 0x7F])),
             confined("model_length", "NUMBER", at).script(|s| s.put(Increment, 2, FIXED + 1, [0x80, 0])),
+            // Three blocks of which the first length is wrong, where nothing is left for the others.
+            confined("block_length", "NUMBER", at)
+                .scene(|s| {
+                    let cell = |code| crate::stream::cells::Cell { code, ..Default::default() };
+                    unit(s).cells = (0..130).map(cell).collect();
+                })
+                .script(|s| {
+                    let payload = s.payload(Increment, 2);
+                    let models = usize::from(payload[FIXED + 1]);
+                    payload.truncate(FIXED + 2 + models);
+                    payload.extend([0x80, 0]);
+                }),
             confined("cut block", "SHORT_SECTION", at).script(|s| _ = s.payload(Increment, 2).pop()),
             confined("a byte more", "TRAILING_BYTES", at).script(|s| s.payload(Increment, 2).push(0)),
             confined("a section without a count", "TRAILING_BYTES", at)

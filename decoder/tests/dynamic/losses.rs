@@ -2,7 +2,7 @@
 
 use crate::random::plans;
 use crate::stream::draw::Plan;
-use crate::stream::expect::{ALL, point};
+use crate::stream::expect::{ALL, point, points};
 use crate::stream::scene::{Gop, Scene};
 use crate::stream::shown::{Place, Receiver};
 use splatstream_format::syntax::GopHeader;
@@ -161,6 +161,7 @@ fn a_layer_that_is_not_complete_leaves_the_lower_one() {
             unit.refinement < counts[usize::from(unit.spatial)]
         };
         scene.gops[0].frames[0].units = full.iter().filter(is_there).cloned().collect();
+        scene.points = Some(points(&scene));
         let receiver = damaged(&[]);
         let shown = receiver.shown(&scene);
         assert_eq!((shown[0].refinements, shown[0].lost), (counts[0], false), "{counts:?}");

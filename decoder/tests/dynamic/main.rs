@@ -15,6 +15,7 @@ mod losses;
 mod models;
 mod points;
 mod prediction;
+mod profiles;
 mod random;
 mod shown;
 mod structure;

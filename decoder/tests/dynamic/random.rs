@@ -1,8 +1,10 @@
 //! Scenes by dice: every mode, shift, layer, predictor and structure, at every operating point.
 
+use crate::crafted::expect::decode_with;
 use crate::stream::draw::Plan;
 use crate::stream::expect::assert_decodes;
 use crate::stream::scene::Scene;
+use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_format::syntax::GopHeader;
 use std::collections::BTreeSet;
 
@@ -22,29 +24,16 @@ pub(crate) fn plans() -> Vec<Plan> {
     let (b2, places6) = all(6, 2);
     let (b3, places9) = all(9, 3);
     let second = |header: GopHeader| GopHeader { gop_index: 1, ..header };
+    let (i2, one) = (GopHeader::intra(0, 2), GopHeader::predicted(0, 1, 0));
     vec![
         plan(2, (1, 1), &[20, 50, 100], true, 20, &[(p3, &places3)]),
         plan(3, (2, 2), &[30, 100], false, 40, &[(b1, &places5), (second(p3), &places3)]),
         plan(4, (2, 3), &[10, 40, 70, 100], true, 30, &[(b2, &places6)]),
         plan(5, (3, 4), &[50, 60, 100], true, 90, &[(b3, &places9)]),
         plan(6, (1, 4), &[100], true, 200, &[(b3, &[0, 1, 4, 6, 8])]),
-        plan(
-            7,
-            (4, 1),
-            &[1, 2, 100],
-            false,
-            150,
-            &[(GopHeader::intra(0, 2), &[0, 1]), (second(p3), &[0, 1])],
-        ),
+        plan(7, (4, 1), &[1, 2, 100], false, 150, &[(i2, &[0, 1]), (second(p3), &[0, 1])]),
         plan(8, (2, 2), &[50, 100], true, 0, &[(b1, &places5)]),
-        plan(
-            9,
-            (1, 1),
-            &[40, 100],
-            true,
-            5,
-            &[(GopHeader::predicted(0, 1, 0), &[0]), (second(p3), &places3)],
-        ),
+        plan(9, (1, 1), &[40, 100], true, 5, &[(one, &[0]), (second(p3), &places3)]),
     ]
 }
 
@@ -55,6 +44,19 @@ fn scenes_by_dice_decode_to_the_frames_of_the_reference_at_every_operating_point
     for plan in plans() {
         assert_decodes(&format!("seed {}", plan.seed), &plan.scene());
     }
+}
+
+// covers: SS-DG-007
+#[test]
+fn digests_change_nothing_but_what_is_refused() {
+    let scene = plans()[3].scene();
+    let shown = |verify, subset| {
+        let options = Options { verify, subset, ..Options::default() };
+        let frames = decode_with(&scene.bytes(), &options).frames;
+        frames.into_iter().map(DecodedFrame::into_shown).collect::<Vec<_>>()
+    };
+    assert_eq!(shown(true, false), shown(false, false));
+    assert_eq!(shown(true, true), shown(false, true));
 }
 
 /// Modes of a scene, and predictors.

@@ -1,12 +1,11 @@
 //! 5.14 increment and 5.15 section: header, then models and blocks of each section that is there.
 
 use super::number::number;
-use super::{Parsed, element, fault, length, whole, write_leb128};
+use super::{Parsed, block_lengths, element, fault, length, whole, write_leb128};
 use crate::entropy::layout::Section;
 use crate::syntax::{IncrementHeader, SequenceParameters, after};
 use crate::{Error, ErrorKind, Limits, Result};
 use nom::bytes::complete::take;
-use nom::multi::count;
 use nom::{Offset, Parser};
 
 /// log2 of the lanes of a section, at most.
@@ -98,11 +97,7 @@ fn one<'a>(
     let (input, model_length) = number("model_length")(input)?;
     let (input, model) = element("models", take(model_length)).parse(input)?;
     let block_count = length(values.div_ceil(1_u32.wrapping_shl(sequence.block_log2.into())));
-    // Every length takes a byte: no more room is asked for than there are bytes.
-    if block_count > input.len() {
-        return fault(input, ErrorKind::ShortSection { element: "block_length" });
-    }
-    let (mut input, lengths) = count(number("block_length"), block_count).parse(input)?;
+    let (mut input, lengths) = block_lengths(block_count, input)?;
     let mut blocks = Vec::with_capacity(lengths.len());
     for block_length in lengths {
         let (rest, block) = element("blocks", take(block_length)).parse(input)?;

@@ -1,11 +1,10 @@
 //! 5.9 refinement: header, models, blocks.
 
 use super::number::number;
-use super::{Parsed, element, fault, length, whole, write_leb128};
+use super::{Parsed, block_lengths, element, fault, length, whole, write_leb128};
 use crate::syntax::{RefinementHeader, SequenceParameters, after, encode};
 use crate::{Error, ErrorKind, Limits, Result};
 use nom::bytes::complete::take;
-use nom::multi::count;
 use nom::{Offset, Parser};
 
 /// The sections of a refinement, borrowed from the stream.
@@ -97,11 +96,7 @@ fn sections<'a>(
         return fault(section, kind);
     }
     let (input, model) = element("models", take(model_length)).parse(input)?;
-    // Every length takes a byte: no more room is asked for than there are bytes.
-    if block_count > input.len() {
-        return fault(input, ErrorKind::ShortSection { element: "block_length" });
-    }
-    let (mut input, lengths) = count(number("block_length"), block_count).parse(input)?;
+    let (mut input, lengths) = block_lengths(block_count, input)?;
     let mut blocks = Vec::with_capacity(lengths.len());
     for block_length in lengths {
         let (rest, block) = element("blocks", take(block_length)).parse(input)?;

@@ -47,6 +47,9 @@ impl Plan {
             temporal_layer_count: self.layers.1,
             refinement_count: self.percents.len() as u8,
             refinement_percent,
+            // Axes that need not be sorted, and a threshold that is not in use.
+            sequence_flags: SequenceParameters::flags(self.seed % 3 > 0, false),
+            rotation_threshold: [12, 8, if self.seed % 3 > 0 { 4 } else { 0 }],
             frame_count: self.gops.iter().map(|(header, _)| header.gop_frame_count).sum(),
             ..sample::sequence()
         }
@@ -219,6 +222,7 @@ impl Drawer<'_> {
 
     fn residual(&mut self, header: &IncrementHeader) -> Gaussian {
         let dice = &mut self.dice;
+        let least = if self.sequence.canonical_axes() { 0 } else { -4 };
         let sh = match header.sh_mode {
             1 => vec![dice.within(-5, 5), dice.within(-5, 5)],
             2 => vec![dice.within(0, 2), dice.within(0, 1)],
@@ -228,7 +232,7 @@ impl Drawer<'_> {
         let delta = [0, 3, 40_000, 150_000][dice.below(4) as usize];
         Gaussian {
             delta: dice.below(delta + 1),
-            log_scale: [dice.within(-20, 20), dice.within(0, 4), dice.within(0, 4)],
+            log_scale: [dice.within(-20, 20), dice.within(least, 4), dice.within(least, 4)],
             opacity: dice.within(-25, 25),
             rotation: [(); 3].map(|()| dice.within(-9, 9)),
             dc: (0..3).map(|_| dice.within(-60, 60)).collect(),
