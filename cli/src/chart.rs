@@ -2,6 +2,9 @@
 
 mod csv_files;
 mod figures;
+mod gop;
+mod gop_files;
+mod gop_text;
 mod judge;
 mod measure;
 mod page;
@@ -37,10 +40,12 @@ use sweep::{Sweep, SweepArgs};
 /// Draw rate-distortion and speed-accuracy charts of scenes: one page, SVG and CSV.
 ///
 /// Every scene is encoded with every variant at every quality, decoded, rendered and compared with its source.
-/// A directory of frames is one sequence. The page holds everything and needs no network.
+/// A directory of frames is one sequence: of its first group with predicted frames, every operating point is measured
+/// too, and what the tools of predicted frames are worth. The page holds everything and needs no network.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream chart --builtin --quick -o look/\n  \
     splatstream chart garden.ply frames/ -o report/ --height 720\n  \
+    splatstream chart frames/ -o report/ --presets balanced --qualities high --without contexts\n  \
     splatstream chart frames/ -o report/ --frames 8 --peers peers.json --st-lpips weights.npz")]
 pub(crate) struct Chart {
     /// Scene files, and directories of frames.
@@ -58,9 +63,13 @@ pub(crate) struct Chart {
     cameras: Option<Views>,
     #[command(flatten)]
     drawing: CameraArgs,
-    /// Frames of each sequence, from the first [default: 4].
+    /// Frames of each sequence, from the first [default: 4, or --gop if that is more].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
+    /// Frames in the group whose operating points are measured: the first of each sequence, with predicted frames.
+    #[arg(long, value_name = "N", default_value_t = gop::FRAMES)]
+    #[arg(value_parser = clap::value_parser!(u32).range(2..=64))]
+    gop: u32,
     #[command(flatten)]
     sweep: SweepArgs,
     /// Results of other codecs on the same scenes.
@@ -94,7 +103,10 @@ impl Chart {
         let sweep = self.sweep.sweep(self.fps);
         let peers = self.peers.as_deref().map(Peers::read).transpose()?;
         let peer_steps = |scene: &Scene| peers.as_ref().map_or(0, |peers| peers.count(scene));
-        let of_scene = |scene: &Scene| scene.frames.len() as u32 + measure::steps(&sweep) + peer_steps(scene);
+        let gop_steps = |scene: &Scene| if gop::is_sequence(scene, self.gop) { gop::STEPS } else { 0 };
+        let of_scene = |scene: &Scene| {
+            scene.frames.len() as u32 + measure::steps(&sweep) + gop_steps(scene) + peer_steps(scene)
+        };
         let progress = Progress::steps(scenes.iter().map(of_scene).sum());
         let learned = self.st_lpips.as_deref().map(read_weights).transpose()?;
         let fps = f64::from(self.fps.0) / f64::from(self.fps.1);
@@ -108,11 +120,13 @@ impl Chart {
 
     fn scenes(&self) -> Result<Vec<Scene>, Failure> {
         let mut scenes = Vec::new();
+        // Whoever asks for a long group wants it whole.
+        let frames = self.frames.or((self.gop > gop::FRAMES).then_some(self.gop));
         if self.builtin {
-            scenes.push(Scene::builtin(self.sweep.quick, self.frames));
+            scenes.push(Scene::builtin(self.sweep.quick, frames));
         }
         for path in &self.scenes {
-            scenes.push(Scene::read(path, self.frames)?);
+            scenes.push(Scene::read(path, frames)?);
         }
         scenes::tell_apart(&mut scenes);
         Ok(scenes)
@@ -134,6 +148,10 @@ impl Chart {
         let mut judge = Judge::new(&scene.frames, cameras, charting.learned.as_ref(), || progress.advance());
         let runs = measure::measure(scene, sweep, &mut judge, progress)?;
         let mut chart = SceneChart::new(scene, judge.cameras(), runs, spelled(sweep.quality()), charting.fps);
+        if gop::is_sequence(scene, self.gop) {
+            let settings = gop::settings(sweep.headline(), self.gop);
+            chart.gop = Some(gop::measure(scene, &settings, charting.fps, &mut judge, progress)?);
+        }
         if let Some(peers) = &charting.peers {
             progress.step(format!("{}: pictures of other codecs", scene.name));
             (chart.peers, chart.missing) = peers.judged(scene, &judge, || progress.advance());

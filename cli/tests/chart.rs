@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{directory, json, text, write_frames};
+use common::{directory, json, succeed, text, write_frames};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 fn read(path: &Path) -> String {
@@ -95,4 +96,55 @@ fn the_numbers_of_a_sequence_and_of_a_peer_are_beside_the_page() {
     let peer = read(&out.join("peers.csv"));
     assert!(peer.contains("frames,Copy,1,300000,3,2,") && peer.contains(",100.000000,"), "{peer}");
     assert_eq!(read(&out.join("bandwidth.csv")).lines().count(), 1 + 4);
+}
+
+/// The lines of a CSV file, each as its cells by name. No cell of these files holds a comma.
+fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let text = read(path);
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let names = lines.next().expect("headings");
+    lines.map(|cells| names.iter().cloned().zip(cells).collect()).collect()
+}
+
+/// A whole number in a cell.
+fn count(row: &BTreeMap<String, String>, name: &str) -> u64 {
+    row[name].parse().expect("a count")
+}
+
+#[test]
+fn the_operating_points_of_a_sequence_add_up() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let out = directory.path().join("report");
+    let options =
+        ["--quick", "--height", "60", "--cameras", "ring:1", "--qualities", "high", "-o", text(&out)];
+    let report = succeed(&[&["chart", text(&frames)], &options[..]].concat());
+    let modes = rows(&out.join("operating_points.csv"));
+    let names: Vec<&str> = modes.iter().map(|mode| mode["mode"].rsplit(' ').next().unwrap()).collect();
+    assert_eq!(names, ["Startup", "quality", "anchor", "temporal", "%", "%"]);
+    let shown: Vec<&str> = modes.iter().map(|mode| mode["frames"].as_str()).collect();
+    assert_eq!(shown, ["0", "0", "0", "0 2", "0 1 2", "0 1 2"]);
+    assert_eq!(modes[1]["units"], "I0 s0 + I0 s1");
+    assert_eq!(modes[3]["units"], "I0 s0-s2 + P2 r0-r1");
+    let intra: Vec<u64> = modes.iter().take(3).map(|mode| count(mode, "gop_bytes")).collect();
+    assert!(intra.is_sorted_by(|a, b| a < b), "{intra:?}");
+    let refinements = rows(&out.join("refinements.csv"));
+    let levels: Vec<_> = refinements.iter().filter(|row| row["frames_coded"] == "predicted").collect();
+    assert_eq!(levels.len(), 2);
+    for (level, mode) in levels.iter().zip(&modes[4..]) {
+        assert_eq!(level["units"], "P2 B1");
+        let units: u64 = level["unit_bytes"].split(' ').map(|bytes| bytes.parse::<u64>().unwrap()).sum();
+        assert_eq!(count(level, "added_bytes"), units);
+        assert_eq!(count(level, "total_bytes"), intra[2] + units);
+        assert_eq!(count(level, "total_bytes"), count(mode, "gop_bytes"));
+        assert_eq!(count(level, "gaussians"), count(mode, "gaussians"));
+        assert!(!level["inter_psnr_db"].is_empty() && !level["subset_psnr_db"].is_empty());
+    }
+    // Nothing is missing any more, so that nothing is carried over.
+    assert_eq!(count(levels[1], "gaussians"), 3 * count(levels[1], "subset_gaussians") / 2);
+    let tools = rows(&out.join("tools.csv"));
+    assert_eq!(tools.len(), 5);
+    let everything = levels[1]["added_bytes"].parse::<u64>().unwrap();
+    assert_eq!(count(&tools[0], "inter_bytes"), everything);
+    assert!(["Low-frame-rate temporal", "without survivors"].iter().all(|words| report.contains(words)));
 }

@@ -1,5 +1,6 @@
 //! The numbers behind every figure and table, as CSV: one file a kind, all scenes in it.
 
+use super::gop_files;
 use super::measure::{Point, Run};
 use super::scene_chart::SceneChart;
 use crate::failure::Failure;
@@ -8,15 +9,18 @@ use crate::output_file::OutputFile;
 use splatstream_render::metrics::Comparison;
 use std::path::Path;
 
-const FIGURES: [&str; 6] = ["psnr_db", "psnr_masked_db", "yuv_psnr_db", "ssim", "ssim_masked", "st_lpips"];
+pub(super) const FIGURES: [&str; 6] =
+    ["psnr_db", "psnr_masked_db", "yuv_psnr_db", "ssim", "ssim_masked", "st_lpips"];
 
 /// A file and how it is made.
 type CsvFile = (&'static str, fn(&[SceneChart]) -> Vec<Vec<String>>);
 
-const FILES: [CsvFile; 6] = [
+const FILES: [CsvFile; 8] = [
     ("points.csv", points),
     ("speed.csv", speed),
+    ("operating_points.csv", gop_files::modes),
     ("refinements.csv", refinements),
+    ("tools.csv", gop_files::tools),
     ("bandwidth.csv", bandwidth),
     ("costs.csv", costs),
     ("peers.csv", peers),
@@ -27,7 +31,12 @@ pub(super) fn write(scenes: &[SceneChart], out: &Path) -> Result<Vec<String>, Fa
     for (name, rows) in FILES {
         OutputFile::write(&out.join(name), &csv(&rows(scenes))?)?;
     }
-    Ok(FILES.iter().map(|(name, _)| (*name).to_owned()).collect())
+    Ok(names().map(str::to_owned).collect())
+}
+
+/// Names of all files.
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    FILES.iter().map(|(name, _)| *name)
 }
 
 fn csv(rows: &[Vec<String>]) -> Result<Vec<u8>, Failure> {
@@ -39,16 +48,16 @@ fn csv(rows: &[Vec<String>]) -> Result<Vec<u8>, Failure> {
     writer.into_inner().map_err(|error| failed(error.to_string()))
 }
 
-fn headings(first: &[&str], last: &[&str]) -> Vec<String> {
+pub(super) fn headings(first: &[&str], last: &[&str]) -> Vec<String> {
     first.iter().chain(last).map(|&name| name.to_owned()).collect()
 }
 
 /// A number, or nothing.
-fn cell(value: Option<f64>) -> String {
+pub(super) fn cell(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map(|value| format!("{value:.6}")).unwrap_or_default()
 }
 
-fn figures(figures: &Comparison) -> [String; 6] {
+pub(super) fn figures(figures: &Comparison) -> [String; 6] {
     [
         cell(Some(figures.psnr_db)),
         cell(figures.psnr_masked_db),
@@ -143,16 +152,30 @@ fn speed(scenes: &[SceneChart]) -> Vec<Vec<String>> {
 }
 
 fn refinements(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let first =
-        ["scene", "percent", "unit_bytes_by_frame", "added_bytes", "total_bytes", "gaussians", "bpg_shown"];
-    let mut rows = vec![headings(&first, &FIGURES)];
+    let first = [
+        "scene",
+        "frames_coded",
+        "percent",
+        "units",
+        "unit_bytes",
+        "added_bytes",
+        "total_bytes",
+        "gaussians",
+        "bpg_shown",
+    ];
+    let last = [&FIGURES[..], &gop_files::OF_PREDICTED].concat();
+    let mut rows = vec![headings(&first, &last)];
     for scene in scenes {
+        rows.extend(gop_files::levels(scene));
         for row in scene.refinement_rows() {
+            let frames: Vec<String> = (0..row.unit_bytes.len()).map(|frame| format!("I{frame}")).collect();
             let units: Vec<String> = row.unit_bytes.iter().map(u64::to_string).collect();
-            let mut cells = vec![scene.name.clone(), row.percent.to_string(), units.join(" ")];
+            let mut cells = headings(&[&scene.name, "intra"], &[]);
+            cells.extend([row.percent.to_string(), frames.join(" "), units.join(" ")]);
             cells.extend([row.added_bytes, row.total_bytes, row.gaussians].map(|count| count.to_string()));
             cells.push(cell(Some(row.bpg)));
             cells.extend(figures(&row.figures));
+            cells.extend(gop_files::OF_PREDICTED.map(|_| String::new()));
             rows.push(cells);
         }
     }

@@ -220,7 +220,7 @@ fn add_bytes(stream: &[u8], point: OperatingPoint, frames: &mut [FramePoint]) ->
 }
 
 /// A stream that was made a moment ago and cannot be read.
-fn fault(error: splatstream_format::Error) -> Failure {
+pub(super) fn fault(error: splatstream_format::Error) -> Failure {
     Failure::stream(Path::new("the stream just encoded"), error)
 }
 

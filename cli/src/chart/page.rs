@@ -1,12 +1,14 @@
 //! The page: one file with everything in it, for people who have read nothing else.
 
 mod glossary;
+mod gop;
 mod peers;
 mod pictures;
 mod scene;
 mod tables;
 mod words;
 
+use super::csv_files;
 use super::scene_chart::{METRICS, SceneChart};
 use super::svg::{Figure, STYLE as FIGURE_STYLE};
 use super::sweep::{Group, Sweep};
@@ -161,11 +163,11 @@ impl Page<'_> {
                         "qualities " (qualities.join(", ")) "; refinement levels " (percents.join(", "))
                         @if !list(Group::Preset).is_empty() { "; presets " (list(Group::Preset).join(", ")) }
                         @if !list(Group::Without).is_empty() { "; " (list(Group::Without).join(", ")) }
-                        ". Streams of this version have one spatial and one temporal layer and no predictors, so \
-                         none of these was swept."
+                        ". All of these code every frame by itself; spatial and temporal layers and predictors are in the \
+                         tables of the first group of each sequence."
                     }
                     dt { "Numbers" } dd {
-                        @for name in ["points.csv", "speed.csv", "refinements.csv", "bandwidth.csv", "costs.csv", "peers.csv"] {
+                        @for name in csv_files::names() {
                             a href=(name) { (name) } " "
                         }
                         "lie beside this page, as does every figure (SVG) and picture (PNG). All but the timings are \

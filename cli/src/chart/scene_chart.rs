@@ -1,5 +1,6 @@
 //! Everything that was found out about a scene.
 
+use super::gop::Gop;
 use super::measure::{Point, Run};
 use super::peers::{MissingPeer, PeerPoint};
 use super::pictures::Pictures;
@@ -31,6 +32,8 @@ pub(crate) struct SceneChart {
     pub(crate) quality: String,
     /// All runs, the baseline first.
     pub(crate) runs: Vec<Run>,
+    /// The first GOP with predicted frames; none if the scene has one frame.
+    pub(crate) gop: Option<Gop>,
     /// Other codecs.
     pub(crate) peers: Vec<PeerPoint>,
     /// Other codecs that were not measured.
@@ -57,6 +60,7 @@ impl SceneChart {
             fps,
             quality,
             runs,
+            gop: None,
             peers: Vec::new(),
             missing: Vec::new(),
             pictures: None,
@@ -103,12 +107,12 @@ impl SceneChart {
         self.baseline().next().map_or_else(Vec::new, |run| curve(&self.runs, &run.variant, self.gaussians))
     }
 
-    /// The first table of the paper.
+    /// The refinement levels of intra frames.
     pub(crate) fn refinement_rows(&self) -> Vec<RefinementRow> {
         self.headline().map_or_else(Vec::new, refinement_rows)
     }
 
-    /// The second table of the paper.
+    /// Ways to play intra frames.
     pub(crate) fn bandwidth_rows(&self) -> Vec<BandwidthRow> {
         self.headline().map_or_else(Vec::new, |run| bandwidth_rows(run, self.fps))
     }

@@ -1,14 +1,12 @@
 //! The scenes of a chart, their frames in memory: timings shall not include a disk.
 
+use super::gop::FRAMES;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use splatstream_encoder::FrameSource;
 use splatstream_scene::GaussianFrame;
 use splatstream_scene::builtin::BuiltinScene;
 use std::path::{Path, PathBuf};
-
-/// Frames of a scene that are measured unless the user says otherwise: one GOP of the paper.
-const FRAMES: u32 = 4;
 
 /// A scene or the first frames of a sequence.
 pub(crate) struct Scene {

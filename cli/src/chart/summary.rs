@@ -1,5 +1,6 @@
 //! What `chart` says on the terminal.
 
+use super::gop_text;
 use super::peers::MissingPeer;
 use super::scene_chart::SceneChart;
 use crate::numbers::grouped;
@@ -13,6 +14,9 @@ pub(super) struct Summary {
     page: PathBuf,
     files: Vec<String>,
     scenes: Vec<SceneSummary>,
+    /// The tables of sequences, in words.
+    #[serde(skip)]
+    sequences: String,
 }
 
 /// The baseline of a scene.
@@ -51,7 +55,8 @@ impl Summary {
     /// The summary of a page in `out`.
     pub(super) fn new(out: &Path, charts: &[SceneChart], files: Vec<String>) -> Self {
         let scenes = charts.iter().filter_map(SceneSummary::new).collect();
-        Self { page: out.join("index.html"), files, scenes }
+        let sequences = charts.iter().map(gop_text::text).collect();
+        Self { page: out.join("index.html"), files, scenes, sequences }
     }
 
     /// For people.
@@ -79,8 +84,9 @@ impl Summary {
         }
         let files = grouped(self.files.len() as u64);
         format!(
-            "{}\nopen {} in a browser; {files} CSV and SVG files are beside it\n",
+            "{}\n{}open {} in a browser; {files} CSV and SVG files are beside it\n",
             table.text(),
+            self.sequences,
             self.page.display()
         )
     }

@@ -1,7 +1,7 @@
 //! What is swept: variants of the encoder's settings, each at every quality.
 //!
-//! A variant is a name, settings and a group. Predictors and layers join the list when the stream carries
-//! them: as variants of groups of their own.
+//! A variant is a name, settings and a group. All of them code every frame by itself; what predicted frames gain is
+//! measured apart, on the first GOP of a sequence.
 
 use crate::setting_names::{PresetName, QualityName, ToolName, spelled};
 use clap::{Args, ValueEnum};
@@ -146,6 +146,11 @@ impl Sweep {
     pub(crate) fn quality(&self) -> QualityName {
         let high = self.qualities.iter().copied().find(|&quality| quality == QualityName::High);
         high.or(self.qualities.last().copied()).unwrap_or(QualityName::High)
+    }
+
+    /// The baseline at the quality of comparison.
+    pub(crate) fn headline(&self) -> Settings {
+        self.variants.first().map_or_else(Settings::default, |variant| variant.at(self.quality()))
     }
 
     /// Operating points of a run that are looked at: every refinement level where the curve over them is drawn.

@@ -1,10 +1,10 @@
-//! The two tables of the paper: refinements of a GOP, and modes of playback by bandwidth.
+//! The two tables of the paper for intra frames: refinements, and modes of playback by bandwidth.
 
 use super::measure::{Point, Run};
 use crate::numbers::bits_per_gaussian;
 use splatstream_render::metrics::Comparison;
 
-/// A refinement level: Table 1 of the paper.
+/// A refinement level.
 #[derive(Debug, Clone)]
 pub(crate) struct RefinementRow {
     /// Share of the Gaussians, percent.
@@ -23,7 +23,7 @@ pub(crate) struct RefinementRow {
     pub(crate) figures: Comparison,
 }
 
-/// A mode of playback: Table 2 of the paper.
+/// A mode of playback.
 #[derive(Debug, Clone)]
 pub(crate) struct BandwidthRow {
     /// What the mode is for.

@@ -1,7 +1,7 @@
 //! The part of a scene.
 
 use super::words::{NOT_MEASURED, figures, how_to_read, made_by};
-use super::{SceneFigures, peers, pictures, tables};
+use super::{SceneFigures, gop, peers, pictures, tables};
 use crate::chart::scene_chart::SceneChart;
 use crate::numbers::grouped;
 use maud::{Markup, html};
@@ -15,6 +15,7 @@ pub(super) fn section(chart: &SceneChart, drawn: &SceneFigures, command: &str) -
             (rates(chart, drawn, command))
             @if let Some(shown) = &chart.pictures { (pictures::part(shown, command)) }
             (speeds(chart, drawn, command))
+            @if let Some(measured) = &chart.gop { (gop::part(chart, measured, command)) }
             (tables::refinements(chart, command))
             (tables::bandwidth(chart, command))
             h3 { "Where the bits go" }

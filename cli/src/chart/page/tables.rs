@@ -29,7 +29,7 @@ pub(super) fn metric_cells(chart: &SceneChart, figures: &Comparison, row: usize,
     }
 }
 
-/// Table 1 of the paper.
+/// Refinement levels of intra frames.
 pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
     let rows = chart.refinement_rows();
     let columns = rows.first().map_or(0, |row| row.unit_bytes.len()).min(COLUMNS);
@@ -53,7 +53,7 @@ pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
         }
     };
     html! {
-        h3 { "Refinement levels" }
+        h3 { "Refinement levels" @if chart.gop.is_some() { ", every frame by itself" } }
         (how_to_read(
             "each row adds Gaussians to the row above: sizes are of all units up to the level, by frame (I0 is the first), \
              then together, then with headers and tables; bits are per Gaussian shown at the level."
@@ -64,7 +64,7 @@ pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
     }
 }
 
-/// Table 2 of the paper.
+/// Operating points of intra frames.
 pub(super) fn bandwidth(chart: &SceneChart, command: &str) -> Markup {
     let rows = chart.bandwidth_rows();
     let mut headings: Vec<Heading<'_>> = ["Mode", "Units"].map(Heading::Words).to_vec();
@@ -88,7 +88,7 @@ pub(super) fn bandwidth(chart: &SceneChart, command: &str) -> Markup {
         }
     };
     html! {
-        h3 { "Operating points by bandwidth" }
+        h3 { "Operating points by bandwidth" @if chart.gop.is_some() { ", every frame by itself" } }
         (how_to_read(
             "each row is a way to play the stream, least bandwidth first: find the last row that your network carries; \
              the bandwidth is 8 × the size of a GOP over its duration."

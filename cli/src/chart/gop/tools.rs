@@ -1,0 +1,77 @@
+//! What the tools of predicted frames are worth: the GOP without each.
+
+use super::decoded::shown;
+use crate::chart::judge::Judge;
+use crate::failure::Failure;
+use crate::setting_names::ToolName;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_encoder::{PredictorChoice, Settings, encode};
+use splatstream_format::syntax::FrameType;
+use splatstream_render::metrics::Comparison;
+use splatstream_scene::GaussianFrame;
+
+/// A GOP with some tools.
+#[derive(Debug, Clone)]
+pub(crate) struct ToolRow {
+    /// What it is with or without.
+    pub(crate) name: &'static str,
+    /// Bytes of predicted frames.
+    pub(crate) bytes: u64,
+    /// Gaussians of predicted frames.
+    pub(crate) gaussians: u64,
+    /// Means over predicted frames, everything decoded.
+    pub(crate) figures: Comparison,
+}
+
+impl ToolRow {
+    /// Bytes a Gaussian of predicted frames.
+    pub(crate) fn bytes_per_gaussian(&self) -> f64 {
+        self.bytes as f64 / self.gaussians.max(1) as f64
+    }
+
+    /// Bytes more than another row takes, percent.
+    pub(crate) fn more_than(&self, other: &Self) -> f64 {
+        100.0 * (self.bytes_per_gaussian() / other.bytes_per_gaussian().max(f64::MIN_POSITIVE) - 1.0)
+    }
+}
+
+/// Everything first.
+pub(super) fn rows(
+    frames: &mut Vec<GaussianFrame>,
+    settings: &Settings,
+    judge: &mut Judge<'_>,
+) -> Result<Vec<ToolRow>, Failure> {
+    let without = |tool: ToolName| {
+        let mut settings = settings.clone();
+        tool.leave_out_of(&mut settings);
+        settings
+    };
+    let predicted = |predictors| Settings { predictors, ..settings.clone() };
+    let variants = [
+        ("everything, predictors by bits", predicted(PredictorChoice::Bits)),
+        ("without cell-motion", without(ToolName::CellMotion)),
+        ("without survivors", without(ToolName::Survivors)),
+        ("predictors none", predicted(PredictorChoice::None)),
+        ("predictors l1", predicted(PredictorChoice::Difference)),
+    ];
+    variants.iter().map(|(name, settings)| row(name, frames, settings, judge)).collect()
+}
+
+fn row(
+    name: &'static str,
+    frames: &mut Vec<GaussianFrame>,
+    settings: &Settings,
+    judge: &mut Judge<'_>,
+) -> Result<ToolRow, Failure> {
+    let mut stream = Vec::new();
+    let report = encode(frames, settings, &mut stream, &mut |_, _| {})
+        .map_err(|error| Failure::other(error.to_string()))?;
+    let inter = report.coded.iter().filter(|frame| frame.frame_type != FrameType::Intra);
+    let figures = shown(&stream, OperatingPoint::ALL, judge)?.figures(|frame| !frame.is_intra())?;
+    Ok(ToolRow {
+        name,
+        bytes: inter.clone().map(|frame| frame.bytes).sum(),
+        gaussians: inter.map(|frame| u64::from(frame.gaussians)).sum(),
+        figures,
+    })
+}

@@ -1,0 +1,85 @@
+//! The tables of a GOP with predicted frames, as rows of CSV files.
+
+use super::csv_files::{FIGURES, cell, figures, headings};
+use super::scene_chart::SceneChart;
+
+/// Columns of refinement levels that only predicted frames have.
+pub(super) const OF_PREDICTED: [&str; 8] = [
+    "inter_psnr_db",
+    "inter_ssim",
+    "inter_st_lpips",
+    "subset_bytes",
+    "subset_gaussians",
+    "subset_psnr_db",
+    "subset_ssim",
+    "subset_st_lpips",
+];
+
+/// Ways to play the GOP.
+pub(super) fn modes(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let first = [
+        "scene",
+        "mode",
+        "units",
+        "frames",
+        "playback",
+        "percent",
+        "gop_bytes",
+        "mbit_s",
+        "fps",
+        "gaussians",
+        "bpg_shown",
+    ];
+    let mut rows = vec![headings(&first, &FIGURES)];
+    for scene in scenes {
+        for mode in scene.gop.iter().flat_map(|gop| &gop.modes) {
+            let names = [&scene.name, &mode.name, &mode.units, &mode.frames, mode.playback];
+            let mut cells = headings(&names, &[]);
+            cells.push(mode.percent.map(|percent| percent.to_string()).unwrap_or_default());
+            cells.extend([mode.bytes.to_string(), cell(Some(mode.mbit_s)), cell(Some(scene.fps))]);
+            cells.extend([mode.gaussians.to_string(), cell(Some(mode.bpg))]);
+            cells.extend(figures(&mode.figures));
+            rows.push(cells);
+        }
+    }
+    rows
+}
+
+/// Refinement levels of the GOP of a scene.
+pub(super) fn levels(scene: &SceneChart) -> Vec<Vec<String>> {
+    let levels = scene.gop.iter().flat_map(|gop| &gop.levels);
+    let row = |level: &super::gop::Level| {
+        let names: Vec<&str> = level.units.iter().map(|(name, _)| name.as_str()).collect();
+        let bytes: Vec<String> = level.units.iter().map(|(_, bytes)| bytes.to_string()).collect();
+        let mut cells = headings(&[&scene.name, "predicted"], &[]);
+        cells.extend([level.percent.to_string(), names.join(" "), bytes.join(" ")]);
+        cells.extend([level.added, level.total, level.gaussians].map(|count| count.to_string()));
+        cells.push(cell(Some(level.bpg)));
+        cells.extend(figures(&level.all));
+        let (inter, subset) = (&level.inter, &level.subset);
+        cells.extend([Some(inter.psnr_db), inter.ssim, inter.st_lpips].map(cell));
+        cells.extend([subset.bytes, subset.gaussians].map(|count| count.to_string()));
+        let figures = &subset.figures;
+        cells.extend([Some(figures.psnr_db), figures.ssim, figures.st_lpips].map(cell));
+        cells
+    };
+    levels.map(row).collect()
+}
+
+/// What tools of predicted frames are worth.
+pub(super) fn tools(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let first = ["scene", "tools", "inter_bytes", "inter_gaussians", "bytes_per_gaussian", "more_percent"];
+    let mut rows = vec![headings(&first, &FIGURES)];
+    for scene in scenes {
+        let tools = scene.gop.as_ref().map_or(&[][..], |gop| gop.tools.as_slice());
+        for tool in tools {
+            let more = tools.first().map(|everything| tool.more_than(everything));
+            let mut cells = headings(&[&scene.name, tool.name], &[]);
+            cells.extend([tool.bytes.to_string(), tool.gaussians.to_string()]);
+            cells.extend([Some(tool.bytes_per_gaussian()), more].map(cell));
+            cells.extend(figures(&tool.figures));
+            rows.push(cells);
+        }
+    }
+    rows
+}
