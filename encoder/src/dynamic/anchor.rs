@@ -215,7 +215,7 @@ impl Anchor<'_> {
 
 /// Differences of rising codes; they start anew in each block.
 pub(crate) fn deltas(codes: &[u64], block: usize) -> Vec<u64> {
-    let before = |place: usize| if place % block == 0 { 0 } else { codes[place - 1] };
+    let before = |place: usize| if place.is_multiple_of(block) { 0 } else { codes[place - 1] };
     codes.iter().enumerate().map(|(place, &code)| code - before(place)).collect()
 }
 

@@ -221,7 +221,8 @@ impl Predicted<'_> {
                 let cell = &motion.cells[place];
                 if part < 3 { cell.translation[part] } else { cell.turn[part - 3] }
             };
-            let difference = |place: usize| of(place) - if place % block == 0 { 0 } else { of(place - 1) };
+            let difference =
+                |place: usize| of(place) - if place.is_multiple_of(block) { 0 } else { of(place - 1) };
             planes.push((0..codes.len()).map(difference).collect());
         }
         SectionValues { deltas: deltas(&codes, block), planes, block }

@@ -166,12 +166,12 @@ impl Wanted {
 
     fn scale_planes(&self, now: &Attributes, shift: u8) -> Vec<Vec<i32>> {
         let at = |planes: &[Vec<i32>; 3], row: usize| planes.each_ref().map(|plane| plane[row]);
-        let mut planes = vec![Vec::with_capacity(self.len()); 3];
+        let mut planes = [const { Vec::new() }; 3];
         for row in 0..self.len() {
             let residuals = scale_residuals(at(&now.log_scale, row), at(&self.log_scale, row), shift);
             planes.iter_mut().zip(residuals).for_each(|(plane, value)| plane.push(value));
         }
-        planes
+        planes.to_vec()
     }
 }
 
