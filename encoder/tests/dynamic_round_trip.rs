@@ -156,7 +156,7 @@ fn the_last_point_of_the_lattice_is_reached_through_every_number_of_layers() {
     let steps = Steps { position_bits: 2047.0_f32.log2(), ..quick().steps };
     for spatial_layers in 2..=4 {
         let settings = Settings { spatial_layers, steps, ..quick() };
-        let (bytes, _) = coded(&[frame.clone()], &settings, "the last point");
+        let (bytes, _) = coded(core::slice::from_ref(&frame), &settings, "the last point");
         let whole = Whole::new(&bytes);
         assert_eq!(whole.sequence.position_bits, 11);
         assert_eq!(whole.all()[0].planes.position[0].iter().max(), Some(&2047), "{spatial_layers} layers");
