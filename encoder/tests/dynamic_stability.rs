@@ -115,7 +115,7 @@ fn ties_are_broken_the_same_way_by_both_sides() {
 fn quaternions_that_change_sign_between_frames_change_no_byte() {
     let frames = scene(150, 5, 1, Tracking::Tracked);
     let flip = |(t, frame): (usize, &GaussianFrame)| {
-        let sign = |row: usize| if (row + t) % 2 == 0 { -1.0 } else { 1.0 };
+        let sign = |row: usize| if (row + t).is_multiple_of(2) { -1.0 } else { 1.0 };
         changed(frame, |planes| {
             for part in &mut planes.rotation {
                 part.iter_mut().enumerate().for_each(|(row, value)| *value *= sign(row));
