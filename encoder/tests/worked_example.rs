@@ -1,7 +1,12 @@
-//! Annex D: a small stream, every byte named. The annex is written by this test and must stay as it is.
+//! Annexes D and E: small streams, every byte named. The annexes are written by these tests and must stay as they are.
 //!
-//! `BLESS=1 cargo test -p splatstream-encoder --test worked_example` writes stream and annex anew.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a panic is a failed test")]
+//! `BLESS=1 cargo test -p splatstream-encoder --test worked_example` writes streams and annexes anew.
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    clippy::print_stdout,
+    reason = "a panic is a failed test"
+)]
 
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::output::to_gaussians;
@@ -18,6 +23,8 @@ use std::path::{Path, PathBuf};
 
 #[path = "worked_example/symbols.rs"]
 mod symbols;
+#[path = "worked_example/temporal/mod.rs"]
+mod temporal;
 
 fn spec(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec").join(name)
@@ -65,15 +72,26 @@ fn decoded(bytes: &[u8]) -> (SequenceParameters, DecodedFrame) {
 #[test]
 fn annex_d_is_the_stream_byte_by_byte() {
     let bytes = stream();
-    let annex = annex(&bytes);
+    check("d-worked-example.md", &annex(&bytes), "worked-example.gss", &bytes);
+}
+
+#[test]
+fn annex_e_is_the_stream_increment_by_increment() {
+    let bytes = temporal::stream();
+    check("e-worked-temporal-example.md", &temporal::annex(&bytes), "worked-temporal-example.gss", &bytes);
+}
+
+/// Compares an annex and its stream with the files of the specification, or writes them.
+fn check(name: &str, annex: &str, data: &str, bytes: &[u8]) {
+    let data = spec("data").join(data);
     if std::env::var_os("BLESS").is_some() {
         std::fs::create_dir_all(spec("data")).unwrap();
-        std::fs::write(spec("data/worked-example.gss"), &bytes).unwrap();
-        std::fs::write(spec("d-worked-example.md"), &annex).unwrap();
+        std::fs::write(&data, bytes).unwrap();
+        std::fs::write(spec(name), annex).unwrap();
     }
     let advice = "the encoder or the text changed: read the difference, then run with BLESS=1";
-    assert!(std::fs::read(spec("data/worked-example.gss")).unwrap() == bytes, "{advice}");
-    assert!(std::fs::read_to_string(spec("d-worked-example.md")).unwrap() == annex, "{advice}");
+    assert!(std::fs::read(&data).unwrap() == bytes, "{advice}");
+    assert!(std::fs::read_to_string(spec(name)).unwrap() == annex, "{advice}");
 }
 
 fn annex(bytes: &[u8]) -> String {
@@ -87,7 +105,7 @@ fn annex(bytes: &[u8]) -> String {
     scene_table(&mut text);
     text.push_str("\n## D.2 The file\n");
     hexadecimal(&mut text, bytes, 0);
-    elements(&mut text, bytes);
+    elements(&mut text, bytes, "D.3");
     symbols::blocks(&mut text, bytes);
     planes(&mut text, bytes);
     extraction(&mut text, bytes);
@@ -135,13 +153,15 @@ fn width(bits: u64) -> String {
     if bits.is_multiple_of(8) { format!("{} B", bits / 8) } else { format!("{bits} b") }
 }
 
-fn elements(text: &mut String, bytes: &[u8]) {
+fn elements(text: &mut String, bytes: &[u8], clause: &str) {
     let mut list: Vec<Element> = Vec::new();
     assert_eq!(inspect(bytes, &Limits::default(), &mut |element| list.push(element)), None);
-    text.push_str(
-        "\n## D.3 Every element\n\nPlaces are byte offsets in the file; `+3` is bit 3 of the byte, counted from the \
-         least significant. The elements follow each other without gaps.\n",
-    );
+    write!(
+        text,
+        "\n## {clause} Every element\n\nPlaces are byte offsets in the file; `+3` is bit 3 of the byte, counted from \
+         the least significant. The elements follow each other without gaps.\n"
+    )
+    .unwrap();
     let mut units = 0;
     let mut end = 0;
     for element in &list {

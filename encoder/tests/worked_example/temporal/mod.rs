@@ -1,0 +1,225 @@
+//! Annex E: a small stream of profile 1, its increments step by step.
+
+mod frames;
+mod predicting;
+mod scene;
+mod steps;
+mod walk;
+mod writing;
+
+use crate::{elements, hexadecimal};
+use core::fmt::Display;
+use splatstream_decoder::displacement::Cell;
+use splatstream_decoder::home::Home;
+use splatstream_decoder::layout::{Layout, Section, ShCoding};
+use splatstream_decoder::position::collect;
+use std::fmt::Write as _;
+use walk::{Common, Step, Walked};
+pub(crate) use writing::stream;
+
+/// The text of the annex for the stream.
+pub(crate) fn annex(bytes: &[u8]) -> String {
+    let (common, frames) = writing::walked(bytes);
+    let mut text = String::from(
+        "# Annex E Worked example of profile 1\n\n\
+         Informative. A stream of an I, a B and a P frame with two spatial layers, two temporal layers and two \
+         refinements: every byte with the element it belongs to, the values of its increments, and the arithmetic of \
+         one step of each kind. The stream is `data/worked-temporal-example.gss`; it was put together by hand, and \
+         its models and blocks are coded as those of annex D. This annex is written by a test from what the \
+         reference decoder computes; the test fails when stream and annex part. Where a table here and clauses 2 to \
+         9 disagree, the clauses are right.\n\n",
+    );
+    overview(&mut text, &common, &frames);
+    text.push_str("\n## E.2 The file\n");
+    hexadecimal(&mut text, bytes, 0);
+    elements(&mut text, bytes, "E.3");
+    text.push_str(
+        "\n## E.4 The increments\n\nThe values `v` of 8.1 of each section, entry by entry; then the home after the \
+         unit (7.14.4). Letters name Gaussians in the order in which units add them.\n",
+    );
+    let names = names(&frames);
+    for step in frames.iter().flat_map(|frame| &frame.steps) {
+        unit(&mut text, step, &names);
+    }
+    cells(&mut text, &frames[1]);
+    steps::displacement(&mut text, &common, &frames[1], 1);
+    steps::residual(&mut text, &common, frames[2].step(1, 1), 1);
+    predicting::prediction(&mut text, &common, frames[1].step(1, 1), "E.8 New Gaussian predicted by KNN");
+    predicting::prediction(
+        &mut text,
+        &common,
+        frames[1].step(1, 0),
+        "E.9 New Gaussian predicted bilaterally",
+    );
+    frames::carried(&mut text, &frames, &names);
+    frames::shown(&mut text, bytes);
+    frames::digests(&mut text, &frames);
+    frames::output(&mut text, bytes);
+    text
+}
+
+fn overview(text: &mut String, common: &Common, frames: &[Walked]) {
+    text.push_str(
+        "## E.1 The frames\n\nThe layers and references are those of 7.13.1 with `temporal_depth` 1. Each unit (s, r) \
+         is listed with its parents, what becomes of them, and how many Gaussians it adds.\n\n\
+         | Frame | Kind | Temporal layer | Refers to | Unit | position_shift | attribute_shift | Parents | Moves | \
+         Updates | Removed | New | Cells |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for frame in frames {
+        let place = common.gop.place(frame.number);
+        let kind = ["I", "P", "B"][usize::from(place.frame_type.code())];
+        let reference = place.reference.map_or("none".to_owned(), |at| at.to_string());
+        for Step { id, header, .. } in &frame.steps {
+            writeln!(
+                text,
+                "| {} | {kind} | {} | {reference} | ({}, {}) | {} | {} | {} | {} | {} | {} | {} | {} |",
+                frame.number,
+                place.temporal_layer,
+                id.spatial_layer,
+                id.refinement,
+                header.position_shift,
+                list(header.attribute_shift),
+                header.parent_count,
+                header.move_count,
+                header.update_count,
+                header.remove_count,
+                header.new_count,
+                header.cell_count
+            )
+            .unwrap();
+        }
+    }
+}
+
+/// Values with commas between them.
+fn list<T: Display>(values: impl IntoIterator<Item = T>) -> String {
+    values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// One Gaussian of a plane each.
+fn of<T: Copy>(planes: &[Vec<T>; 3], i: usize) -> [T; 3] {
+    planes.each_ref().map(|plane| plane[i])
+}
+
+/// The names of the Gaussians of each home after each unit, in stream order.
+type Names = Vec<((u32, u8, u8), Vec<String>)>;
+
+/// Letters for Gaussians in the order in which units add them.
+fn names(frames: &[Walked]) -> Names {
+    let mut letters = ('A'..='Z').map(String::from);
+    let mut names: Names = Vec::new();
+    for step in frames.iter().flat_map(|frame| &frame.steps) {
+        let modes = step.values.plane(Section::Modes, 0);
+        let parents = parent_names(step, &names);
+        let kept = parents.into_iter().zip(modes).filter(|(_, mode)| **mode != 4).map(|(name, _)| name);
+        let all = kept.chain(letters.by_ref().take(step.added)).collect();
+        names.push(((step.id.frame, step.id.spatial_layer, step.id.refinement), all));
+    }
+    names
+}
+
+fn parent_names(step: &Step, names: &Names) -> Vec<String> {
+    let id = &step.id;
+    // Both predicted frames refer to frame 0.
+    let at = match (id.frame, id.spatial_layer) {
+        (0, 0) => return Vec::new(),
+        (0, layer) => (0, layer - 1, id.refinement),
+        (_, layer) => (0, layer, id.refinement),
+    };
+    name_list(names, at).to_vec()
+}
+
+fn name_list(names: &Names, at: (u32, u8, u8)) -> &[String] {
+    names.iter().find(|(place, _)| *place == at).map(|(_, names)| names.as_slice()).unwrap()
+}
+
+fn unit(text: &mut String, step: &Step, names: &Names) {
+    let id = &step.id;
+    write!(text, "\n### Unit {}\n", step.name()).unwrap();
+    let parents = parent_names(step, names);
+    if parents.is_empty() {
+        text.push_str("\nIt has no parents.\n");
+    } else {
+        write!(text, "\nIts parents, in order: {}.\n", parents.join(", ")).unwrap();
+    }
+    for section in Section::ALL.into_iter().filter(|&section| step.header.count(section) > 0) {
+        section_table(text, step, section);
+    }
+    write!(text, "\nHome {} after the unit:\n", id.refinement).unwrap();
+    let names = name_list(names, (id.frame, id.spatial_layer, id.refinement));
+    gaussians(text, &step.home, names);
+}
+
+fn section_table(text: &mut String, step: &Step, section: Section) {
+    let layout = Layout::of_section(section, 3, ShCoding::None);
+    let values = step.values.section(section);
+    let heads: Vec<String> = layout
+        .planes()
+        .iter()
+        .map(|plane| match plane.is_position() {
+            true => "delta".to_owned(),
+            false => format!("{}[{}]", plane.attribute.name(), plane.place),
+        })
+        .collect();
+    write!(text, "\n| {} | {} |\n|{}\n", section.name(), heads.join(" | "), "---|".repeat(heads.len() + 1))
+        .unwrap();
+    for entry in 0..step.header.count(section) as usize {
+        let delta = values.deltas.get(entry).map(|delta| delta.to_string());
+        let others = values.planes.iter().map(|plane| plane[entry].to_string());
+        let cells: Vec<String> = delta.into_iter().chain(others).collect();
+        writeln!(text, "| {entry} | {} |", cells.join(" | ")).unwrap();
+    }
+}
+
+/// A home as a table.
+fn gaussians(text: &mut String, home: &Home, names: &[String]) {
+    assert_eq!(home.len(), names.len());
+    text.push_str(
+        "\n| Gaussian | position_fine | position | q | o | rotation_fine | rotation | dc | anchor |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (i, name) in names.iter().enumerate() {
+        let planes = &home.planes;
+        let cells = [
+            list(of(&home.position_fine, i)),
+            list(of(&planes.position, i)),
+            list(of(&planes.log_scale, i)),
+            planes.opacity[i].to_string(),
+            list(of(&home.rotation_fine, i)),
+            list(of(&planes.rotation, i)),
+            list(of(&planes.dc, i)),
+            u8::from(home.anchor[i]).to_string(),
+        ];
+        writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
+    }
+}
+
+/// The cells of a frame, sums taken.
+fn cells(text: &mut String, frame: &Walked) {
+    let step = &frame.steps[0];
+    let cell_log2 = step.header.cell_log2;
+    write!(
+        text,
+        "\n## E.5 The cells of frame {}\n\n`cell_log2` is {cell_log2}. Codes, translations and turns are sums over the \
+         entries of section cells (7.15.1).\n\n| Cell | delta | code | X | stale | translation | turn |\n\
+         |---|---|---|---|---|---|---|\n",
+        frame.number
+    )
+    .unwrap();
+    let mut code = 0;
+    for (i, delta) in step.values.section(Section::Cells).deltas.iter().enumerate() {
+        code += delta;
+        let x = [collect(code), collect(code >> 1), collect(code >> 2)];
+        let corner = x.map(|x| (x << (cell_log2 + 6)) as i32);
+        let &Cell { coordinates, stale, translation, turn } = frame.field.find(corner).unwrap();
+        assert_eq!(coordinates, x);
+        let (translation, turn) = (list(translation), list(turn));
+        writeln!(
+            text,
+            "| {i} | {delta} | {code} | {} | {} | {translation} | {turn} |",
+            list(x),
+            u8::from(stale)
+        )
+        .unwrap();
+    }
+}
