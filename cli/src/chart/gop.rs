@@ -165,7 +165,7 @@ fn modes(
         modes.push(mode(name, base.units(last), Some(100), &base, (frames, fps))?);
     }
     for ((percent, shown), refinement) in levels.iter().zip(0..) {
-        let name = format!("Full frame rate, {percent} %");
+        let name = format!("Full frame rate at {percent} %");
         modes.push(mode(name, shown.units(refinement), Some(*percent), shown, (frames, fps))?);
     }
     Ok(modes)
