@@ -25,7 +25,7 @@ pub(crate) fn annex(bytes: &[u8]) -> String {
          Informative. A stream of an I, a B and a P frame with two spatial layers, two temporal layers and two \
          refinements: every byte with the element it belongs to, the values of its increments, and the arithmetic of \
          one step of each kind. The stream is `data/worked-temporal-example.gss`; it was put together by hand, and \
-         its models and blocks are coded as those of annex D. This annex is written by a test from what the \
+         its models and blocks follow the syntax of annex D, with one context and one table a plane. This annex is written by a test from what the \
          reference decoder computes; the test fails when stream and annex part. Where a table here and clauses 2 to \
          9 disagree, the clauses are right.\n\n",
     );
