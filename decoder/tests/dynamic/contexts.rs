@@ -112,9 +112,9 @@ fn biases_and_two_sources_at_once_code_the_same_values() {
     let mut coded = plain.clone();
     for section in Section::ALL {
         for (p, plane) in planes(section, 1).into_iter().enumerate() {
-            let usable = Source::ALL.into_iter().filter(|source| is_available(source.code(), plane, p));
+            let usable = |source: &Source| is_available(source.code(), plane, p);
+            let last = Source::ALL.into_iter().rfind(usable).unwrap();
             let axis = |source, thresholds: &[i32]| ContextAxis { source, thresholds: thresholds.to_vec() };
-            let last = usable.last().unwrap();
             let axes = [axis(Source::NeighbourSum, &[-9, 0, 2]), axis(last, &[0, 5])];
             let bias = if plane.is_position() { 0 } else { [-3, 0, 2, 100][p % 4] };
             let shape = Shape { bias, direct_log2: 2 + (p % 4) as u8, axes, tables: None };

@@ -45,7 +45,8 @@ fn opacities(scene: &Scene, count: usize) -> Vec<i32> {
 // covers: SS-PR-004, SS-PR-005
 #[test]
 fn knn_takes_the_nearest_of_equals_the_first_and_weighs_by_distance() {
-    let cases: [(&[(i64, i64)], u8, i32); 9] = [
+    type Line<'a> = &'a [(i64, i64)];
+    let cases: [(Line<'_>, u8, i32); 9] = [
         // The nearest alone.
         (&[(5, 10), (12, 20), (30, 30)], 1, 20),
         // At the same distance, the one of smaller index.

@@ -21,10 +21,9 @@ pub(crate) fn plans() -> Vec<Plan> {
     let all = |count: u32, depth: u8| (GopHeader::predicted(0, count, depth), (0..count).collect::<Vec<_>>());
     let (p3, places3) = all(4, 0);
     let (b1, places5) = all(5, 1);
-    let (b2, places6) = all(6, 2);
-    let (b3, places9) = all(9, 3);
+    let ((b2, places6), (b3, places9)) = (all(6, 2), all(9, 3));
     let second = |header: GopHeader| GopHeader { gop_index: 1, ..header };
-    let (i2, one) = (GopHeader::intra(0, 2), GopHeader::predicted(0, 1, 0));
+    let (i2, one) = (GopHeader::intra(0, 2), all(1, 0).0);
     vec![
         plan(2, (1, 1), &[20, 50, 100], true, 20, &[(p3, &places3)]),
         plan(3, (2, 2), &[30, 100], false, 40, &[(b1, &places5), (second(p3), &places3)]),
@@ -46,7 +45,6 @@ fn scenes_by_dice_decode_to_the_frames_of_the_reference_at_every_operating_point
     }
 }
 
-// covers: SS-DG-007
 #[test]
 fn digests_change_nothing_but_what_is_refused() {
     let scene = plans()[3].scene();

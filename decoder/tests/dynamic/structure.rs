@@ -124,7 +124,11 @@ fn frame_headers_stand_in_the_layers_and_in_the_order_of_the_structure() {
             of("transform", "UNDEFINED", 1).script(|s| s.put(FrameHeader, 1, 1, [9])),
         ],
     );
-    // No first frame: it is missed at the unit that comes in its place.
+}
+
+// covers: SS-BS-010
+#[test]
+fn a_first_frame_that_is_absent_is_missed_at_the_unit_in_its_place() {
     for (unit_type, n) in [(Header, 1), (Index, 0), (End, 0)] {
         let mut script = large().script();
         let (from, to) = (script.find(FrameHeader, 0), script.find(Header, 1));

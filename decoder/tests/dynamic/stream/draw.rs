@@ -41,15 +41,16 @@ impl Plan {
     pub(crate) fn sequence(&self) -> SequenceParameters {
         let mut refinement_percent = [0; 10];
         refinement_percent[..self.percents.len()].copy_from_slice(&self.percents);
+        // Axes that need not be sorted, and a threshold that is not in use.
+        let loose = self.seed.is_multiple_of(3);
         SequenceParameters {
             sh_degree: self.sh.into(),
             spatial_layer_count: self.layers.0,
             temporal_layer_count: self.layers.1,
             refinement_count: self.percents.len() as u8,
             refinement_percent,
-            // Axes that need not be sorted, and a threshold that is not in use.
-            sequence_flags: SequenceParameters::flags(self.seed % 3 > 0, false),
-            rotation_threshold: [12, 8, if self.seed % 3 > 0 { 4 } else { 0 }],
+            sequence_flags: SequenceParameters::flags(!loose, false),
+            rotation_threshold: [12, 8, if loose { 0 } else { 4 }],
             frame_count: self.gops.iter().map(|(header, _)| header.gop_frame_count).sum(),
             ..sample::sequence()
         }

@@ -133,9 +133,9 @@ pub(crate) fn reconstructed(
     let coarser = |&&threshold: &&u8| threshold > 0 && d < i64::from(threshold);
     let c = rules.sequence.rotation_threshold.iter().filter(coarser).count();
     let predicted = predict(Attribute::Rotation, &splat);
-    for k in 0..3 {
+    for (k, predicted) in predicted.into_iter().enumerate() {
         let value = sixteen_bits(v.rotation[k])?;
-        let sum = predicted[k] + (value << (c + usize::from(shift[2]) + 6));
+        let sum = predicted + (value << (c + usize::from(shift[2]) + 6));
         splat.rotation_fine[k] = within(sum, -2_097_088, 2_097_088)?;
     }
     let dc: Vec<i64> = v.dc.iter().map(|value| value << shift[3]).collect();

@@ -97,7 +97,7 @@ pub(crate) fn bilateral(
             f += squares(&own.dc.map(|dc| round(dc, 6)), &theirs.dc.map(|dc| round(dc, 6)));
         }
         let xs = neighbour.d2 * i64::from(header.bilateral_spatial) / (last + 1);
-        let xf = (f * i64::from(header.bilateral_feature) >> 6).min(255);
+        let xf = ((f * i64::from(header.bilateral_feature)) >> 6).min(255);
         EXP[(xs + xf).min(255) as usize]
     };
     let weights: Vec<i64> = near.iter().map(weight).collect();

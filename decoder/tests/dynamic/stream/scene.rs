@@ -108,7 +108,7 @@ impl Gop {
     /// A place that many levels divide is of a low layer.
     pub(crate) fn layer(&self, place: u32) -> u8 {
         let depth = self.header.temporal_depth;
-        let divides = |&level: &u8| place % (1 << (depth - level)) == 0;
+        let divides = |&level: &u8| place.is_multiple_of(1 << (depth - level));
         if self.is_predicted() { (0..=depth).find(divides).unwrap() } else { 0 }
     }
 
