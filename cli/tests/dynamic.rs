@@ -1,6 +1,5 @@
 //! Streams of profile Dynamic: layers, predicted frames, operating points, losses, cuts.
-#![allow(clippy::unwrap_used, reason = "helpers of tests panic as tests do")]
-
+#![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
 mod common;
 

@@ -137,11 +137,11 @@ pub(crate) fn output(text: &mut String, bytes: &[u8]) {
     let mut row = |name: &str, integer: String, value: f32| {
         writeln!(text, "| {name} | {integer} | {value} (`{:08x}`) |", value.to_bits()).unwrap();
     };
-    for axis in 0..3 {
-        row(&format!("position [{axis}]"), position[axis].to_string(), gaussians.position()[axis][i]);
+    for (axis, (integer, plane)) in position.iter().zip(gaussians.position()).enumerate() {
+        row(&format!("position [{axis}]"), integer.to_string(), plane[i]);
     }
-    for k in 0..3 {
-        row(&format!("log_scale [{k}]"), signed[k].to_string(), gaussians.log_scale()[k][i]);
+    for (k, (integer, plane)) in signed.iter().zip(gaussians.log_scale()).enumerate() {
+        row(&format!("log_scale [{k}]"), integer.to_string(), plane[i]);
     }
     row("opacity", signed[3].to_string(), gaussians.opacity_logit()[i]);
     for (k, name) in ["w", "x", "y", "z"].into_iter().enumerate() {

@@ -133,7 +133,7 @@ impl Case<'_> {
         let header = &self.step.header;
         let last = self.near.last().unwrap().distance + 1;
         let xs = self.near.iter().map(|near| near.distance * u64::from(header.bilateral_spatial) / last);
-        let xf = self.features.iter().map(|f| (f * u64::from(header.bilateral_feature) >> 6).min(255));
+        let xf = self.features.iter().map(|f| ((f * u64::from(header.bilateral_feature)) >> 6).min(255));
         let (f, xs, xf) = (list(&self.features), list(xs), list(xf));
         writeln!(text, "| {name} | {f} | {xs} | {xf} | {} |", list(self.weights())).unwrap();
     }
