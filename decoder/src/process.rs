@@ -1,21 +1,22 @@
 //! Clause 7.1: the state of a decoder and what each unit does to it.
 
-use crate::frame::QuantizedFrame;
 use crate::gop::Gop;
 use crate::operating_point::{OperatingPoint, Tally};
 use layered::{LayeredFrame, References};
 use refined::RefinedFrame;
-use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{
-    EndOfStream, FileHeader, FrameHeader, FrameType, GopHeader, IndexEntry, IndexHeader, PlaceInGop, Profile,
-    SequenceParameters, Table, UnitHeader, UnitType,
+    FileHeader, FrameHeader, GopHeader, PlaceInGop, Profile, SequenceParameters, Table, UnitHeader, UnitType,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
 
 mod assembly;
+mod decoded;
 mod layered;
+mod lists;
 mod refined;
+
+pub use decoded::{Compensation, DecodedFrame};
 
 /// How to decode.
 #[derive(Debug, Clone, Copy)]
@@ -37,86 +38,6 @@ impl Default for Options {
     fn default() -> Self {
         let operating_point = OperatingPoint::ALL;
         Self { limits: Limits::default(), verify: true, operating_point, tolerant: false, subset: false }
-    }
-}
-
-/// One frame as far as its units were there.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DecodedFrame {
-    /// Display index.
-    pub number: u32,
-    /// How it is coded.
-    pub frame_type: FrameType,
-    /// The integer planes that are shown.
-    pub planes: QuantizedFrame,
-    /// Refinement units decoded; in an intra frame with spatial layers, those of the layer shown.
-    pub refinements: u8,
-    /// Spatial layer shown.
-    pub spatial_layer: u8,
-    /// Gaussians at the end of `planes` that are carried over from the intra frame (7.18).
-    pub carried: usize,
-    /// The frame that is shown in place of this one, of which nothing could be decoded (7.20.3).
-    pub frozen: Option<u32>,
-    /// Digest of the decoded planes, clause 7.9; none if it was not asked for, or nothing was decoded.
-    pub digest: Option<u64>,
-    /// Digest of the carried planes, clause 7.18, under the same conditions.
-    pub carried_digest: Option<u64>,
-    /// What is added before output.
-    pub compensation: Compensation,
-    /// Bytes of the frame's units that were decoded, headers included.
-    pub bytes: u64,
-    /// Why the refinement after the last decoded one was lost, if it was.
-    pub lost: Option<Error>,
-}
-
-/// Clause 7.18: what fills the holes that missing refinements leave.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Compensation {
-    /// Added to each log-scale, steps.
-    pub log_scale: i8,
-    /// Added to the opacity, steps.
-    pub opacity: i8,
-    /// Which Gaussians, from the first on; those without a flag stay as they are.
-    pub applies: Vec<bool>,
-}
-
-impl DecodedFrame {
-    /// A frame of which nothing is there.
-    fn empty(number: u32, frame_type: FrameType) -> Self {
-        Self {
-            number,
-            frame_type,
-            planes: QuantizedFrame::default(),
-            refinements: 0,
-            spatial_layer: 0,
-            carried: 0,
-            frozen: None,
-            digest: None,
-            carried_digest: None,
-            compensation: Compensation::default(),
-            bytes: 0,
-            lost: None,
-        }
-    }
-
-    /// The planes that clause 7.10 makes output of: compensated.
-    pub fn into_shown(self) -> QuantizedFrame {
-        let Self { mut planes, compensation, .. } = self;
-        compensation.apply(&mut planes);
-        planes
-    }
-}
-
-impl Compensation {
-    fn apply(&self, planes: &mut QuantizedFrame) {
-        let range = crate::attribute::ATTRIBUTE_RANGE;
-        let shift = |plane: &mut Vec<i32>, by: i8| {
-            for (value, _) in plane.iter_mut().zip(&self.applies).filter(|(_, applies)| **applies) {
-                *value = value.wrapping_add(by.into()).clamp(*range.start(), *range.end());
-            }
-        };
-        planes.log_scale.iter_mut().for_each(|plane| shift(plane, self.log_scale));
-        shift(&mut planes.opacity, self.opacity);
     }
 }
 
@@ -501,62 +422,6 @@ impl<'a> Decoder<'a> {
         if place.reference.is_some() {
             let top = sequence.spatial_layer_count.wrapping_sub(1);
             same(at("spatial_layer"), "7.13", "spatial_layer", unit.header.spatial_layer, top)?;
-        }
-        Ok(())
-    }
-
-    /// Whether everything from the start of the stream on has been decoded.
-    fn is_whole(&self) -> bool {
-        !self.starts_inside && !self.has_lost_any && !self.has_passed_over
-    }
-
-    fn operating_points(&mut self, unit: &Unit<'a>) -> Result<()> {
-        self.close_gop(unit.at)?;
-        let points = OperatingPoints::parse(unit.payload, unit.payload_at)?;
-        if self.is_whole() {
-            self.tally.check(&points, unit.payload_at)?;
-        }
-        self.listed = true;
-        Ok(())
-    }
-
-    fn index(&mut self, unit: &Unit<'a>) -> Result<()> {
-        self.close_gop(unit.at)?;
-        if !self.starts_inside {
-            let (header, _) = IndexHeader::parse(unit.payload, unit.payload_at)?;
-            let gops = u32::try_from(self.gops.len()).unwrap_or(u32::MAX);
-            same(unit.payload_at, "6.10", "entry_count", header.entry_count, gops)?;
-        }
-        let index = Index::parse(unit.payload, unit.payload_at)?;
-        let mut at = after(unit.payload_at, IndexHeader::SIZE);
-        for (entry, &(frame, offset)) in index.entries.iter().zip(&self.gops) {
-            if self.starts_inside {
-                break;
-            }
-            same(at, "6.10", "frame", entry.frame, frame)?;
-            same(element_at(&IndexEntry::TABLE, at, "offset"), "6.10", "offset", entry.offset, offset)?;
-            at = after(at, IndexEntry::SIZE);
-        }
-        self.index_offset = Some(unit.at);
-        Ok(())
-    }
-
-    fn end(&mut self, unit: &Unit<'a>) -> Result<()> {
-        self.close_gop(unit.at)?;
-        let end = EndOfStream::parse_payload(unit.payload, unit.payload_at)?;
-        let expected = EndOfStream {
-            frame_count: self.frame_headers,
-            unit_count: self.units,
-            index_offset: self.index_offset.unwrap_or(0),
-        };
-        self.ended = true;
-        if self.starts_inside {
-            return Ok(());
-        }
-        end.validate_against(unit.payload_at, &expected)?;
-        let announced = self.sequence().map_or(0, |sequence| sequence.frame_count);
-        if announced != 0 {
-            same(unit.payload_at, "6.4", "frame_count", self.frames, announced)?;
         }
         Ok(())
     }
