@@ -109,7 +109,6 @@ fn intra_frames_in_layers_are_within_half_a_step_of_the_source() {
 }
 
 #[test]
-#[ignore = "colours of predicted Gaussians are rounded before the prediction and after it: up to a whole step"]
 fn predicted_gaussians_are_within_half_a_step_of_the_source() {
     let frames = scene(300, 1, 1, Tracking::Tracked);
     let steps = Steps { sh: 0.02, ..quick().steps };
@@ -164,7 +163,7 @@ fn the_last_point_of_the_lattice_is_reached_through_every_number_of_layers() {
 }
 
 #[test]
-fn predicted_frames_are_within_a_step_of_the_source() {
+fn predicted_frames_are_within_three_quarters_of_a_step_of_the_source() {
     let steps = Steps { sh: 0.02, ..quick().steps };
     let tools = Tools { coarse_tail: false, ..Tools::default() };
     for tracking in [Tracking::Tracked, Tracking::Untracked] {
@@ -203,8 +202,7 @@ fn settings() -> impl Strategy<Value = Settings> {
             survivors,
             ..Tools::default()
         });
-    // Two layers at most: see the test of the last point of the lattice.
-    (structure, 1_u8..=2, sh, refinements, predictors, tools, preset, 1_u32..6).prop_map(
+    (structure, 1_u8..=4, sh, refinements, predictors, tools, preset, 1_u32..6).prop_map(
         move |(structure, spatial_layers, sh, refinements, predictors, tools, preset, gop)| Settings {
             structure,
             spatial_layers: if structure == Structure::Intra {
@@ -224,20 +222,17 @@ fn settings() -> impl Strategy<Value = Settings> {
     )
 }
 
-/// Frames that continue each other more or less: rows cut off, and every value moved. The first frame has a size, so
-/// that nothing moves by more than a residual can say.
+/// Frames that continue each other more or less: rows cut off, and every value moved. Where the first has no size, the
+/// lattice is as fine as can be.
 fn frames() -> impl Strategy<Value = Vec<GaussianFrame>> {
     let number = prop_oneof![Just(0.0_f32), Just(1.0), -1.0..1.0_f32, -8.0..8.0_f32];
     let numbers = prop::collection::vec(number, 1..300);
     let counts = prop_oneof![Just(0_usize), Just(1), Just(2), Just(3), Just(65), 100..200_usize];
     let change = prop_oneof![Just(0.0_f32), Just(0.01), Just(0.3), -5.0..5.0_f32];
-    (numbers, prop::collection::vec((counts, change), 1..4), 0_u8..=3).prop_map(
+    (numbers, prop::collection::vec((counts, change), 1..5), 0_u8..=3).prop_map(
         |(numbers, changes, degree)| {
-            let spread = (0..31).map(|number| number as f32 / 2.0 - 7.5);
-            let numbers: Vec<f32> = spread.chain(numbers).collect();
             let moved = |change: f32| numbers.iter().map(|number| number + change).collect::<Vec<_>>();
-            let frames = [(100, 0.0)].into_iter().chain(changes);
-            frames.map(|(count, change)| frame_of(&moved(change), count, degree)).collect()
+            changes.iter().map(|(count, change)| frame_of(&moved(*change), *count, degree)).collect()
         },
     )
 }

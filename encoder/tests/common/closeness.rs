@@ -21,9 +21,8 @@ pub(crate) struct Bounds {
 impl Bounds {
     /// Of an intra frame: half a step.
     pub(crate) const INTRA: Self = Self { value: 0.5, colour: 0.5, place: 0.5, sh: true };
-    /// Of a predicted frame: the encoder leaves up to three quarters of a step. Colours of new Gaussians are rounded
-    /// before they are predicted and after it.
-    pub(crate) const PREDICTED: Self = Self { value: 0.75, colour: 1.0, place: 1.25, sh: true };
+    /// Of a predicted frame: the encoder leaves up to three quarters of a step.
+    pub(crate) const PREDICTED: Self = Self { value: 0.75, colour: 0.75, place: 1.25, sh: true };
 }
 
 /// What f32 rounds on the way, steps.
