@@ -170,7 +170,9 @@ FAULTS = [
     ("book-of-other-rank", "MISMATCH", "fixed", lambda u, w: vq(u, w) and wider(u, w) is not None,
      place_of("codebook_ids", 0, wider)),
     ("digest", "DIGEST", "fixed", always, element("refinement_digest", lambda u, w: u.refinement_digest ^ 1)),
-    ("carried-digest", "DIGEST", "fixed", always, element("carried_digest", lambda u, w: u.carried_digest ^ 2 ** 63)),
+    # SS-DG-007: the unit at which the frame is shown.
+    ("carried-digest", "DIGEST", "fixed", lambda u, w: not w.frame.intra and w.r == w.seq.refinement_count - 1,
+     element("carried_digest", lambda u, w: u.carried_digest ^ 2 ** 63)),
     ("home-too-large", "MISMATCH", "size", lambda size, w: not w.frame.intra and w.r == w.seq.refinement_count - 1,
      lambda size, w: size + 1),
     ("share", "MISMATCH", "size", lambda size, w: w.frame.intra and w.s == w.seq.top
