@@ -108,7 +108,7 @@ fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
 
 /// A whole number in a cell.
 fn count(row: &BTreeMap<String, String>, name: &str) -> u64 {
-    row[name].parse().expect("a count")
+    row[name].parse().unwrap_or_else(|_| panic!("{name} is '{}' in {row:?}", row[name]))
 }
 
 #[test]

@@ -48,7 +48,7 @@ pub(super) fn rows(
     };
     let predicted = |predictors| Settings { predictors, ..settings.clone() };
     let variants = [
-        ("everything, predictors by bits", predicted(PredictorChoice::Bits)),
+        ("everything", predicted(PredictorChoice::Bits)),
         ("without cell-motion", without(ToolName::CellMotion)),
         ("without survivors", without(ToolName::Survivors)),
         ("predictors none", predicted(PredictorChoice::None)),
