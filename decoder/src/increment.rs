@@ -1,7 +1,7 @@
 //! Increments: clauses 7.14 to 7.17. Entropy-coded [values](values) in, a [home](crate::home) out.
 //!
-//! [`values::decode_values`] parses a unit without knowing any other frame; [`apply`] then changes the parents and
-//! adds the new Gaussians. The encoder calls [`apply`] with the values it has chosen.
+//! [`values::PreparedIncrement::decode`] parses a unit without knowing any other frame; [`apply`] then changes the
+//! parents and adds the new Gaussians. The encoder calls [`apply`] with the values it has chosen.
 
 pub mod prediction;
 pub mod residual;
