@@ -4,7 +4,7 @@ use crate::crafted::expect::decode_with;
 use crate::crafted::scene::{Gaussian, Shape};
 use crate::stream::cells::Cell;
 use crate::stream::sample::{frame, gaussian, gop, unit};
-use crate::stream::scene::{Scene, Unit, plain_header};
+use crate::stream::scene::{Scene, Unit};
 use splatstream_decoder::process::Options;
 use splatstream_format::entropy::layout::{Attribute, Layout, PlaneInfo, Section, ShCoding};
 use splatstream_format::entropy::model::{ContextAxis, Source};
@@ -31,7 +31,7 @@ fn scene(sh_mode: u8) -> Scene {
             sh_mode,
             vq_stage_count: stages.0,
             codebook_ids: stages.1,
-            ..plain_header()
+            ..IncrementHeader::PLAIN
         },
         cells: (0..40).map(cell).collect(),
         modes: (0..70).map(|place| [0, 2, 1, 3, 4][place % 5]).collect(),

@@ -5,7 +5,7 @@ use crate::crafted::scene::Gaussian;
 use crate::stream::draw::{codebooks, morton};
 use crate::stream::expect::{assert_decodes, point};
 use crate::stream::sample::{frame, gop};
-use crate::stream::scene::{Scene, Unit, plain_header};
+use crate::stream::scene::{Scene, Unit};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream_inside;
 use splatstream_format::syntax::{GopHeader, IncrementHeader, UnitType};
@@ -23,7 +23,11 @@ fn one(x: i64, value: i64) -> Gaussian {
 }
 
 fn compensated(log_scale: i8, opacity: i8) -> IncrementHeader {
-    IncrementHeader { compensation_log_scale: log_scale, compensation_opacity: opacity, ..plain_header() }
+    IncrementHeader {
+        compensation_log_scale: log_scale,
+        compensation_opacity: opacity,
+        ..IncrementHeader::PLAIN
+    }
 }
 
 /// Three homes of one Gaussian; a frame that adds one to each of its homes.

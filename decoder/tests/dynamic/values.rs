@@ -5,7 +5,7 @@ use crate::stream::cells::Cell;
 use crate::stream::draw::transforms;
 use crate::stream::expect::{assert_decodes, assert_refused, confined};
 use crate::stream::sample::{frame, gaussian, gop, small, unit};
-use crate::stream::scene::{Scene, Unit, plain_header};
+use crate::stream::scene::{Scene, Unit};
 use splatstream_decoder::process::Options;
 use splatstream_format::ErrorKind;
 use splatstream_format::entropy::layout::Section;
@@ -80,7 +80,12 @@ fn wide() -> Scene {
     let cell = |code| Cell { code, translation: [3, -1, 2], ..Cell::default() };
     let coloured = |number| crate::crafted::scene::Gaussian { sh: vec![1, 2], ..gaussian(30, number) };
     let unit = Unit {
-        header: IncrementHeader { cell_log2: 2, predictor_block_log2: 0, sh_mode: 1, ..plain_header() },
+        header: IncrementHeader {
+            cell_log2: 2,
+            predictor_block_log2: 0,
+            sh_mode: 1,
+            ..IncrementHeader::PLAIN
+        },
         cells: (0..8).map(cell).collect(),
         modes: vec![1, 1, 2, 2, 2, 4, 0, 0, 0, 0],
         moves: vec![[1, 0, 0]; 2],

@@ -22,7 +22,7 @@ use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR};
 const RUN_LOG2: u8 = 6;
 
 /// Neighbours of a prediction.
-const NEIGHBOURS: u8 = 8;
+pub(super) const NEIGHBOURS: u8 = 8;
 
 /// Weights of the bilateral predictor: e^-1 at the last neighbour, and at 8 squared steps of attribute difference.
 const SPATIAL: u8 = 32;

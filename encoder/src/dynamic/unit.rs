@@ -1,5 +1,6 @@
 //! Codes one increment: values chosen elsewhere are applied as a decoder applies them, then entropy coded.
 
+use super::predictors::NEIGHBOURS;
 use crate::error::Error;
 use crate::section::{SectionPlan, code_section};
 use splatstream_decoder::colour::Colour;
@@ -10,7 +11,7 @@ use splatstream_decoder::increment::{Applied, Situation, Unit, apply};
 use splatstream_decoder::layout::{Layout, Section, ShCoding};
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{SectionBytes, write_increment};
-use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR, SequenceParameters, ShHeader, ShMode};
+use splatstream_format::syntax::{IncrementHeader, SequenceParameters, ShHeader, ShMode};
 
 /// What the units of a frame have in common.
 #[derive(Clone, Copy)]
@@ -33,27 +34,13 @@ pub(crate) struct Draft {
 impl UnitCoder<'_> {
     /// A header without counts and digests.
     pub(crate) fn blank(&self) -> IncrementHeader {
+        let ShHeader { sh_mode, vq_stage_count, codebook_ids } = self.sh;
         IncrementHeader {
-            refinement_digest: 0,
-            carried_digest: 0,
-            parent_count: 0,
-            cell_count: 0,
-            move_count: 0,
-            update_count: 0,
-            remove_count: 0,
-            new_count: 0,
-            position_shift: 0,
-            attribute_shift: [0; 5],
-            cell_log2: 0,
-            predictor_block_log2: NO_PREDICTOR,
-            neighbour_count: 8,
-            bilateral_spatial: 0,
-            bilateral_feature: 0,
-            sh_mode: self.sh.sh_mode,
-            vq_stage_count: self.sh.vq_stage_count,
-            codebook_ids: self.sh.codebook_ids,
-            compensation_log_scale: 0,
-            compensation_opacity: 0,
+            neighbour_count: NEIGHBOURS,
+            sh_mode,
+            vq_stage_count,
+            codebook_ids,
+            ..IncrementHeader::PLAIN
         }
     }
 

@@ -1,6 +1,6 @@
 //! 5.14 increment: what one refinement of one layer changes in its frame, and adds to it.
 
-use super::{SequenceParameters, ShHeader, decode, encode, table};
+use super::{NO_CODEBOOK, SequenceParameters, ShHeader, ShMode, decode, encode, table};
 use crate::entropy::layout::Section;
 use crate::{Limits, Result};
 
@@ -61,6 +61,30 @@ table! {
 }
 
 impl IncrementHeader {
+    /// Of a unit that changes and adds nothing: no predictors, no shifts, no spherical harmonics.
+    pub const PLAIN: Self = Self {
+        refinement_digest: 0,
+        carried_digest: 0,
+        parent_count: 0,
+        cell_count: 0,
+        move_count: 0,
+        update_count: 0,
+        remove_count: 0,
+        new_count: 0,
+        position_shift: 0,
+        attribute_shift: [0; 5],
+        cell_log2: 0,
+        predictor_block_log2: NO_PREDICTOR,
+        neighbour_count: 1,
+        bilateral_spatial: 0,
+        bilateral_feature: 0,
+        sh_mode: ShMode::None.code(),
+        vq_stage_count: 0,
+        codebook_ids: [NO_CODEBOOK; 4],
+        compensation_log_scale: 0,
+        compensation_opacity: 0,
+    };
+
     /// How the spherical harmonics are coded.
     pub const fn sh(&self) -> ShHeader {
         let Self { sh_mode, vq_stage_count, codebook_ids, .. } = *self;

@@ -3,7 +3,7 @@
 use super::cells::Cell;
 use super::frames::{Known, Work, evaluate};
 use super::gaussian::{Rules, Splat, moved};
-use super::scene::{Frame, Gop, Scene, Unit, plain_header};
+use super::scene::{Frame, Gop, Scene, Unit};
 use crate::crafted::sample::{self, Dice};
 use crate::crafted::scene::{Gaussian, codebook, diagonal};
 use splatstream_format::payload::{Codebook, Transform};
@@ -217,7 +217,7 @@ impl Drawer<'_> {
             codebook_ids,
             compensation_log_scale: self.dice.within(-9, 9) as i8,
             compensation_opacity: self.dice.within(-9, 9) as i8,
-            ..plain_header()
+            ..IncrementHeader::PLAIN
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::cells::Cell;
 use super::draw::{Plan, codebooks, morton, transforms};
-use super::scene::{Frame, Gop, Scene, Unit, plain_header};
+use super::scene::{Frame, Gop, Scene, Unit};
 use crate::crafted::sample;
 use crate::crafted::scene::Gaussian;
 use splatstream_format::syntax::{GopHeader, IncrementHeader, SequenceParameters};
@@ -29,7 +29,7 @@ pub(crate) fn placed(places: &[[i64; 3]]) -> Vec<Gaussian> {
 
 /// A header with a predictor for each Gaussian.
 pub(crate) fn predicting(neighbour_count: u8) -> IncrementHeader {
-    IncrementHeader { predictor_block_log2: 0, neighbour_count, ..plain_header() }
+    IncrementHeader { predictor_block_log2: 0, neighbour_count, ..IncrementHeader::PLAIN }
 }
 
 /// A frame with the sh transform.
@@ -65,7 +65,7 @@ pub(crate) fn small() -> Scene {
             cell_log2: 2,
             predictor_block_log2: 1,
             neighbour_count: 2,
-            ..plain_header()
+            ..IncrementHeader::PLAIN
         },
         cells: vec![
             Cell { code: 0, stale: 0, translation: [8, 9, 10], turn: [100, -200, 300] },

@@ -68,32 +68,6 @@ pub(crate) struct Scene {
 /// The models in force for a unit, SS-PM-010.
 pub(crate) type InForce = BTreeMap<Section, (Layout, Vec<PlaneModel>)>;
 
-/// A header that asks for nothing: no predictors, no SH, no shifts.
-pub(crate) fn plain_header() -> IncrementHeader {
-    IncrementHeader {
-        refinement_digest: 0,
-        carried_digest: 0,
-        parent_count: 0,
-        cell_count: 0,
-        move_count: 0,
-        update_count: 0,
-        remove_count: 0,
-        new_count: 0,
-        position_shift: 0,
-        attribute_shift: [0; 5],
-        cell_log2: 0,
-        predictor_block_log2: 255,
-        neighbour_count: 1,
-        bilateral_spatial: 0,
-        bilateral_feature: 0,
-        sh_mode: 0,
-        vq_stage_count: 0,
-        codebook_ids: [255; 4],
-        compensation_log_scale: 0,
-        compensation_opacity: 0,
-    }
-}
-
 impl Gop {
     /// The place of the frame that a frame refers to, by the table of 7.13.1: the nearest earlier one of a lower
     /// layer, in layer 0 of that layer.
@@ -139,7 +113,7 @@ impl Default for Unit {
         Self {
             spatial: 0,
             refinement: 0,
-            header: plain_header(),
+            header: IncrementHeader::PLAIN,
             cells: Vec::new(),
             modes: Vec::new(),
             moves: Vec::new(),

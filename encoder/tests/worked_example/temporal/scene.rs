@@ -201,8 +201,6 @@ impl Plan {
     fn header(&self) -> IncrementHeader {
         let count = |holds: fn(i32) -> bool| self.modes.iter().filter(|&&mode| holds(mode)).count() as u32;
         IncrementHeader {
-            refinement_digest: 0,
-            carried_digest: 0,
             parent_count: self.modes.len() as u32,
             cell_count: self.cells.len() as u32,
             move_count: count(|mode| mode & 1 != 0),
@@ -216,11 +214,9 @@ impl Plan {
             neighbour_count: 3,
             bilateral_spatial: 32,
             bilateral_feature: 16,
-            sh_mode: 0,
-            vq_stage_count: 0,
-            codebook_ids: [255; 4],
             compensation_log_scale: self.compensation.0,
             compensation_opacity: self.compensation.1,
+            ..IncrementHeader::PLAIN
         }
     }
 
