@@ -31,6 +31,16 @@ def one_of(record, element, allowed, clause, code):
     require(getattr(record, element) in allowed, code, clause, record.at(element))
 
 
+def sh_elements(record, clause):
+    """sh_mode, vq_stage_count and codebook_ids, which refinements and increments share."""
+    one_of(record, "sh_mode", (0, 1, 2), clause, "RESERVED")
+    low, high = (1, c.MAX_STAGES) if record.sh_mode == 2 else (0, 0)
+    in_range(record, "vq_stage_count", low, high, clause)
+    for place, identifier in enumerate(record.codebook_ids):
+        good = identifier <= c.MAX_ID if place < record.vq_stage_count else identifier == c.NONE_ID
+        require(good, "OUT_OF_RANGE", clause, record.at("codebook_ids") + place)
+
+
 def element_at_end(table, start, end):
     """Offset of the element of a record in which the data end."""
     for _, kind, places, _ in table:
@@ -228,14 +238,7 @@ def parse_refinement(reader, seq, frame, expected_count, sh_transform, codebooks
     q = "6.9"
     in_range(u, "position_shift", 0, seq.position_bits - 1, q)
     in_range(u, "lanes_log2", 0, 5, q)
-    one_of(u, "sh_mode", (0, 1, 2), q, "RESERVED")
-    if u.sh_mode == 2:
-        in_range(u, "vq_stage_count", 1, c.MAX_STAGES, q)
-    else:
-        in_range(u, "vq_stage_count", 0, 0, q)
-    for place, identifier in enumerate(u.codebook_ids):
-        good = identifier <= c.MAX_ID if place < u.vq_stage_count else identifier == c.NONE_ID
-        require(good, "OUT_OF_RANGE", q, u.at("codebook_ids") + place)
+    sh_elements(u, q)
     # relations to other records
     require(u.gaussian_count == expected_count, "MISMATCH", "7.2", u.at("gaussian_count"))
     if sh_transform is None:

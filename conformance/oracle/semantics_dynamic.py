@@ -4,7 +4,7 @@ import constants as c
 import syntax
 from conventions import ceil_div
 from errors import require
-from semantics import in_range, one_of, reserved_zero
+from semantics import in_range, one_of, reserved_zero, sh_elements
 from syntax import Record
 
 # SS-IN-007
@@ -39,14 +39,7 @@ def parse_increment(reader, unit, frame, context, level, parent_count):
     in_range(u, "cell_log2", 0, seq.position_bits, q)
     one_of(u, "predictor_block_log2", tuple(range(17)) + (c.NONE_ID,), q, "OUT_OF_RANGE")
     in_range(u, "neighbour_count", 1, c.MAX_NEIGHBOURS, q)
-    one_of(u, "sh_mode", (0, 1, 2), q, "RESERVED")
-    if u.sh_mode == 2:
-        in_range(u, "vq_stage_count", 1, c.MAX_STAGES, q)
-    else:
-        in_range(u, "vq_stage_count", 0, 0, q)
-    for place, identifier in enumerate(u.codebook_ids):
-        good = identifier <= c.MAX_ID if place < u.vq_stage_count else identifier == c.NONE_ID
-        require(good, "OUT_OF_RANGE", q, u.at("codebook_ids") + place)
+    sh_elements(u, q)
     # limits
     in_range(u, "parent_count", 0, c.MAX_GAUSSIANS[level], "A.2", "OVER_LIMIT")
     in_range(u, "cell_count", 0, c.MAX_CELLS, "A.2", "OVER_LIMIT")
