@@ -35,7 +35,7 @@ use splatstream_format::syntax::{
 };
 use splatstream_scene::GaussianFrame;
 use survivors::Survivors;
-use unit::{UnitCoder, sh_header};
+use unit::UnitCoder;
 use wanted::{ColourTarget, Wanted};
 
 /// Frames of a predicted GOP, at most (6.5).
@@ -353,7 +353,6 @@ impl Dynamic<'_, '_> {
             ShCoding::VectorQuantised { .. } => [whole, residual, None, None],
             _ => [None; 4],
         };
-        let ids: Vec<u8> = books.iter().flatten().map(|book| book.header.codebook_id).collect();
         UnitCoder {
             sequence: &self.sequence,
             colour: Colour {
@@ -362,7 +361,7 @@ impl Dynamic<'_, '_> {
                 mode: coding,
                 codebooks: books,
             },
-            sh: sh_header(coding, &ids),
+            sh: coding.header(books.iter().flatten().map(|book| book.header.codebook_id)),
             plan: SectionPlan {
                 block_log2: self.sequence.block_log2,
                 preset: self.settings.preset,

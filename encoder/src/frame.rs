@@ -15,7 +15,7 @@ use splatstream_format::entropy::model::{PlaneModel, write_models};
 use splatstream_format::entropy::token::Alphabet;
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 use splatstream_format::payload::write_refinement;
-use splatstream_format::syntax::{RefinementHeader, SequenceParameters};
+use splatstream_format::syntax::{RefinementHeader, SequenceParameters, ShHeader};
 
 /// A frame on the lattices, all colour components included, in the order of the source.
 pub(crate) struct CodedFrame {
@@ -41,8 +41,8 @@ pub(crate) struct FrameUnits {
 pub(crate) struct UnitPlan<'a> {
     /// What the decoder will know of each unit; lanes_log2 is set for each unit.
     pub(crate) parameters: UnitParameters<'a>,
-    /// The header common to the units.
-    pub(crate) header: RefinementHeader,
+    /// How SH is coded.
+    pub(crate) sh: ShHeader,
     /// The parameters of the sequence.
     pub(crate) sequence: &'a SequenceParameters,
     /// How much to search.
@@ -247,11 +247,15 @@ fn payload(
     } else {
         write_models(models, &plan.parameters.layout.alphabets(), previous)
     };
+    let ShHeader { sh_mode, vq_stage_count, codebook_ids } = plan.sh;
     let header = RefinementHeader {
         refinement_digest: digest,
         gaussian_count: count as u32,
+        position_shift: plan.parameters.position_shift,
         lanes_log2,
-        ..plan.header
+        sh_mode,
+        vq_stage_count,
+        codebook_ids,
     };
     Ok(write_refinement(&header, plan.sequence, &section, &blocks)?)
 }

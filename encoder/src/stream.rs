@@ -18,8 +18,8 @@ use splatstream_decoder::layout::{Layout, ShCoding};
 use splatstream_decoder::operating_point::Tally;
 use splatstream_format::payload::{Index, Transform};
 use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, NO_CODEBOOK, Profile,
-    RefinementHeader, SequenceParameters, ShMode, TransformKind, UnitHeader, UnitId, UnitType,
+    EndOfStream, FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, Profile, SequenceParameters,
+    TransformKind, UnitHeader, UnitId, UnitType,
 };
 use splatstream_format::unit::{Unit, write_file_header, write_unit};
 use splatstream_scene::GaussianFrame;
@@ -370,7 +370,7 @@ fn write_frame(
                 codebooks: [codebooks.first(), codebooks.get(1), codebooks.get(2), codebooks.get(3)],
             },
         },
-        header: header_of(coding),
+        sh: coding.header(codebooks.iter().map(|book| book.header.codebook_id)),
         sequence,
         preset: settings.preset,
         tools: settings.tools,
@@ -407,27 +407,6 @@ fn coded_frame(
         sh: sh.unwrap_or_default(),
         order,
     })
-}
-
-pub(crate) fn header_of(coding: ShCoding) -> RefinementHeader {
-    let (mode, stages) = match coding {
-        ShCoding::None => (ShMode::None, 0),
-        ShCoding::Coefficients { .. } => (ShMode::Coefficients, 0),
-        ShCoding::VectorQuantised { stages } => (ShMode::VectorQuantised, stages),
-    };
-    let mut codebook_ids = [NO_CODEBOOK; 4];
-    for (id, slot) in (0..stages).zip(&mut codebook_ids) {
-        *slot = id;
-    }
-    RefinementHeader {
-        refinement_digest: 0,
-        gaussian_count: 0,
-        position_shift: 0,
-        lanes_log2: 0,
-        sh_mode: mode.code(),
-        vq_stage_count: stages,
-        codebook_ids,
-    }
 }
 
 pub(crate) fn finish(writer: &mut UnitWriter<'_>, index: Vec<IndexEntry>, frames: u32) -> Result<(), Error> {

@@ -8,10 +8,10 @@ use splatstream_decoder::home::Home;
 use splatstream_decoder::increment::residual::AttributeCoding;
 use splatstream_decoder::increment::values::UnitValues;
 use splatstream_decoder::increment::{Applied, Situation, Unit, apply};
-use splatstream_decoder::layout::{Layout, Section, ShCoding};
+use splatstream_decoder::layout::{Layout, Section};
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{SectionBytes, write_increment};
-use splatstream_format::syntax::{IncrementHeader, SequenceParameters, ShHeader, ShMode};
+use splatstream_format::syntax::{IncrementHeader, SequenceParameters, ShHeader};
 
 /// What the units of a frame have in common.
 #[derive(Clone, Copy)]
@@ -107,18 +107,4 @@ impl UnitCoder<'_> {
     ) -> Result<Vec<u8>, Error> {
         Ok(write_increment(header, self.sequence, sections)?)
     }
-}
-
-/// The elements that say how SH is coded.
-pub(crate) fn sh_header(coding: ShCoding, codebooks: &[u8]) -> ShHeader {
-    let mut codebook_ids = [splatstream_format::syntax::NO_CODEBOOK; 4];
-    for (slot, &id) in codebook_ids.iter_mut().zip(codebooks) {
-        *slot = id;
-    }
-    let (mode, stages) = match coding {
-        ShCoding::None => (ShMode::None, 0),
-        ShCoding::Coefficients { .. } => (ShMode::Coefficients, 0),
-        ShCoding::VectorQuantised { stages } => (ShMode::VectorQuantised, stages),
-    };
-    ShHeader { sh_mode: mode.code(), vq_stage_count: stages, codebook_ids }
 }

@@ -2,7 +2,7 @@
 
 use super::model::{PlaneModel, Source};
 use super::token::Alphabet;
-use crate::syntax::{ShHeader, ShMode};
+use crate::syntax::{NO_CODEBOOK, ShHeader, ShMode};
 use crate::{Error, ErrorKind, Result};
 
 /// What a coded plane belongs to, in coding order.
@@ -146,6 +146,18 @@ impl ShCoding {
             Some(ShMode::VectorQuantised) => Self::VectorQuantised { stages: header.vq_stage_count },
             _ => Self::None,
         }
+    }
+
+    /// What a header says of it, with the identifiers of the codebooks of the stages.
+    pub fn header(self, codebooks: impl IntoIterator<Item = u8>) -> ShHeader {
+        let (mode, vq_stage_count) = match self {
+            Self::None => (ShMode::None, 0),
+            Self::Coefficients { .. } => (ShMode::Coefficients, 0),
+            Self::VectorQuantised { stages } => (ShMode::VectorQuantised, stages),
+        };
+        let mut codebook_ids = [NO_CODEBOOK; 4];
+        codebook_ids.iter_mut().zip(codebooks).for_each(|(slot, id)| *slot = id);
+        ShHeader { sh_mode: mode.code(), vq_stage_count, codebook_ids }
     }
 }
 
