@@ -2,12 +2,12 @@
 //! sections that are right up to their values or not at all, keeps its laws.
 
 use crate::decode::choice;
+use crate::read_back::ReadBack;
 use crate::{LIMITS, laws};
 use arbitrary::{Arbitrary, Unstructured};
 use splatstream_format::arbitrary_stream::dynamic::{ArbitraryIncrement, DynamicGop, DynamicStream};
-use splatstream_format::payload::{Codebook, Increment, OperatingPoints, Transform};
+use splatstream_format::payload::{Codebook, Increment, OperatingPoints};
 use splatstream_format::syntax::{FrameHeader, GopHeader, Profile, SequenceParameters, UnitType};
-use splatstream_format::unit::{Stream, Unit};
 
 /// The input is what the stream is made of.
 pub fn run(data: &[u8]) {
@@ -20,14 +20,9 @@ pub fn run(data: &[u8]) {
 
 /// Unit by unit what was written.
 fn comes_back(stream: &DynamicStream, bytes: &[u8]) {
-    let opened = Stream::open(bytes, &LIMITS).expect("it starts with a file header");
-    assert_eq!((opened.header().level, opened.header().profile()), (stream.level, Profile::Dynamic));
-    let units: Vec<Unit<'_>> = opened.units().collect::<Result<_, _>>().expect("units lie back to back");
-    let mut units = Payloads { units: units.iter() };
-    let unit = units.next(UnitType::SequenceParameters);
-    let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at, Profile::Dynamic);
-    assert_eq!(sequence, Ok(stream.sequence));
-    stream.gops.iter().for_each(|gop| units.gop(gop, &stream.sequence));
+    let start = (Profile::Dynamic, stream.level);
+    let mut units = ReadBack::start(bytes, &LIMITS, start, &stream.sequence);
+    stream.gops.iter().for_each(|made| gop(&mut units, made, &stream.sequence));
     if let Some(points) = &stream.points {
         let unit = units.next(UnitType::OperatingPoints);
         let read = OperatingPoints::parse(unit.payload, unit.payload_at).expect("a list");
@@ -36,54 +31,37 @@ fn comes_back(stream: &DynamicStream, bytes: &[u8]) {
     if stream.has_index {
         units.next(UnitType::Index);
     }
-    units.next(UnitType::End);
-    assert_eq!(units.units.next(), None);
+    units.end();
 }
 
-/// The units of a stream, to be compared with what they were made of.
-struct Payloads<'u, 'a> {
-    units: core::slice::Iter<'u, Unit<'a>>,
+fn gop(units: &mut ReadBack<'_>, made: &DynamicGop, sequence: &SequenceParameters) {
+    let unit = units.next(UnitType::GopHeader);
+    let read = GopHeader::parse_payload(unit.payload, unit.payload_at, Profile::Dynamic);
+    assert_eq!(read, Ok(made.header));
+    units.transforms(&made.transforms, sequence);
+    for frame in &made.frames {
+        for made in &frame.codebooks {
+            let unit = units.next(UnitType::Codebook);
+            let read = Codebook::parse(unit.payload, unit.payload_at, &LIMITS);
+            assert_eq!(read.as_ref(), Ok(&made.codebook));
+            assert_eq!(unit.header.temporal_layer, made.temporal_layer);
+        }
+        let unit = units.next(UnitType::FrameHeader);
+        let read = FrameHeader::parse_payload(unit.payload, unit.payload_at, Profile::Dynamic);
+        assert_eq!(read, Ok(frame.header));
+        frame.increments.iter().for_each(|made| increment(units, made, sequence));
+    }
 }
 
-impl<'u, 'a> Payloads<'u, 'a> {
-    fn next(&mut self, expected: UnitType) -> &'u Unit<'a> {
-        let unit = self.units.next().expect("there are more units");
-        assert_eq!(unit.header.unit_type(), expected);
-        unit
-    }
-
-    fn gop(&mut self, gop: &DynamicGop, sequence: &SequenceParameters) {
-        let unit = self.next(UnitType::GopHeader);
-        let read = GopHeader::parse_payload(unit.payload, unit.payload_at, Profile::Dynamic);
-        assert_eq!(read, Ok(gop.header));
-        for transform in &gop.transforms {
-            let unit = self.next(UnitType::Transform);
-            assert_eq!(Transform::parse(unit.payload, unit.payload_at, sequence).as_ref(), Ok(transform));
-        }
-        for frame in &gop.frames {
-            for made in &frame.codebooks {
-                let unit = self.next(UnitType::Codebook);
-                let read = Codebook::parse(unit.payload, unit.payload_at, &LIMITS);
-                assert_eq!(read.as_ref(), Ok(&made.codebook));
-                assert_eq!(unit.header.temporal_layer, made.temporal_layer);
-            }
-            let unit = self.next(UnitType::FrameHeader);
-            let read = FrameHeader::parse_payload(unit.payload, unit.payload_at, Profile::Dynamic);
-            assert_eq!(read, Ok(frame.header));
-            frame.increments.iter().for_each(|made| self.increment(made, sequence));
-        }
-    }
-
-    fn increment(&mut self, made: &ArbitraryIncrement, sequence: &SequenceParameters) {
-        let unit = self.next(UnitType::Increment);
-        let place = (unit.header.spatial_layer, unit.header.refinement);
-        assert_eq!(place, (made.spatial_layer, made.refinement));
-        let read = Increment::parse(unit.payload, unit.payload_at, sequence, &LIMITS).expect("an increment");
-        assert_eq!((read.header, read.sections.len()), (made.header, made.sections.len()));
-        for (read, made) in read.sections.iter().zip(&made.sections) {
-            assert_eq!((read.lanes_log2, read.model), (made.lanes_log2, made.model.as_slice()));
-            let blocks = read.blocks.iter().map(|(block, _)| *block);
-            assert!(blocks.eq(made.blocks.iter().map(Vec::as_slice)), "blocks come back");
-        }
+fn increment(units: &mut ReadBack<'_>, made: &ArbitraryIncrement, sequence: &SequenceParameters) {
+    let unit = units.next(UnitType::Increment);
+    let place = (unit.header.spatial_layer, unit.header.refinement);
+    assert_eq!(place, (made.spatial_layer, made.refinement));
+    let read = Increment::parse(unit.payload, unit.payload_at, sequence, &LIMITS).expect("an increment");
+    assert_eq!((read.header, read.sections.len()), (made.header, made.sections.len()));
+    for (read, made) in read.sections.iter().zip(&made.sections) {
+        assert_eq!((read.lanes_log2, read.model), (made.lanes_log2, made.model.as_slice()));
+        let blocks = read.blocks.iter().map(|(block, _)| *block);
+        assert!(blocks.eq(made.blocks.iter().map(Vec::as_slice)), "blocks come back");
     }
 }

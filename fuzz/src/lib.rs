@@ -10,6 +10,7 @@ pub mod edits;
 pub mod increments;
 pub mod laws;
 pub mod payload;
+mod read_back;
 pub mod scene;
 pub mod seal;
 pub mod streams;

@@ -1,6 +1,7 @@
 //! Payloads: what is written is read, what is read is written, and any bytes are refused or read.
 
 use crate::LIMITS;
+use crate::read_back::ReadBack;
 use arbitrary::{Arbitrary, Unstructured};
 use splatstream_format::Limits;
 use splatstream_format::arbitrary_stream::{ArbitraryGop, ArbitraryStream, sequence_parameters};
@@ -8,7 +9,6 @@ use splatstream_format::entropy::layout::{Layout, ShCoding};
 use splatstream_format::entropy::model::{read_models, write_models};
 use splatstream_format::payload::{Codebook, Index, Refinement, Transform};
 use splatstream_format::syntax::{Profile, SequenceParameters, UnitType};
-use splatstream_format::unit::{Stream, Unit};
 
 /// Bytes that sequence parameters are made of, for parsers that need some.
 pub const SEQUENCE: usize = 96;
@@ -70,64 +70,39 @@ fn models(data: &[u8]) {
 /// A stream that obeys the syntax is written, and read again unit by unit.
 fn comes_back(stream: &ArbitraryStream) {
     let bytes = stream.to_bytes().expect("a valid stream can be written");
-    let limits = Limits::default();
-    let opened = Stream::open(&bytes, &limits).expect("it starts with a file header");
-    assert_eq!(opened.header().level, stream.level);
-    let units: Vec<Unit<'_>> = opened.units().collect::<Result<_, _>>().expect("units lie back to back");
-    let mut units = Payloads { units: units.iter() };
-    let sequence = units.next(UnitType::SequenceParameters);
-    assert_eq!(
-        SequenceParameters::parse_payload(sequence.payload, sequence.payload_at, Profile::Intra),
-        Ok(stream.sequence)
-    );
-    stream.gops.iter().for_each(|gop| units.gop(gop, &stream.sequence));
+    let start = (Profile::Intra, stream.level);
+    let mut units = ReadBack::start(&bytes, &Limits::default(), start, &stream.sequence);
+    stream.gops.iter().for_each(|made| gop(&mut units, made, &stream.sequence));
     if stream.has_index {
         let index = units.next(UnitType::Index);
         let index = Index::parse(index.payload, index.payload_at).expect("an index");
         assert_eq!(index.entries.len(), stream.gops.len());
     }
-    units.next(UnitType::End);
-    assert_eq!(units.units.next(), None);
+    units.end();
 }
 
-/// The units of a stream, to be compared with what they were made of.
-struct Payloads<'u, 'a> {
-    units: core::slice::Iter<'u, Unit<'a>>,
-}
-
-impl<'u, 'a> Payloads<'u, 'a> {
-    fn next(&mut self, expected: UnitType) -> &'u Unit<'a> {
-        let unit = self.units.next().expect("there are more units");
-        assert_eq!(unit.header.unit_type(), expected);
-        unit
+fn gop(units: &mut ReadBack<'_>, made: &ArbitraryGop, sequence: &SequenceParameters) {
+    units.next(UnitType::GopHeader);
+    if let Some(private) = &made.private {
+        assert_eq!(units.next(UnitType::User(200)).payload, private);
     }
-
-    fn gop(&mut self, gop: &ArbitraryGop, sequence: &SequenceParameters) {
-        self.next(UnitType::GopHeader);
-        if let Some(private) = &gop.private {
-            assert_eq!(self.next(UnitType::User(200)).payload, private);
-        }
-        for transform in &gop.transforms {
-            let unit = self.next(UnitType::Transform);
-            assert_eq!(Transform::parse(unit.payload, unit.payload_at, sequence).as_ref(), Ok(transform));
-        }
-        for codebook in &gop.codebooks {
-            let unit = self.next(UnitType::Codebook);
-            assert_eq!(Codebook::parse(unit.payload, unit.payload_at, &LIMITS).as_ref(), Ok(codebook));
-        }
-        for frame in &gop.frames {
-            assert_eq!(
-                self.next(UnitType::FrameHeader).payload,
-                frame.header.to_bytes().expect("a frame header")
-            );
-            for refinement in &frame.refinements {
-                let unit = self.next(UnitType::Refinement);
-                let read = Refinement::parse(unit.payload, unit.payload_at, sequence, &LIMITS);
-                let read = read.expect("a refinement");
-                assert_eq!((read.header, read.model), (refinement.header, refinement.model.as_slice()));
-                let blocks = read.blocks.iter().map(|(block, _)| *block);
-                assert!(blocks.eq(refinement.blocks.iter().map(Vec::as_slice)), "blocks come back");
-            }
+    units.transforms(&made.transforms, sequence);
+    for codebook in &made.codebooks {
+        let unit = units.next(UnitType::Codebook);
+        assert_eq!(Codebook::parse(unit.payload, unit.payload_at, &LIMITS).as_ref(), Ok(codebook));
+    }
+    for frame in &made.frames {
+        assert_eq!(
+            units.next(UnitType::FrameHeader).payload,
+            frame.header.to_bytes().expect("a frame header")
+        );
+        for refinement in &frame.refinements {
+            let unit = units.next(UnitType::Refinement);
+            let read = Refinement::parse(unit.payload, unit.payload_at, sequence, &LIMITS);
+            let read = read.expect("a refinement");
+            assert_eq!((read.header, read.model), (refinement.header, refinement.model.as_slice()));
+            let blocks = read.blocks.iter().map(|(block, _)| *block);
+            assert!(blocks.eq(refinement.blocks.iter().map(Vec::as_slice)), "blocks come back");
         }
     }
 }
