@@ -3,6 +3,7 @@
 use super::gop_files;
 use super::measure::{Point, Run};
 use super::scene_chart::SceneChart;
+use super::tables::Mode;
 use crate::failure::Failure;
 use crate::numbers::bits_per_gaussian;
 use crate::output_file::OutputFile;
@@ -11,6 +12,10 @@ use std::path::Path;
 
 pub(super) const FIGURES: [&str; 6] =
     ["psnr_db", "psnr_masked_db", "yuv_psnr_db", "ssim", "ssim_masked", "st_lpips"];
+
+/// Columns of a mode of playback, which figures follow.
+pub(super) const MODE: [&str; 10] =
+    ["scene", "mode", "units", "frames", "playback", "percent", "gop_bytes", "mbit_s", "fps", "gaussians"];
 
 /// A file and how it is made.
 type CsvFile = (&'static str, fn(&[SceneChart]) -> Vec<Vec<String>>);
@@ -183,30 +188,24 @@ fn refinements(scenes: &[SceneChart]) -> Vec<Vec<String>> {
 }
 
 fn bandwidth(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let first = [
-        "scene",
-        "mode",
-        "units",
-        "frames",
-        "playback",
-        "percent",
-        "gop_bytes",
-        "mbit_s",
-        "fps",
-        "gaussians",
-    ];
-    let mut rows = vec![headings(&first, &FIGURES)];
+    let mut rows = vec![headings(&MODE, &FIGURES)];
     for scene in scenes {
-        for row in scene.bandwidth_rows() {
-            let mut cells =
-                vec![scene.name.clone(), row.mode, row.units, row.frames, row.playback.to_owned()];
-            cells.extend([row.percent.to_string(), row.gop_bytes.to_string(), cell(Some(row.mbit_s))]);
-            cells.extend([cell(Some(scene.fps)), row.gaussians.to_string()]);
-            cells.extend(figures(&row.figures));
+        for mode in scene.bandwidth_rows() {
+            let mut cells = mode_cells(scene, &mode);
+            cells.extend(figures(&mode.figures));
             rows.push(cells);
         }
     }
     rows
+}
+
+/// The cells of [`MODE`].
+pub(super) fn mode_cells(scene: &SceneChart, mode: &Mode) -> Vec<String> {
+    let mut cells = headings(&[&scene.name, &mode.name, &mode.units, &mode.frames, mode.playback], &[]);
+    cells.push(mode.percent.map(|percent| percent.to_string()).unwrap_or_default());
+    cells.extend([mode.bytes.to_string(), cell(Some(mode.mbit_s)), cell(Some(scene.fps))]);
+    cells.push(mode.gaussians.to_string());
+    cells
 }
 
 fn costs(scenes: &[SceneChart]) -> Vec<Vec<String>> {

@@ -7,7 +7,7 @@ mod tools;
 
 use super::judge::Judge;
 use super::scenes::Scene;
-use super::tables::mbit_per_second;
+use super::tables::{Mode, mbit_per_second};
 use crate::failure::Failure;
 use crate::numbers::bits_per_gaussian;
 use crate::progress::Progress;
@@ -42,31 +42,6 @@ pub(crate) struct Gop {
     pub(crate) levels: Vec<Level>,
     /// What predicted frames take with all tools, and without each.
     pub(crate) tools: Vec<ToolRow>,
-}
-
-/// A way to play the GOP.
-#[derive(Debug, Clone)]
-pub(crate) struct Mode {
-    /// What it is for.
-    pub(crate) name: String,
-    /// The units it takes.
-    pub(crate) units: String,
-    /// Frames that it shows.
-    pub(crate) frames: String,
-    /// How it plays.
-    pub(crate) playback: &'static str,
-    /// Share of the Gaussians of predicted frames, percent; none if there are none.
-    pub(crate) percent: Option<u8>,
-    /// Bytes of the GOP.
-    pub(crate) bytes: u64,
-    /// What the network must carry, Mbit/s.
-    pub(crate) mbit_s: f64,
-    /// Gaussians received for the frames that are shown.
-    pub(crate) gaussians: u64,
-    /// Bits a Gaussian received.
-    pub(crate) bpg: f64,
-    /// Means over the frames that are shown.
-    pub(crate) figures: Comparison,
 }
 
 /// A refinement level.
@@ -195,7 +170,6 @@ fn mode(
         // However few frames are shown, they last as long as the GOP.
         mbit_s: mbit_per_second(bytes, frames, fps),
         gaussians,
-        bpg: bits_per_gaussian(bytes, gaussians),
         figures: shown.figures(|_| true)?,
     })
 }

@@ -1,6 +1,6 @@
 //! The tables of a GOP with predicted frames, as rows of CSV files.
 
-use super::csv_files::{FIGURES, cell, figures, headings};
+use super::csv_files::{FIGURES, MODE, cell, figures, headings, mode_cells};
 use super::scene_chart::SceneChart;
 
 /// Columns of refinement levels that only predicted frames have.
@@ -17,27 +17,11 @@ pub(super) const OF_PREDICTED: [&str; 8] = [
 
 /// Ways to play the GOP.
 pub(super) fn modes(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let first = [
-        "scene",
-        "mode",
-        "units",
-        "frames",
-        "playback",
-        "percent",
-        "gop_bytes",
-        "mbit_s",
-        "fps",
-        "gaussians",
-        "bpg_shown",
-    ];
-    let mut rows = vec![headings(&first, &FIGURES)];
+    let mut rows = vec![headings(&[&MODE[..], &["bpg_shown"]].concat(), &FIGURES)];
     for scene in scenes {
         for mode in scene.gop.iter().flat_map(|gop| &gop.modes) {
-            let names = [&scene.name, &mode.name, &mode.units, &mode.frames, mode.playback];
-            let mut cells = headings(&names, &[]);
-            cells.push(mode.percent.map(|percent| percent.to_string()).unwrap_or_default());
-            cells.extend([mode.bytes.to_string(), cell(Some(mode.mbit_s)), cell(Some(scene.fps))]);
-            cells.extend([mode.gaussians.to_string(), cell(Some(mode.bpg))]);
+            let mut cells = mode_cells(scene, mode);
+            cells.push(cell(Some(mode.bpg())));
             cells.extend(figures(&mode.figures));
             rows.push(cells);
         }

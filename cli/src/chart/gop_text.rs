@@ -52,7 +52,7 @@ fn modes(gop: &Gop) -> String {
             grouped(mode.bytes),
             format!("{:.2}", mode.mbit_s),
             grouped(mode.gaussians),
-            format!("{:.2}", mode.bpg),
+            format!("{:.2}", mode.bpg()),
             figures(&mode.figures),
         ]);
     }

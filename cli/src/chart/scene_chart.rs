@@ -7,7 +7,7 @@ use super::pictures::Pictures;
 use super::scenes::Scene;
 use super::standing::{Standing, curve, standings};
 use super::sweep::Group;
-use super::tables::{BandwidthRow, RefinementRow, bandwidth_rows, mbit_per_second, refinement_rows};
+use super::tables::{Mode, RefinementRow, bandwidth_rows, mbit_per_second, refinement_rows};
 use crate::numbers::bits_per_gaussian;
 use splatstream_render::Camera;
 use splatstream_render::metrics::{Comparison, RatePoint};
@@ -113,7 +113,7 @@ impl SceneChart {
     }
 
     /// Ways to play intra frames.
-    pub(crate) fn bandwidth_rows(&self) -> Vec<BandwidthRow> {
+    pub(crate) fn bandwidth_rows(&self) -> Vec<Mode> {
         self.headline().map_or_else(Vec::new, |run| bandwidth_rows(run, self.fps))
     }
 }

@@ -25,25 +25,32 @@ pub(crate) struct RefinementRow {
 
 /// A mode of playback.
 #[derive(Debug, Clone)]
-pub(crate) struct BandwidthRow {
-    /// What the mode is for.
-    pub(crate) mode: String,
+pub(crate) struct Mode {
+    /// What it is for.
+    pub(crate) name: String,
     /// The units it takes.
     pub(crate) units: String,
     /// Frames that it shows, counted from 0.
     pub(crate) frames: String,
     /// How it plays.
     pub(crate) playback: &'static str,
-    /// Share of the Gaussians, percent.
-    pub(crate) percent: u8,
+    /// Share of the Gaussians, in a GOP with predicted frames of those, percent; none if it shows none of them.
+    pub(crate) percent: Option<u8>,
     /// Bytes of a GOP.
-    pub(crate) gop_bytes: u64,
+    pub(crate) bytes: u64,
     /// What the network must carry, Mbit/s.
     pub(crate) mbit_s: f64,
-    /// Gaussians shown in a GOP.
+    /// Gaussians of a GOP received for the frames that are shown.
     pub(crate) gaussians: u64,
     /// Means over cameras and the frames that are shown.
     pub(crate) figures: Comparison,
+}
+
+impl Mode {
+    /// Bits a Gaussian received.
+    pub(crate) fn bpg(&self) -> f64 {
+        bits_per_gaussian(self.bytes, self.gaussians)
+    }
 }
 
 /// Mbit/s that frames of so many bytes take.
@@ -69,48 +76,48 @@ pub(crate) fn refinement_rows(run: &Run) -> Vec<RefinementRow> {
 }
 
 /// A row for each way to play the stream, least bandwidth first. Layers add rows when a stream has them.
-pub(crate) fn bandwidth_rows(run: &Run, fps: f64) -> Vec<BandwidthRow> {
+pub(crate) fn bandwidth_rows(run: &Run, fps: f64) -> Vec<Mode> {
     let frames = run.points.first().map_or(0, |point| point.frames.len());
     let mut rows = Vec::new();
     if frames > 1 {
         let ends = [run.points.first(), run.points.last()];
-        let modes = ["Startup", "Complete first frame"];
-        let start = |(mode, point): (&str, Option<&Point>)| first_frame(mode, point?, run, frames, fps);
-        rows.extend(modes.into_iter().zip(ends).filter_map(start));
+        let names = ["Startup", "Complete first frame"];
+        let start = |(name, point): (&str, Option<&Point>)| first_frame(name, point?, run, frames, fps);
+        rows.extend(names.into_iter().zip(ends).filter_map(start));
     }
     rows.extend(run.points.iter().map(|point| all_frames(point, run, frames, fps)));
-    rows.sort_by_key(|row| row.gop_bytes);
+    rows.sort_by_key(|row| row.bytes);
     rows
 }
 
 /// The first frame of a GOP alone: what a client needs to show anything.
-fn first_frame(mode: &str, point: &Point, run: &Run, frames: usize, fps: f64) -> Option<BandwidthRow> {
+fn first_frame(name: &str, point: &Point, run: &Run, frames: usize, fps: f64) -> Option<Mode> {
     let first = point.frames.first()?;
     let others: u64 = point.frames.iter().skip(1).map(|frame| frame.bytes).sum();
     let bytes = point.info.bytes - others;
-    Some(BandwidthRow {
-        mode: mode.to_owned(),
+    Some(Mode {
+        name: name.to_owned(),
         units: units(point, 1),
         frames: "0".to_owned(),
         playback: "still",
-        percent: point.info.percent,
-        gop_bytes: bytes,
+        percent: Some(point.info.percent),
+        bytes,
         mbit_s: mbit_per_second(bytes, frames.div_ceil(run.gops.max(1) as usize), fps),
         gaussians: first.gaussians,
         figures: Comparison::mean(&first.views)?,
     })
 }
 
-fn all_frames(point: &Point, run: &Run, frames: usize, fps: f64) -> BandwidthRow {
+fn all_frames(point: &Point, run: &Run, frames: usize, fps: f64) -> Mode {
     let percent = point.info.percent;
     let gops = u64::from(run.gops.max(1));
-    BandwidthRow {
-        mode: if percent == 100 { "Full quality".to_owned() } else { format!("Refinement {percent} %") },
+    Mode {
+        name: if percent == 100 { "Full quality".to_owned() } else { format!("Refinement {percent} %") },
         units: units(point, frames),
         frames: if frames > 1 { format!("0 to {}", frames - 1) } else { "0".to_owned() },
         playback: if frames > 1 { "full frame rate" } else { "still" },
-        percent,
-        gop_bytes: point.info.bytes / gops,
+        percent: Some(percent),
+        bytes: point.info.bytes / gops,
         mbit_s: mbit_per_second(point.info.bytes, frames, fps),
         gaussians: point.info.gaussians / gops,
         figures: point.figures,
@@ -200,10 +207,10 @@ mod tests {
     #[test]
     fn modes_come_by_bandwidth_and_the_startup_is_one_frame() {
         let rows = bandwidth_rows(&run(), 30.0);
-        let modes: Vec<&str> = rows.iter().map(|row| row.mode.as_str()).collect();
+        let modes: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
         assert_eq!(modes, ["Startup", "Refinement 20 %", "Complete first frame", "Full quality"]);
         let startup = &rows[0];
-        assert_eq!((startup.gop_bytes, startup.gaussians, startup.figures.psnr_db), (740, 100, 30.0));
+        assert_eq!((startup.bytes, startup.gaussians, startup.figures.psnr_db), (740, 100, 30.0));
         assert_eq!(rows[3].mbit_s, 4000.0 * 8.0 * 15.0 / 1e6);
         assert_eq!((rows[1].units.as_str(), rows[3].units.as_str()), ("I0 to I1, r0", "I0 to I1, r0 to r1"));
     }

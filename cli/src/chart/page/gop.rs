@@ -1,9 +1,10 @@
 //! The first group of a sequence, with predicted frames: the two tables of the paper, and what tools are worth.
 
-use super::tables::{METRIC_HEADINGS, metric_cells};
+use super::tables::{METRIC_HEADINGS, metric_cells, mode_cells};
 use super::words::{Heading, figure, how_to_read, made_by, signed, size, table};
-use crate::chart::gop::{Gop, Level, Mode, ToolRow};
+use crate::chart::gop::{Gop, Level, ToolRow};
 use crate::chart::scene_chart::{METRICS, SceneChart};
+use crate::chart::tables::Mode;
 use crate::numbers::grouped;
 use maud::{Markup, html};
 
@@ -46,15 +47,8 @@ fn modes(chart: &SceneChart, gop: &Gop) -> Markup {
     let row = |place: usize, mode: &Mode| {
         html! {
             tr {
-                th scope="row" { (mode.name) }
-                td.text { (mode.units) }
-                td { (mode.frames) }
-                td.text { (mode.playback) }
-                td { @if let Some(percent) = mode.percent { (percent) " %" } @else { "–" } }
-                td { (size(mode.bytes)) }
-                td { (format!("{:.1} Mbit/s", mode.mbit_s)) }
-                td { (grouped(mode.gaussians)) }
-                td { (format!("{:.2}", mode.bpg)) }
+                (mode_cells(mode))
+                td { (format!("{:.2}", mode.bpg())) }
                 (metric_cells(chart, &mode.figures, place, gop.modes.len()))
             }
         }

@@ -4,6 +4,7 @@ use super::words::{Heading, NOT_MEASURED, figure, how_to_read, made_by, signed, 
 use crate::chart::scene_chart::{METRICS, SceneChart};
 use crate::chart::standing::Standing;
 use crate::chart::sweep::Group;
+use crate::chart::tables::Mode;
 use crate::numbers::grouped;
 use maud::{Markup, html};
 use splatstream_render::metrics::Comparison;
@@ -75,14 +76,7 @@ pub(super) fn bandwidth(chart: &SceneChart, command: &str) -> Markup {
     let body = html! {
         @for (place, row) in rows.iter().enumerate() {
             tr {
-                th scope="row" { (row.mode) }
-                td.text { (row.units) }
-                td { (row.frames) }
-                td.text { (row.playback) }
-                td { (row.percent) " %" }
-                td { (size(row.gop_bytes)) }
-                td { (format!("{:.1} Mbit/s", row.mbit_s)) }
-                td { (grouped(row.gaussians)) }
+                (mode_cells(row))
                 (metric_cells(chart, &row.figures, place, rows.len()))
             }
         }
@@ -95,6 +89,20 @@ pub(super) fn bandwidth(chart: &SceneChart, command: &str) -> Markup {
         ))
         (table(&headings, &body))
         (made_by(command))
+    }
+}
+
+/// What a mode of playback is, and what it takes.
+pub(super) fn mode_cells(mode: &Mode) -> Markup {
+    html! {
+        th scope="row" { (mode.name) }
+        td.text { (mode.units) }
+        td { (mode.frames) }
+        td.text { (mode.playback) }
+        td { @if let Some(percent) = mode.percent { (percent) " %" } @else { "–" } }
+        td { (size(mode.bytes)) }
+        td { (format!("{:.1} Mbit/s", mode.mbit_s)) }
+        td { (grouped(mode.gaussians)) }
     }
 }
 
