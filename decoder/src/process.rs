@@ -475,6 +475,16 @@ impl PendingFrame<'_> {
     }
 }
 
+/// Keeps a unit of a frame with those before; a tolerant decoder takes note of one that is wrong.
+fn keep<U>(parsed: Result<U>, units: &mut Vec<U>, lost: &mut Option<Error>, tolerant: bool) -> Result<()> {
+    match parsed {
+        Ok(unit) => units.push(unit),
+        Err(error) if tolerant => *lost = Some(error),
+        Err(error) => return Err(error),
+    }
+    Ok(())
+}
+
 fn unexpected(unit: &Unit<'_>) -> Error {
     let name = unit.header.unit_type().name();
     Error::new(unit.at, "7.1", ErrorKind::UnexpectedUnit { unit: name })

@@ -1,7 +1,7 @@
 //! Frames of profile Dynamic: increments in layers, references, what is carried. Clauses 7.13, 7.18, 7.20.
 
 use super::assembly::Assembly;
-use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, unexpected, unit_bytes};
+use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, keep, unexpected, unit_bytes};
 use crate::frame_state::FrameState;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
@@ -142,24 +142,10 @@ impl<'a> Decoder<'a> {
         } else {
             Err(unexpected(unit))
         };
-        match parsed {
-            Ok(increment) => {
-                let (payload_at, bytes) = (unit.payload_at, unit_bytes(unit));
-                layered.units.push(PendingIncrement {
-                    spatial_layer,
-                    refinement,
-                    increment,
-                    payload_at,
-                    bytes,
-                });
-                Ok(())
-            }
-            Err(error) if self.options.tolerant => {
-                frame.lost = Some(error);
-                Ok(())
-            }
-            Err(error) => Err(error),
-        }
+        let (payload_at, bytes) = (unit.payload_at, unit_bytes(unit));
+        let pending =
+            |increment| PendingIncrement { spatial_layer, refinement, increment, payload_at, bytes };
+        keep(parsed.map(pending), &mut layered.units, &mut frame.lost, self.options.tolerant)
     }
 
     /// Decodes a frame and keeps it for those that refer to it; `at` is the offset of the unit that ends it, if one

@@ -1,6 +1,8 @@
 //! Frames of profile Intra: refinement units, clause 7.1.3.
 
-use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, element_at, same, unexpected, unit_bytes};
+use super::{
+    DecodedFrame, Decoder, FrameUnits, PendingFrame, element_at, keep, same, unexpected, unit_bytes,
+};
 use crate::digest::{UnitDigest, frame_digest, unit_digest};
 use crate::frame::QuantizedFrame;
 use crate::gop::Gop;
@@ -51,18 +53,9 @@ impl<'a> Decoder<'a> {
         } else {
             parse_refinement(unit, sequence, &frame.header, gop)
         };
-        match parsed {
-            Ok(refinement) => {
-                let bytes = unit_bytes(unit);
-                refined.units.push(PendingUnit { refinement, payload_at: unit.payload_at, bytes });
-                Ok(())
-            }
-            Err(error) if self.options.tolerant => {
-                frame.lost = Some(error);
-                Ok(())
-            }
-            Err(error) => Err(error),
-        }
+        let (payload_at, bytes) = (unit.payload_at, unit_bytes(unit));
+        let parsed = parsed.map(|refinement| PendingUnit { refinement, payload_at, bytes });
+        keep(parsed, &mut refined.units, &mut frame.lost, self.options.tolerant)
     }
 
     pub(super) fn decode_refined(
