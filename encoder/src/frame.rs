@@ -1,5 +1,6 @@
 //! Codes one frame: importance, units, Morton order, blocks.
 
+use crate::blocks::code_blocks;
 use crate::error::Error;
 use crate::lattice::Geometry;
 use crate::models;
@@ -10,12 +11,13 @@ use splatstream_decoder::digest::{UnitDigest, frame_digest, unit_digest};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::layout::{Attribute, PlaneInfo};
 use splatstream_decoder::position::morton;
-use splatstream_format::bits::BitWriter;
 use splatstream_format::entropy::model::{PlaneModel, write_models};
 use splatstream_format::entropy::token::Alphabet;
-use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 use splatstream_format::payload::write_refinement;
 use splatstream_format::syntax::{RefinementHeader, SequenceParameters, ShHeader};
+
+/// Gaussians of a unit above which tables of its own always pay.
+const MANY: usize = 1 << 15;
 
 /// A frame on the lattices, all colour components included, in the order of the source.
 pub(crate) struct CodedFrame {
@@ -65,14 +67,14 @@ pub(crate) fn code_frame(frame: &CodedFrame, plan: &UnitPlan<'_>) -> Result<Fram
     let mut digests: Vec<UnitDigest> = Vec::new();
     let mut payloads = Vec::new();
     let mut previous: Option<Vec<PlaneModel>> = None;
-    for unit in coded {
-        digests.push(unit.digest.clone());
-        let digest = frame_digest(&digests);
+    for CodedUnit { blocks, models: own, digest } in coded {
+        digests.push(digest);
         let before = previous.as_deref().filter(|_| plan.tools.table_reuse);
-        let models = cheapest(&unit, before, plan.parameters.layout.planes());
-        payloads.push(payload(&unit, &models, before, plan, digest)?);
+        let tried = before.filter(|_| blocks.iter().map(CodedBlock::len).sum::<usize>() <= MANY);
+        let models = models::cheapest(own, tried, plan.parameters.layout.planes(), &blocks);
+        payloads.push(payload(&blocks, &models, before, plan, frame_digest(&digests))?);
         // A unit without Gaussians carries no models, and leaves those before it in force.
-        if !unit.blocks.is_empty() {
+        if !blocks.is_empty() {
             previous = Some(models);
         }
     }
@@ -195,58 +197,18 @@ fn biases(frame: &CodedFrame, planes: &[PlaneInfo]) -> Vec<i32> {
     planes.iter().map(of_plane).collect()
 }
 
-/// For each plane the unit's own model, or the one before if that saves its tables.
-fn cheapest(unit: &CodedUnit, previous: Option<&[PlaneModel]>, planes: &[PlaneInfo]) -> Vec<PlaneModel> {
-    // Where there are many symbols, tables of their own always pay.
-    const MANY: usize = 1 << 15;
-    if unit.blocks.iter().map(CodedBlock::len).sum::<usize>() > MANY {
-        return unit.models.clone();
-    }
-    let choose = |(plane, own): (usize, &PlaneModel)| {
-        let Some(before) = previous.and_then(|models| models.get(plane)) else { return own.clone() };
-        let bits = |model: &PlaneModel| -> Option<f64> {
-            unit.blocks.iter().map(|block| models::symbol_bits(model, planes[plane], plane, block)).sum()
-        };
-        let own_bits = bits(own).map(|bits| bits + table_bits(own));
-        match (bits(before), own_bits) {
-            (Some(reused), Some(own_bits)) if reused <= own_bits => before.clone(),
-            _ => own.clone(),
-        }
-    };
-    unit.models.par_iter().enumerate().map(choose).collect()
-}
-
-pub(crate) fn table_bits(model: &PlaneModel) -> f64 {
-    let mut bits = BitWriter::new();
-    model.tables.iter().for_each(|table| table.write(&mut bits));
-    bits.len_bits() as f64
-}
-
 fn payload(
-    unit: &CodedUnit,
+    blocks: &[CodedBlock],
     models: &[PlaneModel],
     previous: Option<&[PlaneModel]>,
     plan: &UnitPlan<'_>,
     digest: u64,
 ) -> Result<Vec<u8>, Error> {
-    let planes = plan.parameters.layout.planes();
-    let count: usize = unit.blocks.iter().map(CodedBlock::len).sum();
-    let lanes_log2 = lanes_log2(count.min(1 << plan.sequence.block_log2));
-    let encoders: Vec<PlaneEncoder> = models.iter().map(PlaneEncoder::new).collect();
-    let code_block = |block: &CodedBlock| -> Result<Vec<u8>, Error> {
-        let mut writer = BlockWriter::new(lanes_log2);
-        for (plane, (&info, encoder)) in planes.iter().zip(&encoders).enumerate() {
-            let contexts = models::contexts(&models[plane], info, plane, block);
-            writer.plane(encoder, &contexts, models::unsigned_values(info, plane, block))?;
-        }
-        Ok(writer.finish())
-    };
-    let blocks: Vec<Vec<u8>> = unit.blocks.par_iter().map(code_block).collect::<Result<_, Error>>()?;
-    let section = if blocks.is_empty() {
-        Vec::new()
-    } else {
-        write_models(models, &plan.parameters.layout.alphabets(), previous)
-    };
+    let layout = plan.parameters.layout;
+    let count: usize = blocks.iter().map(CodedBlock::len).sum();
+    let (lanes_log2, blocks) = code_blocks(layout.planes(), models, blocks)?;
+    let section =
+        if blocks.is_empty() { Vec::new() } else { write_models(models, &layout.alphabets(), previous) };
     let ShHeader { sh_mode, vq_stage_count, codebook_ids } = plan.sh;
     let header = RefinementHeader {
         refinement_digest: digest,
@@ -258,9 +220,4 @@ fn payload(
         codebook_ids,
     };
     Ok(write_refinement(&header, plan.sequence, &section, &blocks)?)
-}
-
-/// As many states as cost less than a tenth of a bit a Gaussian.
-pub(crate) fn lanes_log2(block_gaussians: usize) -> u8 {
-    (block_gaussians / 512).checked_ilog2().unwrap_or(0).min(5) as u8
 }

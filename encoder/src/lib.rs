@@ -6,6 +6,7 @@
 //! and with any number of threads.
 
 mod allocation;
+mod blocks;
 pub mod canonical;
 mod clusters;
 mod colour;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context::{self, DeltaNeighbours, Neighbours, is_serial};
 use splatstream_decoder::layout::{Attribute, PlaneInfo, Section, is_available};
+use splatstream_format::bits::BitWriter;
 use splatstream_format::entropy::frequencies::Frequencies;
 use splatstream_format::entropy::model::{AxisLookup, ContextAxis, PlaneModel, Source};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
@@ -250,13 +251,30 @@ pub(crate) fn choose_all(
         .collect()
 }
 
+/// For each plane its own model, or the one before if that saves its tables.
+pub(crate) fn cheapest(
+    own: Vec<PlaneModel>,
+    before: Option<&[PlaneModel]>,
+    planes: &[PlaneInfo],
+    blocks: &[CodedBlock],
+) -> Vec<PlaneModel> {
+    let Some(before) = before else { return own };
+    let choose = |(plane, own): (usize, PlaneModel)| {
+        let Some(before) = before.get(plane) else { return own };
+        let bits = |model: &PlaneModel| -> Option<f64> {
+            blocks.iter().map(|block| symbol_bits(model, planes[plane], plane, block)).sum()
+        };
+        let own_bits = bits(&own).map(|bits| bits + table_bits(&own));
+        match (bits(before), own_bits) {
+            (Some(reused), Some(own_bits)) if reused <= own_bits => before.clone(),
+            _ => own,
+        }
+    };
+    own.into_par_iter().enumerate().map(choose).collect()
+}
+
 /// Bits of a plane's symbols under a model; none if a token cannot be coded.
-pub(crate) fn symbol_bits(
-    model: &PlaneModel,
-    info: PlaneInfo,
-    plane: usize,
-    block: &CodedBlock,
-) -> Option<f64> {
+fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Option<f64> {
     let contexts = contexts(model, info, plane, block);
     let costs: Vec<Vec<f64>> = model.tables.iter().map(token_costs).collect();
     let mut bits = 0.0;
@@ -268,6 +286,12 @@ pub(crate) fn symbol_bits(
         bits += cost + f64::from(token.raw_bits);
     }
     Some(bits)
+}
+
+fn table_bits(model: &PlaneModel) -> f64 {
+    let mut bits = BitWriter::new();
+    model.tables.iter().for_each(|table| table.write(&mut bits));
+    bits.len_bits() as f64
 }
 
 fn token_costs(table: &Frequencies) -> Vec<f64> {

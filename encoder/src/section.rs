@@ -1,7 +1,7 @@
 //! Codes a section of an increment: values to models and blocks.
 
+use crate::blocks::code_blocks;
 use crate::error::Error;
-use crate::frame::{lanes_log2, table_bits};
 use crate::models;
 use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
@@ -9,9 +9,8 @@ use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Attribute, Layout, PlaneInfo, Section};
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
-use splatstream_format::entropy::model::{PlaneModel, write_models};
+use splatstream_format::entropy::model::write_models;
 use splatstream_format::entropy::token::Alphabet;
-use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 use splatstream_format::payload::SectionBytes;
 
 /// How sections are coded.
@@ -41,20 +40,9 @@ pub(crate) fn code_section(
     let blocks = blocks(layout, values, &biases, 1 << plan.block_log2);
     let own = models::choose_all(layout.planes(), &blocks, &biases, plan.preset, plan.tools);
     let before = known.map(|known| known.models.as_slice());
-    let chosen = cheapest(own, before, layout.planes(), &blocks);
+    let chosen = models::cheapest(own, before, layout.planes(), &blocks);
     let model = write_models(&chosen, &layout.alphabets(), before);
-    let most = blocks.iter().map(CodedBlock::len).max().unwrap_or(0);
-    let lanes_log2 = lanes_log2(most);
-    let encoders: Vec<PlaneEncoder> = chosen.iter().map(PlaneEncoder::new).collect();
-    let code_block = |block: &CodedBlock| -> Result<Vec<u8>, Error> {
-        let mut writer = BlockWriter::new(lanes_log2);
-        for (plane, (&info, encoder)) in layout.planes().iter().zip(&encoders).enumerate() {
-            let contexts = models::contexts(&chosen[plane], info, plane, block);
-            writer.plane(encoder, &contexts, models::unsigned_values(info, plane, block))?;
-        }
-        Ok(writer.finish())
-    };
-    let blocks: Vec<Vec<u8>> = blocks.par_iter().map(code_block).collect::<Result<_, Error>>()?;
+    let (lanes_log2, blocks) = code_blocks(layout.planes(), &chosen, &blocks)?;
     in_force.replace(section, SectionModels { layout: layout.clone(), models: chosen });
     Ok(SectionBytes { lanes_log2, model, blocks })
 }
@@ -122,27 +110,4 @@ fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, coded: &[i32], bia
         Attribute::Opacity => block.opacity = values.collect(),
         _ => {}
     }
-}
-
-/// For each plane its own model, or the one in force if that saves its tables.
-fn cheapest(
-    own: Vec<PlaneModel>,
-    before: Option<&[PlaneModel]>,
-    planes: &[PlaneInfo],
-    blocks: &[CodedBlock],
-) -> Vec<PlaneModel> {
-    let Some(before) = before else { return own };
-    let choose = |(plane, own): (usize, PlaneModel)| {
-        let Some(before) = before.get(plane) else { return own };
-        let bits = |model: &PlaneModel| -> Option<f64> {
-            blocks.iter().map(|block| models::symbol_bits(model, planes[plane], plane, block)).sum()
-        };
-        let own_bits = bits(&own).map(|bits| bits + table_bits(&own));
-        match (bits(before), own_bits) {
-            (Some(reused), Some(own_bits)) if reused <= own_bits => before.clone(),
-            (Some(_), None) => before.clone(),
-            _ => own,
-        }
-    };
-    own.into_par_iter().enumerate().map(choose).collect()
 }
