@@ -53,8 +53,8 @@ pub struct Situation<'a> {
 pub struct Applied {
     /// The home after the unit: surviving parents, then new Gaussians.
     pub home: Home,
-    /// How many of them are new.
-    pub added: usize,
+    /// The new ones by themselves: other units predict from them.
+    pub added: QuantizedFrame,
 }
 
 /// Clause 7.15: the cells of a unit.
@@ -126,7 +126,7 @@ pub fn apply(unit: &Unit<'_>, parents: Home, situation: &Situation<'_>) -> Resul
     };
     let added = new_gaussians(unit, position, &predictors, &set)?;
     home.append(&added);
-    Ok(Applied { home, added: added.len() })
+    Ok(Applied { home, added: added.planes })
 }
 
 /// Clause 7.17: everything that new Gaussians may be predicted from, in order.

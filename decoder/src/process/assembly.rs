@@ -256,11 +256,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
     fn take(&mut self, applied: Applied, predicts: bool) {
         let Applied { home, added } = applied;
         if predicts && !self.is_intra() {
-            let mut new = home.planes.clone();
-            let old = home.len().wrapping_sub(added);
-            let flags: Vec<bool> = (0..home.len()).map(|row| row >= old).collect();
-            new.retain(&flags);
-            self.added.push(new);
+            self.added.push(added);
         }
         self.homes.push(home);
     }

@@ -143,6 +143,8 @@ pub(crate) struct Predicted<'a> {
 struct Made {
     draft: Draft,
     home: Home,
+    /// The new Gaussians of the home.
+    added: QuantizedFrame,
     rows: Vec<u32>,
     sections: Vec<splatstream_format::payload::SectionBytes>,
 }
@@ -326,8 +328,7 @@ impl Predicted<'_> {
         draft.values.set(Section::New, new);
         let lower: Vec<&QuantizedFrame> = displaced[..home].iter().map(|home| &home.planes).collect();
         let anchor = self.reference.state.anchor.iter().skip(home + 1).map(|home| &home.planes);
-        let news: Vec<QuantizedFrame> = made.iter().map(new_gaussians).collect();
-        let behind: Vec<&QuantizedFrame> = anchor.chain(&news).collect();
+        let behind: Vec<&QuantizedFrame> = anchor.chain(made.iter().map(|made| &made.added)).collect();
         let situation = Situation { around: [&lower, &behind], parents_follow: false };
         let wanted = fresh.wanted.select(&added);
         let applied =
@@ -336,7 +337,7 @@ impl Predicted<'_> {
         let continued = partners.iter().flatten().map(|&place| self.target.rows[place as usize]);
         let new = added.iter().map(|&place| self.target.rows[fresh.places[place as usize] as usize]);
         let rows = continued.chain(new).collect();
-        Ok(Made { draft, home: applied.home, rows, sections })
+        Ok(Made { draft, home: applied.home, added: applied.added, rows, sections })
     }
 
     fn set_fates(&self, draft: &mut Draft, fates: &[Fate]) {
@@ -399,14 +400,6 @@ impl Predicted<'_> {
         let state = FrameState { number, homes, anchor, fields, carried, compensation, models };
         Ok((units, Reference { state, rows, row_count: self.target.row_count }))
     }
-}
-
-fn new_gaussians(made: &Made) -> QuantizedFrame {
-    let mut planes = made.home.planes.clone();
-    let old = planes.len() - made.draft.header.new_count as usize;
-    let flags: Vec<bool> = (0..planes.len()).map(|row| row >= old).collect();
-    planes.retain(&flags);
-    planes
 }
 
 /// New Gaussians of a frame.

@@ -112,7 +112,7 @@ fn names(frames: &[Walked]) -> Names {
         let modes = step.values.plane(Section::Modes, 0);
         let parents = parent_names(step, &names);
         let kept = parents.into_iter().zip(modes).filter(|(_, mode)| **mode != 4).map(|(name, _)| name);
-        let all = kept.chain(letters.by_ref().take(step.added)).collect();
+        let all = kept.chain(letters.by_ref().take(step.added.len())).collect();
         names.push(((step.id.frame, step.id.spatial_layer, step.id.refinement), all));
     }
     names

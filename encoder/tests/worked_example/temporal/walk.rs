@@ -30,7 +30,8 @@ pub(crate) struct Step {
     pub(crate) displaced: Home,
     pub(crate) set: QuantizedFrame,
     pub(crate) home: Home,
-    pub(crate) added: usize,
+    /// The new Gaussians of the home.
+    pub(crate) added: QuantizedFrame,
     /// refinement_digest and carried_digest as computed.
     pub(crate) digests: [u64; 2],
 }
@@ -93,7 +94,7 @@ impl Common {
         let situation = Situation { around: [&lower, &behind], parents_follow: intra };
         let applied = apply(&unit, displaced.clone(), &situation).unwrap();
         let mut left = applied.home.planes.clone();
-        left.truncate(left.len() - applied.added);
+        left.truncate(left.len() - applied.added.len());
         let set = reference_set(&situation, if intra { &left } else { &displaced.planes });
         let (home, added) = (applied.home, applied.added);
         let mut step = Step {
@@ -140,7 +141,7 @@ fn around(frames: &[Walked], frame: &Walked, id: &UnitId) -> (Vec<QuantizedFrame
     }
     let lower = frame.steps.iter().map(|step| step.displaced.planes.clone()).collect();
     let anchor = frames[0].layer(id.spatial_layer).skip(usize::from(id.refinement) + 1);
-    let added = frame.steps.iter().map(Step::new_gaussians);
+    let added = frame.steps.iter().map(|step| step.added.clone());
     (lower, anchor.map(|step| step.home.planes.clone()).chain(added).collect())
 }
 
@@ -150,14 +151,6 @@ fn digest<'h>(homes: impl Iterator<Item = &'h Home>) -> u64 {
 }
 
 impl Step {
-    /// The planes of what the unit adds.
-    fn new_gaussians(&self) -> QuantizedFrame {
-        let old = self.home.len() - self.added;
-        let mut planes = self.home.planes.clone();
-        planes.retain(&(0..self.home.len()).map(|row| row >= old).collect::<Vec<_>>());
-        planes
-    }
-
     pub(crate) fn name(&self) -> String {
         format!("({}, {}) of frame {}", self.id.spatial_layer, self.id.refinement, self.id.frame)
     }
