@@ -12,9 +12,8 @@ use splatstream_decoder::frame_state::FrameState;
 use splatstream_decoder::home::Home;
 use splatstream_decoder::increment::Situation;
 use splatstream_decoder::increment::residual::{Attributes, Stage};
-use splatstream_decoder::increment::values::{SectionValues, UnitValues};
+use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Section, ShCoding};
-use splatstream_decoder::position::morton;
 use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::syntax::prefix_length;
@@ -133,19 +132,13 @@ impl Anchor<'_> {
     ) -> Result<(), Error> {
         let home = usize::from(refinement);
         let parents = self.homes[home].clone();
-        added.sort_by_key(|&place| (self.code(place, shift), place));
-        let mut draft = Draft { header: self.coder.blank(), values: UnitValues::default() };
+        let mut draft = self.coder.blank();
         draft.header.position_shift = shift;
         draft.header.attribute_shift = self.shifts(shift);
         self.refine(&mut draft, &parents, home, shift);
-        let codes: Vec<u64> = added.iter().map(|&place| self.code(place, shift)).collect();
-        let block = 1 << self.coder.sequence.block_log2;
-        draft.header.new_count = added.len() as u32;
-        let deltas = deltas(&codes, block);
-        draft.values.set(Section::New, SectionValues { deltas, planes: Vec::new(), block });
+        let wanted = self.coder.place_new(&mut draft, self.target.wanted, &mut added);
         let lower: Vec<&QuantizedFrame> = self.homes[..home].iter().map(|home| &home.planes).collect();
         let situation = Situation { around: [&lower, &[]], parents_follow: true };
-        let wanted = self.target.wanted.select(&added);
         let mut models = if refinement == 0 { self.first_models.clone() } else { self.models.clone() };
         let applied = predictors.choose(self.coder, &mut draft, parents, &situation, &wanted, &models)?;
         let sections = self.coder.sections(&draft, &mut models)?;
@@ -180,11 +173,6 @@ impl Anchor<'_> {
         (draft.header.compensation_log_scale, draft.header.compensation_opacity) = (log_scale, opacity);
     }
 
-    fn code(&self, place: u32, shift: u8) -> u64 {
-        let [x, y, z] = self.target.wanted.position.each_ref().map(|plane| plane[place as usize] >> shift);
-        morton(x, y, z)
-    }
-
     /// attribute_shift of a layer. Entries of codebooks are not shifted: no layer refines them.
     fn shifts(&self, shift: u8) -> [u8; 5] {
         let book = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
@@ -211,12 +199,6 @@ impl Anchor<'_> {
         let residuals = |stage| wanted.residuals(stage, &now, shift, &self.coder.colour, false);
         draft.values.set(Section::Updates, section(Stage::ALL.into_iter().flat_map(residuals).collect()));
     }
-}
-
-/// Differences of rising codes; they start anew in each block.
-pub(crate) fn deltas(codes: &[u64], block: usize) -> Vec<u64> {
-    let before = |place: usize| if place.is_multiple_of(block) { 0 } else { codes[place - 1] };
-    codes.iter().enumerate().map(|(place, &code)| code - before(place)).collect()
 }
 
 /// What brings log-scales near those wanted: of the largest, and of the two differences (7.16).

@@ -1,9 +1,8 @@
 //! Predicted frames: cells, survivors, new Gaussians.
 
-use super::anchor::deltas;
 use super::predictors::{Chooser, used};
 use super::survivors::{Fate, Survivors};
-use super::unit::{Draft, UnitCoder};
+use super::unit::{Draft, UnitCoder, deltas};
 use super::wanted::{ColourTarget, Wanted};
 use super::{CodedUnit, Reference, Target};
 use crate::colour;
@@ -21,10 +20,9 @@ use splatstream_decoder::displacement::{CellField, rotation_unit};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::frame_state::FrameState;
 use splatstream_decoder::home::{FINE, Home};
-use splatstream_decoder::increment::values::{SectionValues, UnitValues};
+use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::increment::{Situation, field};
 use splatstream_decoder::layout::{Section, ShCoding};
-use splatstream_decoder::position::morton;
 use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::syntax::SequenceParameters;
@@ -158,7 +156,7 @@ impl Predicted<'_> {
         let sequence = self.coder.sequence;
         let motion = self.cells()?;
         let (cells, cell_log2) = (self.cell_values(&motion), motion.cell_log2);
-        let mut first = Draft { header: self.coder.blank(), values: UnitValues::default() };
+        let mut first = self.coder.blank();
         first.header.cell_count = motion.cells.len() as u32;
         first.header.cell_log2 = if motion.cells.is_empty() { 0 } else { cell_log2 };
         first.values.set(Section::Cells, cells);
@@ -180,8 +178,7 @@ impl Predicted<'_> {
         let mut after_first = models.clone();
         let mut made: Vec<Made> = Vec::new();
         for (home, added) in fresh.of_home.iter().enumerate() {
-            let blank = Draft { header: self.coder.blank(), values: UnitValues::default() };
-            let draft = if home == 0 { first.clone() } else { blank };
+            let draft = if home == 0 { first.clone() } else { self.coder.blank() };
             let unit = self.unit(home, draft, &displaced, &fresh, added, &made, predictors, &mut models)?;
             made.push(unit);
             if home == 0 {
@@ -320,17 +317,11 @@ impl Predicted<'_> {
         let fates = self.survivors.fates(parents, partners, coarse);
         self.set_fates(&mut draft, &fates);
         let mut added = added.to_vec();
-        added.sort_by_key(|&place| (fresh.code(place), place));
-        let codes: Vec<u64> = added.iter().map(|&place| fresh.code(place)).collect();
-        let block = 1 << self.coder.sequence.block_log2;
-        draft.header.new_count = added.len() as u32;
-        let new = SectionValues { deltas: deltas(&codes, block), planes: Vec::new(), block };
-        draft.values.set(Section::New, new);
+        let wanted = self.coder.place_new(&mut draft, &fresh.wanted, &mut added);
         let lower: Vec<&QuantizedFrame> = displaced[..home].iter().map(|home| &home.planes).collect();
         let anchor = self.reference.state.anchor.iter().skip(home + 1).map(|home| &home.planes);
         let behind: Vec<&QuantizedFrame> = anchor.chain(made.iter().map(|made| &made.added)).collect();
         let situation = Situation { around: [&lower, &behind], parents_follow: false };
-        let wanted = fresh.wanted.select(&added);
         let applied =
             predictors.choose(&self.coder, &mut draft, parents.clone(), &situation, &wanted, models)?;
         let sections = self.coder.sections(&draft, models)?;
@@ -409,11 +400,4 @@ struct Fresh {
     wanted: Wanted,
     /// For each home those it gets, as places among the new ones.
     of_home: Vec<Vec<u32>>,
-}
-
-impl Fresh {
-    fn code(&self, place: u32) -> u64 {
-        let [x, y, z] = self.wanted.position.each_ref().map(|plane| plane[place as usize]);
-        morton(x, y, z)
-    }
 }

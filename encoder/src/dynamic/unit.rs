@@ -1,12 +1,13 @@
 //! Codes one increment: values chosen elsewhere are applied as a decoder applies them, then entropy coded.
 
 use super::predictors::NEIGHBOURS;
+use super::wanted::Wanted;
 use crate::error::Error;
 use crate::section::{SectionPlan, code_section};
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::home::Home;
 use splatstream_decoder::increment::residual::AttributeCoding;
-use splatstream_decoder::increment::values::UnitValues;
+use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::increment::{Applied, Situation, Unit, apply};
 use splatstream_decoder::layout::{Layout, Section};
 use splatstream_format::entropy::in_force::ModelsInForce;
@@ -32,16 +33,30 @@ pub(crate) struct Draft {
 }
 
 impl UnitCoder<'_> {
-    /// A header without counts and digests.
-    pub(crate) fn blank(&self) -> IncrementHeader {
+    /// A unit that changes and adds nothing.
+    pub(crate) fn blank(&self) -> Draft {
         let ShHeader { sh_mode, vq_stage_count, codebook_ids } = self.sh;
-        IncrementHeader {
+        let header = IncrementHeader {
             neighbour_count: NEIGHBOURS,
             sh_mode,
             vq_stage_count,
             codebook_ids,
             ..IncrementHeader::PLAIN
-        }
+        };
+        Draft { header, values: UnitValues::default() }
+    }
+
+    /// Puts the positions of new Gaussians in a draft, on the lattice of its position shift. Brings `added`, their
+    /// places in `all`, in Morton order, and gives what they shall become.
+    pub(crate) fn place_new(&self, draft: &mut Draft, all: &Wanted, added: &mut [u32]) -> Wanted {
+        let shift = draft.header.position_shift;
+        added.sort_by_key(|&place| (all.code(place, shift), place));
+        let codes: Vec<u64> = added.iter().map(|&place| all.code(place, shift)).collect();
+        let block = 1 << self.sequence.block_log2;
+        draft.header.new_count = added.len() as u32;
+        let new = SectionValues { deltas: deltas(&codes, block), planes: Vec::new(), block };
+        draft.values.set(Section::New, new);
+        all.select(added)
     }
 
     /// How attributes are coded with some shifts.
@@ -107,4 +122,10 @@ impl UnitCoder<'_> {
     ) -> Result<Vec<u8>, Error> {
         Ok(write_increment(header, self.sequence, sections)?)
     }
+}
+
+/// Differences of rising codes; they start anew in each block.
+pub(crate) fn deltas(codes: &[u64], block: usize) -> Vec<u64> {
+    let before = |place: usize| if place.is_multiple_of(block) { 0 } else { codes[place - 1] };
+    codes.iter().enumerate().map(|(place, &code)| code - before(place)).collect()
 }

@@ -6,6 +6,7 @@ use splatstream_decoder::colour::{Colour, inverse};
 use splatstream_decoder::home::{FINE, Home};
 use splatstream_decoder::increment::residual::{Attributes, Stage};
 use splatstream_decoder::layout::ShCoding;
+use splatstream_decoder::position::morton;
 use splatstream_format::Result;
 use splatstream_format::payload::Transform;
 
@@ -112,6 +113,12 @@ impl Wanted {
             sh: self.sh.iter().map(pick).collect(),
             indices: self.indices.iter().map(pick).collect(),
         }
+    }
+
+    /// The Morton code of a Gaussian on the lattice of every 2^shift-th point.
+    pub(crate) fn code(&self, place: u32, shift: u8) -> u64 {
+        let [x, y, z] = self.position.each_ref().map(|plane| plane[place as usize] >> shift);
+        morton(x, y, z)
     }
 
     /// Gaussians.
