@@ -29,8 +29,8 @@ impl OperatingPoint {
     /// Everything in the stream.
     pub const ALL: Self = Self { spatial: u8::MAX, temporal: u8::MAX, refinement: u8::MAX };
 
-    /// Clause 7.19: whether a unit of profile Dynamic belongs to the operating point. `anchor` is the number of
-    /// spatial layers if the unit is of the intra frame of a predicted GOP: who plays that GOP has all of the frame.
+    /// Clauses 7.11 and 7.19: whether a unit belongs to the operating point. `anchor` is the number of spatial layers
+    /// if the unit is of the intra frame of a predicted GOP: who plays that GOP has all of the frame.
     pub fn takes_of(&self, header: &UnitHeader, anchor: Option<u8>) -> bool {
         let whole = anchor.is_some_and(|layers| self.spatial.saturating_add(1) >= layers);
         let refinement = if whole { u8::MAX } else { self.refinement };

@@ -89,7 +89,7 @@ pub struct Decoder<'a> {
     has_lost_any: bool,
     /// Whether some unit did not belong to the operating point.
     has_passed_over: bool,
-    /// What the units so far add to the operating points.
+    /// What the units so far add to the operating points, and which belong to one.
     tally: Tally,
     ended: bool,
 }
@@ -195,13 +195,7 @@ impl<'a> Decoder<'a> {
 
     /// Whether a unit belongs to the operating point (7.11, 7.19).
     fn belongs(&self, header: &UnitHeader) -> bool {
-        if self.profile == Profile::Intra {
-            return self.options.operating_point.takes(header);
-        }
-        let is_anchor = |gop: &Gop| gop.header.is_predicted() && gop.first_frame == header.frame;
-        let layers = self.sequence().map_or(1, |sequence| sequence.spatial_layer_count);
-        let anchor = self.gop.as_ref().is_some_and(is_anchor).then_some(layers);
-        self.options.operating_point.takes_of(header, anchor)
+        self.tally.takes(self.options.operating_point, header)
     }
 
     /// 7.13.2: whether a unit is passed over before its payload and its place are looked at. In profile Intra a unit
@@ -395,7 +389,7 @@ impl<'a> Decoder<'a> {
 
     /// Step 1 of clauses 7.1.3 and 7.13.3: whether a unit of the frame is looked at.
     fn arrives(&mut self, unit: &Unit<'a>) -> Result<bool> {
-        let takes = self.profile == Profile::Dynamic || self.options.operating_point.takes(&unit.header);
+        let takes = self.belongs(&unit.header);
         self.has_passed_over |= !takes;
         let Some(frame) = &mut self.frame else { return Err(unexpected(unit)) };
         frame.has_unit = true;

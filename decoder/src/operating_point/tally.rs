@@ -29,14 +29,15 @@ pub struct OperatingPointInfo {
 #[derive(Debug, Clone)]
 pub(crate) struct Belonging {
     profile: Profile,
-    spatial_layers: u8,
+    /// The first sequence parameters.
+    sequence: Option<SequenceParameters>,
     /// The first frame of the GOP, if it is a predicted one.
     anchor: Option<u32>,
 }
 
 impl Belonging {
     pub(crate) const fn new(profile: Profile) -> Self {
-        Self { profile, spatial_layers: 1, anchor: None }
+        Self { profile, sequence: None, anchor: None }
     }
 
     /// Takes note of sequence parameters and GOP headers.
@@ -44,7 +45,7 @@ impl Belonging {
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
                 let parsed = SequenceParameters::parse_payload(unit.payload, unit.payload_at, self.profile);
-                self.spatial_layers = parsed.map_or(1, |sequence| sequence.spatial_layer_count);
+                self.sequence = self.sequence.or(parsed.ok());
             }
             UnitType::GopHeader => {
                 let parsed = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile);
@@ -55,17 +56,15 @@ impl Belonging {
         }
     }
 
-    /// Whether an increment is of the intra frame of a predicted GOP.
-    fn is_anchor(&self, header: &UnitHeader) -> bool {
-        header.unit_type() == UnitType::Increment && self.anchor == Some(header.frame)
+    /// The number of spatial layers, for an increment of the intra frame of a predicted GOP.
+    fn anchor_layers(&self, header: &UnitHeader) -> Option<u8> {
+        let is_anchor = header.unit_type() == UnitType::Increment && self.anchor == Some(header.frame);
+        is_anchor.then(|| self.sequence.map_or(1, |sequence| sequence.spatial_layer_count))
     }
 
     /// Whether a unit belongs to an operating point.
     pub(crate) fn takes(&self, point: OperatingPoint, header: &UnitHeader) -> bool {
-        match self.profile {
-            Profile::Intra => point.takes(header),
-            Profile::Dynamic => point.takes_of(header, self.is_anchor(header).then_some(self.spatial_layers)),
-        }
+        point.takes_of(header, self.anchor_layers(header))
     }
 }
 
@@ -73,17 +72,17 @@ impl Belonging {
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     header: UnitHeader,
-    anchor: bool,
+    /// As [`OperatingPoint::takes_of`] asks for it.
+    anchor: Option<u8>,
     bytes: u64,
     /// Gaussians of its home after the unit; of a refinement, those it adds.
     gaussians: u32,
 }
 
 /// The pieces of a stream, unit by unit.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Tally {
-    belonging: Option<Belonging>,
-    sequence: Option<SequenceParameters>,
+    belonging: Belonging,
     levels: Levels,
     pieces: Vec<Piece>,
 }
@@ -91,27 +90,28 @@ pub struct Tally {
 impl Tally {
     /// For a stream of a profile.
     pub fn new(profile: Profile) -> Self {
-        Self { belonging: Some(Belonging::new(profile)), ..Self::default() }
+        Self { belonging: Belonging::new(profile), levels: Levels::default(), pieces: Vec::new() }
+    }
+
+    /// Whether a unit, which need not be counted, belongs to an operating point.
+    pub(crate) fn takes(&self, point: OperatingPoint, header: &UnitHeader) -> bool {
+        self.belonging.takes(point, header)
     }
 
     /// Takes note of a unit.
     pub fn unit(&mut self, unit: &Unit<'_>) {
-        let Some(belonging) = &mut self.belonging else { return };
-        belonging.follow(unit);
+        self.belonging.follow(unit);
+        let Belonging { profile, sequence, .. } = self.belonging;
         let (payload, at) = (unit.payload, unit.payload_at);
-        if unit.header.unit_type() == UnitType::SequenceParameters {
-            let parsed = SequenceParameters::parse_payload(payload, at, belonging.profile);
-            self.sequence = self.sequence.or(parsed.ok());
-        }
-        if !unit.header.unit_type().is_known_in(belonging.profile) {
+        if !unit.header.unit_type().is_known_in(profile) {
             return;
         }
-        if let Some(levels) = levels_of(unit, belonging.profile, self.sequence.as_ref()) {
+        if let Some(levels) = levels_of(unit, profile, sequence.as_ref()) {
             self.levels = levels;
         }
         // The payload of a unit that is passed over shows nothing, whatever it says.
         let is_decoded = self.levels.takes(&unit.header);
-        let gaussians = match (unit.header.unit_type(), &self.sequence) {
+        let gaussians = match (unit.header.unit_type(), &sequence) {
             (UnitType::Refinement, Some(sequence)) => {
                 RefinementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.gaussian_count)
             }
@@ -126,7 +126,7 @@ impl Tally {
         let bytes = u64::try_from(length).unwrap_or(u64::MAX);
         self.pieces.push(Piece {
             header: unit.header,
-            anchor: belonging.is_anchor(&unit.header),
+            anchor: self.belonging.anchor_layers(&unit.header),
             bytes,
             gaussians,
         });
@@ -134,17 +134,12 @@ impl Tally {
 
     /// Every operating point of the sequence, lowest first.
     pub fn points(&self) -> Vec<OperatingPoint> {
-        self.sequence.as_ref().map(all_points).unwrap_or_default()
+        self.belonging.sequence.as_ref().map(all_points).unwrap_or_default()
     }
 
     /// What a point costs and shows.
     pub fn info(&self, point: OperatingPoint) -> OperatingPointInfo {
-        let layers = self.sequence.map_or(1, |sequence| sequence.spatial_layer_count);
-        let intra = self.belonging.as_ref().is_none_or(|belonging| belonging.profile == Profile::Intra);
-        let takes = |piece: &&Piece| match intra {
-            true => point.takes(&piece.header),
-            false => point.takes_of(&piece.header, piece.anchor.then_some(layers)),
-        };
+        let takes = |piece: &&Piece| point.takes_of(&piece.header, piece.anchor);
         let mut info = OperatingPointInfo {
             point,
             bytes: 0,
@@ -175,7 +170,7 @@ impl Tally {
     }
 
     fn percent(&self, refinement: u8) -> u8 {
-        let percents = self.sequence.map_or([0; 10], |sequence| sequence.refinement_percent);
+        let percents = self.belonging.sequence.map_or([0; 10], |sequence| sequence.refinement_percent);
         percents.get(usize::from(refinement)).copied().unwrap_or(100)
     }
 
