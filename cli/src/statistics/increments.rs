@@ -4,7 +4,7 @@ use super::symbols::BitsOfPlanes;
 use super::{Planes, Statistics};
 use splatstream_decoder::gop::{Gop, Transforms};
 use splatstream_decoder::increment::values::PreparedIncrement;
-use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::entropy::layout::ShCoding;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::SequenceParameters;
@@ -16,11 +16,10 @@ use std::collections::BTreeMap;
 #[derive(Default)]
 pub(super) struct Increments {
     frame: u32,
-    /// Of each frame, the models in force for the next unit 0 that follows it: of the next layer, or of a frame that
-    /// refers to it.
+    /// The models in force for the next unit of the frame.
+    in_force: ModelsOfFrame,
+    /// Of each earlier frame, those that frames which refer to it start with.
     first: BTreeMap<u32, ModelsInForce>,
-    /// The models in force for the next unit of a higher refinement.
-    current: ModelsInForce,
 }
 
 impl Increments {
@@ -28,9 +27,10 @@ impl Increments {
     pub(super) fn start_frame(&mut self, number: u32, gop: &Gop) {
         let place = number.checked_sub(gop.first_frame).map(|place| gop.header.place(place));
         let reference = place.and_then(|place| gop.first_frame.checked_add(place.reference?));
-        let inherited = reference.and_then(|reference| self.first.get(&reference)).cloned();
-        self.first.insert(number, inherited.unwrap_or_default());
+        self.first.insert(self.frame, core::mem::take(&mut self.in_force.first));
         self.frame = number;
+        let inherited = reference.and_then(|reference| self.first.get(&reference)).cloned();
+        self.in_force.first = inherited.unwrap_or_default();
     }
 
     /// Adds the costs of a unit.
@@ -43,16 +43,11 @@ impl Increments {
         statistics: &mut Statistics,
     ) -> Result<()> {
         let increment = Increment::parse(unit.payload, unit.payload_at, sequence, limits)?;
-        let is_first = unit.header.refinement == 0;
-        let first = self.first.entry(self.frame).or_default();
-        let mut models = if is_first { first.clone() } else { self.current.clone() };
+        let mut models = self.in_force.before(unit.header.refinement).clone();
         let sh = ShCoding::of(&increment.header.sh(), tools.sh.map_or(0, |sh| sh.header.rank));
         let mut trace = BitsOfPlanes::default();
         let prepared = PreparedIncrement::new(&increment, tools.dc.header.rank, sh, &mut models, &mut trace)?;
-        if is_first {
-            first.clone_from(&models);
-        }
-        self.current = models;
+        self.in_force.follow(unit.header.refinement, models);
         // The bits of models come plane by plane through all sections.
         let mut bits = trace.bits.as_slice();
         for (coded, models) in prepared.sections() {

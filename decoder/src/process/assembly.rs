@@ -13,7 +13,7 @@ use crate::increment::values::{PreparedIncrement, UnitValues};
 use crate::increment::{Applied, Situation, Unit, apply, field};
 use crate::layout::ShCoding;
 use rayon::prelude::*;
-use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::syntax::{FrameType, IncrementHeader, SequenceParameters};
 use splatstream_format::{Error, ErrorKind, Result};
 use std::sync::Arc;
@@ -43,9 +43,7 @@ pub(super) struct Assembly<'d, 'a> {
     /// The homes of the reference frame displaced, and the Gaussians added so far, if units predict from them.
     displaced: Vec<QuantizedFrame>,
     added: Vec<QuantizedFrame>,
-    /// Models in force for unit 0 of the next layer or frame, and for the next unit of a higher refinement.
-    first_models: ModelsInForce,
-    models: ModelsInForce,
+    models: ModelsOfFrame,
     /// Header and offset of the last unit decoded.
     last: Option<(IncrementHeader, u64)>,
     bytes: u64,
@@ -94,8 +92,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
             field: Arc::new(CellField::default()),
             displaced: Vec::new(),
             added: Vec::new(),
-            first_models: models,
-            models: ModelsInForce::default(),
+            models: ModelsOfFrame::starting_with(models),
             last: None,
             bytes: frame.bytes,
         })
@@ -116,7 +113,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
                 rest.par_iter().map(|(_, prepared)| prepared.0.decode(self.sequence)).collect();
             for ((unit, (_, models)), values) in rest.iter().zip(values) {
                 self.unit(unit, &values?, predicts)?;
-                self.follow(unit.refinement, models.clone());
+                self.models.follow(unit.refinement, models.clone());
             }
             rest = later;
         }
@@ -125,29 +122,19 @@ impl<'d, 'a> Assembly<'d, 'a> {
 
     /// Reads the models of the units, up to the first that fails.
     fn prepare<'r>(&self, units: &'r [PendingIncrement<'a>]) -> (Vec<Prepared<'r, 'a>>, Option<Error>) {
-        let (mut first, mut current) = (self.first_models.clone(), self.models.clone());
+        let mut in_force = self.models.clone();
         let mut prepared = Vec::with_capacity(units.len());
         for unit in units {
-            let mut models = if unit.refinement == 0 { first.clone() } else { current.clone() };
+            let mut models = in_force.before(unit.refinement).clone();
             let ranks = (self.transforms.dc.header.rank, self.transforms.sh.map_or(0, |sh| sh.header.rank));
             let sh = ShCoding::of(&unit.increment.header.sh(), ranks.1);
             match PreparedIncrement::new(&unit.increment, ranks.0, sh, &mut models, &mut ()) {
                 Ok(read) => prepared.push((read, models.clone())),
                 Err(error) => return (prepared, Some(error)),
             }
-            if unit.refinement == 0 {
-                first = models.clone();
-            }
-            current = models;
+            in_force.follow(unit.refinement, models);
         }
         (prepared, None)
-    }
-
-    fn follow(&mut self, refinement: u8, models: ModelsInForce) {
-        if refinement == 0 {
-            self.first_models = models.clone();
-        }
-        self.models = models;
     }
 
     /// Applies a unit to its parents and checks what comes out.
@@ -319,7 +306,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
             fields,
             carried: Vec::new(),
             compensation: Compensation::default(),
-            models: self.first_models,
+            models: self.models.first,
         };
         let mut fault = None;
         if let (Some(reference), false) = (self.reference, self.options.subset) {

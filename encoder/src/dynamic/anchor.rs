@@ -15,7 +15,7 @@ use splatstream_decoder::increment::residual::{Attributes, Stage};
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::process::Compensation;
-use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::entropy::in_force::ModelsOfFrame;
 use splatstream_format::syntax::prefix_length;
 use std::sync::Arc;
 
@@ -51,8 +51,7 @@ struct Anchor<'a> {
     homes: Vec<Home>,
     /// Gaussians of each home, by place in the target.
     members: Vec<Vec<u32>>,
-    first_models: ModelsInForce,
-    models: ModelsInForce,
+    models: ModelsOfFrame,
     units: Vec<CodedUnit>,
 }
 
@@ -73,14 +72,13 @@ pub(crate) fn code_anchor(
         target,
         homes: vec![Home::empty(sh_planes); refinements],
         members: vec![Vec::new(); refinements],
-        first_models: ModelsInForce::default(),
-        models: ModelsInForce::default(),
+        models: ModelsOfFrame::default(),
         units: Vec::new(),
     };
     for layer in 0..sequence.spatial_layer_count {
         anchor.layer(layer, predictors)?;
     }
-    let Anchor { homes, members, first_models, units, .. } = anchor;
+    let Anchor { homes, members, models, units, .. } = anchor;
     let rows = members.iter().map(|home| home.iter().map(|&place| target.rows[place as usize]).collect());
     let reference = Reference {
         rows: rows.collect(),
@@ -92,7 +90,7 @@ pub(crate) fn code_anchor(
             carried: homes.iter().cloned().map(Some).collect(),
             homes,
             fields: Vec::new(),
-            models: first_models,
+            models: models.first,
         },
     };
     Ok((units, reference))
@@ -139,13 +137,10 @@ impl Anchor<'_> {
         let wanted = self.coder.place_new(&mut draft, self.target.wanted, &mut added);
         let lower: Vec<&QuantizedFrame> = self.homes[..home].iter().map(|home| &home.planes).collect();
         let situation = Situation { around: [&lower, &[]], parents_follow: true };
-        let mut models = if refinement == 0 { self.first_models.clone() } else { self.models.clone() };
+        let mut models = self.models.before(refinement).clone();
         let applied = predictors.choose(self.coder, &mut draft, parents, &situation, &wanted, &models)?;
         let sections = self.coder.sections(&draft, &mut models)?;
-        if refinement == 0 {
-            self.first_models = models.clone();
-        }
-        self.models = models;
+        self.models.follow(refinement, models);
         digests.push(unit_digest(&applied.home.planes, 0..applied.home.len()));
         draft.header.refinement_digest = frame_digest(digests);
         draft.header.carried_digest = frame_digest(&[]);

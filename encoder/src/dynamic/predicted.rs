@@ -24,7 +24,7 @@ use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::increment::{Situation, field};
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::process::Compensation;
-use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::importance;
 use std::sync::Arc;
@@ -174,18 +174,14 @@ impl Predicted<'_> {
             .collect();
         self.let_go(&displaced);
         let fresh = self.fresh(&displaced)?;
-        let mut models = self.reference.state.models.clone();
-        let mut after_first = models.clone();
+        let mut models = ModelsOfFrame::starting_with(self.reference.state.models.clone());
         let mut made: Vec<Made> = Vec::new();
         for (home, added) in fresh.of_home.iter().enumerate() {
             let draft = if home == 0 { first.clone() } else { self.coder.blank() };
             let unit = self.unit(home, draft, &displaced, &fresh, added, &made, predictors, &mut models)?;
             made.push(unit);
-            if home == 0 {
-                after_first = models.clone();
-            }
         }
-        self.finish(made, field, after_first)
+        self.finish(made, field, models.first)
     }
 
     /// Parts the pairs whose Gaussian cannot be brought to its partner.
@@ -307,8 +303,9 @@ impl Predicted<'_> {
         added: &[u32],
         made: &[Made],
         predictors: Chooser,
-        models: &mut ModelsInForce,
+        models: &mut ModelsOfFrame,
     ) -> Result<Made, Error> {
+        let refinement = home as u8;
         let start: usize = displaced[..home].iter().map(Home::len).sum();
         let parents = &displaced[home];
         let partners = &self.matching.target_of[start..start + parents.len()];
@@ -322,9 +319,11 @@ impl Predicted<'_> {
         let anchor = self.reference.state.anchor.iter().skip(home + 1).map(|home| &home.planes);
         let behind: Vec<&QuantizedFrame> = anchor.chain(made.iter().map(|made| &made.added)).collect();
         let situation = Situation { around: [&lower, &behind], parents_follow: false };
+        let mut in_force = models.before(refinement).clone();
         let applied =
-            predictors.choose(&self.coder, &mut draft, parents.clone(), &situation, &wanted, models)?;
-        let sections = self.coder.sections(&draft, models)?;
+            predictors.choose(&self.coder, &mut draft, parents.clone(), &situation, &wanted, &in_force)?;
+        let sections = self.coder.sections(&draft, &mut in_force)?;
+        models.follow(refinement, in_force);
         let continued = partners.iter().flatten().map(|&place| self.target.rows[place as usize]);
         let new = added.iter().map(|&place| self.target.rows[fresh.places[place as usize] as usize]);
         let rows = continued.chain(new).collect();

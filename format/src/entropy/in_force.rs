@@ -38,3 +38,33 @@ impl ModelsInForce {
         }
     }
 }
+
+/// The models in force for the next unit of a frame, by its refinement.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ModelsOfFrame {
+    /// For a unit of refinement 0: of the next spatial layer, or of a frame that refers to this one. A frame starts
+    /// with those of the frame it refers to.
+    pub first: ModelsInForce,
+    /// For a unit of a higher refinement: those after the unit before it.
+    current: ModelsInForce,
+}
+
+impl ModelsOfFrame {
+    /// Of a frame that has no unit yet, with `first` of the frame it refers to.
+    pub fn starting_with(first: ModelsInForce) -> Self {
+        Self { first, ..Self::default() }
+    }
+
+    /// Those in force for a unit.
+    pub const fn before(&self, refinement: u8) -> &ModelsInForce {
+        if refinement == 0 { &self.first } else { &self.current }
+    }
+
+    /// Takes those in force after a unit.
+    pub fn follow(&mut self, refinement: u8, models: ModelsInForce) {
+        if refinement == 0 {
+            self.first = models.clone();
+        }
+        self.current = models;
+    }
+}

@@ -25,7 +25,7 @@ impl Inspector<'_> {
         let increment = Increment::parse(payload, at, &sequence, &self.limits)?;
         let (dc_rank, sh_rank) = self.coding.frame_ranks;
         let sh = ShCoding::of(&increment.header.sh(), sh_rank);
-        let mut models = self.coding.in_force(unit.header.refinement).clone();
+        let mut models = self.coding.in_force.before(unit.header.refinement).clone();
         let mut here = after(at, IncrementHeader::SIZE);
         for coded in &increment.sections {
             let layout = Layout::of_section(coded.section, dc_rank, sh);
@@ -39,7 +39,7 @@ impl Inspector<'_> {
                 models.replace(coded.section, SectionModels { layout, models: read });
             }
         }
-        self.coding.follow(unit.header.refinement, models);
+        self.coding.in_force.follow(unit.header.refinement, models);
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Element, Inspector, variable_row};
 use crate::Result;
-use crate::entropy::in_force::ModelsInForce;
+use crate::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use crate::entropy::layout::{Layout, PlaneInfo, ShCoding};
 use crate::entropy::model::{ModelTrace, PlaneModel, Source, read_models};
 use crate::payload::{Refinement, leb128};
@@ -16,11 +16,11 @@ pub(super) struct Coding {
     sh_ranks: [u8; 16],
     pub(super) frame_ranks: (u8, u8),
     before: Option<(Layout, Vec<PlaneModel>)>,
-    /// Display index of the frame, and the models in force for its next unit of refinement 0.
-    frame: (u32, ModelsInForce),
-    /// The models in force for the next unit of a higher refinement.
-    current: ModelsInForce,
-    /// What `frame` was when earlier frames of the group ended.
+    /// Display index of the frame.
+    frame: u32,
+    /// The models in force for its next unit.
+    pub(super) in_force: ModelsOfFrame,
+    /// Earlier frames of the group, and the models for those that refer to them.
     earlier: Vec<(u32, ModelsInForce)>,
 }
 
@@ -48,28 +48,11 @@ impl Coding {
             let place = gop.place(number.checked_sub(first)?);
             first.checked_add(place.reference?)
         });
-        let inherited = self.models_of(reference);
-        let ended = core::mem::replace(&mut self.frame, (number, inherited));
-        self.earlier.push(ended);
-    }
-
-    fn models_of(&self, reference: Option<u32>) -> ModelsInForce {
-        let frames = self.earlier.iter().chain([&self.frame]);
-        let found = reference.and_then(|wanted| frames.rev().find(|(number, _)| *number == wanted));
-        found.map(|(_, models)| models.clone()).unwrap_or_default()
-    }
-
-    /// The models in force for a unit.
-    pub(super) fn in_force(&self, refinement: u8) -> &ModelsInForce {
-        if refinement == 0 { &self.frame.1 } else { &self.current }
-    }
-
-    /// Takes the models in force after a unit.
-    pub(super) fn follow(&mut self, refinement: u8, models: ModelsInForce) {
-        if refinement == 0 {
-            self.frame.1 = models.clone();
-        }
-        self.current = models;
+        self.earlier.push((self.frame, core::mem::take(&mut self.in_force.first)));
+        self.frame = number;
+        let mut frames = self.earlier.iter().rev();
+        let found = frames.find(|(number, _)| reference == Some(*number));
+        self.in_force.first = found.map(|(_, models)| models.clone()).unwrap_or_default();
     }
 }
 
