@@ -46,6 +46,7 @@ use sweep::{Sweep, SweepArgs};
 #[command(after_help = "Examples:\n  splatstream chart --builtin --quick -o look/\n  \
     splatstream chart garden.ply frames/ -o report/ --height 720\n  \
     splatstream chart frames/ -o report/ --presets balanced --qualities high --without contexts\n  \
+    splatstream chart frames/ -o report/ --quick --ablation --gop 8\n  \
     splatstream chart frames/ -o report/ --frames 8 --peers peers.json --st-lpips weights.npz")]
 pub(crate) struct Chart {
     /// Scene files, and directories of frames.
@@ -70,6 +71,10 @@ pub(crate) struct Chart {
     #[arg(long, value_name = "N", default_value_t = gop::FRAMES)]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=64))]
     gop: u32,
+    /// Of that group, measure each predictor of new Gaussians alone and together, and the network without each of its
+    /// parts; trains it for every row.
+    #[arg(long)]
+    ablation: bool,
     #[command(flatten)]
     sweep: SweepArgs,
     /// Results of other codecs on the same scenes.
@@ -103,7 +108,8 @@ impl Chart {
         let sweep = self.sweep.sweep(self.fps);
         let peers = self.peers.as_deref().map(Peers::read).transpose()?;
         let peer_steps = |scene: &Scene| peers.as_ref().map_or(0, |peers| peers.count(scene));
-        let gop_steps = |scene: &Scene| if gop::is_sequence(scene, self.gop) { gop::STEPS } else { 0 };
+        let gop_steps =
+            |scene: &Scene| if gop::is_sequence(scene, self.gop) { gop::steps(self.ablation) } else { 0 };
         let of_scene = |scene: &Scene| {
             scene.frames.len() as u32 + measure::steps(&sweep) + gop_steps(scene) + peer_steps(scene)
         };
@@ -150,7 +156,8 @@ impl Chart {
         let mut chart = SceneChart::new(scene, judge.cameras(), runs, spelled(sweep.quality()), charting.fps);
         if gop::is_sequence(scene, self.gop) {
             let settings = gop::settings(sweep.headline(), self.gop);
-            chart.gop = Some(gop::measure(scene, &settings, charting.fps, &mut judge, progress)?);
+            chart.gop =
+                Some(gop::measure(scene, &settings, (charting.fps, self.ablation), &mut judge, progress)?);
         }
         if let Some(peers) = &charting.peers {
             progress.step(format!("{}: pictures of other codecs", scene.name));

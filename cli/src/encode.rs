@@ -9,14 +9,18 @@ use crate::frame_files::FrameFiles;
 use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
 use crate::output_file::OutputFile;
 use crate::progress::Progress;
-use crate::setting_names::{PresetName, QualityName, ShName, ToolName};
+use crate::setting_names::{PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName};
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use splatstream_encoder::transformer::Architecture;
 use splatstream_encoder::{
-    FrameSource, Importance, PredictorChoice, Quality, Report, Settings, Structure, encode,
+    FrameSource, Importance, NetworkSource, Quality, Report, Settings, Structure, encode,
 };
+use splatstream_format::payload::Network;
+use std::convert::Infallible;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Instant;
 
 /// Encode frames of Gaussians to a stream.
@@ -57,9 +61,21 @@ pub(crate) struct Encode {
     /// Code every frame by itself.
     #[arg(long, conflicts_with = "temporal_layers")]
     all_intra: bool,
-    /// How new Gaussians are predicted from those of the reference or of lower layers.
-    #[arg(long, value_enum, default_value_t = PredictorName::Bits)]
-    predictors: PredictorName,
+    /// What new Gaussians are predicted by, from those of the reference or of lower layers.
+    #[arg(long, value_enum, default_value_t = PredictorName::Auto)]
+    predictor: PredictorName,
+    /// How a predictor is chosen.
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = PredictorChoiceName::Bits)]
+    choose_by: PredictorChoiceName,
+    /// Neighbours of a prediction.
+    #[arg(long, value_name = "K", default_value_t = Settings::default().neighbours)]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..=16))]
+    neighbours: u8,
+    /// The network of the transformer: registered, trained (on this sequence, and carried in the stream), or a file
+    /// that train has made; default is trained for the small preset and for --predictor transformer, and none
+    /// otherwise.
+    #[arg(long, value_name = "registered|trained|FILE")]
+    network: Option<NetworkName>,
     /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100.
     #[arg(long, value_name = "PERCENTS", value_delimiter = ',', default_value = "10,20,30,50,100")]
     refinements: Vec<u8>,
@@ -104,23 +120,38 @@ fn parse_psnr(text: &str) -> Result<f32, String> {
     decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum PredictorName {
-    /// Not at all.
-    None,
-    /// Where it saves bits, chosen for runs of Gaussians.
-    Bits,
-    /// By the smallest sum of residuals, for each Gaussian: the paper's choice.
-    L1,
+/// Where the network of the transformer comes from.
+#[derive(Clone)]
+enum NetworkName {
+    Registered,
+    Trained,
+    File(PathBuf),
 }
 
-impl From<PredictorName> for PredictorChoice {
-    fn from(name: PredictorName) -> Self {
-        match name {
-            PredictorName::None => Self::None,
-            PredictorName::Bits => Self::Bits,
-            PredictorName::L1 => Self::Difference,
-        }
+impl FromStr for NetworkName {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text {
+            "registered" => Self::Registered,
+            "trained" => Self::Trained,
+            path => Self::File(path.into()),
+        })
+    }
+}
+
+impl NetworkName {
+    fn source(&self) -> Result<NetworkSource, Failure> {
+        Ok(match self {
+            Self::Registered => NetworkSource::Registered,
+            Self::Trained => NetworkSource::Trained(Architecture::default()),
+            Self::File(path) => {
+                let bytes = std::fs::read(path).map_err(|cause| Failure::file("read", path, &cause))?;
+                let network = Network::parse(&bytes, 0)
+                    .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+                NetworkSource::Given(Box::new(network))
+            }
+        })
     }
 }
 
@@ -189,7 +220,10 @@ impl Encode {
         let mut settings = Settings {
             structure,
             spatial_layers: layers,
-            predictors: self.predictors.into(),
+            predictors: self.predictor.into(),
+            predictor_choice: self.choose_by.into(),
+            neighbours: self.neighbours,
+            network: self.network.as_ref().map(NetworkName::source).transpose()?,
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
             psnr: self.psnr,

@@ -26,6 +26,7 @@ mod statistics;
 mod stream_file;
 mod structure;
 mod table;
+mod train;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -65,6 +66,7 @@ enum Command {
     Compare(compare::Compare),
     Render(render::Render),
     Chart(chart::Chart),
+    Train(train::Train),
 }
 
 fn main() -> ExitCode {
@@ -101,6 +103,7 @@ impl Command {
             Self::Compare(command) => command.run(console),
             Self::Render(command) => command.run(console),
             Self::Chart(command) => command.run(console),
+            Self::Train(command) => command.run(console),
         }
     }
 }

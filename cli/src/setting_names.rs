@@ -1,7 +1,8 @@
 //! How the command line spells what the encoder can be told.
 
 use clap::ValueEnum;
-use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice};
+use splatstream_decoder::predictor::Predictor;
+use splatstream_encoder::{Importance, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice};
 
 /// How much to search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -36,6 +37,51 @@ pub(crate) enum ShName {
     Coefficients,
     /// Vector quantisation.
     Vq,
+}
+
+/// What new Gaussians of predicted frames and of higher spatial layers are predicted by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PredictorName {
+    /// Whatever saves bits: none, knn, bilateral or transformer.
+    Auto,
+    /// Not at all.
+    None,
+    /// By neighbours, weighted by distance, where that saves bits.
+    Knn,
+    /// By neighbours, weighted by distance and likeness, where that saves bits.
+    Bilateral,
+    /// By a network, where that saves bits.
+    Transformer,
+}
+
+impl From<PredictorName> for Predictors {
+    fn from(name: PredictorName) -> Self {
+        match name {
+            PredictorName::Auto => Self::ALL,
+            PredictorName::None => Self::NONE,
+            PredictorName::Knn => Self::one(Predictor::Knn),
+            PredictorName::Bilateral => Self::one(Predictor::Bilateral),
+            PredictorName::Transformer => Self::one(Predictor::Transformer),
+        }
+    }
+}
+
+/// How a predictor is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PredictorChoiceName {
+    /// By estimated bits, for runs of Gaussians.
+    Bits,
+    /// By the smallest sum of residuals, for each Gaussian: the paper's choice.
+    L1,
+}
+
+impl From<PredictorChoiceName> for PredictorChoice {
+    fn from(name: PredictorChoiceName) -> Self {
+        match name {
+            PredictorChoiceName::Bits => Self::Bits,
+            PredictorChoiceName::L1 => Self::Difference,
+        }
+    }
 }
 
 /// A tool of the encoder that can be left out.

@@ -142,7 +142,7 @@ impl State {
                     self.increments.start_frame(unit.header.frame, gop);
                 }
             }
-            UnitType::Transform | UnitType::Codebook => {
+            UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
                 if let (Some(gop), Some(sequence)) = (&mut self.gop, &self.sequence) {
                     gop.tool(unit, sequence, profile, limits)?;
                 }

@@ -42,12 +42,12 @@ pub(crate) struct Group {
     pub(crate) header: GopHeader,
     /// Display index of the first frame.
     pub(crate) first_frame: u32,
-    /// Transforms and codebooks.
+    /// Transforms, codebooks and weights.
     pub(crate) tools: Vec<Tool>,
     pub(crate) frames: Vec<Frame>,
 }
 
-/// A transform or codebook unit.
+/// A transform, codebook or weights unit.
 pub(crate) struct Tool {
     pub(crate) place: UnitPlace,
     pub(crate) unit_type: UnitType,
@@ -75,8 +75,16 @@ pub(crate) struct Frame {
 pub(crate) struct LayerUnit {
     pub(crate) place: UnitPlace,
     pub(crate) header: UnitHeader,
-    /// The codebook units that it uses.
+    pub(crate) tools: UsedTools,
+}
+
+/// The tool units that a refinement unit or increment uses.
+#[derive(Default)]
+pub(crate) struct UsedTools {
+    /// Codebook units.
     pub(crate) codebooks: Vec<usize>,
+    /// The weights unit of the group, if new Gaussians have predictors.
+    pub(crate) weights: Option<usize>,
 }
 
 /// The units that hold the definitions in force.
@@ -85,6 +93,7 @@ struct Definitions {
     dc: [Option<usize>; 16],
     sh: [Option<usize>; 16],
     codebooks: [Option<usize>; 16],
+    weights: Option<usize>,
 }
 
 impl Group {
@@ -174,7 +183,7 @@ impl Structure {
                 self.definitions = Definitions::default();
                 self.groups.push(Group { place, header, first_frame: unit.header.frame, tools, frames });
             }
-            UnitType::Transform | UnitType::Codebook => self.tool(unit, place)?,
+            UnitType::Transform | UnitType::Codebook | UnitType::Weights => self.tool(unit, place)?,
             UnitType::FrameHeader => {
                 self.end_frame();
                 let header = FrameHeader::parse_payload(payload, at, profile)?;
@@ -182,8 +191,8 @@ impl Structure {
                 self.frame(&unit.header, place, transforms);
             }
             unit_type if is_of_frame(unit_type, profile) => {
-                let codebooks = self.codebooks_of(unit);
-                self.layer_unit(unit.header, place, codebooks);
+                let tools = self.tools_of(unit);
+                self.layer_unit(unit.header, place, tools);
             }
             UnitType::OperatingPoints | UnitType::Index | UnitType::End => self.end_frame(),
             _ => {}
@@ -201,12 +210,12 @@ impl Structure {
                 self.frame(header, place, Vec::new());
                 Ok(())
             }
-            UnitType::Transform | UnitType::Codebook => {
+            UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
                 self.add_tool(header, place);
                 Ok(())
             }
             unit_type if is_of_frame(unit_type, self.profile.unwrap_or(Profile::Intra)) => {
-                self.layer_unit(*header, place, Vec::new());
+                self.layer_unit(*header, place, UsedTools::default());
                 Ok(())
             }
             _ => Ok(()),
@@ -221,7 +230,12 @@ impl Structure {
 
     fn tool(&mut self, unit: &Unit<'_>, place: UnitPlace) -> Result<(), Error> {
         let Some(sequence) = &self.sequence else { return Ok(()) };
-        let Definitions { dc, sh, codebooks } = &mut self.definitions;
+        let Definitions { dc, sh, codebooks, weights } = &mut self.definitions;
+        if unit.header.unit_type() == UnitType::Weights {
+            *weights = Some(place.unit);
+            self.add_tool(&unit.header, place);
+            return Ok(());
+        }
         let (slots, id) = if unit.header.unit_type() == UnitType::Transform {
             let (header, _) = TransformHeader::parse(unit.payload, unit.payload_at, sequence)?;
             (if header.kind() == Some(TransformKind::Sh) { sh } else { dc }, header.transform_id)
@@ -256,31 +270,30 @@ impl Structure {
         group.frames.push(Frame { number, place, coding, transforms, units: Vec::new(), ended: false });
     }
 
-    fn layer_unit(&mut self, header: UnitHeader, place: UnitPlace, codebooks: Vec<usize>) {
+    fn layer_unit(&mut self, header: UnitHeader, place: UnitPlace, tools: UsedTools) {
         let frame = self.groups.last_mut().and_then(|group| group.frames.last_mut());
         if let Some(frame) = frame.filter(|frame| frame.number == header.frame) {
-            frame.units.push(LayerUnit { place, header, codebooks });
+            frame.units.push(LayerUnit { place, header, tools });
         }
     }
 
-    /// The codebook units that a unit uses; none where its header cannot be read, which is no error in a unit that
-    /// decoders pass over.
-    fn codebooks_of(&self, unit: &Unit<'_>) -> Vec<usize> {
-        let Some(sequence) = &self.sequence else { return Vec::new() };
+    /// The tools that a unit uses; none where its header cannot be read, which is no error in a unit that decoders pass
+    /// over.
+    fn tools_of(&self, unit: &Unit<'_>) -> UsedTools {
+        let Some(sequence) = &self.sequence else { return UsedTools::default() };
         let (payload, at) = (unit.payload, unit.payload_at);
-        let sh: Result<ShHeader, Error> = match unit.header.unit_type() {
-            UnitType::Increment => {
-                IncrementHeader::parse(payload, at, sequence).map(|(header, _)| header.sh())
-            }
-            _ => RefinementHeader::parse(payload, at, sequence).map(|(header, _)| header.sh()),
+        let elements: Result<(ShHeader, bool), Error> = match unit.header.unit_type() {
+            UnitType::Increment => IncrementHeader::parse(payload, at, sequence)
+                .map(|(header, _)| (header.sh(), header.predictor_count() > 0)),
+            _ => RefinementHeader::parse(payload, at, sequence).map(|(header, _)| (header.sh(), false)),
         };
-        let Ok(sh) = sh else { return Vec::new() };
-        let mut units: Vec<usize> = sh
+        let Ok((sh, predicts)) = elements else { return UsedTools::default() };
+        let mut codebooks: Vec<usize> = sh
             .codebooks()
             .filter_map(|id| self.definitions.codebooks.get(usize::from(id)).copied().flatten())
             .collect();
-        units.dedup();
-        units
+        codebooks.dedup();
+        UsedTools { codebooks, weights: self.definitions.weights.filter(|_| predicts) }
     }
 }
 

@@ -1,5 +1,6 @@
-//! The vectors of profile Dynamic, `conformance/vectors/dynamic`: what is decoded at every operating point, shown in
-//! full and as a subset, and which errors are reported. All were written by the independent decoder's generator.
+//! The vectors of profile Dynamic, `conformance/vectors/dynamic`, and those of its learned predictor, `learned`: what is
+//! decoded at every operating point, shown in full and as a subset, and which errors are reported. All were written by
+//! the independent decoder's generator.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
 use serde_json::{Value, json};
@@ -13,9 +14,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 fn vectors(folder: &str) -> Vec<(PathBuf, Value)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/vectors/dynamic").join(folder);
-    let mut streams: Vec<PathBuf> =
-        std::fs::read_dir(root).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/vectors");
+    let folders = ["dynamic", "learned"].map(|suite| root.join(suite).join(folder));
+    let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    let mut streams: Vec<PathBuf> = files.map(|entry| entry.unwrap().path()).collect();
     streams.retain(|path| path.extension().is_some_and(|extension| extension == "gss"));
     streams.sort();
     let record = |path: &PathBuf| std::fs::read_to_string(path.with_extension("expect.json")).unwrap();
@@ -111,10 +113,11 @@ fn check(path: &Path, wanted: &Value) {
     }
 }
 
+// covers: SS-TR-001, SS-TR-002, SS-TR-003, SS-TR-004, SS-TR-005, SS-TR-006, SS-TR-007, SS-TR-008, SS-TR-010, SS-WT-004
 #[test]
 fn valid_vectors_decode_alike_at_every_point() {
     let vectors = vectors("valid");
-    assert!(vectors.len() >= 60, "{} vectors", vectors.len());
+    assert!(vectors.len() >= 100, "{} vectors", vectors.len());
     vectors.iter().for_each(|(path, wanted)| check(path, wanted));
 }
 
@@ -133,9 +136,10 @@ fn extraction_of_valid_vectors_decodes_like_the_point() {
     }
 }
 
+// covers: SS-WT-001, SS-WT-002, SS-WT-003, SS-WT-004, SS-PR-002, SS-PR-008
 #[test]
 fn invalid_vectors_are_refused_and_shown_as_far_as_they_go() {
     let vectors = vectors("invalid");
-    assert!(vectors.len() >= 60, "{} vectors", vectors.len());
+    assert!(vectors.len() >= 100, "{} vectors", vectors.len());
     vectors.iter().for_each(|(path, wanted)| check(path, wanted));
 }

@@ -33,13 +33,13 @@ MAX_TOKEN = 255
 # 6.3: unit types
 UT_SEQUENCE, UT_GOP, UT_FRAME, UT_TRANSFORM = 1, 2, 3, 4
 UT_CODEBOOK, UT_REFINEMENT, UT_INDEX, UT_END = 5, 6, 7, 8
-UT_INCREMENT, UT_POINTS = 10, 11
+UT_WEIGHTS, UT_INCREMENT, UT_POINTS = 9, 10, 11
 
 
 def known_unit_types(profile):
-    """6.3: type 10 is known in profile 1 only."""
+    """6.3: types 9 and 10 are known in profile 1 only."""
     known = tuple(range(1, 9)) + (UT_POINTS,)
-    return known + (UT_INCREMENT,) if profile == PROFILE_DYNAMIC else known
+    return known + (UT_WEIGHTS, UT_INCREMENT) if profile == PROFILE_DYNAMIC else known
 
 
 # 6.6: frame types
@@ -47,6 +47,7 @@ TYPE_I, TYPE_P, TYPE_B = 0, 1, 2
 
 # A.2
 MAX_GAUSSIANS = {1: 2 ** 18, 2: 2 ** 20, 3: 2 ** 22, 4: 2 ** 24}
+MAX_LEARNED = {1: 2 ** 17, 2: 2 ** 19, 3: 2 ** 21, 4: 2 ** 23}
 MAX_PAYLOAD_LENGTH = 2 ** 30
 MAX_UNITS = 2 ** 24
 MAX_CODEBOOK_VALUES = 2 ** 23

@@ -8,6 +8,7 @@ from dynamic import DynamicFrame, Gop
 from errors import StreamError, require
 from increment import Context, Increment
 from intra import Frame, decode_refinement
+from network import parse_weights
 from semantics_dynamic import parse_points
 
 START, SEQUENCE, GOP, FRAME, BETWEEN = "START", "SEQUENCE", "GOP", "FRAME", "BETWEEN"
@@ -26,7 +27,8 @@ ALLOWED = {
     c.UT_END: (SEQUENCE, GOP, FRAME, BETWEEN, LISTED, INDEXED),
 }
 ALLOWED_DYNAMIC = dict(ALLOWED)
-ALLOWED_DYNAMIC.update({c.UT_CODEBOOK: (GOP, FRAME, BETWEEN), c.UT_REFINEMENT: (), c.UT_INCREMENT: (FRAME,)})
+ALLOWED_DYNAMIC.update({c.UT_CODEBOOK: (GOP, FRAME, BETWEEN), c.UT_REFINEMENT: (), c.UT_INCREMENT: (FRAME,),
+                        c.UT_WEIGHTS: (GOP,)})
 CLOSES_GOP = (c.UT_GOP, c.UT_POINTS, c.UT_INDEX, c.UT_END)
 
 
@@ -61,6 +63,7 @@ class Decoder:
 
     def undefine(self):
         self.dc_transform, self.sh_transform, self.codebook = {}, {}, {}
+        self.network = None
 
     @property
     def dynamic(self):
@@ -131,8 +134,8 @@ class Decoder:
         self.check_payload_crc(unit)                                               # 2.10
         self.check_place(unit)                                                     # 2.11
         {c.UT_SEQUENCE: self.on_sequence, c.UT_GOP: self.on_gop, c.UT_FRAME: self.on_frame,
-         c.UT_TRANSFORM: self.on_transform, c.UT_CODEBOOK: self.on_codebook, c.UT_POINTS: self.on_points,
-         c.UT_INDEX: self.on_index, c.UT_END: self.on_end}[unit.unit_type](unit)   # 2.12
+         c.UT_TRANSFORM: self.on_transform, c.UT_CODEBOOK: self.on_codebook, c.UT_WEIGHTS: self.on_weights,
+         c.UT_POINTS: self.on_points, c.UT_INDEX: self.on_index, c.UT_END: self.on_end}[unit.unit_type](unit)   # 2.12
 
     def check_place(self, unit):
         """9.3 step 2.11: SS-BS-001 to SS-BS-003, SS-UH-007, SS-BS-006, SS-LO-005, SS-BS-010, SS-BS-009"""
@@ -154,7 +157,7 @@ class Decoder:
             require(complete, "MISMATCH", "7.1.2", unit.start)
         if kind == c.UT_GOP and self.next_frame is not None:
             require(unit.frame == self.next_frame + self.frames_left, "MISMATCH", "6.5", unit.at("frame"))
-        if kind in (c.UT_TRANSFORM, c.UT_CODEBOOK):
+        if kind in (c.UT_TRANSFORM, c.UT_CODEBOOK, c.UT_WEIGHTS):
             require(unit.frame == self.gop_header_frame, "MISMATCH", "7.1.2", unit.at("frame"))
         if kind == c.UT_FRAME:
             later = self.gop is not None and self.gop.predicted and self.phase != GOP
@@ -228,6 +231,9 @@ class Decoder:
         self.codebook[book.codebook_id] = book
         if self.phase == FRAME:
             self.phase = BETWEEN
+
+    def on_weights(self, unit):
+        self.network = parse_weights(self.payload_reader(unit), self.network is not None)
 
     def on_frame(self, unit):
         frame_type = self.gop.order(unit.frame)[0] if self.dynamic else None
@@ -308,4 +314,4 @@ class Decoder:
         """Definitions that the frame in progress uses."""
         header = self.frame.header
         return Context(self.sequence, self.dc_transform[header.dc_transform_id],
-                       self.sh_transform.get(header.sh_transform_id), self.codebook)
+                       self.sh_transform.get(header.sh_transform_id), self.codebook, self.network)

@@ -3,6 +3,7 @@
 import models as plane_models
 import prediction
 from cells import coordinates, decode_cells
+from constants import MAX_LEARNED
 from errors import require
 from homes import Gaussian, MOVE_AND_UPDATE, UPDATE, check_modes, moved, survivors
 from parsing import BlockDecoder
@@ -14,10 +15,11 @@ from semantics_dynamic import parse_increment
 class Context:
     """What the values of an increment depend on beside its frame."""
 
-    def __init__(self, seq, dc_transform, sh_transform, codebooks):
+    def __init__(self, seq, dc_transform, sh_transform, codebooks, network):
         self.seq = seq
         self.dc_transform, self.sh_transform = dc_transform, sh_transform
         self.codebooks = codebooks
+        self.network = network                      # None in a GOP without weights
 
 
 class Section:
@@ -84,10 +86,10 @@ class Increment:
             self.models[section.name] = section.parse_models(models_in_force.get(section.name))
         for section in sections:
             section.parse_blocks()
-        self.check_values({section.name: section for section in sections}, parents)
+        self.check_values({section.name: section for section in sections}, parents, MAX_LEARNED[level])
         return self
 
-    def check_values(self, sections, parents):
+    def check_values(self, sections, parents, most_learned):
         """8.7 step 3 and 4, with the reconstruction of 7.14 to 7.17."""
         u, seq, frame = self.header, self.context.seq, self.frame
         if not frame.intra and self.r == 0:
@@ -106,8 +108,9 @@ class Increment:
             parents = self.updated(parents, modes, lambda attribute, p: section.values(attribute), section.at())
         predictors = []
         if "predictors" in sections:
-            prediction.check_predictors(sections["predictors"])
+            prediction.check_predictors(sections["predictors"], self.context.network)
             predictors = sections["predictors"].values("predictor")[0]
+            self.check_learned(predictors, parents, most_learned, sections["predictors"].at())
         self.new = []
         if "new" in sections:
             section = sections["new"]
@@ -144,9 +147,20 @@ class Increment:
             result.append(tuple((x << shift) + middle for x in coordinates(code, bits)))
         return result
 
+    def references(self, parents):
+        """7.17.1; `parents` are those after moves and updates."""
+        return [prediction.reference(g) for g in self.frame.reference_set(self.s, self.r, self.cells, parents)]
+
+    def check_learned(self, predictors, parents, most, at):
+        """SS-PR-008"""
+        if prediction.TRANSFORMER in predictors:
+            kinds = prediction.predictor_of_entries(self.header.new_count, self.header, predictors,
+                                                    self.references(parents))
+            require(kinds.count(prediction.TRANSFORMER) <= most, "OVER_LIMIT", "7.17", at)
+
     def new_gaussians(self, positions, predictors, parents, take, at):
-        """7.16 and 7.17; `parents` are those after moves and updates."""
-        references = [prediction.reference(g) for g in self.frame.reference_set(self.s, self.r, self.cells, parents)]
+        """7.16 and 7.17"""
+        references = self.references(parents)
         kinds = prediction.predictor_of_entries(len(positions), self.header, predictors, references)
         predict = prediction.NewPredictions(positions, kinds, references, self.header, self.context)
         values = Residuals(len(positions), predict, take, self.header, self.context, at).run()

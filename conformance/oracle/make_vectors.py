@@ -14,7 +14,6 @@ import constants as c
 import points
 from decode import report
 from decoding import Decoder
-from errors import StreamError
 from extraction import extract
 from homes import canonical_planes
 from output import float_planes
@@ -133,6 +132,19 @@ def write_valid(folder, count):
         seed += 1
 
 
+def faulty_record(data, fault, code):
+    """The record of a stream with a fault, whose first error has the given code, any if it is None."""
+    decoder, record = whole_record(data)
+    if code is not None and record.get("code") != code:
+        raise ValueError("%s gives %s" % (fault, record.get("code")))
+    record["fault"] = fault
+    if len(decoder.frames) > 0 and decoder.sequence.refinement_count > 1:
+        sequence = decoder.sequence
+        low = (sequence.top, sequence.temporal_layer_count - 1, 0)
+        record["points"] = {"s%d,t%d,r%d" % low: report(Decoder(data, low).decode())}
+    return record
+
+
 def write_invalid(folder, count):
     """All faults and mutations in turn, until there are enough; without a number, each of them once."""
     rows = [("fault", fault) for fault in FAULTS] + [("mutation", mutation) for mutation in MUTATIONS]
@@ -152,16 +164,7 @@ def write_invalid(folder, count):
                 data = mutated(row, stream, seed)
             if data is not None and not Decoder(data).decode().errors:
                 data = None                         # noise where it does not matter
-        decoder, record = whole_record(data)
-        expected = row[1]
-        if expected is not None and record["code"] != expected:
-            raise StreamError(record["code"], record["clause"], record["byte"])
-        record["fault"] = row[0]
-        if len(decoder.frames) > 0 and decoder.sequence.refinement_count > 1:
-            sequence = decoder.sequence
-            low = (sequence.top, sequence.temporal_layer_count - 1, 0)
-            record["points"] = {"s%d,t%d,r%d" % low: report(Decoder(data, low).decode())}
-        write(folder, name, data, record)
+        write(folder, name, data, faulty_record(data, row[0], row[1]))
         written += 1
 
 

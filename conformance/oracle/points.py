@@ -19,13 +19,13 @@ def belongs(unit, point, seq, gop):
 
 
 class Ledger:
-    """The units of known type among 2 to 6 and 10 of a stream, for SS-PL-002."""
+    """The units of known type among 2 to 6, 9 and 10 of a stream, for SS-PL-002."""
 
     def __init__(self):
         self.units = []                             # (unit, GOP or None)
 
     def add(self, unit, gop):
-        if unit.unit_type in (2, 3, 4, 5, 6, 10):
+        if unit.known and unit.unit_type in (2, 3, 4, 5, 6, 9, 10):
             self.units.append((unit, gop))
 
     def frame_count(self, point, seq):

@@ -6,8 +6,10 @@ from collections import namedtuple
 from conventions import Round
 from errors import require
 from homes import canonical
+from tables import EXP
+from transformer import Transformer
 
-NONE, KNN, BILATERAL, RESERVED = range(4)
+NONE, KNN, BILATERAL, TRANSFORMER = range(4)
 
 # Values of a Gaussian of a reference set (SS-PR-004): position and rotation are canonical
 Reference = namedtuple("Reference", "position q o rotation dc sh")
@@ -64,11 +66,11 @@ class Neighbours:
             self.visit(far, position, k, worst_first)
 
 
-def check_predictors(section):
+def check_predictors(section, network):
     """SS-PR-002, entry by entry."""
     for i, value in enumerate(section.values("predictor")[0]):
-        require(value != RESERVED, "RESERVED", "7.17", section.at(i))
-        require(0 <= value < RESERVED, "OUT_OF_RANGE", "7.17", section.at(i))
+        require(NONE <= value <= TRANSFORMER, "OUT_OF_RANGE", "7.17", section.at(i))
+        require(value != TRANSFORMER or network is not None, "UNDEFINED", "7.17", section.at(i))
 
 
 def predictor_of_entries(count, increment, values, references):
@@ -82,11 +84,15 @@ class NewPredictions:
     """`predict` of residuals.Residuals for section new."""
 
     def __init__(self, positions, kinds, references, increment, context):
+        self.positions = positions
         self.kinds = kinds
         self.references = references
         self.increment = increment
         self.context = context
         self.neighbours = [None] * len(kinds)
+        self.learned = {}                           # place of a new Gaussian -> its p.dc and p.sh
+        if TRANSFORMER in kinds:
+            self.transformer = Transformer(context.network, context.dc_transform, context.sh_transform)
         tree = Neighbours(references) if any(kinds) else None
         for i, kind in enumerate(kinds):
             if kind != NONE:
@@ -96,7 +102,9 @@ class NewPredictions:
         kind = self.kinds[i]
         if kind == NONE:
             return self.none(attribute)
-        if kind == KNN:
+        if kind == TRANSFORMER and attribute in ("dc", "sh"):
+            p = self.transformed(attribute, i, values)
+        elif kind == KNN:
             p = self.knn(attribute, self.neighbours[i])
         else:
             p = self.bilateral(attribute, self.neighbours[i], values)
@@ -136,6 +144,9 @@ class NewPredictions:
     # ---- 7.17.4 ----
 
     def bilateral(self, attribute, neighbours, values):
+        return self.means(attribute, self.weights(attribute, neighbours, values), neighbours)
+
+    def weights(self, attribute, neighbours, values):
         farthest = neighbours[-1][0]
         weight = []
         for d2, index in neighbours:
@@ -143,7 +154,20 @@ class NewPredictions:
             xs = (d2 * self.increment.bilateral_spatial) // (farthest + 1)
             xf = min(255, (f * self.increment.bilateral_feature) >> 6)
             weight.append(EXP[min(255, xs + xf)])
-        return self.means(attribute, weight, neighbours)
+        return weight
+
+    # ---- 7.17.6 ----
+
+    def transformed(self, attribute, i, values):
+        """p.dc and p.sh are found at once, before dc is decoded."""
+        if attribute == "dc":
+            neighbours = self.neighbours[i]
+            weight = self.weights("dc", neighbours, values)
+            base = {name: self.means(name, weight, neighbours) for name in ("dc", "sh")}
+            own = (self.positions[i], values.q, values.o, canonical(values.rotation_fine))
+            near = [(self.references[index], d2) for d2, index in neighbours]
+            self.learned[i] = self.transformer.predict(own, near, weight, base)
+        return self.learned[i][attribute]
 
 
 def mean(weight, x):
@@ -169,25 +193,3 @@ def feature_distance(attribute, values, neighbour):
 
 def squares(a, b):
     return sum((x - y) * (x - y) for x, y in zip(a, b))
-
-
-# ---- 7.17.5 ----
-
-EXP = [
-    4096, 3970, 3848, 3729, 3615, 3503, 3396, 3291, 3190, 3092, 2997, 2904, 2815, 2729, 2645, 2563,
-    2484, 2408, 2334, 2262, 2192, 2125, 2060, 1996, 1935, 1875, 1818, 1762, 1707, 1655, 1604, 1555,
-    1507, 1460, 1416, 1372, 1330, 1289, 1249, 1211, 1174, 1137, 1102, 1069, 1036, 1004, 973, 943,
-    914, 886, 859, 832, 807, 782, 758, 734, 712, 690, 669, 648, 628, 609, 590, 572,
-    554, 537, 521, 505, 489, 474, 460, 445, 432, 418, 406, 393, 381, 369, 358, 347,
-    336, 326, 316, 306, 297, 288, 279, 270, 262, 254, 246, 238, 231, 224, 217, 210,
-    204, 198, 192, 186, 180, 174, 169, 164, 159, 154, 149, 145, 140, 136, 132, 128,
-    124, 120, 116, 113, 109, 106, 103, 99, 96, 93, 90, 88, 85, 82, 80, 77,
-    75, 73, 70, 68, 66, 64, 62, 60, 58, 57, 55, 53, 52, 50, 48, 47,
-    46, 44, 43, 41, 40, 39, 38, 37, 35, 34, 33, 32, 31, 30, 29, 28,
-    28, 27, 26, 25, 24, 24, 23, 22, 21, 21, 20, 20, 19, 18, 18, 17,
-    17, 16, 16, 15, 15, 14, 14, 13, 13, 13, 12, 12, 12, 11, 11, 10,
-    10, 10, 10, 9, 9, 9, 8, 8, 8, 8, 7, 7, 7, 7, 7, 6,
-    6, 6, 6, 6, 5, 5, 5, 5, 5, 5, 5, 4, 4, 4, 4, 4,
-    4, 4, 4, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 2, 2, 2,
-    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1,
-]

@@ -142,6 +142,22 @@ OPERATING_POINT = [
     ("byte_count", "u64", 1, "6.16"),
 ]
 
+WEIGHTS_FIXED = [("model_source", "u8", 1, "6.17")]
+
+NETWORK_FIXED = [
+    ("network_flags", "u8", 1, "6.17"),
+    ("width_log2", "u8", 1, "6.17"),
+    ("feed_forward_width", "u8", 1, "6.17"),
+    ("geometry_width", "u8", 1, "6.17"),
+    ("fourier_count", "u8", 1, "6.17"),
+    ("rank_count", "u8", 1, "6.17"),
+    ("dc_count", "u8", 1, "6.17"),
+    ("sh_count", "u8", 1, "6.17"),
+    ("token_shift", "u8", 1, "6.17"),
+    ("output_shift", "u8", 1, "6.17"),
+    ("layer_shift", "u8", 8, "6.17"),
+]
+
 
 class Record:
     """The elements of a record by name; `at(name)` is the offset in the stream of an element."""

@@ -18,6 +18,8 @@ from synth_increment import IncrementWriter
 class DynamicSynth:
     """stream() gives the bytes. tamper(stage, value, writer) may change what increments hold (synth_faults.py)."""
 
+    writer_class = IncrementWriter
+
     def __init__(self, seed, tamper=None, most=None, deep=False):
         """most: Gaussians of a frame, about; deep: one GOP of temporal_depth 2 or 3 in a small sequence."""
         self.rng = random.Random(seed)
@@ -40,7 +42,7 @@ class DynamicSynth:
         """Units that may stand anywhere: private ones, unknown ones, copies of sequence_parameters."""
         rng = self.rng
         if rng.random() < 0.06:
-            self.put(rng.choice([9, 12, 127, 128, 255]), b"private"[:rng.randint(0, 7)], frame=77, flags=0,
+            self.put(rng.choice([13, 12, 127, 128, 255]), b"private"[:rng.randint(0, 7)], frame=77, flags=0,
                      spatial=rng.choice([0, 3, 9]), temporal=rng.choice([0, 1, 200]), refinement=rng.choice([0, 9, 200]))
         if rng.random() < 0.04 and self.live.sequence is not None:
             self.put(c.UT_SEQUENCE, self.parameters)
@@ -128,8 +130,8 @@ class DynamicSynth:
         self.sh_ranks = {}
         means = ([0, 5000, -777, 2 ** 30], [0, 5000, -777, 2 ** 29])
         for kind, dimension in ((0, 3), (1, planes)):
-            for identifier in rng.sample(range(16), rng.randint(1, 2) if dimension else 0):
-                rank = rng.randint(1, min(dimension, 3 if kind == 0 else 5))
+            for identifier in rng.sample(range(16), self.transform_count(kind, dimension)):
+                rank = self.rank(kind, dimension)
                 payload = bytes([identifier, kind, dimension, rank])
                 payload += b"".join(struct.pack("<i", rng.choice(means[kind])) for _ in range(dimension))
                 payload += b"".join(struct.pack("<h", rng.choice([4096, -4096, 0, rng.randint(-4096, 4096)]))
@@ -140,6 +142,12 @@ class DynamicSynth:
         for rank in self.sh_ranks.values():
             for _ in range(rng.randint(0, 2)):
                 self.codebook(rng.randrange(16), rank)
+
+    def transform_count(self, kind, dimension):
+        return self.rng.randint(1, 2) if dimension else 0
+
+    def rank(self, kind, dimension):
+        return self.rng.randint(1, min(dimension, 3 if kind == 0 else 5))
 
     def codebook(self, identifier, rank):
         """Defines a codebook, or defines it again."""
@@ -196,7 +204,7 @@ class DynamicSynth:
         return sizes
 
     def increment(self, number, s, r, size, layers):
-        writer = IncrementWriter(self.rng, self.live.frame, self.live.context(), s, r, size, self.tamper)
+        writer = self.writer_class(self.rng, self.live.frame, self.live.context(), s, r, size, self.tamper)
         payload = writer.payload()
         self.writers.append((len(self.out), writer))
         self.put(c.UT_INCREMENT, payload, frame=number, refinement=r, temporal=layers["temporal"], spatial=s)

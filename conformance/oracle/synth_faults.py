@@ -185,7 +185,7 @@ FAULTS = [
     ("cell-out", "CONSTRAINT", "cells", lambda v, w: w.seq.position_bits < 20, entry(0, 2 ** 59, -1)),
     ("cell-stale-2", "OUT_OF_RANGE", "cells", always, entry(1, 2)),
     ("cell-turn", "OUT_OF_RANGE", "cells", always, entry(6, lambda x: x + (20000 if x >= 0 else -20000))),
-    ("predictor-reserved", "RESERVED", "predictors", always, entry(0, 3, -1)),
+    ("predictor-without-network", "UNDEFINED", "predictors", always, entry(0, 3, -1)),
     ("predictor-4", "OUT_OF_RANGE", "predictors", always, entry(0, 4)),
     ("predictor-negative", "OUT_OF_RANGE", "predictors", always, entry(0, -1, -1)),
     ("position-out", "CONSTRAINT", "new", lambda v, w: w.seq.position_bits < 20, entry(0, 2 ** 59 + 5, -1)),

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Unit checks from the examples in the text; python3 -m unittest test_oracle"""
 
+import hashlib
 import math
 import random
 import struct
@@ -9,6 +10,8 @@ import unittest
 import models as pm
 import points
 import prediction
+import tables
+import transformer
 from cells import Cell, Cells, unity
 from conventions import BitReader, ByteReader, Round, crc32, tz, unzigzag, xxh64
 from decode import report
@@ -18,13 +21,18 @@ from encoding import Bits
 from errors import StreamError
 from extraction import extract
 from homes import Gaussian
+from network import REGISTRY, arrays, parse_network, parse_weights
 from parsing import BlockDecoder
 from reconstruction import prefix_count
 from semantics import parse_file_header, parse_unit_header
 from synth import Synth
 from synth_dynamic import DynamicSynth, valid_stream
 from synth_faults import FAULTS, faulty_stream
+from synth_learned import VALID, learned_stream, predicted_by_network
+from synth_learned_faults import LEARNED_FAULTS, faulty_learned
+from synth_limit import over_limit
 from synth_mutations import MUTATIONS, mutated, stream_of, units_of
+from synth_network import NetworkWriter
 
 
 class Conventions(unittest.TestCase):
@@ -165,7 +173,7 @@ class Dynamic(unittest.TestCase):
         self.assertEqual(rotation, (0, 0, 1600))    # sine of 30 degrees in 64ths of 1 / 0.02
 
     def test_table_exp(self):
-        self.assertEqual(prediction.EXP, [round(4096 * math.exp(-x / 32)) for x in range(256)])
+        self.assertEqual(tables.EXP, [round(4096 * math.exp(-x / 32)) for x in range(256)])
 
     def test_neighbours(self):
         """SS-PR-004 against a sort of all Gaussians, with many equal distances."""
@@ -266,6 +274,219 @@ class DynamicStreams(unittest.TestCase):
                     self.assertFalse(frame.lost)
                     seen += 1
         self.assertGreater(seen, 2)
+
+
+def small_network(**asked):
+    """A network of zeros with d = 8 and one dc component; layer shifts are 6 but for logit 5 and head 1."""
+    asked = {"network_flags": 0, "width_log2": 3, "feed_forward_width": 0, "geometry_width": 0, "fourier_count": 0,
+             "rank_count": 1, "dc_count": 1, "sh_count": 0, "token_shift": 0, "output_shift": 1, "fill": "zero",
+             "layer_shift": [6, 6, 6, 5, 6, 6, 6, 1], **asked}
+    data = NetworkWriter(random.Random(1), asked).bytes()
+    return parse_network(ByteReader(data, 0, len(data)))
+
+
+class Transform:
+    """A transform with one component."""
+
+    def __init__(self, dimension, basis):
+        self.dimension, self.rank, self.basis = dimension, 1, basis
+
+
+def neighbour(position, dc):
+    return prediction.Reference(position, (0, 0, 0), 0, (0, 0, 0), dc, ())
+
+
+class Learned(unittest.TestCase):
+    """Clauses 6.17 and 7.17.6, with values worked out by hand or in floats."""
+
+    def test_sine(self):
+        self.assertEqual(tables.SINE, [round(127 * math.sin(math.pi * x / 256)) for x in range(129)])
+        for x in range(-4100, 4100):
+            self.assertEqual(transformer.sine(x), round(127 * math.sin(2 * math.pi * x / 512)))
+
+    def test_act(self):
+        self.assertEqual([transformer.act(x, 1) for x in (1, -1, -3, 300, -300)], [1, 0, -1, 127, -127])
+        self.assertEqual([transformer.rounded_mean(x) for x in ([1, 2], [-1, -2], [0, 0, 2], [0, 0, -2])], [2, -1, 1, -1])
+
+    def test_near(self):
+        """The farthest coordinate becomes 127; halves towards positive infinity, so not -127.5 but -127"""
+        t = transformer.Transformer(small_network(), None, None)
+        near = t.near((10, 10, 10), [(neighbour((30, 10, 9), ()), 0), (neighbour((-10, 13, 10), ()), 0)])
+        self.assertEqual(near, [[127, 0, -6], [-127, 19, 0]])                     # -6.35, 19.05
+        self.assertEqual(t.near((5, 5, 5), [(neighbour((5, 5, 5), ()), 0)]), [[0, 0, 0]])
+
+    def by_hand(self, net):
+        """Two neighbours with equal weights whose dc[0] is 50 below and 50 above the base 150."""
+        net.embedding[0][0], net.query[0][0], net.value[0][0] = 64, 30, 64       # h is the token; 30; value 1
+        net.head[0][0], net.head_bias[0][0] = 2, 7
+        t = transformer.Transformer(net, Transform(3, [4096, 0, -2048]), None)
+        around = [(neighbour((1, 0, 0), (100, 5, 0)), 1), (neighbour((0, 2, 0), (200, 5, 0)), 4)]
+        return t.predict(((0, 0, 0), (0, 0, 0), 0, (0, 0, 0)), around, [4096, 4096],
+                         {"dc": (150, 5, 0), "sh": ()})
+
+    def test_flat_by_hand(self):
+        """Shares are 128 and 128, z is 0, x[0] is 30 + 10, the output Round(87, 1) << 1 = 88."""
+        net = small_network()
+        net.value_bias[0][0] = 640
+        self.assertEqual(self.by_hand(net), {"dc": (238, 5, -44), "sh": ()})
+
+    def test_attention_by_hand(self):
+        """Logits -47 and 47, e 217 and 4096, r 15559, shares 13 and 243, z 45, x[0] 75, Round(157, 1) << 1 = 158"""
+        net = small_network()
+        net.attention[0][0] = 64
+        self.assertEqual(self.by_hand(net), {"dc": (308, 5, -79), "sh": ()})
+
+    def test_feed_forward_by_hand(self):
+        """As test_flat_by_hand; wide is (40, 0), x[0] becomes 40 - 25, the output Round(37, 1) << 1 = 38."""
+        net = small_network(feed_forward_width=2)
+        net.value_bias[0][0] = 640
+        net.widening[0][0], net.widening[1][0] = 64, -64
+        net.narrowing[0][0], net.narrowing_bias[0][0] = -64, 15 * 64
+        self.assertEqual(self.by_hand(net), {"dc": (188, 5, -19), "sh": ()})
+
+    def test_geometry_and_fourier_by_hand(self):
+        """At 127 the angle is 89.3 degrees; hidden is max(0, 127), and 0 for the second neighbour."""
+        net = small_network(geometry_width=1, fourier_count=2)
+        net.geometry[0][0], net.geometry_embedding[3][0] = 64, 32
+        net.fourier[0][:] = [1, 2, 0, 0, 0, 0, 3, 4, 0, 0, 0, 0]
+        t = transformer.Transformer(net, None, None)
+        self.assertEqual([t.embedded(0, [0] * 9, [x, 9, 9])[3] for x in (127, -127)], [64, 0])
+        # 1 * sin(127) + 2 * sin(255) + 3 * sin(254) + 4 * sin(382), in parts of 512
+        self.assertEqual(t.fourier([127, 0, 0], [0, 0, 0]), 127 + 2 * 2 + 3 * 3 - 4 * 127)
+        self.assertEqual(t.fourier([0, 0, 0], [0, 0, 0]), 2 * 127 + 4 * 127)
+
+    def test_normalisation(self):
+        """8 * gain * (x - mean) / |x - mean|"""
+        net = small_network(network_flags=4)
+        t, rng = transformer.Transformer(net, None, None), random.Random(3)
+        for _ in range(50):
+            x = [rng.randint(-127, 127) for _ in range(8)]
+            net.gain[0][:] = [rng.randint(-20, 20) for _ in range(8)]
+            mean = sum(x) / 8
+            size = math.sqrt(sum((value - mean) ** 2 for value in x))
+            for got, value, gain in zip(t.normalised(x), x, net.gain[0]):
+                self.assertAlmostEqual(got, 8 * gain * (value - mean) / size, delta=1 + 0.07 * abs(gain))
+        net.gain_bias[0][2] = -100
+        self.assertEqual(t.normalised([9] * 8), [0, 0, -3, 0, 0, 0, 0, 0])        # Round(-100, 5)
+
+    def test_against_floats(self):
+        """Whole networks of all flags: the error of rounding is small beside what the network does."""
+        for seed in range(24):
+            rng = random.Random(seed)
+            asked = {"network_flags": seed % 8, "dc_count": 3, "sh_count": 0, "token_shift": 0, "output_shift": 0}
+            data = NetworkWriter(rng, asked).bytes()
+            net = parse_network(ByteReader(data, 0, len(data)))
+            t = transformer.Transformer(net, None, None)
+            count = rng.randint(2, 16)
+            tokens = [[rng.randint(-60, 60) for _ in range(net.f)] for _ in range(count)]
+            near = [[rng.randint(-127, 127) for _ in range(3)] for _ in range(count)]
+            h = [t.embedded(j, token, place) for j, (token, place) in enumerate(zip(tokens, near))]
+            x = [t.fed_forward(t.normalised(t.attended(*pair, h, near))) for pair in zip(*t.rows(h, near))]
+            expected = FloatNetwork(net).outputs(tokens, near)
+            errors = [abs(a - b) for a, b in zip(t.outputs(x), expected)]
+            self.assertLess(sum(errors), 6 + 0.03 * sum(map(abs, expected)), seed)
+
+    def test_bytes_of_networks(self):
+        """A.3; and the table of 6.17.2 for every combination of flags"""
+        widest = small_network(width_log2=6, feed_forward_width=128, geometry_width=32, fourier_count=4, rank_count=16,
+                               dc_count=3, sh_count=16, network_flags=4)
+        size = sum({"i8": 1, "i16": 2}[kind] * rows * columns for _, kind, rows, columns in arrays(widest))
+        self.assertEqual(size, 32606)
+        sizes = [8 * 9 + 16 + 8 * 8 * 2 + 16 + 8 + 2 + (0 if k & 1 else 8) + (24 if k & 4 else 0) for k in range(8)]
+        for k in range(8):
+            data = NetworkWriter(random.Random(k), {"network_flags": k, "width_log2": 3, "feed_forward_width": 0,
+                                                    "geometry_width": 0, "fourier_count": 0, "rank_count": 1,
+                                                    "dc_count": 1, "sh_count": 0}).bytes()
+            self.assertEqual(len(data), 18 + sizes[k])
+            self.assertEqual(parse_network(ByteReader(data, 0, len(data))).gated, k >> 1 & 1)
+
+    def test_registry(self):
+        """A digest in the place of a network gives the registered one."""
+        data = NetworkWriter(random.Random(5), {}).bytes()
+        digest = hashlib.sha256(data).digest()
+        with self.assertRaises(StreamError) as caught:
+            parse_weights(ByteReader(b"\x01" + digest, 0, 33), False)
+        self.assertEqual((caught.exception.code, caught.exception.byte), ("RESERVED", 1))
+        REGISTRY[digest] = data
+        try:
+            net = parse_weights(ByteReader(b"\x01" + digest, 0, 33), False)
+        finally:
+            del REGISTRY[digest]
+        self.assertEqual(net.head, parse_network(ByteReader(data, 0, len(data))).head)
+
+    def test_streams(self):
+        for seed, (name, asked) in enumerate(VALID[::4]):
+            synth = learned_stream(seed, asked)[1]
+            self.assertGreater(predicted_by_network(synth) + (name == "unused"), 0, name)
+
+    def test_faults(self):
+        for seed, row in enumerate(LEARNED_FAULTS):
+            data = None
+            while data is None:
+                data = faulty_learned(row, seed)
+                seed += 100
+            self.assertEqual(Decoder(data).decode().errors[0].code, row[1], row[0])
+
+    def test_limit(self):
+        """SS-PR-008"""
+        self.assertEqual([error.code for error in Decoder(over_limit(1)).decode().errors], ["OVER_LIMIT"])
+
+
+class FloatNetwork:
+    """SS-TR-003 to SS-TR-008 up to the outputs, without rounding and without the tables."""
+
+    def __init__(self, net):
+        self.net = net
+
+    def layer(self, weights, x, bias, place):
+        shift = 2.0 ** self.net.layer_shift[place]
+        sums = [sum(w * v for w, v in zip(row, x)) + b for row, b in zip(weights, bias)]
+        return [max(-127.0, min(127.0, total / shift)) for total in sums]
+
+    def outputs(self, tokens, near):
+        net = self.net
+        h = []
+        for j, (token, place) in enumerate(zip(tokens, near)):
+            hidden = [max(0.0, v) for v in self.layer(net.geometry, place, net.geometry_bias[0], 0)]
+            weights = [a + b for a, b in zip(net.embedding, net.geometry_embedding)]
+            h.append(self.layer(weights, token + hidden, net.rank[min(j, net.rank_count - 1)], 1))
+        rows, origins = h, near
+        if not net.network_flags & 1:
+            mean = [sum(column) / len(h) for column in zip(*h)]
+            rows, origins = [[max(-127, min(127, m + q)) for m, q in zip(mean, net.query[0])]], [[0, 0, 0]]
+        x = [self.row(row, origin, h, near) for row, origin in zip(rows, origins)]
+        pool = [sum(column) / len(x) for column in zip(*x)]
+        shift = 2.0 ** net.layer_shift[7]
+        return [max(-1023, min(1023, (sum(w * v for w, v in zip(row, pool)) + b) / shift))
+                for row, b in zip(net.head, net.head_bias[0])]
+
+    def row(self, row, origin, h, near):
+        net = self.net
+        u = self.layer(net.attention, row, [0] * net.d, 2)
+        logit = [(sum(a * b for a, b in zip(u, h_j)) + self.fourier(place, origin)) / 2.0 ** net.layer_shift[3]
+                 for h_j, place in zip(h, near)]
+        e = [math.exp(x / 32 - max(logit) / 32) for x in logit]
+        z = [sum(a * b for a, b in zip(e, column)) / sum(e) for column in zip(*h)]
+        x = self.added(row, self.layer(net.value, z, net.value_bias[0], 4))
+        if net.network_flags & 4:
+            mean = sum(x) / net.d
+            size = max(1.0, math.sqrt(sum((value - mean) ** 2 for value in x)))
+            x = [max(-127, min(127, (gain * 256 * (value - mean) / size + b) / 32))
+                 for value, gain, b in zip(x, net.gain[0], net.gain_bias[0])]
+        if net.e:
+            wide = [max(0.0, v) for v in self.layer(net.widening, x, net.widening_bias[0], 5)]
+            x = self.added(x, self.layer(net.narrowing, wide, net.narrowing_bias[0], 6))
+        return x
+
+    def added(self, x, y):
+        return [max(-127, min(127, a + b)) for a, b in zip(x, y)]
+
+    def fourier(self, place, origin):
+        total = 0
+        for i, weight in enumerate(self.net.fourier[0]):
+            angle = 2 * math.pi * (place[i % 6 // 2] - origin[i % 6 // 2]) * 2 ** (i // 6) / 512
+            total += weight * 127 * (math.cos(angle) if i % 2 else math.sin(angle))
+        return total
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-//! What a GOP header starts: transforms and codebooks until the next one (clause 7.1).
+//! What a GOP header starts: transforms, codebooks and a network until the next one (clause 7.1).
 
 use crate::colour::Colour;
 use crate::layout::ShCoding;
-use splatstream_format::payload::{Codebook, Transform};
+use splatstream_format::payload::{Codebook, Network, Transform, Weights};
 use splatstream_format::syntax::{
     CodebookHeader, FrameHeader, GopHeader, Profile, SequenceParameters, ShHeader, Table, TransformHeader,
-    TransformKind, UnitType,
+    TransformKind, UnitType, WeightsHeader,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
@@ -21,6 +21,7 @@ pub struct Gop {
     sh: [Option<Transform>; 16],
     codebooks: [Option<Defined>; 16],
     codebook_values: u64,
+    network: Option<Network>,
 }
 
 /// A codebook and the temporal layer that defined it.
@@ -51,13 +52,20 @@ impl Gop {
             sh: [const { None }; 16],
             codebooks: [const { None }; 16],
             codebook_values: 0,
+            network: None,
         }
     }
 
-    /// Takes a transform or codebook unit.
+    /// The learned predictor, if the GOP has one.
+    pub fn network(&self) -> Option<&Network> {
+        self.network.as_ref()
+    }
+
+    /// Takes a transform, codebook or weights unit.
     ///
     /// # Errors
-    /// What clauses 6.7 and 6.8 refuse, an identifier defined twice, more codebook values than the limits.
+    /// What clauses 6.7, 6.8 and 6.17 refuse, an identifier or a network defined twice, more codebook values than the
+    /// limits.
     pub fn tool(
         &mut self,
         unit: &Unit<'_>,
@@ -65,16 +73,36 @@ impl Gop {
         profile: Profile,
         limits: &Limits,
     ) -> Result<()> {
-        if unit.header.unit_type() == UnitType::Transform {
-            let (header, rest) = TransformHeader::parse(unit.payload, unit.payload_at, sequence)?;
-            let slots = match header.kind() {
-                Some(TransformKind::Sh) => &mut self.sh,
-                _ => &mut self.dc,
-            };
-            let slot = undefined(slots, header.transform_id, unit, "6.7")?;
-            *slot = Some(Transform::parse_behind(header, rest, unit.payload_at)?);
-            return Ok(());
+        match unit.header.unit_type() {
+            UnitType::Transform => self.transform(unit, sequence),
+            UnitType::Weights => self.weights(unit),
+            _ => self.codebook(unit, profile, limits),
         }
+    }
+
+    fn transform(&mut self, unit: &Unit<'_>, sequence: &SequenceParameters) -> Result<()> {
+        let (header, rest) = TransformHeader::parse(unit.payload, unit.payload_at, sequence)?;
+        let slots = match header.kind() {
+            Some(TransformKind::Sh) => &mut self.sh,
+            _ => &mut self.dc,
+        };
+        let slot = undefined(slots, header.transform_id, unit, "6.7")?;
+        *slot = Some(Transform::parse_behind(header, rest, unit.payload_at)?);
+        Ok(())
+    }
+
+    fn weights(&mut self, unit: &Unit<'_>) -> Result<()> {
+        let (header, rest) = WeightsHeader::parse(unit.payload, unit.payload_at)?;
+        if self.network.is_some() {
+            let rule = "a GOP has one network";
+            return Err(Error::new(unit.payload_at, "6.17", ErrorKind::Constraint { rule }));
+        }
+        let weights = Weights::parse_behind(header, rest, unit.payload_at)?;
+        self.network = Some(weights.network(unit.payload_at)?);
+        Ok(())
+    }
+
+    fn codebook(&mut self, unit: &Unit<'_>, profile: Profile, limits: &Limits) -> Result<()> {
         let (header, rest) = CodebookHeader::parse(unit.payload, unit.payload_at)?;
         let known = defined(&self.codebooks, header.codebook_id);
         let layer = unit.header.temporal_layer;

@@ -13,7 +13,7 @@
 //! | 7.14 homes and modes | [`home`], [`increment`] |
 //! | 7.15 cells | [`displacement`] |
 //! | 7.16 residuals | [`increment::residual`] |
-//! | 7.17 prediction | [`neighbours`], [`predictor`], [`increment::prediction`] |
+//! | 7.17 prediction | [`neighbours`], [`predictor`], [`transformer`], [`increment::prediction`] |
 //! | 7.18 carried Gaussians | [`frame_state`] |
 //! | 8.5 contexts | [`context`] |
 //!
@@ -48,4 +48,5 @@ pub mod position;
 pub mod predictor;
 pub mod process;
 pub mod stream;
+pub mod transformer;
 pub mod unit;

@@ -31,31 +31,31 @@ pub enum Predictor {
     Knn,
     /// By neighbours, weighted by distance and by the attributes known already.
     Bilateral,
+    /// As bilateral, colour by the network of the GOP.
+    Transformer,
 }
 
 impl Predictor {
+    /// Every predictor, in the order of the codes.
+    pub const ALL: [Self; 4] = [Self::None, Self::Knn, Self::Bilateral, Self::Transformer];
+
     /// The predictor of a code; `at` goes into the error.
     ///
     /// # Errors
-    /// Reserved if the code is 3; Invalid if it is another that has no meaning.
+    /// Invalid if the code is not in 0..=3.
     pub fn from_code(code: i32, at: u64) -> Result<Self> {
-        let element = "predictor";
-        let kind = match code {
-            0 => return Ok(Self::None),
-            1 => return Ok(Self::Knn),
-            2 => return Ok(Self::Bilateral),
-            3 => ErrorKind::Reserved { element, value: 3 },
-            _ => ErrorKind::OutOfRange { element, value: code.into(), min: 0, max: 2 },
-        };
-        Err(Error::new(at, "7.17", kind))
+        let kind = ErrorKind::OutOfRange { element: "predictor", value: code.into(), min: 0, max: 3 };
+        let known = usize::try_from(code).ok().and_then(|code| Self::ALL.get(code)).copied();
+        known.ok_or(Error::new(at, "7.17", kind))
     }
 
-    /// The code of the predictor, 0 to 2.
+    /// The code of the predictor, 0 to 3.
     pub fn code(self) -> i32 {
         match self {
             Self::None => 0,
             Self::Knn => 1,
             Self::Bilateral => 2,
+            Self::Transformer => 3,
         }
     }
 }
@@ -139,11 +139,11 @@ mod tests {
 
     #[test]
     fn a_code_reads_as_it_is_written() {
-        for code in 0..3 {
+        for code in 0..4 {
             assert_eq!(Predictor::from_code(code, 0).map(Predictor::code), Ok(code));
         }
         let kind = |code| Predictor::from_code(code, 0).map_err(|error| error.kind);
-        assert_eq!(kind(3), Err(ErrorKind::Reserved { element: "predictor", value: 3 }));
+        assert!(matches!(kind(4), Err(ErrorKind::OutOfRange { value: 4, .. })));
         assert!(matches!(kind(-1), Err(ErrorKind::OutOfRange { value: -1, .. })));
     }
 

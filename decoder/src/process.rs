@@ -158,7 +158,9 @@ impl<'a> Decoder<'a> {
             UnitType::SequenceParameters => self.sequence_parameters(unit).map(|()| None),
             UnitType::GopHeader => self.closing(unit, Self::gop_header),
             UnitType::Codebook if self.profile == Profile::Dynamic => self.closing(unit, Self::gop_tool),
-            UnitType::Transform | UnitType::Codebook => self.gop_tool(unit).map(|()| None),
+            UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
+                self.gop_tool(unit).map(|()| None)
+            }
             UnitType::FrameHeader => self.closing(unit, Self::frame_header),
             UnitType::Refinement => self.refinement(unit).map(|()| None),
             UnitType::Increment => self.increment(unit).map(|()| None),
@@ -178,7 +180,8 @@ impl<'a> Decoder<'a> {
         let indexed = self.index_offset.is_some() && unit_type != UnitType::End;
         let listed = self.listed && !matches!(unit_type, UnitType::Index | UnitType::End);
         let surplus = unit_type == UnitType::FrameHeader && self.frames_left() == 0;
-        let orphan = matches!(unit_type, UnitType::Transform | UnitType::Codebook) && self.gop.is_none();
+        let of_gop = matches!(unit_type, UnitType::Transform | UnitType::Codebook | UnitType::Weights);
+        let orphan = of_gop && self.gop.is_none();
         let early = self.sequence.is_none() || indexed || listed || orphan;
         let foreign = self.profile == Profile::Dynamic && unit_type == UnitType::Refinement;
         if self.ended || surplus || foreign || !repeatable && early {
@@ -339,7 +342,7 @@ impl<'a> Decoder<'a> {
         let (Some(gop), Some((sequence, _)), None) = (&mut self.gop, &self.sequence, &self.frame) else {
             return Err(unexpected(unit));
         };
-        if unit.header.unit_type() == UnitType::Transform && self.frames != gop.first_frame {
+        if unit.header.unit_type() != UnitType::Codebook && self.frames != gop.first_frame {
             return Err(unexpected(unit));
         }
         same(frame_at(unit), "6.3", "frame", unit.header.frame, gop.first_frame)?;
@@ -383,8 +386,10 @@ impl<'a> Decoder<'a> {
 
     /// A.2: what was agreed, and no more than the level of the stream has.
     fn limits(&self) -> Limits {
-        let most = self.options.limits.max_gaussians.min(Limits::gaussians_of_level(self.level));
-        Limits { max_gaussians: most, ..self.options.limits }
+        let limits = self.options.limits;
+        let max_gaussians = limits.max_gaussians.min(Limits::gaussians_of_level(self.level));
+        let max_learned = limits.max_learned.min(Limits::learned_of_level(self.level));
+        Limits { max_gaussians, max_learned, ..limits }
     }
 
     /// Step 1 of clauses 7.1.3 and 7.13.3: whether a unit of the frame is looked at.

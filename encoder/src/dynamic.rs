@@ -3,6 +3,7 @@
 mod align;
 mod anchor;
 mod compensation;
+pub(crate) mod learning;
 mod predicted;
 mod predictors;
 mod survivors;
@@ -23,12 +24,13 @@ use crate::vq;
 use align::Namings;
 use anchor::{AnchorTarget, code_anchor};
 use compensation::Compensator;
+use learning::Recorder;
 use predicted::{Predicted, ReferenceCloud};
 use predictors::Chooser;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::frame_state::FrameState;
 use splatstream_decoder::layout::ShCoding;
-use splatstream_format::payload::Codebook;
+use splatstream_format::payload::{Codebook, Network};
 use splatstream_format::syntax::{
     FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, PlaceInGop, SequenceParameters,
     UnitHeader, UnitId, UnitType,
@@ -57,7 +59,7 @@ pub(crate) struct CodedUnit {
     header: IncrementHeader,
     payload: Vec<u8>,
     /// New Gaussians by predictor.
-    predicted: [u64; 3],
+    predicted: [u64; 4],
 }
 
 /// A coded frame that others refer to.
@@ -101,6 +103,12 @@ pub(crate) struct Dynamic<'a, 'w> {
     pub(crate) writer: &'a mut UnitWriter<'w>,
     pub(crate) report: &'a mut Report,
     pub(crate) index: Vec<IndexEntry>,
+    /// The network that the GOPs may use.
+    pub(crate) network: Option<Network>,
+    /// New Gaussians of a unit that it may predict.
+    pub(crate) most_learned: u32,
+    /// What a network is trained with, while that is being collected.
+    pub(crate) recorder: Option<&'a Recorder>,
 }
 
 /// A GOP while its frames are being coded.
@@ -113,6 +121,8 @@ struct Gop {
     references: Vec<Option<(u32, Reference)>>,
     /// The units after the GOP header.
     units: Vec<(UnitId, Vec<u8>)>,
+    /// Whether a new Gaussian takes the network.
+    has_learned: bool,
 }
 
 impl Dynamic<'_, '_> {
@@ -123,7 +133,7 @@ impl Dynamic<'_, '_> {
     pub(crate) fn run(&mut self, progress: Progress<'_>) -> Result<(), Error> {
         let mut first = 0;
         let frames = self.source.len();
-        while first < frames {
+        while first < frames && !self.recorder.is_some_and(Recorder::is_full) {
             first = self.gop(first, frames.min(first + self.settings.gop.min(MOST_FRAMES)), progress)?;
         }
         Ok(())
@@ -134,6 +144,15 @@ impl Dynamic<'_, '_> {
         match self.settings.structure {
             Structure::Intra => 0,
             Structure::Predicted { layers } => layers,
+        }
+    }
+
+    fn chooser(&self) -> Chooser<'_> {
+        Chooser {
+            predictors: self.settings.predictors,
+            choice: self.settings.predictor_choice,
+            neighbours: self.settings.neighbours,
+            recorder: self.recorder,
         }
     }
 
@@ -165,6 +184,7 @@ impl Dynamic<'_, '_> {
             units: tools.units(&self.sequence, first)?,
             tools,
             references: (0..self.layers().max(1)).map(|_| None).collect(),
+            has_learned: false,
         };
         if first == 0 {
             gop.tools.report(self.report);
@@ -189,6 +209,10 @@ impl Dynamic<'_, '_> {
         let header = self.header(end - first);
         self.index.push(IndexEntry { frame: first, reserved_zero: 0, offset: self.writer.offset });
         self.writer.unit(UnitId::of_frame(UnitType::GopHeader, first), &header.to_bytes()?)?;
+        if let Some(network) = self.network.as_ref().filter(|_| gop.has_learned) {
+            let id = UnitId::of_frame(UnitType::Weights, first);
+            self.writer.unit(id, &learning::weights(network)?.to_bytes()?)?;
+        }
         gop.units.iter().try_for_each(|(id, payload)| self.writer.unit(*id, payload))?;
         Ok(end)
     }
@@ -243,7 +267,7 @@ impl Dynamic<'_, '_> {
             rows: &target.rows,
             row_count: target.row_count,
         };
-        let (units, reference) = code_anchor(&coder, &anchor, Chooser(self.settings.predictors))?;
+        let (units, reference) = code_anchor(&coder, &anchor, self.chooser())?;
         let place = PlaceInGop { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
         self.write_frame(gop, number, &place, (target.frame.len(), target.row_count), &units)?;
         gop.keep(0, number, reference);
@@ -293,7 +317,7 @@ impl Dynamic<'_, '_> {
             coarse_tail: self.settings.tools.coarse_tail && by_pictures,
             number,
         };
-        let (units, coded) = predicted.code(Chooser(self.settings.predictors))?;
+        let (units, coded) = predicted.code(self.chooser())?;
         if let Some(book) = &book {
             let id = UnitId::of_frame(UnitType::Codebook, gop.first).on_layers(0, place.temporal_layer);
             gop.units.push((id, book.to_bytes()?));
@@ -368,6 +392,8 @@ impl Dynamic<'_, '_> {
                 tools: self.settings.tools,
             },
             intra: predicted.is_none(),
+            network: self.network.as_ref(),
+            most_learned: self.most_learned,
         }
     }
 
@@ -396,6 +422,7 @@ impl Dynamic<'_, '_> {
             let id = id.on_layers(unit.spatial_layer, place.temporal_layer);
             gop.units.push((id, unit.payload.clone()));
             frame.add(&unit.header, unit.predicted);
+            gop.has_learned |= unit.predicted[3] > 0;
         }
         let bytes = |(_, payload): &(UnitId, Vec<u8>)| (UnitHeader::SIZE + payload.len()) as u64;
         frame.bytes = gop.units[start..].iter().map(bytes).sum();

@@ -25,11 +25,14 @@ mod sequence;
 mod settings;
 mod source;
 mod stream;
+pub mod transformer;
 mod vq;
 
+pub use dynamic::learning::{samples, train_network};
 pub use error::Error;
 pub use settings::{
-    Importance, PredictorChoice, Preset, Quality, Settings, ShChoice, Steps, Structure, Tools,
+    Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice, Steps,
+    Structure, Tools,
 };
 pub use source::FrameSource;
 pub use stream::{FrameReport, Progress, Report, encode};

@@ -91,6 +91,9 @@ fn check(settings: &Settings) -> Result<(), Error> {
     if settings.gop == 0 {
         return setting("gop", "0".into(), "1 or more");
     }
+    if !(1..=16).contains(&settings.neighbours) {
+        return setting("neighbours", settings.neighbours.to_string(), "1 to 16");
+    }
     if !(1..=4).contains(&settings.spatial_layers) {
         return setting("spatial_layers", settings.spatial_layers.to_string(), "1 to 4");
     }

@@ -1,5 +1,8 @@
 //! What a user asks for: quality, effort, layers.
 
+use crate::transformer::Architecture;
+use splatstream_decoder::predictor::Predictor;
+use splatstream_format::payload::Network;
 use splatstream_format::syntax::Profile;
 use splatstream_render::Camera;
 
@@ -104,11 +107,58 @@ pub enum Structure {
     },
 }
 
+/// Neighbours of a prediction, unless others are asked for.
+pub(crate) const NEIGHBOURS: u8 = 8;
+
+/// The predictors that new Gaussians may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Predictors {
+    /// By code.
+    allowed: [bool; 4],
+}
+
+impl Predictors {
+    /// Every one; the transformer where there is a network.
+    pub const ALL: Self = Self { allowed: [true; 4] };
+    /// New Gaussians are not predicted.
+    pub const NONE: Self = Self { allowed: [true, false, false, false] };
+
+    /// One, and none where that is better.
+    pub fn one(predictor: Predictor) -> Self {
+        Self { allowed: Predictor::ALL.map(|other| other == predictor || other == Predictor::None) }
+    }
+
+    /// One for every new Gaussian for which there is something to predict from, whether it pays or not.
+    pub fn always(predictor: Predictor) -> Self {
+        Self { allowed: Predictor::ALL.map(|other| other == predictor) }
+    }
+
+    /// Those of both.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self { allowed: Predictor::ALL.map(|predictor| self.allows(predictor) || other.allows(predictor)) }
+    }
+
+    /// Whether new Gaussians may take a predictor.
+    pub fn allows(self, predictor: Predictor) -> bool {
+        self.allowed[predictor.code() as usize]
+    }
+}
+
+/// Where the network of the learned predictor comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NetworkSource {
+    /// The registered one, of which a stream has the name only.
+    Registered,
+    /// Trained on the sequence, and carried.
+    Trained(Architecture),
+    /// Given, and carried.
+    Given(Box<Network>),
+}
+
 /// How the predictor of new Gaussians is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PredictorChoice {
-    /// New Gaussians are not predicted.
-    None,
     /// By estimated bits, for runs of Gaussians, where prediction pays at all.
     #[default]
     Bits,
@@ -166,7 +216,14 @@ pub struct Settings {
     /// Spatial layers, 1 to 4.
     pub spatial_layers: u8,
     /// How new Gaussians are predicted, where frames refer to others or there are spatial layers.
-    pub predictors: PredictorChoice,
+    pub predictors: Predictors,
+    /// How a predictor is chosen among them.
+    pub predictor_choice: PredictorChoice,
+    /// Neighbours of a prediction, 1 to 16.
+    pub neighbours: u8,
+    /// Where the network comes from; none: it is trained for the small preset, and where no other predictor is allowed;
+    /// else there is none.
+    pub network: Option<NetworkSource>,
     /// Refinement percentages, increasing, the last 100; at most 10.
     pub refinements: Vec<u8>,
     /// Highest SH degree kept; none keeps what the scene needs.
@@ -206,7 +263,10 @@ impl Default for Settings {
             gop: 16,
             structure: Structure::default(),
             spatial_layers: 1,
-            predictors: PredictorChoice::default(),
+            predictors: Predictors::ALL,
+            predictor_choice: PredictorChoice::default(),
+            neighbours: NEIGHBOURS,
+            network: None,
             refinements: vec![10, 20, 30, 50, 100],
             sh_degree: None,
             sh: ShChoice::default(),

@@ -3,7 +3,7 @@
 use crate::allocation;
 use crate::canonical::{canonicalise, visible};
 use crate::colour::{self, ShPlan};
-use crate::dynamic::Dynamic;
+use crate::dynamic::{Dynamic, learning};
 use crate::error::Error;
 use crate::frame::{CodedFrame, UnitPlan, code_frame};
 use crate::importance::Ranking;
@@ -16,6 +16,7 @@ use splatstream_decoder::block::UnitParameters;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::layout::{Layout, ShCoding};
 use splatstream_decoder::operating_point::Tally;
+use splatstream_format::Limits;
 use splatstream_format::payload::{Index, Transform};
 use splatstream_format::syntax::{
     EndOfStream, FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry, Profile, SequenceParameters,
@@ -84,8 +85,8 @@ pub struct FrameReport {
     pub removed: u32,
     /// Gaussians that are new.
     pub new: u32,
-    /// New Gaussians by predictor: none, knn, bilateral.
-    pub predicted: [u64; 3],
+    /// New Gaussians by predictor: none, knn, bilateral, transformer.
+    pub predicted: [u64; 4],
 }
 
 impl Default for FrameReport {
@@ -100,14 +101,14 @@ impl Default for FrameReport {
             updated: 0,
             removed: 0,
             new: 0,
-            predicted: [0; 3],
+            predicted: [0; 4],
         }
     }
 }
 
 impl FrameReport {
     /// Adds a unit.
-    pub(crate) fn add(&mut self, header: &IncrementHeader, predicted: [u64; 3]) {
+    pub(crate) fn add(&mut self, header: &IncrementHeader, predicted: [u64; 4]) {
         self.cells += header.cell_count;
         self.parents += header.parent_count;
         self.moved += header.move_count;
@@ -144,14 +145,27 @@ pub fn encode(
         ..Report::default()
     };
     let profile = settings.profile();
-    let mut writer = UnitWriter { sink, offset: 0, units: 0, tally: Tally::new(profile) };
+    let mut writer = UnitWriter::new(sink, profile);
     writer.bytes(&write_file_header(profile, analysis.level)?)?;
     writer.unit(UnitId::stream(UnitType::SequenceParameters), &sequence.to_bytes()?)?;
     let mut index = Vec::new();
     if profile == Profile::Dynamic {
+        let most_learned = Limits::learned_of_level(analysis.level);
+        let network = learning::network(source, settings, &sequence)?;
         let (ranking, writer) = (&mut ranking, &mut writer);
-        let report = &mut report;
-        let mut dynamic = Dynamic { source, settings, sequence, ranking, writer, report, index };
+        let (report, recorder) = (&mut report, None);
+        let mut dynamic = Dynamic {
+            source,
+            settings,
+            sequence,
+            ranking,
+            writer,
+            report,
+            index,
+            network,
+            most_learned,
+            recorder,
+        };
         dynamic.run(progress)?;
         index = dynamic.index;
         let points = writer.tally.list().to_bytes()?;
@@ -425,7 +439,11 @@ pub(crate) struct UnitWriter<'a> {
     pub(crate) tally: Tally,
 }
 
-impl UnitWriter<'_> {
+impl<'a> UnitWriter<'a> {
+    pub(crate) fn new(sink: &'a mut dyn Write, profile: Profile) -> Self {
+        Self { sink, offset: 0, units: 0, tally: Tally::new(profile) }
+    }
+
     fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.sink.write_all(bytes)?;
         self.offset += bytes.len() as u64;

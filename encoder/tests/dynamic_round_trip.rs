@@ -5,9 +5,14 @@ mod common;
 
 use common::closeness::{Bounds, assert_close};
 use common::dynamic::{Whole, coded, predicted, quick, scene};
-use common::frame_of;
+use common::{Random, frame_of};
 use proptest::prelude::*;
-use splatstream_encoder::{PredictorChoice, Preset, Settings, ShChoice, Steps, Structure, Tools};
+use splatstream_decoder::predictor::Predictor;
+use splatstream_encoder::transformer::Architecture;
+use splatstream_encoder::{
+    NetworkSource, PredictorChoice, Predictors, Preset, Settings, ShChoice, Steps, Structure, Tools,
+};
+use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::FrameType;
 use splatstream_scene::GaussianFrame;
 use splatstream_scene::builtin::Tracking;
@@ -97,7 +102,7 @@ fn intra_frames_in_layers_are_within_half_a_step_of_the_source() {
     let steps = Steps { sh: 0.02, ..quick().steps };
     for spatial_layers in 2..=4 {
         let sh = ShChoice::Coefficients;
-        let predictors = PredictorChoice::None;
+        let predictors = Predictors::NONE;
         let settings = Settings { spatial_layers, steps, sh, predictors, ..quick() };
         let (bytes, _) = coded(&frames, &settings, "layers");
         let whole = Whole::new(&bytes);
@@ -112,8 +117,9 @@ fn intra_frames_in_layers_are_within_half_a_step_of_the_source() {
 fn predicted_gaussians_are_within_half_a_step_of_the_source() {
     let frames = scene(300, 1, 1, Tracking::Tracked);
     let steps = Steps { sh: 0.02, ..quick().steps };
-    let (sh, predictors) = (ShChoice::Coefficients, PredictorChoice::Difference);
-    let (bytes, report) = coded(&frames, &Settings { steps, sh, predictors, ..predicted(1) }, "predicted");
+    let (sh, predictor_choice) = (ShChoice::Coefficients, PredictorChoice::Difference);
+    let settings = Settings { steps, sh, predictor_choice, ..predicted(1) };
+    let (bytes, report) = coded(&frames, &settings, "predicted");
     assert!(report.coded[0].predicted[1] > 0);
     let whole = Whole::new(&bytes);
     assert_close(&frames[0], &whole.all()[0].planes, &whole.sequence, Bounds::INTRA, "predicted");
@@ -181,18 +187,34 @@ fn predicted_frames_are_within_three_quarters_of_a_step_of_the_source() {
     }
 }
 
+/// A network that nobody has trained: whatever it says, residuals make up for it.
+fn any_network() -> Network {
+    let header = Architecture { dc_count: 3, sh_count: 9, ..Architecture::default() }.header().unwrap();
+    let mut random = Random(7);
+    let layers = Part::ALL.map(|part| {
+        let (weights, biases) = part.lengths(&header);
+        Layer {
+            weights: (0..weights).map(|_| random.next() as i8).collect(),
+            bias: (0..biases).map(|_| random.next() as i16 >> 6).collect(),
+        }
+    });
+    Network::new(header, layers).unwrap()
+}
+
 fn settings() -> impl Strategy<Value = Settings> {
     let structure =
         prop_oneof![Just(Structure::Intra), (1_u8..=4).prop_map(|layers| Structure::Predicted { layers })];
     let sh = prop_oneof![Just(ShChoice::Auto), Just(ShChoice::Coefficients), Just(ShChoice::VectorQuantised)];
     let refinements = prop_oneof![Just(vec![100]), Just(vec![10, 20, 30, 50, 100]), Just(vec![1, 99, 100])];
     let predictors = prop_oneof![
-        Just(PredictorChoice::None),
-        Just(PredictorChoice::Bits),
-        Just(PredictorChoice::Difference)
+        Just((Predictors::NONE, PredictorChoice::Bits)),
+        Just((Predictors::ALL, PredictorChoice::Bits)),
+        Just((Predictors::ALL, PredictorChoice::Difference)),
+        Just((Predictors::always(Predictor::Transformer), PredictorChoice::Difference)),
     ];
     let preset = prop_oneof![Just(Preset::Fast), Just(Preset::Balanced)];
     let importance = Some(splatstream_encoder::Importance::Volume);
+    let network = any_network();
     let tools =
         any::<[bool; 5]>().prop_map(|[contexts, table_reuse, coarse_tail, cell_motion, survivors]| Tools {
             contexts,
@@ -212,7 +234,9 @@ fn settings() -> impl Strategy<Value = Settings> {
             },
             sh,
             refinements,
-            predictors,
+            predictors: predictors.0,
+            predictor_choice: predictors.1,
+            network: Some(NetworkSource::Given(Box::new(network.clone()))),
             tools,
             preset,
             gop,

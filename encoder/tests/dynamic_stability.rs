@@ -6,16 +6,16 @@ mod common;
 use common::closeness::{Bounds, assert_close, namings, renamed};
 use common::dynamic::{Whole, coded, predicted, quick, scene};
 use common::{encoded, frame_of};
-use splatstream_encoder::{PredictorChoice, Quality, Report, Settings, ShChoice, Steps, Tools};
+use splatstream_encoder::{PredictorChoice, Predictors, Quality, Report, Settings, ShChoice, Steps, Tools};
 use splatstream_format::syntax::FrameType;
 use splatstream_scene::builtin::Tracking;
 use splatstream_scene::{GaussianFrame, Planes, sh_coefficients};
 
 /// Encodes with one temporal layer and looks at every decoded frame.
 fn close(frames: &[GaussianFrame], what: &str) -> Report {
-    let predictors = PredictorChoice::Difference;
+    let predictor_choice = PredictorChoice::Difference;
     let tools = Tools { coarse_tail: false, ..Tools::default() };
-    close_with(frames, &Settings { predictors, tools, ..predicted(1) }, what)
+    close_with(frames, &Settings { predictor_choice, tools, ..predicted(1) }, what)
 }
 
 fn close_with(frames: &[GaussianFrame], settings: &Settings, what: &str) -> Report {
@@ -143,7 +143,7 @@ fn axes_named_otherwise_in_every_frame_update_nothing() {
         })
     };
     let tools = Tools { coarse_tail: false, ..Tools::default() };
-    let settings = Settings { predictors: PredictorChoice::None, tools, ..predicted(1) };
+    let settings = Settings { predictors: Predictors::NONE, tools, ..predicted(1) };
     let report = close_with(&[rename(0), rename(1), rename(2)], &settings, "renamed");
     for frame in &report.coded[1..] {
         assert_eq!((frame.new, frame.removed, frame.moved, frame.updated), (0, 0, 0, 0));
@@ -200,9 +200,15 @@ fn a_scene_cut_starts_a_gop() {
 fn a_frame_that_shares_nothing_with_its_reference_is_all_new() {
     let tools = Tools { survivors: false, coarse_tail: false, ..Tools::default() };
     let frames = scene(200, 4, 1, Tracking::Tracked);
-    for predictors in [PredictorChoice::None, PredictorChoice::Bits, PredictorChoice::Difference] {
-        let report =
-            close_with(&frames, &Settings { tools, predictors, ..predicted(1) }, "nothing is shared");
+    let none = (Predictors::NONE, PredictorChoice::Bits);
+    let choices =
+        [none, (Predictors::ALL, PredictorChoice::Bits), (Predictors::ALL, PredictorChoice::Difference)];
+    for (predictors, predictor_choice) in choices {
+        let report = close_with(
+            &frames,
+            &Settings { tools, predictors, predictor_choice, ..predicted(1) },
+            "nothing is shared",
+        );
         for frame in &report.coded[1..] {
             assert_eq!(frame.frame_type, FrameType::Predicted);
             assert_eq!((frame.parents, frame.removed, frame.new), (200, 200, 200));

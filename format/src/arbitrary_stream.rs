@@ -15,6 +15,9 @@ use arbitrary::{Arbitrary, Result, Unstructured};
 mod coded;
 pub mod dynamic;
 mod increments;
+mod network;
+
+pub use network::weights;
 
 /// Most Gaussians of a frame: enough for several blocks.
 const MAX_GAUSSIANS: u32 = 2000;

@@ -5,12 +5,12 @@
 
 use crate::levels::Levels;
 use crate::payload::{
-    Codebook, Index, OperatingPoints, Refinement, Transform, VARIABLE_ROWS, VariableRow, leb128,
+    Codebook, Index, OperatingPoints, Refinement, Transform, VARIABLE_ROWS, VariableRow, Weights, leb128,
 };
 use crate::syntax::{
-    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader,
+    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, NetworkHeader,
     OperatingPointEntry, OperatingPointsHeader, Profile, RefinementHeader, Row, SequenceParameters, Table,
-    TransformHeader, UnitHeader, UnitType, after,
+    TransformHeader, UnitHeader, UnitType, WeightsHeader, after,
 };
 use crate::unit::{Delivery, Unit, Units};
 use crate::{Error, ErrorKind, Limits, Result};
@@ -125,6 +125,7 @@ impl Inspector<'_> {
             UnitType::Transform => self.transform(payload, at)?,
             UnitType::Codebook => self.codebook(payload, at)?,
             UnitType::Refinement => self.refinement(payload, at)?,
+            UnitType::Weights if self.profile == Profile::Dynamic => self.weights(payload, at)?,
             UnitType::Increment if self.profile == Profile::Dynamic => self.increment(unit)?,
             UnitType::OperatingPoints => self.operating_points(payload, at)?,
             UnitType::Index => self.index(payload, at)?,
@@ -132,7 +133,10 @@ impl Inspector<'_> {
                 self.fixed(&EndOfStream::TABLE, payload, at);
                 EndOfStream::parse_payload(payload, at)?;
             }
-            unknown @ (UnitType::Increment | UnitType::Reserved(_) | UnitType::User(_)) => {
+            unknown @ (UnitType::Weights
+            | UnitType::Increment
+            | UnitType::Reserved(_)
+            | UnitType::User(_)) => {
                 let value = format!("{} bytes", payload.len());
                 let meaning = "skipped by decoders of this version";
                 self.show(at, payload.len(), "payload".into(), value, meaning, "5.3", unknown.name());
@@ -161,6 +165,29 @@ impl Inspector<'_> {
         let entries = value::summary(&codebook.entries);
         self.variable("codebook", "entries", after(at, CodebookHeader::SIZE), bytes, entries);
         Ok(())
+    }
+
+    fn weights(&mut self, payload: &[u8], at: u64) -> Result<()> {
+        self.fixed(&WeightsHeader::TABLE, payload, at);
+        let (header, model) = WeightsHeader::parse(payload, at)?;
+        let model_at = after(at, WeightsHeader::SIZE);
+        if header == WeightsHeader::CARRIED {
+            self.fixed(&NetworkHeader::TABLE, model, model_at);
+        }
+        let weights = Weights::parse_behind(header, model, at)?;
+        match &weights {
+            Weights::Carried(_) => {
+                let bytes = model.len().saturating_sub(NetworkHeader::SIZE);
+                let value = format!("{bytes} bytes");
+                let at = after(model_at, NetworkHeader::SIZE);
+                self.variable("network", "parameters", at, bytes, value);
+            }
+            Weights::Registered(digest) => {
+                let value = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+                self.variable("weights", "model", model_at, model.len(), value);
+            }
+        }
+        weights.network(at).map(drop)
     }
 
     /// Walks the sections itself: before an error there are elements to show.

@@ -15,6 +15,8 @@ pub struct Limits {
     pub max_codebook_values: u32,
     /// Cells that a predicted frame moves.
     pub max_cells: u32,
+    /// New Gaussians of an increment that the network predicts.
+    pub max_learned: u32,
 }
 
 impl Default for Limits {
@@ -26,6 +28,7 @@ impl Default for Limits {
             max_units: 1 << 24,
             max_codebook_values: 1 << 23,
             max_cells: 1 << 20,
+            max_learned: 1 << 21,
         }
     }
 }
@@ -40,6 +43,11 @@ impl Limits {
             4 => 1 << 24,
             _ => 0,
         }
+    }
+
+    /// New Gaussians of an increment that the network predicts that a level allows, table of annex A.2.
+    pub const fn learned_of_level(level: u8) -> u32 {
+        Self::gaussians_of_level(level) / 2
     }
 
     /// The lowest level that allows frames of `gaussians`.

@@ -1,4 +1,4 @@
-//! Clauses 5.7 to 5.10 and 5.14: payloads whose extent depends on their elements, divided into sections.
+//! Clauses 5.7 to 5.10 and 5.14 to 5.17: payloads whose extent depends on their elements, divided into sections.
 //!
 //! The fixed record in front is deku's ([`crate::syntax`]), the division behind it nom's. A section cannot be
 //! read past its end, and what is left over is an error.
@@ -15,6 +15,7 @@ mod number;
 mod operating_points;
 mod refinement;
 mod transform;
+mod weights;
 
 pub use codebook::Codebook;
 pub use increment::{CodedSection, Increment, SectionBytes, write_increment};
@@ -23,6 +24,7 @@ pub use number::{leb128, write_leb128};
 pub use operating_points::OperatingPoints;
 pub use refinement::{Refinement, write_refinement};
 pub use transform::Transform;
+pub use weights::{Layer, Network, Part, REGISTRY, Weights};
 
 /// A row of a syntax table whose extent depends on other elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +52,7 @@ const fn row(
 }
 
 /// The rows behind the fixed part of the records, in the order of clause 5.
-pub const VARIABLE_ROWS: [VariableRow; 15] = [
+pub const VARIABLE_ROWS: [VariableRow; 17] = [
     row("5.7", "transform", "mean", "i32[dimension]", "output of components 0, step/64"),
     row("5.7", "transform", "basis", "i16[rank*dimension]", "weights, Q12, component by component"),
     row(
@@ -72,6 +74,8 @@ pub const VARIABLE_ROWS: [VariableRow; 15] = [
     row("5.15", "section", "block_length", "leb128[block_count]", "bytes of each block"),
     row("5.15", "section", "blocks", "u8[...]", "entropy-coded values"),
     row("5.16", "operating_points", "entries", "operating_point[point_count]", "one for each point"),
+    row("5.17", "weights", "model", "u8[...]", "a network, or the SHA-256 of one"),
+    row("5.17.1", "network", "parameters", "u8[...]", "weights and biases, part by part"),
 ];
 
 /// What nom carries: the bytes from the offending element on stand for its offset.

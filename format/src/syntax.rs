@@ -20,6 +20,7 @@ mod sequence_parameters;
 mod sh_header;
 mod transform;
 mod unit_header;
+mod weights;
 
 pub use codebook::CodebookHeader;
 pub use end::EndOfStream;
@@ -34,6 +35,7 @@ pub use sequence_parameters::{MAX_LAYERS, MAX_REFINEMENTS, SequenceParameters, p
 pub use sh_header::{NO_CODEBOOK, ShHeader, ShMode};
 pub use transform::{TransformHeader, TransformKind};
 pub use unit_header::{UnitHeader, UnitId, UnitType};
+pub use weights::{NetworkHeader, WeightsHeader};
 
 /// Largest identifier of a transform or a codebook.
 pub const MAX_ID: u8 = 15;
@@ -69,7 +71,7 @@ pub struct Table {
 }
 
 /// Every fixed record, in the order of clause 5.
-pub const TABLES: [Table; 14] = [
+pub const TABLES: [Table; 16] = [
     FileHeader::TABLE,
     UnitHeader::TABLE,
     SequenceParameters::TABLE,
@@ -84,6 +86,8 @@ pub const TABLES: [Table; 14] = [
     IncrementHeader::TABLE,
     OperatingPointsHeader::TABLE,
     OperatingPointEntry::TABLE,
+    WeightsHeader::TABLE,
+    NetworkHeader::TABLE,
 ];
 
 /// Declares a record as its specification table: clauses, names, types, meaning.

@@ -5,16 +5,22 @@
 mod sample;
 
 use sample::case::{Case, assert_refused, case, put};
-use sample::{CODEBOOK, DC, END, FRAME, GOP, INDEX, REFINEMENT, SEQUENCE, SH};
+use sample::{CODEBOOK, DC, END, FRAME, GOP, INDEX, REFINEMENT, SEQUENCE, SH, Units, WEIGHTS};
 use splatstream_format::Limits;
+use splatstream_format::syntax::Profile;
 
 fn assert_payloads_refused(cases: &[Case]) {
+    assert_refused_of(Profile::Intra, &sample::units(), cases);
+}
+
+fn assert_refused_of(profile: Profile, units: &Units, cases: &[Case]) {
+    assert_eq!(sample::verdict(&sample::stream_of(profile, units)), None);
     for (number, case) in cases.iter().enumerate() {
-        let mut units = sample::units();
+        let mut units = units.clone();
         (case.edit)(&mut units[case.unit].1);
         let at = sample::unit_at(&units, case.unit) + 20 + case.fault;
         let what = format!("case {number}, unit {}", case.unit);
-        assert_refused(&what, sample::verdict(&sample::stream(&units)), case, at);
+        assert_refused(&what, sample::verdict(&sample::stream_of(profile, &units)), case, at);
     }
 }
 
@@ -170,6 +176,78 @@ fn broken_codebooks_and_refinements_are_refused() {
         ),
         case(INDEX, |p| put(p, 0, u32::MAX.to_le_bytes()), "SHORT_SECTION", "5.10", 4),
     ]);
+}
+
+// covers: SS-WT-001, SS-WT-003, SS-WT-004
+#[test]
+fn broken_weights_are_refused() {
+    let weights = |edit, code, clause, fault| case(WEIGHTS, edit, code, clause, fault);
+    let length = u64::try_from(sample::dynamic_units()[WEIGHTS].1.len()).unwrap();
+    assert_refused_of(
+        Profile::Dynamic,
+        &sample::dynamic_units(),
+        &[
+            weights(|p| p[0] = 2, "RESERVED", "6.17", 0),
+            weights(|p| p[0] = 255, "RESERVED", "6.17", 0),
+            weights(Vec::clear, "SHORT_SECTION", "5.17", 0),
+            // A digest: of nothing that is registered, too short, too long.
+            weights(|p| *p = vec![1; 33], "RESERVED", "6.17", 1),
+            weights(|p| *p = vec![1; 32], "SHORT_SECTION", "5.17", 1),
+            weights(|p| *p = vec![1], "SHORT_SECTION", "5.17", 1),
+            weights(|p| p[0] = 1, "TRAILING_BYTES", "5.17", 33),
+            weights(|p| p[1] = 8, "RESERVED_BITS", "6.17.1", 1),
+            weights(|p| p[1] = 128, "RESERVED_BITS", "6.17.1", 1),
+            weights(|p| p[2] = 2, "OUT_OF_RANGE", "6.17.1", 2),
+            weights(|p| p[2] = 7, "OUT_OF_RANGE", "6.17.1", 2),
+            weights(|p| p[3] = 129, "OUT_OF_RANGE", "6.17.1", 3),
+            weights(|p| p[4] = 33, "OUT_OF_RANGE", "6.17.1", 4),
+            weights(|p| p[5] = 5, "OUT_OF_RANGE", "6.17.1", 5),
+            weights(|p| p[6] = 0, "OUT_OF_RANGE", "6.17.1", 6),
+            weights(|p| p[6] = 17, "OUT_OF_RANGE", "6.17.1", 6),
+            weights(|p| p[7] = 4, "OUT_OF_RANGE", "6.17.1", 7),
+            weights(|p| p[8] = 17, "OUT_OF_RANGE", "6.17.1", 8),
+            weights(|p| p[9] = 9, "OUT_OF_RANGE", "6.17.1", 9),
+            weights(|p| p[10] = 5, "OUT_OF_RANGE", "6.17.1", 10),
+            weights(|p| p[11] = 0, "OUT_OF_RANGE", "6.17.1", 11),
+            weights(|p| p[18] = 16, "OUT_OF_RANGE", "6.17.1", 18),
+            weights(|p| put(p, 7, [0, 0]), "OUT_OF_RANGE", "6.17.1", 8),
+            // In the order of the table, and all before the parameters.
+            weights(|p| put(p, 1, [255; 18]), "RESERVED_BITS", "6.17.1", 1),
+            weights(|p| put(p, 3, [255; 16]), "OUT_OF_RANGE", "6.17.1", 3),
+            weights(|p| put(p, 7, [0, 0, 9]), "OUT_OF_RANGE", "6.17.1", 9),
+            weights(
+                |p| {
+                    put(p, 7, [0, 0]);
+                    p.truncate(30);
+                },
+                "OUT_OF_RANGE",
+                "6.17.1",
+                8,
+            ),
+            weights(|p| p.truncate(18), "SHORT_SECTION", "5.17.1", 11),
+            weights(|p| p.truncate(1), "SHORT_SECTION", "5.17.1", 1),
+            weights(|p| p.truncate(19), "SHORT_SECTION", "5.17.1", 19),
+            weights(|p| _ = p.pop(), "SHORT_SECTION", "5.17.1", 19),
+            weights(|p| p.push(0), "TRAILING_BYTES", "5.17.1", length),
+            // An output less: a column of the embedding, a row of the head and its bias.
+            weights(|p| p[8] = 0, "TRAILING_BYTES", "5.17.1", length - 8 - 8 - 2),
+        ],
+    );
+    let mut ends = sample::dynamic_units();
+    let largest = [7, 6, 128, 32, 4, 16, 3, 16, 8, 4, 15, 15, 15, 15, 15, 15, 15, 15];
+    ends[WEIGHTS].1 = [vec![0], largest.to_vec(), vec![0x80; 32_606]].concat();
+    // full_attention leaves out the 64 bytes of query.
+    ends[WEIGHTS].1.truncate(1 + 18 + 32_606 - 64);
+    assert_eq!(sample::verdict(&sample::stream_of(Profile::Dynamic, &ends)), None);
+    put(&mut ends[WEIGHTS].1, 1, [6]);
+    ends[WEIGHTS].1.extend([0x7F; 64]);
+    assert_eq!(sample::verdict(&sample::stream_of(Profile::Dynamic, &ends)), None);
+    put(&mut ends[WEIGHTS].1, 1, [0, 3, 0, 0, 0, 1, 0, 1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1]);
+    // d is 8, f is 9: embedding, rank, query, attention, value, its bias, head and its bias.
+    ends[WEIGHTS].1.truncate(1 + 18 + 72 + 16 + 8 + 64 + 64 + 16 + 8 + 2);
+    assert_eq!(sample::verdict(&sample::stream_of(Profile::Dynamic, &ends)), None);
+    let intra = sample::stream_of(Profile::Intra, &ends);
+    assert_eq!(sample::verdict(&intra).unwrap().kind.code(), "RESERVED");
 }
 
 // covers: SS-ER-003

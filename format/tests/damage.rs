@@ -98,16 +98,19 @@ fn nothing_is_given_out_behind_a_damaged_header() {
 #[test]
 fn an_unknown_unit_that_is_not_critical_is_passed_over_unread() {
     let units = sample::units();
-    for unit_type in [9, 127, 128, 255] {
+    // Weights and increments are units of profile Dynamic.
+    for unit_type in [9, 10, 12, 127, 128, 255] {
         let mut private = Vec::new();
         let id = UnitId {
-            unit_type: UnitType::from_code(unit_type),
+            unit_type: UnitType::User(200),
             spatial_layer: 1,
             temporal_layer: 2,
             refinement: 200,
             frame: 77,
         };
         write_unit(&mut private, id, b"anything").unwrap();
+        private[0] = unit_type;
+        sample::seal_unit_header(&mut private, 0);
         // Its check sum is not looked at.
         private[25] ^= 1;
         for place in 0..units.len() {

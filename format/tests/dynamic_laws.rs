@@ -6,7 +6,7 @@ use arbitrary::{Arbitrary, Unstructured};
 use proptest::prelude::{ProptestConfig, any};
 use proptest::{collection::vec, prop_assert, prop_assert_eq, proptest};
 use splatstream_format::arbitrary_stream::dynamic::{ArbitraryIncrement, DynamicStream};
-use splatstream_format::payload::{Increment, OperatingPoints};
+use splatstream_format::payload::{Increment, OperatingPoints, Weights};
 use splatstream_format::syntax::{GopHeader, Profile, SequenceParameters, UnitType};
 use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Limits, inspect::inspect};
@@ -39,6 +39,9 @@ proptest! {
         let gops = of_type(UnitType::GopHeader)
             .map(|unit| GopHeader::parse_payload(unit.payload, unit.payload_at, Profile::Dynamic).unwrap());
         prop_assert!(gops.eq(made.gops.iter().map(|gop| gop.header)));
+        let weights = of_type(UnitType::Weights)
+            .map(|unit| Weights::parse(unit.payload, unit.payload_at).unwrap());
+        prop_assert!(weights.eq(made.gops.iter().filter_map(|gop| gop.weights.clone())));
         prop_assert_eq!(of_type(UnitType::Increment).count(), increments(&made).count());
         for (unit, made_of) in of_type(UnitType::Increment).zip(increments(&made)) {
             let place = (unit.header.spatial_layer, unit.header.refinement);

@@ -4,6 +4,7 @@
 mod sample;
 
 use splatstream_format::inspect::{Element, inspect};
+use splatstream_format::syntax::Profile;
 use splatstream_format::{Error, Limits};
 
 fn elements(bytes: &[u8]) -> (Vec<Element>, Option<Error>) {
@@ -50,6 +51,23 @@ fn an_element_has_its_place_its_clause_and_a_meaning() {
     assert_eq!(rank.at_bit, 8 * (sample::unit_at(&units, sample::DC) + 20 + 3));
     assert_eq!((rank.bits, rank.clause), (8, "5.7"));
     assert!(elements.iter().all(|element| !element.meaning.is_empty()));
+}
+
+#[test]
+fn the_elements_of_a_network_are_shown_and_its_parameters_counted() {
+    let units = sample::dynamic_units();
+    let bytes = sample::stream_of(Profile::Dynamic, &units);
+    let (elements, error) = elements(&bytes);
+    assert_eq!(error, None);
+    assert_eq!(values(&elements, "weights", "model_source"), ["0"]);
+    assert_eq!(values(&elements, "network", "feed_forward_width"), ["2"]);
+    let parameters = units[sample::WEIGHTS].1.len() - 19;
+    assert_eq!(values(&elements, "network", "parameters"), [format!("{parameters} bytes")]);
+    let shown: u64 = elements.iter().map(|element| element.bits).sum();
+    assert_eq!(shown, 8 * u64::try_from(bytes.len()).unwrap());
+    // A unit of profile Intra is passed over.
+    let (elements, _) = self::elements(&sample::stream(&units));
+    assert!(values(&elements, "weights", "model_source").is_empty());
 }
 
 #[test]

@@ -10,11 +10,12 @@ use proptest::prelude::{ProptestConfig, any};
 use proptest::{collection::vec, prop_assert, prop_assert_eq, proptest};
 use splatstream_format::arbitrary_stream::{self as random, ArbitraryStream};
 use splatstream_format::payload::{
-    Codebook, Increment, Index, OperatingPoints, Refinement, Transform, leb128, write_leb128,
+    Codebook, Increment, Index, Layer, Network, OperatingPoints, Part, Refinement, Transform, Weights,
+    leb128, write_leb128,
 };
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, Profile,
-    SequenceParameters, TransformKind, UnitHeader, UnitType,
+    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, NetworkHeader,
+    Profile, SequenceParameters, TransformKind, UnitHeader, UnitId, UnitType, WeightsHeader,
 };
 use splatstream_format::unit::Stream;
 use splatstream_format::{Limits, Result, inspect::inspect};
@@ -34,11 +35,16 @@ macro_rules! reading_and_writing_refuse_alike {
     ($($law:ident $Record:ident($parse:expr);)+) => { proptest! { $(
         // covers: SS-ER-001
         #[test]
-        fn $law(valid in any::<bool>(), seed in vec(any::<u8>(), 0..200), place: usize, value: u8) {
+        fn $law(
+            valid in any::<bool>(),
+            seed in vec(any::<u8>(), 0..200),
+            place in 0..$Record::SIZE,
+            value: u8,
+        ) {
             // Close to valid, or anything.
             let mut raw = if valid { near(&seed) } else { seed };
             raw.resize($Record::SIZE, 0);
-            raw[place % $Record::SIZE] = value;
+            raw[place] = value;
             let (_, record) = $Record::from_bytes((&raw, 0)).unwrap();
             let read: Result<$Record> = $parse(&raw);
             prop_assert_eq!(read.map(|_| raw.clone()), record.to_bytes());
@@ -62,6 +68,7 @@ reading_and_writing_refuse_alike! {
     index_headers IndexHeader(|raw: &[u8]| IndexHeader::parse_payload(raw, 0));
     index_entries IndexEntry(|raw: &[u8]| IndexEntry::parse_payload(raw, 0));
     end_units EndOfStream(|raw: &[u8]| EndOfStream::parse_payload(raw, 0));
+    weights_headers WeightsHeader(|raw: &[u8]| WeightsHeader::parse_payload(raw, 0));
 }
 
 proptest! {
@@ -119,6 +126,69 @@ proptest! {
         prop_assert_eq!(Index::parse(&index.to_bytes().unwrap(), 9), Ok(index));
     }
 
+    #[test]
+    fn weights_come_back(seed in vec(any::<u8>(), 0..600), at in 0..u64::MAX / 2) {
+        let weights = made(&seed, random::weights);
+        let bytes = weights.to_bytes().unwrap();
+        prop_assert_eq!(Weights::parse(&bytes, at), Ok(weights));
+    }
+
+    // covers: SS-WT-001
+    #[test]
+    fn a_digest_comes_back_and_names_nothing_that_is_not_registered(digest: [u8; 32], at in 0..u64::MAX / 2) {
+        let weights = Weights::Registered(digest);
+        let bytes = weights.to_bytes().unwrap();
+        prop_assert_eq!((bytes.len(), &bytes[1..]), (33, &digest[..]));
+        prop_assert_eq!(Weights::parse(&bytes, at), Ok(weights.clone()));
+        let error = weights.network(at).unwrap_err();
+        prop_assert_eq!((error.kind.code(), error.at), ("RESERVED", at + 1));
+    }
+
+    // covers: SS-WT-003, SS-WT-004
+    #[test]
+    fn networks_are_refused_alike_when_read_and_when_made(
+        seed in vec(any::<u8>(), 0..100),
+        place in 0..NetworkHeader::SIZE,
+        value: u8,
+        spare in 0..3_usize,
+    ) {
+        let Weights::Carried(network) = made(&seed, random::weights) else { return Ok(()) };
+        let mut raw = network.to_bytes().unwrap()[..NetworkHeader::SIZE].to_vec();
+        raw[place] = value;
+        let (_, header) = NetworkHeader::from_bytes((&raw, 0)).unwrap();
+        // Sizes out of range are refused whatever is there: no need to have as much.
+        let of = if header.validate(0).is_ok() { header } else { network.header };
+        let layers = Part::ALL.map(|part| {
+            let (weights, bias) = part.lengths(&of);
+            Layer { weights: vec![-7; weights], bias: vec![300; bias] }
+        });
+        let parameters: usize = layers.iter().map(|layer| layer.weights.len() + 2 * layer.bias.len()).sum();
+        raw.resize(NetworkHeader::SIZE + parameters, 0);
+        let read = Network::parse(&raw, 0);
+        let same = Network::new(header, layers.clone());
+        prop_assert_eq!(read.as_ref().map(|read| read.header), same.as_ref().map(|made| made.header));
+        // A value more or less in one of the parts.
+        let mut layers = layers;
+        let layer = &mut layers[place % 11];
+        match spare {
+            0 => layer.weights.push(1),
+            1 => layer.bias.push(1),
+            _ if layer.weights.pop().is_none() => layer.bias.push(1),
+            _ => {}
+        }
+        let refused = Network::new(header, layers).unwrap_err().kind.code();
+        prop_assert_eq!(refused, same.map_or_else(|error| error.kind.code(), |_| "CONSTRAINT"));
+        if read.is_ok() {
+            let parameters_at = NetworkHeader::SIZE as u64;
+            raw.push(0);
+            let error = Network::parse(&raw, 0).unwrap_err();
+            prop_assert_eq!((error.kind.code(), error.at), ("TRAILING_BYTES", raw.len() as u64 - 1));
+            raw.truncate(raw.len() - 2);
+            let error = Network::parse(&raw, 0).unwrap_err();
+            prop_assert_eq!((error.kind.code(), error.at), ("SHORT_SECTION", parameters_at));
+        }
+    }
+
     // covers: SS-RU-006
     #[test]
     fn prefixes_grow_to_the_whole_frame(seed in vec(any::<u8>(), 0..200), gaussians: u32) {
@@ -162,12 +232,12 @@ proptest! {
         let _ = Index::parse(&bytes, u64::MAX);
         let _ = Increment::parse(&bytes, u64::MAX, &sequence, &limits);
         let _ = OperatingPoints::parse(&bytes, u64::MAX);
+        let _ = Weights::parse(&bytes, u64::MAX);
         // Behind a good beginning.
         let mut units = sample::units();
-        let id = splatstream_format::syntax::UnitId::stream(UnitType::from_code(unit_type));
-        if unit_type != 9 {
-            units.insert(6, (id, bytes));
-            inspect(&sample::stream(&units), &limits, &mut |_| ());
+        units.insert(6, (UnitId::stream(UnitType::from_code(unit_type)), bytes));
+        for profile in [Profile::Intra, Profile::Dynamic] {
+            inspect(&sample::stream_of(profile, &units), &limits, &mut |_| ());
         }
     }
 }
@@ -179,11 +249,14 @@ fn every_code_of_a_unit_is_one_type() {
         assert_eq!(unit_type.code(), code);
         let name = match code {
             0 => "forbidden",
-            1..=8 | 10..=11 => unit_type.name(),
-            9 | 12..=127 => "reserved",
+            1..=11 => unit_type.name(),
+            12..=127 => "reserved",
             128.. => "user",
         };
-        assert_eq!((unit_type.name(), unit_type.is_known()), (name, matches!(code, 1..=8 | 10..=11)));
+        assert_eq!((unit_type.name(), unit_type.is_known()), (name, matches!(code, 1..=11)));
+        let in_intra = matches!(code, 1..=8 | 11);
+        assert_eq!(unit_type.is_known_in(Profile::Intra), in_intra);
+        assert_eq!(unit_type.is_known_in(Profile::Dynamic), unit_type.is_known());
     }
 }
 

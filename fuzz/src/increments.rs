@@ -6,7 +6,7 @@ use crate::read_back::ReadBack;
 use crate::{LIMITS, laws};
 use arbitrary::{Arbitrary, Unstructured};
 use splatstream_format::arbitrary_stream::dynamic::{ArbitraryIncrement, DynamicGop, DynamicStream};
-use splatstream_format::payload::{Codebook, Increment, OperatingPoints};
+use splatstream_format::payload::{Codebook, Increment, OperatingPoints, Weights};
 use splatstream_format::syntax::{FrameHeader, GopHeader, Profile, SequenceParameters, UnitType};
 
 /// The input is what the stream is made of.
@@ -39,6 +39,10 @@ fn gop(units: &mut ReadBack<'_>, made: &DynamicGop, sequence: &SequenceParameter
     let read = GopHeader::parse_payload(unit.payload, unit.payload_at, Profile::Dynamic);
     assert_eq!(read, Ok(made.header));
     units.transforms(&made.transforms, sequence);
+    if let Some(weights) = &made.weights {
+        let unit = units.next(UnitType::Weights);
+        assert_eq!(Weights::parse(unit.payload, unit.payload_at).as_ref(), Ok(weights));
+    }
     for frame in &made.frames {
         for made in &frame.codebooks {
             let unit = units.next(UnitType::Codebook);

@@ -25,6 +25,7 @@ pub const LIMITS: Limits = Limits {
     max_units: 1 << 9,
     max_codebook_values: 1 << 16,
     max_cells: 1 << 12,
+    max_learned: 1 << 8,
 };
 
 /// Runs a target on the files named as arguments of the program.

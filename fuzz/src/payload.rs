@@ -7,7 +7,7 @@ use splatstream_format::Limits;
 use splatstream_format::arbitrary_stream::{ArbitraryGop, ArbitraryStream, sequence_parameters};
 use splatstream_format::entropy::layout::{Layout, ShCoding};
 use splatstream_format::entropy::model::{read_models, write_models};
-use splatstream_format::payload::{Codebook, Index, Refinement, Transform};
+use splatstream_format::payload::{Codebook, Index, Refinement, Transform, Weights};
 use splatstream_format::syntax::{Profile, SequenceParameters, UnitType};
 
 /// Bytes that sequence parameters are made of, for parsers that need some.
@@ -16,7 +16,7 @@ pub const SEQUENCE: usize = 96;
 /// The first byte of the input chooses what the others are.
 pub fn run(data: &[u8]) {
     let Some((choice, data)) = data.split_first() else { return };
-    if choice % 6 == 0 {
+    if choice % 7 == 0 {
         // Fails only where the bytes do not suffice.
         if let Ok(stream) = ArbitraryStream::arbitrary(&mut Unstructured::new(data)) {
             comes_back(&stream);
@@ -25,7 +25,7 @@ pub fn run(data: &[u8]) {
     }
     let (head, payload) = data.split_at_checked(SEQUENCE).unwrap_or((data, &[]));
     let Ok(sequence) = sequence_parameters(&mut Unstructured::new(head)) else { return };
-    match choice % 6 {
+    match choice % 7 {
         1 => writes_back(payload, Transform::parse(payload, 0, &sequence), |read| read.to_bytes(&sequence)),
         2 => writes_back(payload, Codebook::parse(payload, 0, &LIMITS), Codebook::to_bytes),
         3 => writes_back(payload, Index::parse(payload, 0), Index::to_bytes),
@@ -33,7 +33,8 @@ pub fn run(data: &[u8]) {
             let read = Refinement::parse(payload, 0, &sequence, &LIMITS);
             writes_back(payload, read, |read| read.to_bytes(&sequence));
         }
-        _ => models(payload),
+        5 => models(payload),
+        _ => writes_back(payload, Weights::parse(payload, 0), Weights::to_bytes),
     }
 }
 

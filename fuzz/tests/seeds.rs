@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 
 #[path = "seeds/contexts.rs"]
 mod contexts;
+#[path = "seeds/learned.rs"]
+mod learned;
 #[path = "seeds/scenes.rs"]
 mod scenes;
 #[path = "seeds/valid_streams.rs"]
@@ -136,10 +138,12 @@ fn payloads(seed: u64, sequence: &SequenceParameters) -> Vec<(u8, &'static str, 
     let codebook = random::codebook(&mut u, 2, 5).unwrap();
     let entries = vec![IndexEntry { frame: 0, reserved_zero: 0, offset: 112 }; 2];
     let refinement = random::refinement(&mut u, sequence, 200, &[2], true).unwrap();
+    let weights = random::weights(&mut u).unwrap();
     vec![
         (1, "transform", transform.to_bytes(sequence).unwrap()),
         (2, "codebook", codebook.to_bytes().unwrap()),
         (3, "index", Index { entries }.to_bytes().unwrap()),
         (4, "refinement", refinement.to_bytes(sequence).unwrap()),
+        (6, "weights", weights.to_bytes().unwrap()),
     ]
 }

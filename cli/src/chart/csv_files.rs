@@ -20,12 +20,13 @@ pub(super) const MODE: [&str; 10] =
 /// A file and how it is made.
 type CsvFile = (&'static str, fn(&[SceneChart]) -> Vec<Vec<String>>);
 
-const FILES: [CsvFile; 8] = [
+const FILES: [CsvFile; 9] = [
     ("points.csv", points),
     ("speed.csv", speed),
     ("operating_points.csv", gop_files::modes),
     ("refinements.csv", refinements),
     ("tools.csv", gop_files::tools),
+    ("predictors.csv", gop_files::predictors),
     ("bandwidth.csv", bandwidth),
     ("costs.csv", costs),
     ("peers.csv", peers),

@@ -1,6 +1,7 @@
 //! A sequence as the paper streams it: its first GOP in profile Dynamic, at every operating point that a client would
 //! choose, and what the tools of predicted frames are worth on it.
 
+mod ablation;
 mod decoded;
 mod subset;
 mod tools;
@@ -11,6 +12,7 @@ use super::tables::{Mode, mbit_per_second};
 use crate::failure::Failure;
 use crate::numbers::bits_per_gaussian;
 use crate::progress::Progress;
+pub(crate) use ablation::AblationRow;
 use decoded::{Shown, label, shown};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{Settings, Structure, encode};
@@ -29,7 +31,9 @@ const SPATIAL: u8 = 3;
 const TEMPORAL: u8 = 2;
 
 /// Steps of progress that [`measure`] takes.
-pub(crate) const STEPS: u32 = 3;
+pub(crate) const fn steps(ablation: bool) -> u32 {
+    if ablation { 3 + ablation::ROWS } else { 3 }
+}
 
 /// What was measured of a GOP.
 #[derive(Debug, Clone)]
@@ -42,6 +46,8 @@ pub(crate) struct Gop {
     pub(crate) levels: Vec<Level>,
     /// What predicted frames take with all tools, and without each.
     pub(crate) tools: Vec<ToolRow>,
+    /// What each predictor and each part of the network is worth, if that was asked for.
+    pub(crate) ablation: Vec<AblationRow>,
 }
 
 /// A refinement level.
@@ -82,7 +88,7 @@ pub(crate) fn is_sequence(scene: &Scene, gop: u32) -> bool {
 pub(crate) fn measure(
     scene: &Scene,
     settings: &Settings,
-    fps: f64,
+    (fps, ablation): (f64, bool),
     judge: &mut Judge<'_>,
     progress: &Progress,
 ) -> Result<Gop, Failure> {
@@ -104,8 +110,10 @@ pub(crate) fn measure(
     progress.step(format!("{}: tools of predicted frames", scene.name));
     let tools = tools::rows(&mut frames, settings, judge)?;
     progress.advance();
+    let ablation =
+        if ablation { ablation::rows(&mut frames, settings, judge, progress)? } else { Vec::new() };
     let rows = levels.iter().zip(subsets).map(|((percent, shown), subset)| level(*percent, shown, subset));
-    Ok(Gop { frames: frames.len(), modes, levels: rows.collect::<Result<_, _>>()?, tools })
+    Ok(Gop { frames: frames.len(), modes, levels: rows.collect::<Result<_, _>>()?, tools, ablation })
 }
 
 fn encoded(frames: &mut Vec<GaussianFrame>, settings: &Settings) -> Result<Vec<u8>, Failure> {

@@ -67,3 +67,30 @@ pub(super) fn tools(scenes: &[SceneChart]) -> Vec<Vec<String>> {
     }
     rows
 }
+
+/// What predictors and parts of the network are worth.
+pub(super) fn predictors(scenes: &[SceneChart]) -> Vec<Vec<String>> {
+    let first = [
+        "scene",
+        "predictors",
+        "inter_bytes",
+        "network_bytes",
+        "new_gaussians",
+        "learned_percent",
+        "dc_bits",
+        "sh_bits",
+        "decode_ms",
+    ];
+    let mut rows = vec![headings(&first, &FIGURES)];
+    for scene in scenes {
+        for row in scene.gop.as_ref().map_or(&[][..], |gop| gop.ablation.as_slice()) {
+            let mut cells = headings(&[&scene.name, row.name], &[]);
+            cells.extend([row.bytes, row.network_bytes, row.new].map(|count| count.to_string()));
+            let numbers = [row.learned_percent, row.dc_bits, row.sh_bits, row.decode_ms];
+            cells.extend(numbers.map(|number| cell(Some(number))));
+            cells.extend(figures(&row.figures));
+            rows.push(cells);
+        }
+    }
+    rows
+}

@@ -13,13 +13,14 @@ pub(super) fn text(chart: &SceneChart) -> String {
         "{name}: operating points of the first group, {frames} frames at {fps} frames a second\n{modes}\n\
          {name}: refinement levels of its predicted frames; carried: what is missing comes from the intra frame; \
          subset: it stays away\n{levels}\n\
-         {name}: predicted frames with and without tools\n{tools}\n",
+         {name}: predicted frames with and without tools\n{tools}\n{ablation}",
         name = chart.name,
         frames = gop.frames,
         fps = chart.fps,
         modes = modes(gop),
         levels = levels(gop),
         tools = tools(gop),
+        ablation = ablation(&chart.name, gop),
     )
 }
 
@@ -105,4 +106,27 @@ fn tools(gop: &Gop) -> String {
         ]);
     }
     table.text()
+}
+
+/// Nothing if it was not asked for.
+fn ablation(name: &str, gop: &Gop) -> String {
+    if gop.ablation.is_empty() {
+        return String::new();
+    }
+    let headings =
+        ["predictors", "bytes", "network", "learned", "dc bits", "sh bits", "decode ms", "PSNR / SSIM"];
+    let mut table = Table::new(headings);
+    for row in &gop.ablation {
+        table.row([
+            row.name.to_owned(),
+            grouped(row.bytes),
+            grouped(row.network_bytes),
+            format!("{:.1} %", row.learned_percent),
+            format!("{:.3}", row.dc_bits),
+            format!("{:.3}", row.sh_bits),
+            format!("{:.1}", row.decode_ms),
+            figures(&row.figures),
+        ]);
+    }
+    format!("{name}: predictors of new Gaussians; bits are per new Gaussian\n{}\n", table.text())
 }

@@ -3,7 +3,7 @@
 use crate::numbers::{grouped, percent};
 use serde::Serialize;
 use splatstream_encoder::{
-    FrameReport, Importance, PredictorChoice, Report, Settings, ShChoice, Steps, Structure, Tools,
+    FrameReport, Importance, PredictorChoice, Predictors, Report, Settings, ShChoice, Steps, Structure, Tools,
 };
 use splatstream_format::syntax::FrameType;
 
@@ -178,18 +178,18 @@ fn survivors(report: &Report) -> Option<Choice> {
 
 fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
     let count = |place: usize| report.coded.iter().map(|frame| frame.predicted[place]).sum::<u64>();
-    let [none, knn, bilateral] = [0, 1, 2].map(count);
-    let all = none + knn + bilateral;
+    let counts = [0, 1, 2, 3].map(count);
+    let all: u64 = counts.iter().sum();
     if all == 0 {
         return None;
     }
-    let share = |count: u64| percent(count, all);
-    let choice =
-        format!("none {:.1} %, knn {:.1} %, bilateral {:.1} %", share(none), share(knn), share(bilateral));
-    let why = match settings.predictors {
-        PredictorChoice::None => "--predictors none",
-        PredictorChoice::Bits => "of new Gaussians; a unit is predicted where that makes it smaller",
-        PredictorChoice::Difference => "of new Gaussians; the smallest sum of residuals, --predictors l1",
+    let names = ["none", "knn", "bilateral", "transformer"];
+    let share = |(name, count): (&str, u64)| format!("{name} {:.1} %", percent(count, all));
+    let choice = names.into_iter().zip(counts).map(share).collect::<Vec<_>>().join(", ");
+    let why = match (settings.predictors, settings.predictor_choice) {
+        (Predictors::NONE, _) => "--predictor none",
+        (_, PredictorChoice::Bits) => "of new Gaussians; a unit is predicted where that makes it smaller",
+        (_, PredictorChoice::Difference) => "of new Gaussians; the smallest sum of residuals, --choose-by l1",
     };
     Some(Choice::new("predictors", choice, why))
 }

@@ -73,6 +73,7 @@ struct UnitRow {
     damaged: bool,
     needs: Vec<Need>,
     codebooks: Vec<usize>,
+    weights: Option<usize>,
 }
 
 /// A unit that another needs; those that this one needs are needed too.
@@ -143,7 +144,8 @@ impl FrameRow {
             refinement: unit.header.refinement,
             damaged: unit.place.damaged,
             needs: needs(structure, group, frame, unit),
-            codebooks: unit.codebooks.clone(),
+            codebooks: unit.tools.codebooks.clone(),
+            weights: unit.tools.weights,
         };
         Self {
             frame: frame.number,

@@ -1,6 +1,6 @@
 //! Clause 7.14: what a unit makes of its parents.
 
-use super::prediction::Prediction;
+use super::prediction::{Predicting, Prediction};
 use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use super::values::{SectionValues, UnitValues};
 use crate::displacement::{Cell, CellField};
@@ -10,8 +10,9 @@ use crate::position::{collect, positions};
 use crate::predictor::Predictor;
 use core::ops::RangeInclusive;
 use splatstream_format::entropy::layout::Section;
+use splatstream_format::payload::Network;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
-use splatstream_format::{Error, ErrorKind, Result};
+use splatstream_format::{Error, ErrorKind, Limits, Result};
 
 /// Modes of a parent, bit by bit; removal stands alone.
 const HAS_MOVE: i32 = 1;
@@ -35,6 +36,10 @@ pub struct Unit<'a> {
     pub sequence: &'a SequenceParameters,
     /// Whether the frame is an intra frame.
     pub intra: bool,
+    /// The learned predictor of the GOP.
+    pub network: Option<&'a Network>,
+    /// New Gaussians that it may predict.
+    pub most_learned: u32,
     /// Absolute offset of the payload, for errors.
     pub at: u64,
 }
@@ -118,12 +123,15 @@ pub fn apply(unit: &Unit<'_>, parents: Home, situation: &Situation<'_>) -> Resul
         (!situation.parents_follow && unit.header.predictor_count() > 0).then(|| home.planes.clone());
     let keep = change_parents(unit, &mut home)?;
     let predictors = predictors(unit)?;
-    let position = new_positions(unit)?;
     home.retain(&keep);
     let set = match predictors.iter().any(|&predictor| predictor != Predictor::None) {
         true => reference_set(situation, before.as_ref().unwrap_or(&home.planes)),
         false => QuantizedFrame::default(),
     };
+    if !set.is_empty() {
+        check_learned(unit, &predictors)?;
+    }
+    let position = new_positions(unit)?;
     let added = new_gaussians(unit, position, &predictors, &set)?;
     home.append(&added);
     Ok(Applied { home, added: added.planes })
@@ -222,7 +230,30 @@ fn new_positions(unit: &Unit<'_>) -> Result<[Vec<u32>; 3]> {
 
 fn predictors(unit: &Unit<'_>) -> Result<Vec<Predictor>> {
     let codes = unit.values.plane(Section::Predictors, 0);
-    codes.iter().map(|&code| Predictor::from_code(code, unit.at)).collect()
+    let known = |&code: &i32| {
+        let predictor = Predictor::from_code(code, unit.at)?;
+        if predictor == Predictor::Transformer && unit.network.is_none() {
+            let kind = ErrorKind::Undefined { element: "network", id: 0 };
+            return Err(Error::new(unit.at, "7.17", kind));
+        }
+        Ok(predictor)
+    };
+    codes.iter().map(known).collect()
+}
+
+/// A.2: the new Gaussians that the network predicts are not more than agreed.
+fn check_learned(unit: &Unit<'_>, predictors: &[Predictor]) -> Result<()> {
+    let run = 1_u64.wrapping_shl(unit.header.predictor_block_log2.into());
+    let mut left = u64::from(unit.header.new_count);
+    let mut learned = 0_u64;
+    for predictor in predictors {
+        let count = run.min(left);
+        left = left.wrapping_sub(count);
+        if *predictor == Predictor::Transformer {
+            learned = learned.wrapping_add(count);
+        }
+    }
+    Limits::check(unit.at, "max_learned", learned, unit.most_learned.into())
 }
 
 fn new_gaussians(
@@ -235,7 +266,8 @@ fn new_gaussians(
     let sh_planes = usize::from(unit.sequence.sh_dimension());
     let mut attributes = Attributes::unpredicted(count, &unit.coding.colour, sh_planes);
     let values = AttributeValues(&unit.values.section(Section::New).planes);
-    let prediction = Prediction::new(set, position.each_ref().map(Vec::as_slice), predictors, unit.header);
+    let by = Predicting { header: unit.header, colour: unit.coding.colour, network: unit.network };
+    let prediction = Prediction::new(set, position.each_ref().map(Vec::as_slice), predictors, &by);
     match prediction {
         Some(prediction) => prediction.reconstruct(&mut attributes, values, &unit.coding, unit.at)?,
         None => attributes.add(values, &unit.coding, unit.at)?,

@@ -4,13 +4,29 @@
 //! predictor compares what is known of a Gaussian with its neighbours.
 
 use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
+use crate::colour::Colour;
 use crate::frame::QuantizedFrame;
 use crate::home::{FINE, canonical};
 use crate::neighbours::{Neighbour, NeighbourSearch};
 use crate::predictor::{Predictor, bilateral_weights, knn_weights, weighted_mean};
+use learned::{Learned, Target};
 use rayon::prelude::*;
 use splatstream_format::Result;
+use splatstream_format::payload::Network;
 use splatstream_format::syntax::IncrementHeader;
+
+pub mod learned;
+
+/// What the predictors of a unit go by.
+#[derive(Debug, Clone, Copy)]
+pub struct Predicting<'a> {
+    /// The fixed part.
+    pub header: &'a IncrementHeader,
+    /// The transforms of the frame.
+    pub colour: Colour<'a>,
+    /// The network of the GOP.
+    pub network: Option<&'a Network>,
+}
 
 /// A new Gaussian that is predicted.
 #[derive(Debug, Clone, Copy)]
@@ -24,12 +40,16 @@ struct Item {
 pub struct Prediction<'s> {
     set: &'s QuantizedFrame,
     items: Vec<Item>,
+    /// Where the items are.
+    position: [Vec<u32>; 3],
     /// `count` for each item.
     neighbours: Vec<Neighbour>,
     count: usize,
     /// Squared differences of the attributes known so far, for each of `neighbours`.
     features: Vec<u64>,
     falloff: [u8; 2],
+    /// The network, if a Gaussian takes it.
+    learned: Option<Learned<'s>>,
 }
 
 impl<'s> Prediction<'s> {
@@ -39,8 +59,9 @@ impl<'s> Prediction<'s> {
         set: &'s QuantizedFrame,
         position: [&[u32]; 3],
         predictors: &[Predictor],
-        header: &IncrementHeader,
+        by: &Predicting<'s>,
     ) -> Option<Self> {
+        let header = by.header;
         let run = 1_usize.wrapping_shl(header.predictor_block_log2.into());
         let [x, y, z] = position;
         let predictor_of = |row: usize| predictors.get(row.checked_div(run)?).copied();
@@ -53,13 +74,15 @@ impl<'s> Prediction<'s> {
             return None;
         }
         let pick = |plane: &[u32]| -> Vec<u32> { items.iter().map(|item| at(plane, item.row)).collect() };
-        let [x, y, z] = [pick(x), pick(y), pick(z)];
+        let position = [pick(x), pick(y), pick(z)];
         let count = usize::from(header.neighbour_count).min(set.len());
         let search = NeighbourSearch::new(set.position.each_ref().map(Vec::as_slice));
-        let neighbours = search.nearest_to_all([&x, &y, &z], count);
+        let neighbours = search.nearest_to_all(position.each_ref().map(Vec::as_slice), count);
         let features = vec![0; neighbours.len()];
         let falloff = [header.bilateral_spatial, header.bilateral_feature];
-        Some(Self { set, items, neighbours, count, features, falloff })
+        let network = by.network.filter(|_| predictors.contains(&Predictor::Transformer));
+        let learned = network.map(|network| Learned::new(network, &by.colour, set));
+        Some(Self { set, items, position, neighbours, count, features, falloff, learned })
     }
 
     /// Predicts and adds residuals, attribute by attribute.
@@ -85,13 +108,18 @@ impl<'s> Prediction<'s> {
     pub fn predict(&self, stage: Stage, attributes: &mut Attributes) {
         let set = self.set;
         match stage {
-            Stage::LogScale => self.means(&planes(&set.log_scale), &mut attributes.log_scale, 1),
+            Stage::LogScale => self.means(stage, &planes(&set.log_scale), &mut attributes.log_scale, 1),
             Stage::Opacity => {
-                self.means(&[&set.opacity], core::slice::from_mut(&mut attributes.opacity), 1);
+                self.means(stage, &[&set.opacity], core::slice::from_mut(&mut attributes.opacity), 1);
             }
-            Stage::Rotation => self.means(&planes(&set.rotation), &mut attributes.rotation_fine, FINE),
-            Stage::Dc => self.means(&planes(&set.dc), &mut attributes.dc, 1),
-            Stage::Sh => self.means(&planes(&set.sh), &mut attributes.sh, 1),
+            Stage::Rotation => self.means(stage, &planes(&set.rotation), &mut attributes.rotation_fine, FINE),
+            Stage::Dc => {
+                self.means(stage, &planes(&set.dc), &mut attributes.dc, 1);
+                if let Some(learned) = &self.learned {
+                    learned.predict(&self.targets(), attributes);
+                }
+            }
+            Stage::Sh => self.means(stage, &planes(&set.sh), &mut attributes.sh, 1),
         }
     }
 
@@ -114,6 +142,24 @@ impl<'s> Prediction<'s> {
         }
     }
 
+    /// The network, if a Gaussian takes it.
+    pub fn learned(&self) -> Option<&Learned<'s>> {
+        self.learned.as_ref()
+    }
+
+    /// The items that the network predicts, once all attributes before dc are known.
+    pub fn targets(&self) -> Vec<Target<'_>> {
+        let [spatial, feature] = self.falloff;
+        let target = |(place, item): (usize, &Item)| {
+            let (neighbours, features) = self.of(place);
+            let weights = bilateral_weights(neighbours, spatial, feature, features);
+            let position = self.position.each_ref().map(|plane| plane.get(place).copied().unwrap_or(0));
+            Target { row: item.row, position, neighbours, weights }
+        };
+        let items = self.items.par_iter().enumerate();
+        items.filter(|(_, item)| item.predictor == Predictor::Transformer).map(target).collect()
+    }
+
     /// Neighbours, and their feature distances, of an item.
     fn of(&self, item: usize) -> (&[Neighbour], &[u64]) {
         let start = item.wrapping_mul(self.count);
@@ -121,13 +167,20 @@ impl<'s> Prediction<'s> {
         (self.neighbours.get(range.clone()).unwrap_or_default(), self.features.get(range).unwrap_or_default())
     }
 
-    /// Puts the means of the neighbours, times `unit`, in the place of what `out` holds for the items.
-    fn means(&self, from: &[&Vec<i32>], out: &mut [Vec<i32>], unit: i32) {
+    /// Puts the means of the neighbours, times `unit`, in the place of what `out` holds for the items; not of those
+    /// whose colour the network predicts.
+    fn means(&self, stage: Stage, from: &[&Vec<i32>], out: &mut [Vec<i32>], unit: i32) {
+        let colour = matches!(stage, Stage::Dc | Stage::Sh);
         let means = |(place, item): (usize, &Item)| -> Vec<i32> {
+            if colour && item.predictor == Predictor::Transformer {
+                return Vec::new();
+            }
             let (neighbours, features) = self.of(place);
             let [spatial, feature] = self.falloff;
             let weights = match item.predictor {
-                Predictor::Bilateral => bilateral_weights(neighbours, spatial, feature, features),
+                Predictor::Bilateral | Predictor::Transformer => {
+                    bilateral_weights(neighbours, spatial, feature, features)
+                }
                 Predictor::Knn | Predictor::None => knn_weights(neighbours),
             };
             let mean = |plane: &&Vec<i32>| {
@@ -149,10 +202,11 @@ impl<'s> Prediction<'s> {
 
     /// Adds the squared differences between the items and their neighbours in some planes.
     fn compare(&mut self, from: &[&Vec<i32>], own: &[Vec<i32>], lattice: impl Fn(i32) -> i32) {
+        let compared = |predictor| matches!(predictor, Predictor::Bilateral | Predictor::Transformer);
         let runs = self.neighbours.chunks_exact(self.count.max(1));
         let features = self.features.chunks_exact_mut(self.count.max(1));
         for (item, (neighbours, features)) in self.items.iter().zip(runs.zip(features)) {
-            if item.predictor != Predictor::Bilateral {
+            if !compared(item.predictor) {
                 continue;
             }
             for (neighbour, feature) in neighbours.iter().zip(features) {

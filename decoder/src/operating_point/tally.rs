@@ -119,7 +119,7 @@ impl Tally {
             (UnitType::Increment, Some(sequence)) => {
                 IncrementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.home_count())
             }
-            (kind, _) if !(2..=5).contains(&kind.code()) => return,
+            (kind, _) if !matches!(kind.code(), 2..=5 | 9) => return,
             _ => 0,
         };
         let length = UnitHeader::SIZE.saturating_add(payload.len());

@@ -164,6 +164,8 @@ impl<'d, 'a> Assembly<'d, 'a> {
             },
             sequence: self.sequence,
             intra: self.is_intra(),
+            network: self.gop.network(),
+            most_learned: self.options.limits.max_learned,
             at,
         };
         let parents = self.parents(&unit, usize::from(pending.refinement), predicts)?;

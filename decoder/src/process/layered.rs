@@ -1,7 +1,7 @@
 //! Frames of profile Dynamic: increments in layers, references, what is carried. Clauses 7.13, 7.18, 7.20.
 
 use super::assembly::Assembly;
-use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, keep, unexpected, unit_bytes};
+use super::{DecodedFrame, Decoder, FrameUnits, Options, PendingFrame, keep, unexpected, unit_bytes};
 use crate::frame_state::FrameState;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
@@ -172,7 +172,8 @@ impl<'a> Decoder<'a> {
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return Ok(None) };
         let reference = layered.reference.and_then(|number| self.references.find(number));
         let mut lost = frame.lost;
-        let mut assembly = Assembly::new(self.options, sequence, gop, frame, reference)?;
+        let options = Options { limits: self.limits(), ..self.options };
+        let mut assembly = Assembly::new(options, sequence, gop, frame, reference)?;
         if let Err(error) = assembly.units(&layered.units) {
             lost = Some(error);
         }

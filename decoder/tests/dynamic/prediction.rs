@@ -10,7 +10,7 @@ use crate::stream::scene::{Scene, Unit};
 use splatstream_format::syntax::IncrementHeader;
 
 /// Gaussians along x, each with its opacity and nothing else.
-fn line(points: &[(i64, i64)]) -> Vec<Gaussian> {
+pub(crate) fn line(points: &[(i64, i64)]) -> Vec<Gaussian> {
     let mut before = 0;
     let mut one = |&(x, opacity): &(i64, i64)| {
         let code = morton([x, 0, 0], 10);
@@ -22,7 +22,7 @@ fn line(points: &[(i64, i64)]) -> Vec<Gaussian> {
 }
 
 /// A line, to which a frame adds Gaussians without residuals, one predictor for each.
-fn scene(known: &[(i64, i64)], new: &[i64], predictor: i64, header: IncrementHeader) -> Scene {
+pub(crate) fn scene(known: &[(i64, i64)], new: &[i64], predictor: i64, header: IncrementHeader) -> Scene {
     let new: Vec<(i64, i64)> = new.iter().map(|&x| (x, 0)).collect();
     let first = Unit { new: line(known), ..Unit::default() };
     let second = Unit {

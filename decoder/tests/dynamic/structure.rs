@@ -32,7 +32,7 @@ fn types_layers_and_references_are_those_of_the_table_of_7_13_1() {
     ];
     for (depth, (types, references)) in (0..).zip(table) {
         let header = GopHeader::predicted(0, 9, depth);
-        let gop_of = |frames| Gop { header, transforms: Vec::new(), frames };
+        let gop_of = |frames| Gop { header, transforms: Vec::new(), network: None, frames };
         let mut scene = gop(&[100], (0..9).map(|place| empty(place, &[(0, 0)])).collect());
         scene.gops[0].header = header;
         scene.sequence.temporal_layer_count = depth + 1;

@@ -57,7 +57,7 @@ const LADDER: [(Found, Edit); 40] = [
     (Range(8194), |s| unit(s).updates[1].sh[0] = 8194),
     (Range(-8195), |s| unit(s).updates[0].sh[1] = -8195),
     // Predictors, entry by entry.
-    (Code("RESERVED"), |s| unit(s).predictors[0] = 3),
+    (Code("UNDEFINED"), |s| unit(s).predictors[0] = 3),
     (Range(4), |s| unit(s).predictors[1] = 4),
     (Range(-3), |s| unit(s).predictors[2] = -3),
     // New Gaussians, plane by plane.

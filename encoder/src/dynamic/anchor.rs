@@ -62,7 +62,7 @@ struct Anchor<'a> {
 pub(crate) fn code_anchor(
     coder: &UnitCoder<'_>,
     target: &AnchorTarget<'_>,
-    predictors: Chooser,
+    predictors: Chooser<'_>,
 ) -> Result<(Vec<CodedUnit>, Reference), Error> {
     let sequence = coder.sequence;
     let refinements = usize::from(sequence.refinement_count);
@@ -98,7 +98,7 @@ pub(crate) fn code_anchor(
 
 impl Anchor<'_> {
     /// Codes the units of a layer.
-    fn layer(&mut self, layer: u8, predictors: Chooser) -> Result<(), Error> {
+    fn layer(&mut self, layer: u8, predictors: Chooser<'_>) -> Result<(), Error> {
         let sequence = self.coder.sequence;
         let layers = sequence.spatial_layer_count;
         let shift = (layers - 1 - layer).min(sequence.position_bits - 1);
@@ -126,7 +126,7 @@ impl Anchor<'_> {
         shift: u8,
         mut added: Vec<u32>,
         digests: &mut Vec<UnitDigest>,
-        predictors: Chooser,
+        predictors: Chooser<'_>,
     ) -> Result<(), Error> {
         let home = usize::from(refinement);
         let parents = self.homes[home].clone();

@@ -152,7 +152,7 @@ impl Predicted<'_> {
     ///
     /// # Errors
     /// What the decoder's own checks refuse.
-    pub(crate) fn code(&mut self, predictors: Chooser) -> Result<(Vec<CodedUnit>, Reference), Error> {
+    pub(crate) fn code(&mut self, predictors: Chooser<'_>) -> Result<(Vec<CodedUnit>, Reference), Error> {
         let sequence = self.coder.sequence;
         let motion = self.cells()?;
         let (cells, cell_log2) = (self.cell_values(&motion), motion.cell_log2);
@@ -302,7 +302,7 @@ impl Predicted<'_> {
         fresh: &Fresh,
         added: &[u32],
         made: &[Made],
-        predictors: Chooser,
+        predictors: Chooser<'_>,
         models: &mut ModelsOfFrame,
     ) -> Result<Made, Error> {
         let refinement = home as u8;

@@ -1,12 +1,13 @@
 //! Which predictor new Gaussians take: by estimated bits, or by the paper's sum of absolute residuals.
 
+use super::learning::Recorder;
 use super::unit::{Draft, UnitCoder};
 use super::wanted::Wanted;
 use crate::error::Error;
-use crate::settings::PredictorChoice;
+use crate::settings::{PredictorChoice, Predictors};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::home::Home;
-use splatstream_decoder::increment::prediction::Prediction;
+use splatstream_decoder::increment::prediction::{Predicting, Prediction};
 use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::increment::{Applied, Situation, reference_set};
@@ -20,9 +21,6 @@ use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR};
 
 /// log2 of the new Gaussians that share a predictor chosen by bits.
 const RUN_LOG2: u8 = 6;
-
-/// Neighbours of a prediction.
-pub(super) const NEIGHBOURS: u8 = 8;
 
 /// Weights of the bilateral predictor: e^-1 at the last neighbour, and at 8 squared steps of attribute difference.
 const SPATIAL: u8 = 32;
@@ -41,13 +39,20 @@ const MOST_SAVED: usize = 10;
 const DIRECT: u32 = 32;
 
 /// How predictors are chosen.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Chooser(pub(crate) PredictorChoice);
+#[derive(Clone, Copy)]
+pub(crate) struct Chooser<'r> {
+    pub(crate) predictors: Predictors,
+    pub(crate) choice: PredictorChoice,
+    /// Neighbours of a prediction.
+    pub(crate) neighbours: u8,
+    /// What the network is trained with, while that is being collected.
+    pub(crate) recorder: Option<&'r Recorder>,
+}
 
 /// Residual planes of new Gaussians under one predictor, in plane order.
 type Residuals = Vec<Vec<i32>>;
 
-impl Chooser {
+impl Chooser<'_> {
     /// Gives a draft its new Gaussians, each with its predictor, and what a decoder makes of it. Their positions are in
     /// the draft.
     ///
@@ -68,7 +73,8 @@ impl Chooser {
         draft.values.set(Section::New, new);
         if let Some((predicted, searched)) = self.predict(coder, draft, &parents, situation, wanted, plain)? {
             // What is estimated knows nothing of contexts, which find much of what neighbours have in common.
-            let pays = self.0 == PredictorChoice::Difference
+            let pays = self.choice == PredictorChoice::Difference
+                || !self.predictors.allows(Predictor::None)
                 || new_bytes(coder, &predicted, models)? + searched / (8 * SEARCHED_FOR_A_BIT)
                     < new_bytes(coder, draft, models)?;
             if pays {
@@ -90,32 +96,37 @@ impl Chooser {
     ) -> Result<Option<(Draft, usize)>, Error> {
         // A codebook is made for whole values, not for residuals.
         let codebook = matches!(coder.colour.mode, ShCoding::VectorQuantised { .. });
-        let tries = self.0 != PredictorChoice::None && wanted.len() >= FEW && !codebook;
+        let tries = self.predictors != Predictors::NONE && wanted.len() >= FEW && !codebook;
         let set = if tries { self.set(coder, draft, parents, situation)? } else { QuantizedFrame::default() };
         let SectionValues { deltas, block, .. } = draft.values.section(Section::New).clone();
         let too_large = set.len() / SEARCHED_FOR_A_BIT > wanted.len() * MOST_SAVED;
-        if set.is_empty() || too_large && self.0 == PredictorChoice::Bits {
+        if set.is_empty() || too_large && self.is_frugal() {
             return Ok(None);
         }
         let header = IncrementHeader {
             predictor_block_log2: 0,
-            neighbour_count: NEIGHBOURS,
+            neighbour_count: self.neighbours,
             bilateral_spatial: SPATIAL,
             bilateral_feature: FEATURE,
             ..draft.header
         };
-        let mut all = vec![plain];
-        for predictor in [Predictor::Knn, Predictor::Bilateral] {
-            all.push(predicted(coder, &header, &set, wanted, predictor)?);
+        if let Some(recorder) = self.recorder {
+            predicted(coder, &header, &set, wanted, Predictor::Transformer, &mut |prediction, now| {
+                recorder.take(prediction, now, wanted);
+            })?;
         }
-        let (run_log2, codes) = match self.0 {
-            PredictorChoice::Difference => (0, by_difference(&all)),
-            _ => by_bits(&all),
-        };
+        let mut tried = self.tried(coder, &header, &set, wanted, plain)?;
+        let mut chosen = self.chosen(&tried);
+        if learned(&chosen, wanted.len(), &tried) > coder.most_learned as usize {
+            tried.retain(|(predictor, _)| *predictor != Predictor::Transformer);
+            chosen = self.chosen(&tried);
+        }
+        let (run_log2, places) = chosen;
         let run = 1_usize << run_log2;
-        let planes = (0..all[0].len())
-            .map(|plane| (0..wanted.len()).map(|row| all[codes[row / run] as usize][plane][row]).collect())
+        let planes = (0..tried[0].1.len())
+            .map(|plane| (0..wanted.len()).map(|row| tried[places[row / run]].1[plane][row]).collect())
             .collect();
+        let codes: Vec<i32> = places.iter().map(|&place| tried[place].0.code()).collect();
         if codes.iter().all(|&code| code == 0) {
             return Ok(None);
         }
@@ -125,6 +136,48 @@ impl Chooser {
         let codes = SectionValues { deltas: Vec::new(), planes: vec![codes], block };
         predicted.values.set(Section::Predictors, codes);
         Ok(Some((predicted, set.len())))
+    }
+
+    /// Whether prediction has to pay.
+    fn is_frugal(self) -> bool {
+        self.choice == PredictorChoice::Bits && self.predictors.allows(Predictor::None)
+    }
+
+    /// The residuals under each predictor that Gaussians may take.
+    fn tried(
+        self,
+        coder: &UnitCoder<'_>,
+        header: &IncrementHeader,
+        set: &QuantizedFrame,
+        wanted: &Wanted,
+        plain: Residuals,
+    ) -> Result<Vec<(Predictor, Residuals)>, Error> {
+        let mut tried = Vec::new();
+        // What is only recorded needs no choice.
+        if self.predictors.allows(Predictor::None) || self.recorder.is_some() {
+            tried.push((Predictor::None, plain.clone()));
+        }
+        if self.recorder.is_some() {
+            return Ok(tried);
+        }
+        for predictor in [Predictor::Knn, Predictor::Bilateral, Predictor::Transformer] {
+            let has_network = predictor != Predictor::Transformer || coder.network.is_some();
+            if self.predictors.allows(predictor) && has_network {
+                tried.push((predictor, predicted(coder, header, set, wanted, predictor, &mut |_, _| ())?));
+            }
+        }
+        if tried.is_empty() {
+            tried.push((Predictor::None, plain));
+        }
+        Ok(tried)
+    }
+
+    /// log2 of the Gaussians of a run, and for each run the place of its predictor among those tried.
+    fn chosen(self, tried: &[(Predictor, Residuals)]) -> (u8, Vec<usize>) {
+        match self.choice {
+            PredictorChoice::Difference => (0, by_difference(tried)),
+            PredictorChoice::Bits => (RUN_LOG2, by_bits(tried)),
+        }
     }
 
     /// What new Gaussians may be predicted from.
@@ -183,6 +236,7 @@ fn predicted(
     set: &QuantizedFrame,
     wanted: &Wanted,
     predictor: Predictor,
+    observe: &mut dyn FnMut(&Prediction<'_>, &Attributes),
 ) -> Result<Residuals, Error> {
     let shift = header.position_shift;
     let position = wanted
@@ -193,9 +247,13 @@ fn predicted(
     let predictors = vec![predictor; wanted.len()];
     let slices = position.each_ref().map(Vec::as_slice);
     let mut planes = Vec::new();
-    let mut prediction = Prediction::new(set, slices, &predictors, header);
+    let by = Predicting { header, colour: coder.colour, network: coder.network };
+    let mut prediction = Prediction::new(set, slices, &predictors, &by);
     for stage in Stage::ALL {
         if let Some(prediction) = &prediction {
+            if stage == Stage::Dc {
+                observe(prediction, &now);
+            }
             prediction.predict(stage, &mut now);
         }
         planes.extend(wanted.residuals(stage, &now, shift, &coder.colour, true));
@@ -207,36 +265,38 @@ fn predicted(
     Ok(planes)
 }
 
+/// Gaussians whose runs have chosen the transformer, at most.
+fn learned((run_log2, places): &(u8, Vec<usize>), count: usize, tried: &[(Predictor, Residuals)]) -> usize {
+    let runs = places.iter().filter(|&&place| tried[place].0 == Predictor::Transformer).count();
+    (runs << run_log2).min(count)
+}
+
 /// For each Gaussian the predictor with the smallest sum of absolute residuals; of equal ones the first.
-fn by_difference(all: &[Residuals]) -> Vec<i32> {
-    let count = all[0][0].len();
+fn by_difference(tried: &[(Predictor, Residuals)]) -> Vec<usize> {
+    let count = tried[0].1[0].len();
     let sum = |residuals: &Residuals, row: usize| -> u64 {
         residuals.iter().map(|plane| u64::from(plane[row].unsigned_abs())).sum()
     };
-    let best =
-        |row: usize| (0..all.len()).min_by_key(|&code| (sum(&all[code], row), code)).unwrap_or(0) as i32;
-    (0..count).map(best).collect()
+    let best = |row: usize| (0..tried.len()).min_by_key(|&place| (sum(&tried[place].1, row), place));
+    (0..count).map(|row| best(row).unwrap_or(0)).collect()
 }
 
-/// For each run the predictor with the fewest estimated bits, if that saves bits in all.
-fn by_bits(all: &[Residuals]) -> (u8, Vec<i32>) {
-    let count = all[0][0].len();
+/// For each run the predictor with the fewest estimated bits; the first everywhere if that saves none.
+fn by_bits(tried: &[(Predictor, Residuals)]) -> Vec<usize> {
+    let count = tried[0].1[0].len();
     let run = 1_usize << RUN_LOG2;
-    let costs: Vec<Vec<f64>> = all.iter().map(|residuals| run_bits(residuals, run)).collect();
-    let codes: Vec<i32> = (0..count.div_ceil(run))
-        .map(|place| {
-            let cost = |&code: &usize| costs[code][place];
-            (0..all.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0) as i32
+    let costs: Vec<Vec<f64>> = tried.iter().map(|(_, residuals)| run_bits(residuals, run)).collect();
+    let places: Vec<usize> = (0..count.div_ceil(run))
+        .map(|at| {
+            let cost = |&place: &usize| costs[place][at];
+            (0..tried.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
         })
         .collect();
     // The code of a predictor takes bits, and mixing residuals with values spoils the tables of both.
     let margin = 4.0;
-    let saved: f64 = codes
-        .iter()
-        .enumerate()
-        .map(|(place, &code)| costs[0][place] - costs[code as usize][place] - margin)
-        .sum();
-    if saved > 0.0 { (RUN_LOG2, codes) } else { (RUN_LOG2, vec![0; codes.len()]) }
+    let saved: f64 =
+        places.iter().enumerate().map(|(at, &place)| costs[0][at] - costs[place][at] - margin).sum();
+    if saved > 0.0 { places } else { vec![0; places.len()] }
 }
 
 /// Zero-order bits of each run.
@@ -261,9 +321,9 @@ fn run_bits(residuals: &Residuals, run: usize) -> Vec<f64> {
     bits
 }
 
-/// New Gaussians by predictor: none, knn, bilateral.
-pub(crate) fn used(draft: &Draft) -> [u64; 3] {
-    let mut counts = [0; 3];
+/// New Gaussians by the code of their predictor.
+pub(crate) fn used(draft: &Draft) -> [u64; 4] {
+    let mut counts = [0; 4];
     let total = draft.header.new_count as usize;
     if draft.header.predictor_block_log2 == NO_PREDICTOR {
         counts[0] = total as u64;

@@ -1,9 +1,9 @@
 //! Codes one increment: values chosen elsewhere are applied as a decoder applies them, then entropy coded.
 
-use super::predictors::NEIGHBOURS;
 use super::wanted::Wanted;
 use crate::error::Error;
 use crate::section::{SectionPlan, code_section};
+use crate::settings::NEIGHBOURS;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::home::Home;
 use splatstream_decoder::increment::residual::AttributeCoding;
@@ -11,7 +11,7 @@ use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::increment::{Applied, Situation, Unit, apply};
 use splatstream_decoder::layout::{Layout, Section};
 use splatstream_format::entropy::in_force::ModelsInForce;
-use splatstream_format::payload::{SectionBytes, write_increment};
+use splatstream_format::payload::{Network, SectionBytes, write_increment};
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters, ShHeader};
 
 /// What the units of a frame have in common.
@@ -23,6 +23,10 @@ pub(crate) struct UnitCoder<'a> {
     pub(crate) plan: SectionPlan,
     /// Whether the frame is an intra frame.
     pub(crate) intra: bool,
+    /// The learned predictor of the GOP.
+    pub(crate) network: Option<&'a Network>,
+    /// New Gaussians of a unit that it may predict.
+    pub(crate) most_learned: u32,
 }
 
 /// A unit before it is coded.
@@ -77,6 +81,8 @@ impl UnitCoder<'_> {
             coding: self.coding(draft.header.attribute_shift),
             sequence: self.sequence,
             intra: self.intra,
+            network: self.network,
+            most_learned: self.most_learned,
             at: 0,
         }
     }

@@ -18,8 +18,8 @@ pub(crate) struct Wanted {
     opacity: Vec<i32>,
     rotation: [Vec<i32>; 3],
     /// Steps / 64.
-    dc: [Vec<i32>; 3],
-    sh: Vec<Vec<i32>>,
+    pub(crate) dc: [Vec<i32>; 3],
+    pub(crate) sh: Vec<Vec<i32>>,
     /// Codebook indices, where SH is vector quantised.
     indices: Vec<Vec<i32>>,
 }

@@ -15,22 +15,31 @@ const MOST_DELTA: u64 = 15;
 const REMOVED: i32 = 4;
 
 /// Values from a seed: a section of hundreds takes eight bytes of an input.
-pub(super) struct Values(u64);
+pub(super) struct Values {
+    state: u64,
+    /// The last predictor that is defined.
+    last_predictor: i32,
+}
 
 impl Values {
     pub(super) const fn new(seed: u64) -> Self {
-        Self(seed)
+        Self { state: seed, last_predictor: 2 }
+    }
+
+    /// Values of a group that may have a network.
+    pub(super) fn of_group(seed: u64, has_network: bool) -> Self {
+        Self { last_predictor: if has_network { 3 } else { 2 }, ..Self::new(seed) }
     }
 
     /// The next number below `bound` (SplitMix64).
     fn below(&mut self, bound: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.state ^ self.state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
         (mixed ^ mixed >> 31).checked_rem(bound).unwrap_or(0)
     }
 
-    fn between(&mut self, least: i32, most: i32) -> i32 {
+    pub(super) fn between(&mut self, least: i32, most: i32) -> i32 {
         let span = u64::from(most.abs_diff(least)).saturating_add(1);
         least.saturating_add(i32::try_from(self.below(span)).unwrap_or(0))
     }
@@ -54,7 +63,7 @@ impl Values {
             Attribute::Position => self.between(0, delta),
             // Positions lie near the origin, beyond which nothing may move.
             Attribute::Stale | Attribute::Move => self.between(0, 1),
-            Attribute::Predictor => self.between(0, 2),
+            Attribute::Predictor => self.between(0, self.last_predictor),
             _ if plane.alphabet == Alphabet::Index => 0,
             _ => self.between(-2, 2),
         }

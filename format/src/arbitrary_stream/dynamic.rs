@@ -1,8 +1,8 @@
 //! Streams of profile Dynamic: layers, predicted frames, increments whose counts fit their parents.
 
 use super::increments::{Homes, Tools};
-use super::{Output, codebook, increments, sequence_parameters, transform};
-use crate::payload::{Codebook, Index, OperatingPoints, SectionBytes, Transform, write_increment};
+use super::{Output, codebook, increments, sequence_parameters, transform, weights};
+use crate::payload::{Codebook, Index, OperatingPoints, SectionBytes, Transform, Weights, write_increment};
 use crate::syntax::{
     EndOfStream, FrameHeader, GopHeader, IncrementHeader, IndexEntry, MAX_ID, MAX_LAYERS,
     OperatingPointEntry, PlaceInGop, Profile, SequenceParameters, TransformKind, UnitId, UnitType,
@@ -32,6 +32,8 @@ pub struct DynamicGop {
     pub header: GopHeader,
     /// Transforms with different identifiers; the first is a dc transform.
     pub transforms: Vec<Transform>,
+    /// The payload of the weights unit, if there is one.
+    pub weights: Option<Weights>,
     /// One frame or more, in order of their places.
     pub frames: Vec<DynamicFrame>,
 }
@@ -122,6 +124,9 @@ impl DynamicGop {
         for transform in &self.transforms {
             out.unit(UnitId::of_frame(UnitType::Transform, first), &transform.to_bytes(sequence)?)?;
         }
+        if let Some(weights) = &self.weights {
+            out.unit(UnitId::of_frame(UnitType::Weights, first), &weights.to_bytes()?)?;
+        }
         for frame in &self.frames {
             for LayeredCodebook { temporal_layer, codebook } in &frame.codebooks {
                 let id = UnitId::of_frame(UnitType::Codebook, first).on_layers(0, *temporal_layer);
@@ -189,7 +194,8 @@ fn gop(u: &mut Unstructured<'_>, index: u32, sequence: &SequenceParameters) -> R
     if sequence.sh_degree > 0 && u.arbitrary()? {
         transforms.push(transform(u, (dc ^ 1) & MAX_ID, TransformKind::Sh, sequence)?);
     }
-    let mut tools = Tools::new(&transforms);
+    let weights = if u.ratio(1_u8, 3_u8)? { Some(weights(u)?) } else { None };
+    let mut tools = Tools::new(&transforms, weights.is_some());
     let mut homes: Vec<(u32, Homes)> = Vec::new();
     let mut frames = Vec::new();
     for number in 0..frame_count {
@@ -208,7 +214,7 @@ fn gop(u: &mut Unstructured<'_>, index: u32, sequence: &SequenceParameters) -> R
         homes.push((number, made));
         frames.push(frame);
     }
-    Ok(DynamicGop { header, transforms, frames })
+    Ok(DynamicGop { header, transforms, weights, frames })
 }
 
 /// Codebooks before a frame: new ones, or new definitions of those that are known.

@@ -26,16 +26,17 @@ pub(super) struct Tools {
     sh: Option<(u8, u8)>,
     /// Codebooks and the temporal layers that define them.
     codebooks: Vec<(u8, u8)>,
+    has_network: bool,
 }
 
 impl Tools {
-    pub(super) fn new(transforms: &[Transform]) -> Self {
+    pub(super) fn new(transforms: &[Transform], has_network: bool) -> Self {
         let find = |kind| {
             let found = transforms.iter().find(|transform| transform.header.kind() == Some(kind));
             found.map(|transform| (transform.header.transform_id, transform.header.rank))
         };
         let dc = find(TransformKind::Dc).unwrap_or_default();
-        Self { dc, sh: find(TransformKind::Sh), codebooks: Vec::new() }
+        Self { dc, sh: find(TransformKind::Sh), codebooks: Vec::new(), has_network }
     }
 
     pub(super) fn sh_rank(&self) -> Option<u8> {
@@ -153,7 +154,7 @@ impl Maker<'_> {
         if self.has_cells && refinement == 0 {
             header.cell_count = u.int_in_range(0..=MAX_CELLS)?;
         }
-        let mut values = Values::new(u.arbitrary()?);
+        let mut values = Values::of_group(u.arbitrary()?, self.tools.has_network);
         let modes = values.modes(parents, removed, self.intra);
         let count = |bit: i32| modes.iter().filter(|&&mode| mode != 4 && mode & bit != 0).count();
         header.move_count = u32::try_from(count(1)).unwrap_or(u32::MAX);

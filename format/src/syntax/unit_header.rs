@@ -51,11 +51,13 @@ pub enum UnitType {
     Index,
     /// 8: the last unit.
     End,
+    /// 9: the learned predictor of a group, profile Dynamic.
+    Weights,
     /// 10: what one refinement of one layer changes and adds, profile Dynamic.
     Increment,
     /// 11: what the operating points cost.
     OperatingPoints,
-    /// 0 (forbidden), 9 and 12 to 127: later versions.
+    /// 0 (forbidden), 12 to 127: later versions.
     Reserved(u8),
     /// 128 to 255: private data.
     User(u8),
@@ -73,10 +75,11 @@ impl UnitType {
             6 => Self::Refinement,
             7 => Self::Index,
             8 => Self::End,
+            9 => Self::Weights,
             10 => Self::Increment,
             11 => Self::OperatingPoints,
             128.. => Self::User(code),
-            0 | 9 | 12..=127 => Self::Reserved(code),
+            0 | 12..=127 => Self::Reserved(code),
         }
     }
 
@@ -91,6 +94,7 @@ impl UnitType {
             Self::Refinement => 6,
             Self::Index => 7,
             Self::End => 8,
+            Self::Weights => 9,
             Self::Increment => 10,
             Self::OperatingPoints => 11,
             Self::Reserved(code) | Self::User(code) => code,
@@ -108,6 +112,7 @@ impl UnitType {
             Self::Refinement => "refinement",
             Self::Index => "index",
             Self::End => "end",
+            Self::Weights => "weights",
             Self::Increment => "increment",
             Self::OperatingPoints => "operating_points",
             Self::Reserved(0) => "forbidden",
@@ -121,9 +126,10 @@ impl UnitType {
         !matches!(self, Self::Reserved(_) | Self::User(_))
     }
 
-    /// Whether a decoder of streams of a profile knows the payload; to profile Intra increments are unknown.
+    /// Whether a decoder of streams of a profile knows the payload; to profile Intra increments and weights are
+    /// unknown.
     pub fn is_known_in(self, profile: Profile) -> bool {
-        self.is_known() && !(profile == Profile::Intra && self == Self::Increment)
+        self.is_known() && !(profile == Profile::Intra && matches!(self, Self::Increment | Self::Weights))
     }
 
     /// Whether a writer marks the unit critical.

@@ -4,10 +4,12 @@
 
 pub(crate) mod case;
 
-use splatstream_format::payload::{Codebook, Index, Transform, write_refinement};
+use splatstream_format::payload::{
+    Codebook, Index, Layer, Network, Part, Transform, Weights, write_refinement,
+};
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, Profile, RefinementHeader,
-    SequenceParameters, TransformHeader, UnitId, UnitType,
+    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, NetworkHeader, Profile,
+    RefinementHeader, SequenceParameters, TransformHeader, UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_format::{Error, Limits, inspect::inspect};
@@ -26,6 +28,9 @@ pub(crate) const FRAME: usize = 5;
 pub(crate) const REFINEMENT: usize = 6;
 pub(crate) const INDEX: usize = 7;
 pub(crate) const END: usize = 8;
+
+/// The place of the weights in [`dynamic_units`].
+pub(crate) const WEIGHTS: usize = 2;
 
 pub(crate) type Units = Vec<(UnitId, Vec<u8>)>;
 
@@ -101,15 +106,57 @@ pub(crate) fn units() -> Units {
     units
 }
 
+/// A network that has all parts that can be there together; its parameters are different numbers.
+pub(crate) fn network() -> Network {
+    let header = NetworkHeader {
+        network_flags: NetworkHeader::flags(false, true, true),
+        width_log2: 3,
+        feed_forward_width: 2,
+        geometry_width: 1,
+        fourier_count: 1,
+        rank_count: 2,
+        dc_count: 1,
+        sh_count: 1,
+        token_shift: 8,
+        output_shift: 4,
+        layer_shift: [1, 15, 1, 15, 1, 15, 1, 15],
+    };
+    let mut numbers = (0..255).cycle();
+    let layers = Part::ALL.map(|part| {
+        let (weights, biases) = part.lengths(&header);
+        let weights = numbers.by_ref().take(weights).map(|number: i16| (number - 128) as i8).collect();
+        let bias = numbers.by_ref().take(biases).map(|number| number * 128 - 16_000).collect();
+        Layer { weights, bias }
+    });
+    Network::new(header, layers).unwrap()
+}
+
+/// The units of a stream of profile Dynamic with a network and no frames.
+pub(crate) fn dynamic_units() -> Units {
+    let weights = Weights::Carried(Box::new(network())).to_bytes().unwrap();
+    let end = EndOfStream { frame_count: 0, unit_count: 3, index_offset: 0 };
+    vec![
+        (UnitId::stream(UnitType::SequenceParameters), sequence().to_bytes().unwrap()),
+        (UnitId::of_frame(UnitType::GopHeader, 0), GopHeader::intra(0, 1).to_bytes().unwrap()),
+        (UnitId::of_frame(UnitType::Weights, 0), weights),
+        (UnitId::stream(UnitType::End), end.to_bytes().unwrap()),
+    ]
+}
+
 /// Offset of a unit in the stream of [`stream`].
 pub(crate) fn unit_at(units: &Units, place: usize) -> u64 {
     let before = units.iter().take(place).map(|(_, payload)| UNIT_HEADER + payload.len());
     u64::try_from(FILE_HEADER + before.sum::<usize>()).unwrap()
 }
 
-/// The stream of these units, with check sums that fit.
+/// The stream of profile Intra of these units, with check sums that fit.
 pub(crate) fn stream(units: &Units) -> Vec<u8> {
-    let mut bytes = write_file_header(Profile::Intra, 2).unwrap();
+    stream_of(Profile::Intra, units)
+}
+
+/// The stream of a profile.
+pub(crate) fn stream_of(profile: Profile, units: &Units) -> Vec<u8> {
+    let mut bytes = write_file_header(profile, 2).unwrap();
     for (id, payload) in units {
         write_unit(&mut bytes, *id, payload).unwrap();
     }

@@ -1,6 +1,6 @@
 //! Streams of the encoder, as small as it makes them.
 
-use crate::contexts;
+use crate::{contexts, learned};
 use splatstream_encoder::{PredictorChoice, Preset, Quality, Settings, ShChoice, Steps, Structure, encode};
 use splatstream_format::Limits;
 use splatstream_format::payload::{Refinement, Transform};
@@ -41,8 +41,8 @@ fn intra() -> Vec<(String, Vec<u8>)> {
 
 /// Streams of profile Dynamic.
 fn dynamic() -> Vec<(String, Vec<u8>)> {
-    let (structure, predictors) = (Structure::Predicted { layers: 2 }, PredictorChoice::Difference);
-    let predicted = Settings { refinements: vec![30, 100], structure, predictors, ..fast() };
+    let (structure, predictor_choice) = (Structure::Predicted { layers: 2 }, PredictorChoice::Difference);
+    let predicted = Settings { refinements: vec![30, 100], structure, predictor_choice, ..fast() };
     let settings = [
         ("predicted", 0, 5, Settings { gop: 4, ..predicted.clone() }),
         ("layers", 1, 2, Settings { spatial_layers: 2, keep_invisible: true, ..predicted }),
@@ -50,7 +50,8 @@ fn dynamic() -> Vec<(String, Vec<u8>)> {
     ];
     let encoded =
         settings.map(|(name, sh, frames, settings)| (name.to_owned(), stream(sh, frames, &settings)));
-    encoded.into()
+    let made = [("learned".to_owned(), learned::stream())];
+    encoded.into_iter().chain(made).collect()
 }
 
 fn stream(sh_degree: u8, frames: u32, settings: &Settings) -> Vec<u8> {

@@ -125,7 +125,9 @@ fn sizes(stream: &[u8], point: OperatingPoint) -> Result<BTreeMap<u32, u64>, Fai
         let unit = unit.map_err(fault)?;
         let bytes = (UnitHeader::SIZE + unit.payload.len()) as u64;
         match unit.header.unit_type() {
-            UnitType::GopHeader | UnitType::Transform | UnitType::Codebook => waiting += bytes,
+            UnitType::GopHeader | UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
+                waiting += bytes;
+            }
             UnitType::FrameHeader => {
                 *sizes.entry(unit.header.frame).or_default() += bytes + std::mem::take(&mut waiting);
             }

@@ -5,7 +5,7 @@ use crate::chart::judge::Judge;
 use crate::failure::Failure;
 use crate::setting_names::ToolName;
 use splatstream_decoder::operating_point::OperatingPoint;
-use splatstream_encoder::{PredictorChoice, Settings, encode};
+use splatstream_encoder::{PredictorChoice, Predictors, Settings, encode};
 use splatstream_format::syntax::FrameType;
 use splatstream_render::metrics::Comparison;
 use splatstream_scene::GaussianFrame;
@@ -46,13 +46,13 @@ pub(super) fn rows(
         tool.leave_out_of(&mut settings);
         settings
     };
-    let predicted = |predictors| Settings { predictors, ..settings.clone() };
+    let by = |predictor_choice| Settings { predictor_choice, ..settings.clone() };
     let variants = [
-        ("everything", predicted(PredictorChoice::Bits)),
+        ("everything", by(PredictorChoice::Bits)),
         ("without cell-motion", without(ToolName::CellMotion)),
         ("without survivors", without(ToolName::Survivors)),
-        ("predictors none", predicted(PredictorChoice::None)),
-        ("predictors l1", predicted(PredictorChoice::Difference)),
+        ("predictor none", Settings { predictors: Predictors::NONE, ..settings.clone() }),
+        ("chosen by l1", by(PredictorChoice::Difference)),
     ];
     variants.iter().map(|(name, settings)| row(name, frames, settings, judge)).collect()
 }

@@ -35,6 +35,16 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
         ))
         (tools(chart, gop))
         (made_by(command))
+        @if !gop.ablation.is_empty() {
+            h3 { "What predictors of new Gaussians are worth" }
+            (how_to_read(
+                "each row codes the same group with another choice of predictors: one for every new Gaussian, or what \
+                 saves bits (auto); below, the network with one of its parts changed or left out, trained anew. Bits of \
+                 dc and sh are per new Gaussian, the intra frame included; the network itself is counted apart."
+            ))
+            (ablation(chart, gop))
+            (made_by(command))
+        }
     }
 }
 
@@ -102,6 +112,30 @@ fn tools(chart: &SceneChart, gop: &Gop) -> Markup {
                     td { (format!("{:.3}", tool.bytes_per_gaussian())) }
                     td { (signed(more(tool), " %")) }
                     (metric_cells(chart, &tool.figures, place, gop.tools.len()))
+                }
+            }
+        },
+    )
+}
+
+fn ablation(chart: &SceneChart, gop: &Gop) -> Markup {
+    let mut headings = vec![Heading::Words("Predictors")];
+    let numbers = ["Size", "Network", "Learned", "Bits of dc", "Bits of sh", "Decoding"];
+    headings.extend(numbers.map(Heading::Numbers));
+    headings.extend(METRIC_HEADINGS);
+    table(
+        &headings,
+        &html! {
+            @for (place, row) in gop.ablation.iter().enumerate() {
+                tr {
+                    th scope="row" { (row.name) }
+                    td { (size(row.bytes)) }
+                    td { (size(row.network_bytes)) }
+                    td { (format!("{:.1} %", row.learned_percent)) }
+                    td { (format!("{:.3}", row.dc_bits)) }
+                    td { (format!("{:.3}", row.sh_bits)) }
+                    td { (format!("{:.0} ms", row.decode_ms)) }
+                    (metric_cells(chart, &row.figures, place, gop.ablation.len()))
                 }
             }
         },

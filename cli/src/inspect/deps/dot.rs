@@ -52,7 +52,7 @@ fn edges(row: &FrameRow) -> String {
             text += &edge(unit.unit, row.unit);
         }
         text.extend(unit.needs.iter().filter_map(|need| Some(edge(unit.unit, need.unit?))));
-        text.extend(unit.codebooks.iter().map(|&codebook| edge(unit.unit, codebook)));
+        text.extend(unit.codebooks.iter().chain(&unit.weights).map(|&tool| edge(unit.unit, tool)));
     }
     text
 }

@@ -53,6 +53,7 @@ fn frame(row: &FrameRow) -> String {
 fn unit(frame: u32, row: &UnitRow) -> String {
     let mut needs: Vec<String> = row.needs.iter().map(|it| need(frame, it)).collect();
     needs.extend(row.codebooks.iter().map(|unit| format!("codebook unit {unit}")));
+    needs.extend(row.weights.iter().map(|unit| format!("weights unit {unit}")));
     let needs = if needs.is_empty() { "nothing".to_owned() } else { needs.join(", ") };
     let damaged = if row.damaged { "  damaged" } else { "" };
     let (layer, refinement, bytes) = (row.spatial_layer, row.refinement, grouped(row.bytes));

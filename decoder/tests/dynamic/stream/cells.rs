@@ -29,7 +29,7 @@ fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
 }
 
 /// The largest n with `n * n <= a`, bit by bit.
-fn isqrt(a: i64) -> i64 {
+pub(super) fn isqrt(a: i64) -> i64 {
     (0..31).rev().fold(0, |n, bit| if (n + (1 << bit)) * (n + (1 << bit)) <= a { n + (1 << bit) } else { n })
 }
 

@@ -3,6 +3,7 @@
 use super::cells::Cell;
 use super::frames::{Known, Work, evaluate};
 use super::gaussian::{Rules, Splat, moved};
+use super::network::Network;
 use super::scene::{Frame, Gop, Scene, Unit};
 use crate::crafted::sample::{self, Dice};
 use crate::crafted::scene::{Gaussian, codebook, diagonal};
@@ -23,6 +24,8 @@ pub(crate) struct Plan {
     pub(crate) gops: Vec<(GopHeader, Vec<u32>)>,
     /// Whether predicted frames may stop at a low refinement.
     pub(crate) short: bool,
+    /// Whether GOPs have networks, and transforms whose components are not those of the output.
+    pub(crate) learned: bool,
 }
 
 /// Transform 3 of kind dc; 4 of kind sh with two components.
@@ -72,7 +75,13 @@ struct Drawer<'p> {
 
 impl Drawer<'_> {
     fn gop(&mut self, header: GopHeader, places: &[u32]) -> Gop {
-        let mut gop = Gop { header, transforms: transforms(self.plan.sh), frames: Vec::new() };
+        let mut transforms = transforms(self.plan.sh);
+        let network = self.plan.learned.then(|| {
+            let bases = transforms.iter_mut().flat_map(|transform| &mut transform.basis);
+            bases.for_each(|weight| *weight = self.dice.within(-4096, 4096) as i16);
+            Network::drawn(&mut self.dice)
+        });
+        let mut gop = Gop { header, transforms, network, frames: Vec::new() };
         for &place in places {
             let sh_transform = if self.plan.sh { 4 } else { NO_TRANSFORM };
             let codebooks = if place == 0 { codebooks(2) } else { Vec::new() };
@@ -163,7 +172,8 @@ impl Drawer<'_> {
         let parents = work.parents(shell.spatial, shell.refinement);
         for _ in 0..50 {
             let mut unit = Unit { header: self.header(shell.header.cell_log2), ..shell.clone() };
-            let rules = Rules { sequence: &sequence, tools, header: &unit.header };
+            let network = gop.network.as_ref();
+            let rules = Rules { sequence: &sequence, tools, network, header: &unit.header };
             unit.modes = parents.iter().map(|_| self.dice.within(0, highest)).collect();
             let moved = parents.iter().zip(&unit.modes).filter(|(_, mode)| [1, 3].contains(*mode));
             unit.moves = moved.map(|(parent, _)| self.legal_move(&rules, parent)).collect();
@@ -175,11 +185,12 @@ impl Drawer<'_> {
             }
             let run = unit.header.predictor_block_log2;
             let runs = if run == 255 { 0 } else { new.div_ceil(1 << run) };
-            unit.predictors = (0..runs).map(|_| self.dice.within(0, 2)).collect();
+            let most = if network.is_some() { 3 } else { 2 };
+            unit.predictors = (0..runs).map(|_| self.dice.within(0, most)).collect();
             unit.lanes_log2 = self.dice.below(6) as u8;
             unit.reuse = self.dice.below(2) == 0;
             let header = unit.counted();
-            if work.unit(&Rules { sequence: &sequence, tools, header: &header }, &unit).is_some() {
+            if work.unit(&Rules { header: &header, ..rules }, &unit).is_some() {
                 return unit;
             }
         }

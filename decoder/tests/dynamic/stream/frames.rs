@@ -4,6 +4,7 @@ use super::cells::Field;
 use super::gaussian::{Rules, Splat, moved, placed, planes, reconstructed, unpredicted};
 use super::prediction::{bilateral, knn, neighbours};
 use super::scene::{Frame, Gop, Unit};
+use super::transformer::learned;
 use crate::crafted::reference::{frame_digest, plane_digests};
 use splatstream_format::syntax::SequenceParameters;
 use std::collections::BTreeMap;
@@ -132,9 +133,11 @@ impl Work {
             let predictor = unit.predictors.get(run).copied().unwrap_or(0);
             let near = neighbours(set, &start, unit.header.neighbour_count);
             added.push(match predictor {
-                1 | 2 if near.is_empty() => reconstructed(rules, v, start, |at, _| unpredicted(rules, at))?,
+                3 if rules.network.is_none() => return None,
+                1..=3 if near.is_empty() => reconstructed(rules, v, start, |at, _| unpredicted(rules, at))?,
                 1 => reconstructed(rules, v, start, |at, _| knn(&near, at))?,
                 2 => reconstructed(rules, v, start, |at, own| bilateral(&near, rules.header, at, own))?,
+                3 => reconstructed(rules, v, start, |at, own| learned(&near, rules, at, own))?,
                 0 => reconstructed(rules, v, start, |at, _| unpredicted(rules, at))?,
                 _ => return None,
             });
@@ -201,7 +204,8 @@ pub(crate) fn evaluate_frame(
     for unit in &frame.units {
         if let Some(tools) = gop.tools(frame, &codebooks) {
             let header = unit.counted();
-            let _ = work.unit(&Rules { sequence, tools, header: &header }, unit);
+            let rules = Rules { sequence, tools, network: gop.network.as_ref(), header: &header };
+            let _ = work.unit(&rules, unit);
         }
         after(unit, work.digests(unit.spatial, unit.refinement));
     }

@@ -1,5 +1,6 @@
 //! Clauses 7.14 and 7.16: one Gaussian and its residuals, in the words of the specification.
 
+use super::network::Network;
 use crate::crafted::scene::{Gaussian, Tools};
 use splatstream_format::entropy::layout::Attribute;
 use splatstream_format::payload::Transform;
@@ -22,6 +23,7 @@ pub(crate) struct Splat {
 pub(crate) struct Rules<'a> {
     pub(crate) sequence: &'a SequenceParameters,
     pub(crate) tools: Tools<'a>,
+    pub(crate) network: Option<&'a Network>,
     pub(crate) header: &'a IncrementHeader,
 }
 

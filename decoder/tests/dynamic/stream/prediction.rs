@@ -6,24 +6,28 @@ use splatstream_format::syntax::IncrementHeader;
 use std::sync::LazyLock;
 
 /// The table of 7.17.5, read from the text.
-pub(crate) static EXP: LazyLock<Vec<i64>> = LazyLock::new(|| {
+pub(crate) static EXP: LazyLock<Vec<i64>> = LazyLock::new(|| table("### 7.17.5", "**[SS-PR-007]**"));
+
+/// A table of clause 7 in rows of 16 behind their places, under a heading and before a requirement.
+pub(crate) fn table(heading: &str, requirement: &str) -> Vec<i64> {
     let text = include_str!("../../../../spec/07-decoding.md");
-    let (_, table) = text.split_once("### 7.17.5").unwrap();
+    let (_, table) = text.split_once(heading).unwrap();
     let row = |line: &str| -> Option<Vec<i64>> {
-        let cells = line.strip_prefix('|')?.strip_suffix('|')?;
-        cells.split('|').map(|cell| cell.trim().parse().ok()).collect()
+        let cells = line.strip_prefix('|')?.strip_suffix('|')?.split('|').map(str::trim);
+        // The last row may be short.
+        cells.take_while(|cell| !cell.is_empty()).map(|cell| cell.parse().ok()).collect()
     };
-    let (table, _) = table.split_once("**[SS-PR-007]**").unwrap();
+    let (table, _) = table.split_once(requirement).unwrap();
     let rows: Vec<Vec<i64>> = table.lines().filter_map(row).collect();
     assert!(rows.iter().zip((0..).step_by(16)).all(|(row, first)| row[0] == first));
     rows.into_iter().flat_map(|row| row.into_iter().skip(1)).collect()
-});
+}
 
 /// A Gaussian of the reference set near a new one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Neighbour<'a> {
-    d2: i64,
-    splat: &'a Splat,
+    pub(super) d2: i64,
+    pub(super) splat: &'a Splat,
 }
 
 fn sq(a: i64) -> i64 {
@@ -45,7 +49,7 @@ pub(crate) fn neighbours<'a>(set: &'a [Splat], to: &Splat, count: u8) -> Vec<Nei
 }
 
 /// `mean(weight, x)` for each value of an attribute.
-fn mean(weights: &[i64], near: &[Neighbour<'_>], attribute: Attribute) -> Vec<i64> {
+pub(super) fn mean(weights: &[i64], near: &[Neighbour<'_>], attribute: Attribute) -> Vec<i64> {
     let total: i64 = weights.iter().sum();
     let values: Vec<Vec<i64>> = near.iter().map(|neighbour| neighbour.splat.value(attribute)).collect();
     (0..values[0].len())
@@ -80,6 +84,16 @@ pub(crate) fn bilateral(
     attribute: Attribute,
     own: &Splat,
 ) -> Vec<i64> {
+    fine(attribute, mean(&bilateral_weights(near, header, attribute, own), near, attribute))
+}
+
+/// `weight` of 7.17.4 of each neighbour.
+pub(super) fn bilateral_weights(
+    near: &[Neighbour<'_>],
+    header: &IncrementHeader,
+    attribute: Attribute,
+    own: &Splat,
+) -> Vec<i64> {
     let last = near[near.len() - 1].d2;
     let weight = |neighbour: &Neighbour<'_>| {
         let theirs = neighbour.splat;
@@ -100,6 +114,5 @@ pub(crate) fn bilateral(
         let xf = ((f * i64::from(header.bilateral_feature)) >> 6).min(255);
         EXP[(xs + xf).min(255) as usize]
     };
-    let weights: Vec<i64> = near.iter().map(weight).collect();
-    fine(attribute, mean(&weights, near, attribute))
+    near.iter().map(weight).collect()
 }

@@ -49,7 +49,8 @@ pub(crate) fn gop(percents: &[u8], frames: Vec<Frame>) -> Scene {
         frame_count: count,
         ..sample::sequence()
     };
-    let gop = Gop { header: GopHeader::predicted(0, count, 0), transforms: transforms(true), frames };
+    let header = GopHeader::predicted(0, count, 0);
+    let gop = Gop { header, transforms: transforms(true), network: None, frames };
     Scene { level: 2, sequence, gops: vec![gop], points: None, index: false }
 }
 
@@ -97,5 +98,6 @@ pub(crate) fn large() -> Scene {
         (GopHeader { gop_index: 1, ..GopHeader::intra(0, 1) }, vec![0]),
     ];
     let percents = vec![20, 50, 100];
-    Plan { seed: 21, layers: (2, 3), percents, sh: true, gaussians: 30, gops, short: false }.scene()
+    Plan { seed: 21, layers: (2, 3), percents, sh: true, gaussians: 30, gops, short: false, learned: false }
+        .scene()
 }

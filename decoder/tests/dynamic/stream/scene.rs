@@ -1,6 +1,7 @@
 //! Values of GOPs, frames and units of profile 1, and the payloads that carry them.
 
 use super::cells::Cell;
+use super::network::Network;
 use crate::crafted::coding::{Coding, Row};
 use crate::crafted::scene::{Gaussian, Shape, Tools};
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -52,6 +53,7 @@ pub(crate) struct Frame {
 pub(crate) struct Gop {
     pub(crate) header: GopHeader,
     pub(crate) transforms: Vec<Transform>,
+    pub(crate) network: Option<Network>,
     pub(crate) frames: Vec<Frame>,
 }
 

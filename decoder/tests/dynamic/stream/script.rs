@@ -54,6 +54,8 @@ impl Scene {
                 let payload = transform.to_bytes(&self.sequence).unwrap();
                 parts.push(Part::unit(UnitType::Transform, first, payload));
             }
+            let weights = gop.network.iter().map(|network| network.payload());
+            parts.extend(weights.map(|payload| Part::unit(UnitType::Weights, first, payload)));
             self.frames(gop, first, &mut parts);
             first = first.wrapping_add(gop.header.gop_frame_count);
         }
@@ -139,7 +141,7 @@ impl Scene {
     /// Bytes of a unit of the types that count, if it belongs to the point.
     fn cost(&self, part: &Part, point: OperatingPoint) -> u64 {
         match part {
-            Part::Unit(id, payload) if [2, 3, 4, 5, 6, 10].contains(&id.unit_type.code()) => {
+            Part::Unit(id, payload) if [2, 3, 4, 5, 6, 9, 10].contains(&id.unit_type.code()) => {
                 let takes = belongs(self, id, point);
                 if takes { (UNIT_HEADER + payload.len()) as u64 } else { 0 }
             }

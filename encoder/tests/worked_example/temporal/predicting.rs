@@ -4,7 +4,7 @@ use super::walk::{Common, Step};
 use super::{list, of};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::home::{FINE, canonical};
-use splatstream_decoder::increment::prediction::Prediction;
+use splatstream_decoder::increment::prediction::{Predicting, Prediction};
 use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
 use splatstream_decoder::layout::Section;
 use splatstream_decoder::neighbours::{Neighbour, NeighbourSearch};
@@ -82,7 +82,8 @@ impl Case<'_> {
         let at: [Vec<u32>; 3] =
             step.home.planes.position.each_ref().map(|plane| vec![*plane.last().unwrap()]);
         let position = at.each_ref().map(Vec::as_slice);
-        let mut decoder = Prediction::new(&step.set, position, &[self.predictor], &step.header).unwrap();
+        let by = Predicting { header: &step.header, colour: coding.colour, network: None };
+        let mut decoder = Prediction::new(&step.set, position, &[self.predictor], &by).unwrap();
         let mut known = Attributes::unpredicted(1, &coding.colour, 0);
         let values = AttributeValues(&step.values.section(Section::New).planes);
         let mut rows = String::new();

@@ -78,7 +78,16 @@ impl Common {
     ) {
         let coding = self.coding(&header);
         let intra = frame.reference.is_none();
-        let unit = Unit { header: &header, values: &values, coding, sequence: &self.sequence, intra, at: 0 };
+        let unit = Unit {
+            header: &header,
+            values: &values,
+            coding,
+            sequence: &self.sequence,
+            intra,
+            network: None,
+            most_learned: 0,
+            at: 0,
+        };
         let r = usize::from(id.refinement);
         let reference = frame.reference.map(|at| &frames[at as usize]);
         if let (Some(reference), 0) = (reference, r) {

@@ -1,0 +1,142 @@
+//! `splatstream train`: a network for the learned predictor.
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::frame_files::FrameFiles;
+use crate::numbers::grouped;
+use crate::output_file::OutputFile;
+use crate::progress::Progress;
+use crate::setting_names::QualityName;
+use clap::Args;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use splatstream_encoder::transformer::{Architecture, Sample};
+use splatstream_encoder::{FrameSource, Quality, Settings, ShChoice, Structure, samples, train_network};
+use splatstream_scene::GaussianFrame;
+use splatstream_scene::builtin::{BuiltinScene, Tracking};
+use std::path::PathBuf;
+
+/// Train a network that predicts new Gaussians, for encode --network.
+///
+/// Every sequence is encoded once, for what its new Gaussians can be predicted from. The same sequences give the same
+/// network.
+#[derive(Args)]
+#[command(after_help = "Example:\n  splatstream train talk/ dance/ -o people.bin\n  \
+    splatstream encode walk/ -o walk.gss --predictor transformer --network people.bin")]
+pub(crate) struct Train {
+    /// Directories of frames.
+    #[arg(value_name = "SEQUENCE", required_unless_present = "builtin")]
+    sequences: Vec<PathBuf>,
+    /// Built-in scenes with untracked frames to train on too, by their seeds.
+    #[arg(long, value_name = "SEED,...", value_delimiter = ',')]
+    builtin: Vec<u64>,
+    /// The network to write.
+    #[arg(short, long, value_name = "NETWORK.bin")]
+    out: PathBuf,
+    /// Frames of each sequence, from the first.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(2..))]
+    frames: u32,
+    /// How close decoded scenes are to the source.
+    #[arg(long, value_enum, default_value_t = QualityName::High)]
+    quality: QualityName,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Trained {
+    output: PathBuf,
+    bytes: usize,
+    sha256: String,
+    samples: usize,
+    epochs: usize,
+    /// Mean absolute errors of held-out Gaussians by output, in steps / 64: of the base, and of the network.
+    base_errors: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+impl Train {
+    /// Collects, trains, writes.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        let all = self.samples(&Architecture::default())?;
+        let count = all.len();
+        let progress = Progress::steps(0);
+        let trained = train_network(&Architecture::default(), all, &mut |epoch| {
+            progress.step(format!("epoch {}, error {:.2}", epoch.epoch, epoch.validation));
+        });
+        drop(progress);
+        let Some((network, report)) = trained.map_err(|error| Failure::other(error.to_string()))? else {
+            return Err(Failure::other(
+                "too few Gaussians are new in these sequences to train with: give more frames".to_owned(),
+            ));
+        };
+        let bytes = network.to_bytes().map_err(|error| Failure::other(error.to_string()))?;
+        OutputFile::write(&self.out, &bytes)?;
+        let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let trained = Trained {
+            output: self.out.clone(),
+            bytes: bytes.len(),
+            sha256,
+            samples: count,
+            epochs: report.epochs.len(),
+            base_errors: report.base.means().collect(),
+            errors: report.best.means().collect(),
+        };
+        console.report(&trained, || trained.text())
+    }
+
+    /// What all sequences give.
+    fn samples(&self, architecture: &Architecture) -> Result<Vec<Sample>, Failure> {
+        let settings = Settings {
+            structure: Structure::Predicted { layers: 2 },
+            spatial_layers: 3,
+            steps: Quality::from(self.quality).steps(),
+            // Entries of codebooks are not predicted.
+            sh: ShChoice::Coefficients,
+            ..Settings::default()
+        };
+        let mut all = Vec::new();
+        let progress = Progress::steps((self.sequences.len() + self.builtin.len()) as u32);
+        let mut add = |name: String, frames: &mut Vec<GaussianFrame>| {
+            progress.step(name.clone());
+            let found = samples(frames, &settings, architecture);
+            all.extend(found.map_err(|error| Failure::other(format!("{name}: {error}")))?);
+            progress.advance();
+            Ok(())
+        };
+        for path in &self.sequences {
+            let mut files = FrameFiles::find(std::slice::from_ref(path))?;
+            let count = self.frames.min(files.len());
+            let read = |number| files.frame(number).map_err(|error| Failure::other(error.to_string()));
+            let mut frames: Vec<_> = (0..count).map(read).collect::<Result<_, _>>()?;
+            add(path.display().to_string(), &mut frames)?;
+        }
+        for &seed in &self.builtin {
+            let scene = BuiltinScene {
+                seed,
+                tracking: Tracking::Untracked,
+                frames: self.frames,
+                ..Default::default()
+            };
+            let mut frames: Vec<_> = (0..self.frames).map(|number| scene.frame(number)).collect();
+            add(format!("built-in scene {seed}"), &mut frames)?;
+        }
+        Ok(all)
+    }
+}
+
+impl Trained {
+    fn text(&self) -> String {
+        let steps = |errors: &[f64]| errors.iter().map(|error| error / 64.0).sum::<f64>();
+        let (base, error) = (steps(&self.base_errors), steps(&self.errors));
+        format!(
+            "{}\n  size        {} bytes\n  SHA-256     {}\n  trained     on {} batches of 16 Gaussians, {} epochs\n  \
+             error       {error:.3} steps, {:.1} % less than bilateral has ({base:.3})\n",
+            self.output.display(),
+            grouped(self.bytes as u64),
+            self.sha256,
+            grouped(self.samples as u64),
+            self.epochs,
+            100.0 * (1.0 - error / base.max(f64::MIN_POSITIVE)),
+        )
+    }
+}

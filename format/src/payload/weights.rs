@@ -1,0 +1,213 @@
+//! 5.17 weights: a network, or the name of one.
+
+use super::{element, whole};
+use crate::syntax::{NetworkHeader, WeightsHeader, after, encode};
+use crate::{Error, ErrorKind, Result};
+use nom::Parser;
+use nom::multi::count;
+use nom::number::complete::{i8, le_i16};
+
+/// The parts of a network in the order of 6.17.2, each an array of `i8` and one of `i16` behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Relative positions to the hidden layer of the geometry network.
+    Geometry,
+    /// That layer to the embedding.
+    GeometryEmbedding,
+    /// Tokens to the embedding; the rows of `rank` stand in the place of a bias.
+    Embedding,
+    /// Added to the mean of the neighbours to make the row of the new Gaussian.
+    Query,
+    /// The product of the query and key matrices.
+    Attention,
+    /// Fourier features of relative positions to the logit.
+    Fourier,
+    /// The value matrix.
+    Value,
+    /// Of the normalisation.
+    Gain,
+    /// The first layer of the feed-forward block.
+    Widening,
+    /// The second.
+    Narrowing,
+    /// The outputs.
+    Head,
+}
+
+impl Part {
+    /// Every part, in order.
+    pub const ALL: [Self; 11] = [
+        Self::Geometry,
+        Self::GeometryEmbedding,
+        Self::Embedding,
+        Self::Query,
+        Self::Attention,
+        Self::Fourier,
+        Self::Value,
+        Self::Gain,
+        Self::Widening,
+        Self::Narrowing,
+        Self::Head,
+    ];
+
+    /// Values of the two arrays of the part: of `i8`, of `i16`.
+    pub fn lengths(self, header: &NetworkHeader) -> (usize, usize) {
+        let (d, g) = (header.width(), usize::from(header.geometry_width));
+        let (e, n) = (usize::from(header.feed_forward_width), header.outputs());
+        let square = d.saturating_mul(d);
+        let present = |holds: bool, length: usize| if holds { length } else { 0 };
+        match self {
+            Self::Geometry => (g.saturating_mul(3), g),
+            Self::GeometryEmbedding => (d.saturating_mul(g), 0),
+            Self::Embedding => {
+                (d.saturating_mul(header.inputs()), d.saturating_mul(header.rank_count.into()))
+            }
+            Self::Query => (present(!header.full_attention(), d), 0),
+            Self::Attention => (square, 0),
+            Self::Fourier => (usize::from(header.fourier_count).saturating_mul(6), 0),
+            Self::Value => (square, d),
+            Self::Gain => (present(header.normalised(), d), present(header.normalised(), d)),
+            Self::Widening => (e.saturating_mul(d), e),
+            Self::Narrowing => (d.saturating_mul(e), present(e > 0, d)),
+            Self::Head => (n.saturating_mul(d), n),
+        }
+    }
+}
+
+/// The parameters of a part.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Layer {
+    /// Row by row, one row an output.
+    pub weights: Vec<i8>,
+    /// One an output; of [`Part::Embedding`] one row of them a rank.
+    pub bias: Vec<i16>,
+}
+
+/// The learned predictor of 7.17.6.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Network {
+    /// The fixed part.
+    pub header: NetworkHeader,
+    layers: [Layer; 11],
+}
+
+impl Network {
+    /// A network of parameters made elsewhere, part by part.
+    ///
+    /// # Errors
+    /// A header or lengths that [`Self::parse`] would refuse.
+    pub fn new(header: NetworkHeader, layers: [Layer; 11]) -> Result<Self> {
+        header.validate(0)?;
+        let fits =
+            |(part, layer): (&Part, &Layer)| (layer.weights.len(), layer.bias.len()) == part.lengths(&header);
+        if !Part::ALL.iter().zip(&layers).all(fits) {
+            let rule = "parameters have the places of the header";
+            return Err(Error::new(0, "6.17.2", ErrorKind::Constraint { rule }));
+        }
+        Ok(Self { header, layers })
+    }
+
+    /// Reads and checks a network that stands at offset `at` and ends with `bytes`.
+    pub fn parse(bytes: &[u8], at: u64) -> Result<Self> {
+        let (header, rest) = NetworkHeader::parse(bytes, at)?;
+        let table = &NetworkHeader::TABLE;
+        let mut layers = [(); 11].map(|()| Layer::default());
+        // At most 32,606 bytes.
+        let parts = |input| {
+            let mut rest = input;
+            for (part, layer) in Part::ALL.into_iter().zip(&mut layers) {
+                let (weights, biases) = part.lengths(&header);
+                (rest, (layer.weights, layer.bias)) =
+                    (count(i8, weights), count(le_i16, biases)).parse(rest)?;
+            }
+            Ok((rest, ()))
+        };
+        whole(table, rest, after(at, NetworkHeader::SIZE), element("parameters", parts))?;
+        Ok(Self { header, layers })
+    }
+
+    /// The bytes of the network.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        self.header.validate(0)?;
+        let mut bytes = encode(&NetworkHeader::TABLE, &self.header)?;
+        for layer in &self.layers {
+            bytes.extend(layer.weights.iter().flat_map(|weight| weight.to_le_bytes()));
+            bytes.extend(layer.bias.iter().flat_map(|bias| bias.to_le_bytes()));
+        }
+        Ok(bytes)
+    }
+
+    /// The parameters of a part.
+    pub fn layer(&self, part: Part) -> &Layer {
+        const ABSENT: &Layer = &Layer { weights: Vec::new(), bias: Vec::new() };
+        let layer = Part::ALL.iter().zip(&self.layers).find(|(other, _)| **other == part);
+        layer.map_or(ABSENT, |(_, layer)| layer)
+    }
+}
+
+/// The payload of a weights unit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Weights {
+    /// A network of its own.
+    Carried(Box<Network>),
+    /// The SHA-256 of a registered network.
+    Registered([u8; 32]),
+}
+
+impl Weights {
+    /// Reads and checks a payload that stands at offset `at`.
+    pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
+        let (header, rest) = WeightsHeader::parse(payload, at)?;
+        Self::parse_behind(header, rest, at)
+    }
+
+    /// Reads `rest`, the bytes behind a header that has been accepted. `at` is the offset of the payload, that
+    /// is of the header.
+    pub fn parse_behind(header: WeightsHeader, rest: &[u8], at: u64) -> Result<Self> {
+        let at = after(at, WeightsHeader::SIZE);
+        if header == WeightsHeader::CARRIED {
+            return Network::parse(rest, at).map(Box::new).map(Self::Carried);
+        }
+        let digest = nom::bytes::complete::take(32_usize).map_opt(|bytes: &[u8]| bytes.try_into().ok());
+        whole(&WeightsHeader::TABLE, rest, at, element("model", digest)).map(Self::Registered)
+    }
+
+    /// The bytes of the payload.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let (header, model) = match self {
+            Self::Carried(network) => (WeightsHeader::CARRIED, network.to_bytes()?),
+            Self::Registered(digest) => (WeightsHeader::REGISTERED, digest.to_vec()),
+        };
+        let mut bytes = header.to_bytes()?;
+        bytes.extend(model);
+        Ok(bytes)
+    }
+
+    /// The network; `at` is the offset of the payload.
+    ///
+    /// # Errors
+    /// Reserved (unsupported) if no registered network has the digest.
+    pub fn network(self, at: u64) -> Result<Network> {
+        match self {
+            Self::Carried(network) => Ok(*network),
+            Self::Registered(digest) => registered(&digest, after(at, WeightsHeader::SIZE)),
+        }
+    }
+}
+
+/// Registered networks: SHA-256 and bytes, the table of 6.17.
+pub const REGISTRY: [([u8; 32], &[u8]); 1] = [(
+    [
+        0xa7, 0x7f, 0x2f, 0x50, 0xc5, 0x59, 0xdb, 0xc3, 0x0b, 0x0d, 0xc1, 0x07, 0xb0, 0xa4, 0x06, 0x2e, 0xf1,
+        0x87, 0xe1, 0xfb, 0x99, 0xcf, 0x7c, 0x85, 0x56, 0x8a, 0xf7, 0xfc, 0xe9, 0xe2, 0xd6, 0x94,
+    ],
+    include_bytes!("../../../spec/data/default-network.bin"),
+)];
+
+fn registered(digest: &[u8; 32], at: u64) -> Result<Network> {
+    let known = REGISTRY.iter().find(|(name, _)| name == digest);
+    // The digest is no number: its first byte stands for it.
+    let value = digest.first().copied().unwrap_or(0).into();
+    let unknown = Error::new(at, "6.17", ErrorKind::Reserved { element: "model", value });
+    known.ok_or(unknown).and_then(|(_, bytes)| Network::parse(bytes, at))
+}
