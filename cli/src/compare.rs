@@ -1,6 +1,7 @@
 //! `splatstream compare`: how far apart two scenes or streams are, attribute by attribute.
 
 pub(crate) mod errors;
+mod flicker;
 mod grid;
 pub(crate) mod matching;
 pub(crate) mod pictures;

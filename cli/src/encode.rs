@@ -9,7 +9,9 @@ use crate::frame_files::FrameFiles;
 use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
 use crate::output_file::OutputFile;
 use crate::progress::Progress;
-use crate::setting_names::{PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName};
+use crate::setting_names::{
+    FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
+};
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -94,12 +96,20 @@ pub(crate) struct Encode {
     /// What puts Gaussians into the first refinements; default is removal, and volume for the fast preset.
     #[arg(long, value_enum)]
     importance: Option<ImportanceName>,
-    /// Views to measure importance in: a cameras.json or transforms.json, ring:N or forward:N; default is all
+    /// Views to measure importance and pictures in: a cameras.json or transforms.json, ring:N or forward:N; default is all
     /// around.
     #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
     cameras: Option<Views>,
     #[command(flatten)]
     views: CameraArgs,
+    /// What predicted frames are true to where files are not tracked, that is, no row of one is the same row of the next;
+    /// default is pictures, and attributes for the fast preset.
+    #[arg(long, value_enum)]
+    fidelity: Option<FidelityName>,
+    /// How far the pictures of a frame that is true to them may be below what they would be if every difference were
+    /// sent, decibels, in the views of --cameras.
+    #[arg(long, value_name = "DB", default_value_t = Settings::default().tolerance, value_parser = parse_tolerance)]
+    tolerance: f32,
     /// Tools to leave out, to see what each is worth.
     #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
     without: Vec<ToolName>,
@@ -118,6 +128,11 @@ enum ImportanceName {
 fn parse_psnr(text: &str) -> Result<f32, String> {
     let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
     decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
+}
+
+fn parse_tolerance(text: &str) -> Result<f32, String> {
+    let decibels = text.parse().ok().filter(|decibels| (0.05..=20.0).contains(decibels));
+    decibels.ok_or_else(|| format!("'{text}' is not a number of decibels from 0.05 to 20"))
 }
 
 /// Where the network of the transformer comes from.
@@ -235,6 +250,8 @@ impl Encode {
             ticks: self.fps,
             importance: self.importance.map(Into::into),
             cameras,
+            fidelity: self.fidelity.map(Into::into),
+            tolerance: self.tolerance,
             ..Settings::default()
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));

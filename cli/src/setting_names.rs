@@ -2,7 +2,9 @@
 
 use clap::ValueEnum;
 use splatstream_decoder::predictor::Predictor;
-use splatstream_encoder::{Importance, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice};
+use splatstream_encoder::{
+    Fidelity, Importance, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice,
+};
 
 /// How much to search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -84,6 +86,15 @@ impl From<PredictorChoiceName> for PredictorChoice {
     }
 }
 
+/// What predicted frames of untracked sequences are true to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FidelityName {
+    /// The pictures: what they do not need is carried over.
+    Pictures,
+    /// The attributes: every difference of a step is sent.
+    Attributes,
+}
+
 /// A tool of the encoder that can be left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ToolName {
@@ -156,6 +167,15 @@ impl From<ShName> for ShChoice {
             ShName::Auto => Self::Auto,
             ShName::Coefficients => Self::Coefficients,
             ShName::Vq => Self::VectorQuantised,
+        }
+    }
+}
+
+impl From<FidelityName> for Fidelity {
+    fn from(name: FidelityName) -> Self {
+        match name {
+            FidelityName::Pictures => Self::Pictures,
+            FidelityName::Attributes => Self::Attributes,
         }
     }
 }

@@ -39,6 +39,21 @@ fn what_is_decoded_is_within_a_step_of_what_was_encoded() {
 }
 
 #[test]
+fn a_sequence_compared_with_itself_flickers_as_much_and_one_frame_does_not() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let views = ["--cameras", "ring:2", "--height", "60"];
+    let of = |a: &Path| json(&[&["compare", text(a), text(a)][..], &views].concat());
+    let sequence = of(&frames);
+    let flicker = |report: &serde_json::Value| {
+        ["temporal_psnr_a_db", "temporal_psnr_b_db", "still_percent"].map(|key| report[key].as_f64())
+    };
+    let [Some(a), Some(b), Some(still)] = flicker(&sequence) else { panic!("{sequence}") };
+    assert!(a == b && (0.0..=100.0).contains(&still), "{sequence}");
+    assert_eq!(flicker(&of(&files(&frames)[0])), [None; 3]);
+}
+
+#[test]
 fn frames_come_in_the_order_that_people_count_in() {
     let directory = directory();
     let stream = write_stream(directory.path());

@@ -3,21 +3,24 @@
 mod align;
 mod anchor;
 mod compensation;
+mod judge;
 pub(crate) mod learning;
 mod predicted;
 mod predictors;
+mod price;
 mod survivors;
 mod unit;
 mod wanted;
+mod worth;
 
 use crate::canonical::{canonicalise, visible};
 use crate::colour;
 use crate::error::Error;
 use crate::importance::Ranking;
 use crate::lattice::geometry;
-use crate::matching::{Cloud, Matching, Measure, shares_little};
+use crate::matching::{Cloud, Kind, Matching, Measure, shares_little, shares_much};
 use crate::section::SectionPlan;
-use crate::settings::{Importance, Preset, Settings, ShChoice, Structure};
+use crate::settings::{Fidelity, Importance, Preset, Settings, ShChoice, Structure};
 use crate::source::FrameSource;
 use crate::stream::{FrameReport, GopTools, Prepared, Progress, Report, UnitWriter, sh_planes};
 use crate::vq;
@@ -27,8 +30,10 @@ use compensation::Compensator;
 use learning::Recorder;
 use predicted::{Predicted, ReferenceCloud};
 use predictors::Chooser;
+use price::{Goal, Pictures};
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::frame_state::FrameState;
+use splatstream_decoder::home::Home;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_format::payload::{Codebook, Network};
 use splatstream_format::syntax::{
@@ -119,6 +124,8 @@ struct Gop {
     tools: GopTools,
     /// The last frame of each temporal layer and its number.
     references: Vec<Option<(u32, Reference)>>,
+    /// The level of the price of a bit in pictures, of the last frame that had one.
+    price_level: i32,
     /// The units after the GOP header.
     units: Vec<(UnitId, Vec<u8>)>,
     /// Whether a new Gaussian takes the network.
@@ -185,6 +192,7 @@ impl Dynamic<'_, '_> {
             tools,
             references: (0..self.layers().max(1)).map(|_| None).collect(),
             has_learned: false,
+            price_level: 0,
         };
         if first == 0 {
             gop.tools.report(self.report);
@@ -269,7 +277,7 @@ impl Dynamic<'_, '_> {
         };
         let (units, reference) = code_anchor(&coder, &anchor, self.chooser())?;
         let place = PlaceInGop { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
-        self.write_frame(gop, number, &place, (target.frame.len(), target.row_count), &units)?;
+        self.write_frame(gop, number, &place, target.frame.len(), &target, &units)?;
         gop.keep(0, number, reference);
         Ok(())
     }
@@ -288,12 +296,15 @@ impl Dynamic<'_, '_> {
         let measure = self.measure();
         let cloud = ReferenceCloud::new(reference, &self.sequence);
         let mut matching = cloud.matching(target, &measure, self.sequence.position_bits);
-        if shares_little(&matching) && !target.frame.is_empty() {
+        // Who goes by pictures has a use for partners that differ a lot.
+        let useful = self.by_pictures() && shares_much(&matching);
+        if shares_little(&matching) && !useful && !target.frame.is_empty() {
             return Ok(false);
         }
         if !self.settings.tools.survivors {
             matching.target_of.iter_mut().for_each(|partner| *partner = None);
         }
+        let mut goal = self.goal(gop, &matching, target);
         let mut survivors = Survivors {
             target,
             sequence: &self.sequence,
@@ -301,6 +312,7 @@ impl Dynamic<'_, '_> {
             dc: &gop.tools.dc,
             sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
             namings: Namings::new(),
+            judge: None,
             book: None,
         };
         let book = self.residual_book(gop, &survivors, reference, &matching, place.temporal_layer);
@@ -317,16 +329,42 @@ impl Dynamic<'_, '_> {
             coarse_tail: self.settings.tools.coarse_tail && by_pictures,
             number,
         };
-        let (units, coded) = predicted.code(self.chooser())?;
+        let (units, coded) = predicted.code(self.chooser(), goal.as_mut())?;
         if let Some(book) = &book {
             let id = UnitId::of_frame(UnitType::Codebook, gop.first).on_layers(0, place.temporal_layer);
             gop.units.push((id, book.to_bytes()?));
         }
-        self.write_frame(gop, number, place, (target.frame.len(), target.row_count), &units)?;
+        let gaussians = coded.state.homes.iter().map(Home::len).sum();
+        self.write_frame(gop, number, place, gaussians, target, &units)?;
+        if let (Some(goal), Some(frame)) = (goal, self.report.coded.last_mut()) {
+            gop.price_level = goal.level;
+            frame.by_pictures = true;
+        }
         if place.temporal_layer + 1 < self.layers().max(2) {
             gop.keep(place.temporal_layer, number, coded);
         }
         Ok(true)
+    }
+
+    /// Whether frames of which no row keeps its meaning are true to their pictures. What a network is trained with is
+    /// the same either way, and sooner found without them.
+    fn by_pictures(&self) -> bool {
+        let may = self.settings.tools.survivors && self.recorder.is_none();
+        may && self.settings.fidelity() == Fidelity::Pictures
+    }
+
+    /// How good the pictures of a frame must be, if it is them that the frame is true to.
+    fn goal(&mut self, gop: &Gop, matching: &Matching, target: &Target) -> Option<Goal> {
+        if !self.by_pictures() || matching.kind != Kind::Untracked || target.frame.is_empty() {
+            return None;
+        }
+        let cameras = self.ranking.cameras(&target.frame).to_vec();
+        Some(Goal {
+            pictures: Pictures::new(&target.frame, cameras),
+            tolerance: f64::from(self.settings.tolerance),
+            least: Vec::new(),
+            level: gop.price_level,
+        })
     }
 
     /// Prefixes of intra frames are compensated where time is no matter and they are shown at all: in a predicted GOP
@@ -402,7 +440,8 @@ impl Dynamic<'_, '_> {
         gop: &mut Gop,
         number: u32,
         place: &PlaceInGop,
-        (gaussians, row_count): (usize, u32),
+        gaussians: usize,
+        target: &Target,
         units: &[CodedUnit],
     ) -> Result<(), Error> {
         let sh = gop.tools.sh.as_ref().map(|_| 0);
@@ -426,7 +465,7 @@ impl Dynamic<'_, '_> {
         }
         let bytes = |(_, payload): &(UnitId, Vec<u8>)| (UnitHeader::SIZE + payload.len()) as u64;
         frame.bytes = gop.units[start..].iter().map(bytes).sum();
-        self.report.invisible += u64::from(row_count) - gaussians as u64;
+        self.report.invisible += u64::from(target.row_count) - target.frame.len() as u64;
         self.report.gaussians += gaussians as u64;
         self.report.coded.push(frame);
         self.report.digests.push(units.last().map_or(0, |unit| unit.header.refinement_digest));

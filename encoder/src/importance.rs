@@ -64,8 +64,7 @@ impl Ranking {
         order
     }
 
-    /// The Gaussians of a frame, most important first. Cameras that the settings do not give are made for the
-    /// first frame that comes.
+    /// The Gaussians of a frame, most important first.
     pub(crate) fn order(&mut self, frame: &GaussianFrame) -> Vec<u32> {
         if let Some(order) = self.foreseen.take() {
             return order;
@@ -74,14 +73,20 @@ impl Ranking {
         if self.importance == Importance::Volume {
             return importance::order(&volume);
         }
-        if self.cameras.is_empty() {
-            let (count, height) = if self.preset == Preset::Small { (24, 360) } else { (10, 270) };
-            self.cameras = spiral(frame, Up::default(), count, height);
-        }
+        self.cameras(frame);
         match self.importance {
             Importance::Removal => self.eliminate(frame, &volume),
             _ => ranked(&contribution(frame, &self.cameras), &volume, &all(frame)),
         }
+    }
+
+    /// The cameras in use: those of the settings, or made for the first frame that they are asked for.
+    pub(crate) fn cameras(&mut self, frame: &GaussianFrame) -> &[Camera] {
+        if self.cameras.is_empty() {
+            let (count, height) = if self.preset == Preset::Small { (24, 360) } else { (10, 270) };
+            self.cameras = spiral(frame, Up::default(), count, height);
+        }
+        &self.cameras
     }
 
     /// From the last to the first: what pictures miss least goes, the rest is weighed anew without it.

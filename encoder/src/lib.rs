@@ -31,8 +31,8 @@ mod vq;
 pub use dynamic::learning::{samples, train_network};
 pub use error::Error;
 pub use settings::{
-    Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice, Steps,
-    Structure, Tools,
+    Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice,
+    Steps, Structure, Tools,
 };
 pub use source::FrameSource;
 pub use stream::{FrameReport, Progress, Report, encode};

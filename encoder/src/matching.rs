@@ -24,6 +24,10 @@ const STRAIN: f64 = 0.7;
 /// place and size, reach 0.1 %; retrained frames of one scene, a quarter of a second apart, 93 %.
 const LITTLE: f32 = 0.25;
 
+/// From this share of matches on a frame shares much with its reference. Frames of the built-in scene, each Gaussian
+/// jittered by a third of its size, reach 0.9 with a sixth of a second between them.
+const MUCH: f32 = 0.6;
+
 /// Gaussians as matching sees them; all planes of one length.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cloud<'a> {
@@ -117,6 +121,11 @@ pub(crate) struct Matching {
 /// Whether a frame is better coded without this reference: a scene cut.
 pub(crate) fn shares_little(matching: &Matching) -> bool {
     matching.by_index + matching.close < LITTLE
+}
+
+/// Whether most Gaussians of a frame have a partner, be they as unlike as two trainings make them.
+pub(crate) fn shares_much(matching: &Matching) -> bool {
+    matching.by_index + matching.by_nearest >= MUCH
 }
 
 /// Pairs of the same row, where rows keep their meaning.

@@ -156,6 +156,17 @@ pub enum NetworkSource {
     Given(Box<Network>),
 }
 
+/// What predicted frames are true to where no row of a file keeps its meaning. Sequences of which some rows do are
+/// always true to their attributes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fidelity {
+    /// To the pictures: a difference is sent where they need it, so that they are no more than [`Settings::tolerance`]
+    /// below what they would be if every difference were sent. Everything else is carried over from the reference.
+    Pictures,
+    /// To the attributes: what differs from the reference by more than a step is sent.
+    Attributes,
+}
+
 /// How the predictor of new Gaussians is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PredictorChoice {
@@ -234,8 +245,13 @@ pub struct Settings {
     pub keep_invisible: bool,
     /// What puts Gaussians into the first refinements; none: volume for the fast preset, removal for others.
     pub importance: Option<Importance>,
-    /// The views that importance is measured in; none: made for the first frame, all around.
+    /// The views that importance and pictures are measured in; none: made for the first frame, all around.
     pub cameras: Vec<Camera>,
+    /// What predicted frames are true to; none: attributes for the fast preset, pictures for others.
+    pub fidelity: Option<Fidelity>,
+    /// How far the pictures of a frame that is true to them may be below what they would be if every difference were
+    /// sent, which is what the steps of the quality give: decibels above 0, mean of the views, against the source.
+    pub tolerance: f32,
     /// Tools that may be used.
     pub tools: Tools,
     /// log2 of the Gaussians in an entropy block.
@@ -245,6 +261,14 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// What predicted frames are true to.
+    pub(crate) fn fidelity(&self) -> Fidelity {
+        self.fidelity.unwrap_or(match self.preset {
+            Preset::Fast => Fidelity::Attributes,
+            Preset::Balanced | Preset::Small => Fidelity::Pictures,
+        })
+    }
+
     /// The profile that the layers and the structure take.
     pub(crate) fn profile(&self) -> Profile {
         match (self.structure, self.spatial_layers) {
@@ -273,6 +297,8 @@ impl Default for Settings {
             keep_invisible: false,
             importance: None,
             cameras: Vec::new(),
+            fidelity: None,
+            tolerance: 0.3,
             tools: Tools::default(),
             block_log2: 14,
             ticks: (30, 1),

@@ -87,6 +87,8 @@ pub struct FrameReport {
     pub new: u32,
     /// New Gaussians by predictor: none, knn, bilateral, transformer.
     pub predicted: [u64; 4],
+    /// Whether it is true to its pictures, not to its attributes.
+    pub by_pictures: bool,
 }
 
 impl Default for FrameReport {
@@ -102,6 +104,7 @@ impl Default for FrameReport {
             removed: 0,
             new: 0,
             predicted: [0; 4],
+            by_pictures: false,
         }
     }
 }

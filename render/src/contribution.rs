@@ -21,6 +21,9 @@ pub struct Worth {
     pub contribution: f64,
     /// What the pictures lose without it: see [`removal`].
     pub loss: f64,
+    /// Its transmittance times alpha, squared and summed over the pixels of all views: what the pictures lose, in one
+    /// channel, if its colour changes by 1 there.
+    pub energy: f64,
 }
 
 /// What the pictures lose without each Gaussian: the squared change of colour if that one alone is taken away and
@@ -32,12 +35,12 @@ pub fn removal(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
     worth(frame, cameras).into_iter().map(|worth| worth.loss).collect()
 }
 
-/// Both measures of each Gaussian, for the price of [`removal`].
+/// All measures of each Gaussian, for the price of [`removal`].
 pub fn worth(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     sums::<true>(frame, cameras)
 }
 
-/// `loss` stays 0 without `REMOVAL`.
+/// `loss` and `energy` stay 0 without `REMOVAL`.
 fn sums<const REMOVAL: bool>(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     let mut sums = vec![Worth::default(); frame.len()];
     let shapes = Shapes::of(frame);
@@ -51,6 +54,7 @@ fn sums<const REMOVAL: bool>(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<W
             let sum = &mut sums[view.splats[share.place as usize].gaussian as usize];
             sum.contribution += f64::from(share.contribution);
             sum.loss += f64::from(share.loss);
+            sum.energy += f64::from(share.energy);
         }
     }
     sums
@@ -62,6 +66,7 @@ struct Share {
     place: u32,
     contribution: f32,
     loss: f32,
+    energy: f32,
 }
 
 /// What each ellipse is to the tiles of a row.
@@ -92,6 +97,7 @@ impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
                 ink,
                 given: [0.0; TILE],
                 lost: [0.0; TILE],
+                squared: [0.0; TILE],
                 places,
                 shares: &mut shares,
             };
@@ -107,6 +113,7 @@ struct Counter<'a, const REMOVAL: bool> {
     ink: Ink,
     given: Lanes,
     lost: Lanes,
+    squared: Lanes,
     places: &'a [u32],
     shares: &'a mut Vec<Share>,
 }
@@ -119,6 +126,9 @@ impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
         }
         if !REMOVAL {
             return;
+        }
+        for (sum, visible) in self.squared.iter_mut().zip(visible) {
+            *sum += visible * visible;
         }
         for (behind, colour) in self.ink.light[line].iter_mut().zip(colour) {
             for lane in 0..TILE {
@@ -136,10 +146,11 @@ impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
     fn done(&mut self, entry: usize) {
         let contribution: f32 = self.given.iter().sum();
         if contribution > 0.0 {
-            let loss = self.lost.iter().sum();
-            self.shares.push(Share { place: self.places[entry], contribution, loss });
+            let (loss, energy) = (self.lost.iter().sum(), self.squared.iter().sum());
+            self.shares.push(Share { place: self.places[entry], contribution, loss, energy });
         }
         self.given = [0.0; TILE];
         self.lost = [0.0; TILE];
+        self.squared = [0.0; TILE];
     }
 }

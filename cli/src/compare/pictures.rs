@@ -1,5 +1,6 @@
 //! How far apart two scenes look: renderings of both from the same cameras.
 
+use super::flicker::{Flicker, FlickerSums};
 use crate::cameras::{CameraArgs, Views};
 use crate::failure::Failure;
 use crate::table::Table;
@@ -35,6 +36,9 @@ pub(super) struct PictureErrors {
     /// A and B against photographs.
     #[serde(skip_serializing_if = "Option::is_none")]
     photos: Option<[Figures; 2]>,
+    /// How much A and B flicker.
+    #[serde(flatten)]
+    flicker: Flicker,
     /// Pictures compared.
     pictures: usize,
 }
@@ -57,6 +61,9 @@ pub(super) struct Pictures<'a> {
     cameras: Vec<Camera>,
     rendered: Vec<Comparison>,
     photos: [Vec<Comparison>; 2],
+    /// The renderings of the frame before, A and B of each camera.
+    before: Vec<[Rendering; 2]>,
+    flicker: FlickerSums,
 }
 
 impl PictureArgs {
@@ -64,7 +71,15 @@ impl PictureArgs {
     pub(super) fn start(&self) -> Result<Pictures<'_>, Failure> {
         let learned = self.st_lpips.as_deref().map(read_weights).transpose()?;
         let photos = [const { Vec::new() }; 2];
-        Ok(Pictures { args: self, learned, cameras: Vec::new(), rendered: Vec::new(), photos })
+        Ok(Pictures {
+            args: self,
+            learned,
+            cameras: Vec::new(),
+            rendered: Vec::new(),
+            photos,
+            before: Vec::new(),
+            flicker: FlickerSums::default(),
+        })
     }
 }
 
@@ -80,8 +95,13 @@ impl Pictures<'_> {
         if self.cameras.is_empty() {
             self.cameras = self.args.views.cameras(views, a)?;
         }
+        let before = core::mem::take(&mut self.before);
+        let mut before = before.iter();
         for camera in &self.cameras {
             let [a, b] = [a, b].map(|frame| render(frame, camera, [0.0; 3]));
+            if let Some(before) = before.next() {
+                self.flicker.add(before, [&a, &b]);
+            }
             self.rendered.push(compare(&a.colour, &a.alpha, &b.colour, self.learned.as_ref()));
             if let Some(directory) = &self.args.photos {
                 let photo = read_photo(directory, camera)?;
@@ -91,6 +111,7 @@ impl Pictures<'_> {
                 self.photos[0].push(of_a);
                 self.photos[1].push(of_b);
             }
+            self.before.push([a, b]);
         }
         Ok(())
     }
@@ -100,6 +121,7 @@ impl Pictures<'_> {
         PictureErrors {
             rendered: Figures::of(&self.rendered),
             photos: self.args.photos.as_ref().map(|_| self.photos.each_ref().map(|list| Figures::of(list))),
+            flicker: self.flicker.means(),
             pictures: self.rendered.len(),
         }
     }
@@ -167,6 +189,11 @@ impl PictureErrors {
         let mut table =
             Table::new(["", "PSNR dB", "covered dB", "YUV dB", "SSIM", "covered SSIM", "ST-LPIPS"]);
         rows.into_iter().for_each(|row| table.row(row));
-        format!("\n{} pictures, means over all of them\n{}", self.pictures, table.text())
+        format!(
+            "\n{} pictures, means over all of them\n{}{}",
+            self.pictures,
+            table.text(),
+            self.flicker.text()
+        )
     }
 }

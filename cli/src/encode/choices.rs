@@ -36,6 +36,7 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     choices.extend(order(report, settings));
     choices.extend(layers(report, settings));
     choices.extend(survivors(report));
+    choices.extend(fidelity(report, settings));
     choices.extend(predictors(report, settings));
     choices.push(invisible(report, settings));
     choices.extend(left_out(settings));
@@ -174,6 +175,16 @@ fn survivors(report: &Report) -> Option<Choice> {
     let cells = sum(|frame| frame.cells) / frames().count().max(1) as u64;
     let why = format!("{} cells a frame move the rest where it belongs, or it stays", grouped(cells));
     Some(Choice::new("survivors", choice, why))
+}
+
+/// What untracked frames are true to.
+fn fidelity(report: &Report, settings: &Settings) -> Option<Choice> {
+    let frames = report.coded.iter().filter(|frame| frame.by_pictures).count();
+    let why = format!(
+        "files are not tracked; what costs pictures less than {} dB is carried over",
+        settings.tolerance
+    );
+    (frames > 0).then(|| Choice::new("fidelity", format!("pictures in {frames} frames"), why))
 }
 
 fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {

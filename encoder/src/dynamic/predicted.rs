@@ -1,6 +1,7 @@
 //! Predicted frames: cells, survivors, new Gaussians.
 
 use super::predictors::{Chooser, used};
+use super::price::Goal;
 use super::survivors::{Fate, Survivors};
 use super::unit::{Draft, UnitCoder, deltas};
 use super::wanted::{ColourTarget, Wanted};
@@ -21,7 +22,7 @@ use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::frame_state::FrameState;
 use splatstream_decoder::home::{FINE, Home};
 use splatstream_decoder::increment::values::SectionValues;
-use splatstream_decoder::increment::{Situation, field};
+use splatstream_decoder::increment::{Applied, Situation, field};
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
@@ -31,6 +32,9 @@ use std::sync::Arc;
 
 /// The largest translation of a cell, steps / 8: the difference of two is below 2^16.
 const MOST_TRANSLATION: i32 = (1 << 15) - 1;
+
+/// The row of a Gaussian that no file has any more.
+const NO_ROW: u32 = u32::MAX;
 
 /// The Gaussians of a reference as matching sees them.
 pub(crate) struct ReferenceCloud {
@@ -138,7 +142,7 @@ pub(crate) struct Predicted<'a> {
 }
 
 /// A unit while its frame is being coded.
-struct Made {
+pub(crate) struct Made {
     draft: Draft,
     home: Home,
     /// The new Gaussians of the home.
@@ -147,12 +151,24 @@ struct Made {
     sections: Vec<splatstream_format::payload::SectionBytes>,
 }
 
+/// A unit before its sections are coded.
+pub(crate) struct Drafted {
+    pub(crate) draft: Draft,
+    pub(crate) applied: Applied,
+    /// Places of its new Gaussians among those of the frame, in coded order.
+    added: Vec<u32>,
+}
+
 impl Predicted<'_> {
     /// Codes the units of the frame.
     ///
     /// # Errors
     /// What the decoder's own checks refuse.
-    pub(crate) fn code(&mut self, predictors: Chooser<'_>) -> Result<(Vec<CodedUnit>, Reference), Error> {
+    pub(crate) fn code(
+        &mut self,
+        predictors: Chooser<'_>,
+        goal: Option<&mut Goal>,
+    ) -> Result<(Vec<CodedUnit>, Reference), Error> {
         let sequence = self.coder.sequence;
         let motion = self.cells()?;
         let (cells, cell_log2) = (self.cell_values(&motion), motion.cell_log2);
@@ -173,6 +189,9 @@ impl Predicted<'_> {
             })
             .collect();
         self.let_go(&displaced);
+        if let Some(goal) = goal {
+            self.set_judge(goal, &first, &displaced)?;
+        }
         let fresh = self.fresh(&displaced)?;
         let mut models = ModelsOfFrame::starting_with(self.reference.state.models.clone());
         let mut made: Vec<Made> = Vec::new();
@@ -224,14 +243,15 @@ impl Predicted<'_> {
     }
 
     /// The Gaussians that continue none, on the lattices, and the homes they go to.
-    fn fresh(&self, displaced: &[Home]) -> Result<Fresh, Error> {
-        let mut taken = vec![false; self.target.frame.len()];
-        self.matching.target_of.iter().flatten().for_each(|&place| taken[place as usize] = true);
-        let places: Vec<u32> = (0..self.target.frame.len() as u32).filter(|&p| !taken[p as usize]).collect();
+    pub(crate) fn fresh(&self, displaced: &[Home]) -> Result<Fresh, Error> {
+        let mut places = self.matching.wanted(self.target.frame.len());
+        if let Some(judge) = &self.survivors.judge {
+            places.retain(|&place| judge.is_missed(place));
+        }
         let frame = self.target.frame.select(&places);
         let survivors: Vec<usize> = self.survivors_of(displaced);
         let order = importance::order(&importance::opacity_volume(&frame));
-        let total = self.target.frame.len() as u32;
+        let total = (survivors.iter().sum::<usize>() + frame.len()) as u32;
         let sequence = self.coder.sequence;
         let mut of_home: Vec<Vec<u32>> = Vec::new();
         let mut rest = order.as_slice();
@@ -286,9 +306,9 @@ impl Predicted<'_> {
         displaced
             .iter()
             .map(|home| {
-                let partners = &self.matching.target_of[start..start + home.len()];
+                let partners = (start..).zip(&self.matching.target_of[start..start + home.len()]);
                 start += home.len();
-                partners.iter().flatten().count()
+                partners.filter(|&(from, &partner)| self.survivors.goes_on(from, partner)).count()
             })
             .collect()
     }
@@ -297,7 +317,7 @@ impl Predicted<'_> {
     fn unit(
         &self,
         home: usize,
-        mut draft: Draft,
+        draft: Draft,
         displaced: &[Home],
         fresh: &Fresh,
         added: &[u32],
@@ -306,12 +326,40 @@ impl Predicted<'_> {
         models: &mut ModelsOfFrame,
     ) -> Result<Made, Error> {
         let refinement = home as u8;
+        let mut in_force = models.before(refinement).clone();
+        let Drafted { draft, applied, added } =
+            self.drafted(home, draft, displaced, fresh, added, made, predictors, &in_force)?;
+        let sections = self.coder.sections(&draft, &mut in_force)?;
+        models.follow(refinement, in_force);
+        let start: usize = displaced[..home].iter().map(Home::len).sum();
+        let partners = (start..).zip(&self.matching.target_of[start..start + displaced[home].len()]);
+        let continued = partners
+            .filter(|&(from, &partner)| self.survivors.goes_on(from, partner))
+            .map(|(_, partner)| partner.map_or(NO_ROW, |place| self.target.rows[place as usize]));
+        let new = added.iter().map(|&place| self.target.rows[fresh.places[place as usize] as usize]);
+        let rows = continued.chain(new).collect();
+        Ok(Made { draft, home: applied.home, added: applied.added, rows, sections })
+    }
+
+    /// A unit and what a decoder makes of it.
+    #[expect(clippy::too_many_arguments, reason = "what a unit depends on")]
+    pub(crate) fn drafted(
+        &self,
+        home: usize,
+        mut draft: Draft,
+        displaced: &[Home],
+        fresh: &Fresh,
+        added: &[u32],
+        made: &[Made],
+        predictors: Chooser<'_>,
+        models: &ModelsInForce,
+    ) -> Result<Drafted, Error> {
         let start: usize = displaced[..home].iter().map(Home::len).sum();
         let parents = &displaced[home];
         let partners = &self.matching.target_of[start..start + parents.len()];
         let last = home + 1 == displaced.len();
         let coarse = last && self.coarse_tail && displaced.len() > 1;
-        let fates = self.survivors.fates(parents, partners, coarse);
+        let fates = self.survivors.fates(parents, start, partners, coarse);
         self.set_fates(&mut draft, &fates);
         let mut added = added.to_vec();
         let wanted = self.coder.place_new(&mut draft, &fresh.wanted, &mut added);
@@ -319,15 +367,9 @@ impl Predicted<'_> {
         let anchor = self.reference.state.anchor.iter().skip(home + 1).map(|home| &home.planes);
         let behind: Vec<&QuantizedFrame> = anchor.chain(made.iter().map(|made| &made.added)).collect();
         let situation = Situation { around: [&lower, &behind], parents_follow: false };
-        let mut in_force = models.before(refinement).clone();
         let applied =
-            predictors.choose(&self.coder, &mut draft, parents.clone(), &situation, &wanted, &in_force)?;
-        let sections = self.coder.sections(&draft, &mut in_force)?;
-        models.follow(refinement, in_force);
-        let continued = partners.iter().flatten().map(|&place| self.target.rows[place as usize]);
-        let new = added.iter().map(|&place| self.target.rows[fresh.places[place as usize] as usize]);
-        let rows = continued.chain(new).collect();
-        Ok(Made { draft, home: applied.home, added: applied.added, rows, sections })
+            predictors.choose(&self.coder, &mut draft, parents.clone(), &situation, &wanted, models)?;
+        Ok(Drafted { draft, applied, added })
     }
 
     fn set_fates(&self, draft: &mut Draft, fates: &[Fate]) {
@@ -393,10 +435,10 @@ impl Predicted<'_> {
 }
 
 /// New Gaussians of a frame.
-struct Fresh {
+pub(crate) struct Fresh {
     /// Their places in the target.
     places: Vec<u32>,
     wanted: Wanted,
     /// For each home those it gets, as places among the new ones.
-    of_home: Vec<Vec<u32>>,
+    pub(crate) of_home: Vec<Vec<u32>>,
 }

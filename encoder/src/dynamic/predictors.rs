@@ -4,7 +4,7 @@ use super::learning::Recorder;
 use super::unit::{Draft, UnitCoder};
 use super::wanted::Wanted;
 use crate::error::Error;
-use crate::settings::{PredictorChoice, Predictors};
+use crate::settings::{NEIGHBOURS, PredictorChoice, Predictors};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::home::Home;
 use splatstream_decoder::increment::prediction::{Predicting, Prediction};
@@ -53,6 +53,14 @@ pub(crate) struct Chooser<'r> {
 type Residuals = Vec<Vec<i32>>;
 
 impl Chooser<'_> {
+    /// Predicts nothing.
+    pub(crate) const UNPREDICTED: Self = Self {
+        predictors: Predictors::NONE,
+        choice: PredictorChoice::Bits,
+        neighbours: NEIGHBOURS,
+        recorder: None,
+    };
+
     /// Gives a draft its new Gaussians, each with its predictor, and what a decoder makes of it. Their positions are in
     /// the draft.
     ///

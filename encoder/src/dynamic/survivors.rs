@@ -2,6 +2,7 @@
 
 use super::Target;
 use super::align::{Namings, Pose};
+use super::judge::Judge;
 use crate::settings::Steps;
 use crate::vq;
 use rayon::prelude::*;
@@ -36,6 +37,38 @@ pub(crate) struct Fate {
 /// Removed: nothing continues it.
 const REMOVED: i32 = 4;
 
+/// Attributes before dc: log-scales, opacity, rotation.
+const COLOUR: usize = 7;
+
+/// How far a Gaussian is from its partner, in steps.
+pub(crate) struct Apart {
+    pub(crate) position: [f32; 3],
+    /// Log-scales, opacity, rotation, components of dc and of sh.
+    pub(crate) attributes: Vec<f32>,
+    /// Where the components of sh begin.
+    colours: usize,
+    /// The partner, written like the Gaussian, and the Gaussian.
+    pub(crate) pose: Pose,
+    pub(crate) reference: Pose,
+    /// The opacity of the partner.
+    pub(crate) logit: f32,
+}
+
+impl Apart {
+    /// Components of sh.
+    pub(crate) fn sh(&self) -> &[f32] {
+        &self.attributes[self.colours..]
+    }
+}
+
+/// What is sent of the differences, in steps.
+pub(crate) struct Kept {
+    pub(crate) moved: [i32; 3],
+    pub(crate) attributes: Vec<i32>,
+    /// The entry of the codebook of SH residuals, if there is one.
+    pub(crate) entry: Option<i32>,
+}
+
 /// What survivors are measured with.
 pub(crate) struct Survivors<'a> {
     pub(crate) target: &'a Target,
@@ -44,36 +77,60 @@ pub(crate) struct Survivors<'a> {
     pub(crate) dc: &'a Transform,
     pub(crate) sh: Option<&'a Transform>,
     pub(crate) namings: Namings,
+    /// What pictures say; none: all differences count.
+    pub(crate) judge: Option<Judge>,
     /// The codebook of SH residuals, if they are vector quantised: the second stage, behind that of whole values.
     pub(crate) book: Option<&'a Codebook>,
 }
 
 impl Survivors<'_> {
-    /// The fates of the Gaussians of a home, already displaced. `coarse`: pictures hardly show them, their steps are
-    /// twice as large.
-    pub(crate) fn fates(&self, home: &Home, partner: &[Option<u32>], coarse: bool) -> Vec<Fate> {
-        let removed = || Fate { mode: REMOVED, ..Fate::default() };
-        partner
-            .par_iter()
-            .enumerate()
-            .map(|(row, partner)| partner.map_or_else(removed, |place| self.fate(home, row, place, coarse)))
-            .collect()
+    /// The fates of the Gaussians of a home, already displaced. `start`: place of the first in the reference. `coarse`:
+    /// pictures hardly show them, their steps are twice as large.
+    pub(crate) fn fates(
+        &self,
+        home: &Home,
+        start: usize,
+        partner: &[Option<u32>],
+        coarse: bool,
+    ) -> Vec<Fate> {
+        let fate = |(row, partner): (usize, &Option<u32>)| match *partner {
+            Some(place) => self.fate(home, row, place, coarse),
+            None if self.goes_on(start + row, None) => Fate::default(),
+            None => Fate { mode: REMOVED, ..Fate::default() },
+        };
+        partner.par_iter().enumerate().map(fate).collect()
+    }
+
+    /// Whether a Gaussian of the reference is in the frame.
+    pub(crate) fn goes_on(&self, from: usize, partner: Option<u32>) -> bool {
+        partner.is_some() || self.judge.as_ref().is_some_and(|judge| judge.may_stay(from))
     }
 
     fn fate(&self, home: &Home, row: usize, place: u32, coarse: bool) -> Fate {
         let place = place as usize;
-        let keep = |difference: f32| kept(difference, if coarse { 2.0 * LEFT } else { LEFT });
-        let fine = |value: i32| value as f32 / FINE as f32;
         let last = ((1 << self.sequence.position_bits) - 1) * FINE;
+        let apart = self.apart(home, row, place);
+        let Kept { moved, attributes, entry } = match &self.judge {
+            None => self.all_kept(&apart, [LEFT, if coarse { 2.0 * LEFT } else { LEFT }]),
+            Some(judge) => judge.kept(self, &apart, place),
+        };
         let moved = [0, 1, 2].map(|axis: usize| {
             let now = home.position_fine[axis][row];
-            let steps = kept(self.target.position[axis][place] - fine(now), LEFT);
             // A fraction of a step is left between the outermost point and the end of the lattice.
-            steps.clamp(-(now / FINE), (last - now) / FINE)
+            moved[axis].clamp(-(now / FINE), (last - now) / FINE)
         });
-        let updated = self.residuals(home, row, place, &keep);
+        let updated = self.residuals(home, row, &attributes, entry);
         let mode = i32::from(moved != [0; 3]) + 2 * i32::from(updated.iter().any(|&value| value != 0));
         Fate { mode, moved, updated }
+    }
+
+    /// All differences but those up to so many steps: of position, of attributes.
+    pub(crate) fn all_kept(&self, apart: &Apart, left: [f32; 2]) -> Kept {
+        Kept {
+            moved: apart.position.map(|steps| kept(steps, left[0])),
+            attributes: apart.attributes.iter().map(|&steps| kept(steps, left[1])).collect(),
+            entry: self.book.map(|book| vq::nearest_entry(book, apart.sh())),
+        }
     }
 
     /// Whether a Gaussian is so far from its partner that no residual brings it there.
@@ -84,46 +141,67 @@ impl Survivors<'_> {
         })
     }
 
-    /// Residuals of the attributes, each 0 where the difference is left.
-    fn residuals(&self, home: &Home, row: usize, place: usize, keep: &impl Fn(f32) -> i32) -> Vec<i32> {
+    /// How far a Gaussian is from its partner. Pictures show what fractions are rounded to; who goes by attributes
+    /// lets a fraction be, which motion has brought.
+    fn apart(&self, home: &Home, row: usize, place: usize) -> Apart {
         let (scale_step, turn_step) = (self.sequence.log_scale_step(), self.sequence.rotation_step());
         let planes = &home.planes;
         let now = planes.log_scale.each_ref().map(|plane| plane[row]);
-        let turn = home.rotation_fine.each_ref().map(|plane| plane[row] as f32 / FINE as f32);
-        let pose = self.pose(place, now, turn);
+        let turn = match self.judge {
+            None => home.rotation_fine.each_ref().map(|plane| plane[row] as f32 / FINE as f32),
+            Some(_) => planes.rotation.each_ref().map(|plane| plane[row] as f32),
+        };
+        let (pose, reference) = self.poses(place, now, turn);
         let round = now[0] == now[1] && now[1] == now[2];
-        let wanted = [0, 1, 2].map(|axis: usize| {
+        let mut attributes = Vec::with_capacity(10 + planes.sh.len());
+        attributes.extend([0, 1, 2].map(|axis: usize| {
             let exact = (pose.log_scale[axis] - self.sequence.log_scale_offset()) / scale_step;
-            now[axis] + keep(exact - now[axis] as f32)
-        });
-        let mut residuals = Vec::with_capacity(10 + planes.sh.len());
-        residuals.extend(super::anchor::scale_residuals(now, wanted, 0));
-        let opacity = (self.target.frame.opacity_logit()[place] - self.sequence.opacity_offset())
-            / self.sequence.opacity_step();
-        residuals.push(keep(opacity - planes.opacity[row] as f32));
-        residuals.extend([0, 1, 2].map(|axis: usize| {
-            if round { 0 } else { keep(pose.rotation[axis + 1] / turn_step - turn[axis]) }
+            exact - now[axis] as f32
         }));
+        let logit = self.target.frame.opacity_logit()[place];
+        let opacity = (logit - self.sequence.opacity_offset()) / self.sequence.opacity_step();
+        attributes.push(opacity - planes.opacity[row] as f32);
+        attributes.extend(
+            [0, 1, 2].map(
+                |axis: usize| {
+                    if round { 0.0 } else { pose.rotation[axis + 1] / turn_step - turn[axis] }
+                },
+            ),
+        );
         let dc = |plane: usize| {
             self.target.frame.dc()[plane][place] / self.sequence.dc_step()
                 - planes.dc[plane][row] as f32 / 64.0
         };
-        let component = |part: f32| keep(part).clamp(*COMPONENT_RANGE.start(), *COMPONENT_RANGE.end());
-        residuals.extend(projected(self.dc, &[dc(0), dc(1), dc(2)]).map(component));
+        attributes.extend(projected(self.dc, &[dc(0), dc(1), dc(2)]));
+        let colours = attributes.len();
         if let Some(transform) = self.sh {
             let sh = |plane: usize| {
                 let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[place]);
                 wanted / self.sequence.sh_step() - planes.sh[plane][row] as f32 / 64.0
             };
             let differences: Vec<f32> = (0..planes.sh.len()).map(sh).collect();
-            match self.book {
-                None => residuals.extend(projected(transform, &differences).map(component)),
-                Some(book) => {
-                    let components: Vec<f32> = projected(transform, &differences).collect();
-                    residuals.extend([0, vq::nearest_entry(book, &components)]);
-                }
-            }
+            attributes.extend(projected(transform, &differences));
         }
+        let position = [0, 1, 2].map(|axis: usize| {
+            let now = match self.judge {
+                None => home.position_fine[axis][row] as f32 / FINE as f32,
+                Some(_) => planes.position[axis][row] as f32,
+            };
+            self.target.position[axis][place] - now
+        });
+        Apart { position, attributes, colours, pose, reference, logit }
+    }
+
+    /// The residuals that change attributes by these steps.
+    fn residuals(&self, home: &Home, row: usize, steps: &[i32], entry: Option<i32>) -> Vec<i32> {
+        let now = home.planes.log_scale.each_ref().map(|plane| plane[row]);
+        let wanted = [0, 1, 2].map(|axis: usize| now[axis] + steps[axis]);
+        let mut residuals = super::anchor::scale_residuals(now, wanted, 0).to_vec();
+        residuals.extend(&steps[3..COLOUR]);
+        let colours = COLOUR + usize::from(self.dc.header.rank);
+        let coded = if entry.is_some() { &steps[COLOUR..colours] } else { &steps[COLOUR..] };
+        residuals.extend(coded.iter().map(|part| part.clamp(COMPONENT_RANGE.start(), COMPONENT_RANGE.end())));
+        residuals.extend(entry.into_iter().flat_map(|entry| [0, entry]));
         residuals
     }
 
@@ -146,8 +224,8 @@ impl Survivors<'_> {
             .collect()
     }
 
-    /// The target written like its reference.
-    fn pose(&self, place: usize, now: [i32; 3], turn: [f32; 3]) -> Pose {
+    /// The target written like its reference, and the reference.
+    fn poses(&self, place: usize, now: [i32; 3], turn: [f32; 3]) -> (Pose, Pose) {
         let frame = &self.target.frame;
         let target = Pose {
             log_scale: frame.log_scale().each_ref().map(|plane| plane[place]),
@@ -158,7 +236,7 @@ impl Survivors<'_> {
         let w = (1.0 - (x * x + y * y + z * z)).max(0.0).sqrt();
         let log_scale = now.map(|q| self.sequence.log_scale_offset() + scale_step * q as f32);
         let reference = Pose { log_scale, rotation: [w, x, y, z] };
-        self.namings.nearest(target, reference, (self.steps.log_scale, self.steps.rotation))
+        (self.namings.nearest(target, reference, (self.steps.log_scale, self.steps.rotation)), reference)
     }
 }
 

@@ -21,6 +21,11 @@ impl Mask {
         Self { included: alpha.iter().map(|&alpha| alpha > 0.0).collect() }
     }
 
+    /// Of pixels chosen otherwise.
+    pub(super) fn of(included: Vec<bool>) -> Self {
+        Self { included }
+    }
+
     /// For each pixel, row by row: whether it counts.
     #[must_use]
     pub fn included(&self) -> &[bool] {
