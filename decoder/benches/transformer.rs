@@ -2,17 +2,16 @@
 //!
 //! `cargo bench -p splatstream-decoder --bench transformer`
 //!
-//! `scalar` is the text line by line, one lane after the other, which no decoder has to run. `portable` is what decoders
-//! run where there is nothing better, as the instructions that every machine of the target has; `lanes` takes what this
-//! machine has, AVX2 and FMA where it can. A build with `RUSTFLAGS=-Ctarget-cpu=x86-64-v3` gives AVX2 to all
-//! three: compare with it what the detection at run time leaves.
+//! `scalar` is the text line by line, one lane after the other, which no decoder has to run; `portable` takes what every
+//! machine of the target has, SSE2 on x86-64; `fastest` what this machine has, AVX2 where it can. Where there are no
+//! instructions to add products of pairs, decoders run `without_instructions`.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed benchmark")]
 
 use core::fmt;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use pulp::Arch;
 use splatstream_decoder::transformer::batch::Seen;
+use splatstream_decoder::transformer::lanes::Machine;
 use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, scalar};
 use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::NetworkHeader;
@@ -104,22 +103,29 @@ fn scalar(bencher: Bencher, case: Case) {
         .bench_local(|| black_box(&batches).iter().for_each(|batch| drop(black_box(lanes(batch)))));
 }
 
+#[divan::bench(args = CASES, sample_count = 20, sample_size = 1)]
+fn without_instructions(bencher: Bencher, case: Case) {
+    run(bencher, case, Machine::Portable);
+}
+
+/// With AVX2 this is SSE2, what every x86-64 has.
 #[divan::bench(args = CASES, sample_count = 50, sample_size = 1)]
 fn portable(bencher: Bencher, case: Case) {
-    run(bencher, case, Arch::Scalar);
+    let machines = Machine::all();
+    run(bencher, case, *machines.get(1).unwrap_or(&machines[0]));
 }
 
 #[divan::bench(args = CASES, sample_count = 50, sample_size = 1)]
-fn lanes(bencher: Bencher, case: Case) {
-    run(bencher, case, Arch::new());
+fn fastest(bencher: Bencher, case: Case) {
+    run(bencher, case, *Machine::all().last().unwrap());
 }
 
-fn run(bencher: Bencher<'_, '_>, case: Case, arch: Arch) {
+fn run(bencher: Bencher<'_, '_>, case: Case, machine: Machine) {
     let (network, batches) = inputs(case);
     let network = LaneNetwork::new(&network);
     bencher.counter(ItemsCount::new(GAUSSIANS)).bench_local(|| {
         for batch in black_box(&batches) {
-            black_box(network.outputs_on(arch, batch));
+            black_box(network.outputs_on(machine, batch));
         }
     });
 }

@@ -8,14 +8,18 @@ use crate::colour::Colour;
 use crate::frame::QuantizedFrame;
 use crate::home::{FINE, canonical};
 use crate::neighbours::{Neighbour, NeighbourSearch};
-use crate::predictor::{Predictor, bilateral_weights, knn_weights, weighted_mean};
+use crate::predictor::{NEIGHBOURS_MAX, Predictor, WeightedMean, bilateral_weights, knn_weights};
+use crate::transformer::LaneNetwork;
+use core::ops::Range;
 use learned::{Learned, Target};
 use rayon::prelude::*;
+use rows::Rows;
 use splatstream_format::Result;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::IncrementHeader;
 
 pub mod learned;
+mod rows;
 
 /// What the predictors of a unit go by.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +32,9 @@ pub struct Predicting<'a> {
     pub network: Option<&'a Network>,
 }
 
+/// Items, at least, that are worth another thread.
+const RUN: usize = 64;
+
 /// A new Gaussian that is predicted.
 #[derive(Debug, Clone, Copy)]
 struct Item {
@@ -39,17 +46,19 @@ struct Item {
 #[derive(Debug)]
 pub struct Prediction<'s> {
     set: &'s QuantizedFrame,
+    colour: Colour<'s>,
     items: Vec<Item>,
     /// Where the items are.
     position: [Vec<u32>; 3],
     /// `count` for each item.
     neighbours: Vec<Neighbour>,
     count: usize,
+    rows: Rows,
     /// Squared differences of the attributes known so far, for each of `neighbours`.
     features: Vec<u64>,
     falloff: [u8; 2],
     /// The network, if a Gaussian takes it.
-    learned: Option<Learned<'s>>,
+    network: Option<LaneNetwork>,
 }
 
 impl<'s> Prediction<'s> {
@@ -81,8 +90,9 @@ impl<'s> Prediction<'s> {
         let features = vec![0; neighbours.len()];
         let falloff = [header.bilateral_spatial, header.bilateral_feature];
         let network = by.network.filter(|_| predictors.contains(&Predictor::Transformer));
-        let learned = network.map(|network| Learned::new(network, &by.colour, set));
-        Some(Self { set, items, position, neighbours, count, features, falloff, learned })
+        let network = network.map(LaneNetwork::new);
+        let (rows, colour) = (Rows::new(set, &neighbours), by.colour);
+        Some(Self { set, colour, items, position, neighbours, count, rows, features, falloff, network })
     }
 
     /// Predicts and adds residuals, attribute by attribute.
@@ -106,123 +116,115 @@ impl<'s> Prediction<'s> {
 
     /// Puts the prediction of one attribute in the place of what `attributes` holds for the predicted Gaussians.
     pub fn predict(&self, stage: Stage, attributes: &mut Attributes) {
-        let set = self.set;
-        match stage {
-            Stage::LogScale => self.means(stage, &planes(&set.log_scale), &mut attributes.log_scale, 1),
-            Stage::Opacity => {
-                self.means(stage, &[&set.opacity], core::slice::from_mut(&mut attributes.opacity), 1);
-            }
-            Stage::Rotation => self.means(stage, &planes(&set.rotation), &mut attributes.rotation_fine, FINE),
-            Stage::Dc => {
-                self.means(stage, &planes(&set.dc), &mut attributes.dc, 1);
-                if let Some(learned) = &self.learned {
-                    learned.predict(&self.targets(), attributes);
-                }
-            }
-            Stage::Sh => self.means(stage, &planes(&set.sh), &mut attributes.sh, 1),
+        let unit = if stage == Stage::Rotation { FINE } else { 1 };
+        self.means(stage, attributes.stage_mut(stage), unit);
+        if stage == Stage::Dc
+            && let Some(learned) = self.learned()
+        {
+            learned.predict(&self.targets(), attributes);
         }
     }
 
     /// Takes note of one attribute as it is reconstructed.
     pub fn learn(&mut self, stage: Stage, attributes: &Attributes) {
-        let set = self.set;
         match stage {
-            Stage::LogScale => self.compare(&planes(&set.log_scale), &attributes.log_scale, |value| value),
+            Stage::LogScale => self.compare(stage, &attributes.log_scale, [|value| value; 2]),
             Stage::Opacity => {
-                self.compare(&[&set.opacity], core::slice::from_ref(&attributes.opacity), |value| value);
+                self.compare(stage, core::slice::from_ref(&attributes.opacity), [|value| value; 2]);
             }
-            Stage::Rotation => {
-                let plane = |plane: &Vec<i32>| plane.iter().copied().map(canonical).collect();
-                let own = attributes.rotation_fine.each_ref().map(plane);
-                self.compare(&planes(&set.rotation), &own, |value| value);
-            }
-            Stage::Dc => self.compare(&planes(&set.dc), &attributes.dc, canonical),
+            Stage::Rotation => self.compare(stage, &attributes.rotation_fine, [canonical, |value| value]),
+            Stage::Dc => self.compare(stage, &attributes.dc, [canonical; 2]),
             // Nothing is predicted after it.
             Stage::Sh => {}
         }
     }
 
     /// The network, if a Gaussian takes it.
-    pub fn learned(&self) -> Option<&Learned<'s>> {
-        self.learned.as_ref()
+    pub fn learned(&self) -> Option<Learned<'_>> {
+        let Self { network, set, rows, colour, .. } = self;
+        network.as_ref().map(|network| Learned { network, set, rows, dc: colour.dc, sh: colour.sh })
     }
 
     /// The items that the network predicts, once all attributes before dc are known.
     pub fn targets(&self) -> Vec<Target<'_>> {
-        let [spatial, feature] = self.falloff;
         let target = |(place, item): (usize, &Item)| {
-            let (neighbours, features) = self.of(place);
-            let weights = bilateral_weights(neighbours, spatial, feature, features);
+            let weights = self.weights(place, item.predictor);
+            let neighbours = self.neighbours.get(self.range(place)).unwrap_or_default();
+            let places = self.rows.places(self.range(place));
             let position = self.position.each_ref().map(|plane| plane.get(place).copied().unwrap_or(0));
-            Target { row: item.row, position, neighbours, weights }
+            Target { row: item.row, position, neighbours, places, weights }
         };
         let items = self.items.par_iter().enumerate();
         items.filter(|(_, item)| item.predictor == Predictor::Transformer).map(target).collect()
     }
 
-    /// Neighbours, and their feature distances, of an item.
-    fn of(&self, item: usize) -> (&[Neighbour], &[u64]) {
+    /// The places of an item's neighbours.
+    fn range(&self, item: usize) -> Range<usize> {
         let start = item.wrapping_mul(self.count);
-        let range = start..start.wrapping_add(self.count);
-        (self.neighbours.get(range.clone()).unwrap_or_default(), self.features.get(range).unwrap_or_default())
+        start..start.wrapping_add(self.count)
+    }
+
+    /// What the neighbours of an item weigh.
+    fn weights(&self, item: usize, predictor: Predictor) -> [i64; NEIGHBOURS_MAX] {
+        let neighbours = self.neighbours.get(self.range(item)).unwrap_or_default();
+        let [spatial, feature] = self.falloff;
+        match predictor {
+            Predictor::Bilateral | Predictor::Transformer => {
+                let features = self.features.get(self.range(item)).unwrap_or_default();
+                bilateral_weights(neighbours, spatial, feature, features)
+            }
+            Predictor::Knn | Predictor::None => knn_weights(neighbours),
+        }
     }
 
     /// Puts the means of the neighbours, times `unit`, in the place of what `out` holds for the items; not of those
     /// whose colour the network predicts.
-    fn means(&self, stage: Stage, from: &[&Vec<i32>], out: &mut [Vec<i32>], unit: i32) {
+    fn means(&self, stage: Stage, out: &mut [Vec<i32>], unit: i32) {
         let colour = matches!(stage, Stage::Dc | Stage::Sh);
-        let means = |(place, item): (usize, &Item)| -> Vec<i32> {
-            if colour && item.predictor == Predictor::Transformer {
-                return Vec::new();
+        let columns = self.rows.columns(stage);
+        let mut means = vec![0; self.items.len().wrapping_mul(out.len())];
+        let each = means.par_chunks_exact_mut(out.len().max(1)).zip(&self.items).enumerate();
+        each.with_min_len(RUN).for_each(|(place, (means, item))| {
+            if !(colour && item.predictor == Predictor::Transformer) {
+                let rows = self.rows.of(self.range(place)).filter_map(|row| row.get(columns.clone()));
+                let weighted = WeightedMean::new(&self.weights(place, item.predictor));
+                weighted.of_rows(rows, means);
             }
-            let (neighbours, features) = self.of(place);
-            let [spatial, feature] = self.falloff;
-            let weights = match item.predictor {
-                Predictor::Bilateral | Predictor::Transformer => {
-                    bilateral_weights(neighbours, spatial, feature, features)
-                }
-                Predictor::Knn | Predictor::None => knn_weights(neighbours),
-            };
-            let mean = |plane: &&Vec<i32>| {
-                let values = neighbours.iter().map(|neighbour| at(plane, neighbour.index));
-                weighted_mean(&weights, values).wrapping_mul(unit)
-            };
-            from.iter().map(mean).collect()
-        };
-        let predicted: Vec<Vec<i32>> = self.items.par_iter().enumerate().map(means).collect();
-        for (item, means) in self.items.iter().zip(predicted) {
-            let row = usize::try_from(item.row).unwrap_or(usize::MAX);
-            for (plane, mean) in out.iter_mut().zip(means) {
-                if let Some(slot) = plane.get_mut(row) {
-                    *slot = mean;
-                }
+        });
+        for (item, means) in self.items.iter().zip(means.chunks_exact(out.len().max(1))) {
+            if !(colour && item.predictor == Predictor::Transformer) {
+                set_row(out, item.row, means.iter().map(|mean| mean.wrapping_mul(unit)));
             }
         }
     }
 
-    /// Adds the squared differences between the items and their neighbours in some planes.
-    fn compare(&mut self, from: &[&Vec<i32>], own: &[Vec<i32>], lattice: impl Fn(i32) -> i32) {
+    /// Adds the squared differences between the items and their neighbours in an attribute, both brought to one lattice.
+    fn compare(&mut self, stage: Stage, own: &[Vec<i32>], lattice: [fn(i32) -> i32; 2]) {
         let compared = |predictor| matches!(predictor, Predictor::Bilateral | Predictor::Transformer);
-        let runs = self.neighbours.chunks_exact(self.count.max(1));
-        let features = self.features.chunks_exact_mut(self.count.max(1));
-        for (item, (neighbours, features)) in self.items.iter().zip(runs.zip(features)) {
-            if !compared(item.predictor) {
-                continue;
-            }
-            for (neighbour, feature) in neighbours.iter().zip(features) {
-                for (theirs, own) in from.iter().zip(own) {
-                    let difference =
-                        lattice(at(own, item.row)).abs_diff(lattice(at(theirs, neighbour.index)));
-                    let square = u64::from(difference).wrapping_mul(u64::from(difference));
-                    *feature = feature.saturating_add(square);
+        let columns = self.rows.columns(stage);
+        let mut mine = [0; 3];
+        for (place, item) in self.items.iter().enumerate().filter(|(_, item)| compared(item.predictor)) {
+            mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = lattice[0](at(plane, item.row)));
+            let range = self.range(place);
+            let rows = self.rows.of(range.clone()).filter_map(|row| row.get(columns.clone()));
+            for (feature, row) in self.features.get_mut(range).unwrap_or_default().iter_mut().zip(rows) {
+                for (theirs, mine) in row.iter().zip(mine) {
+                    let difference = u64::from(mine.abs_diff(lattice[1](*theirs)));
+                    *feature = feature.saturating_add(difference.wrapping_mul(difference));
                 }
             }
         }
     }
 }
 
-fn planes(planes: &[Vec<i32>]) -> Vec<&Vec<i32>> {
-    planes.iter().collect()
+/// Writes a value to a row of each plane.
+fn set_row(planes: &mut [Vec<i32>], row: u32, values: impl Iterator<Item = i32>) {
+    let row = usize::try_from(row).unwrap_or(usize::MAX);
+    for (plane, value) in planes.iter_mut().zip(values) {
+        if let Some(slot) = plane.get_mut(row) {
+            *slot = value;
+        }
+    }
 }
 
 fn at<T: Copy + Default>(plane: &[T], row: u32) -> T {

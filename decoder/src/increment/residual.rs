@@ -105,6 +105,17 @@ impl Attributes {
         }
     }
 
+    /// The planes of an attribute.
+    pub fn stage_mut(&mut self, stage: Stage) -> &mut [Vec<i32>] {
+        match stage {
+            Stage::LogScale => &mut self.log_scale,
+            Stage::Opacity => core::slice::from_mut(&mut self.opacity),
+            Stage::Rotation => &mut self.rotation_fine,
+            Stage::Dc => &mut self.dc,
+            Stage::Sh => &mut self.sh,
+        }
+    }
+
     /// The attributes of some Gaussians of a home, which predict themselves.
     pub fn of_home(home: &Home, rows: &[u32]) -> Self {
         let pick = |plane: &Vec<i32>| -> Vec<i32> {

@@ -1,219 +1,219 @@
 //! SS-TR-003 to SS-TR-008 for all Gaussians of a batch at once.
 //!
-//! Integers are carried in single precision, which every machine has in vectors. That is exact: no sum reaches 2^22,
-//! factors that are not powers of two multiply integers only, and a number is rounded by adding one so large that no
-//! fraction is left.
-#![expect(
-    clippy::float_arithmetic,
-    reason = "integers below 2^22 in single precision: every result is exact"
-)]
+//! Activations and weights have 8 bits. Two of them, of neighbouring rows, share an `i32` of each lane as 16-bit
+//! [halves](packed): machines multiply such pairs and add both products in one instruction. No sum overflows (7.12),
+//! so the order of its terms means nothing.
 
-use super::scalar::{reciprocal, shares};
-use super::{Batch, LANES, OUTPUTS_MAX, RANKS, sine};
-use matrix::Matrix;
+use super::{Batch, INPUTS_MAX, LANES, OUTPUTS_MAX, RANKS, act, round};
+use products::{Portable, Products};
 use pulp::{Simd, WithSimd};
-use splatstream_format::payload::{Network, Part};
-use splatstream_format::syntax::NetworkHeader;
 
+mod attention;
+mod finish;
 mod matrix;
+mod prepared;
+mod products;
 
-/// One value of each Gaussian of a batch.
-pub(crate) type Lane = [f32; LANES];
+pub use prepared::LaneNetwork;
 
-const ZERO: Lane = [0.0; LANES];
+/// A value, or a pair of values, of each Gaussian of a batch.
+type Lane = [i32; LANES];
 
-/// Differences of relative positions: -254 to 254.
-const DIFFERENCES: i32 = 254;
+const ZERO: Lane = [0; LANES];
 
-/// A network ready for batches.
-#[derive(Debug, Clone)]
-pub struct LaneNetwork {
-    header: NetworkHeader,
-    geometry: Matrix,
-    /// Tokens, and the hidden layer of the geometry network behind them, to embeddings: one start a rank.
-    embedding: Matrix,
-    ranks: Vec<Vec<f32>>,
-    query: Vec<f32>,
-    attention: Matrix,
-    /// For each axis the relative-position bias of each difference from -254 on.
-    bias: [Vec<f32>; 3],
-    value: Matrix,
-    gain: Vec<[f32; 2]>,
-    widening: Matrix,
-    narrowing: Matrix,
-    head: Matrix,
-}
+/// Widths of an embedding, of the geometry network and of the feed-forward block, at most.
+const WIDTH: usize = 64;
+const GEOMETRY: usize = 32;
+const FEED_FORWARD: usize = 128;
 
-impl LaneNetwork {
-    /// Prepares a network.
-    pub fn new(network: &Network) -> Self {
-        let header = network.header;
-        let matrix = |part: Part, columns: usize| {
-            let layer = network.layer(part);
-            Matrix::new(&layer.weights, &layer.bias, columns)
-        };
-        let width = header.width();
-        let embedding = network.layer(Part::Embedding);
-        let gain = network.layer(Part::Gain);
-        let float = |value: &i8| f32::from(*value);
-        Self {
-            header,
-            geometry: matrix(Part::Geometry, 3),
-            embedding: Matrix::new(&joined(network), &[], Self::embedding_inputs(&header)),
-            ranks: embedding
-                .bias
-                .chunks(width)
-                .map(|row| row.iter().map(|&x| f32::from(x)).collect())
-                .collect(),
-            query: network.layer(Part::Query).weights.iter().map(float).collect(),
-            attention: matrix(Part::Attention, width),
-            bias: [0, 1, 2].map(|axis| position_bias(network, axis)),
-            value: matrix(Part::Value, width),
-            gain: gain.weights.iter().zip(&gain.bias).map(|(&w, &b)| [w.into(), b.into()]).collect(),
-            widening: matrix(Part::Widening, width),
-            narrowing: matrix(Part::Narrowing, header.feed_forward_width.into()),
-            head: matrix(Part::Head, width),
-        }
-    }
+/// Pairs of inputs of an embedding, at most.
+const INPUT_PAIRS: usize = INPUTS_MAX.div_ceil(2) + GEOMETRY / 2;
 
-    /// The outputs for every Gaussian of a batch, in step/64: row k is output k.
-    pub fn outputs(&self, batch: &Batch) -> [[i32; LANES]; OUTPUTS_MAX] {
-        self.outputs_on(pulp::Arch::new(), batch)
-    }
-
-    /// The same with the instructions of an architecture; those of [`pulp::Arch::Scalar`] every machine has.
-    pub fn outputs_on(&self, arch: pulp::Arch, batch: &Batch) -> [[i32; LANES]; OUTPUTS_MAX] {
-        arch.dispatch(OneBatch { network: self, batch })
-    }
-
-    fn embedding_inputs(header: &NetworkHeader) -> usize {
-        header.inputs().wrapping_add(header.geometry_width.into())
-    }
-}
-
-/// The rows of the embedding, each with its row of the geometry embedding behind it.
-fn joined(network: &Network) -> Vec<i8> {
-    let header = &network.header;
-    let tokens = network.layer(Part::Embedding).weights.chunks(header.inputs());
-    let width = usize::from(header.geometry_width);
-    let mut geometry = network.layer(Part::GeometryEmbedding).weights.chunks(width.max(1));
-    tokens.flat_map(|row| row.iter().chain(geometry.next().unwrap_or_default())).copied().collect()
-}
-
-fn position_bias(network: &Network, axis: usize) -> Vec<f32> {
-    let fourier = &network.layer(Part::Fourier).weights;
-    let weight = |place: usize| fourier.get(place).copied().map_or(0, i32::from);
-    let term = |difference: i32, k: u32| {
-        let place = usize::try_from(k).unwrap_or(0).wrapping_mul(6).wrapping_add(axis.wrapping_mul(2));
-        let phase = difference.wrapping_shl(k);
-        let sines = [sine(phase), sine(phase.wrapping_add(128))];
-        weight(place)
-            .wrapping_mul(sines[0])
-            .wrapping_add(weight(place.wrapping_add(1)).wrapping_mul(sines[1]))
-    };
-    let sum = |difference: i32| (0..4).map(|k| term(difference, k)).fold(0, i32::wrapping_add) as f32;
-    (-DIFFERENCES..=DIFFERENCES).map(sum).collect()
-}
-
-/// Round(x, shift) of clause 4.2: adding half a unit more than an integer leaves no tie.
+/// Two values in an `i32`.
 #[inline(always)]
-fn round(x: Lane, shift: u32) -> Lane {
-    const WHOLE: f32 = 12_582_912.0;
-    let unit = 1.0 / (1_u32 << shift.min(31)) as f32;
-    x.map(|x| ((x + 0.5) * unit + WHOLE) - WHOLE)
+fn packed(low: i32, high: i32) -> i32 {
+    (low & 0xFFFF) | high.wrapping_shl(16)
 }
 
 #[inline(always)]
-fn clamp(x: Lane, low: f32, high: f32) -> Lane {
-    x.map(|x| {
-        let x = if x > low { x } else { low };
-        if x < high { x } else { high }
-    })
+fn low(pair: i32) -> i32 {
+    pair.wrapping_shl(16).wrapping_shr(16)
 }
 
 #[inline(always)]
-fn act(x: Lane, shift: u32) -> Lane {
-    clamp(round(x, shift), -127.0, 127.0)
+fn high(pair: i32) -> i32 {
+    pair.wrapping_shr(16)
 }
 
 #[inline(always)]
-fn join(a: &Lane, b: &Lane, each: impl Fn(f32, f32) -> f32) -> Lane {
-    let mut out = *a;
-    out.iter_mut().zip(b).for_each(|(a, b)| *a = each(*a, *b));
+fn clamp(x: i32) -> i32 {
+    x.clamp(-127, 127)
+}
+
+/// Each value of two lanes goes through `each`, then they are packed.
+#[inline(always)]
+fn pair(low: &Lane, high: &Lane, each: impl Fn(i32) -> i32) -> Lane {
+    let mut out = ZERO;
+    for (out, (&low, &high)) in out.iter_mut().zip(low.iter().zip(high)) {
+        *out = packed(each(low), each(high));
+    }
     out
 }
 
+/// Bytes of each lane, row by row, in pairs.
 #[inline(always)]
-fn widened(row: &[i8; LANES]) -> Lane {
-    row.map(f32::from)
+fn packed_bytes(rows: &[[i8; LANES]], out: &mut [Lane]) {
+    for (out, rows) in out.iter_mut().zip(rows.chunks(2)) {
+        if let [first, rest @ ..] = rows {
+            let second = rest.first().unwrap_or(&[0; LANES]);
+            *out = pair(&first.map(i32::from), &second.map(i32::from), |value| value);
+        }
+    }
 }
 
-struct OneBatch<'b> {
+/// Sums two by two, each through `each`.
+#[inline(always)]
+fn pairs(sums: &[Lane], out: &mut [Lane], each: impl Fn(i32) -> i32 + Copy) {
+    for (out, sums) in out.iter_mut().zip(sums.chunks(2)) {
+        if let [first, rest @ ..] = sums {
+            *out = pair(first, rest.first().unwrap_or(&ZERO), each);
+        }
+    }
+}
+
+#[inline(always)]
+fn add(sums: &mut Lane, terms: &Lane) {
+    sums.iter_mut().zip(terms).for_each(|(sum, &term)| *sum = sum.wrapping_add(term));
+}
+
+/// Whose instructions a network runs with. The outputs are the same.
+#[derive(Debug, Clone, Copy)]
+pub enum Machine {
+    /// Any.
+    Portable,
+    /// One with SSE2, as every x86-64 is.
+    #[cfg(target_arch = "x86_64")]
+    Sse2(pulp::core_arch::x86::Sse2),
+    /// One with AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
+}
+
+impl Machine {
+    /// Those that this machine can be, the fastest last.
+    pub fn all() -> Vec<Self> {
+        #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
+        let own =
+            [pulp::core_arch::x86::Sse2::try_new().map(Self::Sse2), pulp::x86::V3::try_new().map(Self::Avx2)];
+        #[cfg(not(all(target_arch = "x86_64", not(feature = "portable"))))]
+        let own = [None; 2];
+        core::iter::once(Self::Portable).chain(own.into_iter().flatten()).collect()
+    }
+}
+
+impl LaneNetwork {
+    /// The outputs for every Gaussian of a batch, in step/64: row k is output k.
+    pub fn outputs(&self, batch: &Batch) -> [[i32; LANES]; OUTPUTS_MAX] {
+        self.outputs_on(self.machine, batch)
+    }
+
+    /// The same with the instructions of a machine.
+    pub fn outputs_on(&self, machine: Machine, batch: &Batch) -> [[i32; LANES]; OUTPUTS_MAX] {
+        match machine {
+            Machine::Portable => OneBatch { network: self, batch, by: Portable }.outputs(),
+            #[cfg(target_arch = "x86_64")]
+            Machine::Sse2(sse2) => OneBatch { network: self, batch, by: products::Sse2(sse2) }.outputs(),
+            #[cfg(target_arch = "x86_64")]
+            Machine::Avx2(v3) => {
+                Simd::vectorize(v3, OneBatch { network: self, batch, by: products::Avx2(v3) })
+            }
+        }
+    }
+}
+
+struct OneBatch<'b, P> {
     network: &'b LaneNetwork,
     batch: &'b Batch,
+    by: P,
 }
 
-impl WithSimd for OneBatch<'_> {
+/// Room for the sums of a layer.
+type Sums = [Lane; FEED_FORWARD];
+
+impl<P: Products> WithSimd for OneBatch<'_, P> {
     type Output = [[i32; LANES]; OUTPUTS_MAX];
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let header = &self.network.header;
-        let h = self.embeddings();
-        let width = header.width();
-        let mut pool = vec![ZERO; width];
-        if header.full_attention() {
-            let mut rows = h.clone();
-            for (m, row) in rows.chunks_exact_mut(width).enumerate() {
-                self.attend(row, Some(m), &h);
-                self.finish(row);
-            }
-            self.mean(&rows, &mut pool);
-        } else {
-            self.mean(&h, &mut pool);
-            for (x, query) in pool.iter_mut().zip(&self.network.query) {
-                *x = clamp(x.map(|x| x + query), -127.0, 127.0);
-            }
-            self.attend(&mut pool, None, &h);
-            self.finish(&mut pool);
-        }
-        let mut sums = [ZERO; OUTPUTS_MAX + 1];
-        self.network.head.multiply(&pool, &mut sums);
-        let unit = (1_u32 << header.output_shift.min(31)) as f32;
-        let mut out = [[0; LANES]; OUTPUTS_MAX];
-        for (out, sum) in out.iter_mut().zip(sums).take(header.outputs()) {
-            *out = clamp(round(sum, self.shift(7)), -1023.0, 1023.0).map(|x| (x * unit) as i32);
-        }
-        out
+        self.outputs()
     }
 }
 
-impl OneBatch<'_> {
+impl<P: Products> OneBatch<'_, P> {
+    #[inline(always)]
+    fn outputs(&self) -> [[i32; LANES]; OUTPUTS_MAX] {
+        let header = &self.network.header;
+        let mut sums = [ZERO; FEED_FORWARD];
+        let h = self.embeddings(&mut sums);
+        let steps = header.width() / 2;
+        let mut pool = [ZERO; WIDTH / 2];
+        let pool = pool.get_mut(..steps).unwrap_or_default();
+        if header.full_attention() {
+            let mut rows = h.clone();
+            for (m, row) in rows.chunks_exact_mut(steps).enumerate() {
+                self.attend(row, Some(m), &h, &mut sums);
+                self.finish(row, &mut sums);
+            }
+            self.mean(&rows, pool);
+        } else {
+            self.mean(&h, pool);
+            for (x, &[first, second]) in pool.iter_mut().zip(&self.network.query) {
+                for x in x {
+                    *x = packed(clamp(low(*x).wrapping_add(first)), clamp(high(*x).wrapping_add(second)));
+                }
+            }
+            self.attend(pool, None, &h, &mut sums);
+            self.finish(pool, &mut sums);
+        }
+        self.network.head.multiply(self.by, pool, &mut sums);
+        let (shift, unit) = (self.shift(7), header.output_shift.into());
+        let mut outputs = [[0; LANES]; OUTPUTS_MAX];
+        for (outputs, sums) in outputs.iter_mut().zip(sums).take(header.outputs()) {
+            *outputs = sums.map(|sum| round(sum, shift).clamp(-1023, 1023).wrapping_shl(unit));
+        }
+        outputs
+    }
+
     #[inline(always)]
     fn shift(&self, place: usize) -> u32 {
         self.network.header.layer_shift.get(place).copied().unwrap_or(1).into()
     }
 
-    /// SS-TR-003: the embeddings of all neighbours, one behind the other.
+    /// SS-TR-003: the embeddings of all neighbours, one behind the other, in pairs.
     #[inline(always)]
-    fn embeddings(&self) -> Vec<Lane> {
+    fn embeddings(&self, sums: &mut Sums) -> Vec<Lane> {
         let (network, batch) = (self.network, self.batch);
-        let width = network.header.width();
-        let mut h = vec![ZERO; width.wrapping_mul(batch.neighbours())];
-        let mut input = vec![ZERO; LaneNetwork::embedding_inputs(&network.header)];
-        let mut hidden = [ZERO; 32];
-        for (rank, row) in h.chunks_exact_mut(width).enumerate() {
-            let (token, behind) = input.split_at_mut_checked(network.header.inputs()).unwrap_or_default();
-            token.iter_mut().zip(batch.token(rank)).for_each(|(slot, value)| *slot = widened(value));
-            let mut near = [ZERO; 3];
-            near.iter_mut().zip(batch.near(rank)).for_each(|(slot, value)| *slot = widened(value));
-            network.geometry.multiply(&near, &mut hidden);
-            for (slot, sum) in behind.iter_mut().zip(&hidden) {
-                *slot = clamp(round(*sum, self.shift(0)), 0.0, 127.0);
+        let steps = network.header.width() / 2;
+        let mut h = vec![ZERO; steps.wrapping_mul(batch.neighbours())];
+        let mut input = [ZERO; INPUT_PAIRS];
+        let inputs = network.header.inputs().div_ceil(2);
+        let geometry = usize::from(network.header.geometry_width);
+        let shift = self.shift(0);
+        for (rank, row) in h.chunks_exact_mut(steps).enumerate() {
+            let (token, behind) = input.split_at_mut_checked(inputs).unwrap_or_default();
+            packed_bytes(batch.token(rank), token);
+            if geometry > 0 {
+                let mut near = [ZERO; 2];
+                packed_bytes(batch.near(rank), &mut near);
+                network.geometry.multiply(self.by, &near, sums);
+                pairs(sums.get(..geometry).unwrap_or_default(), behind, |sum| {
+                    round(sum, shift).clamp(0, 127)
+                });
             }
             let ranks = network.ranks.get(rank).or(network.ranks.last()).map_or(&[][..], Vec::as_slice);
-            network.embedding.multiply_from(ranks, &input, row);
-            row.iter_mut().for_each(|x| *x = act(*x, self.shift(1)));
+            network.embedding.multiply_from(self.by, ranks, &input, sums);
+            let shift = self.shift(1);
+            pairs(sums, row, |sum| act(sum, shift));
         }
         h
     }
@@ -221,115 +221,37 @@ impl OneBatch<'_> {
     /// The mean of rows, halves up.
     #[inline(always)]
     fn mean(&self, rows: &[Lane], out: &mut [Lane]) {
-        let count = self.batch.neighbours().min(RANKS) as f32;
-        let part = 1.0 / (2.0 * count);
-        for row in rows.chunks_exact(out.len().max(1)) {
-            out.iter_mut().zip(row).for_each(|(sum, x)| *sum = join(sum, x, |sum, x| sum + x));
-        }
-        // The numerator is an integer below 2^13: its quotient is off by less than the 1/128 that is left of a half.
-        for x in out {
-            *x = x.map(|x| ((2.0 * x + count) * part - 0.5 + 1.0 / 128.0 + 12_582_912.0) - 12_582_912.0);
+        let count = u32::try_from(self.batch.neighbours().clamp(1, RANKS)).unwrap_or(1);
+        // (2 sum + count) / (2 count) with 128 added, so that it is positive. The numerator is below 2^13, the reciprocal
+        // at most 2^17 and less than 1 too large: the quotient is exact.
+        let divisor = count.wrapping_mul(2);
+        let reciprocal = (1_u32 << 18).div_ceil(divisor);
+        let start = divisor.wrapping_mul(128).wrapping_add(count).cast_signed();
+        let mean = |sum: i32| {
+            let numerator = sum.wrapping_mul(2).wrapping_add(start);
+            numerator.wrapping_mul(reciprocal.cast_signed()).wrapping_shr(18).wrapping_sub(128)
+        };
+        let width = out.len();
+        for (place, out) in out.iter_mut().enumerate() {
+            let (mut first, mut second) = (ZERO, ZERO);
+            for row in rows.iter().skip(place).step_by(width.max(1)) {
+                add(&mut first, &row.map(low));
+                add(&mut second, &row.map(high));
+            }
+            *out = pair(&first, &second, mean);
         }
     }
 
-    /// SS-TR-005: adds its context to a row. `m` is its neighbour; none: it is that of the new Gaussian.
+    /// Adds to a row, in pairs, sums that are rounded.
     #[inline(always)]
-    fn attend(&self, row: &mut [Lane], m: Option<usize>, h: &[Lane]) {
-        let network = self.network;
-        let width = row.len();
-        let mut u = [ZERO; 64];
-        network.attention.multiply(row, &mut u);
-        u.iter_mut().for_each(|x| *x = act(*x, self.shift(2)));
-        let mut share = [ZERO; RANKS];
-        for ((j, logit), h) in share.iter_mut().enumerate().zip(h.chunks_exact(width)) {
-            let mut sum = self.bias(j, m);
-            for (u, h) in u.iter().zip(h) {
-                sum.iter_mut().zip(u.iter().zip(h)).for_each(|(sum, (u, h))| *sum += u * h);
+    fn join(row: &mut [Lane], sums: &[Lane], shift: u32) {
+        let mut rounded = [ZERO; WIDTH / 2];
+        pairs(sums, &mut rounded, |sum| act(sum, shift));
+        for (row, more) in row.iter_mut().zip(&rounded) {
+            for (x, &more) in row.iter_mut().zip(more) {
+                let both = [low(*x).wrapping_add(low(more)), high(*x).wrapping_add(high(more))];
+                *x = packed(clamp(both[0]), clamp(both[1]));
             }
-            *logit = round(sum, self.shift(3));
-        }
-        self.softmax(&mut share);
-        let mut z = [ZERO; 64];
-        for (share, h) in share.iter().zip(h.chunks_exact(width)) {
-            for (z, h) in z.iter_mut().zip(h) {
-                z.iter_mut().zip(share.iter().zip(h)).for_each(|(z, (share, h))| *z += share * h);
-            }
-        }
-        z.iter_mut().for_each(|z| *z = act(*z, 8));
-        let mut context = [ZERO; 64];
-        network.value.multiply(z.get(..width).unwrap_or_default(), &mut context);
-        for (x, sum) in row.iter_mut().zip(&context) {
-            *x = clamp(join(x, &act(*sum, self.shift(4)), |x, c| x + c), -127.0, 127.0);
-        }
-    }
-
-    /// The relative-position bias between a neighbour and a row, before it is rounded.
-    #[inline(always)]
-    fn bias(&self, neighbour: usize, m: Option<usize>) -> Lane {
-        let mut sum = ZERO;
-        let from = m.map_or(&[][..], |m| self.batch.near(m));
-        let from = from.iter().copied().chain([[0; LANES]; 3]);
-        for ((table, near), from) in self.network.bias.iter().zip(self.batch.near(neighbour)).zip(from) {
-            for ((sum, &near), from) in sum.iter_mut().zip(near).zip(from) {
-                let place = i32::from(near).wrapping_sub(from.into()).wrapping_add(DIFFERENCES);
-                *sum += table.get(place.unsigned_abs() as usize).copied().unwrap_or(0.0);
-            }
-        }
-        sum
-    }
-
-    /// Logits become shares, Q8.
-    #[inline(always)]
-    fn softmax(&self, logits: &mut [Lane; RANKS]) {
-        let count = self.batch.neighbours();
-        for lane in 0..LANES {
-            let mut own = [0_i32; RANKS];
-            for (own, logit) in own.iter_mut().zip(logits.iter()) {
-                *own = logit.get(lane).copied().unwrap_or(0.0) as i32;
-            }
-            let own = shares(own.get(..count).unwrap_or_default());
-            for (row, share) in logits.iter_mut().zip(own) {
-                if let Some(slot) = row.get_mut(lane) {
-                    *slot = share as f32;
-                }
-            }
-        }
-    }
-
-    /// SS-TR-006 and SS-TR-007.
-    #[inline(always)]
-    fn finish(&self, row: &mut [Lane]) {
-        if self.network.header.normalised() {
-            self.normalise(row);
-        }
-        let wide_width = usize::from(self.network.header.feed_forward_width);
-        if wide_width == 0 {
-            return;
-        }
-        let mut wide = [ZERO; 128];
-        self.network.widening.multiply(row, &mut wide);
-        let wide = wide.get_mut(..wide_width).unwrap_or_default();
-        wide.iter_mut().for_each(|x| *x = clamp(round(*x, self.shift(5)), 0.0, 127.0));
-        let mut narrow = [ZERO; 64];
-        self.network.narrowing.multiply(wide, &mut narrow);
-        for (x, sum) in row.iter_mut().zip(&narrow) {
-            *x = clamp(join(x, &act(*sum, self.shift(6)), |x, y| x + y), -127.0, 127.0);
-        }
-    }
-
-    #[inline(always)]
-    fn normalise(&self, row: &mut [Lane]) {
-        let sum = row.iter().fold(ZERO, |sum, x| join(&sum, x, |sum, x| sum + x));
-        let mu = round(sum, self.network.header.width_log2.into());
-        let mut squares = ZERO;
-        for x in row.iter_mut() {
-            *x = join(x, &mu, |x, mu| x - mu);
-            squares = join(&squares, x, |sum, x| sum + x * x);
-        }
-        let r = squares.map(|sum| reciprocal(sum as i32) as f32);
-        for (x, &[gain, bias]) in row.iter_mut().zip(&self.network.gain) {
-            let unit = round(join(x, &r, |x, r| x * r), 8);
-            *x = act(unit.map(|unit| unit * gain + bias), 5);
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use proptest::prelude::*;
 use splatstream_decoder::transformer::batch::Seen;
+use splatstream_decoder::transformer::lanes::Machine;
 use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, scalar};
 use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::NetworkHeader;
@@ -116,7 +117,9 @@ proptest! {
         let lanes = LaneNetwork::new(&network);
         let fast = lanes.outputs(&batch);
         // With the instructions of this machine, and with those of every machine.
-        prop_assert_eq!(fast, lanes.outputs_on(pulp::Arch::Scalar, &batch));
+        for machine in Machine::all() {
+            prop_assert_eq!(fast, lanes.outputs_on(machine, &batch), "{:?}", machine);
+        }
         for lane in 0..LANES {
             let slow = scalar::outputs(&network, &batch, lane);
             let fast: Vec<i32> = fast.iter().take(header.outputs()).map(|row| row[lane]).collect();

@@ -1,28 +1,37 @@
 //! Clause 7.17.6: from neighbours to what the network sees, and from its outputs to colour.
 
-use super::{Attributes, at};
-use crate::colour::Colour;
+use super::rows::Rows;
+use super::{Attributes, RUN, at, set_row};
 use crate::frame::QuantizedFrame;
 use crate::home::canonical;
+use crate::increment::residual::Stage;
 use crate::neighbours::Neighbour;
-use crate::predictor::weighted_mean;
+use crate::predictor::{NEIGHBOURS_MAX, WeightedMean};
 use crate::transformer::batch::Seen;
 use crate::transformer::{Batch, LANES, LaneNetwork, OUTPUTS_MAX};
 use rayon::prelude::*;
-use splatstream_format::payload::{Network, Transform};
-use splatstream_format::syntax::NetworkHeader;
+use splatstream_format::payload::Transform;
 
 /// The largest magnitude of a colour.
 const COLOUR_MAX: i64 = 1 << 30;
 
-/// The network of a GOP and the transforms it works in.
+/// Colour planes, at most: dc, and SH of degree 3.
+const COLOURS_MAX: usize = 48;
+
+/// The components of a colour, times 2^12: dc, then sh.
+type Components = [i64; OUTPUTS_MAX];
+
+/// A colour: dc, then sh.
+type Colour = [i32; COLOURS_MAX];
+
+/// The network of a GOP, the transforms it works in, and the set it predicts from.
 #[derive(Debug)]
 pub struct Learned<'s> {
-    header: NetworkHeader,
-    network: LaneNetwork,
-    dc: &'s Transform,
-    sh: Option<&'s Transform>,
-    set: &'s QuantizedFrame,
+    pub(super) network: &'s LaneNetwork,
+    pub(super) dc: &'s Transform,
+    pub(super) sh: Option<&'s Transform>,
+    pub(super) set: &'s QuantizedFrame,
+    pub(super) rows: &'s Rows,
 }
 
 /// A new Gaussian that the network predicts.
@@ -31,229 +40,198 @@ pub struct Target<'n> {
     /// Its place among the new Gaussians.
     pub row: u32,
     /// Its position.
-    pub position: [u32; 3],
+    pub(super) position: [u32; 3],
     /// Its neighbours in the reference set.
-    pub neighbours: &'n [Neighbour],
+    pub(super) neighbours: &'n [Neighbour],
+    /// Their rows.
+    pub(super) places: &'n [u32],
     /// What they weigh for dc, 7.17.4.
-    pub weights: [i64; 16],
+    pub(super) weights: [i64; NEIGHBOURS_MAX],
 }
 
-/// The weighted means of the neighbours.
-struct Base {
-    dc: Vec<i32>,
-    sh: Vec<i32>,
-}
-
-/// The colours predicted for some targets: dc, then sh.
-type Predicted = Vec<(u32, Vec<i32>)>;
-
-impl<'s> Learned<'s> {
-    /// A network that predicts from a set of Gaussians.
-    pub fn new(network: &Network, colour: &Colour<'s>, set: &'s QuantizedFrame) -> Self {
-        let (dc, sh) = (colour.dc, colour.sh);
-        Self { header: network.header, network: LaneNetwork::new(network), dc, sh, set }
-    }
-
+impl Learned<'_> {
     /// Puts the colours that the network predicts in the place of what `attributes` holds for the targets. Their
     /// log-scales, opacities and rotations have been reconstructed.
     pub fn predict(&self, targets: &[Target<'_>], attributes: &mut Attributes) {
         let components = self.components(targets);
         let of_run = |run: &[Target<'_>]| self.colours(run, attributes, &components);
-        let predicted: Vec<Predicted> = targets.par_chunks(LANES).map(of_run).collect();
-        for (row, colours) in predicted.into_iter().flatten() {
-            let row = usize::try_from(row).unwrap_or(usize::MAX);
-            let planes = attributes.dc.iter_mut().chain(&mut attributes.sh);
-            for (plane, colour) in planes.zip(colours) {
-                if let Some(slot) = plane.get_mut(row) {
-                    *slot = colour;
-                }
-            }
+        let predicted: Vec<Vec<Colour>> = targets.par_chunks(LANES).map(of_run).collect();
+        for (target, colour) in targets.iter().zip(predicted.into_iter().flatten()) {
+            let (dc, sh) = colour.split_at(3);
+            set_row(&mut attributes.dc, target.row, dc.iter().copied());
+            set_row(&mut attributes.sh, target.row, sh.iter().copied());
         }
     }
 
     /// What the network sees of targets, [`LANES`] of them in each batch. The encoder trains with it.
     pub fn batches(&self, targets: &[Target<'_>], attributes: &Attributes) -> Vec<Batch> {
         let components = self.components(targets);
-        targets.par_chunks(LANES).map(|run| self.seen(run, attributes, &components).0).collect()
+        let batch = |run: &[Target<'_>]| self.batch(run, &self.bases(run), attributes, &components);
+        targets.par_chunks(LANES).map(batch).collect()
     }
 
     /// What the outputs should be for each target, in step/64: the components of its colour in the planes `dc` and
     /// `sh` less those of its base.
     pub fn wanted(&self, targets: &[Target<'_>], dc: &[Vec<i32>], sh: &[Vec<i32>]) -> Vec<Vec<i32>> {
         let of_target = |target: &Target<'_>| -> Vec<i32> {
-            let base = self.base(target);
-            let mut components = vec![0_i64; self.header.outputs()];
-            let value = |plane: &Vec<i32>| at(plane, target.row);
-            self.add_components(&mut components, dc.iter().map(value), sh.iter().map(value), 1);
-            self.add_components(&mut components, base.dc.into_iter(), base.sh.into_iter(), -1);
-            components.into_iter().map(|sum| round12(sum) as i32).collect()
+            let mut own = [0; COLOURS_MAX];
+            let planes = dc.iter().take(3).chain(sh);
+            own.iter_mut().zip(planes).for_each(|(value, plane)| *value = at(plane, target.row));
+            let own = self.components_of(&own);
+            let base = self.components_of(&self.base(target));
+            let pairs = own.iter().zip(base).take(self.network.header().outputs());
+            pairs.map(|(own, base)| round12(own.wrapping_sub(base)) as i32).collect()
         };
         targets.par_iter().map(of_target).collect()
     }
 
-    /// The components of every Gaussian of the set that is a neighbour, times 2^12.
-    fn components(&self, targets: &[Target<'_>]) -> Components {
-        let width = self.header.outputs();
-        let mut places = vec![u32::MAX; self.set.len()];
-        let mut used = Vec::new();
-        for neighbour in targets.iter().flat_map(|target| target.neighbours) {
-            if let Some(place) = places.get_mut(neighbour.index as usize).filter(|place| **place == u32::MAX)
-            {
-                *place = u32::try_from(used.len()).unwrap_or(u32::MAX);
-                used.push(neighbour.index);
+    /// The components of every row that is a neighbour of a target; of the others 0.
+    fn components(&self, targets: &[Target<'_>]) -> Vec<Components> {
+        let mut used = vec![false; self.rows.len()];
+        for &place in targets.iter().flat_map(|target| target.places) {
+            if let Some(used) = used.get_mut(place as usize) {
+                *used = true;
             }
         }
-        let mut values = vec![0; used.len().wrapping_mul(width)];
-        values.par_chunks_mut(width.max(1)).zip(&used).for_each(|(values, &index)| {
-            let value = |plane: &Vec<i32>| at(plane, index);
-            self.add_components(values, self.set.dc.iter().map(value), self.set.sh.iter().map(value), 1);
+        let start = self.rows.columns(Stage::Dc).start;
+        let mut components = vec![[0; OUTPUTS_MAX]; self.rows.len()];
+        let each = components.par_iter_mut().zip(self.rows.all()).zip(used).with_min_len(RUN);
+        each.filter(|(_, used)| *used).for_each(|((components, row), _)| {
+            let colour = row.get(start..).unwrap_or_default();
+            self.set_components(colour, components);
         });
-        Components { places, values, width }
+        components
     }
 
-    /// Adds `sign` times the components of a colour.
-    fn add_components(
-        &self,
-        out: &mut [i64],
-        dc: impl Iterator<Item = i32> + Clone,
-        sh: impl Iterator<Item = i32> + Clone,
-        sign: i64,
-    ) {
-        let (dc_out, sh_out) = out.split_at_mut_checked(self.header.dc_count.into()).unwrap_or_default();
-        add_forward(self.dc, dc, dc_out, sign);
+    /// The components of a colour that the transforms have; the others are 0.
+    fn components_of(&self, colour: &[i32]) -> Components {
+        let mut out = [0; OUTPUTS_MAX];
+        self.set_components(colour, &mut out);
+        out
+    }
+
+    /// Sets the components of a colour that the transforms have.
+    fn set_components(&self, colour: &[i32], out: &mut Components) {
+        let (dc, sh) = colour.split_at_checked(3).unwrap_or_default();
+        let header = self.network.header();
+        let (dc_out, sh_out) = out.split_at_mut_checked(header.dc_count.into()).unwrap_or_default();
+        forward(self.dc, dc, dc_out);
         if let Some(transform) = self.sh {
-            // The planes are read once for every component.
-            let sh: Vec<i32> = sh.collect();
-            add_forward(transform, sh.iter().copied(), sh_out, sign);
+            forward(transform, sh, sh_out.get_mut(..header.sh_count.into()).unwrap_or_default());
         }
     }
 
-    fn base(&self, target: &Target<'_>) -> Base {
-        let mean = |plane: &Vec<i32>| {
-            let values = target.neighbours.iter().map(|neighbour| at(plane, neighbour.index));
-            weighted_mean(&target.weights, values)
-        };
-        Base { dc: self.set.dc.iter().map(mean).collect(), sh: self.set.sh.iter().map(mean).collect() }
+    /// The weighted mean of the neighbours' colours.
+    fn base(&self, target: &Target<'_>) -> Colour {
+        let mut base = [0; COLOURS_MAX];
+        let (dc, sh) = base.split_at_mut(3);
+        let weighted = WeightedMean::new(&target.weights);
+        for (stage, out) in [(Stage::Dc, dc), (Stage::Sh, sh)] {
+            let columns = self.rows.columns(stage);
+            let rows = target.places.iter().filter_map(|&place| self.rows.row(place).get(columns.clone()));
+            weighted.of_rows(rows, out);
+        }
+        base
     }
 
-    fn seen(
+    fn bases(&self, targets: &[Target<'_>]) -> Vec<Colour> {
+        targets.iter().map(|target| self.base(target)).collect()
+    }
+
+    fn batch(
         &self,
         targets: &[Target<'_>],
+        bases: &[Colour],
         attributes: &Attributes,
-        components: &Components,
-    ) -> (Batch, Vec<Base>) {
+        components: &[Components],
+    ) -> Batch {
         let count = targets.first().map_or(1, |target| target.neighbours.len());
-        let mut batch = Batch::new(&self.header, count);
-        let mut bases = Vec::with_capacity(targets.len());
-        for (lane, target) in targets.iter().enumerate() {
-            let base = self.base(target);
-            let mut own = vec![0; components.width];
-            self.add_components(&mut own, base.dc.iter().copied(), base.sh.iter().copied(), 1);
-            bases.push(base);
+        let header = self.network.header();
+        let mut batch = Batch::new(header, count);
+        for (lane, (target, base)) in targets.iter().zip(bases).enumerate() {
+            let own = self.components_of(base);
             let farthest = target.neighbours.last().map_or(0, |neighbour| neighbour.distance);
             let geometry = geometry_of(attributes, target.row);
-            for (rank, (neighbour, &weight)) in target.neighbours.iter().zip(&target.weights).enumerate() {
-                let difference = |(theirs, own): (&i64, &i64)| theirs.wrapping_sub(*own);
-                let theirs = components.of(neighbour.index);
-                let apart: Vec<i64> = theirs.iter().zip(&own).map(difference).collect();
-                let theirs = geometry_in(self.set, neighbour.index);
-                let mut geometry = geometry.into_iter();
-                let geometry = theirs.map(|theirs| theirs.wrapping_sub(geometry.next().unwrap_or(0)));
+            let neighbours = target.neighbours.iter().zip(target.places).zip(target.weights);
+            for (rank, ((neighbour, &place), weight)) in neighbours.enumerate() {
+                let mut apart = components.get(place as usize).copied().unwrap_or_default();
+                apart.iter_mut().zip(&own).for_each(|(apart, own)| *apart = apart.wrapping_sub(*own));
+                let mut theirs = self.rows.row(place).iter();
+                let geometry = geometry.map(|own| theirs.next().map_or(0, |theirs| theirs.wrapping_sub(own)));
                 let seen = Seen { components: &apart, geometry, weight, distance: neighbour.distance };
-                batch.set_token(&self.header, (lane, rank), &seen, farthest);
+                batch.set_token(header, (lane, rank), &seen, farthest);
             }
-            batch.set_near(lane, &self.offsets(target));
+            let offsets = self.offsets(target);
+            batch.set_near(lane, offsets.get(..target.neighbours.len()).unwrap_or_default());
         }
-        (batch, bases)
+        batch
     }
 
     /// Neighbours' positions less the target's, in lattice steps.
-    fn offsets(&self, target: &Target<'_>) -> Vec<[i32; 3]> {
-        let offset = |neighbour: &Neighbour| {
+    fn offsets(&self, target: &Target<'_>) -> [[i32; 3]; NEIGHBOURS_MAX] {
+        let mut offsets = [[0; 3]; NEIGHBOURS_MAX];
+        for (offset, neighbour) in offsets.iter_mut().zip(target.neighbours) {
             let mut own = target.position.into_iter();
-            self.set
-                .position
-                .each_ref()
-                .map(|plane| at(plane, neighbour.index).wrapping_sub(own.next().unwrap_or(0)).cast_signed())
-        };
-        target.neighbours.iter().map(offset).collect()
+            let apart = |plane: &Vec<u32>| at(plane, neighbour.index).wrapping_sub(own.next().unwrap_or(0));
+            *offset = self.set.position.each_ref().map(apart).map(u32::cast_signed);
+        }
+        offsets
     }
 
     /// The colours of a run of targets.
-    fn colours(&self, targets: &[Target<'_>], attributes: &Attributes, components: &Components) -> Predicted {
-        let (batch, bases) = self.seen(targets, attributes, components);
-        let outputs = self.network.outputs(&batch);
-        let colour = |(lane, (target, base)): (usize, (&Target<'_>, Base))| {
+    fn colours(
+        &self,
+        targets: &[Target<'_>],
+        attributes: &Attributes,
+        components: &[Components],
+    ) -> Vec<Colour> {
+        let mut colours = self.bases(targets);
+        let outputs = self.network.outputs(&self.batch(targets, &colours, attributes, components));
+        let header = self.network.header();
+        for (lane, colour) in colours.iter_mut().enumerate() {
             let mut own = [0; OUTPUTS_MAX];
-            for (own, row) in own.iter_mut().zip(&outputs) {
-                *own = row.get(lane).copied().unwrap_or(0);
+            own.iter_mut().zip(&outputs).for_each(|(own, row)| *own = row.get(lane).copied().unwrap_or(0));
+            let (dc_outputs, sh_outputs) = own.split_at_checked(header.dc_count.into()).unwrap_or_default();
+            let sh_outputs = sh_outputs.get(..header.sh_count.into()).unwrap_or_default();
+            let (dc, sh) = colour.split_at_mut(3);
+            add(self.dc, dc_outputs, dc);
+            if let Some(transform) = self.sh {
+                add(transform, sh_outputs, sh);
             }
-            let (dc, sh) = own.split_at_checked(self.header.dc_count.into()).unwrap_or_default();
-            let sh = sh.get(..self.header.sh_count.into()).unwrap_or_default();
-            let mut colours = added(self.dc, base.dc, dc);
-            colours.extend(match self.sh {
-                Some(transform) => added(transform, base.sh, sh),
-                None => base.sh,
-            });
-            (target.row, colours)
-        };
-        targets.iter().zip(bases).enumerate().map(colour).collect()
+        }
+        colours
     }
 }
 
-/// Components times 2^12 of those Gaussians of a set that are in use.
-struct Components {
-    /// Of each Gaussian of the set, its place among those in use.
-    places: Vec<u32>,
-    values: Vec<i64>,
-    width: usize,
-}
-
-impl Components {
-    fn of(&self, index: u32) -> &[i64] {
-        let place = self.places.get(index as usize).copied().unwrap_or(u32::MAX) as usize;
-        let start = place.wrapping_mul(self.width);
-        self.values.get(start..start.wrapping_add(self.width)).unwrap_or_default()
-    }
-}
-
-/// Adds `sign` times the sums of basis and colour to the components that the transform has.
-fn add_forward(transform: &Transform, colour: impl Iterator<Item = i32> + Clone, out: &mut [i64], sign: i64) {
+/// The sums of basis and colour for those components that the transform has.
+fn forward(transform: &Transform, colour: &[i32], out: &mut [i64]) {
     for (out, row) in out.iter_mut().zip(transform.rows()) {
-        let term = |(&weight, value): (&i16, i32)| i64::from(weight).wrapping_mul(value.into());
-        let sum = row.iter().zip(colour.clone()).map(term).fold(0, i64::wrapping_add);
-        *out = out.wrapping_add(sum.wrapping_mul(sign));
+        let terms = row.iter().zip(colour).map(|(&w, &value)| i64::from(w).wrapping_mul(value.into()));
+        *out = terms.fold(0, i64::wrapping_add);
     }
 }
 
-/// A base and what the outputs add to it.
-fn added(transform: &Transform, base: Vec<i32>, outputs: &[i32]) -> Vec<i32> {
-    let mut sums = vec![0_i64; base.len()];
+/// Adds to a base what the outputs stand for.
+fn add(transform: &Transform, outputs: &[i32], base: &mut [i32]) {
+    let mut sums = [0_i64; COLOURS_MAX];
     for (row, &output) in transform.rows().zip(outputs) {
         for (sum, &weight) in sums.iter_mut().zip(row) {
             *sum = sum.wrapping_add(i64::from(weight).wrapping_mul(output.into()));
         }
     }
-    let value = |(base, sum): (i32, i64)| {
-        i64::from(base).wrapping_add(round12(sum)).clamp(COLOUR_MAX.wrapping_neg(), COLOUR_MAX) as i32
-    };
-    base.into_iter().zip(sums).map(value).collect()
+    for (value, sum) in base.iter_mut().zip(sums) {
+        let sum = i64::from(*value).wrapping_add(round12(sum));
+        *value = sum.clamp(COLOUR_MAX.wrapping_neg(), COLOUR_MAX) as i32;
+    }
 }
 
 fn round12(sum: i64) -> i64 {
     sum.wrapping_add(1 << 11).wrapping_shr(12)
 }
 
-/// log_scale, opacity and rotation of a new Gaussian as reconstructed.
+/// log_scale, opacity and rotation of a new Gaussian as reconstructed, in the order of the columns of a row.
 fn geometry_of(attributes: &Attributes, row: u32) -> [i32; 7] {
     let [a, b, c] = attributes.log_scale.each_ref().map(|plane| at(plane, row));
     let [x, y, z] = attributes.rotation_fine.each_ref().map(|plane| canonical(at(plane, row)));
     [a, b, c, at(&attributes.opacity, row), x, y, z]
-}
-
-/// Those of a Gaussian of the set.
-fn geometry_in(set: &QuantizedFrame, index: u32) -> [i32; 7] {
-    let [a, b, c] = set.log_scale.each_ref().map(|plane| at(plane, index));
-    let [x, y, z] = set.rotation.each_ref().map(|plane| at(plane, index));
-    [a, b, c, at(&set.opacity, index), x, y, z]
 }

@@ -8,7 +8,7 @@ use splatstream_decoder::increment::prediction::{Predicting, Prediction};
 use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
 use splatstream_decoder::layout::Section;
 use splatstream_decoder::neighbours::{Neighbour, NeighbourSearch};
-use splatstream_decoder::predictor::{Predictor, bilateral_weights, knn_weights, weighted_mean};
+use splatstream_decoder::predictor::{Predictor, WeightedMean, bilateral_weights, knn_weights};
 use std::fmt::Write as _;
 
 /// The new Gaussian and its neighbours.
@@ -145,8 +145,8 @@ impl Case<'_> {
 
     fn means(&self, stage: Stage) -> Vec<i32> {
         let unit = if stage == Stage::Rotation { FINE } else { 1 };
-        let weights = self.weights();
-        let mean = |plane: &Vec<i32>| weighted_mean(&weights, self.neighbours(plane).into_iter()) * unit;
+        let weighted = WeightedMean::new(&self.weights());
+        let mean = |plane: &Vec<i32>| weighted.of(self.neighbours(plane).into_iter()) * unit;
         set_planes(stage, &self.step.set).into_iter().map(mean).collect()
     }
 
@@ -173,10 +173,10 @@ impl Case<'_> {
              sum              = {sum}\n(2 * sum + W) / (2 * W) = {top} / {bottom} = {}\n```\n",
             list(&weights),
             list(&x),
-            weighted_mean(&weights, x.iter().copied())
+            WeightedMean::new(&weights).of(x.iter().copied())
         )
         .unwrap();
-        assert_eq!(top.div_euclid(bottom), i64::from(weighted_mean(&weights, x.into_iter())));
+        assert_eq!(top.div_euclid(bottom), i64::from(WeightedMean::new(&weights).of(x.into_iter())));
     }
 }
 

@@ -1,0 +1,90 @@
+//! The neighbours of new Gaussians, gathered: each with all its attributes side by side.
+
+use super::at;
+use crate::frame::QuantizedFrame;
+use crate::increment::residual::Stage;
+use crate::neighbours::Neighbour;
+use core::ops::Range;
+use rayon::prelude::*;
+
+/// Columns of a row before those of sh.
+const BEFORE_SH: usize = 10;
+
+/// Rows that are gathered together: a plane is read for all of them before the next.
+const RUN: usize = 256;
+
+/// The Gaussians of a set that are neighbours, in the order of the set.
+#[derive(Debug)]
+pub(super) struct Rows {
+    width: usize,
+    values: Vec<i32>,
+    /// The row of each neighbour.
+    places: Vec<u32>,
+}
+
+impl Rows {
+    /// Gathers the neighbours out of a set.
+    pub(super) fn new(set: &QuantizedFrame, neighbours: &[Neighbour]) -> Self {
+        let mut used = vec![false; set.len()];
+        for neighbour in neighbours {
+            if let Some(used) = used.get_mut(neighbour.index as usize) {
+                *used = true;
+            }
+        }
+        let indices: Vec<u32> = (0..).zip(&used).filter(|(_, used)| **used).map(|(index, _)| index).collect();
+        let mut row_of = vec![0; set.len()];
+        for (row, &index) in (0..).zip(&indices) {
+            if let Some(slot) = row_of.get_mut(index as usize) {
+                *slot = row;
+            }
+        }
+        let places = neighbours.iter().map(|neighbour| at(&row_of, neighbour.index)).collect();
+        let width = BEFORE_SH.wrapping_add(set.sh.len());
+        let mut values = vec![0; indices.len().wrapping_mul(width)];
+        let runs = values.par_chunks_mut(width.wrapping_mul(RUN)).zip(indices.par_chunks(RUN));
+        runs.for_each(|(values, indices)| {
+            for (column, plane) in set.signed_planes().enumerate() {
+                let slots = values.iter_mut().skip(column).step_by(width);
+                slots.zip(indices).for_each(|(slot, &index)| *slot = at(plane, index));
+            }
+        });
+        Self { width, values, places }
+    }
+
+    /// The attributes of all neighbours in `range`.
+    pub(super) fn of(&self, range: Range<usize>) -> impl Iterator<Item = &[i32]> + Clone {
+        self.places.get(range).unwrap_or_default().iter().map(|&place| self.row(place))
+    }
+
+    /// The number of the row of each neighbour in `range`.
+    pub(super) fn places(&self, range: Range<usize>) -> &[u32] {
+        self.places.get(range).unwrap_or_default()
+    }
+
+    /// Rows.
+    pub(super) fn len(&self) -> usize {
+        self.values.len().checked_div(self.width).unwrap_or(0)
+    }
+
+    /// A row.
+    pub(super) fn row(&self, place: u32) -> &[i32] {
+        let start = (place as usize).wrapping_mul(self.width);
+        self.values.get(start..start.wrapping_add(self.width)).unwrap_or_default()
+    }
+
+    /// All rows, in order.
+    pub(super) fn all(&self) -> impl IndexedParallelIterator<Item = &[i32]> {
+        self.values.par_chunks_exact(self.width)
+    }
+
+    /// The columns of an attribute.
+    pub(super) fn columns(&self, stage: Stage) -> Range<usize> {
+        match stage {
+            Stage::LogScale => 0..3,
+            Stage::Opacity => 3..4,
+            Stage::Rotation => 4..7,
+            Stage::Dc => 7..BEFORE_SH,
+            Stage::Sh => BEFORE_SH..self.width,
+        }
+    }
+}
