@@ -41,6 +41,8 @@ class Decoder:
         self.inside = inside                        # B.3: units before some gop_header were left out
         self.frames = []
         self.errors = []
+        self.networks = []                          # of all GOPs
+        self.coded = {}                             # unit offset -> coded sections, for entropy_state.py
         # 7.1.1
         self.phase = START
         self.sequence = None
@@ -234,6 +236,7 @@ class Decoder:
 
     def on_weights(self, unit):
         self.network = parse_weights(self.payload_reader(unit), self.network is not None)
+        self.networks.append(self.network)
 
     def on_frame(self, unit):
         frame_type = self.gop.order(unit.frame)[0] if self.dynamic else None
@@ -292,9 +295,10 @@ class Decoder:
         expected = r == frame.refinements and r < self.sequence.refinement_count
         require(expected, "UNEXPECTED_UNIT", "7.1.3", unit.at("refinement"))
         header = frame.header
-        frame.append(*decode_refinement(self.payload_reader(unit), unit, frame, self.sequence,
-                                        self.dc_transform[header.dc_transform_id],
-                                        self.sh_transform.get(header.sh_transform_id), self.codebook))
+        *decoded, self.coded[unit.start] = decode_refinement(
+            self.payload_reader(unit), unit, frame, self.sequence, self.dc_transform[header.dc_transform_id],
+            self.sh_transform.get(header.sh_transform_id), self.codebook)
+        frame.append(*decoded)
 
     def increment_unit(self, unit):
         """Steps 4 to 6 of 7.13.3"""
@@ -309,6 +313,7 @@ class Decoder:
         if r == 0 and not frame.intra:
             carried_lists = frame.carried(increment.cells)
         frame.accept(s, r, increment, carried_lists)
+        self.coded[unit.start] = increment.coded
 
     def context(self):
         """Definitions that the frame in progress uses."""

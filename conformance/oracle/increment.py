@@ -43,12 +43,13 @@ class Section:
     def parse_blocks(self):
         """8.7 step 2"""
         self.e = [[] for _ in self.planes]
+        self.blocks = []
         left = self.count
         for block in self.division.block_sections:
             n = min(left, self.block_size)
             left -= n
-            e = BlockDecoder(block, self.planes, self.models, self.division.lanes, n).decode()
-            for whole, part in zip(self.e, e):
+            self.blocks.append(BlockDecoder(block, self.planes, self.models, self.division.lanes, n))
+            for whole, part in zip(self.e, self.blocks[-1].decode()):
                 whole.extend(part)
 
     def values(self, attribute):
@@ -68,7 +69,7 @@ class Increment:
     """Decodes one unit (s, r) of a frame of profile 1: step 5 of 7.13.3.
 
     Afterwards: `home`, `new` (its new Gaussians), `cells` (of unit 0 of a P or B frame), `models` after the
-    unit, `header` (the fixed part).
+    unit, `header` (the fixed part), `coded` (planes, models and blocks of each section).
     """
 
     def __init__(self, unit, frame, context):
@@ -86,6 +87,7 @@ class Increment:
             self.models[section.name] = section.parse_models(models_in_force.get(section.name))
         for section in sections:
             section.parse_blocks()
+        self.coded = [(section.planes, section.models, section.blocks) for section in sections]
         self.check_values({section.name: section for section in sections}, parents, MAX_LEARNED[level])
         return self
 

@@ -43,31 +43,32 @@ class Frame:
 
 
 def decode_refinement(reader, unit, frame, seq, dc_transform, sh_transform, codebooks):
-    """Canonical planes, digests and models (None without Gaussians) of a refinement unit."""
+    """Canonical planes, digests, models (None without Gaussians) and the coded section of a refinement unit."""
     header, r = frame.header, unit.refinement
     n_total = header.gaussian_count
     expected = (reconstruction.prefix_count(seq, n_total, r)
                 - reconstruction.prefix_count(seq, n_total, r - 1))
     body = semantics.parse_refinement(reader, seq, header, expected, sh_transform, codebooks)
     planes = [[] for _ in frame.planes]
-    by_identity = None
+    by_identity, coded_sections = None, []
     if body.gaussian_count > 0:
         coded = plane_models.coded_planes(dc_transform.rank, body.sh_mode,
                                           sh_transform.rank if sh_transform else 0,
                                           body.vq_stage_count)
         models = plane_models.parse_models(body.models_section, coded, frame.models)
         by_identity = {p.identity(): m for p, m in zip(coded, models)}
-        left = body.gaussian_count
+        left, blocks = body.gaussian_count, []
         for section in body.block_sections:
             n = min(left, 2 ** seq.block_log2)
             left -= n
             block_at = section.pos
-            e = BlockDecoder(section, coded, models, 2 ** body.lanes_log2, n).decode()
-            block = reconstruction.BlockValues(e, coded, models, body, seq, dc_transform,
+            blocks.append(BlockDecoder(section, coded, models, 2 ** body.lanes_log2, n))
+            block = reconstruction.BlockValues(blocks[-1].decode(), coded, models, body, seq, dc_transform,
                                                sh_transform, codebooks, block_at)
             for whole, part in zip(planes, block.canonical()):
                 whole.extend(part)
+        coded_sections = [(coded, models, blocks)]
     digests = reconstruction.unit_digests(planes)
     digest = reconstruction.frame_digest(frame.digests + [digests])
     require(digest == body.refinement_digest, "DIGEST", "7.9", body.at("refinement_digest"))
-    return planes, digests, by_identity
+    return planes, digests, by_identity, coded_sections

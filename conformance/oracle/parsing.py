@@ -16,6 +16,7 @@ class BlockDecoder:
         self.lanes = lanes
         self.n = n
         self.start = section.pos
+        self.size = section.end - section.start
         self.e = []                                 # e[p][i], coded values
         self.word_count = section.leb128("6.13")
         self.x = section.values("u32", lanes, "6.13")

@@ -3,35 +3,29 @@
 
 import hashlib
 import math
+import os
 import random
 import struct
+import sys
 import unittest
 
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "generator"))
+
 import models as pm
-import points
 import prediction
 import tables
 import transformer
 from cells import Cell, Cells, unity
 from conventions import BitReader, ByteReader, Round, crc32, tz, unzigzag, xxh64
-from decode import report
-from decoding import Decoder
 from dynamic import Gop
 from encoding import Bits
+from entropy_state import entropy_state
 from errors import StreamError
-from extraction import extract
 from homes import Gaussian
 from network import REGISTRY, arrays, parse_network, parse_weights
 from parsing import BlockDecoder
 from reconstruction import prefix_count
 from semantics import parse_file_header, parse_unit_header
-from synth import Synth
-from synth_dynamic import DynamicSynth, valid_stream
-from synth_faults import FAULTS, faulty_stream
-from synth_learned import VALID, learned_stream, predicted_by_network
-from synth_learned_faults import LEARNED_FAULTS, faulty_learned
-from synth_limit import over_limit
-from synth_mutations import MUTATIONS, mutated, stream_of, units_of
 from synth_network import NetworkWriter
 
 
@@ -107,6 +101,15 @@ class Parsing(unittest.TestCase):
         states = [(block.symbol(0, table), block.x[0]) for _ in range(4)]
         self.assertEqual(states, [(0, 0x80004), (0, 0x4040208), (1, 0x2000000), (0, 0x10000)])
 
+    def test_entropy_state(self):
+        """conformance/README.md: states and bytes block by block, then values, 64 bits for positions"""
+        planes = [pm.Plane(0, "position", 0, "position"), pm.Plane(1, "opacity", 0, "signed")]
+        models = [type("Model", (), {"bias": bias})() for bias in (0, -7)]
+        blocks = [type("Block", (), {"lanes": 2, "x": [65536, 65536], "size": size, "e": e})()
+                  for size, e in ((9, [[1, 2 ** 40], [3, 4]]), (11, [[5], [-6]]))]
+        data = struct.pack("<6I3Q3i", 65536, 65536, 9, 65536, 65536, 11, 1, 2 ** 40, 5, -4, -3, -13)
+        self.assertEqual(entropy_state([(planes, models, blocks)]), xxh64(0, data))
+
     def test_explicit_lengths(self):
         """Lengths 1, 2, 3, 4, 5 and 12 with the largest mantissa: 1, 3, 7, 15, 30, 3840"""
         for length, freq in ((1, 1), (2, 3), (3, 7), (4, 15), (5, 30), (12, 3840)):
@@ -118,12 +121,6 @@ class Parsing(unittest.TestCase):
             data = bits.bytes()
             table = pm.explicit_table(BitReader(data, 0, len(data), "8.3"), 100)
             self.assertEqual((table.tokens, table.freq), ([0, 1], [4096 - freq, freq]))
-
-
-class Streams(unittest.TestCase):
-    def test_synthetic_streams(self):
-        for seed in range(5):
-            self.assertEqual(Decoder(Synth(seed).stream()).decode().errors, [])
 
 
 class Sequence:
@@ -198,82 +195,6 @@ class Dynamic(unittest.TestCase):
         planes = pm.section_planes("cells", 3, 0, 0, 0)
         available = [[s for s in range(11) if pm.source_available_in_section(s, plane)] for plane in planes]
         self.assertEqual(available, [[0, 1], [0, 1, 2]] + [[0, 1, 2, 3], [0, 1, 2, 3, 4], [0, 1, 2, 3, 4]] * 2)
-
-
-class DynamicStreams(unittest.TestCase):
-    """Streams of the generator: operating points, extraction, faults."""
-
-    def test_digests_and_operating_points(self):
-        for seed in range(6):
-            data = valid_stream(seed)
-            full = Decoder(data).decode()
-            seq = full.sequence
-            last = (seq.top, seq.temporal_layer_count - 1, seq.refinement_count - 1)
-            for point in {(0, 0, 0), last, (seq.top, 0, 0), (0,) + last[1:], (last[0], last[1] // 2, last[2] // 2)}:
-                part = Decoder(data, point).decode()
-                self.assertEqual(part.errors, [])
-                exact = sum(frame.shown().exact for frame in part.frames)
-                self.assertEqual(exact, sum(points.exact_gaussians(frame, seq, point) for frame in full.frames))
-                extracted = extract(data, point)
-                again = Decoder(extracted).decode()                               # SS-OP-008
-                self.assertEqual((again.errors, report(again)["frames"]), ([], report(part)["frames"]))
-                self.assertEqual(extract(extracted, point), extracted)
-
-    def test_subset(self):
-        """7.18.2: the exact Gaussians alone"""
-        decoder = Decoder(valid_stream(4)).decode()
-        for frame in decoder.frames:
-            subset = frame.shown(True)
-            self.assertEqual((len(subset.gaussians), subset.carried), (frame.shown().exact, 0))
-
-    def test_start_inside(self):
-        """SS-BS-008"""
-        data = next(data for data in map(valid_stream, range(100)) if len(Decoder(data).decode().gops) > 1)
-        whole = Decoder(data).decode()
-        head, units = units_of(data)
-        parameters = next(u for u in units if u.kind == 1).bytes()
-        first, at = whole.gops[1]
-        inside = Decoder(head + parameters + data[at:], None, True).decode()
-        expected = [record for record in report(whole)["frames"] if record["frame"] >= first]
-        self.assertEqual((inside.errors, report(inside)["frames"]), ([], expected))
-
-    def test_faults(self):
-        for k, fault in enumerate(FAULTS):
-            if fault[0] == "dc-output":             # rare; in make_vectors.py
-                continue
-            data, _ = faulty_stream(fault, 20 * k, most=12)
-            self.assertEqual(Decoder(data).decode().errors[0].code, fault[1], fault[0])
-
-    def test_mutations(self):
-        streams = [valid_stream(seed, most=12) for seed in (3, 14, 22)]
-        for mutation in MUTATIONS:
-            for seed, data in enumerate(streams):
-                changed = mutated(mutation, data, seed)
-                if changed is not None and mutation[1] is not None:
-                    self.assertEqual(Decoder(changed).decode().errors[0].code, mutation[1], mutation[0])
-
-    def test_losses(self):
-        """The example of 7.20.2: unit 1 of a P frame is damaged, and later frames have no more of it."""
-        seen = 0
-        for seed in range(60):
-            data = valid_stream(seed, most=12)
-            head, units = units_of(data)
-            places = [i for i, u in enumerate(units) if u.kind == 10 and u.r == 1 and u.t == 0 and len(u.payload) > 59]
-            whole = Decoder(data).decode()
-            predicted = {f.number for f in whole.frames if not f.intra}
-            places = [i for i in places if units[i].frame in predicted]
-            if not places:
-                continue
-            lost = units[places[0]]
-            lost.damaged = True
-            decoder = Decoder(stream_of(head, units)).decode()
-            self.assertEqual([error.code for error in decoder.errors], ["CHECK_SUM"])
-            for frame in decoder.frames:
-                if frame.number == lost.frame or (frame.reference and frame.reference.number == lost.frame):
-                    self.assertEqual(frame.level(), 1)
-                    self.assertFalse(frame.lost)
-                    seen += 1
-        self.assertGreater(seen, 2)
 
 
 def small_network(**asked):
@@ -413,23 +334,6 @@ class Learned(unittest.TestCase):
         finally:
             del REGISTRY[digest]
         self.assertEqual(net.head, parse_network(ByteReader(data, 0, len(data))).head)
-
-    def test_streams(self):
-        for seed, (name, asked) in enumerate(VALID[::4]):
-            synth = learned_stream(seed, asked)[1]
-            self.assertGreater(predicted_by_network(synth) + (name == "unused"), 0, name)
-
-    def test_faults(self):
-        for seed, row in enumerate(LEARNED_FAULTS):
-            data = None
-            while data is None:
-                data = faulty_learned(row, seed)
-                seed += 100
-            self.assertEqual(Decoder(data).decode().errors[0].code, row[1], row[0])
-
-    def test_limit(self):
-        """SS-PR-008"""
-        self.assertEqual([error.code for error in Decoder(over_limit(1)).decode().errors], ["OVER_LIMIT"])
 
 
 class FloatNetwork:

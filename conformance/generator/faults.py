@@ -1,0 +1,118 @@
+"""Faults: changes of whole streams, for the catalogues of invalid vectors.
+
+A change is a function of the file_header and the units of the parent; it gives new ones. Selectors tell which units.
+"""
+
+import oracle_path  # noqa: F401
+from units import stream_of, units_of
+from vector import Vector
+
+
+def kind(*kinds, nth=0):
+    """Selector: the nth unit of some types, counted from the end if negative."""
+    def select(units):
+        return [i for i, u in enumerate(units) if u.kind in kinds][nth]
+    return select
+
+
+def where(test, nth=0):
+    """Selector: the nth unit for which a test of the unit holds."""
+    def select(units):
+        return [i for i, u in enumerate(units) if test(u)][nth]
+    return select
+
+
+def changed(select, **values):
+    """Attributes of a unit (units.Unit), of its header or its payload; a value may be a function of the unit."""
+    def change(head, units):
+        i = select(units)
+        u = units[i].copy()
+        for name, value in values.items():
+            setattr(u, name, value(u) if callable(value) else value)
+        return head, units[:i] + [u] + units[i + 1:]
+    return change
+
+
+def element(select, name, value, place=0):
+    """One element of a payload; the value may be a function of the old one."""
+    def change(head, units):
+        i = select(units)
+        u = units[i].copy()
+        u.set(name, value(u.get(name, place)) if callable(value) else value, place)
+        return head, units[:i] + [u] + units[i + 1:]
+    return change
+
+
+def payload(select, function):
+    return changed(select, payload=lambda u: function(u.payload))
+
+
+def flipped(select, at=-1, value=0x10):
+    """A byte of the written unit changed without its check sum."""
+    return changed(select, raw=((at, value),))
+
+
+def lost(select):
+    def change(head, units):
+        i = select(units)
+        return head, units[:i] + units[i + 1:]
+    return change
+
+
+def lost_all(test):
+    return lambda head, units: (head, [u for u in units if not test(u)])
+
+
+def repeated(select):
+    def change(head, units):
+        i = select(units)
+        return head, units[:i + 1] + units[i:]
+    return change
+
+
+def moved(select, before):
+    """A unit put before another one."""
+    def change(head, units):
+        i, j = select(units), before(units)
+        rest = units[:j] + [units[i]] + units[j:]
+        del rest[i + (i >= j)]
+        return head, rest
+    return change
+
+
+def inserted(make, before):
+    """A new unit, made from the list of units, before another one."""
+    def change(head, units):
+        j = before(units)
+        return head, units[:j] + [make(units)] + units[j:]
+    return change
+
+
+def copy_of(select, **values):
+    return lambda units: units[select(units)].copy(**values)
+
+
+def in_bytes(function):
+    """A change of the bytes of the whole stream."""
+    function.of_bytes = True
+    return function
+
+
+def kept_end(change):
+    """A change after which index and end unit stay as they are."""
+    change.keep_end = True
+    return change
+
+
+def apply(change, parent):
+    if getattr(change, "of_bytes", False):
+        return change(parent)
+    return stream_of(*change(*units_of(parent)), getattr(change, "keep_end", False))
+
+
+def invalid(area, recipe, rows):
+    """Vectors of rows (name, parent, code, requirements, fault, change)."""
+    for name, parent, code, requirements, fault, change in rows:
+        yield Vector("invalid", area, name, None, requirements,
+                     lambda data, change=change: apply(change, data), recipe, 0, parent, fault, code)
+
