@@ -20,6 +20,15 @@ pub(crate) enum Failure {
     },
     /// Files and settings.
     Other(String),
+    /// A decoder under test failed; the report has said so.
+    Decoder,
+    /// The verdict on a stream in the words of the conformance protocol.
+    Verdict {
+        /// Exit code of its class.
+        exit_code: u8,
+        /// A line of JSON.
+        line: String,
+    },
 }
 
 impl Failure {
@@ -44,11 +53,13 @@ impl Failure {
         Self::Stream { path: path.to_path_buf(), error }
     }
 
-    /// 2 usage, 1 files and settings, 10 to 14 by the class of a stream's error.
+    /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
             Self::Other(_) => 1,
+            Self::Decoder => 3,
+            Self::Verdict { exit_code, .. } => *exit_code,
             Self::Stream { error, .. } => error.class().exit_code(),
         }
     }
@@ -59,6 +70,8 @@ impl fmt::Display for Failure {
         match self {
             Self::Usage(message) => write!(f, "{message}\n  splatstream COMMAND --help shows an example"),
             Self::Other(message) => f.write_str(message),
+            Self::Decoder => f.write_str("the decoder failed: see the report"),
+            Self::Verdict { line, .. } => f.write_str(line),
             Self::Stream { path, error } => {
                 let path = path.display();
                 write!(f, "{path}: {error}\n  {}", advice(error.class()).replace("FILE", &path.to_string()))

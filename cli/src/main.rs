@@ -6,6 +6,7 @@ mod cameras;
 mod chart;
 mod compare;
 mod completeness;
+mod conformance;
 mod console;
 mod costs;
 mod decode;
@@ -40,7 +41,7 @@ use std::process::ExitCode;
     version,
     about,
     after_help = "Example:\n  splatstream demo\n\n\
-        Exit codes: 0 done, 1 files or settings, 2 usage; of streams: 10 malformed, 11 invalid,\n\
+        Exit codes: 0 done, 1 files or settings, 2 usage, 3 a decoder that failed; of streams: 10 malformed, 11 invalid,\n\
         12 unsupported, 13 over a limit, 14 truncated.\n\
         The keys that --json prints are described in cli/json.md."
 )]
@@ -67,6 +68,7 @@ enum Command {
     Render(render::Render),
     Chart(chart::Chart),
     Train(train::Train),
+    Conformance(conformance::Conformance),
 }
 
 fn main() -> ExitCode {
@@ -104,6 +106,7 @@ impl Command {
             Self::Render(command) => command.run(console),
             Self::Chart(command) => command.run(console),
             Self::Train(command) => command.run(console),
+            Self::Conformance(command) => command.run(console),
         }
     }
 }

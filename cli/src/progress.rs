@@ -13,6 +13,11 @@ impl Progress {
         Self::new(frames, "{msg} {wide_bar} {pos}/{len} frames, {eta} left").named(verb)
     }
 
+    /// A bar for `cases` cases of a conformance suite.
+    pub(crate) fn cases(cases: u32) -> Self {
+        Self::new(cases, "testing {wide_bar} {pos}/{len} cases, {eta} left")
+    }
+
     /// A bar for `steps` steps that take about the same time, each with a name.
     pub(crate) fn steps(steps: u32) -> Self {
         Self::new(steps, "{pos}/{len} {wide_bar} {elapsed} gone, {eta} left\n{msg}")

@@ -168,7 +168,7 @@ fn a_result_has_the_permissions_of_any_other_file() {
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    for command in ["demo", "encode", "decode", "inspect", "validate", "extract", "compare"] {
+    for command in ["demo", "encode", "decode", "inspect", "validate", "extract", "compare", "conformance"] {
         let help = succeed(&[command, "--help"]);
         let example = help.rsplit_once("Example").map_or("", |(_, example)| example);
         assert!(example.contains(&format!("splatstream {command}")), "{help}");

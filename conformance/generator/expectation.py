@@ -74,10 +74,11 @@ class States:
 # ---- outcomes and points ----
 
 
-def outcome(decoder):
-    if not decoder.errors:
+def outcome(decoder, subset=False):
+    errors = decoder.found(subset)
+    if not errors:
         return {"outcome": "accept"}
-    return {"outcome": "reject", **decoder.errors[0].as_dict()}
+    return {"outcome": "reject", **errors[0].as_dict()}
 
 
 def operating_points(sequence):
@@ -102,11 +103,12 @@ def point_rows(data, point, states, verdict, with_extraction):
         row["extraction"] = sha256(extract(data, point))
     dynamic = any(isinstance(frame, DynamicFrame) for frame in decoder.frames)
     subset = states.of(decoder, True) if dynamic else row["states"]
-    if subset == row["states"]:
+    found = outcome(decoder, True)
+    if subset == row["states"] and found == outcome(decoder):
         return [row]
     other = {"op": row["op"], "mode": "subset", "states": subset}
-    if "expect" in row:
-        other["expect"] = row["expect"]
+    if found != verdict:
+        other["expect"] = found
     return [row, other]
 
 

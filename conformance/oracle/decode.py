@@ -30,13 +30,14 @@ def operating_point(text):
 
 
 def report(decoder, subset=False):
-    verdict = decoder.errors[0] if decoder.errors else None
+    errors = decoder.found(subset)
+    verdict = errors[0] if errors else None
     result = {"outcome": "reject" if verdict else "accept"}
     if verdict:
         result.update(verdict.as_dict())
     result["frames"] = [frame_record(f, subset) for f in decoder.frames]
-    if len(decoder.errors) > 1:
-        result["errors"] = [error.as_dict() for error in decoder.errors]
+    if len(errors) > 1:
+        result["errors"] = [error.as_dict() for error in errors]
     return result
 
 
@@ -94,7 +95,7 @@ def main():
     if options.extract and not decoder.errors:
         with open(options.extract, "wb") as f:
             f.write(extract(data, options.op or EVERYTHING))
-    return EXIT_CODE[result["class"]] if decoder.errors else 0
+    return EXIT_CODE[result["class"]] if "class" in result else 0
 
 
 if __name__ == "__main__":

@@ -190,7 +190,13 @@ class Decoder:
         if at is not None:
             header = frame.increments[at]
             if header.carried_digest != frame.carried_digest(at[1], frame.carried_lists):
-                self.errors.append(StreamError("DIGEST", "7.18", header.at("carried_digest")))
+                error = StreamError("DIGEST", "7.18", header.at("carried_digest"))
+                error.of_carried = True
+                self.errors.append(error)
+
+    def found(self, subset):
+        """The errors that are found by who shows frames in full, or as subsets."""
+        return [error for error in self.errors if not (subset and error.of_carried)]
 
     def confined(self, error):
         self.errors.append(error)

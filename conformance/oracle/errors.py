@@ -31,6 +31,7 @@ class StreamError(Exception):
         self.code = code
         self.clause = clause
         self.byte = byte
+        self.of_carried = False                     # SS-DG-007: who shows a subset does not look for it
 
     @property
     def error_class(self):

@@ -30,11 +30,12 @@ def same(expected, found, fields):
 
 def point_problems(data, decoder, record, row):
     """Problems of one operating point and mode."""
-    expected = row.get("expect", record["expect"])
+    expected, subset = row.get("expect", record["expect"]), row["mode"] == "subset"
     where = "%s %s: " % (row["op"], row["mode"])
-    if not same(expected, expectation.outcome(decoder), HARD):
-        yield where + "%s, not %s" % (expectation.outcome(decoder), expected)
-    states = [expectation.state_of(frame, decoder.sequence, row["mode"] == "subset") for frame in decoder.frames]
+    found = expectation.outcome(decoder, subset)
+    if not same(expected, found, HARD):
+        yield where + "%s, not %s" % (found, expected)
+    states = [expectation.state_of(frame, decoder.sequence, subset) for frame in decoder.frames]
     if states != [record["states"][place] for place in row["states"]]:
         yield where + "other states"
     if "extraction" in row and expectation.sha256(extract(data, operating_point(row["op"]))) != row["extraction"]:

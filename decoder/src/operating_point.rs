@@ -11,7 +11,7 @@ use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{
     EndOfStream, FileHeader, IndexEntry, OperatingPointEntry, UnitHeader, UnitType,
 };
-use splatstream_format::unit::{Stream, Unit, write_unit};
+use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Limits, Result as FormatResult};
 
 /// The layers a client takes: every unit up to these indices on each axis.
@@ -108,16 +108,16 @@ pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatRe
             UnitType::Index => {
                 index_offset = here;
                 let index = Index { entries: core::mem::take(&mut entries) };
-                write_unit(&mut out, unit.header.id(), &index.to_bytes()?)?;
+                rewrite(&mut out, &unit.header, &index.to_bytes()?)?;
             }
             UnitType::OperatingPoints => {
                 let mut points = OperatingPoints::parse(unit.payload, unit.payload_at)?;
                 points.entries.retain(|entry| point.holds(entry));
-                write_unit(&mut out, unit.header.id(), &points.to_bytes()?)?;
+                rewrite(&mut out, &unit.header, &points.to_bytes()?)?;
             }
             UnitType::End => {
                 let end = EndOfStream { frame_count: frames, unit_count: units, index_offset };
-                write_unit(&mut out, unit.header.id(), &end.to_bytes()?)?;
+                rewrite(&mut out, &unit.header, &end.to_bytes()?)?;
             }
             kind => {
                 if kind == UnitType::GopHeader {
@@ -137,6 +137,13 @@ fn copy(out: &mut Vec<u8>, unit: &Unit<'_>, stream: &[u8]) {
     let start = usize::try_from(unit.at).unwrap_or(usize::MAX);
     let length = UnitHeader::SIZE.saturating_add(unit.payload.len());
     out.extend_from_slice(stream.get(start..start.saturating_add(length)).unwrap_or_default());
+}
+
+/// Appends a unit with a new payload. All elements of its header that do not follow from that are as they were.
+fn rewrite(out: &mut Vec<u8>, header: &UnitHeader, payload: &[u8]) -> FormatResult<()> {
+    out.extend(header.with_payload(payload)?.to_bytes()?);
+    out.extend_from_slice(payload);
+    Ok(())
 }
 
 #[cfg(test)]

@@ -207,10 +207,10 @@ impl UnitHeader {
             reserved_zero: 0,
             header_check: 0,
             frame: id.frame,
-            payload_length: payload_length(payload)?,
-            payload_crc: crc32fast::hash(payload),
+            payload_length: 0,
+            payload_crc: 0,
         };
-        let header = Self { header_check: header.covered_check()?, ..header };
+        let header = header.with_payload(payload)?;
         // A `Reserved(3)` made by hand would come back as a frame header.
         Self::TABLE.check(0).known(
             UnitType::from_code(header.unit_type) == id.unit_type,
@@ -219,6 +219,13 @@ impl UnitHeader {
         )?;
         header.validate(0, Profile::Dynamic)?;
         Ok(header)
+    }
+
+    /// This header before another payload: length and check sums are new, all else stays.
+    pub fn with_payload(&self, payload: &[u8]) -> Result<Self> {
+        let payload_crc = crc32fast::hash(payload);
+        let header = Self { payload_length: payload_length(payload)?, payload_crc, ..*self };
+        Ok(Self { header_check: header.covered_check()?, ..header })
     }
 
     /// Reads and checks the header at the start of `bytes`; gives the bytes after it.

@@ -1,0 +1,122 @@
+//! `splatstream conformance`: the conformance suite and decoders, ours or another.
+
+mod decode;
+mod list;
+mod matrix;
+mod run;
+
+use crate::console::Console;
+use crate::failure::Failure;
+use clap::{Args, Subcommand};
+use splatstream_conformance::case::Case;
+use splatstream_conformance::error::Error;
+use splatstream_conformance::selection::Selection;
+use splatstream_conformance::suite::Suite;
+use splatstream_conformance::vector::Kind;
+use std::path::{Path, PathBuf};
+
+/// Test a decoder, this one or another, on the vectors of the conformance suite.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  splatstream conformance run\n  \
+    splatstream conformance run --decoder './mydec {in} {op} {mode} {out}'\n  \
+    splatstream conformance list --area temporal\n\n\
+    How a decoder is asked and what it writes: conformance/adapters/README.md.")]
+pub(crate) struct Conformance {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(Box<run::Run>),
+    List(list::List),
+    Matrix(matrix::Matrix),
+    Decode(decode::Decode),
+}
+
+impl Conformance {
+    /// Does what the subcommand says.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        match &self.command {
+            Command::Run(command) => command.run(console),
+            Command::List(command) => command.run(console),
+            Command::Matrix(command) => command.run(console),
+            Command::Decode(command) => command.run(),
+        }
+    }
+}
+
+/// Where the vectors are, and which of them are meant.
+#[derive(Args)]
+struct SuiteArgs {
+    /// The folder of the vectors, or the one above it.
+    #[arg(long, value_name = "DIR", default_value = "conformance/vectors")]
+    suite: PathBuf,
+    /// Only vectors whose names match a pattern, such as 'temporal-*'.
+    #[arg(long, value_name = "GLOB")]
+    filter: Option<String>,
+    /// Only vectors of an area.
+    #[arg(long, value_name = "AREA")]
+    area: Option<String>,
+    /// Only vectors of a kind.
+    #[arg(long, value_name = "KIND", value_parser = parse_kind)]
+    kind: Option<Kind>,
+    /// Only streams with a feature, such as b-frames.
+    #[arg(long, value_name = "FEATURE")]
+    feature: Option<String>,
+    /// Only vectors about a rule, such as SS-PR-003.
+    #[arg(long, value_name = "RULE")]
+    requirement: Option<String>,
+}
+
+impl SuiteArgs {
+    fn read(&self) -> Result<Suite, Failure> {
+        let folder =
+            std::path::absolute(&self.suite).map_err(|error| Failure::file("find", &self.suite, &error))?;
+        if !folder.is_dir() {
+            let path = self.suite.display();
+            let advice = "give the folder of the vectors with --suite DIR; they are in conformance/vectors of the repository";
+            return Err(Failure::other(format!("{path}: there is no such directory\n  {advice}")));
+        }
+        Suite::read(&folder).map_err(refused)
+    }
+
+    fn selection(&self) -> Selection {
+        let Self { filter, area, kind, feature, requirement, .. } = self;
+        Selection {
+            filter: filter.clone(),
+            area: area.clone(),
+            kind: *kind,
+            feature: feature.clone(),
+            requirement: requirement.clone(),
+        }
+    }
+
+    /// The cases meant.
+    fn cases<'a>(&self, suite: &'a Suite) -> Result<Vec<Case<'a>>, Failure> {
+        self.selection().of(Case::all(suite)).map_err(refused)
+    }
+}
+
+fn parse_kind(text: &str) -> Result<Kind, String> {
+    let kinds = [Kind::Valid, Kind::Invalid, Kind::Either];
+    kinds
+        .into_iter()
+        .find(|kind| kind.name() == text)
+        .ok_or_else(|| "write valid, invalid or either".to_owned())
+}
+
+/// A run that cannot be made, as a failure of the command.
+fn refused(error: Error) -> Failure {
+    match error {
+        Error::File { path, what, source } => Failure::file(what, &path, &source),
+        Error::Usage(message) => Failure::Usage(message),
+        error => Failure::other(error.to_string()),
+    }
+}
+
+/// A path as the text of an argument.
+fn text_of(path: &Path) -> Result<String, Failure> {
+    let text = path.to_str().map(str::to_owned);
+    text.ok_or_else(|| Failure::other(format!("{}: the path is not Unicode: move the file", path.display())))
+}

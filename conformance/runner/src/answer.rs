@@ -1,0 +1,54 @@
+//! What a decoder answered, as it is: how it ended, what it said. Whether that is right is for [`crate::judge`].
+
+use crate::protocol::Diagnosis;
+use std::process::ExitStatus;
+use std::time::Duration;
+
+/// How a decoder ended a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// With an exit code.
+    Code(i32),
+    /// By a signal.
+    Signal(i32),
+    /// Not within the time; it was killed.
+    TimedOut,
+    /// It took too much memory and was killed.
+    TooMuchMemory,
+    /// It wrote too much and was killed.
+    TooMuchOutput,
+    /// A persistent process said something that is no answer.
+    NoAnswer,
+}
+
+/// The answer to a case.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// How it ended.
+    pub ending: Ending,
+    /// What it said about its verdict.
+    pub diagnosis: Option<Diagnosis>,
+    /// The end of its standard error.
+    pub complaint: String,
+    /// Wall time.
+    pub took: Duration,
+}
+
+impl From<ExitStatus> for Ending {
+    fn from(status: ExitStatus) -> Self {
+        match (status.code(), signal(status)) {
+            (Some(code), _) => Self::Code(code),
+            (None, signal) => Self::Signal(signal.unwrap_or(0)),
+        }
+    }
+}
+
+#[cfg(unix)]
+fn signal(status: ExitStatus) -> Option<i32> {
+    std::os::unix::process::ExitStatusExt::signal(&status)
+}
+
+#[cfg(not(unix))]
+fn signal(_: ExitStatus) -> Option<i32> {
+    None
+}

@@ -1,0 +1,257 @@
+//! Where wrong planes part from the right ones, and what the fault resembles.
+//!
+//! A vector holds digests and no values, so the right values come from the reference decoder, and only where its
+//! digest is that of the vector.
+
+use crate::attribute::{Attribute, from_bytes, to_bytes};
+use crate::carrier::{Carrier, Carriers};
+use crate::case::{Case, states_of};
+use crate::digest;
+use crate::judge::Files;
+use crate::output::Output;
+use crate::reference::Decoded;
+use crate::vector::{Point, State};
+use serde::{Deserialize, Serialize};
+
+/// The first value that differs: of the first wrong frame in the order of coding, since faults spread from there, the
+/// first attribute, and of that the first Gaussian.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Difference {
+    /// Display index of the frame.
+    pub frame: u32,
+    /// I, P or B.
+    #[serde(rename = "type", default, skip_serializing_if = "Option::is_none")]
+    pub frame_type: Option<String>,
+    /// The attribute.
+    pub attribute: Attribute,
+    /// Gaussians that the frame has.
+    pub gaussians: u64,
+    /// Bytes of the decoder's file, where they are not those of so many Gaussians.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bytes_found: Option<u64>,
+    /// The value, if the reference decoder could tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<Value>,
+    /// The unit that carries the Gaussian.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub carrier: Option<Carrier>,
+    /// Clauses to read: those of the attribute in such a unit, then those of the vector.
+    pub read: Vec<String>,
+}
+
+/// A value that differs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Value {
+    /// Place of the Gaussian in the frame, from 0.
+    pub gaussian: u64,
+    /// Plane of the attribute, from 0.
+    pub component: u64,
+    /// The right value.
+    pub expected: i32,
+    /// The decoder's.
+    pub found: i32,
+    /// Values of the attribute in this frame that differ.
+    pub differing: u64,
+}
+
+/// What a fault resembles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Symptom {
+    /// No planes were written at all.
+    NothingWritten,
+    /// The files are right for another operating point.
+    OtherPoint,
+    /// The files are right for the other mode.
+    OtherMode,
+    /// All frames of a type are missing, and no others.
+    TypeMissing,
+    /// A frame has more or fewer Gaussians.
+    OtherCount,
+    /// The same Gaussians in another order.
+    OtherOrder,
+    /// The values are those before compensation (7.18.3).
+    Uncompensated,
+    /// Every value that differs does so by one.
+    OffByOne,
+    /// Nearly nothing is right.
+    Unrelated,
+}
+
+impl Symptom {
+    /// For people.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::NothingWritten => "nothing was written",
+            Self::OtherPoint => "the files are right for another operating point",
+            Self::OtherMode => "the files are right for the other mode",
+            Self::TypeMissing => "all frames of one type are missing",
+            Self::OtherCount => "another number of Gaussians",
+            Self::OtherOrder => "the same Gaussians in another order",
+            Self::Uncompensated => "the values are those before compensation, 7.18.3",
+            Self::OffByOne => "what differs is off by one",
+            Self::Unrelated => "nearly nothing is right",
+        }
+    }
+}
+
+/// Looks at the files of a case that failed by them.
+pub(crate) fn explain(case: &Case<'_>, output: &Output) -> (Option<Symptom>, Option<Difference>) {
+    let files = Files::compare(case, output);
+    let whole = symptom_of_files(case, output, &files);
+    let Ok(stream) = std::fs::read(case.stream) else { return (whole, None) };
+    let carriers = Carriers::of(&stream);
+    let Some(&(state, attribute)) = files
+        .wrong
+        .iter()
+        .min_by_key(|(state, attribute)| (carriers.coding_order(state.frame), state.frame, *attribute))
+    else {
+        return (whole, None);
+    };
+    let found =
+        output.planes.get(&(state.frame, attribute)).and_then(|planes| std::fs::read(&planes.path).ok());
+    let Some(found) = found else { return (whole, None) };
+    let mut difference = Difference {
+        frame: state.frame,
+        frame_type: state.frame_type.clone(),
+        attribute,
+        gaussians: state.gaussians,
+        bytes_found: None,
+        value: None,
+        carrier: None,
+        read: Vec::new(),
+    };
+    let decoded = case.op().parse().map(|point| Decoded::of(&stream, point, case.mode())).unwrap_or_default();
+    let symptom = difference.compare(&decoded, state, &found, &carriers);
+    let more = case.vector.clauses.iter().filter(|clause| !difference.read.contains(clause)).cloned();
+    let more: Vec<String> = more.collect();
+    difference.read.extend(more);
+    let of_values = symptom.filter(|&symptom| symptom != Symptom::Unrelated || files.wrong.len() > 1);
+    // Values before compensation are those of a higher point too, as far as that has the same Gaussians.
+    let best = of_values.filter(|&symptom| symptom == Symptom::Uncompensated).or(whole).or(of_values);
+    (best, Some(difference))
+}
+
+impl Difference {
+    /// Finds the first value that differs; gives what the file resembles.
+    fn compare(
+        &mut self,
+        decoded: &Decoded,
+        state: &State,
+        found: &[u8],
+        carriers: &Carriers,
+    ) -> Option<Symptom> {
+        let frame = decoded.frames.iter().find(|frame| frame.number == state.frame)?;
+        let shown = frame.clone().into_shown();
+        let expected = self.attribute.values(&shown);
+        // The values of a reference that is wrong itself would mislead.
+        if state.planes.get(&self.attribute) != Some(&digest::sha256(&to_bytes(&expected))) {
+            return None;
+        }
+        if found.len() != expected.len().saturating_mul(4) {
+            self.bytes_found = Some(found.len() as u64);
+            self.read.extend(["7.9", "7.18.2"].map(str::to_owned));
+            return Some(Symptom::OtherCount);
+        }
+        let found = from_bytes(found);
+        self.value = first(&expected, &found, shown.len());
+        let gaussian = self.value.map_or(0, |value| value.gaussian);
+        let (carrier, clauses) = carriers.find(frame, gaussian, self.attribute);
+        let symptom = resemblance(&expected, &found, shown.len(), &self.attribute.values(&frame.planes));
+        self.carrier = carrier;
+        let first = match symptom {
+            Some(Symptom::Uncompensated) => &["7.18.3"][..],
+            Some(Symptom::OtherOrder) => &["7.9", "7.18.2"],
+            _ => clauses,
+        };
+        self.read.extend(first.iter().map(|&clause| clause.to_owned()));
+        symptom
+    }
+}
+
+/// The first Gaussian with a value that differs.
+fn first(expected: &[i32], found: &[i32], gaussians: usize) -> Option<Value> {
+    let gaussians = gaussians.max(1);
+    let differing =
+        || expected.iter().zip(found).enumerate().filter(|(_, (expected, found))| expected != found);
+    let (place, (&expected, &found)) = differing().min_by_key(|(place, _)| place % gaussians)?;
+    Some(Value {
+        gaussian: (place % gaussians) as u64,
+        component: (place / gaussians) as u64,
+        expected,
+        found,
+        differing: differing().count() as u64,
+    })
+}
+
+/// What wrong values of the right number resemble.
+fn resemblance(expected: &[i32], found: &[i32], gaussians: usize, uncompensated: &[i32]) -> Option<Symptom> {
+    if found == uncompensated {
+        return Some(Symptom::Uncompensated);
+    }
+    if sorted_rows(expected, gaussians) == sorted_rows(found, gaussians) {
+        return Some(Symptom::OtherOrder);
+    }
+    let errors: Vec<u32> =
+        expected.iter().zip(found).map(|(&a, &b)| a.abs_diff(b)).filter(|&error| error > 0).collect();
+    if errors.iter().all(|&error| error == 1) {
+        return Some(Symptom::OffByOne);
+    }
+    (errors.len().saturating_mul(10) >= expected.len().saturating_mul(9)).then_some(Symptom::Unrelated)
+}
+
+/// The Gaussians of an attribute, each with its values, in an order of their own.
+fn sorted_rows(values: &[i32], gaussians: usize) -> Vec<Vec<i32>> {
+    let planes: Vec<&[i32]> = values.chunks(gaussians.max(1)).collect();
+    let row = |gaussian: usize| planes.iter().filter_map(|plane| plane.get(gaussian).copied()).collect();
+    let mut rows: Vec<Vec<i32>> = (0..gaussians).map(row).collect();
+    rows.sort_unstable();
+    rows
+}
+
+/// What the files resemble as a whole.
+fn symptom_of_files(case: &Case<'_>, output: &Output, files: &Files<'_>) -> Option<Symptom> {
+    let states = case.states()?;
+    if is_output(&states, output) {
+        return None;
+    }
+    if output.planes.is_empty() && !files.missing.is_empty() {
+        return Some(Symptom::NothingWritten);
+    }
+    let shows = |point: &&Point| {
+        states_of(case.vector, Some(*point)).is_some_and(|states| is_output(&states, output))
+    };
+    let others = || {
+        case.vector.points.iter().filter(|point| (point.op.as_str(), point.mode) != (case.op(), case.mode()))
+    };
+    if others().filter(|point| point.op == case.op()).any(|point| shows(&point)) {
+        return Some(Symptom::OtherMode);
+    }
+    if is_a_type_missing(&states, files) {
+        return Some(Symptom::TypeMissing);
+    }
+    others().any(|point| shows(&point)).then_some(Symptom::OtherPoint)
+}
+
+/// Whether the frames that are missing are all those of a type and no others.
+fn is_a_type_missing(states: &[&State], files: &Files<'_>) -> bool {
+    let is_missing = |state: &State| files.missing.iter().any(|(missing, _)| missing.frame == state.frame);
+    let (missing, there): (Vec<&State>, Vec<&State>) = states.iter().partition(|state| is_missing(state));
+    let Some(first) = missing.first() else { return false };
+    let of_kind = |state: &&State| state.frame_type == first.frame_type;
+    missing.iter().all(of_kind) && !there.iter().any(of_kind)
+}
+
+/// Whether the planes that were written are those of these frames, neither more nor fewer.
+fn is_output(states: &[&State], output: &Output) -> bool {
+    let wanted = states
+        .iter()
+        .flat_map(|state| state.planes.iter().map(|(&attribute, sha256)| ((state.frame, attribute), sha256)));
+    let mut count = 0_usize;
+    let all = wanted
+        .inspect(|_| count = count.saturating_add(1))
+        .all(|(place, sha256)| output.planes.get(&place).is_some_and(|planes| planes.sha256 == *sha256));
+    all && count == output.planes.len()
+}

@@ -1,0 +1,95 @@
+//! Cases that a decoder is known to fail: a list that cannot go stale.
+//!
+//! A line is `vector[@op[/mode]] outcome  # why`. It stands for every case of the vector, or of its operating point, and
+//! there are no patterns. Each of these cases has to end in just that outcome, or the run fails.
+
+use crate::error::{Error, Result, read_text};
+use crate::result::{CaseResult, Outcome};
+use std::path::Path;
+
+/// The list.
+#[derive(Debug, Clone, Default)]
+pub struct Expectations {
+    entries: Vec<Entry>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Entry {
+    line: usize,
+    /// `vector`, `vector@op` or `vector@op/mode`.
+    case: String,
+    /// An outcome, or the reason of a failure.
+    outcome: String,
+}
+
+impl Expectations {
+    /// Reads a list.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a line is no entry.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::parse(&read_text(path)?).map_err(|message| Error::content(path, message))
+    }
+
+    fn parse(text: &str) -> std::result::Result<Self, String> {
+        let mut entries = Vec::new();
+        for (place, line) in text.lines().enumerate() {
+            let (entry, why) = line.split_once('#').unwrap_or((line, ""));
+            let line = place.saturating_add(1);
+            let words: Vec<&str> = entry.split_whitespace().collect();
+            let [case, outcome] = words.as_slice() else {
+                if words.is_empty() {
+                    continue;
+                }
+                return Err(format!("line {line}: write `vector[@op[/mode]] outcome  # why`"));
+            };
+            if why.trim().is_empty() {
+                return Err(format!("line {line}: say after a # why {case} is expected to fail"));
+            }
+            if case.contains(['*', '?']) {
+                return Err(format!("line {line}: patterns are not allowed: name each vector"));
+            }
+            if !Outcome::FAILURES.contains(outcome) {
+                return Err(format!("line {line}: {outcome} is none of {}", Outcome::FAILURES.join(", ")));
+            }
+            entries.push(Entry { line, case: (*case).to_owned(), outcome: (*outcome).to_owned() });
+        }
+        Ok(Self { entries })
+    }
+
+    /// Marks the failures that were expected; gives what is stale in the list, in words. `is_everything`: all cases of
+    /// the suite were run, so that an entry without a case names nothing.
+    pub fn apply(&self, results: &mut [CaseResult], is_everything: bool) -> Vec<String> {
+        self.entries.iter().flat_map(|entry| entry.apply(results, is_everything)).collect()
+    }
+}
+
+impl Entry {
+    fn apply(&self, results: &mut [CaseResult], is_everything: bool) -> Vec<String> {
+        let Self { line, case, outcome } = self;
+        let mut stale = Vec::new();
+        let mut met = false;
+        for result in results.iter_mut().filter(|result| self.is_about(result)) {
+            met = true;
+            if result.is_called(outcome) {
+                result.failed_as = Some(outcome.clone());
+                result.outcome = Outcome::ExpectedFailure;
+            } else if result.outcome != Outcome::ExpectedFailure && result.outcome != Outcome::NotClaimed {
+                stale.push(format!(
+                    "line {line}: {} is {} and not {outcome}",
+                    result.case_name(),
+                    result.label()
+                ));
+            }
+        }
+        if !met && is_everything {
+            stale.push(format!("line {line}: there is no case {case}"));
+        }
+        stale
+    }
+
+    fn is_about(&self, result: &CaseResult) -> bool {
+        let name = result.case_name();
+        name.strip_prefix(&self.case).is_some_and(|rest| rest.is_empty() || rest.starts_with(['@', '/']))
+    }
+}

@@ -1,0 +1,261 @@
+//! Whether an answer is right.
+
+use crate::answer::{Answer, Ending};
+use crate::attribute::Attribute;
+use crate::case::Case;
+use crate::output::{Output, floats_name};
+use crate::protocol::{Class, Diagnosis};
+use crate::result::{CaseResult, Outcome, Reason};
+use crate::vector::{Acceptance, State, Verdict};
+use std::time::Duration;
+
+/// How to judge.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Rules {
+    /// A wrong code is a failure and not a warning.
+    pub strict: bool,
+    /// The decoder claims to write the states of its entropy decoder.
+    pub entropy: bool,
+    /// The decoder claims to write the output of 7.10.
+    pub output: bool,
+}
+
+/// The files that a case should have and what is there.
+#[derive(Debug, Default)]
+pub(crate) struct Files<'a> {
+    /// Frames and attributes that were not written.
+    pub(crate) missing: Vec<(&'a State, Attribute)>,
+    /// Those with other bytes.
+    pub(crate) wrong: Vec<(&'a State, Attribute)>,
+    /// Names of files that should not be there.
+    pub(crate) extra: Vec<String>,
+}
+
+/// A case that was not asked: `missing` is not claimed.
+pub(crate) fn not_claimed(case: &Case<'_>, missing: String) -> CaseResult {
+    let mut result = blank(case);
+    result.outcome = Outcome::NotClaimed;
+    result.detail = Some(format!("{missing} is not claimed"));
+    result
+}
+
+/// Judges an answer.
+pub(crate) fn judge(case: &Case<'_>, answer: &Answer, output: &Output, rules: Rules) -> CaseResult {
+    let mut result = blank(case);
+    result.answer = Some(words(answer.ending));
+    result.took = answer.took;
+    let verdicts = case.verdicts();
+    let Some(code) = protocol_code(answer.ending) else {
+        (result.outcome, result.reason) = broken_off(answer.ending);
+        result.detail = last_line(&answer.complaint);
+        return result;
+    };
+    let Some(place) = verdicts.iter().position(|verdict| verdict.exit_code() == code) else {
+        (result.outcome, result.reason) = contradiction(&verdicts, code);
+        result.detail = last_line(&answer.complaint);
+        return result;
+    };
+    if let Some(verdict) = verdicts.get(place) {
+        compare_diagnosis(&mut result, verdict, answer.diagnosis.as_ref(), rules);
+        // What another right outcome shows is not recorded, unless it shows everything.
+        if place == 0 || verdict.outcome == Acceptance::Accept {
+            compare_files(&mut result, case, output, rules);
+        }
+    }
+    result
+}
+
+/// A result that is right so far.
+fn blank(case: &Case<'_>) -> CaseResult {
+    let expected: Vec<String> = case.verdicts().iter().map(ToString::to_string).collect();
+    CaseResult {
+        vector: case.vector.name.clone(),
+        area: case.vector.area.clone(),
+        kind: case.vector.kind,
+        op: case.op().to_owned(),
+        mode: case.mode(),
+        outcome: Outcome::Pass,
+        reason: None,
+        failed_as: None,
+        expected: expected.join(" or "),
+        answer: None,
+        detail: None,
+        symptom: None,
+        difference: None,
+        warnings: Vec::new(),
+        notes: Vec::new(),
+        took: Duration::ZERO,
+    }
+}
+
+/// The exit code, if it is one of the protocol.
+fn protocol_code(ending: Ending) -> Option<i32> {
+    match ending {
+        Ending::Code(code) if code == 0 || Class::of_exit_code(code).is_some() => Some(code),
+        _ => None,
+    }
+}
+
+fn words(ending: Ending) -> String {
+    match ending {
+        Ending::Code(0) => "accept".to_owned(),
+        Ending::Code(code) => Class::of_exit_code(code)
+            .map_or_else(|| format!("exit code {code}"), |class| class.name().to_owned()),
+        Ending::Signal(signal) => format!("signal {signal}"),
+        Ending::TimedOut => "killed: too long".to_owned(),
+        Ending::TooMuchMemory => "killed: too much memory".to_owned(),
+        Ending::TooMuchOutput => "killed: wrote too much".to_owned(),
+        Ending::NoAnswer => "no answer".to_owned(),
+    }
+}
+
+fn broken_off(ending: Ending) -> (Outcome, Option<Reason>) {
+    match ending {
+        Ending::TimedOut => (Outcome::Timeout, None),
+        Ending::TooMuchMemory => (Outcome::Fail, Some(Reason::TooMuchMemory)),
+        Ending::TooMuchOutput => (Outcome::Fail, Some(Reason::TooMuchOutput)),
+        Ending::Code(_) | Ending::Signal(_) | Ending::NoAnswer => (Outcome::Crash, None),
+    }
+}
+
+/// An answer that no verdict of the case allows.
+fn contradiction(verdicts: &[&Verdict], code: i32) -> (Outcome, Option<Reason>) {
+    let accepts = verdicts.first().is_some_and(|verdict| verdict.outcome == Acceptance::Accept);
+    match Class::of_exit_code(code) {
+        Some(Class::Unsupported) if accepts => (Outcome::Unsupported, None),
+        Some(Class::OverLimit) if accepts => (Outcome::OverLimit, None),
+        Some(Class::Truncated) if accepts => (Outcome::Truncated, None),
+        Some(_) if !accepts => (Outcome::Fail, Some(Reason::WrongClass)),
+        _ => (Outcome::Fail, Some(Reason::WrongOutcome)),
+    }
+}
+
+/// Compares what the decoder says of a rejection: the code counts, clause and byte are told to people.
+fn compare_diagnosis(result: &mut CaseResult, verdict: &Verdict, said: Option<&Diagnosis>, rules: Rules) {
+    let Some(said) = said.filter(|_| verdict.outcome == Acceptance::Reject) else { return };
+    let class = verdict.class.map(|class| class.name().to_owned());
+    if said.class.is_some() && said.class != class {
+        result.warnings.push("the class that it names is not that of its exit code".to_owned());
+    }
+    if let (Some(wanted), Some(found)) = (&verdict.code, &said.code)
+        && wanted != found
+    {
+        let message = format!("the code is {found} and should be {wanted}");
+        if rules.strict {
+            (result.outcome, result.reason) = (Outcome::Fail, Some(Reason::WrongCode));
+            result.detail = Some(message);
+        } else {
+            result.warnings.push(message);
+        }
+    }
+    if let (Some(wanted), Some(found)) = (&verdict.clause, &said.clause)
+        && wanted != found
+    {
+        result.notes.push(format!("the clause is {found}, the reference says {wanted}"));
+    }
+    if let (Some(wanted), Some(found)) = (verdict.byte, said.byte)
+        && wanted != found
+    {
+        result.notes.push(format!("the byte is {found}, the reference says {wanted}"));
+    }
+}
+
+fn compare_files(result: &mut CaseResult, case: &Case<'_>, output: &Output, rules: Rules) {
+    let files = Files::compare(case, output);
+    let fault = if !files.missing.is_empty() {
+        Some((Reason::MissingFiles, naming("missing", files.missing.iter().map(file_name))))
+    } else if !files.wrong.is_empty() {
+        Some((Reason::WrongPlanes, naming("different", files.wrong.iter().map(file_name))))
+    } else if !files.extra.is_empty() {
+        Some((Reason::ExtraFiles, naming("not expected", files.extra.iter().cloned())))
+    } else if let Some(detail) = compare_floats(case, output, rules) {
+        Some((Reason::WrongOutput, detail))
+    } else {
+        compare_entropy(case, output, rules).map(|detail| (Reason::WrongEntropy, detail))
+    };
+    if let Some((reason, detail)) = fault {
+        (result.outcome, result.reason, result.detail) = (Outcome::Fail, Some(reason), Some(detail));
+    }
+}
+
+/// Compares the output of 7.10: all that is there, and all of the case if it is claimed.
+fn compare_floats(case: &Case<'_>, output: &Output, rules: Rules) -> Option<String> {
+    let states = case.states()?;
+    let is_wrong = |state: &&&State| match (output.floats.get(&state.frame), &state.f32) {
+        (Some(found), Some(wanted)) => found != wanted,
+        (None, Some(_)) => rules.output,
+        (_, None) => false,
+    };
+    states.iter().find(is_wrong).map(|state| {
+        let name = floats_name(state.frame);
+        let fault =
+            if output.floats.contains_key(&state.frame) { "differs" } else { "is claimed and not there" };
+        format!("{name} {fault}; the planes are right: read 7.10")
+    })
+}
+
+/// Compares the states of the entropy decoder: all that are there, and all of the vector at its highest point.
+fn compare_entropy(case: &Case<'_>, output: &Output, rules: Rules) -> Option<String> {
+    let units = || {
+        case.vector
+            .units
+            .iter()
+            .enumerate()
+            .filter_map(|(unit, record)| Some((unit, record.entropy.as_ref()?)))
+    };
+    let is_wrong = |(unit, wanted): &(usize, &String)| match output.entropy.get(unit) {
+        Some(found) => found != *wanted,
+        None => rules.entropy && case.is_extreme(true) && case.vector.expect.outcome == Acceptance::Accept,
+    };
+    units().find(is_wrong).map(|(unit, wanted)| {
+        let found = output.entropy.get(&unit).map_or("nothing", String::as_str);
+        format!("unit {unit}: the entropy decoder gives {found} and should give {wanted}; what follows from it differs too")
+    })
+}
+
+impl<'a> Files<'a> {
+    /// Compares the folder of a case with its vector. Where that does not say what is shown, only names are looked at.
+    pub(crate) fn compare(case: &Case<'a>, output: &Output) -> Self {
+        let mut files = Self { extra: output.extra.clone(), ..Self::default() };
+        let beyond = |&&unit: &&usize| unit >= case.vector.units.len() && !case.vector.units.is_empty();
+        files.extra.extend(output.entropy.keys().filter(beyond).map(|unit| format!("u{unit:04}.entropy")));
+        let Some(states) = case.states() else { return files };
+        for state in &states {
+            for (&attribute, wanted) in &state.planes {
+                match output.planes.get(&(state.frame, attribute)) {
+                    None => files.missing.push((state, attribute)),
+                    Some(found) if found.sha256 != *wanted => files.wrong.push((state, attribute)),
+                    Some(_) => {}
+                }
+            }
+        }
+        let is_expected = |frame: u32, attribute| {
+            states.iter().any(|state| state.frame == frame && state.planes.contains_key(&attribute))
+        };
+        let unexpected = output.planes.keys().filter(|&&(frame, attribute)| !is_expected(frame, attribute));
+        let floats = output.floats.keys().filter(|&&frame| !states.iter().any(|state| state.frame == frame));
+        files.extra.extend(floats.map(|&frame| floats_name(frame)));
+        files.extra.extend(unexpected.map(|&(frame, attribute)| attribute.file_name(frame)));
+        files
+    }
+}
+
+fn file_name((state, attribute): &(&State, Attribute)) -> String {
+    attribute.file_name(state.frame)
+}
+
+/// `missing: a, b and 3 more`.
+fn naming(what: &str, names: impl Iterator<Item = String>) -> String {
+    let names: Vec<String> = names.collect();
+    let shown = names.iter().take(2).cloned().collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(2) {
+        0 => format!("{what}: {shown}"),
+        more => format!("{what}: {shown} and {more} more"),
+    }
+}
+
+/// The last line of what a decoder said.
+fn last_line(complaint: &str) -> Option<String> {
+    let line = complaint.trim_end().lines().next_back()?.trim();
+    (!line.is_empty()).then(|| format!("it says: {}", line.chars().take(200).collect::<String>()))
+}

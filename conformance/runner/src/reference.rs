@@ -1,0 +1,112 @@
+//! The reference decoder behind the protocol: what the runner compares values with, and what is tested if no other
+//! decoder is given.
+
+use crate::attribute::{Attribute, to_bytes};
+use crate::capabilities::Capabilities;
+use crate::output::floats_name;
+use crate::protocol::{Diagnosis, Request};
+use crate::vector::Mode;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::{DecodedFrame, Options};
+use splatstream_decoder::stream::decode_stream;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::{Error, Limits};
+use std::fs;
+use std::io;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// A stream as the reference decoder shows it.
+#[derive(Debug, Default)]
+pub struct Decoded {
+    /// Frames, in the order in which they came out.
+    pub frames: Vec<DecodedFrame>,
+    /// What holds for the whole sequence, once a frame came out.
+    pub sequence: Option<SequenceParameters>,
+    /// The verdict: the first error, confined or fatal.
+    pub error: Option<Error>,
+}
+
+impl Decoded {
+    /// Decodes a stream as far as it goes (clause 7.20).
+    pub fn of(bytes: &[u8], operating_point: OperatingPoint, mode: Mode) -> Self {
+        let limits = Limits { max_gaussians: Limits::gaussians_of_level(4), ..Limits::default() };
+        let subset = mode == Mode::Subset;
+        let options = Options { limits, operating_point, subset, tolerant: true, ..Options::default() };
+        let mut decoded = Self::default();
+        let summary = decode_stream(bytes, &options, |sequence, frame| {
+            decoded.sequence.get_or_insert(*sequence);
+            decoded.frames.push(frame);
+            ControlFlow::Continue(())
+        });
+        decoded.error = decoded.frames.iter().find_map(|frame| frame.lost).or(summary.end);
+        decoded
+    }
+
+    /// Writes every frame as the protocol says, planes and output of 7.10.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(self, folder: &Path) -> io::Result<()> {
+        let Some(sequence) = self.sequence else { return Ok(()) };
+        // Frames have the attributes of their sequence, even frames without Gaussians.
+        let has_sh = sequence.sh_dimension() > 0;
+        for frame in self.frames {
+            let number = frame.number;
+            let shown = frame.into_shown();
+            for attribute in
+                Attribute::ALL.into_iter().filter(|&attribute| attribute != Attribute::Sh || has_sh)
+            {
+                fs::write(folder.join(attribute.file_name(number)), to_bytes(&attribute.values(&shown)))?;
+            }
+            let gaussians = to_gaussians(shown, &sequence);
+            let planes = gaussians.planes();
+            let opacity = std::slice::from_ref(&planes.opacity_logit);
+            let planes =
+                [&planes.position[..], &planes.log_scale, opacity, &planes.rotation, &planes.dc, &planes.sh]
+                    .concat();
+            let bytes: Vec<u8> = planes.concat().into_iter().flat_map(f32::to_le_bytes).collect();
+            fs::write(folder.join(floats_name(number)), bytes)?;
+        }
+        Ok(())
+    }
+
+    /// The answer: exit code, and what is wrong.
+    pub fn verdict(&self) -> (i32, Option<Diagnosis>) {
+        let Some(error) = self.error else { return (0, None) };
+        let diagnosis = Diagnosis {
+            class: Some(error.class().name().to_owned()),
+            code: Some(error.kind.code().to_owned()),
+            clause: Some(error.clause.to_owned()),
+            unit: None,
+            byte: Some(error.at),
+        };
+        (error.class().exit_code().into(), Some(diagnosis))
+    }
+}
+
+/// What the reference decoder claims: everything but the states of its entropy decoder.
+pub fn capabilities() -> Capabilities {
+    Capabilities { output: true, ..Capabilities::everything("reference") }
+}
+
+/// Does what is asked.
+///
+/// # Errors
+/// The stream cannot be read, what is shown cannot be written, or the operating point is none.
+pub fn answer(request: &Request) -> io::Result<(i32, Option<Diagnosis>)> {
+    let decoded = decode(request)?;
+    let verdict = decoded.verdict();
+    decoded.write(&request.out)?;
+    Ok(verdict)
+}
+
+/// The stream of a request, decoded as it asks.
+///
+/// # Errors
+/// The stream cannot be read, or the operating point is none.
+pub fn decode(request: &Request) -> io::Result<Decoded> {
+    let point = request.op.parse().map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
+    Ok(Decoded::of(&fs::read(&request.input)?, point, request.mode))
+}

@@ -1,0 +1,262 @@
+//! The record of a vector, `vector.json`: what its stream is about and what a decoder shall make of it.
+//!
+//! The fields are those of `conformance/schema/vector.schema.json`. A field that is not known here is an error: a
+//! runner that passes over part of an expectation passes decoders that break it.
+
+use crate::attribute::Attribute;
+use crate::protocol::Class;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+
+/// What `schema` of a record says.
+pub const SCHEMA: &str = "splatstream-vector/1";
+
+/// A vector without its stream.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vector {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Unique in the suite; the folder of the vector.
+    pub name: String,
+    /// The folder above it.
+    pub area: String,
+    /// The folder above that.
+    pub kind: Kind,
+    /// One sentence for people.
+    pub purpose: String,
+    /// What to read in the specification.
+    pub clauses: Vec<String>,
+    /// Rules that it is about.
+    #[serde(default)]
+    pub requirements: Vec<String>,
+    /// What a decoder has to know to decode it.
+    #[serde(default)]
+    pub features: Vec<String>,
+    /// Profile that the stream states, annex A.
+    pub profile: u8,
+    /// Level that the stream states, annex A.
+    pub level: u8,
+    /// Of the vector.
+    pub license: String,
+    /// Length of the stream.
+    pub bytes: u64,
+    /// SHA-256 of the stream, hexadecimal.
+    pub sha256: String,
+    /// What a decoder shall answer.
+    pub expect: Verdict,
+    /// What it may answer instead; of kind either alone.
+    #[serde(default)]
+    pub acceptable: Vec<Verdict>,
+    /// Frames as they are shown at some operating point; points refer to them by index.
+    #[serde(default)]
+    pub states: Vec<State>,
+    /// How the stream is decoded. None: everything, in full.
+    #[serde(default)]
+    pub points: Vec<Point>,
+    /// The units of the stream, in order.
+    #[serde(default)]
+    pub units: Vec<UnitRecord>,
+    /// The vector that this one was made from by `patch`.
+    pub parent: Option<String>,
+    /// Changes to the bytes of the parent.
+    pub patch: Option<Vec<Patch>>,
+    /// What the patch breaks.
+    pub fault: Option<String>,
+    /// What made it.
+    pub generator: Option<Generator>,
+}
+
+/// What a vector is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A stream that every decoder of its profile and level accepts.
+    Valid,
+    /// A stream with one fault.
+    Invalid,
+    /// A stream of which more than one outcome is right.
+    Either,
+}
+
+/// Accepted, or why not.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verdict {
+    /// Whether the stream is accepted.
+    pub outcome: Acceptance,
+    /// Class of clause 9.1, of a rejection.
+    pub class: Option<Class>,
+    /// Code of clause 9.2.
+    pub code: Option<String>,
+    /// The broken clause.
+    pub clause: Option<String>,
+    /// The earliest byte at which the fault can be known.
+    pub byte: Option<u64>,
+    /// Why this is right too, of an acceptable verdict.
+    pub why: Option<String>,
+}
+
+/// Whether a stream is accepted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Acceptance {
+    /// Exit code 0.
+    Accept,
+    /// The exit code of a class.
+    Reject,
+}
+
+/// A frame as it is shown.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct State {
+    /// Display index.
+    pub frame: u32,
+    /// I, P or B.
+    #[serde(rename = "type")]
+    pub frame_type: Option<String>,
+    /// Gaussians in the frame.
+    pub gaussians: u64,
+    /// Those among them that the frame's own units hold (7.18.2).
+    pub exact: Option<u64>,
+    /// Those that are carried over (7.18.1).
+    pub carried: Option<u64>,
+    /// SHA-256 of the planes of each attribute.
+    pub planes: BTreeMap<Attribute, String>,
+    /// SHA-256 of the output of 7.10, f32, plane after plane: position, log-scale, opacity, rotation w x y z, dc, sh.
+    pub f32: Option<String>,
+}
+
+/// The stream decoded at an operating point.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// As 7.11 writes it.
+    pub op: String,
+    /// What is shown.
+    pub mode: Mode,
+    /// The frames that are output: indices into `states`.
+    pub states: Option<Vec<usize>>,
+    /// SHA-256 of the extraction (7.11).
+    pub extraction: Option<String>,
+    /// Where it differs from `expect` of the vector: an error in a unit that does not belong is not found.
+    pub expect: Option<Verdict>,
+}
+
+/// What of a predicted frame is shown (7.18.2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// The exact and the carried Gaussians.
+    Full,
+    /// The exact Gaussians alone.
+    Subset,
+}
+
+/// Where a unit stands.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnitRecord {
+    /// Absolute offset of its header.
+    pub at: u64,
+    /// Header and payload.
+    pub bytes: u64,
+    /// Name of its type, clause 6.3.
+    #[serde(rename = "type")]
+    pub unit_type: String,
+    /// `frame` of its header.
+    pub frame: Option<u32>,
+    /// `spatial_layer` of its header.
+    pub spatial_layer: Option<u8>,
+    /// `temporal_layer` of its header.
+    pub temporal_layer: Option<u8>,
+    /// `refinement` of its header.
+    pub refinement: Option<u8>,
+    /// XXH64 over the final states of its entropy decoder and the values decoded, 16 hexadecimal digits.
+    pub entropy: Option<String>,
+}
+
+/// A change to bytes of the parent.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Patch {
+    /// Offset in the parent.
+    pub at: u64,
+    /// Bytes taken out.
+    pub remove: u64,
+    /// Bytes put in, hexadecimal.
+    pub insert: String,
+}
+
+/// What made a vector.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Generator {
+    /// Of the generator.
+    pub recipe: String,
+    /// Of its random numbers.
+    pub seed: Option<u64>,
+}
+
+impl Verdict {
+    /// The exit code that says so.
+    pub fn exit_code(&self) -> i32 {
+        self.class.map_or(0, Class::exit_code)
+    }
+
+    /// Whether the class is there if and only if the stream is rejected.
+    pub(crate) fn is_consistent(&self) -> bool {
+        (self.outcome == Acceptance::Reject) == self.class.is_some()
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.class, &self.code) {
+            (None, _) => f.write_str("accept"),
+            (Some(class), None) => write!(f, "{class}"),
+            (Some(class), Some(code)) => write!(f, "{class} {code}"),
+        }
+    }
+}
+
+impl Kind {
+    /// The word in records and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Valid => "valid",
+            Self::Invalid => "invalid",
+            Self::Either => "either",
+        }
+    }
+}
+
+impl Mode {
+    /// The word in records and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Subset => "subset",
+        }
+    }
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Mode {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        [Self::Full, Self::Subset]
+            .into_iter()
+            .find(|mode| mode.name() == text)
+            .ok_or_else(|| format!("'{text}' is not a mode; write full or subset"))
+    }
+}

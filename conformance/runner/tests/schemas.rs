@@ -1,0 +1,64 @@
+//! What is written is what the schemas say.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
+
+mod common;
+
+use common::{Vectors, WRITE, results, settings};
+use serde_json::{Value, json};
+use splatstream_conformance::difference::Symptom;
+use splatstream_conformance::reference;
+use splatstream_conformance::report::Report;
+use splatstream_conformance::result::Outcome;
+use splatstream_conformance::selection::Selection;
+use std::path::Path;
+
+/// What is wrong with a value by a schema of the suite.
+fn problems(schema: &str, value: &Value) -> Vec<String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../schema").join(format!("{schema}.schema.json"));
+    let schema = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    validator.iter_errors(value).map(|error| format!("{}: {error}", error.instance_path())).collect()
+}
+
+#[test]
+fn a_report_with_every_sort_of_result_is_what_its_schema_says() {
+    let vectors = Vectors::new();
+    vectors.add("valid", "slow", json!({"outcome": "accept"}), |_| {});
+    vectors.add("valid", "gone", json!({"outcome": "accept"}), |record| record["level"] = json!(4));
+    let suite = vectors.suite();
+    let script = format!(
+        "case $(cat $1) in good) {WRITE}; echo >> $4/f0000.dc.i32;; bad) exit 10;; big) exit 13;; slow) exit 7;; esac"
+    );
+    let mut settings = settings(&script);
+    settings.capabilities.level = 3;
+    let mut report = Report::new(
+        &suite,
+        &settings,
+        &Selection::default(),
+        results(&suite, &settings),
+        vec!["line 1".to_owned()],
+    );
+    let whole = json!({
+        "frame": 0, "type": "I", "attribute": "dc", "gaussians": 1, "bytes_found": 5, "read": ["7.7", "A.2"],
+        "value": {"gaussian": 0, "component": 2, "expected": -1, "found": 7, "differing": 1},
+        "carrier": {"unit": 3, "type": "refinement", "byte": 99, "bytes": 40, "frame": 0, "spatial_layer": 0, "refinement": 1},
+    });
+    report.cases[0].difference = Some(serde_json::from_value(whole).unwrap());
+    report.cases[0].symptom = Some(Symptom::OffByOne);
+    for outcome in [Outcome::Pass, Outcome::Fail, Outcome::Crash, Outcome::NotClaimed] {
+        assert!(report.count(outcome) > 0, "{outcome:?}");
+    }
+    let value = serde_json::to_value(&report).unwrap();
+    assert_eq!(problems("report", &value), Vec::<String>::new());
+    let read: Report = serde_json::from_value(value.clone()).unwrap();
+    assert_eq!(serde_json::to_value(read).unwrap(), value);
+}
+
+#[test]
+fn the_claim_of_the_reference_is_what_its_schema_says() {
+    let value = serde_json::to_value(reference::capabilities()).unwrap();
+    assert_eq!(problems("capabilities", &value), Vec::<String>::new());
+    let other = json!({"schema": "splatstream-capabilities/1", "name": "mine", "colour": true});
+    assert!(!problems("capabilities", &other).is_empty());
+}
