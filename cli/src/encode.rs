@@ -15,7 +15,6 @@ use crate::setting_names::{
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use splatstream_encoder::transformer::Architecture;
 use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Structure, encode,
 };
@@ -159,7 +158,7 @@ impl NetworkName {
     fn source(&self) -> Result<NetworkSource, Failure> {
         Ok(match self {
             Self::Registered => NetworkSource::Registered,
-            Self::Trained => NetworkSource::Trained(Architecture::default()),
+            Self::Trained => NetworkSource::Fitted,
             Self::File(path) => {
                 let bytes = std::fs::read(path).map_err(|cause| Failure::file("read", path, &cause))?;
                 let network = Network::parse(&bytes, 0)

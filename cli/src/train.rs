@@ -11,7 +11,9 @@ use clap::Args;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use splatstream_encoder::transformer::{Architecture, Sample};
-use splatstream_encoder::{FrameSource, Quality, Settings, ShChoice, Structure, samples, train_network};
+use splatstream_encoder::{
+    FrameSource, Quality, Settings, ShChoice, Structure, nearer, samples, train_network,
+};
 use splatstream_scene::GaussianFrame;
 use splatstream_scene::builtin::{BuiltinScene, Tracking};
 use std::path::PathBuf;
@@ -47,6 +49,8 @@ struct Trained {
     output: PathBuf,
     bytes: usize,
     sha256: String,
+    /// What the network adds to.
+    base: &'static str,
     samples: usize,
     epochs: usize,
     /// Mean absolute errors of held-out Gaussians by output, in steps / 64: of the base, and of the network.
@@ -57,10 +61,14 @@ struct Trained {
 impl Train {
     /// Collects, trains, writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
-        let all = self.samples(&Architecture::default())?;
+        let mut found = Vec::new();
+        for architecture in Architecture::BASES {
+            found.push((architecture, self.samples(&architecture)?));
+        }
+        let (architecture, all) = nearer(found);
         let count = all.len();
         let progress = Progress::steps(0);
-        let trained = train_network(&Architecture::default(), all, &mut |epoch| {
+        let trained = train_network(&architecture, all, &mut |epoch| {
             progress.step(format!("epoch {}, error {:.2}", epoch.epoch, epoch.validation));
         });
         drop(progress);
@@ -76,6 +84,7 @@ impl Train {
             output: self.out.clone(),
             bytes: bytes.len(),
             sha256,
+            base: if architecture.knn_base { "knn" } else { "bilateral" },
             samples: count,
             epochs: report.epochs.len(),
             base_errors: report.base.means().collect(),
@@ -130,13 +139,14 @@ impl Trained {
         let (base, error) = (steps(&self.base_errors), steps(&self.errors));
         format!(
             "{}\n  size        {} bytes\n  SHA-256     {}\n  trained     on {} batches of 16 Gaussians, {} epochs\n  \
-             error       {error:.3} steps, {:.1} % less than bilateral has ({base:.3})\n",
+             error       {error:.3} steps, {:.1} % less than {} has ({base:.3})\n",
             self.output.display(),
             grouped(self.bytes as u64),
             self.sha256,
             grouped(self.samples as u64),
             self.epochs,
             100.0 * (1.0 - error / base.max(f64::MIN_POSITIVE)),
+            self.base,
         )
     }
 }

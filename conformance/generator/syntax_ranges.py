@@ -67,7 +67,7 @@ POINTS = {"point_count": some(0, 160), "reserved_zero": some(0, 0)}
 OPERATING_POINT = {"spatial_layer": some(0, 3), "temporal_layer": some(0, 3), "refinement": some(0, 9),
                    "reserved_zero": some(0, 0),
                    "frame_count": some(0, U32), "gaussian_count": some(0, U64), "byte_count": some(0, U64)}
-NETWORK = {"network_flags": some(0, 7), "width_log2": some(3, 6), "feed_forward_width": some(0, 128),
+NETWORK = {"network_flags": some(0, 15), "width_log2": some(3, 6), "feed_forward_width": some(0, 128),
            "geometry_width": some(0, 32),
            "fourier_count": some(0, 4), "rank_count": some(1, 16), "dc_count": some(0, 3), "sh_count": some(0, 16),
            "token_shift": some(0, 8),

@@ -13,7 +13,7 @@ DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "spe
 
 # SS-WT-001: SHA-256 in hexadecimal and file in spec/data of each registered network
 REGISTERED = (
-    ("a77f2f50c559dbc30b0dc107b0a4062ef187e1fb99cf7c85568af7fce9e2d694", "default-network.bin"),
+    ("eb23e765a05bf3f974b059aee3d3c371871c855c69c55dd2b934fc706e5c0b79", "default-network.bin"),
 )
 
 
@@ -55,7 +55,7 @@ def parse_network(reader):
     """A Record with the elements of 5.17.1, the flags and widths by name, and the arrays of 6.17.2."""
     u = Record(syntax.NETWORK_FIXED, reader)
     q = "6.17"
-    require(u.network_flags & 0xF8 == 0, "RESERVED_BITS", q, u.at("network_flags"))
+    require(u.network_flags & 0xF0 == 0, "RESERVED_BITS", q, u.at("network_flags"))
     in_range(u, "width_log2", 3, 6, q)
     in_range(u, "feed_forward_width", 0, 128, q)
     in_range(u, "geometry_width", 0, 32, q)
@@ -69,6 +69,7 @@ def parse_network(reader):
     u.full_attention = u.network_flags & 1
     u.gated = u.network_flags >> 1 & 1
     u.normalised = u.network_flags >> 2 & 1
+    u.knn_base = u.network_flags >> 3 & 1
     u.d, u.e, u.g = 2 ** u.width_log2, u.feed_forward_width, u.geometry_width
     u.n = u.dc_count + u.sh_count
     u.f = u.n + 8

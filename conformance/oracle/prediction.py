@@ -104,7 +104,7 @@ class NewPredictions:
             return self.none(attribute)
         if kind == TRANSFORMER and attribute in ("dc", "sh"):
             p = self.transformed(attribute, i, values)
-        elif kind == KNN:
+        elif kind == KNN or kind == TRANSFORMER and self.context.network.knn_base:
             p = self.knn(attribute, self.neighbours[i])
         else:
             p = self.bilateral(attribute, self.neighbours[i], values)
@@ -162,11 +162,12 @@ class NewPredictions:
         """p.dc and p.sh are found at once, before dc is decoded."""
         if attribute == "dc":
             neighbours = self.neighbours[i]
-            weight = self.weights("dc", neighbours, values)
-            base = {name: self.means(name, weight, neighbours) for name in ("dc", "sh")}
+            affinity = self.weights("dc", neighbours, values)
+            base = {name: self.knn(name, neighbours) if self.context.network.knn_base
+                    else self.means(name, affinity, neighbours) for name in ("dc", "sh")}
             own = (self.positions[i], values.q, values.o, canonical(values.rotation_fine))
             near = [(self.references[index], d2) for d2, index in neighbours]
-            self.learned[i] = self.transformer.predict(own, near, weight, base)
+            self.learned[i] = self.transformer.predict(own, near, affinity, base)
         return self.learned[i][attribute]
 
 

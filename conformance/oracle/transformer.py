@@ -40,13 +40,13 @@ class Transformer:
         self.network = network
         self.dc_transform, self.sh_transform = dc_transform, sh_transform
 
-    def predict(self, own, neighbours, weight, base):
+    def predict(self, own, neighbours, affinity, base):
         """p.dc and p.sh, by name.
 
         own: position, q, o and canonical rotation of the new Gaussian; neighbours: (Reference, D2) in order;
-        weight: those of SS-TR-001; base: base.dc and base.sh by name.
+        affinity: that of SS-TR-001; base: base.dc and base.sh by name.
         """
-        tokens = self.tokens(own, neighbours, weight, base)
+        tokens = self.tokens(own, neighbours, affinity, base)
         near = self.near(own[0], neighbours)
         h = [self.embedded(j, token, place) for j, (token, place) in enumerate(zip(tokens, near))]
         rows, origins = self.rows(h, near)
@@ -61,11 +61,11 @@ class Transformer:
 
     # ---- SS-TR-001 ----
 
-    def tokens(self, own, neighbours, weight, base):
+    def tokens(self, own, neighbours, affinity, base):
         _, q, o, rotation = own
         farthest = neighbours[-1][1]
         result = []
-        for (neighbour, d2), w in zip(neighbours, weight):
+        for (neighbour, d2), w in zip(neighbours, affinity):
             token = [self.projected(column, neighbour, base) for column in self.columns()]
             token += [saturated(4 * (a - b)) for a, b in zip(neighbour.q, q)]
             token.append(saturated(2 * (neighbour.o - o)))

@@ -52,7 +52,7 @@ fn random(state: &mut u64) -> i32 {
 fn inputs(case: Case) -> (Network, Vec<Batch>) {
     let mut state = 1;
     let header = NetworkHeader {
-        network_flags: NetworkHeader::flags(case.full_attention, true, true),
+        network_flags: NetworkHeader::flags(case.full_attention, true, true, true),
         width_log2: case.width_log2,
         feed_forward_width: 2 << case.width_log2,
         geometry_width: 8,
@@ -84,7 +84,7 @@ fn batch(header: &NetworkHeader, state: &mut u64) -> Batch {
             let components: Vec<i64> =
                 (0..header.outputs()).map(|_| i64::from(random(state)) - (1 << 23)).collect();
             let geometry = [(); 7].map(|()| random(state) % 60 - 30);
-            let seen = Seen { components: &components, geometry, weight: 3000, distance: rank as u64 };
+            let seen = Seen { components: &components, geometry, affinity: 3000, distance: rank as u64 };
             batch.set_token(header, (lane, rank), &seen, NEIGHBOURS as u64);
             offsets.push([(); 3].map(|()| random(state) % 200 - 100));
         }

@@ -28,7 +28,7 @@ mod stream;
 pub mod transformer;
 mod vq;
 
-pub use dynamic::learning::{samples, train_network};
+pub use dynamic::learning::{nearer, samples, train_network};
 pub use error::Error;
 pub use settings::{
     Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice,

@@ -150,7 +150,9 @@ impl Predictors {
 pub enum NetworkSource {
     /// The registered one, of which a stream has the name only.
     Registered,
-    /// Trained on the sequence, and carried.
+    /// Trained on the sequence, on the base that is nearer to its colours, and carried.
+    Fitted,
+    /// The same of an architecture.
     Trained(Architecture),
     /// Given, and carried.
     Given(Box<Network>),

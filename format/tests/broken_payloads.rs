@@ -195,7 +195,7 @@ fn broken_weights_are_refused() {
             weights(|p| *p = vec![1; 32], "SHORT_SECTION", "5.17", 1),
             weights(|p| *p = vec![1], "SHORT_SECTION", "5.17", 1),
             weights(|p| p[0] = 1, "TRAILING_BYTES", "5.17", 33),
-            weights(|p| p[1] = 8, "RESERVED_BITS", "6.17.1", 1),
+            weights(|p| p[1] = 16, "RESERVED_BITS", "6.17.1", 1),
             weights(|p| p[1] = 128, "RESERVED_BITS", "6.17.1", 1),
             weights(|p| p[2] = 2, "OUT_OF_RANGE", "6.17.1", 2),
             weights(|p| p[2] = 7, "OUT_OF_RANGE", "6.17.1", 2),

@@ -149,10 +149,11 @@ impl<'s> Prediction<'s> {
     pub fn targets(&self) -> Vec<Target<'_>> {
         let target = |(place, item): (usize, &Item)| {
             let weights = self.weights(place, item.predictor);
+            let affinities = self.weights(place, Predictor::Bilateral);
             let neighbours = self.neighbours.get(self.range(place)).unwrap_or_default();
             let places = self.rows.places(self.range(place));
             let position = self.position.each_ref().map(|plane| plane.get(place).copied().unwrap_or(0));
-            Target { row: item.row, position, neighbours, places, weights }
+            Target { row: item.row, position, neighbours, places, weights, affinities }
         };
         let items = self.items.par_iter().enumerate();
         items.filter(|(_, item)| item.predictor == Predictor::Transformer).map(target).collect()
@@ -168,13 +169,25 @@ impl<'s> Prediction<'s> {
     fn weights(&self, item: usize, predictor: Predictor) -> [i64; NEIGHBOURS_MAX] {
         let neighbours = self.neighbours.get(self.range(item)).unwrap_or_default();
         let [spatial, feature] = self.falloff;
-        match predictor {
-            Predictor::Bilateral | Predictor::Transformer => {
-                let features = self.features.get(self.range(item)).unwrap_or_default();
-                bilateral_weights(neighbours, spatial, feature, features)
+        let by_distance = match predictor {
+            Predictor::None | Predictor::Knn => true,
+            Predictor::Bilateral => false,
+            Predictor::Transformer => {
+                self.network.as_ref().is_some_and(|network| network.header().knn_base())
             }
-            Predictor::Knn | Predictor::None => knn_weights(neighbours),
+        };
+        if by_distance {
+            return knn_weights(neighbours);
         }
+        let features = self.features.get(self.range(item)).unwrap_or_default();
+        bilateral_weights(neighbours, spatial, feature, features)
+    }
+
+    /// Whether it matters how unlike an item's neighbours are.
+    fn is_compared(&self, item: &Item) -> bool {
+        let header = self.network.as_ref().map(|network| network.header());
+        let learned = header.is_some_and(|header| header.gated() || !header.knn_base());
+        item.predictor == Predictor::Bilateral || item.predictor == Predictor::Transformer && learned
     }
 
     /// Puts the means of the neighbours, times `unit`, in the place of what `out` holds for the items; not of those
@@ -200,10 +213,12 @@ impl<'s> Prediction<'s> {
 
     /// Adds the squared differences between the items and their neighbours in an attribute, both brought to one lattice.
     fn compare(&mut self, stage: Stage, own: &[Vec<i32>], lattice: [fn(i32) -> i32; 2]) {
-        let compared = |predictor| matches!(predictor, Predictor::Bilateral | Predictor::Transformer);
         let columns = self.rows.columns(stage);
         let mut mine = [0; 3];
-        for (place, item) in self.items.iter().enumerate().filter(|(_, item)| compared(item.predictor)) {
+        for (place, item) in self.items.iter().enumerate() {
+            if !self.is_compared(item) {
+                continue;
+            }
             mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = lattice[0](at(plane, item.row)));
             let range = self.range(place);
             let rows = self.rows.of(range.clone()).filter_map(|row| row.get(columns.clone()));

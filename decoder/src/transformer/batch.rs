@@ -27,7 +27,7 @@ pub struct Seen<'t> {
     /// log_scale, opacity and rotation less those of the new Gaussian.
     pub geometry: [i32; 7],
     /// Weight of 7.17.4 for dc.
-    pub weight: i64,
+    pub affinity: i64,
     /// Squared distance.
     pub distance: u64,
 }
@@ -92,7 +92,8 @@ impl Batch {
         let padding = core::iter::repeat_n(0, outputs.saturating_sub(seen.components.len()));
         let values = seen.components.iter().take(outputs).map(component).chain(padding).chain(rest);
         for (row, value) in rows.iter_mut().zip(values) {
-            let gated = if header.gated() { act(value.wrapping_mul(seen.weight as i32), 12) } else { value };
+            let gated =
+                if header.gated() { act(value.wrapping_mul(seen.affinity as i32), 12) } else { value };
             if let Some(slot) = row.get_mut(lane) {
                 *slot = gated as i8;
             }

@@ -4,7 +4,7 @@ use crate::crafted::expect::{decode, planes};
 use crate::crafted::scene::{Gaussian, diagonal};
 use crate::prediction::{line, scene};
 use crate::stream::expect::assert_decodes;
-use crate::stream::network::{FULL_ATTENTION, GATED, NORMALISED, Network};
+use crate::stream::network::{FULL_ATTENTION, GATED, KNN_BASE, NORMALISED, Network};
 use crate::stream::sample::{frame, gop, predicting, unit};
 use crate::stream::scene::{Scene, Unit};
 use crate::stream::transformer::{SINE, sine};
@@ -82,6 +82,22 @@ fn a_network_of_zeros_leaves_the_means_by_the_weights_of_dc() {
     assert_eq!((shown(&scene, DC)[0], shown(&scene, SH)), (6330, [626, 9, 9]));
     unit(&mut scene).predictors = vec![2];
     assert_eq!((shown(&scene, DC)[0], shown(&scene, SH)), (6330, [1243, 9, 9]));
+}
+
+// covers: SS-TR-001
+#[test]
+fn with_a_knn_base_it_leaves_the_means_by_distance() {
+    let mut scene = scene(&[(8, 0), (14, 0)], &[10], 3, predicting(2));
+    scene.gops[0].frames[0].units[0].new[1].dc = vec![100, 0, 0];
+    let mut with = |flags: u8, predictor: u8| {
+        scene.gops[0].network = Some(zeros(NetworkHeader { network_flags: flags, ..PLAIN }));
+        unit(&mut scene).predictors = vec![predictor.into()];
+        assert_decodes(&format!("flags {flags}, predictor {predictor}"), &scene);
+        shown(&scene, DC)
+    };
+    assert_eq!(with(KNN_BASE, 3), with(KNN_BASE, 1));
+    assert_eq!(with(0, 3), with(0, 2));
+    assert_ne!(with(0, 3), with(KNN_BASE, 3));
 }
 
 // covers: SS-TR-001

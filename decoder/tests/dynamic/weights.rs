@@ -64,7 +64,7 @@ fn a_broken_weights_unit_ends_decoding() {
             of_unit("no parameters", "SHORT_SECTION").script(|s| s.payload(Weights, 0).truncate(FIXED)),
             of_unit("a parameter less", "SHORT_SECTION").script(|s| _ = s.payload(Weights, 0).pop()),
             of_unit("a byte more", "TRAILING_BYTES").script(|s| s.payload(Weights, 0).push(0)),
-            of_unit("flags", "RESERVED_BITS").script(|s| s.put(Weights, 0, 1, [8])),
+            of_unit("flags", "RESERVED_BITS").script(|s| s.put(Weights, 0, 1, [16])),
             of_unit("width", "OUT_OF_RANGE").script(|s| s.put(Weights, 0, 2, [7])),
             of_unit("shift of the head", "OUT_OF_RANGE").script(|s| s.put(Weights, 0, FIXED - 1, [0])),
             of_unit("no outputs", "OUT_OF_RANGE").script(|s| s.put(Weights, 0, 7, [0, 0])),
@@ -79,7 +79,7 @@ fn a_broken_weights_unit_ends_decoding() {
             second("a second one that is unknown", "CONSTRAINT").script(|s| twice(s, vec![1; 33])),
             of_unit("digest that is long and unknown", "TRAILING_BYTES")
                 .script(|s| *s.payload(Weights, 0) = vec![1; 40]),
-            of_unit("flags and width", "RESERVED_BITS").script(|s| s.put(Weights, 0, 1, [8, 7])),
+            of_unit("flags and width", "RESERVED_BITS").script(|s| s.put(Weights, 0, 1, [16, 7])),
             of_unit("no outputs and a byte less", "OUT_OF_RANGE").script(|s| {
                 s.put(Weights, 0, 7, [0, 0]);
                 s.payload(Weights, 0).pop();

@@ -8,7 +8,7 @@ use crate::sequence::analyse;
 use crate::settings::{NetworkSource, Preset, Settings};
 use crate::source::FrameSource;
 use crate::stream::{Report, UnitWriter};
-use crate::transformer::{Architecture, Progress, Sample, Schedule, TrainingReport, train};
+use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, TrainingReport, train};
 use core::cell::RefCell;
 use core::ops::ControlFlow;
 use splatstream_decoder::increment::prediction::Prediction;
@@ -81,11 +81,18 @@ pub(crate) fn network(
     }
     // Among other predictors it seldom saves what it takes.
     let sought = settings.preset == Preset::Small || !settings.predictors.allows(Predictor::Bilateral);
-    let trained = sought.then(|| NetworkSource::Trained(Architecture::default()));
-    match settings.network.clone().or(trained) {
+    match settings.network.clone().or(sought.then_some(NetworkSource::Fitted)) {
         None => Ok(None),
         Some(NetworkSource::Given(network)) => Ok(Some(*network)),
         Some(NetworkSource::Registered) => registered(),
+        Some(NetworkSource::Fitted) => {
+            let mut found = Vec::new();
+            for architecture in Architecture::BASES {
+                found.push((architecture, recorded(source, settings, sequence, &architecture)?));
+            }
+            let (architecture, samples) = nearer(found);
+            Ok(train_network(&architecture, samples, &mut |_| {})?.map(|(network, _)| network))
+        }
         Some(NetworkSource::Trained(architecture)) => {
             let samples = recorded(source, settings, sequence, &architecture)?;
             Ok(train_network(&architecture, samples, &mut |_| {})?.map(|(network, _)| network))
@@ -142,6 +149,15 @@ pub fn samples(
     recorded(source, settings, &analysis.parameters, architecture)
 }
 
+/// The architecture whose base leaves least, and its samples; of equal ones the first.
+pub fn nearer(found: Vec<(Architecture, Vec<Sample>)>) -> (Architecture, Vec<Sample>) {
+    let left = |(architecture, samples): &(Architecture, Vec<Sample>)| -> u64 {
+        let outputs = usize::from(architecture.dc_count) + usize::from(architecture.sh_count);
+        Loss::of_base(samples, outputs).sums.iter().sum()
+    };
+    found.into_iter().min_by_key(left).unwrap_or_default()
+}
+
 /// A network trained with samples; none where they are too few. `progress` is called after each epoch.
 ///
 /// # Errors
@@ -165,7 +181,7 @@ pub fn train_network(
     train(architecture, &training, &held_out, &Schedule::default(), &mut progress).map(Some)
 }
 
-/// A network of an architecture that gives 0: it predicts what bilateral does.
+/// A network of an architecture that gives 0: it predicts what knn does.
 fn zero(architecture: &Architecture) -> Result<Network, Error> {
     let header = architecture.header()?;
     let layers = Part::ALL.map(|part| {

@@ -22,6 +22,9 @@ use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR};
 /// log2 of the new Gaussians that share a predictor chosen by bits.
 const RUN_LOG2: u8 = 6;
 
+/// The largest that is allowed, for units of one predictor.
+const WHOLE_LOG2: u8 = 16;
+
 /// Weights of the bilateral predictor: e^-1 at the last neighbour, and at 8 squared steps of attribute difference.
 const SPATIAL: u8 = 32;
 const FEATURE: u8 = 255;
@@ -48,6 +51,9 @@ pub(crate) struct Chooser<'r> {
     /// What the network is trained with, while that is being collected.
     pub(crate) recorder: Option<&'r Recorder>,
 }
+
+/// log2 of the Gaussians of a run, and for each run the place of its predictor among those tried.
+type Choice = (u8, Vec<usize>);
 
 /// Residual planes of new Gaussians under one predictor, in plane order.
 type Residuals = Vec<Vec<i32>>;
@@ -79,20 +85,24 @@ impl Chooser<'_> {
         let mut new = draft.values.section(Section::New).clone();
         new.planes.clone_from(&plain);
         draft.values.set(Section::New, new);
-        if let Some((predicted, searched)) = self.predict(coder, draft, &parents, situation, wanted, plain)? {
-            // What is estimated knows nothing of contexts, which find much of what neighbours have in common.
-            let pays = self.choice == PredictorChoice::Difference
-                || !self.predictors.allows(Predictor::None)
-                || new_bytes(coder, &predicted, models)? + searched / (8 * SEARCHED_FOR_A_BIT)
-                    < new_bytes(coder, draft, models)?;
-            if pays {
-                *draft = predicted;
+        let (candidates, searched) = self.predict(coder, draft, &parents, situation, wanted, plain)?;
+        // What is estimated knows nothing of contexts, which find much of what neighbours have in common.
+        let mut least = match self.is_frugal() && !candidates.is_empty() {
+            true => new_bytes(coder, draft, models)?.saturating_sub(searched / (8 * SEARCHED_FOR_A_BIT)),
+            false => usize::MAX,
+        };
+        let only = candidates.len() == 1 && !self.is_frugal();
+        for candidate in candidates {
+            let bytes = if only { 0 } else { new_bytes(coder, &candidate, models)? };
+            if bytes < least {
+                least = bytes;
+                *draft = candidate;
             }
         }
         coder.apply(draft, parents, situation)
     }
 
-    /// A draft with predictors, if they seem to save anything, and the size of the set to search.
+    /// Drafts with predictors that seem to save something, and the size of the set to search.
     fn predict(
         self,
         coder: &UnitCoder<'_>,
@@ -101,7 +111,7 @@ impl Chooser<'_> {
         situation: &Situation<'_>,
         wanted: &Wanted,
         plain: Residuals,
-    ) -> Result<Option<(Draft, usize)>, Error> {
+    ) -> Result<(Vec<Draft>, usize), Error> {
         // A codebook is made for whole values, not for residuals.
         let codebook = matches!(coder.colour.mode, ShCoding::VectorQuantised { .. });
         let tries = self.predictors != Predictors::NONE && wanted.len() >= FEW && !codebook;
@@ -109,7 +119,7 @@ impl Chooser<'_> {
         let SectionValues { deltas, block, .. } = draft.values.section(Section::New).clone();
         let too_large = set.len() / SEARCHED_FOR_A_BIT > wanted.len() * MOST_SAVED;
         if set.is_empty() || too_large && self.is_frugal() {
-            return Ok(None);
+            return Ok((Vec::new(), 0));
         }
         let header = IncrementHeader {
             predictor_block_log2: 0,
@@ -125,25 +135,24 @@ impl Chooser<'_> {
         }
         let mut tried = self.tried(coder, &header, &set, wanted, plain)?;
         let mut chosen = self.chosen(&tried);
-        if learned(&chosen, wanted.len(), &tried) > coder.most_learned as usize {
+        if chosen.iter().any(|choice| learned(choice, wanted.len(), &tried) > coder.most_learned as usize) {
             tried.retain(|(predictor, _)| *predictor != Predictor::Transformer);
             chosen = self.chosen(&tried);
         }
-        let (run_log2, places) = chosen;
-        let run = 1_usize << run_log2;
-        let planes = (0..tried[0].1.len())
-            .map(|plane| (0..wanted.len()).map(|row| tried[places[row / run]].1[plane][row]).collect())
-            .collect();
-        let codes: Vec<i32> = places.iter().map(|&place| tried[place].0.code()).collect();
-        if codes.iter().all(|&code| code == 0) {
-            return Ok(None);
-        }
-        let header = IncrementHeader { predictor_block_log2: run_log2, ..header };
-        let mut predicted = Draft { header, values: draft.values.clone() };
-        predicted.values.set(Section::New, SectionValues { deltas, planes, block });
-        let codes = SectionValues { deltas: Vec::new(), planes: vec![codes], block };
-        predicted.values.set(Section::Predictors, codes);
-        Ok(Some((predicted, set.len())))
+        let drafts = chosen.into_iter().filter_map(|(run_log2, places)| {
+            let run = 1_usize << run_log2;
+            let planes = (0..tried[0].1.len())
+                .map(|plane| (0..wanted.len()).map(|row| tried[places[row / run]].1[plane][row]).collect())
+                .collect();
+            let codes: Vec<i32> = places.iter().map(|&place| tried[place].0.code()).collect();
+            let header = IncrementHeader { predictor_block_log2: run_log2, ..header };
+            let mut predicted = Draft { header, values: draft.values.clone() };
+            predicted.values.set(Section::New, SectionValues { deltas: deltas.clone(), planes, block });
+            let predictors = SectionValues { deltas: Vec::new(), planes: vec![codes.clone()], block };
+            predicted.values.set(Section::Predictors, predictors);
+            codes.iter().any(|&code| code != 0).then_some(predicted)
+        });
+        Ok((drafts.collect(), set.len()))
     }
 
     /// Whether prediction has to pay.
@@ -180,11 +189,11 @@ impl Chooser<'_> {
         Ok(tried)
     }
 
-    /// log2 of the Gaussians of a run, and for each run the place of its predictor among those tried.
-    fn chosen(self, tried: &[(Predictor, Residuals)]) -> (u8, Vec<usize>) {
+    /// Choices that are worth a closer look.
+    fn chosen(self, tried: &[(Predictor, Residuals)]) -> Vec<Choice> {
         match self.choice {
-            PredictorChoice::Difference => (0, by_difference(tried)),
-            PredictorChoice::Bits => (RUN_LOG2, by_bits(tried)),
+            PredictorChoice::Difference => vec![(0, by_difference(tried))],
+            PredictorChoice::Bits => by_bits(tried),
         }
     }
 
@@ -274,7 +283,7 @@ fn predicted(
 }
 
 /// Gaussians whose runs have chosen the transformer, at most.
-fn learned((run_log2, places): &(u8, Vec<usize>), count: usize, tried: &[(Predictor, Residuals)]) -> usize {
+fn learned((run_log2, places): &Choice, count: usize, tried: &[(Predictor, Residuals)]) -> usize {
     let runs = places.iter().filter(|&&place| tried[place].0 == Predictor::Transformer).count();
     (runs << run_log2).min(count)
 }
@@ -289,22 +298,23 @@ fn by_difference(tried: &[(Predictor, Residuals)]) -> Vec<usize> {
     (0..count).map(|row| best(row).unwrap_or(0)).collect()
 }
 
-/// For each run the predictor with the fewest estimated bits; the first everywhere if that saves none.
-fn by_bits(tried: &[(Predictor, Residuals)]) -> Vec<usize> {
+/// For each run the predictor with the fewest estimated bits, and for all runs the one with the fewest: mixing spoils the
+/// tables of contexts, of which estimates know nothing.
+fn by_bits(tried: &[(Predictor, Residuals)]) -> Vec<Choice> {
     let count = tried[0].1[0].len();
     let run = 1_usize << RUN_LOG2;
     let costs: Vec<Vec<f64>> = tried.iter().map(|(_, residuals)| run_bits(residuals, run)).collect();
-    let places: Vec<usize> = (0..count.div_ceil(run))
-        .map(|at| {
-            let cost = |&place: &usize| costs[place][at];
-            (0..tried.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
-        })
-        .collect();
-    // The code of a predictor takes bits, and mixing residuals with values spoils the tables of both.
-    let margin = 4.0;
-    let saved: f64 =
-        places.iter().enumerate().map(|(at, &place)| costs[0][at] - costs[place][at] - margin).sum();
-    if saved > 0.0 { places } else { vec![0; places.len()] }
+    let cheapest = |cost: &dyn Fn(usize) -> f64| {
+        (0..tried.len()).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
+    };
+    let places: Vec<usize> = (0..count.div_ceil(run)).map(|at| cheapest(&|place| costs[place][at])).collect();
+    let one = cheapest(&|place| costs[place].iter().sum());
+    let whole = (count.max(1).next_power_of_two().ilog2() as u8).clamp(RUN_LOG2, WHOLE_LOG2);
+    let mut choices = vec![(whole, vec![one; count.div_ceil(1 << whole)])];
+    if places.iter().any(|&place| place != one) {
+        choices.insert(0, (RUN_LOG2, places));
+    }
+    choices
 }
 
 /// Zero-order bits of each run.

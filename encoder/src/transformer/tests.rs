@@ -18,6 +18,7 @@ const BARE: Architecture = Architecture {
     full_attention: false,
     gated: false,
     normalised: false,
+    knn_base: false,
     width_log2: 3,
     feed_forward_width: 0,
     geometry_width: 0,
@@ -74,8 +75,8 @@ fn any_batch(header: &NetworkHeader, neighbours: usize, random: &mut Random) -> 
                 .map(|_| i64::from(random.within(90)) << (12 + header.token_shift))
                 .collect();
             let geometry = [(); 7].map(|()| random.within(40));
-            let (weight, distance) = (4096 - random.below(2000) as i64, 10 * neighbour as u64 + 5);
-            let seen = Seen { components: &components, geometry, weight, distance };
+            let (affinity, distance) = (4096 - random.below(2000) as i64, 10 * neighbour as u64 + 5);
+            let seen = Seen { components: &components, geometry, affinity, distance };
             batch.set_token(header, (lane, neighbour), &seen, 10 * neighbours as u64);
         }
         let offsets: Vec<[i32; 3]> = (0..neighbours).map(|_| [(); 3].map(|()| random.within(1000))).collect();

@@ -44,7 +44,7 @@ fn header(u: &mut Unstructured<'_>) -> Result<NetworkHeader> {
     }
     let dc_count: u8 = u.int_in_range(0..=3)?;
     Ok(NetworkHeader {
-        network_flags: u.int_in_range(0..=7)?,
+        network_flags: u.int_in_range(0..=15)?,
         width_log2: u.int_in_range(3..=width_log2)?,
         feed_forward_width: u.int_in_range(0..=feed_forward)?,
         geometry_width: u.int_in_range(0..=geometry)?,

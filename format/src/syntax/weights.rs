@@ -7,6 +7,7 @@ use crate::Result;
 const FULL_ATTENTION: u8 = 1;
 const GATED: u8 = 2;
 const NORMALISED: u8 = 4;
+const KNN_BASE: u8 = 8;
 
 table! {
     /// 5.17 — the fixed part of a weights unit; the network, or its SHA-256, follows.
@@ -33,7 +34,7 @@ impl WeightsHeader {
 table! {
     /// 5.17.1 — the fixed part of a network; the parameters follow.
     "5.17.1" "6.17.1" network NetworkHeader {
-        /// bit 0 full attention, bit 1 gated, bit 2 normalised
+        /// bit 0 full attention, bit 1 gated, bit 2 normalised, bit 3 knn base
         network_flags: u8,
         /// log2 of the width of an embedding, 3 to 6
         width_log2: u8,
@@ -67,8 +68,13 @@ impl NetworkHeader {
     }
 
     /// `network_flags` of their meanings.
-    pub fn flags(full_attention: bool, gated: bool, normalised: bool) -> u8 {
-        let meanings = [(full_attention, FULL_ATTENTION), (gated, GATED), (normalised, NORMALISED)];
+    pub fn flags(full_attention: bool, gated: bool, normalised: bool, knn_base: bool) -> u8 {
+        let meanings = [
+            (full_attention, FULL_ATTENTION),
+            (gated, GATED),
+            (normalised, NORMALISED),
+            (knn_base, KNN_BASE),
+        ];
         meanings.into_iter().filter(|(set, _)| *set).fold(0, |flags, (_, flag)| flags | flag)
     }
 
@@ -85,6 +91,11 @@ impl NetworkHeader {
     /// What attention gives is normalised.
     pub const fn normalised(&self) -> bool {
         self.network_flags & NORMALISED != 0
+    }
+
+    /// What the outputs add to, and what predicts the other attributes, is the knn prediction, not the bilateral one.
+    pub const fn knn_base(&self) -> bool {
+        self.network_flags & KNN_BASE != 0
     }
 
     /// Width of an embedding, 8 to 64.
@@ -108,7 +119,7 @@ impl NetworkHeader {
         check.reserved_bits(
             "network_flags",
             0,
-            self.network_flags & !(FULL_ATTENTION | GATED | NORMALISED),
+            self.network_flags & !(FULL_ATTENTION | GATED | NORMALISED | KNN_BASE),
         )?;
         check.range("width_log2", self.width_log2, 3, 6)?;
         check.range("feed_forward_width", self.feed_forward_width, 0, 128)?;

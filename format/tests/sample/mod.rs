@@ -109,7 +109,7 @@ pub(crate) fn units() -> Units {
 /// A network that has all parts that can be there together; its parameters are different numbers.
 pub(crate) fn network() -> Network {
     let header = NetworkHeader {
-        network_flags: NetworkHeader::flags(false, true, true),
+        network_flags: NetworkHeader::flags(false, true, true, true),
         width_log2: 3,
         feed_forward_width: 2,
         geometry_width: 1,

@@ -21,7 +21,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Rows that [`rows`] gives.
-pub(crate) const ROWS: u32 = 21;
+pub(crate) const ROWS: u32 = 22;
 
 /// The GOP with one choice of predictors.
 #[derive(Debug, Clone)]
@@ -61,12 +61,13 @@ fn variants(settings: &Settings) -> Vec<Variant> {
     let neighbours = |neighbours: u8, settings: Settings| Settings { neighbours, ..settings };
     let transformer = || network(whole);
     let classic = Predictors::one(Predictor::Knn).and(Predictors::one(Predictor::Bilateral));
-    let trained = Settings { network: transformer().network, ..with(Predictors::ALL) };
+    let trained = Settings { network: Some(NetworkSource::Fitted), ..with(Predictors::ALL) };
     vec![
         ("none", with(Predictors::NONE)),
         ("knn", with(Predictors::always(Predictor::Knn))),
         ("bilateral", with(Predictors::always(Predictor::Bilateral))),
         ("transformer", transformer()),
+        ("transformer, bilateral base", network(Architecture { knn_base: false, ..whole })),
         (
             "transformer, registered network",
             Settings { network: Some(NetworkSource::Registered), ..transformer() },
@@ -77,14 +78,14 @@ fn variants(settings: &Settings) -> Vec<Variant> {
         ("bilateral, 4 neighbours", neighbours(4, with(Predictors::always(Predictor::Bilateral)))),
         ("bilateral, 16 neighbours", neighbours(16, with(Predictors::always(Predictor::Bilateral)))),
         ("transformer, 4 neighbours", neighbours(4, transformer())),
-        ("transformer, 16 neighbours", neighbours(16, network(Architecture { rank_count: 16, ..whole }))),
+        ("transformer, 16 neighbours", neighbours(16, transformer())),
         ("width 8", network(Architecture { width_log2: 3, ..whole })),
         ("width 32", network(Architecture { width_log2: 5, feed_forward_width: 64, ..whole })),
         ("full attention", network(Architecture { full_attention: true, ..whole })),
         ("without relative-position bias", network(Architecture { fourier_count: 0, ..whole })),
         ("with gate", network(Architecture { gated: true, ..whole })),
-        ("without rank embedding", network(Architecture { rank_count: 1, ..whole })),
-        ("without normalisation", network(Architecture { normalised: false, ..whole })),
+        ("with rank embedding", network(Architecture { rank_count: 8, ..whole })),
+        ("with normalisation", network(Architecture { normalised: true, ..whole })),
         ("without geometry network", network(Architecture { geometry_width: 0, ..whole })),
         ("without feed-forward block", network(Architecture { feed_forward_width: 0, ..whole })),
     ]

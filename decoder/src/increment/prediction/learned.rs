@@ -45,8 +45,10 @@ pub struct Target<'n> {
     pub(super) neighbours: &'n [Neighbour],
     /// Their rows.
     pub(super) places: &'n [u32],
-    /// What they weigh for dc, 7.17.4.
+    /// What they weigh in the base.
     pub(super) weights: [i64; NEIGHBOURS_MAX],
+    /// What they weigh for dc, 7.17.4.
+    pub(super) affinities: [i64; NEIGHBOURS_MAX],
 }
 
 impl Learned<'_> {
@@ -152,13 +154,13 @@ impl Learned<'_> {
             let own = self.components_of(base);
             let farthest = target.neighbours.last().map_or(0, |neighbour| neighbour.distance);
             let geometry = geometry_of(attributes, target.row);
-            let neighbours = target.neighbours.iter().zip(target.places).zip(target.weights);
-            for (rank, ((neighbour, &place), weight)) in neighbours.enumerate() {
+            let neighbours = target.neighbours.iter().zip(target.places).zip(target.affinities);
+            for (rank, ((neighbour, &place), affinity)) in neighbours.enumerate() {
                 let mut apart = components.get(place as usize).copied().unwrap_or_default();
                 apart.iter_mut().zip(&own).for_each(|(apart, own)| *apart = apart.wrapping_sub(*own));
                 let mut theirs = self.rows.row(place).iter();
                 let geometry = geometry.map(|own| theirs.next().map_or(0, |theirs| theirs.wrapping_sub(own)));
-                let seen = Seen { components: &apart, geometry, weight, distance: neighbour.distance };
+                let seen = Seen { components: &apart, geometry, affinity, distance: neighbour.distance };
                 batch.set_token(header, (lane, rank), &seen, farthest);
             }
             let offsets = self.offsets(target);

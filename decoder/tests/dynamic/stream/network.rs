@@ -15,6 +15,7 @@ pub(crate) struct Network {
 pub(crate) const FULL_ATTENTION: u8 = 1;
 pub(crate) const GATED: u8 = 2;
 pub(crate) const NORMALISED: u8 = 4;
+pub(crate) const KNN_BASE: u8 = 8;
 
 /// Name of an array, whether its values are i16, rows and values of a row.
 type Array = (&'static str, bool, usize, usize);
@@ -63,7 +64,7 @@ impl Network {
         let mut below = |end: u64| dice.below(end) as u8;
         let dc_count = below(4);
         let header = NetworkHeader {
-            network_flags: below(8),
+            network_flags: below(16),
             width_log2: 3 + below(2),
             feed_forward_width: [0, 5, 8][usize::from(below(3))],
             geometry_width: [0, 3, 8][usize::from(below(3))],

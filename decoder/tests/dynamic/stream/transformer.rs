@@ -2,8 +2,8 @@
 
 use super::cells::isqrt;
 use super::gaussian::{Rules, Splat, round};
-use super::network::{FULL_ATTENTION, GATED, NORMALISED, Network};
-use super::prediction::{EXP, Neighbour, bilateral, bilateral_weights, mean, table};
+use super::network::{FULL_ATTENTION, GATED, KNN_BASE, NORMALISED, Network};
+use super::prediction::{EXP, Neighbour, bilateral, bilateral_weights, knn, mean, table};
 use splatstream_format::entropy::layout::Attribute;
 use splatstream_format::payload::Transform;
 use std::sync::LazyLock;
@@ -48,7 +48,7 @@ fn mean_row(rows: &[Vec<i64>]) -> Vec<i64> {
     (0..rows[0].len()).map(|i| floor(2 * rows.iter().map(|row| row[i]).sum::<i64>() + k, 2 * k)).collect()
 }
 
-/// Predictor 3: 7.17.4 up to the rotation, then 7.17.6; `own` is the new Gaussian as far as it is reconstructed.
+/// Predictor 3: 7.17.3 or 7.17.4 up to the rotation, then 7.17.6; `own` is the new Gaussian as far as it is reconstructed.
 pub(crate) fn learned(
     near: &[Neighbour<'_>],
     rules: &Rules<'_>,
@@ -59,6 +59,7 @@ pub(crate) fn learned(
     match attribute {
         Attribute::Dc => Predicted { network, rules, near, own }.colours(0),
         Attribute::Sh => Predicted { network, rules, near, own }.colours(1),
+        _ if network.is(KNN_BASE) => knn(near, attribute),
         _ => bilateral(near, rules.header, attribute, own),
     }
 }
@@ -76,7 +77,10 @@ impl Predicted<'_> {
     fn colours(&self, kind: usize) -> Vec<i64> {
         let header = &self.network.header;
         let weight = bilateral_weights(self.near, self.rules.header, Attribute::Dc, self.own);
-        let base = [Attribute::Dc, Attribute::Sh].map(|attribute| mean(&weight, self.near, attribute));
+        let base = [Attribute::Dc, Attribute::Sh].map(|attribute| match self.network.is(KNN_BASE) {
+            true => knn(self.near, attribute),
+            false => mean(&weight, self.near, attribute),
+        });
         let near = self.geometry();
         let h = self.embedded(&self.tokens(&weight, &base), &near);
         let pool = if self.network.is(FULL_ATTENTION) {
