@@ -19,6 +19,15 @@ pub enum Class {
 }
 
 impl Class {
+    /// Every class, in the order of the exit codes.
+    pub const ALL: [Self; 5] =
+        [Self::Malformed, Self::Invalid, Self::Unsupported, Self::OverLimit, Self::Truncated];
+
+    /// The class that an exit code stands for.
+    pub fn of_exit_code(code: i32) -> Option<Self> {
+        Self::ALL.into_iter().find(|class| i32::from(class.exit_code()) == code)
+    }
+
     /// The exit code of the tools, clause 9.1.
     pub const fn exit_code(self) -> u8 {
         match self {

@@ -5,9 +5,10 @@ use crate::frames::{
     reverse,
 };
 use clap::ValueEnum;
-use splatstream_conformance::protocol::{Class, EVERYTHING, Request};
+use splatstream_conformance::protocol::{EVERYTHING, Request};
 use splatstream_conformance::reference::{Decoded, decode};
 use splatstream_conformance::vector::Mode;
+use splatstream_format::Class;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::process::abort;
@@ -65,7 +66,7 @@ impl Fault {
     pub(crate) fn answer(self, request: &Request) -> io::Result<i32> {
         match self {
             Self::Always0 => Ok(0),
-            Self::AlwaysReject => Ok(Class::Invalid.exit_code()),
+            Self::AlwaysReject => Ok(Class::Invalid.exit_code().into()),
             Self::CrashAlways => abort(),
             Self::Hang => loop {
                 thread::sleep(Duration::from_secs(1));
@@ -103,8 +104,8 @@ impl Fault {
         let code = write(decoded, request)?;
         Ok(match (self, Class::of_exit_code(code)) {
             (Self::AcceptsEverything, _) => 0,
-            (Self::WrongClass, Some(Class::Invalid)) => Class::Malformed.exit_code(),
-            (Self::WrongClass, Some(_)) => Class::Invalid.exit_code(),
+            (Self::WrongClass, Some(Class::Invalid)) => Class::Malformed.exit_code().into(),
+            (Self::WrongClass, Some(_)) => Class::Invalid.exit_code().into(),
             _ => code,
         })
     }

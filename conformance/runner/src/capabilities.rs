@@ -2,9 +2,9 @@
 
 use crate::case::Case;
 use crate::error::{Error, Result, read_json};
-use crate::protocol::Class;
 use crate::vector::Mode;
 use serde::{Deserialize, Serialize};
+use splatstream_format::Class;
 use std::path::Path;
 
 /// What `schema` of a claim says.

@@ -4,9 +4,10 @@ use crate::answer::{Answer, Ending};
 use crate::attribute::Attribute;
 use crate::case::Case;
 use crate::output::{Output, floats_name};
-use crate::protocol::{Class, Diagnosis};
+use crate::protocol::Diagnosis;
 use crate::result::{CaseResult, Outcome, Reason};
 use crate::vector::{Acceptance, State, Verdict};
+use splatstream_format::Class;
 use std::time::Duration;
 
 /// How to judge.

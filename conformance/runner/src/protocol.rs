@@ -3,66 +3,10 @@
 
 use crate::vector::Mode;
 use serde::{Deserialize, Serialize};
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// The operating point of a decoder that is not told one: every unit of known type belongs to it (SS-OP-006).
 pub const EVERYTHING: &str = "s3,t3,r9";
-
-/// What a rejected stream is (clause 9.1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Class {
-    /// The bytes do not parse.
-    Malformed,
-    /// The bytes parse and break a constraint.
-    Invalid,
-    /// A reserved value, or a feature of another profile or version.
-    Unsupported,
-    /// More than the level or the decoder allows.
-    OverLimit,
-    /// The data end before the end unit does.
-    Truncated,
-}
-
-impl Class {
-    /// All of them, in the order of their exit codes.
-    pub const ALL: [Self; 5] =
-        [Self::Malformed, Self::Invalid, Self::Unsupported, Self::OverLimit, Self::Truncated];
-
-    /// The exit code of clause 9.1.
-    pub const fn exit_code(self) -> i32 {
-        match self {
-            Self::Malformed => 10,
-            Self::Invalid => 11,
-            Self::Unsupported => 12,
-            Self::OverLimit => 13,
-            Self::Truncated => 14,
-        }
-    }
-
-    /// The class that an exit code stands for.
-    pub fn of_exit_code(code: i32) -> Option<Self> {
-        Self::ALL.into_iter().find(|class| class.exit_code() == code)
-    }
-
-    /// The word in records and reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Malformed => "malformed",
-            Self::Invalid => "invalid",
-            Self::Unsupported => "unsupported",
-            Self::OverLimit => "over-limit",
-            Self::Truncated => "truncated",
-        }
-    }
-}
-
-impl fmt::Display for Class {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
 
 /// What a decoder may say about its verdict: the last line of its standard error, or the end of its answer.
 /// What else the object holds is the decoder's own business.

@@ -4,8 +4,9 @@
 //! runner that passes over part of an expectation passes decoders that break it.
 
 use crate::attribute::Attribute;
-use crate::protocol::Class;
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use splatstream_format::Class;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -88,6 +89,7 @@ pub struct Verdict {
     /// Whether the stream is accepted.
     pub outcome: Acceptance,
     /// Class of clause 9.1, of a rejection.
+    #[serde(default, deserialize_with = "class_of_name")]
     pub class: Option<Class>,
     /// Code of clause 9.2.
     pub code: Option<String>,
@@ -97,6 +99,12 @@ pub struct Verdict {
     pub byte: Option<u64>,
     /// Why this is right too, of an acceptable verdict.
     pub why: Option<String>,
+}
+
+fn class_of_name<'d, D: Deserializer<'d>>(deserializer: D) -> Result<Option<Class>, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    let class = Class::ALL.into_iter().find(|class| class.name() == name);
+    class.map(Some).ok_or_else(|| D::Error::custom(format!("'{name}' is no class of clause 9.1")))
 }
 
 /// Whether a stream is accepted.
@@ -204,7 +212,7 @@ pub struct Generator {
 impl Verdict {
     /// The exit code that says so.
     pub fn exit_code(&self) -> i32 {
-        self.class.map_or(0, Class::exit_code)
+        self.class.map_or(0, |class| class.exit_code().into())
     }
 
     /// Whether the class is there if and only if the stream is rejected.
@@ -217,8 +225,8 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.class, &self.code) {
             (None, _) => f.write_str("accept"),
-            (Some(class), None) => write!(f, "{class}"),
-            (Some(class), Some(code)) => write!(f, "{class} {code}"),
+            (Some(class), None) => f.write_str(class.name()),
+            (Some(class), Some(code)) => write!(f, "{} {code}", class.name()),
         }
     }
 }
