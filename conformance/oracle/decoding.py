@@ -39,6 +39,7 @@ class Decoder:
         self.data = data
         self.point = points.EVERYTHING if point is None else point
         self.inside = inside                        # B.3: units before some gop_header were left out
+        self.file_header = None                     # as long as none has been read
         self.frames = []
         self.errors = []
         self.networks = []                          # of all GOPs

@@ -61,7 +61,7 @@ def decode(data, point, subset):
 def entropy_states(data, decoder):
     """The units of a stream that have one, as far as the stream can be followed."""
     at, index = c.FILE_HEADER_BYTES, 0
-    while at < len(data):
+    while decoder.file_header is not None and at < len(data):
         if decoder.coded.get(at):
             yield index, entropy_state(decoder.coded[at])
         try:
