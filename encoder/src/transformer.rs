@@ -97,7 +97,7 @@ pub struct Progress {
 /// What training has done to the validation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainingReport {
-    /// With outputs 0, that is of the bilateral prediction.
+    /// With outputs 0, that is of the base.
     pub base: Loss,
     /// Of the network that training started from; of a new one, that is `base`.
     pub start: Loss,

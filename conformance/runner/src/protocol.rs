@@ -82,7 +82,7 @@ mod tests {
             input: "a b/in.gss".into(),
             op: EVERYTHING.to_owned(),
             mode: Mode::Subset,
-            out: "/tmp/x".into(),
+            out: "a b/out".into(),
         };
         assert_eq!(Request::parse(&request.line()), Some(request));
         for wrong in ["", "in\ts0,t0,r0\tfull", "in\top\thalf\tout", "in\top\tfull\tout\tmore"] {

@@ -127,16 +127,15 @@ impl<'s> Prediction<'s> {
 
     /// Takes note of one attribute as it is reconstructed.
     pub fn learn(&mut self, stage: Stage, attributes: &Attributes) {
-        match stage {
-            Stage::LogScale => self.compare(stage, &attributes.log_scale, [|value| value; 2]),
-            Stage::Opacity => {
-                self.compare(stage, core::slice::from_ref(&attributes.opacity), [|value| value; 2]);
-            }
-            Stage::Rotation => self.compare(stage, &attributes.rotation_fine, [canonical, |value| value]),
-            Stage::Dc => self.compare(stage, &attributes.dc, [canonical; 2]),
+        let same: fn(i32) -> i32 = |value| value;
+        let lattice: [fn(i32) -> i32; 2] = match stage {
+            Stage::LogScale | Stage::Opacity => [same; 2],
+            Stage::Rotation => [canonical, same],
+            Stage::Dc => [canonical; 2],
             // Nothing is predicted after it.
-            Stage::Sh => {}
-        }
+            Stage::Sh => return,
+        };
+        self.compare(stage, attributes.stage(stage), lattice);
     }
 
     /// The network, if a Gaussian takes it.
@@ -147,9 +146,12 @@ impl<'s> Prediction<'s> {
 
     /// The items that the network predicts, once all attributes before dc are known.
     pub fn targets(&self) -> Vec<Target<'_>> {
+        let gated = self.network.as_ref().is_some_and(|network| network.header().gated());
         let target = |(place, item): (usize, &Item)| {
             let weights = self.weights(place, item.predictor);
-            let affinities = self.weights(place, Predictor::Bilateral);
+            // No other network looks at them.
+            let affinities =
+                if gated { self.weights(place, Predictor::Bilateral) } else { [0; NEIGHBOURS_MAX] };
             let neighbours = self.neighbours.get(self.range(place)).unwrap_or_default();
             let places = self.rows.places(self.range(place));
             let position = self.position.each_ref().map(|plane| plane.get(place).copied().unwrap_or(0));

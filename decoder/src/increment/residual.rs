@@ -106,6 +106,17 @@ impl Attributes {
     }
 
     /// The planes of an attribute.
+    pub fn stage(&self, stage: Stage) -> &[Vec<i32>] {
+        match stage {
+            Stage::LogScale => &self.log_scale,
+            Stage::Opacity => core::slice::from_ref(&self.opacity),
+            Stage::Rotation => &self.rotation_fine,
+            Stage::Dc => &self.dc,
+            Stage::Sh => &self.sh,
+        }
+    }
+
+    /// The same, to be changed.
     pub fn stage_mut(&mut self, stage: Stage) -> &mut [Vec<i32>] {
         match stage {
             Stage::LogScale => &mut self.log_scale,

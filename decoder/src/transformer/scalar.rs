@@ -110,7 +110,7 @@ fn features(near: &[i32], from: &[i32]) -> Row {
 }
 
 /// The softmax of logits: Q8.
-pub(super) fn shares(logits: &[i32]) -> Vec<i32> {
+fn shares(logits: &[i32]) -> Vec<i32> {
     let largest = logits.iter().copied().max().unwrap_or(0);
     let e = |logit: &i32| -> u32 {
         let below = largest.wrapping_sub(*logit).min(255).unsigned_abs();

@@ -85,19 +85,24 @@ pub(crate) fn network(
         None => Ok(None),
         Some(NetworkSource::Given(network)) => Ok(Some(*network)),
         Some(NetworkSource::Registered) => registered(),
-        Some(NetworkSource::Fitted) => {
-            let mut found = Vec::new();
-            for architecture in Architecture::BASES {
-                found.push((architecture, recorded(source, settings, sequence, &architecture)?));
-            }
-            let (architecture, samples) = nearer(found);
-            Ok(train_network(&architecture, samples, &mut |_| {})?.map(|(network, _)| network))
-        }
-        Some(NetworkSource::Trained(architecture)) => {
-            let samples = recorded(source, settings, sequence, &architecture)?;
-            Ok(train_network(&architecture, samples, &mut |_| {})?.map(|(network, _)| network))
-        }
+        Some(NetworkSource::Fitted) => trained(source, settings, sequence, &Architecture::BASES),
+        Some(NetworkSource::Trained(architecture)) => trained(source, settings, sequence, &[architecture]),
     }
+}
+
+/// A network trained on the sequence, of the architecture whose base is nearer.
+fn trained(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    sequence: &SequenceParameters,
+    architectures: &[Architecture],
+) -> Result<Option<Network>, Error> {
+    let mut found = Vec::new();
+    for architecture in architectures {
+        found.push((*architecture, recorded(source, settings, sequence, architecture)?));
+    }
+    let (architecture, samples) = nearer(found);
+    Ok(train_network(&architecture, samples, &mut |_| {})?.map(|(network, _)| network))
 }
 
 /// The registered network, if there is one.
@@ -181,7 +186,7 @@ pub fn train_network(
     train(architecture, &training, &held_out, &Schedule::default(), &mut progress).map(Some)
 }
 
-/// A network of an architecture that gives 0: it predicts what knn does.
+/// A network of an architecture that gives 0: it predicts what its base does.
 fn zero(architecture: &Architecture) -> Result<Network, Error> {
     let header = architecture.header()?;
     let layers = Part::ALL.map(|part| {

@@ -28,6 +28,7 @@ use splatstream_decoder::process::Compensation;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::importance;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The largest translation of a cell, steps / 8: the difference of two is below 2^16.
@@ -249,7 +250,8 @@ impl Predicted<'_> {
             places.retain(|&place| judge.is_missed(place));
         }
         let frame = self.target.frame.select(&places);
-        let survivors: Vec<usize> = self.survivors_of(displaced);
+        let survivors: Vec<usize> =
+            (0..displaced.len()).map(|home| self.continued(displaced, home).count()).collect();
         let order = importance::order(&importance::opacity_volume(&frame));
         let total = (survivors.iter().sum::<usize>() + frame.len()) as u32;
         let sequence = self.coder.sequence;
@@ -300,17 +302,17 @@ impl Predicted<'_> {
         vec![first, second]
     }
 
-    /// Gaussians of each home that continue.
-    fn survivors_of(&self, displaced: &[Home]) -> Vec<usize> {
-        let mut start = 0;
-        displaced
-            .iter()
-            .map(|home| {
-                let partners = (start..).zip(&self.matching.target_of[start..start + home.len()]);
-                start += home.len();
-                partners.filter(|&(from, &partner)| self.survivors.goes_on(from, partner)).count()
-            })
-            .collect()
+    /// The places of a home's Gaussians among those of all homes.
+    fn places(displaced: &[Home], home: usize) -> Range<usize> {
+        let start = displaced[..home].iter().map(Home::len).sum();
+        start..start + displaced[home].len()
+    }
+
+    /// Gaussians of a home that continue, and their partners.
+    fn continued(&self, displaced: &[Home], home: usize) -> impl Iterator<Item = (usize, Option<u32>)> {
+        let places = Self::places(displaced, home);
+        let partners = places.clone().zip(self.matching.target_of[places].iter().copied());
+        partners.filter(|&(from, partner)| self.survivors.goes_on(from, partner))
     }
 
     #[expect(clippy::too_many_arguments, reason = "what a unit depends on")]
@@ -331,10 +333,8 @@ impl Predicted<'_> {
             self.drafted(home, draft, displaced, fresh, added, made, predictors, &in_force)?;
         let sections = self.coder.sections(&draft, &mut in_force)?;
         models.follow(refinement, in_force);
-        let start: usize = displaced[..home].iter().map(Home::len).sum();
-        let partners = (start..).zip(&self.matching.target_of[start..start + displaced[home].len()]);
-        let continued = partners
-            .filter(|&(from, &partner)| self.survivors.goes_on(from, partner))
+        let continued = self
+            .continued(displaced, home)
             .map(|(_, partner)| partner.map_or(NO_ROW, |place| self.target.rows[place as usize]));
         let new = added.iter().map(|&place| self.target.rows[fresh.places[place as usize] as usize]);
         let rows = continued.chain(new).collect();
@@ -354,9 +354,10 @@ impl Predicted<'_> {
         predictors: Chooser<'_>,
         models: &ModelsInForce,
     ) -> Result<Drafted, Error> {
-        let start: usize = displaced[..home].iter().map(Home::len).sum();
         let parents = &displaced[home];
-        let partners = &self.matching.target_of[start..start + parents.len()];
+        let places = Self::places(displaced, home);
+        let start = places.start;
+        let partners = &self.matching.target_of[places];
         let last = home + 1 == displaced.len();
         let coarse = last && self.coarse_tail && displaced.len() > 1;
         let fates = self.survivors.fates(parents, start, partners, coarse);

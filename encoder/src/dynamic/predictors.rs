@@ -140,17 +140,20 @@ impl Chooser<'_> {
             chosen = self.chosen(&tried);
         }
         let drafts = chosen.into_iter().filter_map(|(run_log2, places)| {
+            let codes: Vec<i32> = places.iter().map(|&place| tried[place].0.code()).collect();
+            if codes.iter().all(|&code| code == 0) {
+                return None;
+            }
             let run = 1_usize << run_log2;
             let planes = (0..tried[0].1.len())
                 .map(|plane| (0..wanted.len()).map(|row| tried[places[row / run]].1[plane][row]).collect())
                 .collect();
-            let codes: Vec<i32> = places.iter().map(|&place| tried[place].0.code()).collect();
             let header = IncrementHeader { predictor_block_log2: run_log2, ..header };
             let mut predicted = Draft { header, values: draft.values.clone() };
             predicted.values.set(Section::New, SectionValues { deltas: deltas.clone(), planes, block });
-            let predictors = SectionValues { deltas: Vec::new(), planes: vec![codes.clone()], block };
+            let predictors = SectionValues { deltas: Vec::new(), planes: vec![codes], block };
             predicted.values.set(Section::Predictors, predictors);
-            codes.iter().any(|&code| code != 0).then_some(predicted)
+            Some(predicted)
         });
         Ok((drafts.collect(), set.len()))
     }

@@ -32,7 +32,8 @@ pub(crate) struct Seen {
 pub(crate) struct Shown {
     loss: f32,
     energy: f32,
-    /// Natural log of the semi-axes, and how much of each the low-pass filter of the renderer leaves, 0 to 1.
+    /// Semi-axes behind the low-pass filter of the renderer, scene units, and the part of each square that is the
+    /// Gaussian's own, 0 to 1.
     width: [f32; 3],
     share: [f32; 3],
     rotation: [f32; 4],

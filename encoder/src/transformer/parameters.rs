@@ -86,8 +86,8 @@ impl Layout {
     ///
     /// Weights are uniform and so wide that a layer of them gives what it is given on the average: `2^layer_shift`
     /// over the root of its inputs, for a shift of 6 at most 64 / sqrt(8) * sqrt(3) = 39 of 127, so that a weight has
-    /// room to become larger and steps enough to be fine. The head is zero: an untrained network is the knn
-    /// prediction.
+    /// room to become larger and steps enough to be fine. The head is zero: an untrained network is its
+    /// base.
     pub(super) fn initial(&self, seed: u64) -> Vec<f32> {
         let mut random = Random(seed);
         let mut values = vec![0.0; self.length];

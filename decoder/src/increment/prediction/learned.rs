@@ -47,7 +47,7 @@ pub struct Target<'n> {
     pub(super) places: &'n [u32],
     /// What they weigh in the base.
     pub(super) weights: [i64; NEIGHBOURS_MAX],
-    /// What they weigh for dc, 7.17.4.
+    /// What they weigh for dc, 7.17.4; 0 if the network is not gated.
     pub(super) affinities: [i64; NEIGHBOURS_MAX],
 }
 

@@ -47,11 +47,7 @@ impl<P: Products> OneBatch<'_, P> {
         // Neighbours two by two: pairs of values of one row become pairs of values of one place.
         let width = out.len().max(1);
         let mut both = [ZERO; RANKS / 2];
-        for (both, shares) in both.iter_mut().zip(shares.chunks(2)) {
-            if let [first, rest @ ..] = shares {
-                *both = pair(first, rest.first().unwrap_or(&ZERO), |share| share);
-            }
-        }
+        pairs(shares, &mut both, |share| share);
         for (place, out) in out.iter_mut().enumerate() {
             let (mut first, mut second) = (ZERO, ZERO);
             for (shares, rows) in both.iter().zip(h.chunks(width.wrapping_mul(2))) {

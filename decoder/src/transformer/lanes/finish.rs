@@ -1,7 +1,7 @@
 //! SS-TR-006 and SS-TR-007: normalisation and the feed-forward block.
 
 use super::products::Products;
-use super::{FEED_FORWARD, Lane, OneBatch, Sums, WIDTH, ZERO, act, add, high, low, pair, pairs, round};
+use super::{FEED_FORWARD, Lane, OneBatch, Sums, WIDTH, ZERO, act, add, high, low, pairs, round};
 use crate::transformer::scalar::reciprocal;
 
 impl<P: Products> OneBatch<'_, P> {
@@ -51,10 +51,6 @@ impl<P: Products> OneBatch<'_, P> {
                 *x = act(unit.wrapping_mul(gain).wrapping_add(bias), 5);
             }
         }
-        for (row, values) in row.iter_mut().zip(values.chunks(2)) {
-            if let [first, second] = values {
-                *row = pair(first, second, |x| x);
-            }
-        }
+        pairs(values, row, |x| x);
     }
 }

@@ -25,13 +25,6 @@ pub(super) trait Products: Copy {
     fn add(self, sum: Self::Part, a: Self::Part, b: Self::Part) -> Self::Part;
 }
 
-/// Places of a part of a lane.
-#[inline(always)]
-fn places(part: usize, width: usize) -> core::ops::Range<usize> {
-    let start = part.wrapping_mul(width);
-    start..start.wrapping_add(width)
-}
-
 /// Without instructions of its own.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Portable;
@@ -48,14 +41,13 @@ impl Products for Portable {
 
     #[inline(always)]
     fn load(self, lane: &Lane, part: usize) -> Self::Part {
-        let values = lane.get(places(part, 8)).and_then(|values| values.try_into().ok());
-        values.unwrap_or([0; 8])
+        lane.as_chunks().0.get(part).copied().unwrap_or([0; 8])
     }
 
     #[inline(always)]
     fn store(self, values: Self::Part, lane: &mut Lane, part: usize) {
-        if let Some(slots) = lane.get_mut(places(part, 8)) {
-            slots.copy_from_slice(&values);
+        if let Some(slots) = lane.as_chunks_mut().0.get_mut(part) {
+            *slots = values;
         }
     }
 
@@ -72,7 +64,7 @@ impl Products for Portable {
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::super::Lane;
-    use super::{Products, places};
+    use super::{Portable, Products};
     use core::arch::x86_64::{__m128i, __m256i};
     use pulp::bytemuck::cast;
     use pulp::core_arch::x86;
@@ -89,20 +81,17 @@ mod x86 {
 
         #[inline(always)]
         fn splat(self, value: i32) -> Self::Part {
-            cast([value; 8])
+            cast(Portable.splat(value))
         }
 
         #[inline(always)]
         fn load(self, lane: &Lane, part: usize) -> Self::Part {
-            let values = lane.get(places(part, 8)).and_then(|values| values.try_into().ok());
-            cast::<[i32; 8], _>(values.unwrap_or([0; 8]))
+            cast(Portable.load(lane, part))
         }
 
         #[inline(always)]
         fn store(self, values: Self::Part, lane: &mut Lane, part: usize) {
-            if let Some(slots) = lane.get_mut(places(part, 8)) {
-                slots.copy_from_slice(&cast::<_, [i32; 8]>(values));
-            }
+            Portable.store(cast(values), lane, part);
         }
 
         #[inline(always)]
