@@ -1,7 +1,7 @@
 //! Clause 7.17.6: the learned predictor, a network over the neighbours of a new Gaussian.
 //!
 //! A [`Batch`] holds what the network sees of [`LANES`] Gaussians, one a lane. [`scalar`] is the text line by line for
-//! one of them; [`lanes`] computes all at once, in single precision, which is exact here, and gives the same integers.
+//! one of them; [`lanes`] computes all at once and gives the same integers.
 
 pub mod batch;
 pub mod lanes;

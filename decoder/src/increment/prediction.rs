@@ -12,6 +12,7 @@ use crate::predictor::{NEIGHBOURS_MAX, Predictor, WeightedMean, bilateral_weight
 use crate::transformer::LaneNetwork;
 use core::ops::Range;
 use learned::{Learned, Target};
+use projection::Projection;
 use rayon::prelude::*;
 use rows::Rows;
 use splatstream_format::Result;
@@ -19,6 +20,7 @@ use splatstream_format::payload::Network;
 use splatstream_format::syntax::IncrementHeader;
 
 pub mod learned;
+mod projection;
 mod rows;
 
 /// What the predictors of a unit go by.
@@ -141,7 +143,10 @@ impl<'s> Prediction<'s> {
     /// The network, if a Gaussian takes it.
     pub fn learned(&self) -> Option<Learned<'_>> {
         let Self { network, set, rows, colour, .. } = self;
-        network.as_ref().map(|network| Learned { network, set, rows, dc: colour.dc, sh: colour.sh })
+        network.as_ref().map(|network| {
+            let projection = Projection::new(network.header(), colour.dc, colour.sh);
+            Learned { network, projection, set, rows }
+        })
     }
 
     /// The items that the network predicts, once all attributes before dc are known.

@@ -1,6 +1,6 @@
 //! SS-TR-001 and SS-TR-002: what the network sees of the neighbours of new Gaussians.
 
-use super::{RANKS, act};
+use super::{INPUTS_MAX, RANKS, act};
 use splatstream_format::syntax::NetworkHeader;
 
 /// Gaussians of a batch.
@@ -73,29 +73,22 @@ impl Batch {
         let Some(rows) = self.tokens.get_mut(start..start.wrapping_add(self.inputs)) else { return };
         let shift = u32::from(header.token_shift).wrapping_add(12);
         let half = 1_i64.wrapping_shl(shift.wrapping_sub(1));
-        let component = |sum: &i64| sum.wrapping_add(half).wrapping_shr(shift).clamp(-127, 127) as i32;
-        let [q0, q1, q2, o, r0, r1, r2] = seen.geometry;
+        let mut token = [0; INPUTS_MAX];
+        let (components, rest) = token.split_at_mut_checked(header.outputs()).unwrap_or_default();
+        for (input, sum) in components.iter_mut().zip(seen.components) {
+            *input = sum.wrapping_add(half).wrapping_shr(shift).clamp(-127, 127) as i32;
+        }
         let apart = seen.distance.wrapping_mul(127).checked_div(farthest.wrapping_add(1)).unwrap_or(0);
-        let clamped = |value: i32| value.clamp(-127, 127);
-        let rest = [
-            clamped(q0.wrapping_mul(4)),
-            clamped(q1.wrapping_mul(4)),
-            clamped(q2.wrapping_mul(4)),
-            clamped(o.wrapping_mul(2)),
-            clamped(r0),
-            clamped(r1),
-            clamped(r2),
-            apart as i32,
-        ];
-        // Components without a transform are 0.
-        let outputs = header.outputs();
-        let padding = core::iter::repeat_n(0, outputs.saturating_sub(seen.components.len()));
-        let values = seen.components.iter().take(outputs).map(component).chain(padding).chain(rest);
-        for (row, value) in rows.iter_mut().zip(values) {
-            let gated =
-                if header.gated() { act(value.wrapping_mul(seen.affinity as i32), 12) } else { value };
+        let units = [4, 4, 4, 2, 1, 1, 1].into_iter().zip(seen.geometry);
+        let geometry = units.map(|(unit, value)| value.wrapping_mul(unit).clamp(-127, 127));
+        rest.iter_mut().zip(geometry.chain([apart as i32])).for_each(|(input, value)| *input = value);
+        if header.gated() {
+            let weight = seen.affinity as i32;
+            token.iter_mut().for_each(|input| *input = act(input.wrapping_mul(weight), 12));
+        }
+        for (row, value) in rows.iter_mut().zip(token) {
             if let Some(slot) = row.get_mut(lane) {
-                *slot = gated as i8;
+                *slot = value as i8;
             }
         }
     }

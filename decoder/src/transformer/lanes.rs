@@ -9,15 +9,17 @@ use products::{Portable, Products};
 use pulp::{Simd, WithSimd};
 
 mod attention;
+mod columns;
 mod finish;
 mod matrix;
 mod prepared;
 mod products;
 
+pub(crate) use columns::Columns;
 pub use prepared::LaneNetwork;
 
 /// A value, or a pair of values, of each Gaussian of a batch.
-type Lane = [i32; LANES];
+pub(crate) type Lane = [i32; LANES];
 
 const ZERO: Lane = [0; LANES];
 
@@ -31,7 +33,7 @@ const INPUT_PAIRS: usize = INPUTS_MAX.div_ceil(2) + GEOMETRY / 2;
 
 /// Two values in an `i32`.
 #[inline(always)]
-fn packed(low: i32, high: i32) -> i32 {
+pub(crate) fn packed(low: i32, high: i32) -> i32 {
     (low & 0xFFFF) | high.wrapping_shl(16)
 }
 

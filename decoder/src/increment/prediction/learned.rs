@@ -1,5 +1,6 @@
 //! Clause 7.17.6: from neighbours to what the network sees, and from its outputs to colour.
 
+use super::projection::{COLOURS_MAX, Colour, Components, Projection};
 use super::rows::Rows;
 use super::{Attributes, RUN, at, set_row};
 use crate::frame::QuantizedFrame;
@@ -10,26 +11,12 @@ use crate::predictor::{NEIGHBOURS_MAX, WeightedMean};
 use crate::transformer::batch::Seen;
 use crate::transformer::{Batch, LANES, LaneNetwork, OUTPUTS_MAX};
 use rayon::prelude::*;
-use splatstream_format::payload::Transform;
 
-/// The largest magnitude of a colour.
-const COLOUR_MAX: i64 = 1 << 30;
-
-/// Colour planes, at most: dc, and SH of degree 3.
-const COLOURS_MAX: usize = 48;
-
-/// The components of a colour, times 2^12: dc, then sh.
-type Components = [i64; OUTPUTS_MAX];
-
-/// A colour: dc, then sh.
-type Colour = [i32; COLOURS_MAX];
-
-/// The network of a GOP, the transforms it works in, and the set it predicts from.
+/// The network of a GOP, what it works in, and the set it predicts from.
 #[derive(Debug)]
 pub struct Learned<'s> {
     pub(super) network: &'s LaneNetwork,
-    pub(super) dc: &'s Transform,
-    pub(super) sh: Option<&'s Transform>,
+    pub(super) projection: Projection,
     pub(super) set: &'s QuantizedFrame,
     pub(super) rows: &'s Rows,
 }
@@ -79,8 +66,8 @@ impl Learned<'_> {
             let mut own = [0; COLOURS_MAX];
             let planes = dc.iter().take(3).chain(sh);
             own.iter_mut().zip(planes).for_each(|(value, plane)| *value = at(plane, target.row));
-            let own = self.components_of(&own);
-            let base = self.components_of(&self.base(target));
+            let own = self.projection.components(&own);
+            let base = self.projection.components(&self.base(target));
             let pairs = own.iter().zip(base).take(self.network.header().outputs());
             pairs.map(|(own, base)| round12(own.wrapping_sub(base)) as i32).collect()
         };
@@ -99,28 +86,9 @@ impl Learned<'_> {
         let mut components = vec![[0; OUTPUTS_MAX]; self.rows.len()];
         let each = components.par_iter_mut().zip(self.rows.all()).zip(used).with_min_len(RUN);
         each.filter(|(_, used)| *used).for_each(|((components, row), _)| {
-            let colour = row.get(start..).unwrap_or_default();
-            self.set_components(colour, components);
+            *components = self.projection.components(row.get(start..).unwrap_or_default());
         });
         components
-    }
-
-    /// The components of a colour that the transforms have; the others are 0.
-    fn components_of(&self, colour: &[i32]) -> Components {
-        let mut out = [0; OUTPUTS_MAX];
-        self.set_components(colour, &mut out);
-        out
-    }
-
-    /// Sets the components of a colour that the transforms have.
-    fn set_components(&self, colour: &[i32], out: &mut Components) {
-        let (dc, sh) = colour.split_at_checked(3).unwrap_or_default();
-        let header = self.network.header();
-        let (dc_out, sh_out) = out.split_at_mut_checked(header.dc_count.into()).unwrap_or_default();
-        forward(self.dc, dc, dc_out);
-        if let Some(transform) = self.sh {
-            forward(transform, sh, sh_out.get_mut(..header.sh_count.into()).unwrap_or_default());
-        }
     }
 
     /// The weighted mean of the neighbours' colours.
@@ -151,7 +119,7 @@ impl Learned<'_> {
         let header = self.network.header();
         let mut batch = Batch::new(header, count);
         for (lane, (target, base)) in targets.iter().zip(bases).enumerate() {
-            let own = self.components_of(base);
+            let own = self.projection.components(base);
             let farthest = target.neighbours.last().map_or(0, |neighbour| neighbour.distance);
             let geometry = geometry_of(attributes, target.row);
             let neighbours = target.neighbours.iter().zip(target.places).zip(target.affinities);
@@ -189,41 +157,11 @@ impl Learned<'_> {
     ) -> Vec<Colour> {
         let mut colours = self.bases(targets);
         let outputs = self.network.outputs(&self.batch(targets, &colours, attributes, components));
-        let header = self.network.header();
         for (lane, colour) in colours.iter_mut().enumerate() {
-            let mut own = [0; OUTPUTS_MAX];
-            own.iter_mut().zip(&outputs).for_each(|(own, row)| *own = row.get(lane).copied().unwrap_or(0));
-            let (dc_outputs, sh_outputs) = own.split_at_checked(header.dc_count.into()).unwrap_or_default();
-            let sh_outputs = sh_outputs.get(..header.sh_count.into()).unwrap_or_default();
-            let (dc, sh) = colour.split_at_mut(3);
-            add(self.dc, dc_outputs, dc);
-            if let Some(transform) = self.sh {
-                add(transform, sh_outputs, sh);
-            }
+            let outputs = outputs.iter().map(|row| row.get(lane).copied().unwrap_or(0));
+            self.projection.add(outputs, colour);
         }
         colours
-    }
-}
-
-/// The sums of basis and colour for those components that the transform has.
-fn forward(transform: &Transform, colour: &[i32], out: &mut [i64]) {
-    for (out, row) in out.iter_mut().zip(transform.rows()) {
-        let terms = row.iter().zip(colour).map(|(&w, &value)| i64::from(w).wrapping_mul(value.into()));
-        *out = terms.fold(0, i64::wrapping_add);
-    }
-}
-
-/// Adds to a base what the outputs stand for.
-fn add(transform: &Transform, outputs: &[i32], base: &mut [i32]) {
-    let mut sums = [0_i64; COLOURS_MAX];
-    for (row, &output) in transform.rows().zip(outputs) {
-        for (sum, &weight) in sums.iter_mut().zip(row) {
-            *sum = sum.wrapping_add(i64::from(weight).wrapping_mul(output.into()));
-        }
-    }
-    for (value, sum) in base.iter_mut().zip(sums) {
-        let sum = i64::from(*value).wrapping_add(round12(sum));
-        *value = sum.clamp(COLOUR_MAX.wrapping_neg(), COLOUR_MAX) as i32;
     }
 }
 

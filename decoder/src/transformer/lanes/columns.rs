@@ -1,0 +1,79 @@
+//! A matrix for one vector at a time: its rows are the lanes.
+
+use super::products::{self, Portable, Products};
+use super::{LANES, Lane, Machine, ZERO, packed};
+use pulp::{Simd, WithSimd};
+
+/// Weights of 16 bits.
+#[derive(Debug, Clone)]
+pub(crate) struct Columns {
+    /// Pairs of columns.
+    pairs: usize,
+    /// The weights of 16 rows, a pair of columns after the other; then of the next 16.
+    weights: Vec<Lane>,
+    machine: Machine,
+}
+
+impl Columns {
+    /// A matrix of `rows` rows and `columns` columns; `weight` gives what stands in a row and a column.
+    pub(crate) fn new(rows: usize, columns: usize, weight: impl Fn(usize, usize) -> Option<i16>) -> Self {
+        let (blocks, pairs) = (rows.div_ceil(LANES), columns.div_ceil(2));
+        let at = |row, column| weight(row, column).map_or(0, i32::from);
+        let lane = |block: usize, pair: usize| {
+            let (first, column) = (block.wrapping_mul(LANES), pair.wrapping_mul(2));
+            let mut lane = ZERO;
+            for (slot, row) in lane.iter_mut().zip(first..rows) {
+                *slot = packed(at(row, column), at(row, column.wrapping_add(1)));
+            }
+            lane
+        };
+        let weights = (0..blocks).flat_map(|block| (0..pairs).map(move |pair| (block, pair)));
+        let weights = weights.map(|(block, pair)| lane(block, pair)).collect();
+        Self { pairs, weights, machine: Machine::all().last().copied().unwrap_or(Machine::Portable) }
+    }
+
+    /// The products of the rows with a vector of values of 16 bits, in pairs, 16 rows at a time. No sum may leave 32 bits.
+    pub(crate) fn multiply(&self, x: &[i32], out: &mut [Lane]) {
+        match self.machine {
+            Machine::Portable => Product { columns: self, x, out, by: Portable }.run(),
+            #[cfg(target_arch = "x86_64")]
+            Machine::Sse2(sse2) => Product { columns: self, x, out, by: products::Sse2(sse2) }.run(),
+            #[cfg(target_arch = "x86_64")]
+            Machine::Avx2(v3) => {
+                Simd::vectorize(v3, Product { columns: self, x, out, by: products::Avx2(v3) });
+            }
+        }
+    }
+}
+
+struct Product<'p, P> {
+    columns: &'p Columns,
+    x: &'p [i32],
+    out: &'p mut [Lane],
+    by: P,
+}
+
+impl<P: Products> WithSimd for Product<'_, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.run();
+    }
+}
+
+impl<P: Products> Product<'_, P> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { columns, x, out, by } = self;
+        for (block, out) in columns.weights.chunks_exact(columns.pairs.max(1)).zip(out) {
+            for part in 0..P::PARTS {
+                let mut sum = by.splat(0);
+                for (&x, weights) in x.iter().zip(block) {
+                    sum = by.add(sum, by.splat(x), by.load(weights, part));
+                }
+                by.store(sum, out, part);
+            }
+        }
+    }
+}
