@@ -17,7 +17,7 @@ use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Report, Settings, encode};
 use splatstream_format::Limits;
-use splatstream_scene::builtin::BuiltinScene;
+use splatstream_scene::builtin::{BuiltinScene, Tracking};
 use splatstream_scene::{GaussianFrame, ply};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -40,6 +40,9 @@ pub(crate) struct Demo {
     #[arg(long, value_name = "N", default_value_t = BuiltinScene::default().frames)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
+    /// Make each frame as if it had been trained by itself: no Gaussian keeps its row from frame to frame.
+    #[arg(long)]
+    untracked: bool,
 }
 
 /// The stream's name in the directory of the demo.
@@ -49,8 +52,13 @@ impl Demo {
     /// Makes, encodes, decodes, verifies, reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         make_directory(&self.out)?;
-        let scene =
-            BuiltinScene { gaussians: self.gaussians, frames: self.frames, ..BuiltinScene::default() };
+        let tracking = if self.untracked { Tracking::Untracked } else { Tracking::Tracked };
+        let scene = BuiltinScene {
+            gaussians: self.gaussians,
+            frames: self.frames,
+            tracking,
+            ..BuiltinScene::default()
+        };
         let mut source = self.write_source(scene)?;
         let (stream, encoding, digests) = self.encode(&mut source.frames)?;
         let infos = operating_points(&stream, &Limits::default()).map_err(|error| self.fault(error))?;

@@ -3,6 +3,7 @@
 mod common;
 
 use common::{directory, json, succeed, text};
+use splatstream_scene::{ReadLimits, read_scene};
 
 #[test]
 fn the_demo_writes_stream_frames_and_report() {
@@ -27,4 +28,19 @@ fn the_demo_says_what_to_try_next() {
     let out = text(directory.path());
     let said = succeed(&["demo", "--out", out, "--gaussians", "100", "--frames", "1"]);
     assert!(said.contains(&format!("splatstream inspect --stats {out}/demo.gss")), "{said}");
+}
+
+#[test]
+fn an_untracked_demo_has_frames_that_differ_in_their_gaussians() {
+    let directory = directory();
+    let out = directory.path().join("demo");
+    let settings = ["--gaussians", "2000", "--frames", "2"];
+    let report = json(&[&["demo", "--untracked", "--out", text(&out)][..], &settings].concat());
+    let count = |number: u32| {
+        let path = out.join(format!("source/frame_000{number}.ply"));
+        read_scene(&path, &ReadLimits::default()).unwrap().len() as u64
+    };
+    assert_ne!(count(0), count(1), "Gaussians vanish and split");
+    assert_eq!(report["scene"]["gaussians"], count(0) + count(1));
+    succeed(&["validate", text(&out.join("demo.gss"))]);
 }
