@@ -59,7 +59,7 @@ pub const VARIABLE_ROWS: [VariableRow; 17] = [
         "5.8",
         "codebook",
         "entries",
-        "u8[(entry_count_minus1+1)*component_count*value_bytes]",
+        "u8[(entry_count_minus1 + 1) * component_count * value_bytes]",
         "values, entry by entry",
     ),
     row("5.9", "refinement", "model_length", "leb128", "bytes of models"),
