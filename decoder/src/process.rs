@@ -306,7 +306,10 @@ impl<'a> Decoder<'a> {
         if starts_here {
             self.frames = unit.header.frame;
         }
-        same(frame_at(unit), "6.5", "frame", unit.header.frame, self.frames)?;
+        // A GOP took the last index there is: no frame can follow.
+        let is_full = self.gop.is_some() && self.frames == 0;
+        let next = if is_full { 1 << 32 } else { u64::from(self.frames) };
+        same(frame_at(unit), "6.5", "frame", unit.header.frame.into(), next)?;
         let header = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
         let layers = self.sequence().map_or(1, |sequence| sequence.temporal_layer_count);
         header.validate_layers(unit.payload_at, layers)?;

@@ -152,6 +152,22 @@ fn decoding_from_a_gop_on_gives_the_frames_from_there() {
     assert_eq!(from_inside(&frame.bytes(), second).1.unwrap().kind.code(), "MISMATCH");
 }
 
+// covers: SS-GH-001
+#[test]
+fn no_gop_follows_the_last_display_index() {
+    let mut scene = sample::scene();
+    scene.gops.push(Gop { frames: vec![sample::frame(4)], ..sample::tools() });
+    let mut script = scene.script();
+    let (last, after) = (script.find(GopHeader, 1), script.find(GopHeader, 2));
+    for (place, part) in script.parts.iter_mut().enumerate().skip(last) {
+        if let Part::Unit(id, _) = part {
+            id.frame = if place < after { u32::MAX } else { 0 };
+        }
+    }
+    let end = from_inside(&script.bytes(), script.at(last)).1;
+    assert_eq!(code_at(end), Some(("MISMATCH", script.at(after) + 8)));
+}
+
 fn code_at(error: Option<Error>) -> Option<(&'static str, u64)> {
     error.map(|error| (error.kind.code(), error.at))
 }
