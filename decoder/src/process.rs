@@ -2,16 +2,18 @@
 
 use crate::gop::Gop;
 use crate::operating_point::{OperatingPoint, Tally};
+use expected::{element_at, frame_at, same, unexpected};
 use layered::{LayeredFrame, References};
 use refined::RefinedFrame;
 use splatstream_format::syntax::{
-    FileHeader, FrameHeader, GopHeader, PlaceInGop, Profile, SequenceParameters, Table, UnitHeader, UnitType,
+    FileHeader, FrameHeader, GopHeader, PlaceInGop, Profile, SequenceParameters, UnitHeader, UnitType,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Limits, Result};
 
 mod assembly;
 mod decoded;
+mod expected;
 mod layered;
 mod lists;
 mod refined;
@@ -485,39 +487,6 @@ fn keep<U>(parsed: Result<U>, units: &mut Vec<U>, lost: &mut Option<Error>, tole
         Err(error) => return Err(error),
     }
     Ok(())
-}
-
-fn unexpected(unit: &Unit<'_>) -> Error {
-    let name = unit.header.unit_type().name();
-    Error::new(unit.at, "7.1", ErrorKind::UnexpectedUnit { unit: name })
-}
-
-fn same<T: Into<u64>>(
-    at: u64,
-    clause: &'static str,
-    element: &'static str,
-    value: T,
-    expected: T,
-) -> Result<()> {
-    let (value, expected) = (value.into(), expected.into());
-    if value == expected {
-        return Ok(());
-    }
-    Err(Error::new(at, clause, ErrorKind::Mismatch { element, value, expected }))
-}
-
-/// Absolute offset of an element of a record that starts at `at`.
-fn element_at(table: &Table, at: u64, element: &str) -> u64 {
-    after(at, table.offset(element))
-}
-
-/// Absolute offset of `frame` in the header of a unit.
-fn frame_at(unit: &Unit<'_>) -> u64 {
-    element_at(&UnitHeader::TABLE, unit.at, "frame")
-}
-
-fn after(at: u64, bytes: usize) -> u64 {
-    at.saturating_add(u64::try_from(bytes).unwrap_or(u64::MAX))
 }
 
 fn unit_bytes(unit: &Unit<'_>) -> u64 {

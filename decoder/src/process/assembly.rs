@@ -1,7 +1,8 @@
 //! One frame of profile Dynamic, unit by unit: clauses 7.13, 7.14 and 7.18.
 
+use super::expected::element_at;
 use super::layered::{PendingIncrement, Reference};
-use super::{Compensation, DecodedFrame, Options, PendingFrame, element_at};
+use super::{Compensation, DecodedFrame, Options, PendingFrame};
 use crate::digest::{UnitDigest, frame_digest, unit_digest};
 use crate::displacement::{CellField, rotation_unit};
 use crate::frame::QuantizedFrame;

@@ -1,7 +1,8 @@
 //! Frames of profile Dynamic: increments in layers, references, what is carried. Clauses 7.13, 7.18, 7.20.
 
 use super::assembly::Assembly;
-use super::{DecodedFrame, Decoder, FrameUnits, Options, PendingFrame, keep, unexpected, unit_bytes};
+use super::expected::unexpected;
+use super::{DecodedFrame, Decoder, FrameUnits, Options, PendingFrame, keep, unit_bytes};
 use crate::frame_state::FrameState;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};

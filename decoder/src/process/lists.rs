@@ -1,6 +1,7 @@
 //! The units behind the last frame: operating points, index, end. Clauses 6.16, 6.10, 6.11.
 
-use super::{Decoder, after, element_at, same};
+use super::Decoder;
+use super::expected::{after, element_at, same};
 use splatstream_format::Result;
 use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{EndOfStream, IndexEntry, IndexHeader};

@@ -1,8 +1,7 @@
 //! Frames of profile Intra: refinement units, clause 7.1.3.
 
-use super::{
-    DecodedFrame, Decoder, FrameUnits, PendingFrame, element_at, keep, same, unexpected, unit_bytes,
-};
+use super::expected::{element_at, same, unexpected};
+use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, keep, unit_bytes};
 use crate::digest::{UnitDigest, frame_digest, unit_digest};
 use crate::frame::QuantizedFrame;
 use crate::gop::Gop;
