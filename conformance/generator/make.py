@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes all vectors: make.py FOLDER [--check] [--jobs N] [--only TEXT]
+"""Writes all vectors and their MANIFEST: make.py FOLDER [--check] [--jobs N] [--only TEXT]
 
 With --check nothing is written: what is there is compared with what would be, and differences end with exit code 1.
 """
@@ -10,6 +10,7 @@ import os
 import shutil
 import sys
 
+import manifest
 import oracle_path  # noqa: F401
 import patches
 import schema_check
@@ -101,6 +102,10 @@ def main():
             problems.append("not in the catalogue: " + folder)
         else:
             shutil.rmtree(folder)
+    if options.check:
+        problems += manifest.problems(options.folder)
+    else:
+        manifest.write(options.folder)
     print("\n".join(problems + ["%d vectors, %d bytes, %d problems" % (count, size, len(problems))]))
     return 1 if problems else 0
 
