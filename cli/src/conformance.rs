@@ -52,9 +52,9 @@ struct SuiteArgs {
     /// The folder of the vectors, or the one above it.
     #[arg(long, value_name = "DIR", default_value = "conformance/vectors")]
     suite: PathBuf,
-    /// Only vectors whose names match a pattern, such as 'temporal-*'.
+    /// Only vectors whose names match a pattern, such as 'temporal-*', or cases, vector@op or vector@op/mode. Several add up.
     #[arg(long, value_name = "GLOB")]
-    filter: Option<String>,
+    filter: Vec<String>,
     /// Only vectors of an area.
     #[arg(long, value_name = "AREA")]
     area: Option<String>,
@@ -75,8 +75,9 @@ impl SuiteArgs {
             std::path::absolute(&self.suite).map_err(|error| Failure::file("find", &self.suite, &error))?;
         if !folder.is_dir() {
             let path = self.suite.display();
+            let what = if folder.exists() { "this is a file" } else { "there is no such directory" };
             let advice = "give the folder of the vectors with --suite DIR; they are in conformance/vectors of the repository";
-            return Err(Failure::other(format!("{path}: there is no such directory\n  {advice}")));
+            return Err(Failure::other(format!("{path}: {what}\n  {advice}")));
         }
         Suite::read(&folder).map_err(refused)
     }

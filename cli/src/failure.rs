@@ -20,8 +20,10 @@ pub(crate) enum Failure {
     },
     /// Files and settings.
     Other(String),
-    /// A decoder under test failed; the report has said so.
-    Decoder,
+    /// A decoder under test failed; where to read more.
+    Decoder(String),
+    /// The user ended a run; how far it had come.
+    Interrupted(String),
     /// The verdict on a stream in the words of the conformance protocol.
     Verdict {
         /// Exit code of its class.
@@ -53,12 +55,13 @@ impl Failure {
         Self::Stream { path: path.to_path_buf(), error }
     }
 
-    /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error.
+    /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error, 130 interrupted.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
             Self::Other(_) => 1,
-            Self::Decoder => 3,
+            Self::Decoder(_) => 3,
+            Self::Interrupted(_) => 130,
             Self::Verdict { exit_code, .. } => *exit_code,
             Self::Stream { error, .. } => error.class().exit_code(),
         }
@@ -68,9 +71,10 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(message) => write!(f, "{message}\n  splatstream COMMAND --help shows an example"),
-            Self::Other(message) => f.write_str(message),
-            Self::Decoder => f.write_str("the decoder failed: see the report"),
+            Self::Usage(message)
+            | Self::Other(message)
+            | Self::Decoder(message)
+            | Self::Interrupted(message) => f.write_str(message),
             Self::Verdict { line, .. } => f.write_str(line),
             Self::Stream { path, error } => {
                 let path = path.display();

@@ -30,9 +30,10 @@ mod table;
 mod train;
 mod validate;
 
-use clap::{Parser, Subcommand};
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::Console;
 use failure::Failure;
+use std::iter;
 use std::process::ExitCode;
 
 /// SplatStream: scalable, exact bitstreams of dynamic 3D Gaussian splatting.
@@ -42,7 +43,7 @@ use std::process::ExitCode;
     about,
     after_help = "Example:\n  splatstream demo\n\n\
         Exit codes: 0 done, 1 files or settings, 2 usage, 3 a decoder that failed; of streams: 10 malformed, 11 invalid,\n\
-        12 unsupported, 13 over a limit, 14 truncated.\n\
+        12 unsupported, 13 over a limit, 14 truncated; 130 interrupted.\n\
         The keys that --json prints are described in cli/json.md."
 )]
 struct Cli {
@@ -72,15 +73,26 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = Cli::command().get_matches();
+    let command = name_of(&matches);
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let console = Console::new(cli.json);
     match in_threads(cli.threads, || cli.command.run(&console)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             console.complain(&failure.to_string());
+            if matches!(failure, Failure::Usage(_)) {
+                console.complain(&format!("  {command} --help shows an example"));
+            }
             ExitCode::from(failure.exit_code())
         }
     }
+}
+
+/// The command with its subcommands, as it was called.
+fn name_of(matches: &ArgMatches) -> String {
+    let below = iter::successors(matches.subcommand(), |(_, matches)| matches.subcommand());
+    iter::once("splatstream").chain(below.map(|(name, _)| name)).collect::<Vec<_>>().join(" ")
 }
 
 /// Runs `work` with so many threads.

@@ -1,11 +1,19 @@
 //! A progress bar on standard error; none where that is not a terminal.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::{self, IsTerminal};
-use std::time::Duration;
+use std::io::{self, IsTerminal, Write};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Between two lines where nobody sees a bar.
+const LINES: Duration = Duration::from_secs(30);
 
 /// How far a command has come.
-pub(crate) struct Progress(ProgressBar);
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    /// The last line, of a command that writes lines instead of a bar.
+    line: Option<Mutex<Instant>>,
+}
 
 impl Progress {
     /// A bar for `frames` frames; 0 if their number is not known. `verb` is "encoding" or the like.
@@ -13,9 +21,11 @@ impl Progress {
         Self::new(frames, "{msg} {wide_bar} {pos}/{len} frames, {eta} left").named(verb)
     }
 
-    /// A bar for `cases` cases of a conformance suite.
+    /// A bar for `cases` cases of a conformance suite; where standard error is no terminal, a line now and then.
     pub(crate) fn cases(cases: u32) -> Self {
-        Self::new(cases, "testing {wide_bar} {pos}/{len} cases, {eta} left")
+        let mut progress = Self::new(cases, "testing {wide_bar} {pos}/{len} cases, {eta} left");
+        progress.line = (!io::stderr().is_terminal()).then(|| Mutex::new(Instant::now()));
+        progress
     }
 
     /// A bar for `steps` steps that take about the same time, each with a name.
@@ -35,32 +45,39 @@ impl Progress {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self(bar)
+        Self { bar, line: None }
     }
 
     fn named(self, name: &'static str) -> Self {
-        self.0.set_message(name);
+        self.bar.set_message(name);
         self
     }
 
     /// `done` frames are done.
     pub(crate) fn at(&self, done: u32) {
-        self.0.set_position(done.into());
+        self.bar.set_position(done.into());
     }
 
     /// The step that is under way.
     pub(crate) fn step(&self, name: String) {
-        self.0.set_message(name);
+        self.bar.set_message(name);
     }
 
     /// A step is done.
     pub(crate) fn advance(&self) {
-        self.0.inc(1);
+        self.bar.inc(1);
+        let Some(line) = &self.line else { return };
+        let mut last = line.lock().unwrap_or_else(PoisonError::into_inner);
+        if last.elapsed() >= LINES {
+            *last = Instant::now();
+            let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
+            let _nobody_listens = writeln!(io::stderr().lock(), "{done} of {all} cases");
+        }
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
     }
 }

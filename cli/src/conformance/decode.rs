@@ -1,6 +1,7 @@
 //! `splatstream conformance decode`: our decoder as the conformance suite asks decoders.
 
 use crate::failure::Failure;
+use crate::output_file::make_directory;
 use clap::Args;
 use splatstream_conformance::protocol::{Diagnosis, Request};
 use splatstream_conformance::reference;
@@ -29,7 +30,7 @@ pub(super) struct Decode {
     /// full, or subset: only what the units of the operating point hold.
     #[arg(long, value_name = "MODE", default_value = "full")]
     mode: Mode,
-    /// A folder for the planes, fNNNN.ATTRIBUTE.i32 and fNNNN.f32.
+    /// A folder for fNNNN.ATTRIBUTE.i32, fNNNN.f32 and uNNNN.entropy; it is made if it is not there.
     #[arg(long, value_name = "DIR", required_unless_present = "stdio")]
     out: Option<PathBuf>,
     /// Answer requests from standard input, a line each: IN tab OP tab MODE tab OUT.
@@ -44,10 +45,11 @@ impl Decode {
             return serve(io::stdin().lock(), io::stdout().lock(), reference::answer)
                 .map_err(|error| failure(&error));
         };
+        make_directory(out)?;
         let request =
             Request { input: input.clone(), op: self.op.to_string(), mode: self.mode, out: out.clone() };
-        let (exit_code, diagnosis) = reference::answer(&request)
-            .map_err(|error| Failure::other(format!("{} to {}: {error}", input.display(), out.display())))?;
+        let (exit_code, diagnosis) =
+            reference::answer(&request).map_err(|error| Failure::other(error.to_string()))?;
         diagnosis.map_or(Ok(()), |diagnosis| Err(verdict(exit_code, &diagnosis)))
     }
 }

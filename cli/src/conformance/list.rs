@@ -6,8 +6,9 @@ use crate::failure::Failure;
 use clap::Args;
 use serde::Serialize;
 use splatstream_conformance::case::Case;
+use splatstream_conformance::report::summary::counted;
 
-/// List the vectors of the suite, what each is for, and its cases.
+/// List the vectors of the suite: what each is for, the right answer, its cases, clauses, features and requirements.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream conformance list --kind valid --area temporal\n  \
     splatstream conformance list --requirement SS-PR-003 --json")]
@@ -64,11 +65,12 @@ fn text(rows: &[Row<'_>], cases: usize) -> String {
     for group in rows.chunk_by(|a, b| (a.kind, a.area) == (b.kind, b.area)) {
         let Some(Row { kind, area, .. }) = group.first() else { continue };
         text += &format!("{kind}/{area}\n");
-        for Row { vector, purpose, expect, cases, clauses, .. } in group {
-            let plural = if cases.len() == 1 { "" } else { "s" };
+        for Row { vector, purpose, expect, cases, clauses, features, requirements, .. } in group {
             text += &format!("  {vector}: {purpose}\n");
-            text += &format!("    {expect}; {} case{plural}; {}\n", cases.len(), clauses.join(", "));
+            text += &format!("    {expect}; {}; {}\n", counted(cases.len(), "case"), clauses.join(", "));
+            let more: Vec<&str> = features.iter().chain(*requirements).map(String::as_str).collect();
+            text += &format!("    {}\n", more.join(", "));
         }
     }
-    text + &format!("{} vectors, {cases} cases\n", rows.len())
+    text + &format!("{}, {}\n", counted(rows.len(), "vector"), counted(cases, "case"))
 }

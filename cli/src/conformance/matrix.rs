@@ -8,11 +8,12 @@ use clap::Args;
 use serde::Serialize;
 use splatstream_conformance::matrix;
 use splatstream_conformance::report::Report;
+use splatstream_conformance::report::summary::counted;
 use std::path::PathBuf;
 
 /// Make a page of features and decoders from reports of runs.
 ///
-/// A Yes is written only where the report says that every valid case with the feature was run and passed.
+/// A Yes is written only where the report says that every valid case of the whole suite with the feature was run and passed.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream conformance matrix ours.json theirs.json -o DECODERS.md")]
 pub(super) struct Matrix {
@@ -43,6 +44,6 @@ impl Matrix {
         OutputFile::write(&self.out, matrix::page(&reports).as_bytes())?;
         let decoders = reports.iter().map(|report| report.decoder.name.as_str()).collect();
         let written = Written { output: &self.out, decoders };
-        console.report(&written, || format!("{}: {} decoders", self.out.display(), reports.len()))
+        console.report(&written, || format!("{}: {}", self.out.display(), counted(reports.len(), "decoder")))
     }
 }

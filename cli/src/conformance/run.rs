@@ -7,13 +7,15 @@ use crate::output_file::OutputFile;
 use crate::progress::Progress;
 use clap::Args;
 use splatstream_conformance::capabilities::Capabilities;
-use splatstream_conformance::command::{Template, split};
+use splatstream_conformance::command::{Template, shell_word, split_persistent};
 use splatstream_conformance::expectations::Expectations;
 use splatstream_conformance::limits::{Limits, Size};
 use splatstream_conformance::reference;
 use splatstream_conformance::report::{Report, junit, markdown, summary};
 use splatstream_conformance::run::{Settings, run};
 use splatstream_conformance::session::Decoder;
+use splatstream_conformance::stop::Stop;
+use splatstream_conformance::suite::Suite;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -28,13 +30,13 @@ use std::time::Duration;
     splatstream conformance run --decoder './mydec {in} {op} {mode} {out}' --capabilities mydec.json \\\n      \
     --expectations mydec.txt --report mydec-report.json --junit mydec.xml\n\n\
     Exit codes: 0 every case passed that the decoder claims, 1 files or settings, 2 usage,\n\
-    3 some case failed, or an expectation no longer holds.")]
+    3 some case failed, or an expectation no longer holds, 130 interrupted.")]
 pub(super) struct Run {
     /// The command of the decoder, once a case: {in} is the stream, {out} an empty folder, {op} like s0,t0,r2, {mode} full
-    /// or subset. It is split as a shell would; no shell runs.
+    /// or subset. Both paths are absolute. It is split as a shell would; no shell runs, so write sh -c '...' for pipes.
     #[arg(long, value_name = "CMD", conflicts_with = "stdio")]
     decoder: Option<String>,
-    /// The command of a decoder that answers many cases, line by line.
+    /// The command of a decoder that answers many cases, line by line; --jobs N starts N of them.
     #[arg(long, value_name = "CMD")]
     stdio: Option<String>,
     #[command(flatten)]
@@ -45,15 +47,15 @@ pub(super) struct Run {
     /// Cases that the decoder is known to fail, one a line: vector[@op[/mode]] outcome  # why.
     #[arg(long, value_name = "FILE.txt")]
     expectations: Option<PathBuf>,
-    /// Count a wrong error code as a failure, not as a warning.
+    /// Demand the code of each error, and the right one: without it a wrong code is a warning.
     #[arg(long)]
     strict: bool,
     /// Cases at a time [default: one a processor].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Seconds that a case may take.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86400))]
-    time: u32,
+    /// Seconds that a case may take. A slow decoder needs 60 or more.
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = parse_seconds)]
+    time: Duration,
     /// Memory that a case may take.
     #[arg(long, value_name = "SIZE", default_value_t = Size(Limits::default().memory))]
     memory: Size,
@@ -75,19 +77,53 @@ impl Run {
     /// Runs, writes the reports; fails if the decoder did.
     pub(super) fn run(&self, console: &Console) -> Result<(), Failure> {
         let settings = self.settings()?;
-        let expectations =
-            self.expectations.as_deref().map(Expectations::read).transpose().map_err(refused)?;
+        if let Some(word) = shell_word(settings.decoder.words()) {
+            console
+                .complain(&format!("warning: '{word}' is for a shell, and no shell runs; use sh -c '...'"));
+        }
         let suite = self.suite.read()?;
+        if let Some(complaint) = suite.complaint() {
+            console.complain(&format!("warning: {complaint}"));
+        }
+        let expectations = self.expectations(&suite)?;
         let cases = self.suite.cases(&suite)?;
+        if cases.iter().all(|case| settings.capabilities.missing(case).is_some()) {
+            return Err(Failure::other("the capabilities claim none of the selected cases"));
+        }
+        stop_on_signals(&settings.stop)?;
         let progress = Progress::cases(u32::try_from(cases.len()).unwrap_or(u32::MAX));
         let mut results = run(&cases, &settings, |_| progress.advance()).map_err(refused)?;
         drop(progress);
         let selection = self.suite.selection();
-        let stale = expectations.unwrap_or_default().apply(&mut results, selection.is_everything());
+        let stale = expectations.apply(&mut results);
         let report = Report::new(&suite, &settings, &selection, results, stale);
         self.write(&report)?;
         console.report(&report, || summary::text(&report))?;
-        if report.is_good() { Ok(()) } else { Err(Failure::Decoder) }
+        self.verdict(&report)
+    }
+
+    fn expectations(&self, suite: &Suite) -> Result<Expectations, Failure> {
+        let read = |path: &PathBuf| Expectations::read(path, suite).map_err(refused);
+        self.expectations.as_ref().map_or_else(|| Ok(Expectations::default()), read)
+    }
+
+    /// Whether the decoder did what it claims, and where to read more.
+    fn verdict(&self, report: &Report) -> Result<(), Failure> {
+        let path = self.report.as_ref().or(self.markdown.as_ref()).or(self.junit.as_ref());
+        if let Some(selected) = report.interrupted {
+            let written = path.map_or_else(String::new, |path| format!("; report: {}", path.display()));
+            let done = report.cases.len();
+            return Err(Failure::Interrupted(format!(
+                "interrupted after {done} of {selected} cases{written}"
+            )));
+        }
+        match path {
+            _ if report.is_good() => Ok(()),
+            Some(path) => Err(Failure::Decoder(format!("the decoder failed: see {}", path.display()))),
+            None => {
+                Err(Failure::Decoder("the decoder failed; --report FILE.json keeps all of it".to_owned()))
+            }
+        }
     }
 
     fn settings(&self) -> Result<Settings, Failure> {
@@ -95,16 +131,16 @@ impl Run {
         let capabilities = match &self.capabilities {
             Some(path) => Capabilities::read(path).map_err(refused)?,
             None if self.is_ours() => reference::capabilities(),
-            None => Capabilities::everything(&name(decoder.program())),
+            None => Capabilities::everything(&name(decoder.words())),
         };
+        if let Decoder::Once(template) = &decoder {
+            template.check_claim(&capabilities).map_err(refused)?;
+        }
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
-        let limits = Limits {
-            time: Duration::from_secs(self.time.into()),
-            memory: self.memory.0,
-            output: self.output.0,
-        };
+        let limits = Limits { time: self.time, memory: self.memory.0, output: self.output.0 };
         let jobs = self.jobs.map_or(processors, usize::from);
-        Ok(Settings { decoder, capabilities, limits, strict: self.strict, jobs })
+        let (strict, stop) = (self.strict, Stop::default());
+        Ok(Settings { decoder, capabilities, limits, strict, jobs, stop })
     }
 
     fn decoder(&self) -> Result<Decoder, Failure> {
@@ -112,7 +148,7 @@ impl Run {
             return Ok(Decoder::Once(Template::parse(command).map_err(refused)?));
         }
         if let Some(command) = &self.stdio {
-            return Ok(Decoder::Persistent(split(command).map_err(refused)?));
+            return Ok(Decoder::Persistent(split_persistent(command).map_err(refused)?));
         }
         let us = std::env::current_exe()
             .map_err(|error| Failure::other(format!("cannot find this program to test it: {error}")))?;
@@ -140,8 +176,22 @@ impl Run {
 }
 
 /// What a decoder is called that did not say: its program, without folders.
-fn name(program: &str) -> String {
+fn name(words: &[String]) -> String {
+    let program = words.first().map_or("", String::as_str);
     Path::new(program)
         .file_name()
         .map_or_else(|| program.to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Lets whoever interrupts or ends this program end the run instead: what was found so far is told, and nothing is left.
+fn stop_on_signals(stop: &Stop) -> Result<(), Failure> {
+    let stop = stop.clone();
+    ctrlc::set_handler(move || stop.set())
+        .map_err(|error| Failure::other(format!("cannot listen to signals: {error}")))
+}
+
+/// A time in seconds, which need not be whole.
+fn parse_seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| (0.001..=86_400.0).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "write seconds, 0.001 to 86400".to_owned())
 }

@@ -4,12 +4,13 @@
 use splatstream_conformance::capabilities::Capabilities;
 use splatstream_conformance::case::Case;
 use splatstream_conformance::command::{Template, split};
-use splatstream_conformance::difference::Symptom;
 use splatstream_conformance::limits::Limits;
 use splatstream_conformance::result::CaseResult;
 use splatstream_conformance::run::{Settings, run};
 use splatstream_conformance::session::Decoder;
+use splatstream_conformance::stop::Stop;
 use splatstream_conformance::suite::{Located, Suite};
+use splatstream_conformance::symptom::Symptom;
 use splatstream_conformance::vector::{Kind, Mode};
 use splatstream_format::Class;
 use std::collections::BTreeSet;
@@ -62,7 +63,14 @@ fn rich(suite: &Suite) -> &Located {
 
 fn settings(decoder: Decoder) -> Settings {
     let limits = Limits { time: Duration::from_secs(20), memory: 256 << 20, output: 32 << 20 };
-    Settings { decoder, capabilities: Capabilities::everything("planted"), limits, strict: false, jobs: 2 }
+    Settings {
+        decoder,
+        capabilities: Capabilities::everything("planted"),
+        limits,
+        strict: false,
+        jobs: 2,
+        stop: Stop::default(),
+    }
 }
 
 fn once(fault: &str) -> Decoder {

@@ -1,6 +1,6 @@
 //! What a decoder answered, as it is: how it ended, what it said. Whether that is right is for [`crate::judge`].
 
-use crate::protocol::Diagnosis;
+use crate::protocol::Said;
 use std::process::ExitStatus;
 use std::time::Duration;
 
@@ -19,6 +19,8 @@ pub enum Ending {
     TooMuchOutput,
     /// A persistent process said something that is no answer.
     NoAnswer,
+    /// The run was stopped; of the case nothing is known.
+    Stopped,
 }
 
 /// The answer to a case.
@@ -27,7 +29,9 @@ pub struct Answer {
     /// How it ended.
     pub ending: Ending,
     /// What it said about its verdict.
-    pub diagnosis: Option<Diagnosis>,
+    pub said: Said,
+    /// How it broke the protocol or passed a limit, in words.
+    pub fault: Option<String>,
     /// The end of its standard error.
     pub complaint: String,
     /// Wall time.

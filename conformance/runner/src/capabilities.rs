@@ -2,6 +2,8 @@
 
 use crate::case::Case;
 use crate::error::{Error, Result, read_json};
+use crate::feature;
+use crate::nearest::nearest;
 use crate::vector::Mode;
 use serde::{Deserialize, Serialize};
 use splatstream_format::Class;
@@ -73,7 +75,8 @@ impl Capabilities {
     /// Reads a claim.
     ///
     /// # Errors
-    /// The file cannot be read, or is no claim.
+    /// The file cannot be read, or is no claim, or claims what there is not: a word that nobody knows would be passed over, and
+    /// the cases with it.
     pub fn read(path: &Path) -> Result<Self> {
         let claim: Self = read_json(path)?;
         if claim.schema != SCHEMA {
@@ -82,7 +85,29 @@ impl Capabilities {
                 format!("the schema is {}, this runner knows {SCHEMA}", claim.schema),
             ));
         }
-        Ok(claim)
+        match claim.unknown() {
+            Some(message) => Err(Error::content(path, message)),
+            None => Ok(claim),
+        }
+    }
+
+    /// What is claimed and does not exist, and what does.
+    fn unknown(&self) -> Option<String> {
+        if self.name.trim().is_empty() {
+            return Some("the name is empty; reports need one".to_owned());
+        }
+        if let Some(profile) = self.profiles.iter().find(|profile| !all_profiles().contains(profile)) {
+            return Some(format!("there is no profile {profile}; there are 0 and 1"));
+        }
+        if !(1..=highest_level()).contains(&self.level) {
+            return Some(format!("there is no level {}; there are 1 to {}", self.level, highest_level()));
+        }
+        let claimed = self.features.iter().flatten();
+        let stranger = claimed.into_iter().find(|claimed| feature::names().all(|name| name != *claimed))?;
+        let all: Vec<&str> = feature::names().collect();
+        let near = nearest(stranger, feature::names());
+        let near = near.first().map_or("", |name| name);
+        Some(format!("there is no feature '{stranger}', perhaps {near}; there are {}", all.join(", ")))
     }
 
     /// What a case needs that is not claimed; none if everything is. A stream that every decoder shall call

@@ -24,7 +24,7 @@ impl<'a> Case<'a> {
         suite.vectors.iter().flat_map(Self::of).collect()
     }
 
-    fn of(Located { vector, stream }: &'a Located) -> Vec<Self> {
+    fn of(Located { vector, stream, .. }: &'a Located) -> Vec<Self> {
         let case = |point| Case { vector, stream, point };
         match vector.points.as_slice() {
             [] => vec![case(None)],

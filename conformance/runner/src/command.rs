@@ -1,9 +1,15 @@
 //! The command of a decoder under test. It is split as a shell splits it, and no shell runs.
 
+use crate::capabilities::{Capabilities, Points};
 use crate::error::{Error, Result};
 use crate::protocol::Request;
+use crate::vector::Mode;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::process::Command;
+
+/// What stands in a command for what is asked.
+const PLACES: [&str; 4] = ["{in}", "{op}", "{mode}", "{out}"];
 
 /// A command with places for what is asked: `{in}`, `{op}`, `{mode}`, `{out}`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,18 +21,48 @@ impl Template {
     /// A command that is run for each case.
     ///
     /// # Errors
-    /// A quote is left open, or `{in}` or `{out}` has no place.
+    /// A quote is left open, `{in}` or `{out}` has no place, or something else is in braces.
     pub fn parse(text: &str) -> Result<Self> {
         let words = split(text)?;
+        if let Some(name) = words.iter().flat_map(|word| names_in_braces(word)).find(|name| !is_place(name)) {
+            let message = format!("'{{{name}}}' is no placeholder; there are {}", PLACES.join(" "));
+            return Err(Error::Usage(message));
+        }
+        let template = Self { words };
         for place in ["{in}", "{out}"] {
-            if !words.iter().any(|word| word.contains(place)) {
+            if !template.has(place) {
                 let message = format!(
                     "the command has no {place}; write --decoder 'CMD {{in}} {{op}} {{mode}} {{out}}'"
                 );
                 return Err(Error::Usage(message));
             }
         }
-        Ok(Self { words })
+        Ok(template)
+    }
+
+    /// Whether the decoder is told all that its claim lets it be asked.
+    ///
+    /// # Errors
+    /// `{op}` or `{mode}` has no place, and the claim is not of one point or mode alone.
+    pub fn check_claim(&self, claim: &Capabilities) -> Result<()> {
+        let lacks = [
+            ("{op}", "operating point", "\"points\": \"full\"", claim.points == Points::Full),
+            ("{mode}", "mode", "\"modes\": [\"full\"]", claim.modes == [Mode::Full]),
+        ];
+        for (place, what, narrow, is_narrow) in lacks {
+            if !self.has(place) && !is_narrow {
+                let message = format!(
+                    "the command has no {place}, so that the decoder is not told the {what}\n  \
+                    add {place}, or claim {narrow} alone in a file for --capabilities"
+                );
+                return Err(Error::Usage(message));
+            }
+        }
+        Ok(())
+    }
+
+    fn has(&self, place: &str) -> bool {
+        self.words.iter().any(|word| word.contains(place))
     }
 
     /// The words of the command for a request.
@@ -41,10 +77,26 @@ impl Template {
         self.words.iter().map(fill).collect()
     }
 
-    /// The program.
-    pub fn program(&self) -> &str {
-        self.words.first().map_or("", String::as_str)
+    /// The words with their places.
+    pub fn raw_words(&self) -> &[String] {
+        &self.words
     }
+}
+
+fn is_place(name: &str) -> bool {
+    PLACES.iter().any(|place| place.strip_prefix('{').and_then(|place| place.strip_suffix('}')) == Some(name))
+}
+
+/// What stands in braces in a text and looks like a name. `${NAME}` is a shell's.
+fn names_in_braces(text: &str) -> impl Iterator<Item = &str> {
+    let is_name =
+        |name: &&str| name.starts_with(char::is_alphabetic) && !name.contains(|c: char| !c.is_alphanumeric());
+    let named = move |(at, _): (usize, &str)| {
+        let (before, brace) = text.split_at(at);
+        let (name, _) = brace.strip_prefix('{')?.split_once('}')?;
+        Some(name).filter(is_name).filter(|_| !before.ends_with('$'))
+    };
+    text.match_indices('{').filter_map(named)
 }
 
 /// The words of a command.
@@ -58,6 +110,27 @@ pub fn split(text: &str) -> Result<Vec<String>> {
     })
 }
 
+/// The words of a command whose process answers many requests.
+///
+/// # Errors
+/// As [`split`]; or there are places, which nobody would fill.
+pub fn split_persistent(text: &str) -> Result<Vec<String>> {
+    let words = split(text)?;
+    if let Some(place) = PLACES.into_iter().find(|place| words.iter().any(|word| word.contains(place))) {
+        let message = format!("--stdio has no {place}: requests come on standard input; --decoder has");
+        return Err(Error::Usage(message));
+    }
+    Ok(words)
+}
+
+/// A word that means something to a shell alone, if there is one.
+pub fn shell_word(words: &[String]) -> Option<&str> {
+    const OPERATORS: [&str; 10] = ["|", "||", "&", "&&", ";", "<", ">", ">>", "2>", "2>&1"];
+    let first = words.first().filter(|word| *word == "cd" || word.contains('='));
+    let operator = words.iter().find(|word| OPERATORS.contains(&word.as_str()) || word.ends_with(';'));
+    first.or(operator).map(String::as_str)
+}
+
 /// A command made of words.
 pub(crate) fn of(words: &[String]) -> Command {
     let (program, arguments) =
@@ -67,10 +140,35 @@ pub(crate) fn of(words: &[String]) -> Command {
     command
 }
 
+/// Why a command does not start, and what to do.
+pub(crate) fn cannot_start(words: &[String], source: &io::Error) -> Error {
+    /// The error of a file that is no program of this machine.
+    const ENOEXEC: i32 = 8;
+    let program = words.first().cloned().unwrap_or_default();
+    let path = Path::new(&program);
+    let why = if let Some(word) = shell_word(words) {
+        format!("'{word}' is for a shell, and no shell runs; use sh -c '...'")
+    } else if path.is_dir() {
+        "it is a folder\n  name the program in it".to_owned()
+    } else if source.kind() == ErrorKind::NotFound && path.is_file() {
+        "the interpreter that its first line names is not there".to_owned()
+    } else if source.kind() == ErrorKind::NotFound {
+        "there is no such program\n  check the path; a name without / is looked for in PATH".to_owned()
+    } else if source.kind() == ErrorKind::PermissionDenied {
+        format!("it is not executable\n  chmod +x {program}")
+    } else if source.raw_os_error() == Some(ENOEXEC) {
+        "it is no program for this machine and no script\n  a script starts with #! and its interpreter, as in \
+            #!/usr/bin/env python3"
+            .to_owned()
+    } else {
+        format!("{source}\n  check the path and that it can be executed")
+    };
+    Error::Start { program, why }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::Mode;
 
     #[test]
     fn places_are_filled_inside_words_and_quotes_hold_words_together() {
@@ -90,5 +188,50 @@ mod tests {
         for wrong in ["", "decoder {in}", "decoder {out}", "'decoder {in} {out}"] {
             assert!(Template::parse(wrong).is_err(), "{wrong}");
         }
+        let error = Template::parse("decoder {in} {mod} {out}").unwrap_err().to_string();
+        assert_eq!(error, "'{mod}' is no placeholder; there are {in} {op} {mode} {out}");
+        assert!(Template::parse("sh -c 'echo ${HOME} {} {\"a\":1}' {in} {out}").is_ok());
+        assert!(split_persistent("decoder {in}").is_err());
+    }
+
+    #[test]
+    fn who_is_not_told_point_or_mode_claims_one_of_them() {
+        let narrow = |points, modes: &[Mode]| Capabilities {
+            points,
+            modes: modes.to_vec(),
+            ..Capabilities::everything("mine")
+        };
+        let check =
+            |command: &str, claim: &Capabilities| Template::parse(command).unwrap().check_claim(claim);
+        let all = narrow(Points::All, &[Mode::Full, Mode::Subset]);
+        assert!(check("decoder {in} {op} {mode} {out}", &all).is_ok());
+        assert!(
+            check("decoder {in} {mode} {out}", &all)
+                .unwrap_err()
+                .to_string()
+                .contains("\"points\": \"full\"")
+        );
+        assert!(
+            check("decoder {in} {op} {out}", &all).unwrap_err().to_string().contains("\"modes\": [\"full\"]")
+        );
+        assert!(check("decoder {in} {out}", &narrow(Points::Full, &[Mode::Full])).is_ok());
+    }
+
+    #[test]
+    fn a_command_that_does_not_start_is_told_why() {
+        let folder = tempfile::tempdir().unwrap();
+        let script = folder.path().join("script");
+        std::fs::write(&script, "exit 0\n").unwrap();
+        let why = |words: &[&str], kind: ErrorKind| {
+            let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
+            cannot_start(&words, &io::Error::from(kind)).to_string()
+        };
+        let (folder, script) = (folder.path().to_str().unwrap(), script.to_str().unwrap());
+        assert!(why(&["cd", "x", "&&", "mydec"], ErrorKind::NotFound).contains("'cd' is for a shell"));
+        assert!(why(&["nowhere", "|", "cat"], ErrorKind::NotFound).contains("'|' is for a shell"));
+        assert!(why(&[folder], ErrorKind::PermissionDenied).contains("is a folder"));
+        assert!(why(&[script], ErrorKind::PermissionDenied).contains("chmod +x"));
+        assert!(why(&[script], ErrorKind::NotFound).contains("interpreter"));
+        assert!(why(&["nowhere"], ErrorKind::NotFound).contains("no such program"));
     }
 }

@@ -10,8 +10,11 @@ use crate::digest;
 use crate::judge::Files;
 use crate::output::Output;
 use crate::reference::Decoded;
+use crate::resemblance;
+use crate::symptom::Symptom;
 use crate::vector::{Point, State};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The first value that differs: of the first wrong frame in the order of coding, since faults spread from there, the
 /// first attribute, and of that the first Gaussian.
@@ -56,47 +59,6 @@ pub struct Value {
     pub differing: u64,
 }
 
-/// What a fault resembles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Symptom {
-    /// No planes were written at all.
-    NothingWritten,
-    /// The files are right for another operating point.
-    OtherPoint,
-    /// The files are right for the other mode.
-    OtherMode,
-    /// All frames of a type are missing, and no others.
-    TypeMissing,
-    /// A frame has more or fewer Gaussians.
-    OtherCount,
-    /// The same Gaussians in another order.
-    OtherOrder,
-    /// The values are those before compensation (7.18.3).
-    Uncompensated,
-    /// Every value that differs does so by one.
-    OffByOne,
-    /// Nearly nothing is right.
-    Unrelated,
-}
-
-impl Symptom {
-    /// For people.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::NothingWritten => "nothing was written",
-            Self::OtherPoint => "the files are right for another operating point",
-            Self::OtherMode => "the files are right for the other mode",
-            Self::TypeMissing => "all frames of one type are missing",
-            Self::OtherCount => "another number of Gaussians",
-            Self::OtherOrder => "the same Gaussians in another order",
-            Self::Uncompensated => "the values are those before compensation, 7.18.3",
-            Self::OffByOne => "what differs is off by one",
-            Self::Unrelated => "nearly nothing is right",
-        }
-    }
-}
-
 /// Looks at the files of a case that failed by them.
 pub(crate) fn explain(case: &Case<'_>, output: &Output) -> (Option<Symptom>, Option<Difference>) {
     let files = Files::compare(case, output);
@@ -129,8 +91,11 @@ pub(crate) fn explain(case: &Case<'_>, output: &Output) -> (Option<Symptom>, Opt
     let more: Vec<String> = more.collect();
     difference.read.extend(more);
     let of_values = symptom.filter(|&symptom| symptom != Symptom::Unrelated || files.wrong.len() > 1);
-    // Values before compensation are those of a higher point too, as far as that has the same Gaussians.
-    let best = of_values.filter(|&symptom| symptom == Symptom::Uncompensated).or(whole).or(of_values);
+    // Values before compensation are those of a higher point too, as far as that has the same Gaussians; the other mode
+    // differs in compensation too, and in more.
+    let is_other_mode = whole == Some(Symptom::OtherMode);
+    let uncompensated = of_values.filter(|&symptom| symptom == Symptom::Uncompensated && !is_other_mode);
+    let best = uncompensated.or(whole).or(of_values);
     (best, Some(difference))
 }
 
@@ -150,20 +115,21 @@ impl Difference {
         if state.planes.get(&self.attribute) != Some(&digest::sha256(&to_bytes(&expected))) {
             return None;
         }
+        let symptom =
+            resemblance::of_file(&expected, found, shown.len(), &self.attribute.values(&frame.planes));
         if found.len() != expected.len().saturating_mul(4) {
             self.bytes_found = Some(found.len() as u64);
             self.read.extend(["7.9", "7.18.2"].map(str::to_owned));
-            return Some(Symptom::OtherCount);
+            return symptom;
         }
-        let found = from_bytes(found);
-        self.value = first(&expected, &found, shown.len());
+        self.value = first(&expected, &from_bytes(found), shown.len());
         let gaussian = self.value.map_or(0, |value| value.gaussian);
         let (carrier, clauses) = carriers.find(frame, gaussian, self.attribute);
-        let symptom = resemblance(&expected, &found, shown.len(), &self.attribute.values(&frame.planes));
         self.carrier = carrier;
         let first = match symptom {
             Some(Symptom::Uncompensated) => &["7.18.3"][..],
             Some(Symptom::OtherOrder) => &["7.9", "7.18.2"],
+            Some(Symptom::OtherPlanes | Symptom::Interleaved | Symptom::BigEndian) => &["7.9"],
             _ => clauses,
         };
         self.read.extend(first.iter().map(|&clause| clause.to_owned()));
@@ -186,31 +152,6 @@ fn first(expected: &[i32], found: &[i32], gaussians: usize) -> Option<Value> {
     })
 }
 
-/// What wrong values of the right number resemble.
-fn resemblance(expected: &[i32], found: &[i32], gaussians: usize, uncompensated: &[i32]) -> Option<Symptom> {
-    if found == uncompensated {
-        return Some(Symptom::Uncompensated);
-    }
-    if sorted_rows(expected, gaussians) == sorted_rows(found, gaussians) {
-        return Some(Symptom::OtherOrder);
-    }
-    let errors: Vec<u32> =
-        expected.iter().zip(found).map(|(&a, &b)| a.abs_diff(b)).filter(|&error| error > 0).collect();
-    if errors.iter().all(|&error| error == 1) {
-        return Some(Symptom::OffByOne);
-    }
-    (errors.len().saturating_mul(10) >= expected.len().saturating_mul(9)).then_some(Symptom::Unrelated)
-}
-
-/// The Gaussians of an attribute, each with its values, in an order of their own.
-fn sorted_rows(values: &[i32], gaussians: usize) -> Vec<Vec<i32>> {
-    let planes: Vec<&[i32]> = values.chunks(gaussians.max(1)).collect();
-    let row = |gaussian: usize| planes.iter().filter_map(|plane| plane.get(gaussian).copied()).collect();
-    let mut rows: Vec<Vec<i32>> = (0..gaussians).map(row).collect();
-    rows.sort_unstable();
-    rows
-}
-
 /// What the files resemble as a whole.
 fn symptom_of_files(case: &Case<'_>, output: &Output, files: &Files<'_>) -> Option<Symptom> {
     let states = case.states()?;
@@ -218,7 +159,7 @@ fn symptom_of_files(case: &Case<'_>, output: &Output, files: &Files<'_>) -> Opti
         return None;
     }
     if output.planes.is_empty() && !files.missing.is_empty() {
-        return Some(Symptom::NothingWritten);
+        return output.extra.is_empty().then_some(Symptom::NothingWritten);
     }
     let shows = |point: &&Point| {
         states_of(case.vector, Some(*point)).is_some_and(|states| is_output(&states, output))
@@ -229,10 +170,29 @@ fn symptom_of_files(case: &Case<'_>, output: &Output, files: &Files<'_>) -> Opti
     if others().filter(|point| point.op == case.op()).any(|point| shows(&point)) {
         return Some(Symptom::OtherMode);
     }
+    if are_renumbered(&states, output) {
+        return Some(Symptom::OtherNumbers);
+    }
     if is_a_type_missing(&states, files) {
         return Some(Symptom::TypeMissing);
     }
     others().any(|point| shows(&point)).then_some(Symptom::OtherPoint)
+}
+
+/// Whether the planes that were written are those of these frames, called as those of others.
+fn are_renumbered(states: &[&State], output: &Output) -> bool {
+    let mut found: BTreeMap<u32, BTreeMap<Attribute, &String>> = BTreeMap::new();
+    for (&(frame, attribute), planes) in &output.planes {
+        found.entry(frame).or_default().insert(attribute, &planes.sha256);
+    }
+    let mut found: Vec<_> = found.into_values().collect();
+    let mut wanted: Vec<BTreeMap<Attribute, &String>> = states
+        .iter()
+        .map(|state| state.planes.iter().map(|(&attribute, sha256)| (attribute, sha256)).collect())
+        .collect();
+    found.sort_unstable();
+    wanted.sort_unstable();
+    found == wanted
 }
 
 /// Whether the frames that are missing are all those of a type and no others.

@@ -31,12 +31,12 @@ pub enum Error {
     #[error("{0}")]
     Usage(String),
     /// The decoder under test does not start.
-    #[error("{program}: cannot start the decoder: {source}\n  check the path and that it can be executed")]
+    #[error("{program}: cannot start the decoder: {why}")]
     Start {
         /// The first word of its command.
         program: String,
-        /// Why.
-        source: io::Error,
+        /// Why, and what to do.
+        why: String,
     },
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String> {
     std::fs::read_to_string(path).map_err(Error::file("read", path))
 }
 
-/// Reads a file of JSON.
+/// Reads a file of JSON of this form.
 pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&read_text(path)?).map_err(|error| Error::content(path, error.to_string()))
 }

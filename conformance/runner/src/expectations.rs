@@ -3,8 +3,11 @@
 //! A line is `vector[@op[/mode]] outcome  # why`. It stands for every case of the vector, or of its operating point, and
 //! there are no patterns. Each of these cases has to end in just that outcome, or the run fails.
 
+use crate::case::Case;
 use crate::error::{Error, Result, read_text};
+use crate::nearest::nearest;
 use crate::result::{CaseResult, Outcome};
+use crate::suite::Suite;
 use std::path::Path;
 
 /// The list.
@@ -26,9 +29,26 @@ impl Expectations {
     /// Reads a list.
     ///
     /// # Errors
-    /// The file cannot be read, or a line is no entry.
-    pub fn read(path: &Path) -> Result<Self> {
-        Self::parse(&read_text(path)?).map_err(|message| Error::content(path, message))
+    /// The file cannot be read, a line is no entry, or it names no case of the suite.
+    pub fn read(path: &Path, suite: &Suite) -> Result<Self> {
+        let refused = |message: String| Error::content(path, message);
+        let list = Self::parse(&read_text(path)?).map_err(refused)?;
+        let cases: Vec<String> = Case::all(suite).iter().map(ToString::to_string).collect();
+        let idle = list.entries.iter().find(|entry| !cases.iter().any(|case| entry.is_about(case)));
+        match idle {
+            None => Ok(list),
+            Some(Entry { line, case, .. }) => {
+                let name = case.split('@').next().unwrap_or_default();
+                let near = match cases.iter().any(|known| known.split('@').next() == Some(name)) {
+                    true => nearest(case, cases.iter().map(String::as_str)),
+                    false => nearest(name, suite.vectors.iter().map(|located| located.vector.name.as_str())),
+                };
+                Err(refused(format!(
+                    "line {line}: there is no case {case}; the nearest are {}",
+                    near.join(", ")
+                )))
+            }
+        }
     }
 
     fn parse(text: &str) -> std::result::Result<Self, String> {
@@ -57,20 +77,17 @@ impl Expectations {
         Ok(Self { entries })
     }
 
-    /// Marks the failures that were expected; gives what is stale in the list, in words. `is_everything`: all cases of
-    /// the suite were run, so that an entry without a case names nothing.
-    pub fn apply(&self, results: &mut [CaseResult], is_everything: bool) -> Vec<String> {
-        self.entries.iter().flat_map(|entry| entry.apply(results, is_everything)).collect()
+    /// Marks the failures that were expected; gives what is stale in the list, in words.
+    pub fn apply(&self, results: &mut [CaseResult]) -> Vec<String> {
+        self.entries.iter().flat_map(|entry| entry.apply(results)).collect()
     }
 }
 
 impl Entry {
-    fn apply(&self, results: &mut [CaseResult], is_everything: bool) -> Vec<String> {
-        let Self { line, case, outcome } = self;
+    fn apply(&self, results: &mut [CaseResult]) -> Vec<String> {
+        let Self { line, outcome, .. } = self;
         let mut stale = Vec::new();
-        let mut met = false;
-        for result in results.iter_mut().filter(|result| self.is_about(result)) {
-            met = true;
+        for result in results.iter_mut().filter(|result| self.is_about(&result.case_name())) {
             if result.is_called(outcome) {
                 result.failed_as = Some(outcome.clone());
                 result.outcome = Outcome::ExpectedFailure;
@@ -82,14 +99,11 @@ impl Entry {
                 ));
             }
         }
-        if !met && is_everything {
-            stale.push(format!("line {line}: there is no case {case}"));
-        }
         stale
     }
 
-    fn is_about(&self, result: &CaseResult) -> bool {
-        let name = result.case_name();
+    /// Whether the entry stands for a case, `vector@op/mode`.
+    fn is_about(&self, name: &str) -> bool {
         name.strip_prefix(&self.case).is_some_and(|rest| rest.is_empty() || rest.starts_with(['@', '/']))
     }
 }

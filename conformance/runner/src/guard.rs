@@ -3,6 +3,7 @@
 use crate::answer::Ending;
 use crate::group::Group;
 use crate::limits::Limits;
+use crate::stop::Stop;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -15,6 +16,7 @@ const WAIT: [Duration; 2] = [Duration::from_micros(300), Duration::from_millis(5
 /// Looks after one case.
 pub(crate) struct Guard<'a> {
     limits: &'a Limits,
+    stop: &'a Stop,
     /// The folder with all that the decoder writes in this case.
     folder: &'a Path,
     start: Instant,
@@ -24,9 +26,9 @@ pub(crate) struct Guard<'a> {
 
 impl<'a> Guard<'a> {
     /// A guard for a case that starts now.
-    pub(crate) fn new(limits: &'a Limits, folder: &'a Path) -> Self {
+    pub(crate) fn new(limits: &'a Limits, stop: &'a Stop, folder: &'a Path) -> Self {
         let now = Instant::now();
-        Self { limits, folder, start: now, looked: now, wait: WAIT[0] }
+        Self { limits, stop, folder, start: now, looked: now, wait: WAIT[0] }
     }
 
     /// How long to wait for an answer before the next look.
@@ -41,8 +43,11 @@ impl<'a> Guard<'a> {
         self.start.elapsed()
     }
 
-    /// The limit that the decoder has passed, if it has.
+    /// Why the decoder is not to go on, if so: a limit that it has passed, or the end of the run.
     pub(crate) fn look(&mut self, group: &Group) -> Option<Ending> {
+        if self.stop.is_set() {
+            return Some(Ending::Stopped);
+        }
         if self.took() > self.limits.time {
             return Some(Ending::TimedOut);
         }

@@ -3,8 +3,8 @@
 use crate::answer::{Answer, Ending};
 use crate::attribute::Attribute;
 use crate::case::Case;
-use crate::output::{Output, floats_name};
-use crate::protocol::Diagnosis;
+use crate::output::{Output, entropy_name, floats_name};
+use crate::protocol::{Diagnosis, Said};
 use crate::result::{CaseResult, Outcome, Reason};
 use crate::vector::{Acceptance, State, Verdict};
 use splatstream_format::Class;
@@ -48,18 +48,20 @@ pub(crate) fn judge(case: &Case<'_>, answer: &Answer, output: &Output, rules: Ru
     let verdicts = case.verdicts();
     let Some(code) = protocol_code(answer.ending) else {
         (result.outcome, result.reason) = broken_off(answer.ending);
-        result.detail = last_line(&answer.complaint);
+        result.detail = explanation(answer);
         return result;
     };
     let Some(place) = verdicts.iter().position(|verdict| verdict.exit_code() == code) else {
         (result.outcome, result.reason) = contradiction(&verdicts, code);
-        result.detail = last_line(&answer.complaint);
+        result.detail = explanation(answer);
         return result;
     };
     if let Some(verdict) = verdicts.get(place) {
-        compare_diagnosis(&mut result, verdict, answer.diagnosis.as_ref(), rules);
+        compare_words(&mut result, verdict, &answer.said, rules);
+        if let Some(fault) = &output.fault {
+            fail(&mut result, Reason::MissingFiles, fault.clone());
         // What another right outcome shows is not recorded, unless it shows everything.
-        if place == 0 || verdict.outcome == Acceptance::Accept {
+        } else if place == 0 || verdict.outcome == Acceptance::Accept {
             compare_files(&mut result, case, output, rules);
         }
     }
@@ -106,7 +108,7 @@ fn words(ending: Ending) -> String {
         Ending::TimedOut => "killed: too long".to_owned(),
         Ending::TooMuchMemory => "killed: too much memory".to_owned(),
         Ending::TooMuchOutput => "killed: wrote too much".to_owned(),
-        Ending::NoAnswer => "no answer".to_owned(),
+        Ending::NoAnswer | Ending::Stopped => "no answer".to_owned(),
     }
 }
 
@@ -115,7 +117,7 @@ fn broken_off(ending: Ending) -> (Outcome, Option<Reason>) {
         Ending::TimedOut => (Outcome::Timeout, None),
         Ending::TooMuchMemory => (Outcome::Fail, Some(Reason::TooMuchMemory)),
         Ending::TooMuchOutput => (Outcome::Fail, Some(Reason::TooMuchOutput)),
-        Ending::Code(_) | Ending::Signal(_) | Ending::NoAnswer => (Outcome::Crash, None),
+        Ending::Code(_) | Ending::Signal(_) | Ending::NoAnswer | Ending::Stopped => (Outcome::Crash, None),
     }
 }
 
@@ -131,23 +133,38 @@ fn contradiction(verdicts: &[&Verdict], code: i32) -> (Outcome, Option<Reason>) 
     }
 }
 
-/// Compares what the decoder says of a rejection: the code counts, clause and byte are told to people.
-fn compare_diagnosis(result: &mut CaseResult, verdict: &Verdict, said: Option<&Diagnosis>, rules: Rules) {
-    let Some(said) = said.filter(|_| verdict.outcome == Acceptance::Reject) else { return };
-    let class = verdict.class.map(|class| class.name().to_owned());
-    if said.class.is_some() && said.class != class {
-        result.warnings.push("the class that it names is not that of its exit code".to_owned());
+/// Compares what the decoder says of a rejection. The code counts, and the class if it is named; clause and byte are told to
+/// people.
+fn compare_words(result: &mut CaseResult, verdict: &Verdict, said: &Said, rules: Rules) {
+    if verdict.outcome == Acceptance::Accept {
+        return;
+    }
+    let silence = match said {
+        Said::Diagnosis(said) => {
+            compare_diagnosis(result, verdict, said, rules);
+            said.code.is_none().then(|| "the JSON object has no code".to_owned())
+        }
+        Said::Nothing => Some("no code: the last line on standard error is no JSON object".to_owned()),
+        Said::Unclear(why) => Some(format!("no code: {why}")),
+    };
+    if let (Some(why), true) = (silence, rules.strict) {
+        fail(result, Reason::WrongCode, why);
+    }
+}
+
+fn compare_diagnosis(result: &mut CaseResult, verdict: &Verdict, said: &Diagnosis, rules: Rules) {
+    let mut complain = |message: String| match rules.strict {
+        true => fail(result, Reason::WrongCode, message),
+        false => result.warnings.push(message),
+    };
+    let class = verdict.class.map_or("", Class::name);
+    if let Some(found) = said.class.as_deref().filter(|&found| found != class) {
+        complain(format!("the JSON object says {found} and the exit code {class}"));
     }
     if let (Some(wanted), Some(found)) = (&verdict.code, &said.code)
         && wanted != found
     {
-        let message = format!("the code is {found} and should be {wanted}");
-        if rules.strict {
-            (result.outcome, result.reason) = (Outcome::Fail, Some(Reason::WrongCode));
-            result.detail = Some(message);
-        } else {
-            result.warnings.push(message);
-        }
+        complain(format!("the code is {found} and should be {wanted}"));
     }
     if let (Some(wanted), Some(found)) = (&verdict.clause, &said.clause)
         && wanted != found
@@ -161,10 +178,17 @@ fn compare_diagnosis(result: &mut CaseResult, verdict: &Verdict, said: Option<&D
     }
 }
 
+/// Makes a failure of a result; the first thing that is wrong with it is told.
+fn fail(result: &mut CaseResult, reason: Reason, detail: String) {
+    if result.outcome == Outcome::Pass {
+        (result.outcome, result.reason, result.detail) = (Outcome::Fail, Some(reason), Some(detail));
+    }
+}
+
 fn compare_files(result: &mut CaseResult, case: &Case<'_>, output: &Output, rules: Rules) {
     let files = Files::compare(case, output);
     let fault = if !files.missing.is_empty() {
-        Some((Reason::MissingFiles, naming("missing", files.missing.iter().map(file_name))))
+        Some((Reason::MissingFiles, missing(&files)))
     } else if !files.wrong.is_empty() {
         Some((Reason::WrongPlanes, naming("different", files.wrong.iter().map(file_name))))
     } else if !files.extra.is_empty() {
@@ -175,7 +199,7 @@ fn compare_files(result: &mut CaseResult, case: &Case<'_>, output: &Output, rule
         compare_entropy(case, output, rules).map(|detail| (Reason::WrongEntropy, detail))
     };
     if let Some((reason, detail)) = fault {
-        (result.outcome, result.reason, result.detail) = (Outcome::Fail, Some(reason), Some(detail));
+        fail(result, reason, detail);
     }
 }
 
@@ -195,22 +219,38 @@ fn compare_floats(case: &Case<'_>, output: &Output, rules: Rules) -> Option<Stri
     })
 }
 
-/// Compares the states of the entropy decoder: all that are there, and all of the vector at its highest point.
+/// Compares the states of the entropy decoder: all that are there, and if they are claimed all of the vector at its highest
+/// point.
 fn compare_entropy(case: &Case<'_>, output: &Output, rules: Rules) -> Option<String> {
-    let units = || {
-        case.vector
-            .units
-            .iter()
-            .enumerate()
-            .filter_map(|(unit, record)| Some((unit, record.entropy.as_ref()?)))
+    let units = &case.vector.units;
+    if units.is_empty() {
+        return None;
+    }
+    let wanted_of = |unit: usize| units.get(unit).and_then(|record| record.entropy.as_ref());
+    let is_obliged =
+        rules.entropy && case.is_extreme(true) && case.vector.expect.outcome == Acceptance::Accept;
+    let is_wrong = |&unit: &usize| match output.entropy.get(&unit) {
+        Some(found) => Some(found) != wanted_of(unit),
+        None => is_obliged && wanted_of(unit).is_some(),
     };
-    let is_wrong = |(unit, wanted): &(usize, &String)| match output.entropy.get(unit) {
-        Some(found) => found != *wanted,
-        None => rules.entropy && case.is_extreme(true) && case.vector.expect.outcome == Acceptance::Accept,
-    };
-    units().find(is_wrong).map(|(unit, wanted)| {
-        let found = output.entropy.get(&unit).map_or("nothing", String::as_str);
-        format!("unit {unit}: the entropy decoder gives {found} and should give {wanted}; what follows from it differs too")
+    let beyond = output.entropy.keys().copied().filter(|&unit| unit >= units.len());
+    let wrong: Vec<usize> = (0..units.len()).chain(beyond).filter(is_wrong).collect();
+    let &unit = wrong.first()?;
+    let is_shifted = || (0..units.len()).all(|unit| output.entropy.get(&(unit + 1)) == wanted_of(unit));
+    let name = entropy_name(unit);
+    Some(match (output.entropy.get(&unit), wanted_of(unit)) {
+        _ if is_shifted() => {
+            "the entropy states are those of the units before: units count from 0".to_owned()
+        }
+        (None, _) => format!("{name} is claimed and not there; the planes are right"),
+        (Some(_), None) => format!("{name}: unit {unit} has no entropy state; the planes are right"),
+        (Some(found), Some(wanted)) if found.to_lowercase() == *wanted => {
+            format!("{name} is {found}: write lower-case letters")
+        }
+        (Some(found), Some(wanted)) => {
+            let all = wrong.len();
+            format!("{name} is {found} and should be {wanted}, {all} in all; the planes are right")
+        }
     })
 }
 
@@ -218,8 +258,6 @@ impl<'a> Files<'a> {
     /// Compares the folder of a case with its vector. Where that does not say what is shown, only names are looked at.
     pub(crate) fn compare(case: &Case<'a>, output: &Output) -> Self {
         let mut files = Self { extra: output.extra.clone(), ..Self::default() };
-        let beyond = |&&unit: &&usize| unit >= case.vector.units.len() && !case.vector.units.is_empty();
-        files.extra.extend(output.entropy.keys().filter(beyond).map(|unit| format!("u{unit:04}.entropy")));
         let Some(states) = case.states() else { return files };
         for state in &states {
             for (&attribute, wanted) in &state.planes {
@@ -245,6 +283,16 @@ fn file_name((state, attribute): &(&State, Attribute)) -> String {
     attribute.file_name(state.frame)
 }
 
+/// What is missing, and what is there in its place by the look of it.
+fn missing(files: &Files<'_>) -> String {
+    let missing = naming("missing", files.missing.iter().map(file_name));
+    if files.extra.is_empty() {
+        return missing;
+    }
+    let found = naming("found instead", files.extra.iter().cloned());
+    format!("{missing}; {found}; names are f%04d.ATTRIBUTE.i32")
+}
+
 /// `missing: a, b and 3 more`.
 fn naming(what: &str, names: impl Iterator<Item = String>) -> String {
     let names: Vec<String> = names.collect();
@@ -253,6 +301,13 @@ fn naming(what: &str, names: impl Iterator<Item = String>) -> String {
         0 => format!("{what}: {shown}"),
         more => format!("{what}: {shown} and {more} more"),
     }
+}
+
+/// What is wrong with an answer: what the runner found, and what the decoder says last.
+fn explanation(answer: &Answer) -> Option<String> {
+    let said = last_line(&answer.complaint);
+    let parts: Vec<String> = answer.fault.iter().cloned().chain(said).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
 }
 
 /// The last line of what a decoder said.

@@ -1,5 +1,6 @@
 //! How much a decoder under test may take of the machine.
 
+use crate::answer::Ending;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -27,6 +28,24 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Self { time: Duration::from_secs(10), memory: 2 << 30, output: 256 << 20 }
+    }
+}
+
+impl Limits {
+    /// Which of them a decoder has passed that ended so, and how to allow more.
+    pub(crate) fn passed(&self, ending: Ending) -> Option<String> {
+        match ending {
+            Ending::TimedOut => {
+                Some(format!("not done within {} s; --time SECONDS allows more", self.time.as_secs_f64()))
+            }
+            Ending::TooMuchMemory => {
+                Some(format!("it held more than {}; --memory SIZE allows more", Size(self.memory)))
+            }
+            Ending::TooMuchOutput => {
+                Some(format!("it wrote more than {}; --output SIZE allows more", Size(self.output)))
+            }
+            _ => None,
+        }
     }
 }
 

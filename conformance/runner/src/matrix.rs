@@ -1,32 +1,38 @@
 //! Which decoder does what: a page of features and decoders. Every word of it comes from reports.
 
 use crate::report::{Report, Tally};
-use crate::result::Outcome;
+use crate::result::{CaseResult, Outcome};
 use std::collections::BTreeSet;
+
+const HEAD: &str = "# What decoders do\n\nMade by `splatstream conformance matrix` from reports of runs. Yes: every case with this \
+    feature in the valid vectors of the whole suite was run and passed. Cells are as true as the reports: whoever doubts one runs \
+    the suite again.\n\n";
 
 /// The page.
 ///
-/// A Yes means that every valid case with the feature was run and passed. The last rows are about broken streams and about
-/// the runs themselves.
+/// A Yes means that every valid case with the feature in the whole suite was run and passed. The last rows are about broken
+/// streams and about the runs themselves.
 pub fn page(reports: &[Report]) -> String {
-    let mut page = "# What decoders do\n\nMade by `splatstream conformance matrix` from reports of runs; nothing here was \
-        written by hand. Yes: every valid case with this feature was run and passed.\n\n"
-        .to_owned();
-    let row = |first: &str, cells: Vec<String>| format!("| {first} | {} |\n", cells.join(" | "));
-    page += &row("Feature", reports.iter().map(|report| report.decoder.name.clone()).collect());
-    page += &row("---", reports.iter().map(|_| "---".to_owned()).collect());
+    let mut page = HEAD.to_owned();
+    let mut row = |first: &str, cell: &dyn Fn(&Report) -> String| {
+        let cells: Vec<String> = reports.iter().map(cell).collect();
+        page += &format!("| {first} | {} |\n", cells.join(" | "));
+    };
+    let names = names(reports);
+    let name = |report: &Report| {
+        let place = reports.iter().position(|other| std::ptr::eq(other, report));
+        place.and_then(|place| names.get(place)).cloned().unwrap_or_default()
+    };
+    row("Feature", &name);
+    row("---", &|_| "---".to_owned());
     let features: BTreeSet<&String> = reports.iter().flat_map(|report| report.features.keys()).collect();
     for feature in features {
-        let cell = |report: &Report| word(report.features.get(feature).copied().unwrap_or_default());
-        page += &row(feature, reports.iter().map(cell).collect());
+        row(feature, &|report| word(report, report.features.get(feature).copied().unwrap_or_default()));
     }
-    page += &row(
-        "broken streams refused, and rightly",
-        reports.iter().map(|report| word(broken(report))).collect(),
-    );
-    page += &row("no crash, no timeout", reports.iter().map(steadiness).collect());
-    page += &row("suite", reports.iter().map(suite).collect());
-    page += &row("day", reports.iter().map(|report| report.date.clone()).collect());
+    row("broken streams refused, and rightly", &|report| word(report, report.broken));
+    row("no crash, no timeout", &|report| word(report, steadiness(report)));
+    row("suite", &suite);
+    row("day", &|report| report.date.clone());
     if !all_alike(reports) {
         page +=
             "\nThe reports are of different suites: rows can be compared only where the suite is the same.\n";
@@ -34,42 +40,56 @@ pub fn page(reports: &[Report]) -> String {
     page
 }
 
+/// What decoders are called; of reports with the same name the later ones are numbered.
+fn names(reports: &[Report]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for (place, Report { decoder, .. }) in reports.iter().enumerate() {
+        let name = decoder.name.replace('|', "\\|");
+        let before = reports.iter().take(place).filter(|other| other.decoder.name == decoder.name).count();
+        names.push(if before == 0 { name } else { format!("{name} ({})", before.saturating_add(1)) });
+    }
+    names
+}
+
 /// What a tally amounts to.
-fn word(tally: Tally) -> String {
-    let Tally { cases, pass, not_claimed } = tally;
-    match (cases, pass) {
-        (0, _) => "not tested".to_owned(),
-        _ if not_claimed == cases => "not claimed".to_owned(),
-        _ if pass == cases => "Yes".to_owned(),
-        (_, 0) => "No".to_owned(),
-        _ => format!("partly, {pass} of {cases}"),
+fn word(report: &Report, tally: Tally) -> String {
+    let Tally { cases, claimed, run, pass } = tally;
+    let failed = run.saturating_sub(pass);
+    if cases == 0 {
+        "not tested".to_owned()
+    } else if claimed == 0 {
+        "not claimed".to_owned()
+    } else if failed > 0 {
+        format!("No: {failed} of {run} failed")
+    } else if run == 0 {
+        "not run".to_owned()
+    } else if run < claimed {
+        format!("part: {run} of {cases} run")
+    } else if claimed < cases {
+        format!("{claimed} of {cases} claimed, all passed")
+    } else if report.suite.changed.is_some() {
+        format!("{pass} of a changed suite, all passed")
+    } else {
+        "Yes".to_owned()
     }
 }
 
-/// Cases that are not of valid vectors.
-fn broken(report: &Report) -> Tally {
-    let mut tally = Tally::default();
-    for case in report.cases.iter().filter(|case| case.kind != crate::vector::Kind::Valid) {
-        tally.cases += 1;
-        tally.pass += u64::from(case.outcome == Outcome::Pass);
-        tally.not_claimed += u64::from(case.outcome == Outcome::NotClaimed);
-    }
-    tally
-}
-
-fn steadiness(report: &Report) -> String {
-    let is = |case: &crate::result::CaseResult, outcome: Outcome| {
+/// All cases, those that ended in a crash or a timeout as failed.
+fn steadiness(report: &Report) -> Tally {
+    let is = |case: &CaseResult, outcome: Outcome| {
         case.outcome == outcome || case.failed_as.as_deref() == Some(outcome.name())
     };
     let bad =
         report.cases.iter().filter(|case| is(case, Outcome::Crash) || is(case, Outcome::Timeout)).count();
-    if bad == 0 { "Yes".to_owned() } else { format!("No, {bad} cases") }
+    Tally { pass: report.all.run.saturating_sub(bad as u64), ..report.all }
 }
 
 fn suite(report: &Report) -> String {
     let version = report.suite.version.as_deref().unwrap_or("?");
+    let changed = if report.suite.changed.is_some() { ", changed" } else { "" };
     let part = if report.settings.selection.is_everything() { "" } else { ", a part" };
-    format!("{version}{part}")
+    let interrupted = if report.interrupted.is_some() { ", interrupted" } else { "" };
+    format!("{version}{changed}{part}{interrupted}")
 }
 
 fn all_alike(reports: &[Report]) -> bool {

@@ -5,6 +5,7 @@ use crate::digest;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// What `u%04d.entropy` is called after its number.
@@ -23,6 +24,8 @@ pub struct Output {
     pub entropy: BTreeMap<usize, String>,
     /// What has no business there.
     pub extra: Vec<String>,
+    /// What the decoder did to the folder so that it cannot be read.
+    pub fault: Option<String>,
 }
 
 /// A file of planes.
@@ -40,12 +43,25 @@ impl Output {
     /// Reads a folder.
     ///
     /// # Errors
-    /// The folder or a file in it cannot be read.
+    /// The folder or a file in it cannot be read, and not because of what the decoder did.
     pub fn read(folder: &Path) -> Result<Self> {
+        match Self::read_whole(folder) {
+            Err(Error::File { path, source, .. }) if is_of_the_decoder(&source) => {
+                let fault = match path == folder && source.kind() != ErrorKind::PermissionDenied {
+                    true => "the decoder removed its output folder".to_owned(),
+                    false => format!("{} cannot be read: {source}", path.display()),
+                };
+                Ok(Self { fault: Some(fault), ..Self::default() })
+            }
+            output => output,
+        }
+    }
+
+    fn read_whole(folder: &Path) -> Result<Self> {
         let mut output = Self::default();
         let failed = Error::file("read", folder);
         let entries =
-            fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>).map_err(failed)?;
+            fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>).map_err(failed)?;
         for entry in entries {
             let name = entry.file_name().to_string_lossy().into_owned();
             // Links are not followed: what they lead to was not written by the decoder.
@@ -73,6 +89,11 @@ impl Output {
     }
 }
 
+/// Whether a decoder can have brought this about in its folder.
+fn is_of_the_decoder(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::PermissionDenied)
+}
+
 /// The name of the file that holds the output of 7.10 of a frame.
 pub fn floats_name(frame: u32) -> String {
     format!("f{frame:04}.f32")
@@ -83,8 +104,13 @@ fn floats_frame(name: &str) -> Option<u32> {
     (name == floats_name(frame)).then_some(frame)
 }
 
+/// The name of the file that holds the entropy state of a unit.
+pub fn entropy_name(unit: usize) -> String {
+    format!("u{unit:04}{ENTROPY}")
+}
+
 /// The unit whose entropy decoding a file is about, by its name.
 fn entropy_unit(name: &str) -> Option<usize> {
     let unit: usize = name.strip_prefix('u')?.strip_suffix(ENTROPY)?.parse().ok()?;
-    (name == format!("u{unit:04}{ENTROPY}")).then_some(unit)
+    (name == entropy_name(unit)).then_some(unit)
 }

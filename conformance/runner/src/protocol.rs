@@ -29,11 +29,46 @@ pub struct Diagnosis {
     pub byte: Option<u64>,
 }
 
-impl Diagnosis {
-    /// The diagnosis in the last line of a text, if that is one.
-    pub fn in_last_line(text: &str) -> Option<Self> {
-        serde_json::from_str(text.trim_end().lines().next_back()?.trim()).ok()
+/// What a decoder said beside its verdict.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum Said {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// What can be understood.
+    Diagnosis(Diagnosis),
+    /// Something else: where it stands and what is wrong with it.
+    Unclear(String),
+}
+
+impl Said {
+    /// What the last line of a text says.
+    pub fn in_last_line(text: &str) -> Self {
+        let line = text.trim_end().lines().next_back().unwrap_or_default();
+        Self::of("the last line on standard error", line)
     }
+
+    fn of(place: &str, text: &str) -> Self {
+        let text = text.trim();
+        if text.is_empty() {
+            return Self::Nothing;
+        }
+        // An array would be taken for an object whose keys are left out.
+        let is_object = text.starts_with('{');
+        match serde_json::from_str(text) {
+            Ok(diagnosis) if is_object => Self::Diagnosis(diagnosis),
+            Err(error) if is_object => Self::Unclear(format!("{place}, {}: {error}", quoted(text))),
+            _ => Self::Unclear(format!("{place} is no JSON object: {}", quoted(text))),
+        }
+    }
+}
+
+/// A text in quotes, not too long.
+fn quoted(text: &str) -> String {
+    const MOST: usize = 80;
+    let start: String = text.chars().take(MOST).collect();
+    let rest = if text.chars().nth(MOST).is_some() { "..." } else { "" };
+    format!("{start:?}{rest}")
 }
 
 /// One thing that a decoder is asked to do.
@@ -66,10 +101,17 @@ impl Request {
 }
 
 /// The answer of a persistent process: an exit code, and a diagnosis if it follows after a tab.
-pub fn parse_answer(line: &str) -> Option<(i32, Option<Diagnosis>)> {
+///
+/// # Errors
+/// Why the line is no answer.
+pub fn parse_answer(line: &str) -> Result<(i32, Said), String> {
     let line = line.trim_end_matches(['\r', '\n']);
     let (code, rest) = line.split_once('\t').unwrap_or((line, ""));
-    Some((code.trim().parse().ok()?, serde_json::from_str(rest).ok()))
+    let code = code.trim().parse().map_err(|_| {
+        let advice = "standard output is for answers only";
+        format!("the answer {} does not start with an exit code; {advice}", quoted(line))
+    })?;
+    Ok((code, Said::of("what follows the tab of the answer", rest)))
 }
 
 #[cfg(test)]
@@ -93,16 +135,32 @@ mod tests {
     #[test]
     fn an_answer_is_a_code_and_perhaps_a_diagnosis() {
         let diagnosis = Diagnosis { code: Some("RANGE".into()), byte: Some(7), ..Diagnosis::default() };
-        assert_eq!(parse_answer("11\t{\"code\":\"RANGE\",\"byte\":7}\n"), Some((11, Some(diagnosis))));
-        assert_eq!(parse_answer("0\r\n"), Some((0, None)));
-        assert_eq!(parse_answer("done\n"), None);
+        let said = Said::Diagnosis(diagnosis);
+        assert_eq!(parse_answer("11\t{\"code\":\"RANGE\",\"byte\":7}\n"), Ok((11, said)));
+        assert_eq!(parse_answer("0\r\n"), Ok((0, Said::Nothing)));
+        assert!(matches!(parse_answer("11\tbroken"), Ok((11, Said::Unclear(_)))));
+        let error = parse_answer("decoding in.gss\n").unwrap_err();
+        assert!(
+            error.starts_with("the answer \"decoding in.gss\" does not start with an exit code"),
+            "{error}"
+        );
     }
 
     #[test]
     fn a_diagnosis_is_the_last_line_and_nothing_else() {
-        let found = |text| Diagnosis::in_last_line(text).and_then(|diagnosis| diagnosis.code);
-        assert_eq!(found("warning\n{\"code\":\"X\",\"mine\":1}\n").as_deref(), Some("X"));
-        assert_eq!(found("{\"code\":\"X\"}\nbye\n"), None);
-        assert_eq!(found(""), None);
+        let code = |text| match Said::in_last_line(text) {
+            Said::Diagnosis(diagnosis) => diagnosis.code.unwrap_or_default(),
+            Said::Unclear(why) => why,
+            Said::Nothing => "nothing".to_owned(),
+        };
+        assert_eq!(code("warning\n{\"code\":\"X\",\"mine\":1}\n"), "X");
+        assert_eq!(code(""), "nothing");
+        for (text, why) in [
+            ("{\"code\":\"X\"}\nbye\n", "is no JSON object: \"bye\""),
+            ("[\"invalid\",\"X\",null,null,null]", "is no JSON object"),
+            ("{\"code\":5}", "invalid type"),
+        ] {
+            assert!(code(text).contains(why), "{}", code(text));
+        }
     }
 }

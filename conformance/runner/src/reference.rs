@@ -98,7 +98,7 @@ pub fn capabilities() -> Capabilities {
 pub fn answer(request: &Request) -> io::Result<(i32, Option<Diagnosis>)> {
     let decoded = decode(request)?;
     let verdict = decoded.verdict();
-    decoded.write(&request.out)?;
+    decoded.write(&request.out).map_err(naming("write into", &request.out))?;
     Ok(verdict)
 }
 
@@ -108,5 +108,12 @@ pub fn answer(request: &Request) -> io::Result<(i32, Option<Diagnosis>)> {
 /// The stream cannot be read, or the operating point is none.
 pub fn decode(request: &Request) -> io::Result<Decoded> {
     let point = request.op.parse().map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
-    Ok(Decoded::of(&fs::read(&request.input)?, point, request.mode))
+    let stream = fs::read(&request.input).map_err(naming("read", &request.input))?;
+    Ok(Decoded::of(&stream, point, request.mode))
+}
+
+/// For `map_err`: the error with the path that it is about.
+fn naming(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> io::Error {
+    let path = path.display();
+    move |error| io::Error::new(error.kind(), format!("{path}: cannot {what}: {error}"))
 }

@@ -4,9 +4,13 @@
 pub mod junit;
 pub mod markdown;
 pub mod summary;
+mod tally;
+
+pub use tally::Tally;
 
 use crate::capabilities::Capabilities;
-use crate::error::{Error, Result, read_json};
+use crate::case::Case;
+use crate::error::{Error, Result, read_text};
 use crate::limits::Limits;
 use crate::result::{CaseResult, Outcome};
 use crate::run::Settings;
@@ -15,9 +19,10 @@ use crate::suite::Suite;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
+use tally::Tallies;
 
 /// What `schema` of a report says.
-const SCHEMA: &str = "splatstream-report/1";
+const SCHEMA: &str = "splatstream-report/2";
 
 /// A report.
 #[derive(Debug, Clone, Deserialize, Serialize)]
@@ -39,6 +44,13 @@ pub struct Report {
     pub settings: SettingsRecord,
     /// Cases by outcome.
     pub summary: BTreeMap<Outcome, u64>,
+    /// Of a run that was ended early: the cases that were to be run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interrupted: Option<u64>,
+    /// All cases of the suite.
+    pub all: Tally,
+    /// Those of kind invalid and either.
+    pub broken: Tally,
     /// Cases by feature of the stream; those of kind valid alone, so that a decoder that rejects everything has none.
     pub features: BTreeMap<String, Tally>,
     /// Entries of the list of expectations that no longer hold.
@@ -57,9 +69,12 @@ pub struct SuiteRecord {
     /// Version of the specification.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specification: Option<String>,
+    /// How the vectors differ from those of the version, in words; none if they do not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub changed: Option<String>,
     /// Vectors in the suite.
     pub vectors: u64,
-    /// SHA-256 over names and streams.
+    /// SHA-256 over names and records.
     pub sha256: String,
 }
 
@@ -97,18 +112,6 @@ pub struct SettingsRecord {
     pub selection: Selection,
 }
 
-/// Cases by what became of them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Tally {
-    /// All of them.
-    pub cases: u64,
-    /// Passed.
-    pub pass: u64,
-    /// Not asked, because the decoder does not claim it.
-    pub not_claimed: u64,
-}
-
 impl Report {
     /// The report of a run on a suite.
     pub fn new(
@@ -123,6 +126,8 @@ impl Report {
         for case in &cases {
             *summary.entry(case.outcome).or_default() += 1;
         }
+        let selected = selection.of(Case::all(suite)).map_or(0, |selected| selected.len());
+        let Tallies { all, broken, features } = Tallies::new(suite, &settings.capabilities, &cases);
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         Self {
             schema: SCHEMA.to_owned(),
@@ -130,6 +135,7 @@ impl Report {
             suite: SuiteRecord {
                 version: suite.version.clone(),
                 specification: suite.specification.clone(),
+                changed: suite.changed.clone(),
                 vectors: suite.vectors.len() as u64,
                 sha256: suite.sha256(),
             },
@@ -149,7 +155,10 @@ impl Report {
                 selection: selection.clone(),
             },
             summary,
-            features: tallies(suite, &cases),
+            interrupted: (cases.len() < selected).then_some(selected as u64),
+            all,
+            broken,
+            features,
             stale,
             cases,
         }
@@ -160,12 +169,21 @@ impl Report {
     /// # Errors
     /// The file cannot be read, or is no report.
     pub fn read(path: &Path) -> Result<Self> {
-        let report: Self = read_json(path)?;
-        if report.schema != SCHEMA {
-            let message = format!("the schema is {}, this runner knows {SCHEMA}", report.schema);
-            return Err(Error::content(path, message));
+        let wrong = |what: String| {
+            let advice = "`splatstream conformance run --report FILE.json` writes one";
+            Error::content(path, format!("{what}\n  {advice}"))
+        };
+        let text = read_text(path)?;
+        let value: serde_json::Value =
+            serde_json::from_str(&text).map_err(|error| wrong(format!("no report of a run: {error}")))?;
+        match value.get("schema").and_then(serde_json::Value::as_str) {
+            Some(SCHEMA) => {}
+            Some(other) => {
+                return Err(wrong(format!("the schema is {other} and not that of a report, {SCHEMA}")));
+            }
+            None => return Err(wrong("no report of a run: it has no schema".to_owned())),
         }
-        Ok(report)
+        serde_json::from_value(value).map_err(|error| wrong(error.to_string()))
     }
 
     /// Cases with an outcome.
@@ -186,21 +204,4 @@ impl Report {
     pub fn is_good(&self) -> bool {
         self.failures() == 0 && self.stale.is_empty() && self.count(Outcome::Pass) > 0
     }
-}
-
-/// Cases of valid vectors by the features of their streams, and under `profile N` by profile.
-fn tallies(suite: &Suite, cases: &[CaseResult]) -> BTreeMap<String, Tally> {
-    let vectors: BTreeMap<&str, _> =
-        suite.vectors.iter().map(|located| (located.vector.name.as_str(), &located.vector)).collect();
-    let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
-    for case in cases.iter().filter(|case| case.kind == crate::vector::Kind::Valid) {
-        let Some(vector) = vectors.get(case.vector.as_str()) else { continue };
-        for feature in vector.features.iter().cloned().chain([format!("profile {}", vector.profile)]) {
-            let tally = tallies.entry(feature).or_default();
-            tally.cases += 1;
-            tally.pass += u64::from(case.outcome == Outcome::Pass);
-            tally.not_claimed += u64::from(case.outcome == Outcome::NotClaimed);
-        }
-    }
-    tallies
 }

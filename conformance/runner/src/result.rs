@@ -1,6 +1,7 @@
 //! How a case went.
 
-use crate::difference::{Difference, Symptom};
+use crate::difference::Difference;
+use crate::symptom::Symptom;
 use crate::vector::{Kind, Mode};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;

@@ -1,5 +1,6 @@
 //! A run: cases to decoders, answers to results.
 
+use crate::answer::Ending;
 use crate::capabilities::Capabilities;
 use crate::case::Case;
 use crate::difference::explain;
@@ -9,6 +10,7 @@ use crate::limits::Limits;
 use crate::output::Output;
 use crate::result::{CaseResult, Reason};
 use crate::session::{Decoder, Session};
+use crate::stop::Stop;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
@@ -26,9 +28,12 @@ pub struct Settings {
     pub strict: bool,
     /// Cases at a time.
     pub jobs: usize,
+    /// Ends the run early.
+    pub stop: Stop,
 }
 
-/// Runs cases; the results are in the order of the cases. `on_result` is told of each as it comes, from any thread.
+/// Runs cases; the results are in the order of the cases, and fewer if the run was stopped. `on_result` is told of each
+/// as it comes, from any thread.
 ///
 /// # Errors
 /// The decoder does not start, or folders for what it writes cannot be made or read.
@@ -40,13 +45,14 @@ pub fn run(
     let next = AtomicUsize::new(0);
     let results = Mutex::new(Vec::with_capacity(cases.len()));
     let work = || -> Result<()> {
-        let mut session = Session::new(&settings.decoder, &settings.limits)?;
+        let mut session = Session::new(&settings.decoder, &settings.limits, &settings.stop)?;
         loop {
             let place = next.fetch_add(1, Ordering::Relaxed);
             let Some(case) = cases.get(place) else { return Ok(()) };
             // Who cannot go on stops the others too: they find no more cases.
             let result = ask(&mut session, case, settings)
                 .inspect_err(|_| next.store(cases.len(), Ordering::Relaxed))?;
+            let Some(result) = result else { return Ok(()) };
             on_result(&result);
             results.lock().unwrap_or_else(PoisonError::into_inner).push((place, result));
         }
@@ -64,18 +70,26 @@ pub fn run(
     Ok(results.into_iter().map(|(_, result)| result).collect())
 }
 
-/// Asks a case and judges the answer.
-fn ask(session: &mut Session<'_>, case: &Case<'_>, settings: &Settings) -> Result<CaseResult> {
+/// Asks a case and judges the answer; none if the run was stopped.
+fn ask(session: &mut Session<'_>, case: &Case<'_>, settings: &Settings) -> Result<Option<CaseResult>> {
+    if settings.stop.is_set() {
+        return Ok(None);
+    }
     if let Some(missing) = settings.capabilities.missing(case) {
-        return Ok(not_claimed(case, missing));
+        return Ok(Some(not_claimed(case, missing)));
     }
     let Capabilities { entropy, output, .. } = settings.capabilities;
     let rules = Rules { strict: settings.strict, entropy, output };
     let answer = session.ask(case.stream, case.op(), case.mode())?;
+    if answer.ending == Ending::Stopped {
+        return Ok(None);
+    }
     let output = Output::read(&session.out())?;
     let mut result = judge(case, &answer, &output, rules);
-    if matches!(result.reason, Some(Reason::WrongPlanes | Reason::MissingFiles | Reason::ExtraFiles)) {
+    let by_files =
+        matches!(result.reason, Some(Reason::WrongPlanes | Reason::MissingFiles | Reason::ExtraFiles));
+    if by_files && output.fault.is_none() {
         (result.symptom, result.difference) = explain(case, &output);
     }
-    Ok(result)
+    Ok(Some(result))
 }

@@ -2,17 +2,21 @@
 
 use crate::case::Case;
 use crate::error::{Error, Result};
+use crate::feature;
+use crate::nearest::nearest;
 use crate::vector::Kind;
 use globset::{Glob, GlobMatcher};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// What a case has to be to be run; what is not given is not asked for.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Selection {
-    /// A pattern on names of vectors: `*` and `?` as in file names.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub filter: Option<String>,
+    /// Patterns, `*` and `?` as in file names, one of which shall match: the name of the vector, or if there is an `@` in the
+    /// pattern `vector@op` or `vector@op/mode`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub filter: Vec<String>,
     /// An area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<String>,
@@ -31,16 +35,23 @@ impl Selection {
     /// The cases to run.
     ///
     /// # Errors
-    /// The pattern is none, or no case is left.
+    /// A pattern is none, or selects nothing, or no case is left.
     pub fn of<'a>(&self, cases: Vec<Case<'a>>) -> Result<Vec<Case<'a>>> {
-        let name = self.filter.as_deref().map(matcher).transpose()?;
+        let filter = self.filter.iter().map(|pattern| Pattern::new(pattern)).collect::<Result<Vec<_>>>()?;
+        if let Some(idle) = filter.iter().find(|pattern| !cases.iter().any(|case| pattern.takes(case))) {
+            let core: String = idle.text.split('@').next().unwrap_or_default().replace(['*', '?'], "");
+            let near = nearest(&core, cases.iter().map(|case| case.vector.name.as_str())).join(", ");
+            let message = format!("no case is called {}; the nearest vectors are {near}", idle.text);
+            return Err(Error::Usage(message));
+        }
+        self.check_words(&cases)?;
         let takes = |case: &Case<'_>| {
-            self.takes(case) && name.as_ref().is_none_or(|name| name.is_match(&case.vector.name))
+            self.takes(case) && (filter.is_empty() || filter.iter().any(|pattern| pattern.takes(case)))
         };
         let selected: Vec<Case<'a>> = cases.into_iter().filter(takes).collect();
         if selected.is_empty() {
-            let message =
-                "no case is selected; `splatstream conformance list` shows names, areas and features";
+            let message = "each of these options selects cases, and no case is selected by all of them\n  \
+                `splatstream conformance list` shows names, areas, features and requirements";
             return Err(Error::Usage(message.to_owned()));
         }
         Ok(selected)
@@ -61,10 +72,56 @@ impl Selection {
             && among(&self.feature, &vector.features)
             && among(&self.requirement, &vector.requirements)
     }
+
+    /// Refuses an area, a feature or a rule that no vector has.
+    fn check_words(&self, cases: &[Case<'_>]) -> Result<()> {
+        let vectors = || cases.iter().map(|case| case.vector);
+        let areas: BTreeSet<&str> = vectors().map(|vector| vector.area.as_str()).collect();
+        let rules: BTreeSet<&str> =
+            vectors().flat_map(|vector| &vector.requirements).map(String::as_str).collect();
+        let is_known = |word: &Option<String>, known: &BTreeSet<&str>| {
+            word.as_ref().is_none_or(|word| known.contains(word.as_str()))
+        };
+        let features: BTreeSet<&str> = feature::names().collect();
+        let list = |what: &str, word: &str, known: &BTreeSet<&str>| {
+            let known: Vec<&str> = known.iter().copied().collect();
+            Err(Error::Usage(format!("there is no {what} '{word}'; there are {}", known.join(", "))))
+        };
+        match self {
+            Self { area: Some(area), .. } if !is_known(&self.area, &areas) => list("area", area, &areas),
+            Self { feature: Some(feature), .. } if !is_known(&self.feature, &features) => {
+                list("feature", feature, &features)
+            }
+            Self { requirement: Some(rule), .. } if !is_known(&self.requirement, &rules) => {
+                let near = nearest(rule, rules).join(", ");
+                Err(Error::Usage(format!("no vector is about '{rule}'; the nearest rules are {near}")))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
-fn matcher(pattern: &str) -> Result<GlobMatcher> {
-    let glob =
-        Glob::new(pattern).map_err(|error| Error::Usage(format!("--filter {pattern}: {}", error.kind())))?;
-    Ok(glob.compile_matcher())
+/// A pattern on cases.
+struct Pattern<'p> {
+    text: &'p str,
+    matcher: GlobMatcher,
+}
+
+impl<'p> Pattern<'p> {
+    fn new(text: &'p str) -> Result<Self> {
+        let glob =
+            Glob::new(text).map_err(|error| Error::Usage(format!("--filter {text}: {}", error.kind())))?;
+        Ok(Self { text, matcher: glob.compile_matcher() })
+    }
+
+    fn takes(&self, case: &Case<'_>) -> bool {
+        let name = &case.vector.name;
+        match self.text.contains('@') {
+            false => self.matcher.is_match(name),
+            true => {
+                self.matcher.is_match(case.to_string())
+                    || self.matcher.is_match(format!("{name}@{}", case.op()))
+            }
+        }
+    }
 }

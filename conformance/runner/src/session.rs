@@ -8,9 +8,10 @@ use crate::error::{Error, Result};
 use crate::group::Group;
 use crate::guard::Guard;
 use crate::limits::Limits;
-use crate::protocol::{Diagnosis, Request};
+use crate::protocol::{Request, Said};
+use crate::stop::Stop;
 use crate::vector::Mode;
-use persistent::Persistent;
+use persistent::{Persistent, Reply};
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -30,11 +31,11 @@ pub enum Decoder {
 }
 
 impl Decoder {
-    /// The program.
-    pub fn program(&self) -> &str {
+    /// The words of its command.
+    pub fn words(&self) -> &[String] {
         match self {
-            Self::Once(template) => template.program(),
-            Self::Persistent(words) => words.first().map_or("", String::as_str),
+            Self::Once(template) => template.raw_words(),
+            Self::Persistent(words) => words,
         }
     }
 }
@@ -43,16 +44,18 @@ impl Decoder {
 pub(crate) struct Session<'a> {
     decoder: &'a Decoder,
     limits: &'a Limits,
-    folder: TempDir,
+    stop: &'a Stop,
+    // Before the folder, so that nobody writes into it when it goes.
     process: Option<Persistent>,
+    folder: TempDir,
 }
 
 impl<'a> Session<'a> {
-    pub(crate) fn new(decoder: &'a Decoder, limits: &'a Limits) -> Result<Self> {
+    pub(crate) fn new(decoder: &'a Decoder, limits: &'a Limits, stop: &'a Stop) -> Result<Self> {
         let above = std::env::temp_dir();
         let folder = tempfile::Builder::new().prefix("splatstream-conformance-").tempdir_in(&above);
         let folder = folder.map_err(Error::file("make a folder in", &above))?;
-        Ok(Self { decoder, limits, folder, process: None })
+        Ok(Self { decoder, limits, stop, process: None, folder })
     }
 
     /// The folder with what the decoder wrote in the last case.
@@ -73,10 +76,14 @@ impl<'a> Session<'a> {
     /// The folder for files, empty.
     fn clean_out(&self) -> Result<PathBuf> {
         let out = self.out();
-        if out.exists() {
-            fs::remove_dir_all(&out).map_err(Error::file("empty", &out))?;
-        }
-        fs::create_dir(&out).map_err(Error::file("make", &out))?;
+        // A decoder may have removed its folder, or have put something else in its place.
+        let emptied = match fs::symlink_metadata(&out) {
+            Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(&out),
+            Ok(_) => fs::remove_file(&out),
+            Err(_) => Ok(()),
+        };
+        emptied.map_err(Error::file("empty", &out))?;
+        fs::create_dir_all(&out).map_err(Error::file("make", &out))?;
         Ok(out)
     }
 
@@ -84,8 +91,9 @@ impl<'a> Session<'a> {
         let complaints = self.complaints()?;
         let mut command = command::of(words);
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(complaints);
-        let mut guard = Guard::new(self.limits, self.folder.path());
-        let mut group = Group::start(&mut command, self.limits).map_err(cannot_start(self.decoder))?;
+        let mut guard = Guard::new(self.limits, self.stop, self.folder.path());
+        let mut group = Group::start(&mut command, self.limits)
+            .map_err(|source| command::cannot_start(words, &source))?;
         let ending = loop {
             match group.has_ended() {
                 Ok(false) => {}
@@ -96,30 +104,35 @@ impl<'a> Session<'a> {
             }
             std::thread::sleep(guard.wait());
         };
-        let status = group.end().map_err(cannot_start(self.decoder))?;
+        let status = group.end().map_err(|source| command::cannot_start(words, &source))?;
         let took = guard.took();
         let complaint = self.complaint();
-        let diagnosis = Diagnosis::in_last_line(&complaint);
-        Ok(Answer { ending: ending.unwrap_or_else(|| status.into()), diagnosis, complaint, took })
+        let ending = ending.unwrap_or_else(|| status.into());
+        let fault = self.limits.passed(ending);
+        Ok(Answer { ending, said: Said::in_last_line(&complaint), fault, complaint, took })
     }
 
     fn ask_persistent(&mut self, words: &[String], request: &Request) -> Result<Answer> {
         let mut process = match self.process.take() {
             Some(process) => process,
             None => Persistent::start(words, self.complaints()?, self.limits)
-                .map_err(cannot_start(self.decoder))?,
+                .map_err(|source| command::cannot_start(words, &source))?,
         };
         self.forget_complaints()?;
-        let mut guard = Guard::new(self.limits, self.folder.path());
-        let (ending, diagnosis) = process.ask(request, &mut guard);
+        let mut guard = Guard::new(self.limits, self.stop, self.folder.path());
+        let Reply { ending, said, fault } = process.ask(request, &mut guard);
         let took = guard.took();
         let complaint = self.complaint();
-        let diagnosis = diagnosis.or_else(|| Diagnosis::in_last_line(&complaint));
+        let said = if said == Said::Nothing { Said::in_last_line(&complaint) } else { said };
         // Whoever breaks the protocol once is started anew.
         if matches!(ending, Ending::Code(_)) {
             self.process = Some(process);
         }
-        Ok(Answer { ending, diagnosis, complaint, took })
+        let fault = fault.or_else(|| self.limits.passed(ending)).map(|fault| match ending {
+            Ending::TimedOut => format!("{fault}; an answer is a line, with its newline and a flush"),
+            _ => fault,
+        });
+        Ok(Answer { ending, said, fault, complaint, took })
     }
 
     /// The file for standard error, empty.
@@ -150,9 +163,4 @@ impl<'a> Session<'a> {
         };
         read().unwrap_or_default()
     }
-}
-
-fn cannot_start(decoder: &Decoder) -> impl FnOnce(std::io::Error) -> Error {
-    let program = decoder.program().to_owned();
-    move |source| Error::Start { program, source }
 }

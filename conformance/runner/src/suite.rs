@@ -1,7 +1,8 @@
 //! The vectors on disk.
 
 use crate::digest;
-use crate::error::{Error, Result, read_json};
+use crate::error::{Error, Result};
+use crate::report::summary::counted;
 use crate::vector::{Kind, SCHEMA, Vector};
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,6 +15,8 @@ pub struct Suite {
     pub version: Option<String>,
     /// Version of the specification that it goes with, the second line.
     pub specification: Option<String>,
+    /// How it differs from its MANIFEST, in words; none if it is whole and as it was made.
+    pub changed: Option<String>,
     /// The vectors.
     pub vectors: Vec<Located>,
 }
@@ -25,6 +28,8 @@ pub struct Located {
     pub vector: Vector,
     /// The stream.
     pub stream: PathBuf,
+    /// SHA-256 of the file of the record, which has that of the stream.
+    pub sha256: String,
 }
 
 impl Suite {
@@ -38,7 +43,7 @@ impl Suite {
             true => (folder, inner.as_path()),
             false => (folder.parent().unwrap_or(folder), folder),
         };
-        let mut suite = Self { version: None, specification: None, vectors: Vec::new() };
+        let mut suite = Self { version: None, specification: None, changed: None, vectors: Vec::new() };
         for kind in [Kind::Valid, Kind::Invalid, Kind::Either] {
             for area in folders(&vectors.join(kind.name()))? {
                 for place in folders(&area)? {
@@ -47,25 +52,56 @@ impl Suite {
             }
         }
         if suite.vectors.is_empty() {
-            let message = "no vectors here: there should be folders valid/AREA/NAME with a vector.json\n  \
-                give the folder of the vectors with --suite DIR";
-            return Err(Error::content(vectors, message));
+            return Err(Error::content(folder, nothing_here(folder)));
         }
         suite.check_names(vectors)?;
         suite.read_version(&root.join("VERSION"));
+        suite.compare_manifest(&root.join("MANIFEST"));
         Ok(suite)
     }
 
-    /// SHA-256 over names and streams: two runs with the same were made on the same vectors.
+    /// SHA-256 over records and names: two runs with the same were made on the same vectors. A line `sha256 name` for each
+    /// vector, in the order of the names; the digest in it is that of its vector.json.
     pub fn sha256(&self) -> String {
-        let lines =
-            self.vectors.iter().map(|Located { vector, .. }| format!("{} {}\n", vector.sha256, vector.name));
+        let mut vectors: Vec<(&str, &str)> = self
+            .vectors
+            .iter()
+            .map(|located| (located.vector.name.as_str(), located.sha256.as_str()))
+            .collect();
+        vectors.sort_unstable();
+        let lines = vectors.into_iter().map(|(name, sha256)| format!("{sha256} {name}\n"));
         digest::sha256(lines.collect::<String>().as_bytes())
+    }
+
+    /// That the vectors are not those of the version, and why; none if they are.
+    pub fn complaint(&self) -> Option<String> {
+        let version = self.version.as_deref().unwrap_or("of a known version");
+        self.changed.as_ref().map(|changed| format!("this is not suite {version}: {changed}"))
+    }
+
+    /// Compares with MANIFEST, which the generator writes: the number of vectors, then what [`Suite::sha256`] gives.
+    fn compare_manifest(&mut self, path: &Path) {
+        let text = fs::read_to_string(path).unwrap_or_default();
+        let mut words = text.split_whitespace();
+        let count = words.next().and_then(|count| count.parse::<usize>().ok());
+        let (Some(count), Some(sha256)) = (count, words.next()) else {
+            self.changed = Some("it has no MANIFEST beside the vectors".to_owned());
+            return;
+        };
+        if sha256 == self.sha256() {
+            return;
+        }
+        let are = |number: usize| counted(number, "vector") + if number == 1 { " is" } else { " are" };
+        self.changed = Some(match self.vectors.len() {
+            found if found < count => format!("{} missing", are(count.saturating_sub(found))),
+            found if found > count => format!("{} not of it", are(found.saturating_sub(count))),
+            _ => "vectors were changed".to_owned(),
+        });
     }
 
     fn check_names(&self, folder: &Path) -> Result<()> {
         let mut places = BTreeMap::new();
-        for Located { vector, stream } in &self.vectors {
+        for Located { vector, stream, .. } in &self.vectors {
             if let Some(other) = places.insert(&vector.name, stream) {
                 let message = format!(
                     "two vectors are called {}: {} and {}",
@@ -93,9 +129,13 @@ impl Located {
         if !path.is_file() {
             return Ok(None);
         }
-        let vector: Vector = read_json(&path)?;
+        let again = "get the suite again";
+        let record = fs::read(&path).map_err(Error::file("read", &path))?;
+        let vector: Vector = serde_json::from_slice(&record)
+            .map_err(|error| Error::content(&path, format!("{error}\n  {again}")))?;
         let stream = folder.join("in.gss");
-        let bytes = fs::read(&stream).map_err(Error::file("read", &stream))?;
+        let bytes = fs::read(&stream)
+            .map_err(|error| Error::content(&stream, format!("cannot read: {error}\n  {again}")))?;
         let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
         let complaint = if vector.schema != SCHEMA {
             Some(format!("the schema is {}, this runner knows {SCHEMA}", vector.schema))
@@ -104,12 +144,27 @@ impl Located {
         {
             Some("name, area and kind are not those of the folder".to_owned())
         } else if vector.bytes != bytes.len() as u64 || vector.sha256 != digest::sha256(&bytes) {
-            Some("in.gss is not the stream of this record: get the suite again".to_owned())
+            Some(format!("in.gss is not the stream of this record\n  {again}"))
         } else {
             inconsistency(&vector)
         };
-        complaint.map_or(Ok(Some(Self { vector, stream })), |message| Err(Error::content(&path, message)))
+        let sha256 = digest::sha256(&record);
+        let located = Self { vector, stream, sha256 };
+        complaint.map_or(Ok(Some(located)), |message| Err(Error::content(&path, message)))
     }
+}
+
+/// Where the vectors are that are not in a folder: below it, above it, or elsewhere.
+fn nothing_here(folder: &Path) -> String {
+    let has_vectors = |path: &Path| path.join("valid").is_dir() && path.join("invalid").is_dir();
+    let below = ["vectors", "conformance/vectors"].map(|inner| folder.join(inner));
+    let found =
+        below.iter().map(PathBuf::as_path).chain(folder.ancestors().skip(1)).find(|path| has_vectors(path));
+    let advice = match found {
+        Some(path) => format!("did you mean --suite {}", path.display()),
+        None => "give the folder of the vectors with --suite DIR".to_owned(),
+    };
+    format!("no vectors here: there should be folders valid/AREA/NAME with a vector.json\n  {advice}")
 }
 
 /// What a record says that cannot be.

@@ -64,17 +64,18 @@ fn a_claim_can_be_of_the_highest_or_the_lowest_point_alone() {
     }
 }
 
-fn read(list: &str) -> Result<Expectations, String> {
+fn read(list: &str, suite: &Suite) -> Result<Expectations, String> {
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(file.path(), list).unwrap();
-    Expectations::read(file.path()).map_err(|error| error.to_string())
+    Expectations::read(file.path(), suite).map_err(|error| error.to_string())
 }
 
 /// The results of a decoder that calls everything invalid, and what a list makes of them.
 fn expecting(list: &str) -> (Vec<CaseResult>, Vec<String>) {
     let vectors = Vectors::new();
-    let mut results = results(&vectors.suite(), &settings("exit 11"));
-    let stale = read(list).unwrap().apply(&mut results, true);
+    let suite = vectors.suite();
+    let mut results = results(&suite, &settings("exit 11"));
+    let stale = read(list, &suite).unwrap().apply(&mut results);
     (results, stale)
 }
 
@@ -88,12 +89,10 @@ fn an_expected_failure_is_one_of_just_that_sort() {
 }
 
 #[test]
-fn a_list_goes_stale_with_what_passes_fails_otherwise_or_is_gone() {
+fn a_list_goes_stale_with_what_passes_or_fails_otherwise() {
     for (line, why) in [
         ("bad wrong-class # x", "is pass and not wrong-class"),
         ("good crash # x", "is wrong-outcome and not crash"),
-        ("gone crash # x", "there is no case gone"),
-        ("good@s0,t0,r0 fail # x", "there is no case good@s0,t0,r0"),
     ] {
         let (_, stale) = expecting(line);
         assert!(stale.len() == 1 && stale[0].contains(why), "{line}: {stale:?}");
@@ -101,14 +100,17 @@ fn a_list_goes_stale_with_what_passes_fails_otherwise_or_is_gone() {
 }
 
 #[test]
-fn a_list_without_reasons_or_with_patterns_is_refused() {
+fn a_list_without_reasons_with_patterns_or_of_cases_that_are_not_there_is_refused() {
+    let vectors = Vectors::new();
     for (line, why) in [
         ("good fail", "say after a # why"),
         ("g* fail # x", "patterns are not allowed"),
         ("good pass # x", "pass is none of"),
         ("good # x", "write `vector[@op[/mode]] outcome"),
+        ("goood crash # x", "there is no case goood; the nearest are good"),
+        ("good@s0,t0,r0 fail # x", "the nearest are good@s3,t3,r9/full"),
     ] {
-        let error = read(line).unwrap_err();
+        let error = read(line, &vectors.suite()).unwrap_err();
         assert!(error.contains("line 1") && error.contains(why), "{line}: {error}");
     }
 }
@@ -143,13 +145,58 @@ fn a_selection_takes_what_has_all_that_it_asks_for() {
         let cases = selection.of(Case::all(&suite)).unwrap();
         cases.iter().map(|case| case.vector.name.clone()).collect()
     };
-    let filter = |pattern: &str| Selection { filter: Some(pattern.to_owned()), ..Selection::default() };
+    let filter = |pattern: &str| Selection { filter: vec![pattern.to_owned()], ..Selection::default() };
     assert_eq!(names(&filter("b*")), ["bad", "big"]);
     assert_eq!(names(&Selection { kind: Some(Kind::Either), ..filter("b*") }), ["big"]);
-    assert!(
-        Selection { feature: Some("vq".to_owned()), ..Selection::default() }.of(Case::all(&suite)).is_err()
-    );
-    assert!(filter("[").of(Case::all(&suite)).is_err());
+    assert_eq!(names(&filter("good@s3,t3,r9/full")), ["good"]);
+    assert_eq!(names(&filter("*@s3*")), ["good", "bad", "big"]);
+    let two = Selection { filter: ["good", "big"].map(str::to_owned).to_vec(), ..Selection::default() };
+    assert_eq!(names(&two), ["good", "big"]);
+}
+
+#[test]
+fn a_selection_of_nothing_says_which_word_is_to_blame() {
+    let vectors = Vectors::new();
+    let suite = vectors.suite();
+    let some = |word: &str| Some(word.to_owned());
+    let none = Selection::default;
+    for (selection, why) in [
+        (Selection { filter: vec!["[".to_owned()], ..none() }, "--filter ["),
+        (
+            Selection { filter: ["b*", "goad*"].map(str::to_owned).to_vec(), ..none() },
+            "goad*; the nearest vectors are good",
+        ),
+        (Selection { area: some("streams"), ..none() }, "no area 'streams'; there are stream"),
+        (Selection { feature: some("bframes"), ..none() }, "no feature 'bframes'; there are b-frames"),
+        (Selection { requirement: some("SS-XX-002"), ..none() }, "nearest rules are SS-XX-001"),
+        (Selection { kind: Some(Kind::Either), filter: vec!["good".to_owned()], ..none() }, "by all of them"),
+    ] {
+        let error = selection.of(Case::all(&suite)).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+    }
+}
+
+#[test]
+fn a_claim_of_what_does_not_exist_is_refused_with_what_does() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    for (key, value, why) in [
+        (
+            "features",
+            json!(["bframes"]),
+            "no feature 'bframes', perhaps b-frames; there are predicted, b-frames",
+        ),
+        ("level", json!(7), "no level 7; there are 1 to 4"),
+        ("profiles", json!([0, 3]), "no profile 3; there are 0 and 1"),
+        ("name", json!(""), "the name is empty"),
+        ("modes", json!(["half"]), "unknown variant `half`, expected `full` or `subset`"),
+        ("colour", json!(true), "unknown field `colour`"),
+    ] {
+        let mut claim = json!({"schema": "splatstream-capabilities/1", "name": "mine"});
+        claim[key] = value;
+        fs::write(file.path(), claim.to_string()).unwrap();
+        let error = Capabilities::read(file.path()).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+    }
 }
 
 #[test]

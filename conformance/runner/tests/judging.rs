@@ -5,10 +5,15 @@
 mod common;
 
 use common::{Vectors, WRITE, labels, results, settings};
+use serde_json::json;
 use splatstream_conformance::command::split;
 use splatstream_conformance::limits::Limits;
+use splatstream_conformance::report::Report;
+use splatstream_conformance::result::CaseResult;
 use splatstream_conformance::run::Settings;
+use splatstream_conformance::selection::Selection;
 use splatstream_conformance::session::Decoder;
+use splatstream_conformance::symptom::Symptom;
 use std::time::{Duration, Instant};
 
 #[test]
@@ -74,6 +79,157 @@ fn a_wrong_code_is_a_warning_and_if_asked_for_a_failure() {
     );
     let strict = bad(&Settings { strict: true, ..settings(script) });
     assert_eq!(strict.label(), "wrong-code");
+}
+
+#[test]
+fn who_is_strict_demands_a_code_and_the_class_of_the_exit_code() {
+    let vectors = Vectors::new();
+    let said = |line: &str, strict| {
+        let settings = Settings { strict, ..settings(&format!("echo \"{line}\" >&2; exit 11")) };
+        let all = results(&vectors.suite(), &settings);
+        let bad = all.into_iter().find(|result| result.vector == "bad").unwrap();
+        (bad.label(), bad.detail.unwrap_or_default())
+    };
+    for (line, why) in [
+        ("", "no code: the last line on standard error is no JSON object"),
+        ("done", "is no JSON object: \"done\""),
+        ("7", "is no JSON object: \"7\""),
+        ("{\\\"class\\\":\\\"invalid\\\"}", "the JSON object has no code"),
+        (
+            "{\\\"code\\\":\\\"RANGE\\\",\\\"class\\\":\\\"malformed\\\"}",
+            "says malformed and the exit code invalid",
+        ),
+        ("{\\\"code\\\":3}", "invalid type"),
+    ] {
+        assert_eq!(said(line, false).0, "pass", "{line}");
+        let (label, detail) = said(line, true);
+        assert!(label == "wrong-code" && detail.contains(why), "{line}: {label}: {detail}");
+    }
+    assert_eq!(said("{\\\"code\\\":\\\"RANGE\\\"}", true).0, "pass");
+}
+
+#[test]
+fn a_decoder_that_does_away_with_its_folder_fails_that_case_alone() {
+    let vectors = Vectors::new();
+    for change in ["rm -r $4", "rm -r $4; echo > $4", "rm -r $(dirname $4)"] {
+        let script =
+            format!("case $(cat $1) in big) {WRITE};; good) {change};; bad) {change}; exit 11;; esac");
+        let all = results(&vectors.suite(), &Settings { jobs: 1, ..settings(&script) });
+        let labels: Vec<&str> = all.iter().map(CaseResult::label).collect();
+        assert_eq!(labels, ["missing-files", "missing-files", "pass"], "{all:#?}");
+        assert_eq!(all[0].detail.as_deref(), Some("the decoder removed its output folder"));
+        assert_eq!(all[0].symptom, None);
+    }
+}
+
+#[test]
+fn files_with_other_names_are_told_with_those_that_are_right() {
+    let vectors = Vectors::new();
+    let first = |script: &str| results(&vectors.suite(), &settings(script)).remove(0);
+    let shorter =
+        first("for a in position log_scale opacity rotation dc; do printf abcd > $4/f000.$a.i32; done");
+    let detail = shorter.detail.unwrap();
+    assert!(
+        detail.contains("found instead: f000.dc.i32, ") && detail.ends_with("names are f%04d.ATTRIBUTE.i32")
+    );
+    assert_eq!(shorter.symptom, None);
+    let later =
+        first("for a in position log_scale opacity rotation dc; do printf abcd > $4/f0001.$a.i32; done");
+    assert_eq!(later.symptom, Some(Symptom::OtherNumbers));
+    assert_eq!(first("exit 0").symptom, Some(Symptom::NothingWritten));
+}
+
+/// What a decoder of one vector with states of the entropy decoder is told: units 1 and 2 have some.
+fn entropy(script: &str, is_claimed: bool) -> (&'static str, String) {
+    let vectors = Vectors::none();
+    vectors.add("valid", "states", json!({"outcome": "accept"}), |record| {
+        let unit = |state: Option<&str>| {
+            let mut unit = json!({"at": 16, "bytes": 20, "type": "refinement"});
+            state.map(|state| unit["entropy"] = json!(state));
+            unit
+        };
+        record["units"] = json!([unit(None), unit(Some("00000000000000ab")), unit(Some("00000000000000cd"))]);
+    });
+    let mut settings = settings(&format!("{WRITE}; {script}"));
+    settings.capabilities.entropy = is_claimed;
+    let result = results(&vectors.suite(), &settings).remove(0);
+    (result.label(), result.detail.unwrap_or_default())
+}
+
+#[test]
+fn states_of_the_entropy_decoder_are_compared_where_they_are_written_or_claimed() {
+    let write = |unit: u32, state: &str| format!("echo {state} > $4/u{unit:04}.entropy");
+    let right = [write(1, "00000000000000ab"), write(2, "00000000000000cd")].join("; ");
+    assert_eq!((entropy(&right, true).0, entropy("true", false).0), ("pass", "pass"));
+    assert_eq!(entropy(&write(2, "00000000000000cd"), false).0, "pass");
+    for (script, is_claimed, why) in [
+        ("true".to_owned(), true, "u0001.entropy is claimed and not there"),
+        (write(1, "00000000000000AB"), false, "u0001.entropy is 00000000000000AB: write lower-case letters"),
+        (write(2, "1"), false, "u0002.entropy is 1 and should be 00000000000000cd, 1 in all"),
+        (write(0, "1"), false, "u0000.entropy: unit 0 has no entropy state"),
+        (
+            [write(2, "00000000000000ab"), write(3, "00000000000000cd")].join("; "),
+            false,
+            "units count from 0",
+        ),
+    ] {
+        let (label, detail) = entropy(&script, is_claimed);
+        assert!(label == "wrong-entropy" && detail.contains(why), "{script}: {label}: {detail}");
+    }
+}
+
+#[test]
+fn a_process_that_breaks_the_protocol_is_told_how() {
+    let vectors = Vectors::new();
+    let told = |script: &str| {
+        let decoder = Decoder::Persistent(split(&format!("sh -c '{script}'")).unwrap());
+        let limits = Limits { time: Duration::from_millis(300), ..Limits::default() };
+        let all = results(&vectors.suite(), &Settings { decoder, limits, jobs: 1, ..settings("") });
+        (all[0].label(), all[0].detail.clone().unwrap_or_default())
+    };
+    for (script, label, why) in [
+        ("read line; echo decoding", "crash", "the answer \"decoding\" does not start with an exit code"),
+        ("read line; exit 3", "crash", "the process ended with exit code 3 before it answered"),
+        ("read line; kill -9 $$", "crash", "ended by a signal before it answered"),
+        (
+            "read line; printf 0; sleep 9",
+            "timeout",
+            "not done within 0.3 s; --time SECONDS allows more; an answer is a line",
+        ),
+    ] {
+        let (found, detail) = told(script);
+        assert!(found == label && detail.contains(why), "{script}: {found}: {detail}");
+    }
+}
+
+#[test]
+fn a_run_that_is_stopped_ends_at_once_and_leaves_no_process() {
+    let vectors = Vectors::new();
+    let suite = vectors.suite();
+    let (folder, start) = (tempfile::tempdir().unwrap(), Instant::now());
+    let alive = folder.path().join("alive");
+    let script = format!(
+        "case $(cat $1) in bad) while true; do date > {}; sleep 0.1; done;; esac; exit 12",
+        alive.display()
+    );
+    let settings = Settings { jobs: 1, ..settings(&script) };
+    let stop = settings.stop.clone();
+    let results = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !alive.exists() && start.elapsed() < Duration::from_secs(9) {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            stop.set();
+        });
+        results(&suite, &settings)
+    });
+    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+    assert_eq!(results.len(), 1, "{results:#?}");
+    let report = Report::new(&suite, &settings, &Selection::default(), results, Vec::new());
+    assert_eq!(report.interrupted, Some(3));
+    std::fs::remove_file(&alive).unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(!alive.exists());
 }
 
 #[test]

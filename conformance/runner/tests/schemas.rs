@@ -6,11 +6,12 @@ mod common;
 
 use common::{Vectors, WRITE, results, settings};
 use serde_json::{Value, json};
-use splatstream_conformance::difference::Symptom;
+use splatstream_conformance::feature::{self, FEATURES, Feature};
 use splatstream_conformance::reference;
 use splatstream_conformance::report::Report;
 use splatstream_conformance::result::Outcome;
 use splatstream_conformance::selection::Selection;
+use splatstream_conformance::symptom::Symptom;
 use std::path::Path;
 
 /// What is wrong with a value by a schema of the suite.
@@ -53,6 +54,22 @@ fn a_report_with_every_sort_of_result_is_what_its_schema_says() {
     assert_eq!(problems("report", &value), Vec::<String>::new());
     let read: Report = serde_json::from_value(value.clone()).unwrap();
     assert_eq!(serde_json::to_value(read).unwrap(), value);
+}
+
+#[test]
+fn features_are_the_same_in_schemas_and_guide() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let names: Vec<&str> = feature::names().collect();
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let schema =
+        |name: &str| serde_json::from_str::<Value>(&read(&format!("schema/{name}.schema.json"))).unwrap();
+    let of_vectors = &schema("vector")["properties"]["features"]["items"]["enum"];
+    let of_claims = &schema("capabilities")["properties"]["features"]["items"]["enum"];
+    assert_eq!((of_vectors, of_claims), (&json!(names), &json!(names)));
+    let guide = read("adapters/README.md");
+    for Feature { name, meaning, clause } in FEATURES {
+        assert!(guide.contains(&format!("| `{name}` | {meaning} | {clause} |")), "{name}");
+    }
 }
 
 #[test]

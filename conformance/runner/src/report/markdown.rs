@@ -1,7 +1,7 @@
 //! A report as Markdown: what a project puts beside its decoder.
 
-use super::Report;
-use super::summary::{contrast, explanation};
+use super::summary::{contrast, counted, explanation};
+use super::{Report, Tally};
 use crate::result::{CaseResult, Outcome};
 
 /// The page.
@@ -9,23 +9,29 @@ pub fn page(report: &Report) -> String {
     let version = report.suite.version.as_deref().unwrap_or("without a version");
     let mut page = format!("# Conformance of {}\n\n", report.decoder.name);
     page += &format!(
-        "Suite {version}, {} vectors (`{}`), {}, {} on {}.\n",
-        report.suite.vectors,
+        "Suite {version}, {} (`{}`), {}, {} on {}.\n",
+        counted(report.suite.vectors.try_into().unwrap_or(usize::MAX), "vector"),
         report.suite.sha256.get(..16).unwrap_or_default(),
         report.date,
         report.system.os,
         report.system.arch
     );
+    if let Some(changed) = &report.suite.changed {
+        page += &format!("\nThe vectors are not those of suite {version}: {changed}.\n");
+    }
     if !report.settings.selection.is_everything() {
-        page += "\nOnly a part of the suite was run.\n";
+        page += "\nOnly a part of the suite was selected.\n";
+    }
+    if let Some(selected) = report.interrupted {
+        page += &format!("\nThe run was interrupted after {} of {selected} cases.\n", report.cases.len());
     }
     page += "\n| Outcome | Cases |\n|---|---|\n";
     for outcome in Outcome::ALL {
         page += &format!("| {} | {} |\n", outcome.name(), report.count(outcome));
     }
-    page += "\n| Feature of valid streams | Cases | Passed | Not claimed |\n|---|---|---|---|\n";
-    for (feature, tally) in &report.features {
-        page += &format!("| {feature} | {} | {} | {} |\n", tally.cases, tally.pass, tally.not_claimed);
+    page += "\n| Feature of valid streams | Cases of the suite | Claimed | Run | Passed |\n|---|---|---|---|---|\n";
+    for (feature, Tally { cases, claimed, run, pass }) in &report.features {
+        page += &format!("| {feature} | {cases} | {claimed} | {run} | {pass} |\n");
     }
     page + &failures(report)
 }

@@ -16,7 +16,7 @@ pub fn text(report: &Report) -> String {
         text += &told(case);
     }
     if let Some(more @ 1..) = failures.len().checked_sub(SHOWN) {
-        text += &format!("... and {more} more failures; --report FILE has all of them\n");
+        text += &format!("... and {}; --report FILE has all of them\n", counted(more, "more failure"));
     }
     for entry in &report.stale {
         text += &format!("STALE expectation, {entry}\n");
@@ -29,7 +29,7 @@ pub fn text(report: &Report) -> String {
         .collect();
     text += &warnings.iter().take(SHOWN).map(String::as_str).collect::<String>();
     if let Some(more @ 1..) = warnings.len().checked_sub(SHOWN) {
-        text += &format!("... and {more} more warnings; --strict makes failures of them\n");
+        text += &format!("... and {}; --strict makes failures of them\n", counted(more, "more warning"));
     }
     if !text.is_empty() {
         text.push('\n');
@@ -98,16 +98,18 @@ fn last_line(report: &Report) -> String {
         .map(|outcome| format!("{} {}", report.count(outcome), outcome.name()))
         .collect();
     let vectors = report.cases.chunk_by(|a, b| a.vector == b.vector).count();
+    let is_whole = report.all.run == report.all.claimed && report.suite.changed.is_none();
     let verdict = match (report.is_good(), report.count(Outcome::Pass)) {
-        (true, _) if report.settings.selection.is_everything() => "good",
+        (true, _) if is_whole => "good",
         (true, _) => "good as far as it was run",
         (false, 0) => "NOT GOOD: no case passed",
         (false, _) => "NOT GOOD",
     };
-    format!(
-        "{}: {verdict}; {} cases of {vectors} vectors: {}\n",
-        report.decoder.name,
-        report.cases.len(),
-        counts.join(", ")
-    )
+    let (cases, vectors) = (counted(report.cases.len(), "case"), counted(vectors, "vector"));
+    format!("{}: {verdict}; {cases} of {vectors}: {}\n", report.decoder.name, counts.join(", "))
+}
+
+/// A number of things.
+pub fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }

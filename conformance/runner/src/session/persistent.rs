@@ -5,7 +5,7 @@ use crate::command;
 use crate::group::Group;
 use crate::guard::Guard;
 use crate::limits::Limits;
-use crate::protocol::{Diagnosis, Request, parse_answer};
+use crate::protocol::{Request, Said, parse_answer};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{ChildStdin, ChildStdout, Stdio};
@@ -25,6 +25,20 @@ pub(super) struct Persistent {
     answers: Receiver<String>,
 }
 
+/// What came of a request.
+pub(super) struct Reply {
+    pub(super) ending: Ending,
+    pub(super) said: Said,
+    /// How the protocol was broken.
+    pub(super) fault: Option<String>,
+}
+
+impl Reply {
+    fn without_words(ending: Ending) -> Self {
+        Self { ending, said: Said::Nothing, fault: None }
+    }
+}
+
 impl Persistent {
     pub(super) fn start(words: &[String], complaints: File, limits: &Limits) -> io::Result<Self> {
         let mut command = command::of(words);
@@ -39,44 +53,48 @@ impl Persistent {
     }
 
     /// Asks one case and waits for its answer.
-    pub(super) fn ask(&mut self, request: &Request, guard: &mut Guard<'_>) -> (Ending, Option<Diagnosis>) {
+    pub(super) fn ask(&mut self, request: &Request, guard: &mut Guard<'_>) -> Reply {
         let asked = self
             .requests
             .as_mut()
             .map(|pipe| pipe.write_all(request.line().as_bytes()).and_then(|()| pipe.flush()));
         if !matches!(asked, Some(Ok(()))) {
-            return (self.died(guard), None);
+            return self.died(guard);
         }
         loop {
             match self.answers.recv_timeout(guard.wait()) {
                 Ok(line) => {
-                    let answer = parse_answer(&line);
-                    return answer
-                        .map_or((Ending::NoAnswer, None), |(code, said)| (Ending::Code(code), said));
+                    return match parse_answer(&line) {
+                        Ok((code, said)) => Reply { ending: Ending::Code(code), said, fault: None },
+                        Err(why) => Reply { fault: Some(why), ..Reply::without_words(Ending::NoAnswer) },
+                    };
                 }
-                Err(RecvTimeoutError::Disconnected) => return (self.died(guard), None),
+                Err(RecvTimeoutError::Disconnected) => return self.died(guard),
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if let Some(ending) = guard.look(&self.group) {
-                return (ending, None);
+                return Reply::without_words(ending);
             }
         }
     }
 
     /// How a process ended that no longer answers: by itself, or not at all with its standard output closed.
-    fn died(&mut self, guard: &Guard<'_>) -> Ending {
+    fn died(&mut self, guard: &Guard<'_>) -> Reply {
         if let Some(ending) = guard.look_at_output() {
-            return ending;
+            return Reply::without_words(ending);
         }
         let ended = self.wait_to_end();
-        match self.group.end() {
+        let (ending, how) = match self.group.end() {
             // An exit code is no answer: the process was to go on.
             Ok(status) if ended => match Ending::from(status) {
-                Ending::Code(_) => Ending::NoAnswer,
-                ending => ending,
+                Ending::Code(code) => {
+                    (Ending::NoAnswer, format!("the process ended with exit code {code} before it answered"))
+                }
+                ending => (ending, "the process was ended by a signal before it answered".to_owned()),
             },
-            _ => Ending::NoAnswer,
-        }
+            _ => (Ending::NoAnswer, "the process closed its standard output before it answered".to_owned()),
+        };
+        Reply { fault: Some(how), ..Reply::without_words(ending) }
     }
 
     fn wait_to_end(&mut self) -> bool {

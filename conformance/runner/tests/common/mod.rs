@@ -11,9 +11,10 @@ use splatstream_conformance::limits::Limits;
 use splatstream_conformance::result::CaseResult;
 use splatstream_conformance::run::{Settings, run};
 use splatstream_conformance::session::Decoder;
+use splatstream_conformance::stop::Stop;
 use splatstream_conformance::suite::Suite;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
 
@@ -25,12 +26,18 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A folder of vectors.
-pub(crate) struct Vectors(TempDir);
+/// A folder of vectors, in one of their own.
+pub(crate) struct Vectors {
+    around: TempDir,
+    folder: PathBuf,
+}
 
 impl Vectors {
     pub(crate) fn none() -> Self {
-        Self(tempfile::tempdir().unwrap())
+        let around = tempfile::tempdir().unwrap();
+        let folder = around.path().join("vectors");
+        fs::create_dir(&folder).unwrap();
+        Self { around, folder }
     }
 
     /// A suite with a valid vector `good`, an invalid one `bad`, and `big`, which may be refused.
@@ -67,7 +74,15 @@ impl Vectors {
     }
 
     pub(crate) fn path(&self) -> &Path {
-        self.0.path()
+        &self.folder
+    }
+
+    /// Makes these vectors a whole suite, version 9.
+    pub(crate) fn seal(&self) {
+        let suite = self.suite();
+        fs::write(self.around.path().join("VERSION"), "9\n1.0\n").unwrap();
+        let manifest = format!("{}\n{}\n", suite.vectors.len(), suite.sha256());
+        fs::write(self.around.path().join("MANIFEST"), manifest).unwrap();
     }
 
     pub(crate) fn suite(&self) -> Suite {
@@ -84,6 +99,7 @@ pub(crate) fn settings(script: &str) -> Settings {
         limits: Limits { time: Duration::from_secs(10), ..Limits::default() },
         strict: false,
         jobs: 2,
+        stop: Stop::default(),
     }
 }
 
