@@ -171,6 +171,10 @@ fn our_decoder_speaks_the_protocol() {
     let position = fs::metadata(directory.join("f0000.position.i32")).unwrap().len();
     let opacity = fs::metadata(directory.join("f0000.opacity.i32")).unwrap().len();
     assert!(opacity > 0 && position == 3 * opacity);
+    let states = fs::read_dir(&directory)
+        .unwrap()
+        .filter(|entry| entry.as_ref().unwrap().file_name().to_string_lossy().ends_with(".entropy"));
+    assert!(states.count() > 0);
     let output = decode(Path::new("no-such.gss"));
     assert!(String::from_utf8(output.stderr).unwrap().starts_with("no-such.gss: cannot read"));
     let broken = around.path().join("broken.gss");

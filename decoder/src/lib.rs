@@ -35,6 +35,7 @@ pub mod colour;
 pub mod context;
 pub mod digest;
 pub mod displacement;
+pub mod entropy_state;
 pub mod frame;
 pub mod frame_state;
 pub mod gop;

@@ -66,6 +66,8 @@ enum FrameUnits<'a> {
 /// Decodes a stream unit by unit.
 pub struct Decoder<'a> {
     options: Options,
+    /// Whether entropy states are asked for.
+    observes: bool,
     profile: Profile,
     level: u8,
     /// Whether the units before the first GOP header are not known (B.3).
@@ -101,6 +103,7 @@ impl<'a> Decoder<'a> {
     pub fn new(file: &FileHeader, options: Options) -> Self {
         Self {
             options,
+            observes: false,
             profile: file.profile(),
             level: file.level,
             starts_inside: false,
@@ -126,6 +129,11 @@ impl<'a> Decoder<'a> {
     /// What relates to the start of the stream is not checked.
     pub fn starting_inside(file: &FileHeader, options: Options) -> Self {
         Self { starts_inside: true, ..Self::new(file, options) }
+    }
+
+    /// The same decoder, which also tells the entropy states of units: [`DecodedFrame::entropy`].
+    pub fn observing(self) -> Self {
+        Self { observes: true, ..self }
     }
 
     /// The sequence parameters, once they have arrived.

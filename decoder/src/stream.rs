@@ -25,7 +25,18 @@ pub fn decode_stream(
     mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
     let mut summary = Summary::default();
-    summary.end = run(bytes, options, None, &mut summary.frames, &mut on_frame).err();
+    summary.end = run(bytes, options, Start::First, &mut summary.frames, &mut on_frame).err();
+    summary
+}
+
+/// The same, with the entropy states of units in [`DecodedFrame::entropy`].
+pub fn decode_stream_observed(
+    bytes: &[u8],
+    options: &Options,
+    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+) -> Summary {
+    let mut summary = Summary::default();
+    summary.end = run(bytes, options, Start::Observed, &mut summary.frames, &mut on_frame).err();
     summary
 }
 
@@ -39,13 +50,29 @@ pub fn decode_stream_inside(
     mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
     let mut summary = Summary::default();
-    summary.end = run(bytes, options, Some(gop), &mut summary.frames, &mut on_frame).err();
+    summary.end = run(bytes, options, Start::Inside(gop), &mut summary.frames, &mut on_frame).err();
     summary
 }
 
-/// A decoder and the units that it takes, from the first on or from the group at an offset on.
-fn start<'a>(stream: &Stream<'a>, options: &Options, gop: Option<u64>) -> Result<(Decoder<'a>, Units<'a>)> {
-    let Some(gop) = gop else { return Ok((Decoder::new(stream.header(), *options), stream.units())) };
+/// Where decoding starts.
+#[derive(Clone, Copy)]
+enum Start {
+    /// With the first unit.
+    First,
+    /// With the first unit, and entropy states are told.
+    Observed,
+    /// With the group whose header stands at this absolute offset.
+    Inside(u64),
+}
+
+/// A decoder and the units that it takes.
+fn start<'a>(stream: &Stream<'a>, options: &Options, start: Start) -> Result<(Decoder<'a>, Units<'a>)> {
+    let decoder = || Decoder::new(stream.header(), *options);
+    let gop = match start {
+        Start::First => return Ok((decoder(), stream.units())),
+        Start::Observed => return Ok((decoder().observing(), stream.units())),
+        Start::Inside(gop) => gop,
+    };
     let mut decoder = Decoder::starting_inside(stream.header(), *options);
     if let Some(first) = stream.units().next() {
         decoder.unit(&first?)?;
@@ -56,12 +83,12 @@ fn start<'a>(stream: &Stream<'a>, options: &Options, gop: Option<u64>) -> Result
 fn run(
     bytes: &[u8],
     options: &Options,
-    gop: Option<u64>,
+    from: Start,
     frames: &mut u32,
     on_frame: &mut impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Result<()> {
     let stream = Stream::open(bytes, &options.limits)?;
-    let (mut decoder, mut units) = start(&stream, options, gop)?;
+    let (mut decoder, mut units) = start(&stream, options, from)?;
     let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame)
     {
         (Some(sequence), Some(frame)) => {

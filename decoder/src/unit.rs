@@ -1,6 +1,7 @@
 //! The refinement units of a frame, all their blocks at once on all cores.
 
 use crate::block::{CodedBlock, UnitParameters, decode_block, decode_coded};
+use crate::entropy_state::{UnitEntropy, of_refinement};
 use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::gop::{Gop, Transforms};
 use crate::layout::Layout;
@@ -130,6 +131,22 @@ pub fn decode_units(
     }
     results.extend(failure.map(Err));
     (frame, results)
+}
+
+/// The entropy states of units that have been decoded without an error. Their blocks are decoded once more.
+pub fn entropy_states(
+    units: &[CodedUnit<'_, '_>],
+    gop: &Gop,
+    transforms: Transforms<'_>,
+    sequence: &SequenceParameters,
+) -> Vec<UnitEntropy> {
+    let (prepared, _) = prepare(units, gop, transforms);
+    let state = |unit: &PreparedUnit<'_, '_, '_>| {
+        let blocks = unit.coded_blocks(sequence).ok()?;
+        let state = of_refinement(unit.unit.refinement, &unit.layout, &unit.models, &blocks)?;
+        Some(UnitEntropy { payload_at: unit.unit.payload_at, state })
+    };
+    prepared.iter().filter_map(state).collect()
 }
 
 /// Bytes, offset and Gaussians of a block.

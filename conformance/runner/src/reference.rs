@@ -3,14 +3,15 @@
 
 use crate::attribute::{Attribute, to_bytes};
 use crate::capabilities::Capabilities;
-use crate::output::floats_name;
+use crate::output::{entropy_name, floats_name};
 use crate::protocol::{Diagnosis, Request};
 use crate::vector::Mode;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
-use splatstream_decoder::stream::decode_stream;
+use splatstream_decoder::stream::decode_stream_observed;
 use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::unit::{Delivery, Stream};
 use splatstream_format::{Error, Limits};
 use std::fs;
 use std::io;
@@ -26,6 +27,8 @@ pub struct Decoded {
     pub sequence: Option<SequenceParameters>,
     /// The verdict: the first error, confined or fatal.
     pub error: Option<Error>,
+    /// Entropy states by unit, counted from 0.
+    pub entropy: Vec<(usize, u64)>,
 }
 
 impl Decoded {
@@ -35,20 +38,24 @@ impl Decoded {
         let subset = mode == Mode::Subset;
         let options = Options { limits, operating_point, subset, tolerant: true, ..Options::default() };
         let mut decoded = Self::default();
-        let summary = decode_stream(bytes, &options, |sequence, frame| {
+        let summary = decode_stream_observed(bytes, &options, |sequence, frame| {
             decoded.sequence.get_or_insert(*sequence);
             decoded.frames.push(frame);
             ControlFlow::Continue(())
         });
+        decoded.entropy = entropy_states(bytes, &decoded.frames);
         decoded.error = decoded.frames.iter().find_map(|frame| frame.lost).or(summary.end);
         decoded
     }
 
-    /// Writes every frame as the protocol says, planes and output of 7.10.
+    /// Writes every frame as the protocol says, planes and output of 7.10, and entropy states.
     ///
     /// # Errors
     /// A file cannot be written.
     pub fn write(self, folder: &Path) -> io::Result<()> {
+        for (unit, state) in &self.entropy {
+            fs::write(folder.join(entropy_name(*unit)), format!("{state:016x}"))?;
+        }
         let Some(sequence) = self.sequence else { return Ok(()) };
         // Frames have the attributes of their sequence, even frames without Gaussians.
         let has_sh = sequence.sh_dimension() > 0;
@@ -86,9 +93,9 @@ impl Decoded {
     }
 }
 
-/// What the reference decoder claims: everything but the states of its entropy decoder.
+/// What the reference decoder claims: everything.
 pub fn capabilities() -> Capabilities {
-    Capabilities { output: true, ..Capabilities::everything("reference") }
+    Capabilities { entropy: true, output: true, ..Capabilities::everything("reference") }
 }
 
 /// Does what is asked.
@@ -100,6 +107,28 @@ pub fn answer(request: &Request) -> io::Result<(i32, Option<Diagnosis>)> {
     let verdict = decoded.verdict();
     decoded.write(&request.out).map_err(naming("write into", &request.out))?;
     Ok(verdict)
+}
+
+/// The entropy states of frames with the places of their units in the stream.
+fn entropy_states(bytes: &[u8], frames: &[DecodedFrame]) -> Vec<(usize, u64)> {
+    let Ok(stream) = Stream::open(bytes, &Limits::default()) else { return Vec::new() };
+    let mut units = stream.units();
+    let starts: Vec<u64> = std::iter::from_fn(|| units.next_unit())
+        .map_while(|delivery| {
+            delivery.ok().map(|delivery| match delivery {
+                Delivery::Intact(unit) => unit.payload_at,
+                // A damaged unit has no state.
+                Delivery::Damaged(_) => 0,
+            })
+        })
+        .collect();
+    let states = frames.iter().flat_map(|frame| &frame.entropy);
+    states
+        .filter_map(|entropy| {
+            let unit = starts.iter().position(|&start| start == entropy.payload_at)?;
+            Some((unit, entropy.state))
+        })
+        .collect()
 }
 
 /// The stream of a request, decoded as it asks.

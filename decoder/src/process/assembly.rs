@@ -5,6 +5,7 @@ use super::layered::{PendingIncrement, Reference};
 use super::{Compensation, DecodedFrame, Options, PendingFrame};
 use crate::digest::{UnitDigest, frame_digest, unit_digest};
 use crate::displacement::{CellField, rotation_unit};
+use crate::entropy_state::{UnitEntropy, of_increment};
 use crate::frame::QuantizedFrame;
 use crate::frame_state::FrameState;
 use crate::gop::{Gop, Transforms};
@@ -25,6 +26,8 @@ const MOST_TABLES: usize = 1 << 12;
 /// A frame that is being put together.
 pub(super) struct Assembly<'d, 'a> {
     options: Options,
+    /// Entropy states of the units so far, if they are asked for.
+    entropy: Option<Vec<UnitEntropy>>,
     sequence: &'d SequenceParameters,
     gop: &'d Gop,
     transforms: Transforms<'d>,
@@ -79,6 +82,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let models = reference.map(|reference| reference.state.models.clone()).unwrap_or_default();
         Ok(Self {
             options,
+            entropy: None,
             sequence,
             gop,
             transforms: gop.transforms(&frame.header, frame.at)?,
@@ -113,12 +117,26 @@ impl<'d, 'a> Assembly<'d, 'a> {
             let values: Vec<Result<UnitValues>> =
                 rest.par_iter().map(|(_, prepared)| prepared.0.decode(self.sequence)).collect();
             for ((unit, (_, models)), values) in rest.iter().zip(values) {
-                self.unit(unit, &values?, predicts)?;
+                let values = values?;
+                self.unit(unit, &values, predicts)?;
+                self.observe(unit, &values);
                 self.models.follow(unit.refinement, models.clone());
             }
             rest = later;
         }
         failure.map_or(Ok(()), Err)
+    }
+
+    /// Asks for entropy states.
+    pub(super) fn observing(self) -> Self {
+        Self { entropy: Some(Vec::new()), ..self }
+    }
+
+    /// Keeps the entropy state of a unit, if it has one and is asked for it.
+    fn observe(&mut self, unit: &PendingIncrement<'a>, values: &UnitValues) {
+        let Some(states) = &mut self.entropy else { return };
+        let state = of_increment(&unit.increment, values);
+        states.extend(state.map(|state| UnitEntropy { payload_at: unit.payload_at, state }));
     }
 
     /// Reads the models of the units, up to the first that fails.
@@ -262,6 +280,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let decoded = DecodedFrame {
             spatial_layer: self.spatial_layer,
             bytes: self.bytes,
+            entropy: self.entropy.take().unwrap_or_default(),
             refinements: u8::try_from(self.homes.len()).unwrap_or(u8::MAX),
             ..DecodedFrame::empty(self.frame.number, self.frame_type())
         };

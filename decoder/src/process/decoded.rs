@@ -1,5 +1,6 @@
 //! What comes out of a decoder for a frame.
 
+use crate::entropy_state::UnitEntropy;
 use crate::frame::QuantizedFrame;
 use splatstream_format::Error;
 use splatstream_format::syntax::FrameType;
@@ -29,6 +30,8 @@ pub struct DecodedFrame {
     pub compensation: Compensation,
     /// Bytes of the frame's units that were decoded, headers included.
     pub bytes: u64,
+    /// Entropy states of the frame's units that were decoded, if they were asked for.
+    pub entropy: Vec<UnitEntropy>,
     /// Why the refinement after the last decoded one was lost, if it was.
     pub lost: Option<Error>,
 }
@@ -59,6 +62,7 @@ impl DecodedFrame {
             carried_digest: None,
             compensation: Compensation::default(),
             bytes: 0,
+            entropy: Vec::new(),
             lost: None,
         }
     }

@@ -175,6 +175,9 @@ impl<'a> Decoder<'a> {
         let mut lost = frame.lost;
         let options = Options { limits: self.limits(), ..self.options };
         let mut assembly = Assembly::new(options, sequence, gop, frame, reference)?;
+        if self.observes {
+            assembly = assembly.observing();
+        }
         if let Err(error) = assembly.units(&layered.units) {
             lost = Some(error);
         }

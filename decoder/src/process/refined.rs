@@ -5,7 +5,7 @@ use super::{DecodedFrame, Decoder, FrameUnits, PendingFrame, keep, unit_bytes};
 use crate::digest::{UnitDigest, frame_digest, unit_digest};
 use crate::frame::QuantizedFrame;
 use crate::gop::Gop;
-use crate::unit::{CodedUnit, decode_units};
+use crate::unit::{CodedUnit, decode_units, entropy_states};
 use splatstream_format::payload::Refinement;
 use splatstream_format::syntax::{FrameHeader, FrameType, RefinementHeader, SequenceParameters};
 use splatstream_format::unit::Unit;
@@ -70,7 +70,12 @@ impl<'a> Decoder<'a> {
             .collect();
         let tools = gop.transforms(&frame.header, 0)?;
         let (planes, results) = decode_units(&coded, gop, tools, sequence);
-        self.assemble(frame, refined, planes, results).map(Some)
+        let mut decoded = self.assemble(frame, refined, planes, results)?;
+        if self.observes {
+            let known = coded.get(..decoded.refinements.into()).unwrap_or_default();
+            decoded.entropy = entropy_states(known, gop, tools, sequence);
+        }
+        Ok(Some(decoded))
     }
 
     /// Checks the units of a frame, and cuts the planes before the first that failed.

@@ -1,0 +1,74 @@
+//! How the sections of a unit were decoded, as one number: two decoders that compare it unit by unit find the unit at which
+//! they part. Defined in `conformance/README.md`; no part of the decoding process, and nothing is computed unless
+//! [`Decoder::observing`](crate::process::Decoder::observing) asks for it.
+
+use crate::attribute::unbias;
+use crate::block::CodedBlock;
+use crate::increment::values::UnitValues;
+use crate::layout::Layout;
+use splatstream_format::entropy::STATE_LOW;
+use splatstream_format::entropy::model::PlaneModel;
+use splatstream_format::payload::{Increment, Refinement};
+use xxhash_rust::xxh64::Xxh64;
+
+/// The entropy state of a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UnitEntropy {
+    /// Absolute offset of the payload of the unit.
+    pub payload_at: u64,
+    /// XXH64 over the lanes and lengths of all blocks, and all values.
+    pub state: u64,
+}
+
+/// The number of an increment all of whose blocks were decoded; none if it has no sections.
+pub(crate) fn of_increment(increment: &Increment<'_>, values: &UnitValues) -> Option<u64> {
+    let mut hash = Xxh64::new(0);
+    for coded in &increment.sections {
+        add_blocks(&mut hash, coded.lanes_log2, &coded.blocks);
+        let values = values.section(coded.section);
+        // The plane of the position alphabet is the first.
+        add_deltas(&mut hash, &values.deltas);
+        values.planes.iter().for_each(|plane| add_values(&mut hash, plane));
+    }
+    (!increment.sections.is_empty()).then(|| hash.digest())
+}
+
+/// The number of a refinement from its decoded blocks; none if it has no Gaussian.
+pub(crate) fn of_refinement(
+    refinement: &Refinement<'_>,
+    layout: &Layout,
+    models: &[PlaneModel],
+    blocks: &[CodedBlock],
+) -> Option<u64> {
+    let mut hash = Xxh64::new(0);
+    add_blocks(&mut hash, refinement.header.lanes_log2, &refinement.blocks);
+    for (plane, (info, model)) in layout.planes().iter().zip(models).enumerate() {
+        for block in blocks {
+            if info.is_position() {
+                add_deltas(&mut hash, &block.deltas);
+            } else {
+                let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+                add_values(&mut hash, &unbias(coded, model.bias));
+            }
+        }
+    }
+    (!blocks.is_empty()).then(|| hash.digest())
+}
+
+/// The final states and the length of each block. A block of another final state is an error (8.4), so that those of a
+/// decoded one need not be kept.
+fn add_blocks(hash: &mut Xxh64, lanes_log2: u8, blocks: &[(&[u8], u64)]) {
+    let lanes = 1_usize.wrapping_shl(lanes_log2.into());
+    for (bytes, _) in blocks {
+        (0..lanes).for_each(|_| hash.update(&STATE_LOW.to_le_bytes()));
+        hash.update(&u32::try_from(bytes.len()).unwrap_or(u32::MAX).to_le_bytes());
+    }
+}
+
+fn add_deltas(hash: &mut Xxh64, deltas: &[u64]) {
+    deltas.iter().for_each(|delta| hash.update(&delta.to_le_bytes()));
+}
+
+fn add_values(hash: &mut Xxh64, values: &[i32]) {
+    values.iter().for_each(|value| hash.update(&value.to_le_bytes()));
+}
