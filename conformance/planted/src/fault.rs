@@ -11,6 +11,7 @@ use splatstream_conformance::vector::Mode;
 use splatstream_format::Class;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
+use std::path::Path;
 use std::process::abort;
 use std::thread;
 use std::time::Duration;
@@ -55,6 +56,12 @@ pub(crate) enum Fault {
     IgnoresSubsetMode,
     /// Shows values without compensation.
     IgnoresCompensation,
+    /// The last entropy state is off by one.
+    WrongEntropy,
+    /// Writes the bytes of each value the other way round.
+    BigEndian,
+    /// Removes the folder that it was given.
+    RemovesFolder,
     /// Takes memory until there is no more.
     OutOfMemory,
     /// Writes until the disk is full.
@@ -98,10 +105,16 @@ impl Fault {
             }
             Self::IgnoresCompensation => forget_compensation(frames),
             Self::ExtraFiles => fs::write(request.out.join("decoder.log"), "all is well\n")?,
+            Self::WrongEntropy => decoded.entropy.last_mut().into_iter().for_each(|(_, state)| *state ^= 1),
             Self::Crash if decoded.error.is_some() => abort(),
             _ => {}
         }
         let code = write(decoded, request)?;
+        match self {
+            Self::BigEndian => turn_values(&request.out)?,
+            Self::RemovesFolder => fs::remove_dir_all(&request.out)?,
+            _ => {}
+        }
         Ok(match (self, Class::of_exit_code(code)) {
             (Self::AcceptsEverything, _) => 0,
             (Self::WrongClass, Some(Class::Invalid)) => Class::Malformed.exit_code().into(),
@@ -116,6 +129,19 @@ fn write(decoded: Decoded, request: &Request) -> io::Result<i32> {
     let (code, _) = decoded.verdict();
     decoded.write(&request.out)?;
     Ok(code)
+}
+
+/// Reverses each four bytes of the files of planes in a folder.
+fn turn_values(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension == "i32") {
+            let mut bytes = fs::read(&path)?;
+            bytes.chunks_mut(4).for_each(<[u8]>::reverse);
+            fs::write(&path, bytes)?;
+        }
+    }
+    Ok(())
 }
 
 /// Takes memory, page by page, and keeps it.

@@ -264,6 +264,22 @@ fn missing_compensation_is_told_with_its_clause() {
 }
 
 #[test]
+fn a_wrong_state_of_the_entropy_decoder_is_wrong_entropy() {
+    assert_caught("wrong-entropy", &["wrong-entropy"], &[]);
+}
+
+#[test]
+fn values_the_other_way_round_are_told() {
+    let results = assert_caught("big-endian", &["wrong-planes"], &[]);
+    assert_looks_like(&results, Symptom::BigEndian);
+}
+
+#[test]
+fn a_decoder_that_removes_its_folder_fails_and_the_run_goes_on() {
+    assert_caught("removes-folder", &["missing-files"], &["missing-files"]);
+}
+
+#[test]
 fn memory_without_end_is_too_much_memory() {
     let suite = suite();
     let cases: Vec<Case<'_>> = few(&suite).into_iter().take(2).collect();

@@ -236,12 +236,12 @@ fn compare_entropy(case: &Case<'_>, output: &Output, rules: Rules) -> Option<Str
     let beyond = output.entropy.keys().copied().filter(|&unit| unit >= units.len());
     let wrong: Vec<usize> = (0..units.len()).chain(beyond).filter(is_wrong).collect();
     let &unit = wrong.first()?;
-    let is_shifted = || (0..units.len()).all(|unit| output.entropy.get(&(unit + 1)) == wanted_of(unit));
+    let is_of_unit_before =
+        |(&unit, found): (&usize, &String)| Some(found) == unit.checked_sub(1).and_then(wanted_of);
+    let is_shifted = !output.entropy.is_empty() && output.entropy.iter().all(is_of_unit_before);
     let name = entropy_name(unit);
     Some(match (output.entropy.get(&unit), wanted_of(unit)) {
-        _ if is_shifted() => {
-            "the entropy states are those of the units before: units count from 0".to_owned()
-        }
+        _ if is_shifted => "the entropy states are those of the units before: units count from 0".to_owned(),
         (None, _) => format!("{name} is claimed and not there; the planes are right"),
         (Some(_), None) => format!("{name}: unit {unit} has no entropy state; the planes are right"),
         (Some(found), Some(wanted)) if found.to_lowercase() == *wanted => {

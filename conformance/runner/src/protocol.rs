@@ -108,8 +108,14 @@ pub fn parse_answer(line: &str) -> Result<(i32, Said), String> {
     let line = line.trim_end_matches(['\r', '\n']);
     let (code, rest) = line.split_once('\t').unwrap_or((line, ""));
     let code = code.trim().parse().map_err(|_| {
-        let advice = "standard output is for answers only";
-        format!("the answer {} does not start with an exit code; {advice}", quoted(line))
+        let first = line.split_whitespace().next().unwrap_or_default();
+        match first.parse::<i32>() {
+            Ok(_) => format!("the answer {} has no tab behind the exit code", quoted(line)),
+            Err(_) => {
+                let advice = "standard output is for answers only";
+                format!("the answer {} does not start with an exit code; {advice}", quoted(line))
+            }
+        }
     })?;
     Ok((code, Said::of("what follows the tab of the answer", rest)))
 }
@@ -139,6 +145,7 @@ mod tests {
         assert_eq!(parse_answer("11\t{\"code\":\"RANGE\",\"byte\":7}\n"), Ok((11, said)));
         assert_eq!(parse_answer("0\r\n"), Ok((0, Said::Nothing)));
         assert!(matches!(parse_answer("11\tbroken"), Ok((11, Said::Unclear(_)))));
+        assert!(parse_answer("11 {}\n").unwrap_err().ends_with("has no tab behind the exit code"));
         let error = parse_answer("decoding in.gss\n").unwrap_err();
         assert!(
             error.starts_with("the answer \"decoding in.gss\" does not start with an exit code"),

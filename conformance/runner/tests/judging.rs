@@ -145,7 +145,9 @@ fn entropy(script: &str, is_claimed: bool) -> (&'static str, String) {
     vectors.add("valid", "states", json!({"outcome": "accept"}), |record| {
         let unit = |state: Option<&str>| {
             let mut unit = json!({"at": 16, "bytes": 20, "type": "refinement"});
-            state.map(|state| unit["entropy"] = json!(state));
+            if let Some(state) = state {
+                unit["entropy"] = json!(state);
+            }
             unit
         };
         record["units"] = json!([unit(None), unit(Some("00000000000000ab")), unit(Some("00000000000000cd"))]);
@@ -167,6 +169,8 @@ fn states_of_the_entropy_decoder_are_compared_where_they_are_written_or_claimed(
         (write(1, "00000000000000AB"), false, "u0001.entropy is 00000000000000AB: write lower-case letters"),
         (write(2, "1"), false, "u0002.entropy is 1 and should be 00000000000000cd, 1 in all"),
         (write(0, "1"), false, "u0000.entropy: unit 0 has no entropy state"),
+        (write(7, "1"), false, "u0007.entropy: unit 7 has no entropy state"),
+        (write(3, "00000000000000cd"), false, "units count from 0"),
         (
             [write(2, "00000000000000ab"), write(3, "00000000000000cd")].join("; "),
             false,
