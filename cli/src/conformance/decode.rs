@@ -1,7 +1,6 @@
 //! `splatstream conformance decode`: our decoder as the conformance suite asks decoders.
 
 use crate::failure::Failure;
-use crate::output_file::make_directory;
 use clap::Args;
 use splatstream_conformance::protocol::{Diagnosis, Request};
 use splatstream_conformance::reference;
@@ -45,7 +44,6 @@ impl Decode {
             return serve(io::stdin().lock(), io::stdout().lock(), reference::answer)
                 .map_err(|error| failure(&error));
         };
-        make_directory(out)?;
         let request =
             Request { input: input.clone(), op: self.op.to_string(), mode: self.mode, out: out.clone() };
         let (exit_code, diagnosis) =

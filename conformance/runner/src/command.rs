@@ -123,9 +123,12 @@ pub fn split_persistent(text: &str) -> Result<Vec<String>> {
     Ok(words)
 }
 
-/// A word that means something to a shell alone, if there is one.
+/// A word that means something to a shell alone, if there is one and no shell is asked to run.
 pub fn shell_word(words: &[String]) -> Option<&str> {
     const OPERATORS: [&str; 10] = ["|", "||", "&", "&&", ";", "<", ">", ">>", "2>", "2>&1"];
+    if words.get(1).is_some_and(|word| word == "-c") {
+        return None;
+    }
     let first = words.first().filter(|word| *word == "cd" || word.contains('='));
     let operator = words.iter().find(|word| OPERATORS.contains(&word.as_str()) || word.ends_with(';'));
     first.or(operator).map(String::as_str)
@@ -229,6 +232,8 @@ mod tests {
         let (folder, script) = (folder.path().to_str().unwrap(), script.to_str().unwrap());
         assert!(why(&["cd", "x", "&&", "mydec"], ErrorKind::NotFound).contains("'cd' is for a shell"));
         assert!(why(&["nowhere", "|", "cat"], ErrorKind::NotFound).contains("'|' is for a shell"));
+        let asked = ["sh", "-c", "mydec;"].map(str::to_owned);
+        assert_eq!(shell_word(&asked), None);
         assert!(why(&[folder], ErrorKind::PermissionDenied).contains("is a folder"));
         assert!(why(&[script], ErrorKind::PermissionDenied).contains("chmod +x"));
         assert!(why(&[script], ErrorKind::NotFound).contains("interpreter"));

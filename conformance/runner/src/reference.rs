@@ -98,13 +98,14 @@ pub fn capabilities() -> Capabilities {
     Capabilities { entropy: true, output: true, ..Capabilities::everything("reference") }
 }
 
-/// Does what is asked.
+/// Does what is asked; makes the folder if it is not there.
 ///
 /// # Errors
 /// The stream cannot be read, what is shown cannot be written, or the operating point is none.
 pub fn answer(request: &Request) -> io::Result<(i32, Option<Diagnosis>)> {
     let decoded = decode(request)?;
     let verdict = decoded.verdict();
+    fs::create_dir_all(&request.out).map_err(naming("make", &request.out))?;
     decoded.write(&request.out).map_err(naming("write into", &request.out))?;
     Ok(verdict)
 }
