@@ -320,13 +320,14 @@ impl<'a> Decoder<'a> {
         let is_full = self.gop.is_some() && self.frames == 0;
         let next = if is_full { 1 << 32 } else { u64::from(self.frames) };
         same(frame_at(unit), "6.5", "frame", unit.header.frame.into(), next)?;
-        let header = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
+        let (header, rest) = GopHeader::parse(unit.payload, unit.payload_at, self.profile)?;
         let layers = self.sequence().map_or(1, |sequence| sequence.temporal_layer_count);
         header.validate_layers(unit.payload_at, layers)?;
         let expected = self.gop.as_ref().map_or(0, |gop| gop.header.gop_index.wrapping_add(1));
         let expected = if starts_here { header.gop_index } else { expected };
         same(unit.payload_at, "6.5", "gop_index", header.gop_index, expected)?;
         header.validate_from(unit.payload_at, self.frames)?;
+        GopHeader::TABLE.ends(rest, unit.payload_at)?;
         self.references = References::default();
         self.gops.push((self.frames, unit.at));
         self.gop = Some(Gop::new(header, self.frames));
@@ -378,10 +379,11 @@ impl<'a> Decoder<'a> {
             if place.reference.is_some() { sequence.spatial_layer_count.wrapping_sub(1) } else { 0 };
         let spatial = element_at(&UnitHeader::TABLE, unit.at, "spatial_layer");
         same(spatial, "6.6", "spatial_layer", unit.header.spatial_layer, spatial_layer)?;
-        let header = FrameHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
+        let (header, rest) = FrameHeader::parse(unit.payload, unit.payload_at, self.profile)?;
         header.validate_place(unit.payload_at, &place)?;
         gop.transforms(&header, unit.payload_at)?;
         header.within(unit.payload_at, &self.limits())?;
+        FrameHeader::TABLE.ends(rest, unit.payload_at)?;
         let units = match self.profile {
             Profile::Intra => FrameUnits::Refined(RefinedFrame::new()),
             Profile::Dynamic => {

@@ -155,7 +155,7 @@ macro_rules! record_io {
             /// Reads and checks a payload that is this record and nothing more.
             pub fn parse_payload(payload: &[u8], at: u64) -> $crate::Result<Self> {
                 let (record, rest) = Self::parse(payload, at)?;
-                $crate::syntax::nothing_after(&Self::TABLE, rest, $crate::syntax::after(at, Self::SIZE))?;
+                Self::TABLE.ends(rest, at)?;
                 Ok(record)
             }
 
@@ -174,16 +174,26 @@ pub(crate) use record_io;
 macro_rules! record_io_in_profile {
     ($Record:ident) => {
         impl $Record {
-            /// Reads and checks a payload of a stream of a profile, at offset `at`, that is this record and nothing
-            /// more.
+            /// Reads and checks the record at the start of `bytes`, which stand at offset `at` of a stream of a
+            /// profile; gives the bytes after it.
+            pub fn parse(
+                bytes: &[u8],
+                at: u64,
+                profile: $crate::syntax::Profile,
+            ) -> $crate::Result<(Self, &[u8])> {
+                let (record, rest): (Self, _) = $crate::syntax::decode(&Self::TABLE, bytes, at)?;
+                record.validate(at, profile)?;
+                Ok((record, rest))
+            }
+
+            /// Reads and checks a payload that is this record and nothing more.
             pub fn parse_payload(
                 payload: &[u8],
                 at: u64,
                 profile: $crate::syntax::Profile,
             ) -> $crate::Result<Self> {
-                let (record, rest): (Self, _) = $crate::syntax::decode(&Self::TABLE, payload, at)?;
-                record.validate(at, profile)?;
-                $crate::syntax::nothing_after(&Self::TABLE, rest, $crate::syntax::after(at, Self::SIZE))?;
+                let (record, rest) = Self::parse(payload, at, profile)?;
+                Self::TABLE.ends(rest, at)?;
                 Ok(record)
             }
 
@@ -241,6 +251,11 @@ impl Table {
     /// Bytes before an element of the record.
     pub fn offset(&self, element: &str) -> usize {
         self.rows.iter().take_while(|row| row.name != element).map(|row| row.bytes).sum()
+    }
+
+    /// 6.1: nothing is left of a payload at offset `at` that is this record alone; `rest` is what comes after it.
+    pub fn ends(&self, rest: &[u8], at: u64) -> Result<()> {
+        nothing_after(self, rest, after(at, self.size()))
     }
 
     /// The checks of one record at a place in the stream.

@@ -46,21 +46,19 @@ impl<'a> Decoder<'a> {
 
     pub(super) fn end(&mut self, unit: &Unit<'a>) -> Result<()> {
         self.close_gop(unit.at)?;
-        let end = EndOfStream::parse_payload(unit.payload, unit.payload_at)?;
+        let (end, rest) = EndOfStream::parse(unit.payload, unit.payload_at)?;
         let expected = EndOfStream {
             frame_count: self.frame_headers,
             unit_count: self.units,
             index_offset: self.index_offset.unwrap_or(0),
         };
         self.ended = true;
-        if self.starts_inside {
-            return Ok(());
-        }
-        end.validate_against(unit.payload_at, &expected)?;
         let announced = self.sequence().map_or(0, |sequence| sequence.frame_count);
-        if announced != 0 {
-            same(unit.payload_at, "6.4", "frame_count", self.frames, announced)?;
+        if !self.starts_inside {
+            end.validate_against(unit.payload_at, &expected)?;
+            let frames = if announced == 0 { 0 } else { self.frames };
+            same(unit.payload_at, "6.4", "frame_count", frames, announced)?;
         }
-        Ok(())
+        EndOfStream::TABLE.ends(rest, unit.payload_at)
     }
 }
