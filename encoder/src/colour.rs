@@ -80,8 +80,10 @@ pub(crate) fn components(
     step: f32,
     spacing: &Spacing,
 ) -> Vec<Vec<i32>> {
-    let limit = *COMPONENT_RANGE.end() as f32;
-    project(transform, planes, step, |row, value| spacing.nearest(row, value.clamp(-limit, limit)))
+    let (first, last) = COMPONENT_RANGE.into_inner();
+    let nearest = |row, value: f32| spacing.nearest(row, value.clamp(first as f32, last as f32));
+    // The nearest multiple of two steps may lie beyond.
+    project(transform, planes, step, |row, value| nearest(row, value).clamp(first, last))
 }
 
 /// Drops the last components that are 0 for every Gaussian; at least one stays.

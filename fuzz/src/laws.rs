@@ -4,38 +4,73 @@ use crate::LIMITS;
 use core::ops::ControlFlow;
 use splatstream_decoder::digest::{frame_digest, unit_digest};
 use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_points};
+use splatstream_decoder::operating_point::{OperatingPoint, operating_points};
 use splatstream_decoder::output::to_gaussians;
-use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
+use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::decode_stream;
+use splatstream_format::Error;
 use splatstream_format::inspect::inspect;
 use splatstream_format::syntax::{FrameType, SequenceParameters, UnitType};
-use splatstream_format::unit::{Stream, Unit};
-use splatstream_format::{Error, ErrorKind, Result};
+use splatstream_format::unit::Stream;
+
+pub mod arrival;
+pub mod extraction;
+pub mod parts;
 
 /// Strict: the first fault ends decoding. Digests are not compared, as no edit could make them right again.
-const STRICT: Options = Options {
+pub const STRICT: Options = Options {
     limits: LIMITS,
     verify: false,
     operating_point: OperatingPoint::ALL,
     tolerant: false,
     subset: false,
 };
-const TOLERANT: Options = Options { tolerant: true, ..STRICT };
-const VERIFIED: Options = Options { verify: true, ..STRICT };
+/// A damaged refinement ends its frame only.
+pub const TOLERANT: Options = Options { tolerant: true, ..STRICT };
+/// Strict, and digests are compared.
+pub const VERIFIED: Options = Options { verify: true, ..STRICT };
 
 /// What decoding a stream gave.
 #[derive(Debug, PartialEq)]
-struct Decoded {
-    sequence: Option<SequenceParameters>,
-    frames: Vec<DecodedFrame>,
-    end: Option<Error>,
+pub struct Decoded {
+    /// What holds for all frames, once one came out.
+    pub sequence: Option<SequenceParameters>,
+    /// The frames in the order in which they came out.
+    pub frames: Vec<DecodedFrame>,
+    /// What ended decoding before the end of the stream.
+    pub end: Option<Error>,
 }
 
 /// Decodes a stream in every way; `choice` chooses an operating point, what is lost, and where to start.
 pub fn hold(bytes: &[u8], choice: u32) {
-    let strict = decoded(bytes, &STRICT);
-    let tolerant = decoded(bytes, &TOLERANT);
+    let strict = decodes(bytes);
+    if strict.end.is_none() && is_in_place(bytes) {
+        parts::hold(bytes, &strict, choice);
+        if let Some(sequence) = &strict.sequence {
+            extraction::holds_at(bytes, &strict, extraction::chosen(sequence, choice));
+        }
+    }
+}
+
+/// Whether every refinement and increment stands behind the header of its own frame. One that a decoder passes over
+/// may be of another frame (9.3): with fewer units before it, it then counts for something.
+pub fn is_in_place(bytes: &[u8]) -> bool {
+    let mut frame = None;
+    let Ok(stream) = Stream::open(bytes, &LIMITS) else { return true };
+    stream.units().flatten().all(|unit| match unit.header.unit_type() {
+        UnitType::FrameHeader => {
+            frame = Some(unit.header.frame);
+            true
+        }
+        UnitType::Refinement | UnitType::Increment => frame == Some(unit.header.frame),
+        _ => true,
+    })
+}
+
+/// A stream decodes or is refused, the same however careful the decoder is; what a strict one gives.
+pub fn decodes(bytes: &[u8]) -> Decoded {
+    let strict = Decoded::of(bytes, &STRICT);
+    let tolerant = Decoded::of(bytes, &TOLERANT);
     assert!(tolerant.frames.len() >= strict.frames.len(), "a tolerant decoder shows no less");
     assert!(tolerant.frames.starts_with(&strict.frames), "it shows the same where there is no fault");
     verified(bytes, &strict);
@@ -43,28 +78,28 @@ pub fn hold(bytes: &[u8], choice: u32) {
     if strict.end.is_none() {
         assert_eq!(tolerant.frames, strict.frames, "without a fault there is nothing to tolerate");
         assert_eq!(inspect(bytes, &LIMITS, &mut |_| ()), None, "the inspector refuses what decodes");
-        extracted(bytes, &strict, choice);
-        with_losses(bytes, &strict, choice);
-        subsets(bytes, &strict);
-        from_inside(bytes, &strict, choice).expect("decoding can start at any GOP header");
     }
     shown(tolerant);
+    strict
 }
 
-fn decoded(bytes: &[u8], options: &Options) -> Decoded {
-    let mut result = Decoded { sequence: None, frames: Vec::new(), end: None };
-    let summary = decode_stream(bytes, options, |sequence, frame| {
-        result.sequence = Some(*sequence);
-        result.frames.push(frame);
-        ControlFlow::Continue(())
-    });
-    assert_eq!(summary.frames as usize, result.frames.len());
-    Decoded { end: summary.end, ..result }
+impl Decoded {
+    /// Decodes a stream as far as it goes.
+    pub fn of(bytes: &[u8], options: &Options) -> Self {
+        let mut result = Self { sequence: None, frames: Vec::new(), end: None };
+        let summary = decode_stream(bytes, options, |sequence, frame| {
+            result.sequence = Some(*sequence);
+            result.frames.push(frame);
+            ControlFlow::Continue(())
+        });
+        assert_eq!(summary.frames as usize, result.frames.len());
+        Self { end: summary.end, ..result }
+    }
 }
 
 /// What is accepted with digests is what comes without, and has the digests that it is said to have.
 fn verified(bytes: &[u8], strict: &Decoded) {
-    let verified = decoded(bytes, &VERIFIED);
+    let verified = Decoded::of(bytes, &VERIFIED);
     if verified.end.is_some() {
         return;
     }
@@ -92,95 +127,6 @@ fn digest_of(sequence: &SequenceParameters, frame: &DecodedFrame) -> Option<u64>
     });
     let digests: Vec<_> = ranges.map(|range| unit_digest(&frame.planes, range)).collect();
     Some(frame_digest(&digests))
-}
-
-/// Extraction and decoding at an operating point give the same frames.
-fn extracted(bytes: &[u8], strict: &Decoded, choice: u32) {
-    let Some(sequence) = &strict.sequence else { return };
-    let one_of = |count: u8, shift: u32| (choice.rotate_right(shift) % u32::from(count)) as u8;
-    let point = OperatingPoint {
-        spatial: one_of(sequence.spatial_layer_count, 8),
-        temporal: one_of(sequence.temporal_layer_count, 16),
-        refinement: one_of(sequence.refinement_count, 0),
-    };
-    let part = extract(bytes, point, &LIMITS).expect("what decodes can be extracted");
-    let from_part = decoded(&part, &STRICT);
-    let from_whole = decoded(bytes, &Options { operating_point: point, ..STRICT });
-    assert_eq!(from_part.end, None, "what is extracted decodes");
-    assert_eq!(from_part.frames, from_whole.frames, "extraction changes a frame");
-    let at_point = decoded(&part, &Options { operating_point: point, ..STRICT });
-    assert_eq!(
-        at_point.frames, from_whole.frames,
-        "at its own point an extracted stream shows something else"
-    );
-    is_less(&from_part.frames, &strict.frames);
-    let belongs = |frame: &&DecodedFrame| from_part.frames.iter().any(|part| part.number == frame.number);
-    let expected = strict
-        .frames
-        .iter()
-        .filter(|frame| point.spatial + 1 == sequence.spatial_layer_count || belongs(frame));
-    assert!(
-        sequence.temporal_layer_count > 1 || expected.count() == from_part.frames.len(),
-        "a frame is missing"
-    );
-}
-
-/// Units are lost on the way: every frame still comes, and is a part of the whole one or frozen.
-fn with_losses(bytes: &[u8], strict: &Decoded, losses: u32) {
-    let frames = lossy(bytes, losses).expect("losing refinements is no fault");
-    assert_eq!(frames.len(), strict.frames.len(), "there are as many frames");
-    is_less(&frames, &strict.frames);
-}
-
-/// What a frame shows as a subset is what of it is exact.
-fn subsets(bytes: &[u8], strict: &Decoded) {
-    let subsets = decoded(bytes, &Options { subset: true, ..STRICT });
-    assert_eq!((subsets.end, subsets.frames.len()), (None, strict.frames.len()));
-    for (subset, frame) in subsets.frames.iter().zip(&strict.frames) {
-        assert_eq!(subset.carried, 0);
-        assert!(subset.planes == exact(frame), "frame {} as a subset is not what is exact", frame.number);
-    }
-}
-
-fn lossy(bytes: &[u8], losses: u32) -> Result<Vec<DecodedFrame>> {
-    let stream = Stream::open(bytes, &LIMITS)?;
-    let mut decoder = Decoder::new(stream.header(), TOLERANT);
-    let mut frames = Vec::new();
-    for (place, unit) in stream.units().enumerate() {
-        let unit = unit?;
-        let is_lost = losses.rotate_right(place as u32) & 1 == 1;
-        if is_lost && matches!(unit.header.unit_type(), UnitType::Refinement | UnitType::Increment) {
-            let kind = ErrorKind::CheckSum { element: "payload_crc", stored: 0, computed: 1 };
-            decoder.damaged(&unit.header, Error::new(unit.at, "5.3", kind))?;
-        } else {
-            frames.extend(decoder.unit(&unit)?);
-        }
-    }
-    Ok(frames)
-}
-
-/// Decoding starts at a GOP header, behind the sequence parameters: the frames from there on are the same.
-fn from_inside(bytes: &[u8], strict: &Decoded, choice: u32) -> Result<()> {
-    let stream = Stream::open(bytes, &LIMITS)?;
-    let units: Vec<Unit<'_>> = stream.units().collect::<Result<_>>()?;
-    let of_type =
-        |unit_type| units.iter().enumerate().filter(move |(_, unit)| unit.header.unit_type() == unit_type);
-    let gops: Vec<usize> = of_type(UnitType::GopHeader).map(|(place, _)| place).collect();
-    let (Some((_, parameters)), false) = (of_type(UnitType::SequenceParameters).next(), gops.is_empty())
-    else {
-        return Ok(());
-    };
-    let start = gops[choice as usize % gops.len()];
-    let mut decoder = Decoder::starting_inside(stream.header(), STRICT);
-    decoder.unit(parameters)?;
-    let mut frames = Vec::new();
-    for unit in &units[start..] {
-        frames.extend(decoder.unit(unit)?);
-    }
-    assert!(strict.frames.ends_with(&frames), "frames depend on what is before their GOP");
-    let first = units[start].header.frame;
-    assert_eq!(frames.len(), strict.frames.iter().filter(|frame| frame.number >= first).count());
-    Ok(())
 }
 
 /// The Gaussians of a frame that were decoded, not carried over.

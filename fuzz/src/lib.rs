@@ -1,19 +1,27 @@
-//! What is fuzzed, as ordinary functions: libFuzzer calls them (`targets/`), and `tests/regressions.rs` replays
+//! What is fuzzed, as ordinary functions: libFuzzer calls them (`main.rs`), and `tests/regressions.rs` replays
 //! with them what was found, on any toolchain.
 //!
 //! Each takes any bytes and returns. A panic is a finding, and so are a request for more memory than
 //! [`ceiling`] allows and an input that takes seconds.
 
 pub mod ceiling;
+pub mod chunks;
 pub mod decode;
 pub mod edits;
+pub mod encode;
+pub mod entropy;
+pub mod extraction;
+pub mod headers;
 pub mod increments;
 pub mod laws;
+pub mod oracle;
 pub mod payload;
 mod read_back;
 pub mod scene;
 pub mod seal;
+mod small_scene;
 pub mod streams;
+pub mod targets;
 pub mod units;
 
 use splatstream_format::Limits;
@@ -27,17 +35,6 @@ pub const LIMITS: Limits = Limits {
     max_cells: 1 << 12,
     max_learned: 1 << 8,
 };
-
-/// Runs a target on the files named as arguments of the program.
-///
-/// # Errors
-/// A file that cannot be read.
-pub fn replay(run: fn(&[u8])) -> std::io::Result<()> {
-    for path in std::env::args_os().skip(1) {
-        run(&std::fs::read(path)?);
-    }
-    Ok(())
-}
 
 /// Lets parallel work happen on the calling thread, which must be the only one: coverage then depends on
 /// the input alone, and no time goes into waking threads.

@@ -1,22 +1,22 @@
 //! Payloads: what is written is read, what is read is written, and any bytes are refused or read.
 
 use crate::LIMITS;
+use crate::headers::SEQUENCE;
 use crate::read_back::ReadBack;
 use arbitrary::{Arbitrary, Unstructured};
-use splatstream_format::Limits;
+use splatstream_format::{Limits, Result};
 use splatstream_format::arbitrary_stream::{ArbitraryGop, ArbitraryStream, sequence_parameters};
 use splatstream_format::entropy::layout::{Layout, ShCoding};
 use splatstream_format::entropy::model::{read_models, write_models};
-use splatstream_format::payload::{Codebook, Index, Refinement, Transform, Weights};
+use splatstream_format::payload::{
+    Codebook, Increment, Index, OperatingPoints, Refinement, SectionBytes, Transform, Weights, write_increment,
+};
 use splatstream_format::syntax::{Profile, SequenceParameters, UnitType};
-
-/// Bytes that sequence parameters are made of, for parsers that need some.
-pub const SEQUENCE: usize = 96;
 
 /// The first byte of the input chooses what the others are.
 pub fn run(data: &[u8]) {
     let Some((choice, data)) = data.split_first() else { return };
-    if choice % 7 == 0 {
+    if choice % 9 == 0 {
         // Fails only where the bytes do not suffice.
         if let Ok(stream) = ArbitraryStream::arbitrary(&mut Unstructured::new(data)) {
             comes_back(&stream);
@@ -25,7 +25,7 @@ pub fn run(data: &[u8]) {
     }
     let (head, payload) = data.split_at_checked(SEQUENCE).unwrap_or((data, &[]));
     let Ok(sequence) = sequence_parameters(&mut Unstructured::new(head)) else { return };
-    match choice % 7 {
+    match choice % 9 {
         1 => writes_back(payload, Transform::parse(payload, 0, &sequence), |read| read.to_bytes(&sequence)),
         2 => writes_back(payload, Codebook::parse(payload, 0, &LIMITS), Codebook::to_bytes),
         3 => writes_back(payload, Index::parse(payload, 0), Index::to_bytes),
@@ -34,19 +34,30 @@ pub fn run(data: &[u8]) {
             writes_back(payload, read, |read| read.to_bytes(&sequence));
         }
         5 => models(payload),
-        _ => writes_back(payload, Weights::parse(payload, 0), Weights::to_bytes),
+        6 => writes_back(payload, Weights::parse(payload, 0), Weights::to_bytes),
+        7 => writes_back(payload, OperatingPoints::parse(payload, 0), OperatingPoints::to_bytes),
+        _ => {
+            let read = Increment::parse(payload, 0, &sequence, &LIMITS);
+            writes_back(payload, read, |read| written(read, &sequence));
+        }
     }
 }
 
 /// What is accepted has one form.
-fn writes_back<T>(
-    payload: &[u8],
-    read: splatstream_format::Result<T>,
-    write: impl FnOnce(&T) -> splatstream_format::Result<Vec<u8>>,
-) {
+fn writes_back<T>(payload: &[u8], read: Result<T>, write: impl FnOnce(&T) -> Result<Vec<u8>>) {
     if let Ok(read) = read {
         assert_eq!(write(&read).as_deref(), Ok(payload));
     }
+}
+
+/// The bytes of an increment that was read.
+fn written(read: &Increment<'_>, sequence: &SequenceParameters) -> Result<Vec<u8>> {
+    let sections = read.sections.iter().map(|section| SectionBytes {
+        lanes_log2: section.lanes_log2,
+        model: section.model.to_vec(),
+        blocks: section.blocks.iter().map(|(block, _)| block.to_vec()).collect(),
+    });
+    write_increment(&read.header, sequence, &sections.collect::<Vec<_>>())
 }
 
 /// Models have several forms; the one that is written stands for the same models.

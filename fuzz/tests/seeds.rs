@@ -8,7 +8,7 @@ use splatstream_format::arbitrary_stream::dynamic::DynamicStream;
 use splatstream_format::arbitrary_stream::{self as random, ArbitraryStream};
 use splatstream_format::payload::Index;
 use splatstream_format::syntax::{IndexEntry, SequenceParameters, TransformKind};
-use splatstream_fuzz::{payload, scene, streams};
+use splatstream_fuzz::{headers, scene, streams};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -110,14 +110,14 @@ fn payloads_are_accepted() {
     let mut seeds: Vec<(String, Vec<u8>)> =
         (1..=6).map(|seed| (format!("stream-{seed}"), [vec![0], noise(seed, 700)].concat())).collect();
     for seed in 1..=3_u64 {
-        let head = noise(seed + 100, payload::SEQUENCE);
+        let head = noise(seed + 100, headers::SEQUENCE);
         let sequence = random::sequence_parameters(&mut Unstructured::new(&head)).unwrap();
         for (choice, name, bytes) in payloads(seed, &sequence) {
             seeds.push((format!("{name}-{seed}"), [vec![choice], head.clone(), bytes].concat()));
         }
     }
     for (place, section) in valid_streams::model_sections().into_iter().enumerate() {
-        let head = vec![0; payload::SEQUENCE];
+        let head = vec![0; headers::SEQUENCE];
         seeds.push((format!("models-{place}"), [vec![5], head, section].concat()));
     }
     bless("payload", &seeds);

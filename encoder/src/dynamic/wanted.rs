@@ -2,7 +2,7 @@
 
 use super::anchor::scale_residuals;
 use crate::lattice::{Geometry, Spacing};
-use splatstream_decoder::colour::{Colour, inverse};
+use splatstream_decoder::colour::{COMPONENT_RANGE, Colour, inverse};
 use splatstream_decoder::home::{FINE, Home};
 use splatstream_decoder::increment::residual::{Attributes, Stage};
 use splatstream_decoder::layout::ShCoding;
@@ -196,12 +196,14 @@ fn components(transform: &Transform, wanted: &[Vec<i32>], now: &[Vec<i32>], shif
     let count = wanted.first().map_or(0, Vec::len);
     // Basis in Q12, colours in 1/64: one step is 2^18.
     let unit = 1_i64 << (18 + shift);
+    // In range when a decoder has shifted it back.
+    let most = i64::from(COMPONENT_RANGE.end() >> shift);
     let row_sum = |weights: &[i16], row: usize| -> i32 {
         let term = |(&weight, (wanted, now)): (&i16, (&Vec<i32>, &Vec<i32>))| {
             i64::from(weight) * (i64::from(wanted[row]) - i64::from(now[row]))
         };
         let sum: i64 = weights.iter().zip(wanted.iter().zip(now)).map(term).sum();
-        (sum + unit / 2).div_euclid(unit) as i32
+        (sum + unit / 2).div_euclid(unit).clamp(-most, most) as i32
     };
     transform.rows().map(|weights| (0..count).map(|row| row_sum(weights, row)).collect()).collect()
 }

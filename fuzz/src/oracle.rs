@@ -1,0 +1,62 @@
+//! The decoder beside the independent one of `conformance/oracle`, a program in Python of its own, on small streams.
+//!
+//! A stream that was changed has wrong digests, and so never shows a frame. Here they are put right with what the
+//! decoder itself reconstructs: then the other one has to reconstruct the same.
+
+mod client;
+mod healed;
+
+use crate::decode::{choice, stream_of};
+use crate::laws::{Decoded, VERIFIED, is_in_place};
+use client::{Answer, Oracle, Request};
+use healed::healed;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::process::Options;
+use splatstream_format::{Class, Error, Limits};
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+/// What takes the independent decoder no more than a second.
+const LIMITS: Limits = Limits { max_gaussians: 300, max_learned: 4, max_payload: 1 << 13, ..crate::LIMITS };
+/// Gaussians of all frames.
+const MOST_GAUSSIANS: usize = 600;
+
+/// One process for all inputs.
+static ORACLE: LazyLock<Mutex<Oracle>> = LazyLock::new(|| Mutex::new(Oracle::start()));
+
+/// An input is a stream, or edits of one, as for `decode`; its bytes choose the operating point and the mode too.
+pub fn run(data: &[u8]) {
+    let choice = choice(data);
+    let stream = healed(stream_of(data).into_owned());
+    let request = Request { stream: &stream, point: point(choice), subset: choice >> 28 & 1 == 1 };
+    let Some(mine) = mine(&request).filter(|_| is_in_place(&stream)) else { return };
+    let theirs = ORACLE.lock().unwrap_or_else(PoisonError::into_inner).ask(&request);
+    assert_eq!(mine.verdict, theirs.verdict, "{request:?}");
+    assert_eq!(mine.planes.keys().collect::<Vec<_>>(), theirs.planes.keys().collect::<Vec<_>>(), "{request:?}");
+    for (name, planes) in &mine.planes {
+        assert!(theirs.planes.get(name) == Some(planes), "{name} differs, {request:?}");
+    }
+}
+
+/// Often everything.
+fn point(choice: u32) -> OperatingPoint {
+    if choice & 1 == 0 {
+        return OperatingPoint { spatial: 3, temporal: 3, refinement: 9 };
+    }
+    let at = |shift: u32, most: u32| ((choice >> shift) % (most + 1)) as u8;
+    OperatingPoint { spatial: at(1, 3), temporal: at(9, 3), refinement: at(17, 9) }
+}
+
+/// What the decoder answers; none if the stream takes the other one too long.
+fn mine(request: &Request<'_>) -> Option<Answer> {
+    let options =
+        Options { limits: LIMITS, operating_point: request.point, subset: request.subset, tolerant: true, ..VERIFIED };
+    let decoded = Decoded::of(request.stream, &options);
+    let gaussians: usize = decoded.frames.iter().map(|frame| frame.planes.len()).sum();
+    let error = decoded.frames.iter().find_map(|frame| frame.lost).or(decoded.end);
+    let is_large = |error: &Error| error.class() == Class::OverLimit;
+    let lost = |is_large: fn(&Error) -> bool| decoded.frames.iter().flat_map(|frame| &frame.lost).any(is_large);
+    if gaussians > MOST_GAUSSIANS || lost(is_large) || decoded.end.as_ref().is_some_and(is_large) {
+        return None;
+    }
+    Some(Answer::of(error, decoded))
+}
