@@ -143,15 +143,7 @@ for target in "${targets[@]}"; do
     cp "$program" "$folder/programs/$target.new"
     mv "$folder/programs/$target.new" "$folder/programs/$target"
 done
+heap_ends "$folder/planted"
 vectors_into "$folder/vectors"
-running=0
-for target in "${targets[@]}"; do
-    fuzz "$target" &
-    running=$((running + 1))
-    if [ "$running" -ge "$jobs" ]; then
-        wait -n
-        running=$((running - 1))
-    fi
-done
-wait
+side_by_side "$jobs" fuzz "${targets[@]}"
 report

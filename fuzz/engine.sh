@@ -28,10 +28,47 @@ vectors_into() {
     (cd ../conformance/vectors && find . -name in.gss -size -17b -print0 | xargs -0 cp --parents -t "$1" --)
 }
 
-# Sets `starts` to the folders that a target begins with; the second argument is that of the vectors, if any.
+# Whether a request of 1 MiB is granted, and one of 64 MiB and a byte ends the program: without that the limit of
+# src/ceiling.rs would find nothing. The file given is written; the count in it is what is asked for.
+heap_ends() {
+    local planted=(env FUZZ_TARGET=planted "$program" "$1")
+    printf '\x00\x00\x10\x00' >"$1"
+    "${planted[@]}" >/dev/null 2>&1
+    printf '\x01\x00\x00\x04' >"$1"
+    if "${planted[@]}" >/dev/null 2>&1; then
+        echo "a request for more than 64 MiB is granted: see src/ceiling.rs" >&2
+        return 1
+    fi
+}
+
+# Runs a command on each of the arguments that follow, so many at a time; fails if one of them does.
+side_by_side() {
+    local most=$1 command=$2 running=0 failed=0 argument
+    shift 2
+    for argument; do
+        "$command" "$argument" &
+        running=$((running + 1))
+        if [ "$running" -ge "$most" ]; then
+            wait -n || failed=1
+            running=$((running - 1))
+        fi
+    done
+    while [ "$running" -gt 0 ]; do
+        wait -n || failed=1
+        running=$((running - 1))
+    done
+    return "$failed"
+}
+
+# Sets `starts` to what a target begins with: its dictionary, and folders; the second argument is that of the vectors,
+# if any.
 starts_of() {
     local folder
-    starts=()
+    case $1 in
+        units | headers | payload | decode | chunks | extraction | oracle) starts=(-dict=dictionaries/stream.dict) ;;
+        scene) starts=(-dict=dictionaries/scene.dict) ;;
+        *) starts=() ;;
+    esac
     for folder in "seeds/$1" "regressions/$1"; do
         if [ -d "$folder" ]; then starts+=("$folder"); fi
     done

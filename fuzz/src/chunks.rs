@@ -21,7 +21,7 @@ fn ends(length: usize, choice: u32) -> Vec<usize> {
     // The fractional part of multiples of the golden ratio: spread over the stream, others for each choice.
     let end = |piece: u32| {
         let share = choice.wrapping_add(piece).wrapping_mul(0x9e37_79b9);
-        (u64::from(share) * (length as u64 + 1) >> 32) as usize
+        ((u64::from(share) * (length as u64 + 1)) >> 32) as usize
     };
     let mut ends: Vec<usize> = (0..choice % (MOST_PIECES + 1)).map(end).collect();
     ends.sort_unstable();

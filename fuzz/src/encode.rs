@@ -6,8 +6,8 @@ use crate::laws::{self, Decoded, VERIFIED};
 use crate::small_scene::scene;
 use arbitrary::{Result, Unstructured};
 use splatstream_encoder::{
-    Error, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Report, Settings,
-    ShChoice, Structure, Tools, encode,
+    Error, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Report,
+    Settings, ShChoice, Structure, Tools, encode,
 };
 use splatstream_format::arbitrary_stream;
 use splatstream_scene::{GaussianFrame, MAX_SH_DEGREE};
@@ -16,11 +16,15 @@ use splatstream_scene::{GaussianFrame, MAX_SH_DEGREE};
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     // Fails only where the bytes do not suffice.
-    let Ok((settings, mut frames)) = settings(&mut u).and_then(|settings| Ok((settings, scene(&mut u)?))) else {
+    let Ok((settings, mut frames)) = settings(&mut u).and_then(|settings| Ok((settings, scene(&mut u)?)))
+    else {
         return;
     };
     let Some((bytes, report)) = encoded(&mut frames, &settings) else { return };
-    assert!(encoded(&mut frames, &settings).is_some_and(|again| again.0 == bytes), "encoded twice, it differs");
+    assert!(
+        encoded(&mut frames, &settings).is_some_and(|again| again.0 == bytes),
+        "encoded twice, it differs"
+    );
     let decoded = Decoded::of(&bytes, &VERIFIED);
     assert_eq!((decoded.end, decoded.frames.len()), (None, frames.len()), "what is encoded decodes");
     let digests = decoded.frames.iter().map(|frame| frame.digest.expect("it was asked for"));

@@ -25,7 +25,8 @@ pub fn run(data: &[u8]) {
         // Only with the highest spatial layer intra frames come in all their refinements (7.19).
         let is_top = |point: OperatingPoint| point.spatial + 1 == sequence.spatial_layer_count;
         if is_top(point) == is_top(other) {
-            let (of_part, of_all) = (extract(&part, other, &LIMITS), extract(&stream, both(point, other), &LIMITS));
+            let (of_part, of_all) =
+                (extract(&part, other, &LIMITS), extract(&stream, both(point, other), &LIMITS));
             assert!(of_part == of_all, "{other} of {point} is not what both have");
         }
     }
@@ -47,6 +48,11 @@ fn costs(stream: &[u8]) {
         let options = Options { operating_point: info.point, ..STRICT };
         let frames = Decoded::of(stream, &options).frames;
         let gaussians: usize = frames.iter().map(|frame| frame.planes.len() - frame.carried).sum();
-        assert_eq!((info.frames as usize, info.gaussians), (frames.len(), gaussians as u64), "{}", info.point);
+        assert_eq!(
+            (info.frames as usize, info.gaussians),
+            (frames.len(), gaussians as u64),
+            "{}",
+            info.point
+        );
     }
 }

@@ -6,8 +6,9 @@ use core::fmt::Debug;
 use deku::DekuContainerRead;
 use splatstream_format::arbitrary_stream::sequence_parameters;
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IncrementHeader, IndexEntry, IndexHeader,
-    OperatingPointEntry, OperatingPointsHeader, Profile, SequenceParameters, UnitHeader, WeightsHeader,
+    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IncrementHeader, IndexEntry,
+    IndexHeader, OperatingPointEntry, OperatingPointsHeader, Profile, SequenceParameters, UnitHeader,
+    WeightsHeader,
 };
 use splatstream_format::{Error, Result};
 
@@ -53,7 +54,8 @@ fn law<R: Record>(case: &Case<'_>) {
         assert!(error.at <= at + raw.len() as u64, "{error} is outside the record");
         return;
     };
-    let (_, made) = R::from_bytes((&raw, 0)).expect("any bytes are a record, before its values are looked at");
+    let (_, made) =
+        R::from_bytes((&raw, 0)).expect("any bytes are a record, before its values are looked at");
     // Offsets of errors of a writer count from the record.
     let written = made.write(sequence).map_err(|error| Error { at: error.at + at, ..error });
     assert_eq!(read(&raw, Profile::Dynamic).map(|_| raw.clone()), written);

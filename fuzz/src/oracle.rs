@@ -31,7 +31,11 @@ pub fn run(data: &[u8]) {
     let Some(mine) = mine(&request).filter(|_| is_in_place(&stream)) else { return };
     let theirs = ORACLE.lock().unwrap_or_else(PoisonError::into_inner).ask(&request);
     assert_eq!(mine.verdict, theirs.verdict, "{request:?}");
-    assert_eq!(mine.planes.keys().collect::<Vec<_>>(), theirs.planes.keys().collect::<Vec<_>>(), "{request:?}");
+    assert_eq!(
+        mine.planes.keys().collect::<Vec<_>>(),
+        theirs.planes.keys().collect::<Vec<_>>(),
+        "{request:?}"
+    );
     for (name, planes) in &mine.planes {
         assert!(theirs.planes.get(name) == Some(planes), "{name} differs, {request:?}");
     }
@@ -48,13 +52,19 @@ fn point(choice: u32) -> OperatingPoint {
 
 /// What the decoder answers; none if the stream takes the other one too long.
 fn mine(request: &Request<'_>) -> Option<Answer> {
-    let options =
-        Options { limits: LIMITS, operating_point: request.point, subset: request.subset, tolerant: true, ..VERIFIED };
+    let options = Options {
+        limits: LIMITS,
+        operating_point: request.point,
+        subset: request.subset,
+        tolerant: true,
+        ..VERIFIED
+    };
     let decoded = Decoded::of(request.stream, &options);
     let gaussians: usize = decoded.frames.iter().map(|frame| frame.planes.len()).sum();
     let error = decoded.frames.iter().find_map(|frame| frame.lost).or(decoded.end);
     let is_large = |error: &Error| error.class() == Class::OverLimit;
-    let lost = |is_large: fn(&Error) -> bool| decoded.frames.iter().flat_map(|frame| &frame.lost).any(is_large);
+    let lost =
+        |is_large: fn(&Error) -> bool| decoded.frames.iter().flat_map(|frame| &frame.lost).any(is_large);
     if gaussians > MOST_GAUSSIANS || lost(is_large) || decoded.end.as_ref().is_some_and(is_large) {
         return None;
     }

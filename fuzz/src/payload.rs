@@ -4,14 +4,15 @@ use crate::LIMITS;
 use crate::headers::SEQUENCE;
 use crate::read_back::ReadBack;
 use arbitrary::{Arbitrary, Unstructured};
-use splatstream_format::{Limits, Result};
 use splatstream_format::arbitrary_stream::{ArbitraryGop, ArbitraryStream, sequence_parameters};
 use splatstream_format::entropy::layout::{Layout, ShCoding};
 use splatstream_format::entropy::model::{read_models, write_models};
 use splatstream_format::payload::{
-    Codebook, Increment, Index, OperatingPoints, Refinement, SectionBytes, Transform, Weights, write_increment,
+    Codebook, Increment, Index, OperatingPoints, Refinement, SectionBytes, Transform, Weights,
+    write_increment,
 };
 use splatstream_format::syntax::{Profile, SequenceParameters, UnitType};
+use splatstream_format::{Limits, Result};
 
 /// The first byte of the input chooses what the others are.
 pub fn run(data: &[u8]) {

@@ -23,7 +23,8 @@ struct Row {
 /// Frames of which each is the one before with changes.
 pub(crate) fn scene(u: &mut Unstructured<'_>) -> Result<Vec<GaussianFrame>> {
     let sh_degree = u.int_in_range(0..=MAX_SH_DEGREE)?;
-    let mut rows = (0..u.int_in_range(0..=MOST_GAUSSIANS)?).map(|_| row(u, sh_degree)).collect::<Result<Vec<_>>>()?;
+    let mut rows =
+        (0..u.int_in_range(0..=MOST_GAUSSIANS)?).map(|_| row(u, sh_degree)).collect::<Result<Vec<_>>>()?;
     let mut frames = vec![frame(&rows, sh_degree)];
     for _ in 1..u.int_in_range(1..=MOST_FRAMES)? {
         for _ in 0..u.int_in_range(0..=MOST_CHANGES)? {
@@ -44,7 +45,9 @@ fn row(u: &mut Unstructured<'_>, sh_degree: u8) -> Result<Row> {
         rotation: [f32::from(w?) + 0.5, x?.into(), y?.into(), z?.into()],
         opacity_logit: number(u, 1.0 / 2048.0)?,
         dc: [number(u, 1.0 / 8192.0)?, number(u, 1.0 / 8192.0)?, number(u, 1.0 / 8192.0)?],
-        sh: (0..3 * sh_coefficients(sh_degree)).map(|_| Ok(f32::from(i8::arbitrary(u)?) / 128.0)).collect::<Result<_>>()?,
+        sh: (0..3 * sh_coefficients(sh_degree))
+            .map(|_| Ok(f32::from(i8::arbitrary(u)?) / 128.0))
+            .collect::<Result<_>>()?,
     })
 }
 

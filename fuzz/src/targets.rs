@@ -1,6 +1,8 @@
 //! The targets by name. One program holds them all: linking it once is much of what building costs.
 
-use crate::{chunks, decode, encode, entropy, extraction, headers, increments, oracle, payload, scene, units};
+use crate::{
+    chunks, decode, encode, entropy, extraction, headers, increments, oracle, payload, scene, units,
+};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -28,6 +30,15 @@ pub const ALL: [Target; 11] = [
     Target { name: "oracle", run: oracle::run },
 ];
 
+/// Not a target but a fault: a request as large as the input says. It shows that the [`ceiling`](crate::ceiling) holds
+/// in the program that the targets are in.
+pub const PLANTED: Target = Target { name: "planted", run: planted };
+
+fn planted(data: &[u8]) {
+    let count = data.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    std::hint::black_box(Vec::<u8>::with_capacity(count as usize));
+}
+
 /// The variable that names the target of a program that is not called as one.
 const VARIABLE: &str = "FUZZ_TARGET";
 
@@ -46,5 +57,5 @@ pub fn chosen() -> Result<Target, String> {
 }
 
 fn named(name: &OsStr) -> Option<Target> {
-    ALL.into_iter().find(|target| name == target.name)
+    ALL.into_iter().chain([PLANTED]).find(|target| name == target.name)
 }

@@ -6,8 +6,12 @@ use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::arbitrary_stream::dynamic::DynamicStream;
 use splatstream_format::arbitrary_stream::{self as random, ArbitraryStream};
-use splatstream_format::payload::Index;
-use splatstream_format::syntax::{IndexEntry, SequenceParameters, TransformKind};
+use splatstream_format::payload::{Index, OperatingPoints, write_increment};
+use splatstream_format::syntax::{
+    EndOfStream, FrameHeader, GopHeader, IncrementHeader, IndexEntry, OperatingPointEntry, Profile,
+    SequenceParameters, TransformKind, UnitId,
+};
+use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_fuzz::{headers, scene, streams};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -95,6 +99,62 @@ fn streams_of_profile_dynamic_are_seeds_of_increments() {
     }
 }
 
+/// Noise is a seed of targets that make something of any bytes: long enough that they have what they want.
+fn noise_is_seed_of(target: &str, lengths: impl Iterator<Item = usize>) {
+    let seeds: Vec<_> =
+        lengths.map(|length| (format!("{length}-bytes"), noise(length as u64 + 500, length))).collect();
+    bless(target, &seeds);
+    let saved = saved(target);
+    assert_eq!(saved.len(), seeds.len());
+}
+
+#[test]
+fn noise_is_coded_and_encoded() {
+    noise_is_seed_of("entropy", (1..=8).map(|part| part * 500));
+    noise_is_seed_of("encode", (1..=12).map(|part| part * 250));
+}
+
+#[test]
+fn records_are_seeds_of_headers() {
+    let head = noise(100, headers::SEQUENCE);
+    let sequence = random::sequence_parameters(&mut Unstructured::new(&head)).unwrap();
+    let [mut unit, index, list] = [Vec::new(), vec![2, 0, 0, 0], vec![1, 0, 0, 0]];
+    write_unit(&mut unit, UnitId::of_refinement(3, 1), &[]).unwrap();
+    let entry = OperatingPointEntry {
+        spatial_layer: 1,
+        temporal_layer: 2,
+        refinement: 3,
+        reserved_zero: 0,
+        frame_count: 4,
+        gaussian_count: 5,
+        byte_count: 6,
+    };
+    let records = [
+        ("file-header", write_file_header(Profile::Dynamic, 2).unwrap()),
+        ("unit-header", unit),
+        ("sequence-parameters", sequence.to_bytes().unwrap()),
+        ("gop-header", GopHeader::predicted(1, 8, 2).to_bytes().unwrap()),
+        ("frame-header", FrameHeader::intra(1, Some(2), 300).to_bytes().unwrap()),
+        (
+            "codebook",
+            random::codebook(&mut Unstructured::new(&head), 1, 2).unwrap().header.to_bytes().unwrap(),
+        ),
+        ("index", index),
+        ("index-entry", IndexEntry { frame: 1, reserved_zero: 0, offset: 112 }.to_bytes().unwrap()),
+        ("end", EndOfStream { frame_count: 1, unit_count: 7, index_offset: 0 }.to_bytes().unwrap()),
+        ("operating-points", list),
+        ("operating-point", entry.to_bytes().unwrap()),
+        ("weights", vec![1]),
+        ("increment", IncrementHeader::PLAIN.to_bytes(&sequence).unwrap()),
+    ];
+    let seeds = (0_u8..).zip(records).map(|(choice, (name, record))| {
+        (name.to_owned(), [&[choice, 0, 0, 0, 0][..], &head, &record].concat())
+    });
+    let seeds: Vec<_> = seeds.collect();
+    bless("headers", &seeds);
+    assert_eq!(saved("headers").len(), seeds.len());
+}
+
 #[test]
 fn scene_files_read() {
     bless("scene", &scenes::all());
@@ -139,11 +199,14 @@ fn payloads(seed: u64, sequence: &SequenceParameters) -> Vec<(u8, &'static str, 
     let entries = vec![IndexEntry { frame: 0, reserved_zero: 0, offset: 112 }; 2];
     let refinement = random::refinement(&mut u, sequence, 200, &[2], true).unwrap();
     let weights = random::weights(&mut u).unwrap();
+    let points = OperatingPoints { entries: Vec::new() };
     vec![
         (1, "transform", transform.to_bytes(sequence).unwrap()),
         (2, "codebook", codebook.to_bytes().unwrap()),
         (3, "index", Index { entries }.to_bytes().unwrap()),
         (4, "refinement", refinement.to_bytes(sequence).unwrap()),
         (6, "weights", weights.to_bytes().unwrap()),
+        (7, "points", points.to_bytes().unwrap()),
+        (8, "increment", write_increment(&IncrementHeader::PLAIN, sequence, &[]).unwrap()),
     ]
 }

@@ -29,7 +29,9 @@ pub fn holds_at(bytes: &[u8], strict: &Decoded, point: OperatingPoint) -> Vec<u8
         "at its own point an extracted stream shows something else"
     );
     is_less(&from_part.frames, &strict.frames);
-    let Some(sequence) = strict.sequence.filter(|sequence| sequence.temporal_layer_count == 1) else { return part };
+    let Some(sequence) = strict.sequence.filter(|sequence| sequence.temporal_layer_count == 1) else {
+        return part;
+    };
     let is_top = point.spatial + 1 == sequence.spatial_layer_count;
     let has_part = |frame: &&DecodedFrame| from_part.frames.iter().any(|part| part.number == frame.number);
     let expected = strict.frames.iter().filter(|frame| is_top || has_part(frame));

@@ -61,7 +61,8 @@ impl Answer {
 
 /// The canonical planes of a frame in the groups that are files.
 fn attributes(frame: &QuantizedFrame) -> [(&'static str, Vec<u8>); 6] {
-    let signed = |planes: &[Vec<i32>]| planes.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+    let signed =
+        |planes: &[Vec<i32>]| planes.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
     [
         ("position", frame.position.iter().flatten().flat_map(|value| value.to_le_bytes()).collect()),
         ("log_scale", signed(&frame.log_scale)),

@@ -24,7 +24,9 @@ pub(super) fn healed(stream: Vec<u8>) -> Vec<u8> {
 fn wrong_digest(stream: &[u8]) -> Option<(Option<usize>, u64)> {
     let options = Options { limits: super::LIMITS, ..VERIFIED };
     match Decoded::of(stream, &options).end {
-        Some(Error { at, kind: ErrorKind::Digest { computed, .. }, .. }) => Some((usize::try_from(at).ok(), computed)),
+        Some(Error { at, kind: ErrorKind::Digest { computed, .. }, .. }) => {
+            Some((usize::try_from(at).ok(), computed))
+        }
         _ => None,
     }
 }
