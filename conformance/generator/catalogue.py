@@ -13,13 +13,14 @@ import catalogue_order
 import catalogue_records
 import catalogue_stream
 import catalogue_tools
+import catalogue_truncation
 import catalogue_values
 import catalogue_weights
 
 MODULES = (catalogue_stream, catalogue_values, catalogue_entropy, catalogue_dynamic, catalogue_tools,
            catalogue_learned, catalogue_weights, catalogue_mixed, catalogue_bytes,
            catalogue_records, catalogue_order, catalogue_increments, catalogue_blocks,
-           catalogue_limits)
+           catalogue_limits, catalogue_truncation)
 
 
 def collected():

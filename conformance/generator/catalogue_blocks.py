@@ -157,6 +157,8 @@ MODELS = [
      "the opacity plane uses source 9, its own value", source("opacity", 9)),
     ("models-source-of-log-scale-0", PLAIN, "CONSTRAINT", "SS-PM-003 SS-EC-005",
      "the first log_scale plane uses source 5, its own value", source("log_scale", 5)),
+    ("models-source-3-of-log-scale-0", PLAIN, "CONSTRAINT", "SS-PM-003 SS-EC-005",
+     "the first log_scale plane uses source 3; the plane before is that of positions", source("log_scale", 3)),
     ("models-source-of-place-0", PLAIN, "CONSTRAINT", "SS-PM-003", "a plane of place 0 uses source 4",
      source("rotation", 4)),
     ("models-source-of-index", QUANTISED, "CONSTRAINT", "SS-PM-003", "an index plane uses source 1", source("sh", 1)),

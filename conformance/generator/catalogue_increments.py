@@ -200,6 +200,12 @@ FAULTS = [
     ("entropy", "entropy-increment-source-not-in-section", "CONSTRAINT", "SS-EC-007 SS-PM-003",
      "the plane of modes uses source 10, which section new alone has",
      "available", lambda value, w: w.section_name == "modes", lambda value, w: lambda source, plane: source == 10),
+] + [
+    ("entropy", "entropy-increment-source-3-of-" + plane, "CONSTRAINT", "SS-EC-007 SS-PM-003",
+     "the first plane of section %s uses source 3, and there is no plane before it" % name,
+     "available", lambda value, w, name=name: w.section_name == name, lambda value, w: lambda source, plane: source == 3)
+    for name, plane in (("modes", "mode"), ("moves", "move"), ("updates", "log-scale"), ("predictors", "predictor"))
+] + [
     ("entropy", "entropy-increment-reuse-without-model", "CONSTRAINT", "SS-PM-010",
      "reuse is 1 in section modes of a unit for which no models are in force",
      "in_force", lambda value, w: w.section_name == "modes" and not value, model_of_modes),

@@ -10,7 +10,7 @@ from catalogue_stream import one_frame
 from conventions import crc32
 from encoding import leb
 from expectation import UNIT_NAMES
-from faults import element, in_bytes, invalid, kept_end, kind, lost, payload, repeated
+from faults import element, in_bytes, invalid, kept_end, kind, lost, payload, repeated, together
 from intra_writer import IntraStream
 from synth_directed import directed
 from synth_learned import LearnedSynth
@@ -36,15 +36,6 @@ def unit_length(select, length):
     return in_bytes(change)
 
 
-def counted(*changes):
-    """Counts that belong together."""
-    def change(head, units):
-        for one in changes:
-            head, units = one(head, units)
-        return head, units
-    return change
-
-
 LIMIT = [
     ("limit-gaussians-of-level-%d" % level, "stream-one-frame" if level == 1 else "stream-level-%d" % level,
      "OVER_LIMIT", "SS-FR-003 SS-LM-001",
@@ -64,7 +55,7 @@ RESOURCE = [
      "payload_length is 2^30 and a few bytes follow", unit_length(REFINED, 2 ** 30)),
     ("resource-blocks", "stream-level-4", "SHORT_SECTION", "SS-ER-003 SS-LM-001",
      "2^24 Gaussians in 2^18 blocks of which almost none are there",
-     counted(element(FRAME, "gaussian_count", 2 ** 24), element(REFINED, "gaussian_count", 2 ** 24),
+     together(element(FRAME, "gaussian_count", 2 ** 24), element(REFINED, "gaussian_count", 2 ** 24),
              payload(REFINED, lambda data: data[:20] + b"\x00"))),
     ("resource-model-length", INTRA, "SHORT_SECTION", "SS-ER-003", "model_length is 2^32 - 1",
      payload(REFINED, lambda data: data[:20] + leb(2 ** 32 - 1) + data[21:])),
@@ -85,11 +76,11 @@ RESOURCE = [
      payload(kind(c.UT_WEIGHTS), lambda data: b"\x00\x04\x06\x80\x20\x04\x10\x03\x10" + data[9:19])),
     ("resource-cells", DYNAMIC, "SHORT_SECTION", "SS-IN-007 SS-IN-002",
      "cell_count is 2^20 and there are no such cells",
-     counted(element(increment(4), "cell_count", 2 ** 20),
+     together(element(increment(4), "cell_count", 2 ** 20),
              payload(increment(4), lambda data: data[:59] + b"\x00\x00"))),
     ("resource-new-gaussians", DYNAMIC, "SHORT_SECTION", "SS-IN-007 SS-IN-004",
      "new_count is 2^18, the limit, and there are no such Gaussians",
-     counted(element(FRAME, "gaussian_count", 2 ** 18), element(increment(0), "new_count", 2 ** 18),
+     together(element(FRAME, "gaussian_count", 2 ** 18), element(increment(0), "new_count", 2 ** 18),
              payload(increment(0), lambda data: data[:59] + b"\x00\x00"))),
     ("resource-gop-frames", INTRA, "MISMATCH", "SS-BS-003", "gop_frame_count is 2^32 - 1",
      element(kind(c.UT_GOP), "gop_frame_count", 2 ** 32 - 1)),

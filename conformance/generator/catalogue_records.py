@@ -5,6 +5,7 @@ import struct
 
 import oracle_path  # noqa: F401
 import constants as c
+from conventions import ByteReader
 from faults import element, invalid, kept_end, kind, payload
 
 INTRA, VQ, DYNAMIC = "stream-several-gops", "codebook-two-stages", "temporal-gops-mixed"
@@ -40,6 +41,15 @@ def stretched(data):
     while data[end] > 127:
         end += 1
     return data[:end] + bytes([data[end] | 128, 0]) + data[end + 1:]
+
+
+def block_lengths(new):
+    """Other bytes behind models of a refinement unit."""
+    def change(data):
+        reader = ByteReader(data, 20, len(data))
+        length = reader.leb128("5.9")
+        return data[:reader.pos + length] + new
+    return payload(REFINED, change)
 
 
 def percent(*values):
@@ -309,6 +319,10 @@ REFINEMENTS = [
      payload(REFINED, stretched)),
     ("bytes-length-of-six-bytes", INTRA, "NUMBER", "SS-ER-003", "model_length has more than 32 bits",
      payload(REFINED, lambda data: data[:20] + b"\xff" * 5 + b"\x01" + data[21:])),
+    ("bytes-block-length-not-shortest", "stream-one-block", "NUMBER", "SS-ER-003",
+     "block_length is not in its shortest form", block_lengths(b"\x81\x00")),
+    ("bytes-block-lengths-run-out", "attribute-parent-of-faults", "SHORT_SECTION", "SS-ER-003",
+     "two blocks and two bytes, which are those of one block_length", block_lengths(b"\x81\x01")),
     ("bytes-length-above-32-bits", INTRA, "NUMBER", "SS-ER-003", "the fifth byte of model_length is 16",
      payload(REFINED, lambda data: data[:20] + b"\xff\xff\xff\xff\x10" + data[21:])),
 ]
@@ -317,5 +331,5 @@ REFINEMENTS = [
 def rows():
     for table in (SEQUENCE, GOPS, FRAMES, LISTS):
         yield from invalid("stream", "records", table)
-    yield from invalid("constraint", "records", DEFINITIONS + REFINEMENTS[:-3])
-    yield from invalid("bytes", "records", REFINEMENTS[-3:])
+    yield from invalid("constraint", "records", DEFINITIONS + REFINEMENTS[:-5])
+    yield from invalid("bytes", "records", REFINEMENTS[-5:])

@@ -92,6 +92,15 @@ def copy_of(select, **values):
     return lambda units: units[select(units)].copy(**values)
 
 
+def together(*changes):
+    """Changes that make one fault, or, where the order of errors is asked for, one behind the other."""
+    def change(head, units):
+        for one in changes:
+            head, units = one(head, units)
+        return head, units
+    return change
+
+
 def in_bytes(function):
     """A change of the bytes of the whole stream."""
     function.of_bytes = True
