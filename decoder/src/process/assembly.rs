@@ -271,7 +271,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
 
     /// Clause 7.20: what is shown of the frame, and what is kept.
     pub(super) fn finish(mut self) -> Assembled {
-        if self.homes.len() < self.width && self.is_intra() {
+        if self.homes.len() < self.width {
             let below = core::mem::take(&mut self.below);
             let complete =
                 if below.homes.len() == self.width { below } else { self.complete.take().unwrap_or(below) };

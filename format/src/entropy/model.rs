@@ -344,10 +344,9 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
             return Err(self.broken("bias is a 16-bit value"));
         }
         let direct_log2 = self.element("direct_log2_minus2", 3)?.wrapping_add(2);
-        let last_token = match alphabet.last_token(direct_log2) {
-            Some(last) if direct_log2 <= 7 => last,
-            _ => return Err(self.broken("direct_log2 leaves no room for the longest values")),
-        };
+        let last_token = alphabet
+            .last_token(direct_log2)
+            .ok_or(self.broken("direct_log2 leaves no room for the longest values"))?;
         let first = self.axis(&AXIS_A)?;
         let second = if first.source == Source::None { ContextAxis::NONE } else { self.axis(&AXIS_B)? };
         let contexts = first.contexts().wrapping_mul(second.contexts());

@@ -21,7 +21,7 @@ impl Alphabet {
         }
     }
 
-    /// The largest token for `direct_log2`, if all tokens fit in a byte.
+    /// The largest token for `direct_log2`, if all tokens fit in a byte; they do for none above 7.
     pub fn last_token(self, direct_log2: u8) -> Option<u8> {
         u8::try_from(token_base(u32::from(direct_log2), self.max_exponent()).wrapping_add(3)).ok()
     }
