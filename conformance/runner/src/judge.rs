@@ -41,7 +41,7 @@ pub(crate) fn not_claimed(case: &Case<'_>, missing: String) -> CaseResult {
 }
 
 /// Judges an answer.
-pub(crate) fn judge(case: &Case<'_>, answer: &Answer, output: &Output, rules: Rules) -> CaseResult {
+pub fn judge(case: &Case<'_>, answer: &Answer, output: &Output, rules: Rules) -> CaseResult {
     let mut result = blank(case);
     result.answer = Some(words(answer.ending));
     result.took = answer.took;
