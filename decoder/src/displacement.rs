@@ -87,9 +87,6 @@ impl CellField {
         let [x, y, z] = position;
         let [a, b, c] = rotation;
         let mut stale = vec![false; x.len()];
-        if self.is_empty() {
-            return stale;
-        }
         stale
             .par_chunks_mut(RUN)
             .zip(x.par_chunks_mut(RUN).zip(y.par_chunks_mut(RUN)).zip(z.par_chunks_mut(RUN)))

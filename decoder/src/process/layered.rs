@@ -97,10 +97,11 @@ impl LayeredFrame<'_> {
         self.units.iter().find(is_below).map_or(0, |unit| unit.increment.header.home_count())
     }
 
-    /// Whether a unit is the next: of the same layer, or the first of the next layer of an intra frame.
+    /// Whether a unit, of a layer of the sequence, is the next: of the same layer, or the first of the next layer of an
+    /// intra frame.
     fn expects(&self, spatial_layer: u8, refinement: u8, sequence: &SequenceParameters) -> bool {
         let top = sequence.spatial_layer_count.wrapping_sub(1);
-        let allowed = spatial_layer <= top && refinement < sequence.refinement_count;
+        let allowed = refinement < sequence.refinement_count;
         let next = match self.units.last() {
             None => refinement == 0 && spatial_layer == if self.reference.is_some() { top } else { 0 },
             Some(last) if spatial_layer == last.spatial_layer => {
