@@ -42,7 +42,7 @@ pub fn decode_stream_observed(
 
 /// The same from the group on whose header stands at the absolute offset `gop`, as an index gives it (B.3).
 ///
-/// What stands before it is not looked at, but for the first unit if that is the sequence parameters.
+/// What stands before it is not looked at, but for the units up to the sequence parameters.
 pub fn decode_stream_inside(
     bytes: &[u8],
     gop: u64,
@@ -74,8 +74,11 @@ fn start<'a>(stream: &Stream<'a>, options: &Options, start: Start) -> Result<(De
         Start::Inside(gop) => gop,
     };
     let mut decoder = Decoder::starting_inside(stream.header(), *options);
-    if let Some(first) = stream.units().next() {
-        decoder.unit(&first?)?;
+    for unit in stream.units() {
+        decoder.unit(&unit?)?;
+        if decoder.sequence().is_some() {
+            break;
+        }
     }
     Ok((decoder, stream.units_from(gop)))
 }

@@ -7,11 +7,17 @@ use splatstream_conformance::case::Case;
 use splatstream_conformance::judge::{Rules, judge};
 use splatstream_conformance::output::Output;
 use splatstream_conformance::protocol::Request;
-use splatstream_conformance::reference;
+use splatstream_conformance::reference::{self, Decoded};
 use splatstream_conformance::result::Outcome;
 use splatstream_conformance::suite::Suite;
-use splatstream_decoder::operating_point::extract;
+use splatstream_conformance::vector::{Kind, Mode};
+use splatstream_decoder::operating_point::{OperatingPoint, extract};
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream_inside;
 use splatstream_format::Limits;
+use splatstream_format::syntax::UnitType;
+use splatstream_format::unit::Stream;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -78,4 +84,32 @@ fn the_reference_extracts_the_bytes_of_every_record() {
         extractions.fetch_add(1, Ordering::Relaxed);
     });
     assert!(extractions.into_inner() >= 500);
+}
+
+/// B.3: from each group of a stream on come the frames that also come from its start on.
+fn decode_from_groups(case: &Case<'_>) {
+    let bytes = std::fs::read(case.stream).unwrap();
+    let whole = Decoded::of(&bytes, OperatingPoint::ALL, Mode::Full).frames;
+    let units = Stream::open(&bytes, &Limits::default()).unwrap().units().map(Result::unwrap);
+    for group in units.filter(|unit| unit.header.unit_type() == UnitType::GopHeader) {
+        let mut frames = Vec::new();
+        let summary = decode_stream_inside(&bytes, group.at, &Options::default(), |_, frame| {
+            frames.push(frame);
+            ControlFlow::Continue(())
+        });
+        assert_eq!(summary.end, None, "{case} from byte {}", group.at);
+        let first = whole.iter().position(|frame| frame.number >= group.header.frame).unwrap_or(whole.len());
+        assert_eq!(frames, whole[first..], "{case} from byte {}", group.at);
+    }
+}
+
+// covers: SS-BS-008
+#[test]
+fn from_each_group_on_the_reference_shows_what_it_shows_of_the_whole() {
+    let suite = suite();
+    let mut cases = Case::all(&suite);
+    cases.retain(|case| case.vector.kind == Kind::Valid);
+    cases.dedup_by_key(|case| &case.vector.name);
+    assert!(cases.len() >= 200, "{} streams", cases.len());
+    check_all(&cases, decode_from_groups);
 }
