@@ -6,14 +6,14 @@ use splatstream_conformance::answer::{Answer, Ending};
 use splatstream_conformance::case::Case;
 use splatstream_conformance::judge::{Rules, judge};
 use splatstream_conformance::output::Output;
-use splatstream_conformance::protocol::Request;
-use splatstream_conformance::reference::{self, Decoded};
+use splatstream_conformance::protocol::{Request, Said};
+use splatstream_conformance::reference;
 use splatstream_conformance::result::Outcome;
 use splatstream_conformance::suite::Suite;
-use splatstream_conformance::vector::{Kind, Mode};
-use splatstream_decoder::operating_point::{OperatingPoint, extract};
+use splatstream_conformance::vector::Kind;
+use splatstream_decoder::operating_point::extract;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream_inside;
+use splatstream_decoder::stream::{decode_stream, decode_stream_inside};
 use splatstream_format::Limits;
 use splatstream_format::syntax::UnitType;
 use splatstream_format::unit::Stream;
@@ -24,8 +24,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// Codes of errors count as planes do.
-const RULES: Rules = Rules { strict: true, entropy: false, output: true };
+/// Codes of errors and states of the entropy decoder count as planes do.
+const RULES: Rules = Rules { strict: true, entropy: true, output: true };
 
 fn suite() -> Suite {
     Suite::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../vectors")).unwrap()
@@ -55,8 +55,9 @@ fn decode(case: &Case<'_>) {
     let request =
         Request { input: case.stream.to_path_buf(), op: case.op().to_owned(), mode: case.mode(), out };
     let (code, diagnosis) = reference::answer(&request).unwrap();
-    let answer =
-        Answer { ending: Ending::Code(code), diagnosis, complaint: String::new(), took: Duration::ZERO };
+    let said = diagnosis.map_or(Said::Nothing, Said::Diagnosis);
+    let (ending, complaint) = (Ending::Code(code), String::new());
+    let answer = Answer { ending, said, fault: None, complaint, took: Duration::ZERO };
     let result = judge(case, &answer, &Output::read(&request.out).unwrap(), RULES);
     assert_eq!(result.outcome, Outcome::Pass, "{case}: {result:#?}");
 }
@@ -89,7 +90,11 @@ fn the_reference_extracts_the_bytes_of_every_record() {
 /// B.3: from each group of a stream on come the frames that also come from its start on.
 fn decode_from_groups(case: &Case<'_>) {
     let bytes = std::fs::read(case.stream).unwrap();
-    let whole = Decoded::of(&bytes, OperatingPoint::ALL, Mode::Full).frames;
+    let mut whole = Vec::new();
+    decode_stream(&bytes, &Options::default(), |_, frame| {
+        whole.push(frame);
+        ControlFlow::Continue(())
+    });
     let units = Stream::open(&bytes, &Limits::default()).unwrap().units().map(Result::unwrap);
     for group in units.filter(|unit| unit.header.unit_type() == UnitType::GopHeader) {
         let mut frames = Vec::new();
