@@ -106,6 +106,11 @@ def value(plane, entry, new):
     return "values", change
 
 
+def twice(plane, new):
+    """Two values of a plane, so that one fault cannot undo the other."""
+    return "values", lambda v: value(plane, 1, new)[1](value(plane, 0, new)[1](v))
+
+
 def steep(v):
     """The last step of a Gaussian whose second log-scale is below -1 is as large as it may be."""
     i = next(i for i, (first, step) in enumerate(zip(v[1], v[2])) if first - step < -1)
@@ -279,6 +284,8 @@ VALUES = [
      "v_log_scale[2] is -1 with canonical_axes, in the second block", value(3, 65, -1)),
     ("opacity-high", PLAIN, "OUT_OF_RANGE", "SS-AT-003", "opacity is 32768", value(4, 0, 32768)),
     ("opacity-low", PLAIN, "OUT_OF_RANGE", "SS-AT-003", "opacity is -32769", value(4, 0, -32769)),
+    ("opacity-high-twice", PLAIN, "OUT_OF_RANGE", "SS-AT-003", "two opacities are 32768", twice(4, 32768)),
+    ("opacity-low-twice", PLAIN, "OUT_OF_RANGE", "SS-AT-003", "two opacities are -32769", twice(4, -32769)),
     ("rotation-value-low", PLAIN, "OUT_OF_RANGE", "SS-AT-005", "v_rotation[0] is -32769", value(5, 0, -32769)),
     ("rotation-shifted", PLAIN, "OUT_OF_RANGE", "SS-AT-005 SS-AT-004",
      "rotation[1] is beyond 32767 after its shift by the thresholds", value(6, 0, 30000)),
