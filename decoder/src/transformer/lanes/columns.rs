@@ -34,7 +34,12 @@ impl Columns {
 
     /// The products of the rows with a vector of values of 16 bits, in pairs, 16 rows at a time. No sum may leave 32 bits.
     pub(crate) fn multiply(&self, x: &[i32], out: &mut [Lane]) {
-        match self.machine {
+        self.multiply_on(self.machine, x, out);
+    }
+
+    /// The same with the instructions of a machine.
+    fn multiply_on(&self, machine: Machine, x: &[i32], out: &mut [Lane]) {
+        match machine {
             Machine::Portable => Product { columns: self, x, out, by: Portable }.run(),
             #[cfg(target_arch = "x86_64")]
             Machine::Sse2(sse2) => Product { columns: self, x, out, by: products::Sse2(sse2) }.run(),
@@ -73,6 +78,34 @@ impl<P: Products> Product<'_, P> {
                     sum = by.add(sum, by.splat(x), by.load(weights, part));
                 }
                 by.store(sum, out, part);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing, reason = "a panic is a failed test")]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Numbers of rows and columns that fill no lane and no pair, on every machine that this one can be.
+        #[test]
+        fn every_machine_gives_the_sums_of_rows_and_vector(
+            (rows, columns) in (1_usize..50, 1_usize..50),
+            weights in proptest::collection::vec(-1300_i16..=1300, 50 * 50),
+            values in proptest::collection::vec(any::<i16>(), 50),
+        ) {
+            let matrix = Columns::new(rows, columns, |row, column| (column < columns).then(|| weights[row * 50 + column]));
+            let value = |place: usize| if place < columns { i32::from(values[place]) } else { 0 };
+            let pairs: Vec<i32> = (0..columns.div_ceil(2)).map(|p| packed(value(2 * p), value(2 * p + 1))).collect();
+            let dot = |row: usize| (0..columns).map(|k| i32::from(weights[row * 50 + k]) * value(k)).sum::<i32>();
+            for machine in Machine::all() {
+                let mut sums = vec![ZERO; rows.div_ceil(LANES)];
+                matrix.multiply_on(machine, &pairs, &mut sums);
+                let sums: Vec<i32> = sums.as_flattened()[..rows].to_vec();
+                prop_assert_eq!(sums, (0..rows).map(dot).collect::<Vec<_>>(), "{:?}", machine);
             }
         }
     }
