@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
 # Fuzzes targets for so many seconds of processor time each, and adds up what all campaigns of a folder did.
-# usage: fuzz/campaign.sh [-s SECONDS] [-j JOBS] [-d FOLDER] [TARGET...]
+# usage: fuzz/campaign.sh [-r] [-s SECONDS] [-j JOBS] [-d FOLDER] [TARGET...]
 #   -s  processor time a target gets, seconds (600)      -j  targets at a time (1)
 #   -d  where programs, corpora, findings and results are kept (target/campaign)
+#   -r  only show what was done so far
 # Without a target: all. Results are in FOLDER/results.json and, as a table, on standard output.
 # Time is what the fuzzing process and its children used: a busy machine makes a campaign longer, not its figures better.
 set -euo pipefail
-seconds=600 jobs=1 folder=
-while getopts s:j:d: option; do
+seconds=600 jobs=1 folder= only_report=
+while getopts rs:j:d: option; do
     case $option in
+        r) only_report=yes ;;
         s) seconds=$OPTARG ;;
         j) jobs=$OPTARG ;;
         d) folder=$OPTARG ;;
-        *) sed -n '2,7s/^# //p' "$0" >&2; exit 2 ;;
+        *) sed -n '2,8s/^# //p' "$0" >&2; exit 2 ;;
     esac
 done
 shift $((OPTIND - 1))
@@ -136,6 +138,10 @@ report() {
         END { printf "\n%d executions in %.2f CPU-hours, %d findings\n", executions, used / 3600, found }'
 }
 
+if [ -n "$only_report" ]; then
+    report
+    exit
+fi
 build "$built"
 mkdir -p "$folder"/{programs,corpus,findings,logs}
 # Copies: another build does not change what is running.
