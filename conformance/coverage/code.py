@@ -57,7 +57,7 @@ class File:
     """One source file: what ran and what did not."""
 
     def __init__(self, name, lines, branches):
-        self.name, self.ran, self.branches, self.places = name, lines, branches, {}
+        self.name, self.ran, self.branches = name, lines, branches
         with open(os.path.join(ROOT, name), encoding="utf-8") as f:
             self.source = Functions(f.read())
         ran = {self.source.at(line) for line, count in lines.items() if count}
@@ -65,7 +65,6 @@ class File:
 
     def miss(self, line, side, text):
         function = self.source.at(line)
-        self.places.setdefault((function, side, text), line)
         return Miss(self.name, function, *(("all", "") if function in self.idle else (side, text)))
 
     def condition(self, place):
@@ -92,12 +91,6 @@ class File:
 
     def numbers(self):
         return [len(self.ran), len(list(self.line_misses())), 2 * len(self.branches), len(list(self.branch_misses()))]
-
-    def idle_numbers(self, functions):
-        """Lines and sides of some functions that nothing runs."""
-        lines = sum(self.source.at(line) in functions for line in self.ran)
-        sides = sum(2 for place in self.branches if self.source.at(place[0]) in functions)
-        return lines, sides
 
 
 class Waivers:

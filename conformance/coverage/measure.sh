@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The numbers of coverage: measure.sh [--check] [PART...]. Parts are requirements, syntax, code, matrix and mutants; all
-# but the last if none is named. Writes the tables and the page of this folder; with --check demands that they are what would be
+# The numbers of coverage: measure.sh [--check] [PART...]. Parts are requirements, syntax, code, matrix and mutants; all of
+# them if none is named. Writes the tables and the page of this folder; with --check demands that they are what would be
 # written, or for code no more than is reached. SPLATSTREAM may name a program that is built already.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -77,12 +77,12 @@ matrix() {
     splatstream conformance matrix "$out/reference.json" "$out/independent.json" -o "$here/matrix.md"
 }
 
-if [ $# -eq 0 ]; then set -- requirements syntax code matrix; fi
+if [ $# -eq 0 ]; then set -- requirements syntax code matrix mutants; fi
 for part; do
     case $part in
     requirements | syntax | code | mutants | matrix) ;;
     *)
-        echo "measure.sh: there is no part $part; parts are requirements, syntax, code, mutants, matrix" >&2
+        echo "measure.sh: there is no part $part; parts are requirements, syntax, code, matrix, mutants" >&2
         exit 2
         ;;
     esac
