@@ -121,6 +121,7 @@ impl Decode {
             operating_point: self.op.unwrap_or(OperatingPoint::ALL),
             tolerant: !self.strict,
             subset: self.subset,
+            ..Options::default()
         }
     }
 

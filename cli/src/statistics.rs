@@ -126,6 +126,7 @@ impl State {
         limits: &Limits,
         statistics: &mut Statistics,
     ) -> Result<bool> {
+        self.levels.follow(unit, profile);
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
                 let parsed = SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
@@ -165,8 +166,6 @@ impl State {
     }
 
     fn start_gop(&mut self, header: GopHeader, first: u32) {
-        let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
-        self.levels = Levels::of_gop(header, first, refinements);
         self.increments = Increments::default();
         self.gop = Some(Gop::new(header, first));
     }

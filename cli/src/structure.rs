@@ -123,8 +123,9 @@ impl Structure {
             let taken = match delivery {
                 Ok(Delivery::Intact(unit)) => structure.take(&unit, number),
                 Ok(Delivery::Damaged(damaged)) => {
-                    structure.error = structure.error.or(Some(damaged.error));
-                    structure.damaged(damaged.at, &damaged.header, number)
+                    let error = Some(damaged.error).filter(|_| !damaged.passed_over);
+                    structure.error = structure.error.or(error);
+                    structure.damaged(&damaged.unit, number)
                 }
                 Err(error) => Err(error),
             };
@@ -201,8 +202,9 @@ impl Structure {
     }
 
     /// A unit with a damaged payload: what its header says. Behind a damaged group header nothing has a place.
-    fn damaged(&mut self, at: u64, header: &UnitHeader, number: usize) -> Result<(), Error> {
-        let place = UnitPlace::new(number, at, header, true);
+    fn damaged(&mut self, unit: &Unit<'_>, number: usize) -> Result<(), Error> {
+        let header = &unit.header;
+        let place = UnitPlace::new(number, unit.at, header, true);
         match header.unit_type() {
             UnitType::GopHeader | UnitType::SequenceParameters => self.error.map_or(Ok(()), Err),
             UnitType::FrameHeader => {

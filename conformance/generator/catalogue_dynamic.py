@@ -1,9 +1,11 @@
 """Valid vectors of the structure of profile 1: layers, refinements, operating points, absent frames."""
 
 import oracle_path  # noqa: F401
+import constants as c
 from decoding import Decoder
 from extraction import extract
 from synth_directed import directed
+from units import stream_of, units_of
 from vector import Vector, seed_of
 
 QUARTERS = [25, 50, 75, 100]
@@ -18,6 +20,7 @@ def grown(by):
     return lambda number, before: [n + by for n in before]
 
 
+ABOVE_REFERENCE = dict(gops=[(1, 0, 3)], percent=QUARTERS, units=lambda k: [4, 2, 4][k], sizes=same)
 SPATIAL = [
     ("spatial-layers-%d" % n, "SS-PA-001 SS-BS-012 SS-LO-001 SS-OP-006", "An all-intra GOP with %d spatial layers" % n,
      dict(gops=[(0, 0, 1)], spatial_layer_count=n, most=16)) for n in (1, 2, 3, 4)
@@ -63,7 +66,10 @@ TEMPORAL = [
      dict(gops=[(1, 1, 6)], percent=QUARTERS, units=lambda k: [4, 2, 3, 3, 1, 1][k], sizes=same)),
     ("temporal-units-above-reference", "SS-LO-003 SS-BS-012",
      "Units above the level of the reference frame are passed over, whatever they hold",
-     dict(gops=[(1, 0, 3)], percent=QUARTERS, units=lambda k: [4, 2, 4][k], sizes=same)),
+     ABOVE_REFERENCE),
+    ("temporal-units-above-reference-in-layers", "SS-LO-003 SS-BS-012 SS-BS-009",
+     "Units of a B frame and of a P frame above the level of their reference frame, at the higher of two spatial layers",
+     dict(gops=[(1, 1, 5)], percent=QUARTERS, units=lambda k: [4, 4, 2, 4, 4][k], sizes=same, spatial_layer_count=2)),
     ("temporal-count-grows", "SS-PA-006", "The number of Gaussians grows a hundredfold from one P frame to the next",
      dict(gops=[(1, 0, 3)], most=2, sizes=lambda k, before: [100 * n for n in before] if k == 1 else before)),
     ("temporal-count-shrinks", "SS-PA-006 SS-PA-003", "From 200 Gaussians to two",
@@ -156,6 +162,15 @@ def extracted(seed, point, **asked):
     return data
 
 
+def damaged_above_reference(seed):
+    """Units 2 and 3 of frame 2 of which a byte was changed without their check sums."""
+    head, units = units_of(directed(seed, **ABOVE_REFERENCE))
+    for u in units:
+        if u.kind == c.UT_INCREMENT and u.frame == 2 and u.r >= 2:
+            u.raw = ((-1, 0x10),)
+    return stream_of(head, units)
+
+
 EXTRACTED = [
     ("extraction-result-s0", (0, 3, 9),
      "An extraction of spatial layer 0: I frames alone, of a sequence with P frames"),
@@ -173,6 +188,11 @@ def rows():
             seed = seed_of(name)
             yield Vector("valid", area, name, purpose, requirements,
                          lambda seed=seed, asked=asked: directed(seed, **asked), "directed", seed)
+    name = "temporal-units-above-reference-check-sum"
+    seed = seed_of(name)
+    yield Vector("valid", "temporal", name,
+                 "payload_crc of units above the level of the reference frame is wrong and not looked at",
+                 "SS-LO-003", lambda seed=seed: damaged_above_reference(seed), "directed", seed)
     asked = dict(spatial_layer_count=2, gops=[(1, 2, 5), (0, 0, 1)], temporal_layer_count=3, percent=QUARTERS)
     for name, point, purpose in EXTRACTED:
         yield Vector("valid", "extraction", name, purpose, "SS-OP-004 SS-OP-006 SS-OP-008 SS-OP-009",

@@ -8,6 +8,7 @@ from faults import (changed, copy_of, element, flipped, inserted, invalid, kind,
 
 INTRA, FALLING, DYNAMIC = "stream-several-gops", "refinement-ceiling", "temporal-gops-mixed"
 DEEP, LAYERS, BOOKS = "temporal-depth-2", "spatial-with-predicted-frames", "codebook-defined-again"
+SEVERAL, ABOVE = "refinement-frames-stop-early", "temporal-units-above-reference-in-layers"
 REFINED, GOP, FRAME, END = kind(c.UT_REFINEMENT), kind(c.UT_GOP), kind(c.UT_FRAME), kind(c.UT_END)
 PARAMETERS, POINTS, INDEX = kind(c.UT_SEQUENCE), kind(c.UT_POINTS), kind(c.UT_INDEX)
 
@@ -17,8 +18,18 @@ def increment(frame, r=0, s=None):
     return where(lambda u: u.kind == c.UT_INCREMENT and u.frame == frame and u.r == r and s in (None, u.s))
 
 
+def refinement(frame, r):
+    """The refinement unit r of a frame by display index."""
+    return where(lambda u: u.kind == c.UT_REFINEMENT and u.frame == frame and u.r == r)
+
+
 def header_of(frame):
     return where(lambda u: u.kind == c.UT_FRAME and u.frame == frame)
+
+
+def damaged(select, **values):
+    """A unit with another header whose payload is damaged besides."""
+    return together(flipped(select), changed(select, **values))
 
 
 def whole_frame(number):
@@ -74,6 +85,9 @@ ORDER = [
      "frame of a refinement unit is that of the next frame", changed(kind(c.UT_REFINEMENT, nth=1), frame=2)),
     ("order-frame-of-increment", DYNAMIC, "MISMATCH", "SS-BS-002", "frame of an increment is far ahead",
      changed(increment(1), frame=6)),
+    ("order-frame-of-later-refinement", SEVERAL, "MISMATCH", "SS-BS-002 SS-ER-008 SS-OP-001",
+     "frame of refinement 2 is that of the next frame, which is not looked at where refinement 2 is passed over",
+     changed(refinement(1, 2), frame=2)),
     ("order-refinement-1-first", FALLING, "UNEXPECTED_UNIT", "SS-BS-004 SS-BS-005 SS-ER-004 SS-ER-005",
      "refinement 0 is missing: the frame is lost", lost(REFINED)),
     ("order-refinement-left-out", FALLING, "UNEXPECTED_UNIT", "SS-BS-004 SS-BS-005",
@@ -150,6 +164,42 @@ ORDER = [
      "refinement of an increment is 2 in a sequence of two refinements",
      inserted(lambda units: units[increment(8, 1)(units)].copy(r=2), POINTS)),
 ]
+OF_ABOVE = "of an increment above the level of the reference frame "
+ABOVE_REFERENCE = [
+    ("order-above-reference-frame", ABOVE, "MISMATCH", "SS-BS-002 SS-LO-003 SS-ER-008",
+     "frame " + OF_ABOVE + "is that of the next frame", changed(increment(3, 2), frame=4)),
+    ("order-above-reference-frame-of-i-frame", ABOVE, "MISMATCH", "SS-BS-002 SS-LO-003 SS-ER-008 SS-OP-006",
+     "frame " + OF_ABOVE + "is that of the I frame, so that it belongs to lower refinements too",
+     changed(increment(3, 2), frame=0)),
+    ("order-above-reference-temporal-layer", ABOVE, "MISMATCH", "SS-BS-009 SS-LO-003 SS-ER-008",
+     "temporal_layer " + OF_ABOVE + "is not that of its frame", changed(increment(3, 2), t=0)),
+    ("order-above-reference-spatial-layer", ABOVE, "MISMATCH", "SS-BS-009 SS-LO-003 SS-ER-008",
+     "spatial_layer " + OF_ABOVE + "is not top", changed(increment(4, 2), s=0)),
+    ("order-above-reference-temporal-layer-beyond", ABOVE, "OUT_OF_RANGE", "SS-UH-007 SS-LO-003 SS-ER-008",
+     "temporal_layer " + OF_ABOVE + "is temporal_layer_count", changed(increment(3, 2), t=2)),
+    ("order-above-reference-spatial-layer-beyond", ABOVE, "OUT_OF_RANGE", "SS-UH-007 SS-LO-003 SS-ER-008",
+     "spatial_layer " + OF_ABOVE + "is spatial_layer_count", changed(increment(4, 2), s=2)),
+]
+BEFORE_CHECK_SUM = [
+    ("order-frame-before-check-sum", SEVERAL, "MISMATCH", "SS-ER-006 SS-BS-002",
+     "frame of a refinement unit is that of the next frame, and its payload is damaged",
+     damaged(refinement(1, 1), frame=2)),
+    ("order-frame-of-increment-before-check-sum", DEEP, "MISMATCH", "SS-ER-006 SS-BS-002",
+     "frame of an increment is that of the next frame, and its payload is damaged",
+     damaged(increment(4, 0), frame=5)),
+    ("order-temporal-layer-before-check-sum", DEEP, "MISMATCH", "SS-ER-006 SS-BS-009",
+     "temporal_layer of an increment is not that of its frame, and its payload is damaged",
+     damaged(increment(4, 0), t=1)),
+    ("order-spatial-layer-before-check-sum", LAYERS, "MISMATCH", "SS-ER-006 SS-BS-009",
+     "spatial_layer of an increment of a P frame is not top, and its payload is damaged",
+     damaged(increment(2, 0), s=1)),
+    ("order-layer-beyond-before-check-sum", LAYERS, "OUT_OF_RANGE", "SS-ER-006 SS-UH-007",
+     "spatial_layer of an increment is spatial_layer_count, and its payload is damaged",
+     damaged(increment(2, 0), s=3)),
+    ("order-layer-beyond-before-frame", DEEP, "OUT_OF_RANGE", "SS-ER-006 SS-UH-007",
+     "temporal_layer of an increment is temporal_layer_count, and its frame is that of the next frame",
+     changed(increment(4, 0), t=3, frame=5)),
+]
 LOSSES = [
     ("order-loss-of-b-frame", DEEP, "UNDEFINED", "SS-LO-004 SS-LO-005 SS-BS-010",
      "frame 2 is absent, to which frame 3 refers: frame 3 has no Gaussians", whole_frame(2)),
@@ -183,20 +233,35 @@ LOSSES = [
     ("order-loss-of-two-refinements", FALLING, "CHECK_SUM", "SS-BS-005 SS-ER-008 SS-ER-007",
      "refinements 1 and 3 are damaged: the frame stays at refinement 0",
      together(flipped(kind(c.UT_REFINEMENT, nth=1)), flipped(kind(c.UT_REFINEMENT, nth=3)))),
-    ("order-loss-then-frame-of-refinement", FALLING, "DIGEST", "SS-BS-005 SS-ER-007 SS-BS-002",
-     "refinement 1 has another digest, so that frame of refinement 2, which is wrong, is not looked at",
+    ("order-loss-then-frame-of-refinement", FALLING, "DIGEST", "SS-BS-005 SS-ER-007 SS-ER-008 SS-BS-002",
+     "refinement 1 has another digest, and frame of refinement 2, which would be dropped, is wrong: decoding stops",
      together(element(kind(c.UT_REFINEMENT, nth=1), "refinement_digest", lambda x: x ^ 1),
               changed(kind(c.UT_REFINEMENT, nth=2), frame=1))),
+    ("order-loss-then-frame-of-later-refinement", SEVERAL, "CHECK_SUM", "SS-BS-005 SS-ER-007 SS-ER-008 SS-BS-002",
+     "refinement 1 is damaged, and refinement 2, which would be dropped, is of the next frame: decoding stops",
+     together(flipped(refinement(1, 1)), changed(refinement(1, 2), frame=2))),
     ("order-loss-of-two-increments", "refinement-digests", "CHECK_SUM", "SS-LO-002 SS-ER-007",
      "increments 1 and 3 of the P frame are damaged",
      together(flipped(increment(4, 1)), flipped(increment(4, 3)))),
     ("order-loss-beyond-reference", "refinement-digests", "CHECK_SUM", "SS-LO-002 SS-LO-003 SS-BS-011 SS-ER-007",
      "increment 2 of a B frame is damaged, and that of a frame that refers to it, where it is passed over",
      together(flipped(increment(2, 2)), flipped(increment(3, 2)))),
-    ("order-loss-then-layer-of-increment", DEEP, "DIGEST", "SS-LO-002 SS-ER-007 SS-BS-009",
-     "increment 0 of a P frame has another digest, so that temporal_layer of increment 1, which is wrong, is not "
-     "looked at",
+    ("order-loss-then-layer-of-increment", DEEP, "DIGEST", "SS-LO-002 SS-ER-007 SS-ER-008 SS-BS-009",
+     "increment 0 of a P frame has another digest, and temporal_layer of increment 1, which would be passed over, is "
+     "wrong: decoding stops",
      together(element(increment(4, 0), "refinement_digest", lambda x: x ^ 1), changed(increment(4, 1), t=1))),
+    ("order-loss-then-layer-beyond", DEEP, "DIGEST", "SS-ER-007 SS-ER-008 SS-UH-007",
+     "increment 0 of a P frame has another digest, and temporal_layer of increment 1, which would be passed over, is "
+     "temporal_layer_count: decoding stops",
+     together(element(increment(4, 0), "refinement_digest", lambda x: x ^ 1), changed(increment(4, 1), t=3))),
+    ("order-loss-then-frame-of-increment", DEEP, "CHECK_SUM", "SS-ER-007 SS-ER-008 SS-BS-002",
+     "increment 0 of a P frame is damaged, and increment 1, which would be passed over, is of the next frame: decoding "
+     "stops",
+     together(flipped(increment(4, 0)), changed(increment(4, 1), frame=5))),
+    ("order-loss-then-spatial-layer", LAYERS, "CHECK_SUM", "SS-ER-007 SS-ER-008 SS-BS-009",
+     "increment 0 of a P frame is damaged, and spatial_layer of increment 1, which would be passed over, is wrong: "
+     "decoding stops",
+     together(flipped(increment(2, 0)), changed(increment(2, 1), s=0))),
     ("order-loss-of-refinement-0", FALLING, "CHECK_SUM", "SS-BS-005 SS-BS-006",
      "refinement 0 is damaged: the frame is lost", flipped(REFINED)),
 ]
@@ -258,5 +323,5 @@ DIGESTS = [
 
 
 def rows():
-    yield from invalid("order", "order", ORDER + LOSSES)
+    yield from invalid("order", "order", ORDER + ABOVE_REFERENCE + BEFORE_CHECK_SUM + LOSSES)
     yield from invalid("digest", "digest", DIGESTS)

@@ -94,9 +94,8 @@ class Decoder:
         unit = semantics.parse_unit_header(self.data, pos, self.unit_count, self.file_header.profile)   # 2.1 to 2.8
         frame_unit = unit.known and self.phase == FRAME and unit.unit_type == (
             c.UT_INCREMENT if self.dynamic else c.UT_REFINEMENT)
-        if unit.known and not self.passed_over(unit, frame_unit):                  # 2.9
+        if unit.known and not self.beyond_point(unit, frame_unit):                 # 2.9
             if frame_unit:
-                self.frame.units_seen += 1
                 self.frame_unit(unit)
             else:
                 self.other_unit(unit)
@@ -106,25 +105,21 @@ class Decoder:
         self.ledger.add(unit, self.gop)
         return unit.end
 
-    def passed_over(self, unit, frame_unit):
-        """SS-BS-011, step 1 of 7.1.3 and of 7.13.3"""
+    def beyond_point(self, unit, frame_unit):
+        """What is passed over because it does not belong to the operating point: 7.1.3 before its steps, SS-BS-011"""
         if self.dynamic:
             layered = unit.unit_type in (c.UT_FRAME, c.UT_CODEBOOK, c.UT_INCREMENT)
-            if layered and self.phase in (GOP, FRAME, BETWEEN):
-                if not points.belongs(unit, self.point, self.sequence, self.gop):
-                    self.used_all = False
-                    if frame_unit and unit.frame == self.frame.number:
-                        self.frame.units_seen += 1
-                    return True
-            over = frame_unit and self.frame.passes_over(unit.refinement)
+            beyond = (layered and self.phase in (GOP, FRAME, BETWEEN)
+                      and not points.belongs(unit, self.point, self.sequence, self.gop))
+            stood = frame_unit and unit.frame == self.frame.number
         else:
-            over = frame_unit and unit.refinement > self.point[2]
-            if over:
-                self.used_all = False
-            over = over or (frame_unit and self.frame.dropping)
-        if over:
-            self.frame.units_seen += 1
-        return over
+            beyond = frame_unit and unit.refinement > self.point[2]
+            stood = frame_unit
+        if beyond:
+            self.used_all = False
+            if stood:
+                self.frame.units_seen += 1
+        return beyond
 
     def check_payload_crc(self, unit):
         payload = self.data[unit.payload_start:unit.end]
@@ -277,24 +272,28 @@ class Decoder:
     # ---- 7.1.3 and 7.13.3 ----
 
     def frame_unit(self, unit):
-        """Steps 2 to 6; step 1 is in passed_over()."""
+        """On a refinement unit or an increment in phase FRAME that belongs to the operating point"""
+        self.check_frame_of(unit)                                                  # step 1, fatal
+        self.frame.units_seen += 1
+        if self.frame.passes_over(unit.refinement):                                # step 2
+            return
         try:
-            self.check_payload_crc(unit)                                           # step 2
-        except StreamError as error:
-            return self.confined(error)
-        self.check_layers(unit)                                                    # step 3, fatal
-        require(unit.frame == self.frame.number, "MISMATCH", "7.1.2", unit.at("frame"))
-        if self.dynamic:
-            require(unit.temporal_layer == self.frame.layer, "MISMATCH", "7.13", unit.at("temporal_layer"))
-            good = self.frame.intra or unit.spatial_layer == self.sequence.top
-            require(good, "MISMATCH", "7.13", unit.at("spatial_layer"))
-        try:
+            self.check_payload_crc(unit)                                           # step 3
             if self.dynamic:
                 self.increment_unit(unit)
             else:
                 self.refinement_unit(unit)
         except StreamError as error:
-            return self.confined(error)
+            self.confined(error)
+
+    def check_frame_of(self, unit):
+        """Step 1: whether the unit is of the frame in progress"""
+        self.check_layers(unit)
+        require(unit.frame == self.frame.number, "MISMATCH", "7.1.2", unit.at("frame"))
+        if self.dynamic:
+            require(unit.temporal_layer == self.frame.layer, "MISMATCH", "7.13", unit.at("temporal_layer"))
+            good = self.frame.intra or unit.spatial_layer == self.sequence.top
+            require(good, "MISMATCH", "7.13", unit.at("spatial_layer"))
 
     def refinement_unit(self, unit):
         """Steps 4 to 6 of 7.1.3"""

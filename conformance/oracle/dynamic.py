@@ -68,7 +68,7 @@ class DynamicFrame:
     # ---- 7.13.3 ----
 
     def passes_over(self, r):
-        """Step 1"""
+        """Step 2"""
         if self.dropping:
             return True
         return not self.intra and self.reference_level() <= r < self.seq.refinement_count

@@ -33,6 +33,10 @@ class Frame:
     def without_reference(self):
         return False
 
+    def passes_over(self, r):
+        """Step 2"""
+        return self.dropping
+
     def append(self, planes, digests, models):
         """Step 6"""
         for whole, part in zip(self.planes, planes):

@@ -1,6 +1,6 @@
 //! How the sections of a unit were decoded, as one number: two decoders that compare it unit by unit find the unit at which
 //! they part. Defined in `conformance/README.md`; no part of the decoding process, and nothing is computed unless
-//! [`Decoder::observing`](crate::process::Decoder::observing) asks for it.
+//! [`Options::entropy`](crate::process::Options::entropy) asks for it.
 
 use crate::attribute::unbias;
 use crate::block::CodedBlock;

@@ -8,7 +8,7 @@ use refined::RefinedFrame;
 use splatstream_format::syntax::{
     FileHeader, FrameHeader, GopHeader, PlaceInGop, Profile, SequenceParameters, UnitHeader, UnitType,
 };
-use splatstream_format::unit::Unit;
+use splatstream_format::unit::{Damaged, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
 
 mod assembly;
@@ -34,12 +34,20 @@ pub struct Options {
     /// Show only what the units of the operating point hold, not what is carried over from the intra frame: the
     /// paper's subset. Makes no difference in profile Intra.
     pub subset: bool,
+    /// Tell the entropy states of units, in [`DecodedFrame::entropy`].
+    pub entropy: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        let operating_point = OperatingPoint::ALL;
-        Self { limits: Limits::default(), verify: true, operating_point, tolerant: false, subset: false }
+        Self {
+            limits: Limits::default(),
+            verify: true,
+            operating_point: OperatingPoint::ALL,
+            tolerant: false,
+            subset: false,
+            entropy: false,
+        }
     }
 }
 
@@ -66,8 +74,6 @@ enum FrameUnits<'a> {
 /// Decodes a stream unit by unit.
 pub struct Decoder<'a> {
     options: Options,
-    /// Whether entropy states are asked for.
-    observes: bool,
     profile: Profile,
     level: u8,
     /// Whether the units before the first GOP header are not known (B.3).
@@ -103,7 +109,6 @@ impl<'a> Decoder<'a> {
     pub fn new(file: &FileHeader, options: Options) -> Self {
         Self {
             options,
-            observes: false,
             profile: file.profile(),
             level: file.level,
             starts_inside: false,
@@ -129,11 +134,6 @@ impl<'a> Decoder<'a> {
     /// What relates to the start of the stream is not checked.
     pub fn starting_inside(file: &FileHeader, options: Options) -> Self {
         Self { starts_inside: true, ..Self::new(file, options) }
-    }
-
-    /// The same decoder, which also tells the entropy states of units: [`DecodedFrame::entropy`].
-    pub fn observing(self) -> Self {
-        Self { observes: true, ..self }
     }
 
     /// The sequence parameters, once they have arrived.
@@ -243,26 +243,25 @@ impl<'a> Decoder<'a> {
     /// Takes note of a unit whose payload is damaged.
     ///
     /// # Errors
-    /// The damage itself, unless the decoder is tolerant and the unit is a refinement.
-    pub fn damaged(&mut self, header: &UnitHeader, error: Error) -> Result<()> {
-        if self.is_passed_over(header) {
-            self.pass_over(header);
+    /// The damage itself, unless the decoder is tolerant and the unit is of a frame; what a unit of a frame contradicts
+    /// in its header.
+    pub fn damaged(&mut self, Damaged { unit, error, .. }: &Damaged<'a>) -> Result<()> {
+        if self.is_passed_over(&unit.header) {
+            self.pass_over(&unit.header);
             return Ok(());
         }
         self.units = self.units.wrapping_add(1);
-        let (takes, of_frame) = (self.belongs(header), self.is_of_frame(header.unit_type()));
-        self.has_passed_over |= !takes;
-        match &mut self.frame {
-            Some(frame) if of_frame => {
-                frame.has_unit = true;
-                if !takes || frame.lost.is_some() || frame.is_beyond(header) {
-                    return Ok(());
-                }
-                frame.lost = Some(error);
-                if self.options.tolerant { Ok(()) } else { Err(error) }
-            }
-            _ => Err(error),
+        if self.frame.is_none() || !self.is_of_frame(unit.header.unit_type()) {
+            return Err(*error);
         }
+        // Its bytes count; if it is not passed over, nothing that counts them is compared.
+        self.tally.unit(unit);
+        let arrives = self.arrives(unit)?;
+        match &mut self.frame {
+            Some(frame) if arrives => frame.lost = Some(*error),
+            _ => return Ok(()),
+        }
+        if self.options.tolerant { Ok(()) } else { Err(*error) }
     }
 
     /// The frame before an error if it was complete; if the decoder is tolerant, also one that was still arriving.
@@ -407,35 +406,31 @@ impl<'a> Decoder<'a> {
         Limits { max_gaussians, max_learned, ..limits }
     }
 
-    /// Step 1 of clauses 7.1.3 and 7.13.3: whether a unit of the frame is looked at.
+    /// Steps 1 and 2 of clauses 7.1.3 and 7.13.3: whether the payload of a unit of the frame is looked at. Without a frame it is, as its check sum comes before its place.
     fn arrives(&mut self, unit: &Unit<'a>) -> Result<bool> {
         let takes = self.belongs(&unit.header);
         self.has_passed_over |= !takes;
-        let Some(frame) = &mut self.frame else { return Err(unexpected(unit)) };
+        if takes {
+            self.check_stand(unit)?;
+        }
+        let Some(frame) = &mut self.frame else { return Ok(true) };
         frame.has_unit = true;
         Ok(takes && frame.lost.is_none() && !frame.is_beyond(&unit.header))
     }
 
-    /// Step 3: what is fatal unless the frame has lost a unit already, so that this one is passed over.
-    fn stands(&mut self, unit: &Unit<'a>) -> Result<bool> {
-        match self.check_stand(unit) {
-            Ok(()) => Ok(true),
-            Err(_) if self.has_lost()? => Ok(false),
-            Err(error) => Err(error),
-        }
-    }
-
+    /// Step 1.
     fn check_stand(&self, unit: &Unit<'a>) -> Result<()> {
         let (Some(frame), Some((sequence, _))) = (&self.frame, &self.sequence) else { return Ok(()) };
         self.check_layers(unit)?;
-        let clause = if self.profile == Profile::Intra { "6.9" } else { "7.1" };
-        same(frame_at(unit), clause, "frame", unit.header.frame, frame.number)?;
+        let header = &unit.header;
         let at = |element| element_at(&UnitHeader::TABLE, unit.at, element);
-        let (place, layer) = (&frame.place, unit.header.temporal_layer);
+        let clause = if self.profile == Profile::Intra { "6.9" } else { "7.1" };
+        same(at("frame"), clause, "frame", header.frame, frame.number)?;
+        let (place, layer) = (&frame.place, header.temporal_layer);
         same(at("temporal_layer"), "7.13", "temporal_layer", layer, place.temporal_layer)?;
         if place.reference.is_some() {
             let top = sequence.spatial_layer_count.wrapping_sub(1);
-            same(at("spatial_layer"), "7.13", "spatial_layer", unit.header.spatial_layer, top)?;
+            same(at("spatial_layer"), "7.13", "spatial_layer", header.spatial_layer, top)?;
         }
         Ok(())
     }
@@ -457,25 +452,6 @@ impl<'a> Decoder<'a> {
         }?;
         self.has_lost_any |= decoded.as_ref().is_some_and(|decoded| decoded.lost.is_some());
         Ok(decoded)
-    }
-
-    /// Decodes the pending frame as far as it is there: whether a unit of it is lost, so that later ones are not
-    /// looked at. Blocks are not decoded when they arrive; an error that ends decoding asks for it.
-    fn has_lost(&mut self) -> Result<bool> {
-        let Some(frame) = &self.frame else { return Ok(false) };
-        let decoded = match &frame.units {
-            FrameUnits::Refined(refined) => self.decode_refined(frame, refined)?,
-            FrameUnits::Layered(layered) => {
-                self.decode_layered(frame, layered, None)?.map(|(decoded, ..)| decoded)
-            }
-        };
-        if let (Some(frame), Some(decoded)) = (&mut self.frame, decoded) {
-            if let FrameUnits::Refined(refined) = &mut frame.units {
-                refined.truncate(decoded.refinements);
-            }
-            frame.lost = decoded.lost;
-        }
-        Ok(self.frame.as_ref().is_some_and(|frame| frame.lost.is_some()))
     }
 }
 

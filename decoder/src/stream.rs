@@ -25,18 +25,7 @@ pub fn decode_stream(
     mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
     let mut summary = Summary::default();
-    summary.end = run(bytes, options, Start::First, &mut summary.frames, &mut on_frame).err();
-    summary
-}
-
-/// The same, with the entropy states of units in [`DecodedFrame::entropy`].
-pub fn decode_stream_observed(
-    bytes: &[u8],
-    options: &Options,
-    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
-) -> Summary {
-    let mut summary = Summary::default();
-    summary.end = run(bytes, options, Start::Observed, &mut summary.frames, &mut on_frame).err();
+    summary.end = run(bytes, None, options, &mut summary.frames, &mut on_frame).err();
     summary
 }
 
@@ -50,29 +39,13 @@ pub fn decode_stream_inside(
     mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
     let mut summary = Summary::default();
-    summary.end = run(bytes, options, Start::Inside(gop), &mut summary.frames, &mut on_frame).err();
+    summary.end = run(bytes, Some(gop), options, &mut summary.frames, &mut on_frame).err();
     summary
 }
 
-/// Where decoding starts.
-#[derive(Clone, Copy)]
-enum Start {
-    /// With the first unit.
-    First,
-    /// With the first unit, and entropy states are told.
-    Observed,
-    /// With the group whose header stands at this absolute offset.
-    Inside(u64),
-}
-
-/// A decoder and the units that it takes.
-fn start<'a>(stream: &Stream<'a>, options: &Options, start: Start) -> Result<(Decoder<'a>, Units<'a>)> {
-    let decoder = || Decoder::new(stream.header(), *options);
-    let gop = match start {
-        Start::First => return Ok((decoder(), stream.units())),
-        Start::Observed => return Ok((decoder().observing(), stream.units())),
-        Start::Inside(gop) => gop,
-    };
+/// A decoder and the units that it takes: all, or those from a group on.
+fn start<'a>(stream: &Stream<'a>, gop: Option<u64>, options: &Options) -> Result<(Decoder<'a>, Units<'a>)> {
+    let Some(gop) = gop else { return Ok((Decoder::new(stream.header(), *options), stream.units())) };
     let mut decoder = Decoder::starting_inside(stream.header(), *options);
     for unit in stream.units() {
         decoder.unit(&unit?)?;
@@ -85,13 +58,13 @@ fn start<'a>(stream: &Stream<'a>, options: &Options, start: Start) -> Result<(De
 
 fn run(
     bytes: &[u8],
+    gop: Option<u64>,
     options: &Options,
-    from: Start,
     frames: &mut u32,
     on_frame: &mut impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Result<()> {
     let stream = Stream::open(bytes, &options.limits)?;
-    let (mut decoder, mut units) = start(&stream, options, from)?;
+    let (mut decoder, mut units) = start(&stream, gop, options)?;
     let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame)
     {
         (Some(sequence), Some(frame)) => {
@@ -103,7 +76,7 @@ fn run(
     while let Some(delivery) = units.next_unit() {
         let step = match delivery {
             Ok(Delivery::Intact(unit)) => decoder.unit(&unit),
-            Ok(Delivery::Damaged(damaged)) => decoder.damaged(&damaged.header, damaged.error).map(|()| None),
+            Ok(Delivery::Damaged(damaged)) => decoder.damaged(&damaged).map(|()| None),
             Err(error) => Err(error),
         };
         let frame = match step {

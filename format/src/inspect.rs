@@ -90,9 +90,11 @@ impl Inspector<'_> {
             }
             match units.next_unit() {
                 Some(Ok(Delivery::Intact(unit))) => {
+                    self.levels.follow(&unit, self.profile);
                     let checked = self.payload(&unit);
                     self.note(checked);
                 }
+                Some(Ok(Delivery::Damaged(damaged))) if damaged.passed_over => {}
                 Some(Ok(Delivery::Damaged(damaged))) => self.note(Err(damaged.error)),
                 Some(Err(error)) => self.note(Err(error)),
                 None => return,
@@ -112,8 +114,6 @@ impl Inspector<'_> {
                 self.fixed(&GopHeader::TABLE, payload, at);
                 let header = GopHeader::parse_payload(payload, at, self.profile)?;
                 self.coding = Coding::of_gop(header, unit.header.frame);
-                let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
-                self.levels = Levels::of_gop(header, unit.header.frame, refinements);
                 header.validate_from(at, unit.header.frame)?;
             }
             UnitType::FrameHeader => {

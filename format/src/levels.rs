@@ -1,7 +1,8 @@
-//! Step 1 of clause 7.13.3, from headers alone: which increments of predicted frames are passed over because the
+//! Step 2 of clause 7.13.3, from headers alone: which increments of predicted frames are passed over because the
 //! reference frame has fewer refinements. Their payload may be anything.
 
-use crate::syntax::{GopHeader, UnitHeader, UnitType};
+use crate::syntax::{GopHeader, Profile, SequenceParameters, UnitHeader, UnitType};
+use crate::unit::Unit;
 
 /// The refinements of the frames of a group that other frames can refer to, if every unit is there and good.
 #[derive(Debug, Clone, Default)]
@@ -14,12 +15,23 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// The frames of a group that starts with the frame `first`, in a sequence of so many refinements.
-    pub const fn of_gop(header: GopHeader, first: u32, refinements: u8) -> Self {
-        Self { gop: Some((header, first)), refinements, frames: Vec::new() }
+    /// Takes note of a unit that is intact, for what it says of the sequence or of a group.
+    pub fn follow(&mut self, unit: &Unit<'_>, profile: Profile) {
+        match unit.header.unit_type() {
+            UnitType::SequenceParameters => {
+                let parsed = SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile);
+                self.refinements = parsed.map_or(0, |sequence| sequence.refinement_count);
+            }
+            UnitType::GopHeader => {
+                let parsed = GopHeader::parse_payload(unit.payload, unit.payload_at, profile);
+                self.gop = parsed.ok().map(|header| (header, unit.header.frame));
+                self.frames.clear();
+            }
+            _ => {}
+        }
     }
 
-    /// Takes note of a unit of the group; whether it is decoded, as far as the reference frame goes.
+    /// Takes note of the header of a unit of the group; whether it is decoded, as far as the reference frame goes.
     pub fn takes(&mut self, header: &UnitHeader) -> bool {
         let Some((gop, first)) = self.gop else { return true };
         let place = gop.place(header.frame.saturating_sub(first));
@@ -52,7 +64,8 @@ mod tests {
 
     #[test]
     fn a_frame_has_no_more_refinements_than_its_reference() {
-        let mut levels = Levels::of_gop(GopHeader::predicted(0, 8, 1), 40, 3);
+        let gop = Some((GopHeader::predicted(0, 8, 1), 40));
+        let mut levels = Levels { gop, refinements: 3, frames: Vec::new() };
         let mut taken = |frame: u32, refinements: u8| -> Vec<bool> {
             let unit = |refinement: u8| {
                 let id = UnitId { refinement, ..UnitId::of_frame(UnitType::Increment, frame) };

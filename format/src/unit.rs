@@ -1,5 +1,6 @@
 //! Annex B: a stream is a file header and units, back to back, up to the end unit.
 
+use crate::levels::Levels;
 use crate::syntax::{FileHeader, Profile, UnitHeader, UnitId, UnitType, after};
 use crate::{Error, ErrorKind, Limits, Result};
 
@@ -15,7 +16,7 @@ pub struct Stream<'a> {
 }
 
 /// A unit: header accepted, payload within the stream. The payload of a unit of known type has the check sum
-/// that the header gives.
+/// that the header gives, but for [`Damaged`] ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unit<'a> {
     /// Absolute offset of the header.
@@ -30,13 +31,14 @@ pub struct Unit<'a> {
 
 /// A unit whose payload is not the one that was written. The next unit can still be found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Damaged {
-    /// Absolute offset of the header.
-    pub at: u64,
-    /// The header, which is intact.
-    pub header: UnitHeader,
+pub struct Damaged<'a> {
+    /// Its header is intact.
+    pub unit: Unit<'a>,
     /// The check sum that failed.
     pub error: Error,
+    /// Whether nobody looks at the payload, so that the damage is no error: the unit is passed over by step 2 of 7.13.3
+    /// if no unit before it was lost.
+    pub passed_over: bool,
 }
 
 /// What stands at the place of a unit.
@@ -45,12 +47,12 @@ pub enum Delivery<'a> {
     /// A whole unit.
     Intact(Unit<'a>),
     /// A unit with a wrong payload.
-    Damaged(Damaged),
+    Damaged(Damaged<'a>),
 }
 
 /// The units of a stream, in order.
 ///
-/// As an iterator it is for readers that want every unit: a damaged one is an `Err`. [`Units::next_unit`] keeps
+/// As an iterator it is for readers that want every unit: a damaged one is an `Err`, unless it is passed over. [`Units::next_unit`] keeps
 /// damage, after which more units come, apart from errors, after which nothing comes.
 #[derive(Debug, Clone)]
 pub struct Units<'a> {
@@ -59,6 +61,7 @@ pub struct Units<'a> {
     profile: Profile,
     limits: Limits,
     unit_count: u32,
+    levels: Levels,
     state: State,
 }
 
@@ -99,7 +102,15 @@ impl<'a> Units<'a> {
     /// The units of a stream from an offset on. Past the end of the stream there are none.
     pub(crate) fn starting_at(stream: &'a [u8], at: u64, profile: Profile, limits: &Limits) -> Self {
         let rest = usize::try_from(at).ok().and_then(|start| stream.get(start..)).unwrap_or_default();
-        Self { rest, at, profile, limits: *limits, unit_count: 0, state: State::Open }
+        Self {
+            rest,
+            at,
+            profile,
+            limits: *limits,
+            unit_count: 0,
+            levels: Levels::default(),
+            state: State::Open,
+        }
     }
 
     /// Absolute offset of the next unit.
@@ -153,9 +164,14 @@ impl<'a> Units<'a> {
         if header.unit_type() == UnitType::End {
             self.state = State::Ended;
         }
+        let unit = Unit { at, header, payload, payload_at };
+        let passed_over = !self.levels.takes(&header);
         Ok(match header.check_payload(at, payload, self.profile) {
-            Ok(()) => Delivery::Intact(Unit { at, header, payload, payload_at }),
-            Err(error) => Delivery::Damaged(Damaged { at, header, error }),
+            Ok(()) => {
+                self.levels.follow(&unit, self.profile);
+                Delivery::Intact(unit)
+            }
+            Err(error) => Delivery::Damaged(Damaged { unit, error, passed_over }),
         })
     }
 
@@ -175,6 +191,7 @@ impl<'a> Iterator for Units<'a> {
     fn next(&mut self) -> Option<Self::Item> {
         Some(match self.next_unit()? {
             Ok(Delivery::Intact(unit)) => Ok(unit),
+            Ok(Delivery::Damaged(damaged)) if damaged.passed_over => Ok(damaged.unit),
             Ok(Delivery::Damaged(damaged)) => Err(damaged.error),
             Err(error) => Err(error),
         })

@@ -5,7 +5,7 @@ mod sample;
 
 use sample::{DC, FRAME, GOP, REFINEMENT};
 use splatstream_format::syntax::{UnitId, UnitType};
-use splatstream_format::unit::{Delivery, Stream, write_unit};
+use splatstream_format::unit::{Damaged, Delivery, Stream, write_unit};
 use splatstream_format::{Class, ErrorKind, Limits};
 
 // covers: SS-UH-001, SS-UH-002, SS-FH-002
@@ -70,10 +70,10 @@ fn units_behind_a_damaged_payload_are_given_out() {
     for (place, (id, payload)) in units.iter().enumerate() {
         match given.next_unit().unwrap().unwrap() {
             Delivery::Intact(unit) => assert_eq!((unit.header.id(), unit.payload), (*id, payload.as_slice())),
-            Delivery::Damaged(unit) => {
+            Delivery::Damaged(Damaged { unit, error, passed_over }) => {
                 assert!(place == DC || place == REFINEMENT);
                 assert_eq!((unit.header.id(), unit.at), (*id, sample::unit_at(&units, place)));
-                assert_eq!(unit.error.at, unit.at + 16);
+                assert_eq!((error.at, passed_over), (unit.at + 16, false));
             }
         }
     }

@@ -3,7 +3,7 @@
 use crate::LIMITS;
 use crate::decode::{choice, stream_of};
 use crate::laws::extraction::{chosen, holds_at};
-use crate::laws::{Decoded, STRICT, is_in_place};
+use crate::laws::{Decoded, STRICT};
 use crate::seal::{seal, sealed};
 use splatstream_decoder::operating_point::{OperatingPoint, all_points, extract, operating_points};
 use splatstream_decoder::process::Options;
@@ -14,9 +14,6 @@ pub fn run(data: &[u8]) {
     let stream = sealed(&stream);
     let strict = Decoded::of(&stream, &STRICT);
     let (Some(sequence), None) = (&strict.sequence, strict.end) else { return };
-    if !is_in_place(&stream) {
-        return;
-    }
     let all = extract(&stream, OperatingPoint::ALL, &LIMITS);
     assert!(all.is_ok_and(|all| seal(all) == seal(stream.to_vec())), "everything is not the stream itself");
     let other = chosen(sequence, choice(data));

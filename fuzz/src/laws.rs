@@ -10,8 +10,7 @@ use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::Error;
 use splatstream_format::inspect::inspect;
-use splatstream_format::syntax::{FrameType, SequenceParameters, UnitType};
-use splatstream_format::unit::Stream;
+use splatstream_format::syntax::{FrameType, SequenceParameters};
 
 pub mod arrival;
 pub mod extraction;
@@ -24,6 +23,7 @@ pub const STRICT: Options = Options {
     operating_point: OperatingPoint::ALL,
     tolerant: false,
     subset: false,
+    entropy: false,
 };
 /// A damaged refinement ends its frame only.
 pub const TOLERANT: Options = Options { tolerant: true, ..STRICT };
@@ -44,27 +44,12 @@ pub struct Decoded {
 /// Decodes a stream in every way; `choice` chooses an operating point, what is lost, and where to start.
 pub fn hold(bytes: &[u8], choice: u32) {
     let strict = decodes(bytes);
-    if strict.end.is_none() && is_in_place(bytes) {
+    if strict.end.is_none() {
         parts::hold(bytes, &strict, choice);
         if let Some(sequence) = &strict.sequence {
             extraction::holds_at(bytes, &strict, extraction::chosen(sequence, choice));
         }
     }
-}
-
-/// Whether every refinement and increment stands behind the header of its own frame. One that a decoder passes over
-/// may be of another frame (9.3): with fewer units before it, it then counts for something.
-pub fn is_in_place(bytes: &[u8]) -> bool {
-    let mut frame = None;
-    let Ok(stream) = Stream::open(bytes, &LIMITS) else { return true };
-    stream.units().flatten().all(|unit| match unit.header.unit_type() {
-        UnitType::FrameHeader => {
-            frame = Some(unit.header.frame);
-            true
-        }
-        UnitType::Refinement | UnitType::Increment => frame == Some(unit.header.frame),
-        _ => true,
-    })
 }
 
 /// A stream decodes or is refused, the same however careful the decoder is; what a strict one gives.

@@ -43,8 +43,10 @@ fn delimit(bytes: &[u8]) -> Result<()> {
                 assert_eq!(bytes[payload_at as usize..next as usize], *unit.payload);
             }
             Some(Ok(Delivery::Damaged(damaged))) => {
-                next = payload_at + u64::from(damaged.header.payload_length);
-                damage = damage.and(Err(within(damaged.error)));
+                next = payload_at + u64::from(damaged.unit.header.payload_length);
+                if !damaged.passed_over {
+                    damage = damage.and(Err(within(damaged.error)));
+                }
             }
             Some(Err(error)) => {
                 assert_eq!(units.next_unit(), None, "after an error nothing comes");

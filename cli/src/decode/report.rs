@@ -67,7 +67,7 @@ impl Shown {
         self.spatial_layers.push(frame.spatial_layer);
         self.carried.push(frame.carried as u64);
         self.frozen.push(frame.frozen);
-        if let Some(error) = frame.lost {
+        for error in frame.lost.into_iter().chain(frame.carried_fault) {
             self.lost.push(Lost {
                 frame: frame.number,
                 kind: frame.frame_type.name(),

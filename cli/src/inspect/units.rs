@@ -10,9 +10,9 @@ use serde::Serialize;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::levels::Levels;
 use splatstream_format::syntax::{
-    FrameHeader, FrameType, GopHeader, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
+    FrameHeader, FrameType, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
 };
-use splatstream_format::unit::{Delivery, Stream, Unit};
+use splatstream_format::unit::{Damaged, Delivery, Stream, Unit};
 use splatstream_format::{Error, Limits};
 
 /// What `--json` prints.
@@ -92,14 +92,14 @@ fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<E
                 let frame_type = context.frame_type_of(&unit.header);
                 lines.push(Line { frame_type, increment, ..line });
             }
-            Ok(Delivery::Damaged(unit)) => {
+            Ok(Delivery::Damaged(Damaged { unit, error, passed_over })) => {
                 if unit.header.unit_type() == UnitType::FrameHeader {
                     context.frame_type = None;
                 }
                 let line = Line::new(lines.len(), unit.at, &unit.header);
                 let frame_type = context.frame_type_of(&unit.header);
                 lines.push(Line { damaged: true, frame_type, ..line });
-                first = first.or(Some(unit.error));
+                first = first.or((!passed_over).then_some(error));
             }
             Err(error) => first = first.or(Some(error)),
         }
@@ -152,6 +152,7 @@ impl Context {
     /// Takes note of a unit; gives the counts of an increment.
     fn take(&mut self, unit: &Unit<'_>) -> Option<Counts> {
         let (payload, at) = (unit.payload, unit.payload_at);
+        self.levels.follow(unit, self.profile);
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
                 self.sequence = SequenceParameters::parse_payload(payload, at, self.profile).ok();
@@ -159,11 +160,6 @@ impl Context {
             UnitType::FrameHeader => {
                 let header = FrameHeader::parse_payload(payload, at, self.profile).ok();
                 self.frame_type = header.and_then(|header| header.kind());
-            }
-            UnitType::GopHeader => {
-                let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
-                let header = GopHeader::parse_payload(payload, at, self.profile).ok()?;
-                self.levels = Levels::of_gop(header, unit.header.frame, refinements);
             }
             // What is passed over by decoders may hold anything.
             UnitType::Increment if self.profile == Profile::Dynamic && self.levels.takes(&unit.header) => {

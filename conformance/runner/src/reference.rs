@@ -9,7 +9,7 @@ use crate::vector::Mode;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
-use splatstream_decoder::stream::decode_stream_observed;
+use splatstream_decoder::stream::decode_stream;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_format::unit::{Delivery, Stream};
 use splatstream_format::{Error, Limits};
@@ -36,9 +36,10 @@ impl Decoded {
     pub fn of(bytes: &[u8], operating_point: OperatingPoint, mode: Mode) -> Self {
         let limits = Limits { max_gaussians: Limits::gaussians_of_level(4), ..Limits::default() };
         let subset = mode == Mode::Subset;
-        let options = Options { limits, operating_point, subset, tolerant: true, ..Options::default() };
+        let options =
+            Options { limits, operating_point, subset, tolerant: true, entropy: true, ..Options::default() };
         let mut decoded = Self::default();
-        let summary = decode_stream_observed(bytes, &options, |sequence, frame| {
+        let summary = decode_stream(bytes, &options, |sequence, frame| {
             decoded.sequence.get_or_insert(*sequence);
             decoded.frames.push(frame);
             ControlFlow::Continue(())

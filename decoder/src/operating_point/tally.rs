@@ -106,9 +106,7 @@ impl Tally {
         if !unit.header.unit_type().is_known_in(profile) {
             return;
         }
-        if let Some(levels) = levels_of(unit, profile, sequence.as_ref()) {
-            self.levels = levels;
-        }
+        self.levels.follow(unit, profile);
         // The payload of a unit that is passed over shows nothing, whatever it says.
         let is_decoded = self.levels.takes(&unit.header);
         let gaussians = match (unit.header.unit_type(), &sequence) {
@@ -215,16 +213,6 @@ impl Tally {
         }
         Ok(())
     }
-}
-
-/// The levels of the frames of a group, if its header is what the unit is.
-fn levels_of(unit: &Unit<'_>, profile: Profile, sequence: Option<&SequenceParameters>) -> Option<Levels> {
-    if unit.header.unit_type() != UnitType::GopHeader {
-        return None;
-    }
-    let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile).ok()?;
-    let refinements = sequence.map_or(0, |sequence| sequence.refinement_count);
-    Some(Levels::of_gop(header, unit.header.frame, refinements))
 }
 
 /// Every operating point of a sequence, lowest first.

@@ -27,7 +27,7 @@ const MOST_TABLES: usize = 1 << 12;
 pub(super) struct Assembly<'d, 'a> {
     options: Options,
     /// Entropy states of the units so far, if they are asked for.
-    entropy: Option<Vec<UnitEntropy>>,
+    entropy: Vec<UnitEntropy>,
     sequence: &'d SequenceParameters,
     gop: &'d Gop,
     transforms: Transforms<'d>,
@@ -82,7 +82,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let models = reference.map(|reference| reference.state.models.clone()).unwrap_or_default();
         Ok(Self {
             options,
-            entropy: None,
+            entropy: Vec::new(),
             sequence,
             gop,
             transforms: gop.transforms(&frame.header, frame.at)?,
@@ -127,16 +127,12 @@ impl<'d, 'a> Assembly<'d, 'a> {
         failure.map_or(Ok(()), Err)
     }
 
-    /// Asks for entropy states.
-    pub(super) fn observing(self) -> Self {
-        Self { entropy: Some(Vec::new()), ..self }
-    }
-
     /// Keeps the entropy state of a unit, if it has one and is asked for it.
     fn observe(&mut self, unit: &PendingIncrement<'a>, values: &UnitValues) {
-        let Some(states) = &mut self.entropy else { return };
-        let state = of_increment(&unit.increment, values);
-        states.extend(state.map(|state| UnitEntropy { payload_at: unit.payload_at, state }));
+        if self.options.entropy {
+            let state = of_increment(&unit.increment, values);
+            self.entropy.extend(state.map(|state| UnitEntropy { payload_at: unit.payload_at, state }));
+        }
     }
 
     /// Reads the models of the units, up to the first that fails.
@@ -280,7 +276,7 @@ impl<'d, 'a> Assembly<'d, 'a> {
         let decoded = DecodedFrame {
             spatial_layer: self.spatial_layer,
             bytes: self.bytes,
-            entropy: self.entropy.take().unwrap_or_default(),
+            entropy: core::mem::take(&mut self.entropy),
             refinements: u8::try_from(self.homes.len()).unwrap_or(u8::MAX),
             ..DecodedFrame::empty(self.frame.number, self.frame_type())
         };

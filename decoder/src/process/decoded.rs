@@ -32,8 +32,11 @@ pub struct DecodedFrame {
     pub bytes: u64,
     /// Entropy states of the frame's units that were decoded, if they were asked for.
     pub entropy: Vec<UnitEntropy>,
-    /// Why the refinement after the last decoded one was lost, if it was.
+    /// The first error of the frame: why the refinement after the last decoded one was lost, or that the carried
+    /// planes are not those of their digest.
     pub lost: Option<Error>,
+    /// That the carried planes are not those of their digest, where `lost` says something else (SS-ER-007).
+    pub carried_fault: Option<Error>,
 }
 
 /// Clause 7.18: what fills the holes that missing refinements leave.
@@ -64,6 +67,7 @@ impl DecodedFrame {
             bytes: 0,
             entropy: Vec::new(),
             lost: None,
+            carried_fault: None,
         }
     }
 

@@ -121,7 +121,7 @@ impl LayeredFrame<'_> {
 impl<'a> Decoder<'a> {
     /// Clause 7.13: an increment that belongs to the operating point.
     pub(super) fn increment(&mut self, unit: &Unit<'a>) -> Result<()> {
-        if !self.arrives(unit)? || !self.stands(unit)? {
+        if !self.arrives(unit)? {
             return Ok(());
         }
         let limits = self.limits();
@@ -176,13 +176,11 @@ impl<'a> Decoder<'a> {
         let mut lost = frame.lost;
         let options = Options { limits: self.limits(), ..self.options };
         let mut assembly = Assembly::new(options, sequence, gop, frame, reference)?;
-        if self.observes {
-            assembly = assembly.observing();
-        }
         if let Err(error) = assembly.units(&layered.units) {
             lost = Some(error);
         }
         let finished = assembly.finish();
+        let carried_fault = lost.and(finished.fault);
         lost = lost.or(finished.fault);
         // SS-LO-005: a frozen frame that no error of its own explains.
         if let (0, Some(reference), None, Some(at)) = (finished.level, layered.reference, lost, at) {
@@ -191,7 +189,10 @@ impl<'a> Decoder<'a> {
         }
         match lost {
             Some(error) if !self.options.tolerant => Err(error),
-            _ => Ok(Some((DecodedFrame { lost, ..finished.decoded }, finished.level, finished.state))),
+            _ => {
+                let decoded = DecodedFrame { lost, carried_fault, ..finished.decoded };
+                Ok(Some((decoded, finished.level, finished.state)))
+            }
         }
     }
 }

@@ -26,17 +26,12 @@ impl RefinedFrame<'_> {
     pub(super) const fn new() -> Self {
         Self { units: Vec::new() }
     }
-
-    /// Forgets the units from the `count`-th on.
-    pub(super) fn truncate(&mut self, count: u8) {
-        self.units.truncate(usize::from(count));
-    }
 }
 
 impl<'a> Decoder<'a> {
-    /// Steps 3 to 6 of clause 7.1.3, except that blocks are decoded when the frame ends.
+    /// Clause 7.1.3, except that blocks are decoded when the frame ends.
     pub(super) fn refinement(&mut self, unit: &Unit<'a>) -> Result<()> {
-        if !self.arrives(unit)? || !self.stands(unit)? {
+        if !self.arrives(unit)? {
             return Ok(());
         }
         let (Some(frame), Some((sequence, _)), Some(gop)) = (&mut self.frame, &self.sequence, &self.gop)
@@ -71,7 +66,7 @@ impl<'a> Decoder<'a> {
         let tools = gop.transforms(&frame.header, 0)?;
         let (planes, results) = decode_units(&coded, gop, tools, sequence);
         let mut decoded = self.assemble(frame, refined, planes, results)?;
-        if self.observes {
+        if self.options.entropy {
             let known = coded.get(..decoded.refinements.into()).unwrap_or_default();
             decoded.entropy = entropy_states(known, gop, tools, sequence);
         }

@@ -176,9 +176,13 @@ fn increments_stand_in_their_frame_and_in_order() {
                 _ = s.remove(Increment, 1);
             }),
             lost("damage", "CHECK_SUM", 7).script(|s| s.damage(Increment, 7)),
-            // Damage hides where a unit stands.
-            lost("damage of another frame", "CHECK_SUM", 7).script(|s| {
+            // Damage does not hide whose a unit is, but which.
+            stop("damage of another frame", "MISMATCH", 7).script(|s| {
                 s.id(Increment, 7).frame = 4;
+                s.damage(Increment, 7);
+            }),
+            lost("damage of a unit out of order", "CHECK_SUM", 7).script(|s| {
+                s.id(Increment, 7).refinement = 2;
                 s.damage(Increment, 7);
             }),
         ],

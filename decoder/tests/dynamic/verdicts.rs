@@ -16,14 +16,41 @@ fn decoded(script: &Script) -> Decoded {
 fn losses(script: &Script) -> Vec<(u32, &'static str, u64)> {
     let decoded = decoded(script);
     assert_eq!(decoded.end, None);
-    let lost = |frame: &splatstream_decoder::process::DecodedFrame| {
-        frame.lost.map(|error| (frame.number, error.kind.code(), error.at))
-    };
-    decoded.frames.iter().filter_map(lost).collect()
+    let mut lost = Vec::new();
+    for frame in &decoded.frames {
+        let faults = frame.lost.into_iter().chain(frame.carried_fault);
+        lost.extend(faults.map(|error| (frame.number, error.kind.code(), error.at)));
+    }
+    lost
 }
 
 fn at(script: &Script, kind: UnitType, n: usize) -> u64 {
     script.at(script.find(kind, n))
+}
+
+// covers: SS-BS-002, SS-BS-009, SS-UH-007, SS-ER-007
+#[test]
+fn a_unit_of_something_else_behind_a_lost_one_is_fatal() {
+    let of_something_else: [fn(&mut Script); 3] = [
+        |s| s.id(Increment, 3).frame = 77,
+        |s| s.id(Increment, 3).temporal_layer = 3,
+        |s| s.id(Increment, 3).spatial_layer = 2,
+    ];
+    for change in of_something_else {
+        let mut scene = small();
+        let mut alone = scene.script();
+        change(&mut alone);
+        let end = decoded(&alone).end;
+        assert!(matches!(end.unwrap().kind.code(), "MISMATCH" | "OUT_OF_RANGE"));
+        // A damaged payload is not looked at, so the header says the same.
+        alone.damage(Increment, 3);
+        assert_eq!(decoded(&alone).verdict(), end);
+        unit(&mut scene).edit = |h| h.refinement_digest ^= 1;
+        let mut script = scene.script();
+        change(&mut script);
+        let whole = decoded(&script);
+        assert_eq!((whole.verdict().unwrap().kind.code(), whole.end), ("DIGEST", end));
+    }
 }
 
 // covers: SS-BS-012, SS-ER-007, SS-ER-008
@@ -31,10 +58,7 @@ fn at(script: &Script, kind: UnitType, n: usize) -> u64 {
 fn what_stands_behind_a_lost_unit_is_not_looked_at() {
     let mut scene = small();
     unit(&mut scene).edit = |h| h.refinement_digest ^= 1;
-    let behind: [fn(&mut Script); 6] = [
-        |s| s.id(Increment, 3).frame = 77,
-        |s| s.id(Increment, 3).temporal_layer = 3,
-        |s| s.id(Increment, 3).spatial_layer = 2,
+    let behind: [fn(&mut Script); 3] = [
         |s| s.id(Increment, 3).refinement = 9,
         |s| s.payload(Increment, 3).clear(),
         |s| s.damage(Increment, 3),
@@ -53,6 +77,21 @@ fn what_stands_behind_a_lost_unit_is_not_looked_at() {
         assert_ne!(decoded(&alone).verdict().map(|error| error.kind.code()), Some("DIGEST"));
         assert!(decoded(&alone).verdict().is_some());
     }
+}
+
+// covers: SS-ER-007, SS-DG-007
+#[test]
+fn a_wrong_carried_digest_is_reported_beside_what_was_lost_first() {
+    let mut scene = small();
+    unit(&mut scene).edit = |h| h.carried_digest ^= 1;
+    let mut script = scene.script();
+    assert_eq!(losses(&script), []);
+    script.damage(Increment, 3);
+    let stands = at(&script, Increment, 2) + 20;
+    let lost = losses(&script);
+    let codes: Vec<_> = lost.iter().map(|(number, code, _)| (*number, *code)).collect();
+    assert_eq!(codes, [(1, "CHECK_SUM"), (1, "DIGEST")]);
+    assert!((stands..at(&script, Increment, 3)).contains(&lost[1].2));
 }
 
 // covers: SS-LO-005, SS-LO-003, SS-LO-004, SS-BS-006

@@ -75,7 +75,7 @@ fn a_frame_is_shown_at_the_refinement_before_the_one_that_is_damaged_missing_or_
     }
 }
 
-// covers: SS-BS-005, SS-ER-007
+// covers: SS-BS-002, SS-BS-005, SS-ER-007
 #[test]
 fn units_after_a_lost_one_are_passed_over_whatever_they_hold() {
     let scene = sample::scene();
@@ -86,9 +86,8 @@ fn units_after_a_lost_one_are_passed_over_whatever_they_hold() {
         // Found when the blocks are decoded.
         |s| *s.payload(Refinement, 0).last_mut().unwrap() ^= 0x55,
     ];
-    let later: [fn(&mut Script); 4] = [
+    let later: [fn(&mut Script); 3] = [
         |s| s.damage(Refinement, 1),
-        |s| s.id(Refinement, 1).frame = 77,
         |s| s.payload(Refinement, 1).truncate(3),
         |s| s.id(Refinement, 1).refinement = 9,
     ];
@@ -106,6 +105,14 @@ fn units_after_a_lost_one_are_passed_over_whatever_they_hold() {
             assert!((script.at(part)..=script.at(part + 1)).contains(&error.at), "{name}: {error}");
             assert_eq!(decode(&script.bytes()).verdict(), Some(error), "{name}");
         }
+        // But a unit of another frame says that a frame_header is missing.
+        let mut script = scene.script();
+        script.id(Refinement, 1).frame = 77;
+        spoil(&mut script);
+        let decoded = decode_tolerant(&script.bytes());
+        assert_eq!(decoded.end.unwrap().kind.code(), "MISMATCH", "first error {a}");
+        assert_eq!(decoded.shown(), [(0, 0)]);
+        assert_eq!(decode(&script.bytes()).verdict(), decoded.verdict());
     }
 }
 
@@ -263,11 +270,12 @@ fn the_verdict_is_the_first_error_in_the_order_of_9_3() {
                 s.id(Refinement, 1).frame = 1;
             },
         ),
-        confined("check sum before the frame of a refinement", "CHECK_SUM", "5.3", (Refinement, 1, 16))
-            .script(|s| {
+        fatal("frame of a refinement before the check sum", "MISMATCH", "6.9", (Refinement, 1, 8)).script(
+            |s| {
                 s.id(Refinement, 1).frame = 1;
                 s.damage(Refinement, 1);
-            }),
+            },
+        ),
         fatal("frames left before the numbers of the end", "MISMATCH", "6.5", (End, 0, 0)).script(|s| {
             s.payload(End, 0)[0] = 99;
             s.remove(UnitType::Index, 0);

@@ -71,7 +71,7 @@ impl<'a> Client<'a> {
                 self.has_ended = unit.header.unit_type() == UnitType::End;
                 decoder.unit(&unit)?
             }
-            Delivery::Damaged(damaged) => decoder.damaged(&damaged.header, damaged.error).map(|()| None)?,
+            Delivery::Damaged(damaged) => decoder.damaged(&damaged).map(|()| None)?,
         };
         if !self.has_ended {
             self.at = units.position();

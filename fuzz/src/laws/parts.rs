@@ -4,7 +4,7 @@ use super::{Decoded, STRICT, TOLERANT, exact, is_less};
 use crate::LIMITS;
 use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
 use splatstream_format::syntax::UnitType;
-use splatstream_format::unit::{Stream, Unit};
+use splatstream_format::unit::{Damaged, Stream, Unit};
 use splatstream_format::{Error, ErrorKind, Result};
 
 /// `strict` is what the whole stream decodes to; `choice` chooses what is lost, and where to start.
@@ -40,7 +40,8 @@ fn lossy(bytes: &[u8], losses: u32) -> Result<Vec<DecodedFrame>> {
         let is_lost = losses.rotate_right(place as u32) & 1 == 1;
         if is_lost && matches!(unit.header.unit_type(), UnitType::Refinement | UnitType::Increment) {
             let kind = ErrorKind::CheckSum { element: "payload_crc", stored: 0, computed: 1 };
-            decoder.damaged(&unit.header, Error::new(unit.at, "5.3", kind))?;
+            let error = Error::new(unit.at, "5.3", kind);
+            decoder.damaged(&Damaged { unit, error, passed_over: false })?;
         } else {
             frames.extend(decoder.unit(&unit)?);
         }
