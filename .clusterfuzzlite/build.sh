@@ -10,7 +10,7 @@ trap 'rm -rf "$work"' EXIT
 built=${CARGO_TARGET_DIR:-$work/target}/fuzz
 
 if cargo fuzz --version >/dev/null 2>&1; then
-    cargo fuzz build -O --fuzz-dir . --target-dir "$built"
+    cargo fuzz build -O -a --fuzz-dir . --target-dir "$built"
     program=$(find "$built" -path '*/release/splatstream-fuzz' -type f)
 else
     build "$built"

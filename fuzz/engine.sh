@@ -17,8 +17,8 @@ build() {
 -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1 --cfg fuzzing -Cdebug-assertions"
     # An explicit target keeps the flags away from build scripts and procedural macros.
     host=$(rustc -vV | sed -n 's/^host: //p')
-    RUSTFLAGS=$flags cargo build --release --locked --target "$host" --target-dir "$1"
-    program=$1/$host/release/splatstream-fuzz
+    RUSTFLAGS=$flags cargo build --profile fuzz -p splatstream-fuzz --locked --target "$host" --target-dir "$1"
+    program=$1/$host/fuzz/splatstream-fuzz
 }
 
 # Puts the streams of the conformance vectors into a folder, an absolute path: those that are no longer than the longest input.
