@@ -1,11 +1,8 @@
 //! Layers and predicted frames: what the encoder reconstructs is what the decoder reconstructs, near the source.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::closeness::{Bounds, assert_close};
-use common::dynamic::{Whole, coded, predicted, quick, scene};
-use common::{Random, frame_of};
+use crate::common::closeness::{Bounds, assert_close};
+use crate::common::dynamic::{Whole, coded, predicted, quick, scene};
+use crate::common::{Random, frame_of};
 use proptest::prelude::*;
 use splatstream_decoder::predictor::Predictor;
 use splatstream_encoder::transformer::Architecture;

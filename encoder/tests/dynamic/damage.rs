@@ -1,11 +1,8 @@
 //! Damaged streams of profile Dynamic: never a panic, never a wrong frame, and of what is cut off all that is there.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::dynamic::{Arrival, Whole, predicted, range, scene};
-use common::remains::{assert_remains, remains};
-use common::{Random, decoded, encoded, strict};
+use crate::common::dynamic::{Arrival, Whole, predicted, range, scene};
+use crate::common::remains::{assert_remains, remains};
+use crate::common::{Random, decoded, encoded, strict};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::process::Options;
 use splatstream_encoder::{Settings, ShChoice, Steps};

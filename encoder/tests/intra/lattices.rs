@@ -1,9 +1,6 @@
 //! Every coded Gaussian is its source, canonicalised, within half a step: matched by the coded order itself.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::{Random, decoded, encoded, strict};
+use crate::common::{Random, decoded, encoded, strict};
 use proptest::prelude::*;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::position::morton;

@@ -1,12 +1,9 @@
 //! Lost units of profile Dynamic: what remains is what clause 7.20 says, compared with what is decoded at the
 //! operating points, and with a model of the clause that knows nothing of the decoder.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::dynamic::{Arrival, Whole, arrived, predicted, range, scene, units};
-use common::remains::{assert_remains, remains};
-use common::{Random, decoded, encoded, strict};
+use crate::common::dynamic::{Arrival, Whole, arrived, predicted, range, scene, units};
+use crate::common::remains::{assert_remains, remains};
+use crate::common::{Random, decoded, encoded, strict};
 use splatstream_decoder::process::{Decoder, Options};
 use splatstream_encoder::{Settings, Structure, Tools};
 use splatstream_format::Limits;

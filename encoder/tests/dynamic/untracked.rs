@@ -1,10 +1,7 @@
 //! Sequences whose frames were trained apart: what pictures do not need is carried over.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::dynamic::{predicted, scene};
-use common::{decoded, encoded, frame_of, strict};
+use crate::common::dynamic::{predicted, scene};
+use crate::common::{decoded, encoded, frame_of, strict};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Fidelity, Quality, Report, Settings, Structure};

@@ -1,11 +1,8 @@
 //! Where prediction might fail: each case by name, with what comes of it.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::closeness::{Bounds, assert_close, namings, renamed};
-use common::dynamic::{Whole, coded, predicted, quick, scene};
-use common::{encoded, frame_of};
+use crate::common::closeness::{Bounds, assert_close, namings, renamed};
+use crate::common::dynamic::{Whole, coded, predicted, quick, scene};
+use crate::common::{encoded, frame_of};
 use splatstream_encoder::{PredictorChoice, Predictors, Quality, Report, Settings, ShChoice, Steps, Tools};
 use splatstream_format::syntax::FrameType;
 use splatstream_scene::builtin::Tracking;

@@ -1,10 +1,7 @@
 //! The learned predictor: what the encoder trains and chooses, a decoder reproduces.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::dynamic::{coded, predicted, scene};
-use common::{decoded, encoded, strict};
+use crate::common::dynamic::{coded, predicted, scene};
+use crate::common::{decoded, encoded, strict};
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::predictor::Predictor;
 use splatstream_decoder::process::Options;

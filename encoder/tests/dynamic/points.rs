@@ -1,11 +1,8 @@
 //! Operating points of profile Dynamic: extraction and decoding at a point agree, prefixes are nested, the list of
 //! points in the stream says what they cost.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::dynamic::{Whole, decoded_at, predicted, scene, units_of_frames};
-use common::encoded;
+use crate::common::dynamic::{Whole, decoded_at, predicted, scene, units_of_frames};
+use crate::common::encoded;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::process::DecodedFrame;
 use splatstream_encoder::{Settings, Structure};

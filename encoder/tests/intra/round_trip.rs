@@ -1,9 +1,6 @@
 //! What the encoder reconstructs is what the decoder reconstructs, for any frame and any setting.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::{builtin, decoded, encoded, frame_of, planes, strict};
+use crate::common::{builtin, decoded, encoded, frame_of, planes, strict};
 use proptest::prelude::*;
 use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_points};
 use splatstream_decoder::output::to_gaussians;
@@ -180,7 +177,7 @@ fn extremes_of_scale_and_opacity_are_coded() {
     let steps = Steps { opacity: 0.4, ..Settings::default().steps };
     let settings = Settings { steps, keep_invisible: true, ..Settings::default() };
     let (bytes, _) = encoded(vec![frame], &settings);
-    let decoded = &common::planes(&bytes)[0];
+    let decoded = &crate::common::planes(&bytes)[0];
     assert_eq!((decoded.opacity.iter().max(), decoded.opacity.iter().min()), (Some(&200), Some(&-200)));
     assert!(
         decoded.position.iter().all(|plane| plane.iter().all(|&q| q == 0)),

@@ -1,9 +1,6 @@
 //! Real captures, where `../shared/data` stands beside the checkout.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::{Random, decoded, encoded, strict};
+use crate::common::{Random, decoded, encoded, strict};
 use splatstream_encoder::Settings;
 use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
 use std::path::Path;

@@ -1,9 +1,6 @@
 //! What the values mean: a PLY file becomes a stream and a PLY file again, property by property.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::{encoded, strict};
+use crate::common::{encoded, strict};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Quality, Settings, Tools};

@@ -1,10 +1,7 @@
 //! 300 frames, each predicted from the one before: nothing drifts.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::closeness::{Bounds, assert_close};
-use common::dynamic::{Whole, coded, predicted, scene};
+use crate::common::closeness::{Bounds, assert_close};
+use crate::common::dynamic::{Whole, coded, predicted, scene};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_encoder::{Settings, Tools};
 use splatstream_format::syntax::SequenceParameters;

@@ -1,9 +1,6 @@
 //! A real sequence, where `../shared/data` stands beside the checkout.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, reason = "a panic is a failed test")]
 
-mod common;
-
-use common::dynamic::{coded, predicted};
+use crate::common::dynamic::{coded, predicted};
 use splatstream_encoder::{Quality, Settings};
 use splatstream_format::syntax::FrameType;
 use splatstream_scene::{ReadLimits, read_scene};
