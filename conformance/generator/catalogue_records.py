@@ -6,7 +6,7 @@ import struct
 import oracle_path  # noqa: F401
 import constants as c
 from conventions import ByteReader
-from faults import element, invalid, kept_end, kind, payload
+from faults import element, invalid, kept_end, kind, payload, together
 
 INTRA, VQ, DYNAMIC = "stream-several-gops", "codebook-two-stages", "temporal-gops-mixed"
 FALLING, BOOKS, SH = "refinement-ceiling", "codebook-defined-again", "colour-sh-degree-1"
@@ -164,6 +164,12 @@ FRAMES = [
      element(FRAME, "dc_transform_id", 16)),
     ("stream-frame-sh-transform-16", SH, "OUT_OF_RANGE", "SS-ER-001", "sh_transform_id is 16",
      element(FRAME, "sh_transform_id", 16)),
+    ("stream-frame-transform-before-bytes-left", INTRA, "UNDEFINED", "SS-ER-006 SS-FR-002",
+     "dc_transform_id names no transform, and a byte stands behind the elements of the frame_header",
+     together(element(FRAME, "dc_transform_id", 5), payload(FRAME, longer))),
+    ("stream-gop-index-before-bytes-left", INTRA, "MISMATCH", "SS-ER-006 SS-GH-001",
+     "gop_index of the first GOP is 1, and a byte stands behind the elements of the gop_header",
+     together(element(GOP, "gop_index", 1), payload(GOP, longer))),
     ("stream-frame-transform-undefined", INTRA, "UNDEFINED", "SS-FR-002", "dc_transform_id names no transform",
      element(FRAME, "dc_transform_id", 5)),
     ("stream-frame-sh-transform-undefined", SH, "UNDEFINED", "SS-FR-002",
@@ -206,6 +212,9 @@ LISTS = [
      kept_end(payload(END, cut(-1)))),
     ("stream-end-long", INTRA, "TRAILING_BYTES", "SS-ER-003", "the end unit has a byte too many",
      kept_end(payload(END, longer))),
+    ("stream-end-count-before-bytes-left", INTRA, "MISMATCH", "SS-ER-006 SS-EN-001",
+     "unit_count is one more than there are units, and a byte stands behind the end unit's elements",
+     kept_end(together(element(END, "unit_count", lambda x: x + 1), payload(END, longer)))),
     ("stream-points-reserved", INTRA, "RESERVED_BITS", "SS-ER-002", "reserved_zero of operating_points is not 0",
      payload(POINTS, entry(2, "H", 1))),
     ("stream-points-entry-reserved", INTRA, "RESERVED_BITS", "SS-ER-002",
