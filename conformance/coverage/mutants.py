@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Mutants of format and decoder: mutants.py sample ALL.json COUNT SEED, record OUTCOMES.json, or check
 
-`sample` prints an expression that matches so many mutants, drawn of all in functions that the vectors run; what they do
-not run is in code_missed.csv with its reason. `record` writes mutants.csv; `check` demands of it that every mutant is of
-code that is there, that those that no vector noticed are explained, and the goal.
+`sample` draws so many mutants of all in functions that the vectors run, and prints an expression that matches those that
+are not in mutants.csv yet; what the vectors do not run is in code_missed.csv with its reason. `record` adds outcomes to
+mutants.csv; `check` demands of it that mutants that no vector noticed are explained, and the goal.
 """
 
 import csv
@@ -34,6 +34,18 @@ def source(file):
         return Functions(f.read())
 
 
+def key(row):
+    return tuple(row[name] for name in COLUMNS[:4])
+
+
+def standing():
+    """The rows of mutants.csv whose line is still there."""
+    files = {row["file"] for row in table("mutants.csv")} if os.path.exists(TABLE) else ()
+    lines = {file: {line.strip() for line in source(file).lines} for file in files
+             if os.path.exists(os.path.join(ROOT, file))}
+    return [row for row in table("mutants.csv") if row["text"] in lines.get(row["file"], ())] if files else []
+
+
 def running(mutants):
     """Those in functions that some vector runs."""
     idle = {(row["file"], row["function"]) for row in table("code_missed.csv") if row["side"] == "all"}
@@ -43,17 +55,18 @@ def running(mutants):
 
 
 def sample(path, count, seed):
-    """The drawn mutants' names as one regular expression. Drawn by a hash of what is changed and not of where, so that a
-    change of the code elsewhere draws the same."""
+    """One regular expression of mutants' names. Drawn by a hash of what is changed and not of where, so that a change of
+    the code elsewhere draws the same."""
     with open(path, encoding="utf-8") as f:
         mutants = running(json.load(f))
 
     def rank(mutant):
-        row = row_of(mutant, "")
-        key = "\0".join([str(seed)] + [row[name] for name in COLUMNS[:4]])
-        return hashlib.sha256(key.encode()).digest(), mutant["name"]
+        drawn = "\0".join((str(seed),) + key(row_of(mutant, "")))
+        return hashlib.sha256(drawn.encode()).digest(), mutant["name"]
 
-    return "^(%s)$" % "|".join(re.escape(mutant["name"]) for mutant in sorted(mutants, key=rank)[:count])
+    known = {key(row) for row in standing()}
+    new = [mutant["name"] for mutant in sorted(mutants, key=rank)[:count] if key(row_of(mutant, "")) not in known]
+    return "^(%s)$" % "|".join(map(re.escape, new)) if new else ""
 
 
 def row_of(mutant, outcome):
@@ -65,17 +78,18 @@ def row_of(mutant, outcome):
 
 
 def record(path):
-    known = {tuple(row[name] for name in COLUMNS[:4]): row["explanation"] for row in table("mutants.csv")} \
-        if os.path.exists(TABLE) else {}
     with open(path, encoding="utf-8") as f:
         outcomes = json.load(f)["outcomes"]
     tried = [{**outcome["scenario"]["Mutant"], "outcome": NAMES[outcome["summary"]]} for outcome in outcomes
              if isinstance(outcome["scenario"], dict) and outcome["summary"] in NAMES]
     # cargo-mutants does not ask whether deleted fields are among the mutants chosen.
     rows = [row_of(mutant, mutant["outcome"]) for mutant in running(tried)]
+    known = {key(row): row for row in standing()}
     for row in rows:
-        if row["outcome"] == "missed":
-            row["explanation"] = known.get(tuple(row[name] for name in COLUMNS[:4]), "")
+        if row["outcome"] == "missed" and key(row) in known:
+            row["explanation"] = known[key(row)]["explanation"]
+    anew = {key(row) for row in rows}
+    rows += [row for row in standing() if key(row) not in anew]
     rows.sort(key=lambda row: [row[name] for name in COLUMNS])
     with open(TABLE, "w", encoding="utf-8", newline="") as f:
         out = csv.DictWriter(f, COLUMNS, lineterminator="\n")
@@ -84,29 +98,29 @@ def record(path):
 
 
 def check():
-    """What mutants.csv lacks, and what it says."""
-    rows, problems = table("mutants.csv"), []
+    """What mutants.csv lacks, and what it says. A mutant of a line that has changed since counts for nothing."""
+    rows, problems = standing(), []
     for row in rows:
-        where = "%(file)s: %(function)s: %(change)s" % row
-        if row["text"] not in (line.strip() for line in source(row["file"]).lines):
-            problems.append(where + ": the line that was changed is gone: run mutants.sh")
         if (row["outcome"] == "missed") != bool(row["explanation"]):
-            problems.append(where + (": nobody noticed and nobody says why" if row["outcome"] == "missed" else
-                                     ": explained and noticed"))
+            problems.append("%(file)s: %(function)s: %(change)s: " % row + (
+                "nobody noticed and nobody says why" if row["outcome"] == "missed" else "explained and noticed"))
     counting = [row for row in rows if row["outcome"] != "unviable"]
     noticed = sum(row["outcome"] in ("caught", "timeout") for row in counting)
     same = sum(row["explanation"].startswith(EQUIVALENT) for row in counting)
     score = 100 * noticed / max(len(counting), 1)
     if len(rows) < FEWEST or score < GOAL:
-        problems.append("the goal is %d %% of %d mutants" % (GOAL, FEWEST))
+        problems.append("the goal is %d %% of %d mutants: run mutants.sh" % (GOAL, FEWEST))
     told = "%d mutants, of which %d do not compile: the vectors notice %d of %d, %.1f %%; %d of the others change nothing" % (
         len(rows), len(rows) - len(counting), noticed, len(counting), score, same)
+    gone = len(table("mutants.csv")) - len(rows)
+    if gone:
+        told += "; %d more are of code that has changed since" % gone
     return problems, told
 
 
 def main(arguments):
     if arguments[:1] == ["sample"] and len(arguments) == 4:
-        print(sample(arguments[1], int(arguments[2]), int(arguments[3])))
+        sys.stdout.write(sample(arguments[1], int(arguments[2]), int(arguments[3])))
         return 0
     if arguments[:1] == ["record"] and len(arguments) == 2:
         record(arguments[1])
