@@ -265,6 +265,7 @@ LOSSES = [
     ("order-loss-of-refinement-0", FALLING, "CHECK_SUM", "SS-BS-005 SS-BS-006",
      "refinement 0 is damaged: the frame is lost", flipped(REFINED)),
 ]
+WRONG_CARRIED = element(increment(4, 3), "carried_digest", lambda x: x ^ 1)
 DIGESTS = [
     ("digest-of-frame", INTRA, "DIGEST", "SS-RU-005 SS-DG-003 SS-DG-001 SS-DG-002",
      "a bit of refinement_digest is wrong", element(REFINED, "refinement_digest", lambda x: x ^ 1)),
@@ -281,7 +282,14 @@ DIGESTS = [
      element(increment(0, 0), "refinement_digest", lambda x: x + 1)),
     ("digest-carried", "refinement-digests", "DIGEST", "SS-DG-006 SS-DG-007 SS-CA-001 SS-CA-002 SS-DG-004",
      "carried_digest of the unit at which a frame is shown is wrong; the frame is output as it is",
-     element(increment(4, 3), "carried_digest", lambda x: x ^ 1)),
+     WRONG_CARRIED),
+    ("digest-carried-at-the-end-of-the-data", "refinement-digests", "TRUNCATED", "SS-ER-007 SS-DG-007 SS-BS-006",
+     "carried_digest of the unit at which a frame is shown is wrong, which is found where the data ends: after that error",
+     together(WRONG_CARRIED, lambda head, units: (head, units[:increment(4, 3)(units) + 1]))),
+    ("digest-carried-before-a-fatal-error", "refinement-digests", "OUT_OF_RANGE", "SS-ER-007 SS-DG-007 SS-BS-006",
+     "carried_digest of the unit at which a frame is shown is wrong, and refinement of the unit behind it is 1: that error "
+     "ends the frame and comes first",
+     together(WRONG_CARRIED, changed(lambda units: increment(4, 3)(units) + 1, r=1))),
     ("digest-carried-of-i-frame", DEEP, "DIGEST", "SS-DG-006 SS-DG-007",
      "carried_digest of the last unit of an I frame is not that of no lists",
      element(increment(0, 1), "carried_digest", 0)),

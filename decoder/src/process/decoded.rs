@@ -35,7 +35,8 @@ pub struct DecodedFrame {
     /// The first error of the frame: why the refinement after the last decoded one was lost, or that the carried
     /// planes are not those of their digest.
     pub lost: Option<Error>,
-    /// That the carried planes are not those of their digest, where `lost` says something else (SS-ER-007).
+    /// That the carried planes are not those of their digest, where another error comes before (SS-ER-007): `lost`, or
+    /// the one that ended decoding within the frame.
     pub carried_fault: Option<Error>,
 }
 

@@ -180,8 +180,10 @@ impl<'a> Decoder<'a> {
             lost = Some(error);
         }
         let finished = assembly.finish();
-        let carried_fault = lost.and(finished.fault);
-        lost = lost.or(finished.fault);
+        // SS-ER-007: found because an error ends the frame, it comes after that error.
+        let comes_first = lost.is_none() && at.is_some();
+        let carried_fault = finished.fault.filter(|_| !comes_first);
+        lost = lost.or(finished.fault.filter(|_| comes_first));
         // SS-LO-005: a frozen frame that no error of its own explains.
         if let (0, Some(reference), None, Some(at)) = (finished.level, layered.reference, lost, at) {
             let kind = ErrorKind::Undefined { element: "reference frame", id: reference.into() };

@@ -92,6 +92,14 @@ fn a_wrong_carried_digest_is_reported_beside_what_was_lost_first() {
     let codes: Vec<_> = lost.iter().map(|(number, code, _)| (*number, *code)).collect();
     assert_eq!(codes, [(1, "CHECK_SUM"), (1, "DIGEST")]);
     assert!((stands..at(&script, Increment, 3)).contains(&lost[1].2));
+    // What ends the frame comes before it, at an operating point where it is the last.
+    let bytes = &scene.bytes()[..at(&scene.script(), Increment, 3) as usize];
+    let operating_point = crate::stream::expect::point(3, 3, 0);
+    for tolerant in [true, false] {
+        let cut = decode_with(bytes, &Options { operating_point, tolerant, ..Options::default() });
+        assert_eq!(cut.verdict().unwrap().kind.code(), "TRUNCATED");
+        assert_eq!(cut.frames.last().is_some_and(|frame| frame.carried_fault.is_some()), tolerant);
+    }
 }
 
 // covers: SS-LO-005, SS-LO-003, SS-LO-004, SS-BS-006
