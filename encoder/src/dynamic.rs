@@ -17,7 +17,7 @@ use crate::canonical::{canonicalise, visible};
 use crate::colour;
 use crate::error::Error;
 use crate::importance::Ranking;
-use crate::lattice::geometry;
+use crate::lattice::{Spacing, check_reach, geometry};
 use crate::matching::{Cloud, Kind, Matching, Measure, shares_little, shares_much};
 use crate::section::SectionPlan;
 use crate::settings::{Fidelity, Importance, Preset, Settings, ShChoice, Structure};
@@ -172,6 +172,7 @@ impl Dynamic<'_, '_> {
         let rows = visible(&frame, self.settings.keep_invisible);
         let row_count = frame.len() as u32;
         let frame = canonicalise(&frame, &rows, true);
+        check_reach(&frame, &self.sequence, number)?;
         let step = self.sequence.position_step();
         let offset = self.sequence.position_offset();
         let position = [0, 1, 2].map(|axis: usize| {
@@ -236,11 +237,8 @@ impl Dynamic<'_, '_> {
 
     /// Transforms and codebooks, made for the first frame.
     fn tools(&self, target: &Target, frames: u32) -> GopTools {
-        let prepared = Prepared {
-            frame: target.frame.clone(),
-            order: Vec::new(),
-            spacing: crate::lattice::Spacing::default(),
-        };
+        let prepared =
+            Prepared { frame: target.frame.clone(), order: Vec::new(), spacing: Spacing::default() };
         let mut tools = GopTools::new(&prepared, &self.sequence, self.settings, frames);
         tools.keep_zero();
         tools

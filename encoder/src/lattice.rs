@@ -3,12 +3,16 @@
 use crate::error::Error;
 use crate::settings::Steps;
 use rayon::prelude::*;
-use splatstream_decoder::attribute::{ATTRIBUTE_RANGE, rotation_shift};
+use splatstream_decoder::attribute::rotation_shift;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::GaussianFrame;
 
 /// The most bits of an axis that the syntax carries.
 const MAX_POSITION_BITS: u32 = 20;
+/// The largest magnitude of a log-scale, steps: the difference of two fits 16 bits on the coarsest layer's lattice too.
+const MAX_LOG_SCALE: f32 = 16_000.0;
+/// The same of an opacity.
+const MAX_OPACITY: f32 = 32_000.0;
 
 /// The integers of a frame that are coded as they are: all but colour. In the order of the source.
 #[derive(Debug, Clone, Default)]
@@ -132,6 +136,7 @@ pub(crate) fn geometry(
     number: u32,
 ) -> Result<Geometry, Error> {
     let last = ((1_u32 << sequence.position_bits) - 1) as f32;
+    check_reach(frame, sequence, number)?;
     let step = sequence.position_step();
     let mut position = [const { Vec::new() }; 3];
     for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
@@ -143,34 +148,42 @@ pub(crate) fn geometry(
     }
     let mut log_scale = [const { Vec::new() }; 3];
     for (plane, values) in log_scale.iter_mut().zip(frame.log_scale()) {
-        let lattice = ("log_scale", sequence.log_scale_offset(), sequence.log_scale_step());
-        *plane = rounded(values, lattice, spacing, number)?;
+        *plane = rounded(values, sequence.log_scale_offset(), sequence.log_scale_step(), spacing);
     }
-    let lattice = ("opacity", sequence.opacity_offset(), sequence.opacity_step());
-    let opacity = rounded(frame.opacity_logit(), lattice, &Spacing::default(), number)?;
+    let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
+    let opacity = rounded(frame.opacity_logit(), offset, step, &Spacing::default());
     let [_, x, y, z] = frame.rotation();
     let shifts = rotation_shifts(&log_scale, sequence);
     let rotation = [x, y, z].map(|plane| rotation_plane(plane, &shifts, sequence.rotation_step(), spacing));
     Ok(Geometry { position, log_scale, opacity, rotation })
 }
 
-fn rounded(
-    values: &[f32],
-    lattice: (&'static str, f32, f32),
-    spacing: &Spacing,
-    frame: u32,
-) -> Result<Vec<i32>, Error> {
-    let (attribute, offset, step) = lattice;
-    let limit = *ATTRIBUTE_RANGE.end() as f32;
-    let outside = |&value: &f32| ((value - offset) / step).abs() > limit;
-    match values.iter().position(outside) {
-        Some(row) => Err(Error::OutOfLattice { frame, attribute, row, value: values[row], step }),
-        None => Ok(values
-            .par_iter()
-            .enumerate()
-            .map(|(row, &value)| spacing.nearest(row, (value - offset) / step))
-            .collect()),
+/// Whether log-scales and opacities of a canonical frame are such that every layer can carry them.
+///
+/// # Errors
+/// The first value that is too far out.
+pub(crate) fn check_reach(
+    frame: &GaussianFrame,
+    sequence: &SequenceParameters,
+    number: u32,
+) -> Result<(), Error> {
+    let check = |attribute: &'static str, values: &[f32], offset: f32, step: f32, most: f32| {
+        let row = values.iter().position(|&value| ((value - offset) / step).abs() > most);
+        row.map_or(Ok(()), |row| {
+            Err(Error::OutOfLattice { frame: number, attribute, row, value: values[row], step })
+        })
+    };
+    let (offset, step) = (sequence.log_scale_offset(), sequence.log_scale_step());
+    for plane in frame.log_scale() {
+        check("log_scale", plane, offset, step, MAX_LOG_SCALE)?;
     }
+    let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
+    check("opacity", frame.opacity_logit(), offset, step, MAX_OPACITY)
+}
+
+fn rounded(values: &[f32], offset: f32, step: f32, spacing: &Spacing) -> Vec<i32> {
+    let nearest = |(row, &value): (usize, &f32)| spacing.nearest(row, (value - offset) / step);
+    values.par_iter().enumerate().map(nearest).collect()
 }
 
 /// For each Gaussian the bits left out of its rotation; none for a sphere, which needs no rotation.

@@ -3,7 +3,9 @@
 use crate::common::closeness::{Bounds, assert_close, namings, renamed};
 use crate::common::dynamic::{Whole, coded, predicted, quick, scene};
 use crate::common::{encoded, frame_of};
-use splatstream_encoder::{PredictorChoice, Predictors, Quality, Report, Settings, ShChoice, Steps, Tools};
+use splatstream_encoder::{
+    Error, PredictorChoice, Predictors, Quality, Report, Settings, ShChoice, Steps, Tools, encode,
+};
 use splatstream_format::syntax::FrameType;
 use splatstream_scene::builtin::Tracking;
 use splatstream_scene::{GaussianFrame, Planes, sh_coefficients};
@@ -47,6 +49,30 @@ fn an_empty_frame_is_shown_empty_and_others_are_not() {
     {
         let frames: Vec<GaussianFrame> = order.into_iter().cloned().collect();
         close(&frames, "an empty frame");
+    }
+}
+
+#[test]
+fn values_too_far_out_are_named_whatever_their_frame_and_others_are_carried_in_every_layer() {
+    let calm = still(60, 1);
+    let loud = |opacity: f32, scale: f32| {
+        changed(&calm, |planes| {
+            planes.opacity_logit[7] = opacity;
+            planes.log_scale.iter_mut().zip([scale, 0.0, -scale]).for_each(|(plane, value)| plane[7] = value);
+        })
+    };
+    let settings = Settings { spatial_layers: 4, ..predicted(2) };
+    let Steps { log_scale, opacity, .. } = settings.steps;
+    for frames in [[&calm, &loud(32_100.0 * opacity, 1.0)], [&loud(1.0, 16_100.0 * log_scale), &calm]] {
+        let mut frames: Vec<GaussianFrame> = frames.into_iter().cloned().collect();
+        let number = u32::from(frames[0] == calm);
+        let error = encode(&mut frames, &settings, &mut Vec::new(), &mut |_, _| {}).unwrap_err();
+        let Error::OutOfLattice { frame, attribute, .. } = error else { panic!("{error}") };
+        assert_eq!((frame, attribute), (number, ["log_scale", "opacity"][number as usize]));
+    }
+    let loudest = loud(-31_990.0 * opacity, 15_990.0 * log_scale);
+    for frames in [[loudest.clone(), calm.clone()], [calm, loudest]] {
+        coded(&frames, &settings, "far out");
     }
 }
 
