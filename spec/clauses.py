@@ -17,7 +17,8 @@ HEADING = re.compile(r"^(#+) (?:Annex )?((?:\d+|[A-Z])(?:\.\d+)*) .*$", re.M)
 DEFINED = re.compile(r"\*\*\[(SS-[A-Z]{2}-\d{3})\]\*\*")
 # Fences, code, links, headings and version numbers are kept.
 KEPT = re.compile(r"^```.*?^```|`[^`\n]*`|[Vv]ersion \d+\.\d+|!?\[[^\]\n]*\]\([^)\n]*\)|^#[^\n]*|\*\*\[SS-[A-Z]{2}-\d{3}\]\*\*", re.M | re.S)
-NAMED = re.compile(r"\b(?:SS-[A-Z]{2}-\d{3}|(?<![\w.^-])(?:\d+|[A-Z])(?:\.\d+)+(?!\.?\w))")
+REQUIREMENT = r"\bSS-[A-Z]{2}-\d{3}\b"
+CLAUSE = r"(?<![\w.^-])(?:\d+|[A-Z])(?:\.\d+)+(?!\.?\w)"
 
 
 def chapters(items):
@@ -31,14 +32,17 @@ def targets(book):
     """What can be linked to, and the page it is on."""
     pages = {}
     for chapter in book:
-        for number in (match[2] for match in HEADING.finditer(chapter["content"])):
-            pages.setdefault(number, (chapter["path"], "clause-" + number))
+        numbers = HEADING.finditer(chapter["content"]) if PAGES.match(chapter["path"]) else ()
+        for number in (match[2] for match in numbers):
+            pages[number] = (chapter["path"], "clause-" + number)
         for name in DEFINED.findall(chapter["content"]):
             pages[name] = (chapter["path"], name)
     return pages
 
 
 def linked(text, page, pages):
+    named = re.compile("%s|%s" % (REQUIREMENT, CLAUSE) if PAGES.match(page) else REQUIREMENT)
+
     def link(match):
         path, anchor = pages.get(match[0], (None, None))
         if path is None:
@@ -47,18 +51,19 @@ def linked(text, page, pages):
 
     parts, end = [], 0
     for kept in KEPT.finditer(text):
-        parts += [NAMED.sub(link, text[end:kept.start()]), kept[0]]
+        parts += [named.sub(link, text[end:kept.start()]), kept[0]]
         end = kept.end()
-    text = "".join(parts) + NAMED.sub(link, text[end:])
-    text = HEADING.sub(lambda match: "%s { #clause-%s }" % (match[0], match[2]), text)
+    text = "".join(parts) + named.sub(link, text[end:])
+    if PAGES.match(page):
+        text = HEADING.sub(lambda match: "%s { #clause-%s }" % (match[0], match[2]), text)
     return DEFINED.sub(r'<a id="\1"></a>**[\1]**', text)
 
 
 def preprocess():
     _, book = json.load(sys.stdin)
-    linking = [chapter for chapter in chapters(book["items"]) if PAGES.match(chapter["path"])]
-    pages = targets(linking)
-    for chapter in linking:
+    book_chapters = list(chapters(book["items"]))
+    pages = targets(book_chapters)
+    for chapter in book_chapters:
         chapter["content"] = linked(chapter["content"], chapter["path"], pages)
     json.dump(book, sys.stdout)
 
