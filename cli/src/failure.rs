@@ -108,7 +108,7 @@ fn advice(class: Class) -> &'static str {
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct StreamFault {
     class: &'static str,
-    code: &'static str,
+    pub(crate) code: &'static str,
     clause: &'static str,
     byte: u64,
     message: String,

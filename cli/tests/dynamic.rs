@@ -6,6 +6,7 @@ mod common;
 use common::{UNIT_HEADER, directory, fail, fixture, json, run, seal, succeed, text};
 use serde_json::Value;
 use splatstream_encoder::{Preset, Quality, Settings, Structure, encode};
+use splatstream_format::syntax::IncrementHeader;
 use splatstream_scene::builtin::BuiltinScene;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -238,6 +239,25 @@ fn operating_points_agree_with_decoding_and_with_extraction() {
         let said = fail(2, &["extract", text(&dynamic()), "--op", op, "-o", text(&part)]);
         assert!(said.contains(op) && said.contains("--ops"), "{said}");
     }
+}
+
+// covers: SS-ER-007
+#[test]
+fn every_error_of_a_frame_is_told() {
+    // The carried lists at the refinement before the one that is lost.
+    let (at, _) = unit("increment", 4, 1, 1);
+    let (_directory, path) = changed(|bytes| {
+        bytes[at + UNIT_HEADER + IncrementHeader::TABLE.offset("carried_digest")] ^= 1;
+        seal(bytes, at);
+        damage(bytes, 4, 1, 2);
+    });
+    let report = decode_faulty(10, &path, &[]);
+    let lost = report["lost"].as_array().unwrap();
+    let codes: Vec<&str> =
+        lost.iter().filter(|lost| lost["frame"] == 4).filter_map(|lost| lost["code"].as_str()).collect();
+    assert_eq!(codes, ["CHECK_SUM", "DIGEST"]);
+    let said = told(&path);
+    assert!(said.contains("1 wrong, as said below") && said.matches("frame 4 (P)").count() == 2, "{said}");
 }
 
 #[test]

@@ -125,8 +125,7 @@ impl Report {
             Some(path) => path.display().to_string(),
             None => "nothing written (--dry-run)".to_owned(),
         };
-        let digests =
-            if self.verified { "agree with the frames shown" } else { "not compared (--no-verify)" };
+        let digests = self.digests();
         let mut text = format!(
             "{place}\n  frames       {}{}\n  Gaussians    {}{}\n  decoding     {:.3} s, {} Gaussians a second\n  \
              in all       {:.3} s\n  digests      {digests}\n",
@@ -148,6 +147,15 @@ impl Report {
             text += &format!("  stopped early; {last}\n");
         }
         text + &self.complete.as_deref().map(completeness::text).unwrap_or_default()
+    }
+
+    fn digests(&self) -> String {
+        let wrong = self.shown.lost.iter().filter(|lost| lost.fault.code == "DIGEST").count();
+        match wrong {
+            _ if !self.verified => "not compared (--no-verify)".to_owned(),
+            0 => "agree with the frames shown".to_owned(),
+            wrong => format!("{wrong} wrong, as said below; the others agree with the frames shown"),
+        }
     }
 
     fn carried(&self) -> String {
