@@ -247,7 +247,7 @@ impl Dynamic<'_, '_> {
     fn intra(&mut self, gop: &mut Gop, number: u32, target: Target) -> Result<(), Error> {
         let order = self.ranking.order(&target.frame);
         let spacing = self.ranking.spacing(&order, self.settings);
-        let geometry = geometry(&target.frame, &self.sequence, &spacing, number)?;
+        let geometry = geometry(&target.frame, &self.sequence, &spacing);
         let dc: Vec<&[f32]> = target.frame.dc().iter().map(Vec::as_slice).collect();
         let dc_step = self.sequence.dc_step();
         let dc_components = colour::components(&gop.tools.dc, &dc, dc_step, &spacing);

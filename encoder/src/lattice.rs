@@ -125,18 +125,9 @@ impl Spacing {
     }
 }
 
-/// Rounds a canonical frame onto the lattices.
-///
-/// # Errors
-/// A value beyond the range of its integer.
-pub(crate) fn geometry(
-    frame: &GaussianFrame,
-    sequence: &SequenceParameters,
-    spacing: &Spacing,
-    number: u32,
-) -> Result<Geometry, Error> {
+/// Rounds a canonical frame whose reach has been checked onto the lattices.
+pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters, spacing: &Spacing) -> Geometry {
     let last = ((1_u32 << sequence.position_bits) - 1) as f32;
-    check_reach(frame, sequence, number)?;
     let step = sequence.position_step();
     let mut position = [const { Vec::new() }; 3];
     for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
@@ -155,7 +146,7 @@ pub(crate) fn geometry(
     let [_, x, y, z] = frame.rotation();
     let shifts = rotation_shifts(&log_scale, sequence);
     let rotation = [x, y, z].map(|plane| rotation_plane(plane, &shifts, sequence.rotation_step(), spacing));
-    Ok(Geometry { position, log_scale, opacity, rotation })
+    Geometry { position, log_scale, opacity, rotation }
 }
 
 /// Whether log-scales and opacities of a canonical frame are such that every layer can carry them.

@@ -7,7 +7,7 @@ use crate::dynamic::{Dynamic, learning};
 use crate::error::Error;
 use crate::frame::{CodedFrame, UnitPlan, code_frame};
 use crate::importance::Ranking;
-use crate::lattice::{Spacing, geometry};
+use crate::lattice::{Spacing, check_reach, geometry};
 use crate::pca::Components;
 use crate::sequence::analyse;
 use crate::settings::{Importance, Settings, Steps};
@@ -408,6 +408,7 @@ fn coded_frame(
     tools: &mut GopTools,
     number: u32,
 ) -> Result<CodedFrame, Error> {
+    check_reach(&frame, sequence, number)?;
     let zeros = vec![0.0; frame.len()];
     let first = tools.first_components.take();
     let sh = first.or_else(|| {
@@ -419,7 +420,7 @@ fn coded_frame(
         })
     });
     Ok(CodedFrame {
-        geometry: geometry(&frame, sequence, &spacing, number)?,
+        geometry: geometry(&frame, sequence, &spacing),
         dc: colour::components(&tools.dc, &dc_planes(&frame), sequence.dc_step(), &spacing),
         sh: sh.unwrap_or_default(),
         order,

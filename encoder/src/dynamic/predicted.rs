@@ -266,7 +266,7 @@ impl Predicted<'_> {
             rest = later;
         }
         let spacing = Spacing::default();
-        let geometry = geometry(&frame, sequence, &spacing, self.number)?;
+        let geometry = geometry(&frame, sequence, &spacing);
         let dc: Vec<&[f32]> = frame.dc().iter().map(Vec::as_slice).collect();
         let dc_components = colour::components(self.survivors.dc, &dc, sequence.dc_step(), &spacing);
         let zeros = vec![0.0; frame.len()];
