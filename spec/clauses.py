@@ -11,14 +11,16 @@ import os
 import re
 import sys
 
+from check import CLAUSE
+
 # Where every number with a point is that of a clause, as check.py demands; elsewhere there are decibels and bits too.
 PAGES = re.compile(r"0\d-|[abf]-|changes")
 HEADING = re.compile(r"^(#+) (?:Annex )?((?:\d+|[A-Z])(?:\.\d+)*) .*$", re.M)
-DEFINED = re.compile(r"\*\*\[(SS-[A-Z]{2}-\d{3})\]\*\*")
-# Fences, code, links, headings and version numbers are kept.
-KEPT = re.compile(r"^```.*?^```|`[^`\n]*`|[Vv]ersion \d+\.\d+|!?\[[^\]\n]*\]\([^)\n]*\)|^#[^\n]*|\*\*\[SS-[A-Z]{2}-\d{3}\]\*\*", re.M | re.S)
 REQUIREMENT = r"\bSS-[A-Z]{2}-\d{3}\b"
-CLAUSE = r"(?<![\w.^-])(?:\d+|[A-Z])(?:\.\d+)+(?!\.?\w)"
+DEFINED = re.compile(rf"\*\*\[({REQUIREMENT})\]\*\*")
+# Fences, code, links, headings and version numbers are kept.
+KEPT = re.compile(
+    rf"^```.*?^```|`[^`\n]*`|[Vv]ersion \d+\.\d+|!?\[[^\]\n]*\]\([^)\n]*\)|^#[^\n]*|{DEFINED.pattern}", re.M | re.S)
 
 
 def chapters(items):
@@ -41,7 +43,7 @@ def targets(book):
 
 
 def linked(text, page, pages):
-    named = re.compile("%s|%s" % (REQUIREMENT, CLAUSE) if PAGES.match(page) else REQUIREMENT)
+    named = re.compile("%s|%s" % (REQUIREMENT, CLAUSE.pattern) if PAGES.match(page) else REQUIREMENT)
 
     def link(match):
         path, anchor = pages.get(match[0], (None, None))

@@ -40,10 +40,10 @@ def key(row):
 
 def standing():
     """The rows of mutants.csv whose line is still there."""
-    files = {row["file"] for row in table("mutants.csv")} if os.path.exists(TABLE) else ()
-    lines = {file: {line.strip() for line in source(file).lines} for file in files
-             if os.path.exists(os.path.join(ROOT, file))}
-    return [row for row in table("mutants.csv") if row["text"] in lines.get(row["file"], ())] if files else []
+    rows = table("mutants.csv") if os.path.exists(TABLE) else []
+    files = {row["file"] for row in rows if os.path.exists(os.path.join(ROOT, row["file"]))}
+    lines = {file: {line.strip() for line in source(file).lines} for file in files}
+    return [row for row in rows if row["text"] in lines.get(row["file"], ())]
 
 
 def running(mutants):
@@ -84,12 +84,13 @@ def record(path):
              if isinstance(outcome["scenario"], dict) and outcome["summary"] in NAMES]
     # cargo-mutants does not ask whether deleted fields are among the mutants chosen.
     rows = [row_of(mutant, mutant["outcome"]) for mutant in running(tried)]
-    known = {key(row): row for row in standing()}
+    before = standing()
+    known = {key(row): row for row in before}
     for row in rows:
         if row["outcome"] == "missed" and key(row) in known:
             row["explanation"] = known[key(row)]["explanation"]
     anew = {key(row) for row in rows}
-    rows += [row for row in standing() if key(row) not in anew]
+    rows += [row for row in before if key(row) not in anew]
     rows.sort(key=lambda row: [row[name] for name in COLUMNS])
     with open(TABLE, "w", encoding="utf-8", newline="") as f:
         out = csv.DictWriter(f, COLUMNS, lineterminator="\n")

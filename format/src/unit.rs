@@ -52,8 +52,8 @@ pub enum Delivery<'a> {
 
 /// The units of a stream, in order.
 ///
-/// As an iterator it is for readers that want every unit: a damaged one is an `Err`, unless it is passed over. [`Units::next_unit`] keeps
-/// damage, after which more units come, apart from errors, after which nothing comes.
+/// As an iterator it is for readers that want every unit: a damaged one is an `Err`, unless it is passed over.
+/// [`Units::next_unit`] keeps damage, after which more units come, apart from errors, after which nothing comes.
 #[derive(Debug, Clone)]
 pub struct Units<'a> {
     rest: &'a [u8],
