@@ -2,7 +2,7 @@
 # libFuzzer is run with it. Sourced with the working directory in fuzz/.
 
 # As in src/targets.rs.
-targets=(units headers payload entropy scene decode chunks extraction increments encode oracle)
+targets=(units records entropy scene decode synthetic encode oracle)
 
 # Options of every run. The limit on single allocations is in src/ceiling.rs: -malloc_limit_mb needs a sanitizer,
 # which stable lacks.
@@ -65,7 +65,7 @@ side_by_side() {
 starts_of() {
     local folder
     case $1 in
-        units | headers | payload | decode | chunks | extraction | oracle) starts=(-dict=dictionaries/stream.dict) ;;
+        units | records | decode | oracle) starts=(-dict=dictionaries/stream.dict) ;;
         scene) starts=(-dict=dictionaries/scene.dict) ;;
         *) starts=() ;;
     esac
@@ -73,5 +73,5 @@ starts_of() {
         if [ -d "$folder" ]; then starts+=("$folder"); fi
     done
     # A stream is an input of these targets as it is.
-    case $1 in units | decode | chunks | extraction | oracle) starts+=(seeds/units ${2:+"$2"}) ;; esac
+    case $1 in units | decode | oracle) starts+=(seeds/units ${2:+"$2"}) ;; esac
 }

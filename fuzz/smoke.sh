@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Fuzzes every target for a while from seeds, regressions and vectors, as many at a time as there are processors.
-# usage: fuzz/smoke.sh [SECONDS] [TARGET...]        20 seconds, all targets
+# usage: fuzz/smoke.sh [SECONDS] [TARGET...]        10 seconds, all targets
 set -euo pipefail
-seconds=${1:-20}
+seconds=${1:-10}
 shift $(($# > 0 ? 1 : 0))
 mkdir -p "${CARGO_TARGET_DIR:=$(dirname "$0")/../target}/fuzz"
 built=$(cd "$CARGO_TARGET_DIR/fuzz" && pwd)

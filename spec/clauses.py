@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Links between clauses: a preprocessor of mdBook, and `clauses.py --check FOLDER`, which follows them in what mdBook wrote.
 
-A clause can be linked to as #clause-7.13.3, a requirement as #SS-BS-012. Numbers of clauses and requirements in the text
+A clause can be linked to as #clause-7.13.3, a requirement as #SS-BS-004. Numbers of clauses and requirements in the text
 become links; code, headings and what is a link already stay as they are.
 """
 
@@ -20,7 +20,7 @@ REQUIREMENT = r"\bSS-[A-Z]{2}-\d{3}\b"
 DEFINED = re.compile(rf"\*\*\[({REQUIREMENT})\]\*\*")
 # Fences, code, links, headings and version numbers are kept.
 KEPT = re.compile(
-    rf"^```.*?^```|`[^`\n]*`|[Vv]ersion \d+\.\d+|!?\[[^\]\n]*\]\([^)\n]*\)|^#[^\n]*|{DEFINED.pattern}", re.M | re.S)
+    rf"^```.*?^```|`[^`\n]*`|(?:[Vv]ersion|SplatStream) \d+\.\d+|!?\[[^\]\n]*\]\([^)\n]*\)|^#[^\n]*|{DEFINED.pattern}", re.M | re.S)
 
 
 def chapters(items):

@@ -2,14 +2,18 @@
 
 use crate::failure::Failure;
 use clap::{Args, ValueEnum};
+use splatstream_format::payload::{SceneDescription, UpAxis};
+use splatstream_format::syntax::Camera as StreamCamera;
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, forward, read_cameras, ring};
 use splatstream_scene::GaussianFrame;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Rows of a picture where neither the user nor a file says.
 const HEIGHT: u32 = 540;
+/// Cameras that are made where neither the user nor the stream has any.
+const COUNT: u32 = 8;
 
 /// The options of every command that draws.
 #[derive(Args, Debug, Clone)]
@@ -17,9 +21,33 @@ pub(crate) struct CameraArgs {
     /// Rows of the pictures, 540, 720 and 1080 as a rule; default is what the camera file says, or 540.
     #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(1..=8640))]
     pub(crate) height: Option<u32>,
-    /// What points up in the scene, for cameras that are made for it.
-    #[arg(long, value_enum, allow_hyphen_values = true, default_value_t = UpName::MinusY)]
-    pub(crate) up: UpName,
+    /// What points up in the scene, for cameras that are made for it; default is what the stream says, or -y.
+    #[arg(long, value_enum, allow_hyphen_values = true)]
+    pub(crate) up: Option<UpName>,
+}
+
+/// The colour around the scene.
+#[derive(Args, Debug, Clone, Copy)]
+pub(crate) struct BackgroundArg {
+    /// Red, green and blue around the scene, each 0 to 1; default is what the stream says, or black.
+    #[arg(long, value_name = "R,G,B", value_parser = parse_colour)]
+    pub(crate) background: Option<[f32; 3]>,
+}
+
+impl BackgroundArg {
+    /// The colour that the user, or else the stream, asks for.
+    pub(crate) fn colour(self, description: &SceneDescription) -> [f32; 3] {
+        self.background.or(description.background).unwrap_or_default()
+    }
+}
+
+fn parse_colour(text: &str) -> Result<[f32; 3], String> {
+    let parts: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let colour = parts.and_then(|parts| <[f32; 3]>::try_from(parts).ok());
+    let in_range = colour.filter(|colour| colour.iter().all(|part| (0.0..=1.0).contains(part)));
+    in_range.ok_or_else(|| {
+        format!("'{text}' is not a colour; write red, green and blue from 0 to 1, as in 1,1,1")
+    })
 }
 
 /// An axis and its sign.
@@ -37,16 +65,37 @@ pub(crate) enum UpName {
     /// z points up.
     #[value(name = "z")]
     PlusZ,
+    /// x points down.
+    #[value(name = "-x")]
+    MinusX,
+    /// x points up.
+    #[value(name = "x")]
+    PlusX,
 }
 
-impl From<UpName> for Up {
+impl From<UpName> for UpAxis {
     fn from(name: UpName) -> Self {
         match name {
             UpName::MinusY => Self::MinusY,
             UpName::PlusY => Self::PlusY,
             UpName::MinusZ => Self::MinusZ,
             UpName::PlusZ => Self::PlusZ,
+            UpName::MinusX => Self::MinusX,
+            UpName::PlusX => Self::PlusX,
         }
+    }
+}
+
+/// The direction of an axis, if it is known.
+fn direction(axis: UpAxis) -> Option<Up> {
+    match axis {
+        UpAxis::Unknown => None,
+        UpAxis::MinusY => Some(Up::MinusY),
+        UpAxis::PlusY => Some(Up::PlusY),
+        UpAxis::MinusZ => Some(Up::MinusZ),
+        UpAxis::PlusZ => Some(Up::PlusZ),
+        UpAxis::MinusX => Some(Up::MinusX),
+        UpAxis::PlusX => Some(Up::PlusX),
     }
 }
 
@@ -91,25 +140,61 @@ impl std::fmt::Display for Views {
 }
 
 impl CameraArgs {
-    /// The cameras; those that are made look at `frame`, the first of its sequence.
-    pub(crate) fn cameras(&self, views: &Views, frame: &GaussianFrame) -> Result<Vec<Camera>, Failure> {
+    /// The cameras; those that are made look at `frame`, the first of its sequence. Without `views` they are those of the
+    /// stream, if it has any.
+    pub(crate) fn cameras(
+        &self,
+        views: Option<&Views>,
+        frame: &GaussianFrame,
+        description: &SceneDescription,
+    ) -> Result<Vec<Camera>, Failure> {
         let height = self.height.unwrap_or(HEIGHT);
+        let up = direction(self.up_axis(description)).unwrap_or_default();
         match views {
-            Views::Ring(count) => Ok(ring(frame, self.up.into(), *count, height)),
-            Views::Forward(count) => Ok(forward(frame, self.up.into(), *count, height)),
-            Views::File(path) => {
-                let cameras = read_cameras(path)
-                    .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
-                if cameras.is_empty() {
-                    return Err(Failure::other(format!("{}: there is no camera in it", path.display())));
-                }
-                Ok(match self.height {
-                    None => cameras,
-                    Some(height) => cameras.iter().map(|camera| camera.scaled_to_height(height)).collect(),
-                })
-            }
+            Some(Views::Ring(count)) => Ok(ring(frame, up, *count, height)),
+            Some(Views::Forward(count)) => Ok(forward(frame, up, *count, height)),
+            Some(Views::File(path)) => self.of_file(path),
+            None if description.cameras.is_empty() => Ok(ring(frame, up, COUNT, height)),
+            None => Ok(of_stream(description, height)),
         }
     }
+
+    /// The axis that the user, or else the stream, says points up.
+    pub(crate) fn up_axis(&self, description: &SceneDescription) -> UpAxis {
+        self.up.map_or(description.up_axis, UpAxis::from)
+    }
+
+    fn of_file(&self, path: &Path) -> Result<Vec<Camera>, Failure> {
+        let cameras =
+            read_cameras(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+        if cameras.is_empty() {
+            return Err(Failure::other(format!("{}: there is no camera in it", path.display())));
+        }
+        Ok(match self.height {
+            None => cameras,
+            Some(height) => cameras.iter().map(|camera| camera.scaled_to_height(height)).collect(),
+        })
+    }
+}
+
+/// The cameras of a scene description, which says nothing of the width of pictures: they are 16:9.
+fn of_stream(description: &SceneDescription, height: u32) -> Vec<Camera> {
+    let size = [(height * 16 / 9).max(1), height];
+    let one = |(index, camera): (usize, &StreamCamera)| {
+        let StreamCamera { position, rotation, vertical_field_of_view } = *camera;
+        Camera::of_pose(format!("camera_{index:02}"), position, rotation, vertical_field_of_view, size)
+    };
+    description.cameras.iter().enumerate().map(one).collect()
+}
+
+/// Cameras as a scene description holds them.
+pub(crate) fn to_stream(cameras: &[Camera]) -> Vec<StreamCamera> {
+    let one = |camera: &Camera| StreamCamera {
+        position: camera.position,
+        rotation: camera.quaternion(),
+        vertical_field_of_view: camera.vertical_field(),
+    };
+    cameras.iter().map(one).collect()
 }
 
 #[cfg(test)]
@@ -123,5 +208,11 @@ mod tests {
         assert_eq!("a/cameras.json".parse(), Ok(Views::File("a/cameras.json".into())));
         assert!(["ring:", "ring:0", "ring:x"].iter().all(|text| text.parse::<Views>().is_err()));
         assert_eq!("ring:8".parse::<Views>().map(|views| views.to_string()), Ok("ring:8".to_owned()));
+    }
+
+    #[test]
+    fn a_colour_is_three_shares() {
+        assert_eq!(parse_colour("1,0.5, 0"), Ok([1.0, 0.5, 0.0]));
+        assert!(["", "1,1", "1,1,2", "1,1,x", "1,1,NaN"].iter().all(|text| parse_colour(text).is_err()));
     }
 }

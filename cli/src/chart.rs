@@ -32,6 +32,7 @@ use page::Page;
 use peers::Peers;
 use scene_chart::SceneChart;
 use scenes::Scene;
+use splatstream_format::payload::SceneDescription;
 use splatstream_render::metrics::StLpips;
 use std::path::PathBuf;
 use summary::Summary;
@@ -40,7 +41,7 @@ use sweep::{Sweep, SweepArgs};
 /// Draw rate-distortion and speed-accuracy charts of scenes: one page, SVG and CSV.
 ///
 /// Every scene is encoded with every variant at every quality, decoded, rendered and compared with its source.
-/// A directory of frames is one sequence: of its first group with predicted frames, every operating point is measured
+/// A directory of frames is one sequence: of its first GOP with predicted frames, every operating point is measured
 /// too, and what the tools of predicted frames are worth. The page holds everything and needs no network.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream chart --builtin --quick -o look/\n  \
@@ -67,11 +68,11 @@ pub(crate) struct Chart {
     /// Frames of each sequence, from the first [default: 4, or --gop if that is more].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
-    /// Frames in the group whose operating points are measured: the first of each sequence, with predicted frames.
+    /// Frames in the GOP whose operating points are measured: the first of each sequence, with predicted frames.
     #[arg(long, value_name = "N", default_value_t = gop::FRAMES)]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=64))]
     gop: u32,
-    /// Of that group, measure each predictor of new Gaussians alone and together, and the network without each of its
+    /// Of that GOP, measure each predictor of new Gaussians alone and together, and the network without each of its
     /// parts; trains it for every row.
     #[arg(long)]
     ablation: bool,
@@ -83,7 +84,7 @@ pub(crate) struct Chart {
     /// Weights of the learned metric; without them it is not measured.
     #[arg(long, value_name = "WEIGHTS.npz")]
     st_lpips: Option<PathBuf>,
-    /// Frames a second, for bandwidths: 30, 29.97 or 30000/1001.
+    /// Frames per second, for bandwidths: 30, 29.97 or 30000/1001.
     #[arg(long, value_name = "RATE", default_value = "30", value_parser = parse_frame_rate)]
     fps: (u32, u32),
 }
@@ -126,7 +127,7 @@ impl Chart {
 
     fn scenes(&self) -> Result<Vec<Scene>, Failure> {
         let mut scenes = Vec::new();
-        // Whoever asks for a long group wants it whole.
+        // Whoever asks for a long GOP wants it whole.
         let frames = self.frames.or((self.gop > gop::FRAMES).then_some(self.gop));
         if self.builtin {
             scenes.push(Scene::builtin(self.sweep.quick, frames));
@@ -143,7 +144,11 @@ impl Chart {
         let views = self.cameras.clone().unwrap_or(Views::Ring(if quick { 2 } else { 8 }));
         let height = self.drawing.height.or(quick.then_some(QUICK_HEIGHT));
         let first = scene.frames.first().ok_or_else(|| Failure::other("there is no frame"))?;
-        CameraArgs { height, ..self.drawing.clone() }.cameras(&views, first)
+        CameraArgs { height, ..self.drawing.clone() }.cameras(
+            Some(&views),
+            first,
+            &SceneDescription::default(),
+        )
     }
 
     /// Measures a scene; its pictures are written on the way.

@@ -7,7 +7,7 @@ pub(crate) mod matching;
 pub(crate) mod pictures;
 
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::numbers::grouped;
 use crate::progress::Progress;
@@ -20,7 +20,7 @@ use serde::Serialize;
 use splatstream_encoder::canonical::canonicalise;
 use splatstream_scene::GaussianFrame;
 use std::cmp::Ordering;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Compare two scenes or streams: the error of each attribute and, with cameras, of pictures.
 ///
@@ -70,6 +70,9 @@ struct Report {
     /// The matching of each frame.
     matched_by: Vec<Matching>,
     attributes: AttributeErrors,
+    /// Errors of the streams.
+    errors_a: Vec<StreamFault>,
+    errors_b: Vec<StreamFault>,
     #[serde(flatten)]
     pictures: PictureErrors,
 }
@@ -83,7 +86,8 @@ impl Compare {
         let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();
-        let mut pictures = self.pictures.start()?;
+        let description = opened_a.description(&limits).or_else(|| opened_b.description(&limits));
+        let mut pictures = self.pictures.start(description.unwrap_or_default())?;
         let mut a = next(&mut frames_a, &mut report.frames_a)?;
         let mut b = next(&mut frames_b, &mut report.frames_b)?;
         while let Some(order) = order(a.as_ref(), b.as_ref()) {
@@ -102,7 +106,9 @@ impl Compare {
         report.pairs = sums.pairs();
         report.attributes = sums.errors();
         report.pictures = pictures.errors();
-        console.report(&report, || report.text())
+        (report.errors_a, report.errors_b) = (frames_a.faults(), frames_b.faults());
+        console.report(&report, || report.text())?;
+        frames_a.verdict().and_then(|()| frames_b.verdict())
     }
 
     fn empty_report(&self) -> Report {
@@ -117,6 +123,8 @@ impl Compare {
             pairs: 0,
             matched_by: Vec::new(),
             attributes: AttributeErrors::default(),
+            errors_a: Vec::new(),
+            errors_b: Vec::new(),
             pictures: PictureErrors::default(),
         }
     }
@@ -181,15 +189,13 @@ fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<(u32, Gaussia
 
 impl Report {
     fn text(&self) -> String {
-        let mut text = format!(
-            "A {}: {} frames, {} Gaussians in those compared\nB {}: {} frames, {} Gaussians in those compared\n",
-            self.a.display(),
-            grouped(self.frames_a.into()),
-            grouped(self.gaussians_a),
-            self.b.display(),
-            grouped(self.frames_b.into()),
-            grouped(self.gaussians_b),
-        );
+        let side = |name, path: &Path, frames: u32, gaussians, errors: &[StreamFault]| {
+            let (path, frames, gaussians) = (path.display(), grouped(frames.into()), grouped(gaussians));
+            let errors = faults_text(errors);
+            format!("{name} {path}: {frames} frames, {gaussians} Gaussians in those compared\n{errors}")
+        };
+        let mut text = side("A", &self.a, self.frames_a, self.gaussians_a, &self.errors_a);
+        text += &side("B", &self.b, self.frames_b, self.gaussians_b, &self.errors_b);
         let by_order = self.matched_by.iter().filter(|matching| **matching == Matching::Order).count() as u32;
         text += &format!(
             "{} frames compared, {} pairs; {by_order} frames matched by order, {} by nearest position\n\n",

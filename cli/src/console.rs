@@ -5,7 +5,7 @@
 
 use crate::failure::Failure;
 use serde::Serialize;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 
 /// Where results and complaints go.
 pub(crate) struct Console {
@@ -30,23 +30,41 @@ impl Console {
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
         let mut output = if self.json { to_json(report)? } else { text() };
-        if output.is_empty() {
-            return Ok(());
-        }
-        if !output.ends_with('\n') {
+        if !output.is_empty() && !output.ends_with('\n') {
             output.push('\n');
         }
-        match io::stdout().lock().write_all(output.as_bytes()) {
-            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-                Err(Failure::other(format!("cannot write to standard output: {error}")))
-            }
-            _ => Ok(()),
-        }
+        written(io::stdout().lock().write_all(output.as_bytes()))
     }
 
-    /// Tells the user on standard error. If nobody listens there, nobody can be told.
+    /// The same for a result of any length, which is written as it comes; JSON without indentation.
+    pub(crate) fn stream(
+        &self,
+        report: &impl Serialize,
+        text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), Failure> {
+        let mut out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
+        let result = match self.json {
+            true => {
+                serde_json::to_writer(&mut out, report).map_err(io::Error::from).and_then(|()| writeln!(out))
+            }
+            false => text(&mut out),
+        };
+        written(result.and_then(|()| out.flush()))
+    }
+
+    /// Writes to standard error. If nobody listens there, nobody can be told.
     pub(crate) fn complain(&self, message: &str) {
         let _nobody_listens = writeln!(io::stderr().lock(), "{message}");
+    }
+}
+
+/// A reader that has gone away is no failure.
+fn written(result: io::Result<()>) -> Result<(), Failure> {
+    match result {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::other(format!("cannot write to standard output: {error}")))
+        }
+        _ => Ok(()),
     }
 }
 

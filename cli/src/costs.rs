@@ -5,7 +5,6 @@ use crate::statistics::{FrameTypeCost, SectionCost, Statistics, UnitCost, stream
 use serde::Serialize;
 use splatstream_format::Limits;
 use splatstream_format::entropy::layout::Attribute;
-use splatstream_format::syntax::Profile;
 
 /// What a stream spends on what.
 #[derive(Debug, Clone, Serialize)]
@@ -14,11 +13,11 @@ pub(crate) struct Costs {
     pub(crate) bytes: u64,
     /// Gaussians over all frames.
     pub(crate) gaussians: u64,
-    /// Bits a Gaussian.
+    /// Bits per Gaussian.
     pub(crate) bpg: f64,
     /// By attribute, in coding order.
     pub(crate) attributes: Vec<OfAttribute>,
-    /// By section of increments and attribute, in coding order; empty in profile Intra.
+    /// By section and attribute, in coding order.
     pub(crate) sections: Vec<OfSection>,
     /// By type of frame.
     pub(crate) frame_types: Vec<OfFrames>,
@@ -26,7 +25,7 @@ pub(crate) struct Costs {
     pub(crate) units: Vec<OfUnits>,
 }
 
-/// Bits a Gaussian of one attribute.
+/// Bits per Gaussian of one attribute.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct OfAttribute {
     /// The attribute.
@@ -35,7 +34,7 @@ pub(crate) struct OfAttribute {
     pub(crate) symbols_bpg: f64,
     /// Of plane models.
     pub(crate) models_bpg: f64,
-    /// Bits a Gaussian.
+    /// Bits per Gaussian.
     pub(crate) bpg: f64,
 }
 
@@ -46,7 +45,7 @@ pub(crate) struct OfSection {
     pub(crate) section: &'static str,
     /// Cells, parents, predictors or Gaussians that it codes.
     pub(crate) entries: u64,
-    /// Bits an entry.
+    /// Bits per entry.
     pub(crate) bits_per_entry: f64,
     /// Of all Gaussians of the stream.
     #[serde(flatten)]
@@ -67,7 +66,7 @@ pub(crate) struct OfFrames {
     pub(crate) gaussians: u64,
     /// Share of the stream.
     pub(crate) percent: f64,
-    /// Bits a Gaussian of these frames.
+    /// Bits per Gaussian of these frames.
     pub(crate) bpg: f64,
 }
 
@@ -83,7 +82,7 @@ pub(crate) struct OfUnits {
     pub(crate) bytes: u64,
     /// Share of the stream.
     pub(crate) percent: f64,
-    /// Bits a Gaussian.
+    /// Bits per Gaussian.
     pub(crate) bpg: f64,
 }
 
@@ -113,17 +112,12 @@ impl Costs {
             percent: percent(cost.bytes, statistics.bytes),
             bpg: bits_per_gaussian(cost.bytes, cost.gaussians),
         };
-        let of_section = |cost| OfSection::new(cost, gaussians);
-        let sections = match statistics.profile {
-            Profile::Intra => Vec::new(),
-            Profile::Dynamic => statistics.sections.iter().map(of_section).collect(),
-        };
         Self {
             bytes: statistics.bytes,
             gaussians,
             bpg: bits_per_gaussian(statistics.bytes, gaussians),
             attributes: attributes(statistics),
-            sections,
+            sections: statistics.sections.iter().map(|cost| OfSection::new(cost, gaussians)).collect(),
             frame_types: statistics.frame_types.iter().map(frames).collect(),
             units: statistics.units.iter().map(units).collect(),
         }

@@ -1,22 +1,22 @@
 //! `splatstream decode`: a stream to frames in files.
 
+mod loss;
 mod report;
 mod target;
 
-use crate::completeness::complete_points;
 use crate::console::Console;
-use crate::failure::{Failure, StreamFault};
+use crate::failure::Failure;
 use crate::numbers::FrameRange;
 use crate::progress::Progress;
-use crate::seek::{Seek, group_of};
+use crate::seek::{Seek, gop_of};
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
+use loss::Loss;
 use report::{Report, Shown};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::{Summary, decode_stream, decode_stream_inside};
-use splatstream_format::Error;
 use splatstream_format::syntax::SequenceParameters;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -25,10 +25,10 @@ use target::{Format, Target};
 
 /// Decode a stream to files of Gaussians.
 ///
-/// Every frame is compared with the digest in the stream. Of a frame with a damaged refinement, the
-/// refinements before it are written, with what is carried over from the intra frame; a frame of which nothing
-/// is there shows the frame it refers to again. The report says so, and the exit code is that of the first error.
-/// With --frames, decoding starts at the group that holds the first frame, if the stream has an index.
+/// Every frame is compared with the digest in the stream. Decoding goes on after errors: a damaged refinement costs that
+/// refinement, for which carried Gaussians of the I frame stand in; damage that costs more costs the rest of its GOP, and
+/// decoding resumes at the next one. The report lists what is lost and what is reduced, and the exit code is that of the
+/// first error. With --frames, decoding starts at the GOP that holds the first frame, if the stream has an index.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream decode talk.gss -o frames/\n  \
     splatstream decode talk.gss -o poster.ply --op s0,t0,r2 --frames 0..1\n  \
@@ -50,13 +50,13 @@ pub(crate) struct Decode {
     /// Format of the files; default is that of the file's name, or ply.
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// Show only the Gaussians of the operating point's units, not what is carried over from the intra frame.
+    /// Show only the Gaussians of the operating point's units, not those that are carried from the I frame.
     #[arg(long)]
     subset: bool,
     /// Do not compare frames with the digests in the stream.
     #[arg(long)]
     no_verify: bool,
-    /// Stop at the first damaged unit.
+    /// Stop at the first error.
     #[arg(long)]
     strict: bool,
     /// Decode and verify only; write nothing.
@@ -76,7 +76,6 @@ struct Decoding<'a> {
     passed: u64,
     bytes: u64,
     shown: Shown,
-    first_error: Option<Error>,
     failed: Option<Failure>,
     /// Time in which files were made and written.
     writing: Duration,
@@ -97,21 +96,20 @@ impl Decode {
         let target = self.target(frames.count_in(announced))?;
         let mut decoding = Decoding::new(frames, target.as_ref(), announced);
         let start = Instant::now();
-        let seek = group_of(&stream, frames.first, &options.limits);
+        let seek = gop_of(&stream, frames.first, &options.limits);
         let summary = decoding.run(&stream.bytes, seek, &options);
         let total = start.elapsed();
         if let Some(failure) = decoding.failed.take() {
             return Err(failure);
         }
-        let first_error = decoding.first_error.or(summary.end);
-        let mut report = self.report(decoding, summary.end, total);
-        report.seek = seek;
-        report.complete = summary.end.map(|end| complete_points(&stream.bytes, &options.limits, end));
-        // Of a file that is no stream there is nothing to tell people but the error.
+        let verdict = summary.verdict();
+        let loss = Loss::new(&stream, announced, &options, &summary, frames);
+        let report = Report { seek, ..self.report(decoding, loss, announced, total) };
+        // Of a file that is no stream there is nothing to say but the error.
         console.report(&report, || {
-            if report.frames > 0 || first_error.is_none() { report.text() } else { String::new() }
+            if report.frames > 0 || verdict.is_none() { report.text() } else { String::new() }
         })?;
-        first_error.map_or(Ok(()), |error| Err(stream.fault(error)))
+        verdict.map_or(Ok(()), |error| Err(stream.fault(error)))
     }
 
     fn options(&self) -> Options {
@@ -119,7 +117,7 @@ impl Decode {
             limits: self.limits.limits(),
             verify: !self.no_verify,
             operating_point: self.op.unwrap_or(OperatingPoint::ALL),
-            tolerant: !self.strict,
+            stop_at_first_error: self.strict,
             subset: self.subset,
             ..Options::default()
         }
@@ -130,12 +128,22 @@ impl Decode {
         self.out.as_deref().map(|path| Target::new(path, self.format, frames)).transpose()
     }
 
-    fn report(&self, decoding: Decoding<'_>, end: Option<Error>, total: Duration) -> Report {
+    fn report(&self, decoding: Decoding<'_>, loss: Loss, announced: u32, total: Duration) -> Report {
         let seconds = total.saturating_sub(decoding.writing).as_secs_f64();
         let decoded = decoding.gaussians + decoding.passed;
+        let frames = decoding.shown.len() as u32;
+        let has_errors = !loss.errors.is_empty();
+        let point = self.op.unwrap_or(OperatingPoint::ALL);
+        let reduced = match has_errors {
+            true => decoding.shown.reduced(loss.listed.unwrap_or_else(|| decoding.shown.most(point))),
+            false => Vec::new(),
+        };
+        // Without the announced number nobody knows what stood after an error.
+        let is_known = frames > 0 && announced > 0 && !self.strict;
         Report {
             output: self.out.clone(),
-            frames: decoding.shown.digests.len() as u32,
+            frames,
+            frames_in_stream: (announced > 0).then_some(announced),
             gaussians: decoding.gaussians,
             bytes: decoding.bytes,
             seconds,
@@ -144,9 +152,10 @@ impl Decode {
             verified: !self.no_verify,
             subset: self.subset,
             seek: None,
+            complete: loss.lost.is_empty() && reduced.is_empty() && (is_known || !has_errors),
+            reduced,
             shown: decoding.shown,
-            error: end.map(StreamFault::from),
-            complete: None,
+            loss,
         }
     }
 }
@@ -161,13 +170,12 @@ impl<'a> Decoding<'a> {
             passed: 0,
             bytes: 0,
             shown: Shown::default(),
-            first_error: None,
             failed: None,
             writing: Duration::ZERO,
         }
     }
 
-    /// Decodes all of a stream, or from a group on.
+    /// Decodes all of a stream, or from a GOP on.
     fn run(&mut self, bytes: &[u8], seek: Option<Seek>, options: &Options) -> Summary {
         let take = |sequence: &SequenceParameters, frame| self.take(sequence, frame);
         match seek {
@@ -178,7 +186,7 @@ impl<'a> Decoding<'a> {
 
     /// Takes a frame out of the decoder; breaks off after the last frame asked for and when a file fails.
     fn take(&mut self, sequence: &SequenceParameters, frame: DecodedFrame) -> ControlFlow<()> {
-        let number = frame.number;
+        let number = frame.index;
         if self.frames.contains(number) {
             self.count(sequence, &frame);
             let gaussians = to_gaussians(frame.into_shown(), sequence);
@@ -199,6 +207,5 @@ impl<'a> Decoding<'a> {
         self.gaussians += frame.planes.len() as u64;
         self.bytes += frame.bytes;
         self.shown.take(sequence, frame);
-        self.first_error = self.first_error.or(frame.lost);
     }
 }

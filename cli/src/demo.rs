@@ -116,7 +116,7 @@ impl Demo {
         let options = Options { operating_point: info.point, ..Options::default() };
         let start = Instant::now();
         let summary = decode_stream(stream, &options, |sequence, frame| {
-            let path = frame_path(&directory, frame.number as usize);
+            let path = frame_path(&directory, frame.index as usize);
             let gaussians = to_gaussians(frame.into_shown(), sequence);
             let start = Instant::now();
             failed = OutputFile::write(&path, &ply::write(&gaussians)).err();
@@ -124,7 +124,7 @@ impl Demo {
             if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         let seconds = start.elapsed().saturating_sub(writing).as_secs_f64();
-        match (failed, summary.end) {
+        match (failed, summary.verdict()) {
             (Some(failure), _) => Err(failure),
             (None, Some(error)) => Err(self.fault(error)),
             (None, None) => Ok(Point::new(info, seconds)),
@@ -144,14 +144,14 @@ impl Demo {
         let summary = decode_stream(stream, &options, |sequence, frame| {
             decoded.extend(frame.digest);
             // One frame says enough about the errors of a scene like this one.
-            if frame.number == 0
+            if frame.index == 0
                 && let Some(original) = source.first()
             {
                 compare_frames(original, &to_gaussians(frame.into_shown(), sequence), Match::Auto, &mut sums);
             }
             ControlFlow::Continue(())
         });
-        match summary.end {
+        match summary.verdict() {
             Some(error) => Err(self.fault(error)),
             None if decoded != digests => {
                 Err(Failure::other("the decoder's digests are not the encoder's: please report this"))

@@ -2,7 +2,7 @@
 
 mod choices;
 
-use crate::cameras::{CameraArgs, Views};
+use crate::cameras::{BackgroundArg, CameraArgs, Views, to_stream};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
@@ -10,7 +10,7 @@ use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
 use crate::output_file::OutputFile;
 use crate::progress::Progress;
 use crate::setting_names::{
-    FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
+    AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
 };
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
@@ -18,7 +18,8 @@ use serde::Serialize;
 use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Structure, encode,
 };
-use splatstream_format::payload::Network;
+use splatstream_format::payload::{Network, SceneDescription};
+use splatstream_render::Camera;
 use std::convert::Infallible;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -48,7 +49,7 @@ pub(crate) struct Encode {
     /// more.
     #[arg(long, value_name = "DB", conflicts_with = "quality", value_parser = parse_psnr)]
     psnr: Option<f32>,
-    /// Frames in a group; decoding can start at each.
+    /// Frames in a GOP; decoding can start at each.
     #[arg(long, value_name = "N", default_value_t = Settings::default().gop)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     gop: u32,
@@ -62,6 +63,9 @@ pub(crate) struct Encode {
     /// Code every frame by itself.
     #[arg(long, conflicts_with = "temporal_layers")]
     all_intra: bool,
+    /// What of I frames a receiver of the first refinements gets.
+    #[arg(long, value_enum, default_value_t = AnchorName::Nested, conflicts_with = "all_intra")]
+    anchor: AnchorName,
     /// What new Gaussians are predicted by, from those of the reference or of lower layers.
     #[arg(long, value_enum, default_value_t = PredictorName::Auto)]
     predictor: PredictorName,
@@ -86,7 +90,7 @@ pub(crate) struct Encode {
     /// How spherical harmonics are coded.
     #[arg(long, value_enum, default_value_t = ShName::Auto)]
     sh: ShName,
-    /// Frames a second: 30, 29.97 or 30000/1001.
+    /// Frames per second: 30, 29.97 or 30000/1001.
     #[arg(long, value_name = "RATE", default_value = "30", value_parser = parse_frame_rate)]
     fps: (u32, u32),
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
@@ -96,11 +100,19 @@ pub(crate) struct Encode {
     #[arg(long, value_enum)]
     importance: Option<ImportanceName>,
     /// Views to measure importance and pictures in: a cameras.json or transforms.json, ring:N or forward:N; default is all
-    /// around.
+    /// around. The first 64 cameras of a file go into the stream, for viewers to start from.
     #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
     cameras: Option<Views>,
     #[command(flatten)]
     views: CameraArgs,
+    #[command(flatten)]
+    background: BackgroundArg,
+    /// What the scene is called, for viewers.
+    #[arg(long, value_name = "TEXT", value_parser = parse_title)]
+    title: Option<String>,
+    /// Metres that a unit of the scene stands for.
+    #[arg(long, value_name = "METRES", value_parser = parse_metres)]
+    metres_per_unit: Option<f32>,
     /// What predicted frames are true to where files are not tracked, that is, no row of one is the same row of the next;
     /// default is pictures, and attributes for the fast preset.
     #[arg(long, value_enum)]
@@ -114,9 +126,12 @@ pub(crate) struct Encode {
     without: Vec<ToolName>,
 }
 
+/// Cameras that a stream can hold.
+const MAX_CAMERAS: usize = 64;
+
 #[derive(Clone, Copy, ValueEnum)]
 enum ImportanceName {
-    /// What pictures gain by a Gaussian and lose without it, weighed anew at each refinement.
+    /// What pictures gain by a Gaussian and lose without it, weighed again at each refinement.
     Removal,
     /// Transmittance times alpha over the pixels of all views.
     Contribution,
@@ -132,6 +147,18 @@ fn parse_psnr(text: &str) -> Result<f32, String> {
 fn parse_tolerance(text: &str) -> Result<f32, String> {
     let decibels = text.parse().ok().filter(|decibels| (0.05..=20.0).contains(decibels));
     decibels.ok_or_else(|| format!("'{text}' is not a number of decibels from 0.05 to 20"))
+}
+
+fn parse_title(text: &str) -> Result<String, String> {
+    match text.len() {
+        1..=1024 => Ok(text.to_owned()),
+        bytes => Err(format!("a title has 1 to 1024 bytes, this one has {bytes}")),
+    }
+}
+
+fn parse_metres(text: &str) -> Result<f32, String> {
+    let metres = text.parse().ok().filter(|metres| (f32::MIN_POSITIVE..=1e12).contains(metres));
+    metres.ok_or_else(|| format!("'{text}' is not a number of metres above 0"))
 }
 
 /// Where the network of the transformer comes from.
@@ -217,9 +244,10 @@ impl Encode {
             None => Vec::new(),
             Some(views) => {
                 let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
-                self.views.cameras(views, &first)?
+                self.views.cameras(Some(views), &first, &SceneDescription::default())?
             }
         };
+        let description = self.description(&cameras);
         let sequence = source.len() > 1;
         let layers = match self.layers.as_slice() {
             [] if sequence && !self.all_intra => 3,
@@ -233,6 +261,7 @@ impl Encode {
         };
         let mut settings = Settings {
             structure,
+            anchor: self.anchor.into(),
             spatial_layers: layers,
             predictors: self.predictor.into(),
             predictor_choice: self.choose_by.into(),
@@ -251,10 +280,27 @@ impl Encode {
             cameras,
             fidelity: self.fidelity.map(Into::into),
             tolerance: self.tolerance,
+            description,
             ..Settings::default()
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
         Ok(settings)
+    }
+
+    /// What the stream says about its scene. Cameras that were made are made again by whoever needs some.
+    fn description(&self, cameras: &[Camera]) -> SceneDescription {
+        let cameras = match &self.cameras {
+            Some(Views::File(_)) => to_stream(cameras.get(..MAX_CAMERAS).unwrap_or(cameras)),
+            _ => Vec::new(),
+        };
+        SceneDescription {
+            up_axis: self.views.up_axis(&SceneDescription::default()),
+            metres_per_unit: self.metres_per_unit,
+            background: self.background.background,
+            title: self.title.clone(),
+            cameras,
+            ..SceneDescription::default()
+        }
     }
 
     /// The encoder counts frames; a user has files.
@@ -263,7 +309,9 @@ impl Encode {
         match error {
             // Errors of reading name the file.
             Error::Source { source, .. } => Failure::other(source.to_string()),
-            Error::TooManyGaussians { frame, .. } | Error::OutOfLattice { frame, .. } => {
+            Error::TooManyGaussians { frame, .. }
+            | Error::TooManyPerSecond { frame, .. }
+            | Error::OutOfGrid { frame, .. } => {
                 let path = source.paths().get(*frame as usize).unwrap_or(&self.out);
                 Failure::other(format!("{}: {error}", path.display()))
             }
@@ -292,7 +340,7 @@ impl Encoded {
         let chosen: String = self.chosen.iter().map(Choice::text).collect();
         format!(
             "{}\n  frames             {}\n  Gaussians          {}\n  bytes              {}\n  \
-             bits a Gaussian    {:.2}\n  seconds            {:.2}\nchosen\n{chosen}",
+             bits per Gaussian  {:.2}\n  seconds            {:.2}\nchosen\n{chosen}",
             self.output.display(),
             grouped(self.frames.into()),
             grouped(self.gaussians),

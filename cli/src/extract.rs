@@ -42,6 +42,7 @@ impl Extract {
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
         stream.check_point(self.op, &limits)?;
+        self.check_out()?;
         let extracted = extract(&stream.bytes, self.op, &limits).map_err(|error| stream.fault(error))?;
         OutputFile::write(&self.out, &extracted)?;
         let report = Report {
@@ -51,6 +52,19 @@ impl Extract {
             bytes_in: stream.bytes.len() as u64,
         };
         console.report(&report, || report.text())
+    }
+}
+
+impl Extract {
+    /// Nobody wants to lose the whole stream for a part of it.
+    fn check_out(&self) -> Result<(), Failure> {
+        match (self.input.canonicalize(), self.out.canonicalize()) {
+            (Ok(input), Ok(out)) if input == out => Err(Failure::Usage(format!(
+                "{}: is the stream to extract from; give another file",
+                self.out.display()
+            ))),
+            _ => Ok(()),
+        }
     }
 }
 

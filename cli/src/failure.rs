@@ -1,4 +1,4 @@
-//! What went wrong, for people: file, place, clause, cause, and what to do about it.
+//! What went wrong, for people: file, byte, clause, cause, and what to do about it.
 
 use serde::Serialize;
 use splatstream_format::{Class, Error};
@@ -44,7 +44,8 @@ impl Failure {
         let advice = match error.kind() {
             io::ErrorKind::NotFound => "check the path",
             io::ErrorKind::PermissionDenied => "check the permissions",
-            io::ErrorKind::StorageFull => "make room, or choose another place",
+            io::ErrorKind::StorageFull => "make room, or choose another disk",
+            io::ErrorKind::OutOfMemory => "it needs more memory than there is: close other programs",
             _ => "check the path and the disk",
         };
         Self::Other(format!("{}: cannot {what}: {error}\n  {advice}", path.display()))
@@ -129,5 +130,21 @@ impl From<Error> for StreamFault {
 impl fmt::Display for StreamFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "byte {:#x}: {} (clause {})", self.byte, self.message, self.clause)
+    }
+}
+
+/// Errors that a report lists one by one; a file can have any number.
+const LISTED: usize = 20;
+
+/// The lines of a report for the errors of a stream; nothing if there are none.
+pub(crate) fn faults_text(faults: &[StreamFault]) -> String {
+    let mut text = String::new();
+    for (index, fault) in faults.iter().take(LISTED).enumerate() {
+        let label = if index == 0 { "errors" } else { "" };
+        text += &format!("  {label:<12} {fault}\n");
+    }
+    match faults.len().saturating_sub(LISTED) {
+        0 => text,
+        more => text + &format!("  {:<12} and {more} more\n", ""),
     }
 }

@@ -82,17 +82,17 @@ fn frames_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
             paths.push(path);
         }
     }
-    let place = directory.display();
+    let folder = directory.display();
     match kinds.len() {
         0 => Err(Failure::other(format!(
-            "{place}: no frames here\n  give a directory with .ply, .compressed.ply, .spz, .sog or .splat files"
+            "{folder}: no frames here\n  give a directory with .ply, .compressed.ply, .spz, .sog or .splat files"
         ))),
         1 => Ok(paths),
         _ => {
             let kinds: Vec<&str> = kinds.into_iter().collect();
             let kinds = kinds.join(", ");
             Err(Failure::other(format!(
-                "{place}: frames of several formats ({kinds})\n  give the files themselves, as in {place}/*.ply"
+                "{folder}: frames of several formats ({kinds})\n  give the files themselves, as in {folder}/*.ply"
             )))
         }
     }

@@ -1,14 +1,15 @@
 //! The frames of a stream, a scene file or a directory, one after the other.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, StreamFault};
 use crate::frame_files::FrameFiles;
 use crate::stream_file::{StreamFile, is_stream};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
 use splatstream_encoder::FrameSource;
-use splatstream_format::Limits;
+use splatstream_format::payload::SceneDescription;
 use splatstream_format::unit::{Stream, Units};
+use splatstream_format::{Error, Limits};
 use splatstream_scene::GaussianFrame;
 use std::path::{Path, PathBuf};
 
@@ -23,9 +24,17 @@ pub(crate) enum Opened {
 /// The frames, in order.
 pub(crate) enum Frames<'a> {
     /// Decoded as they are asked for.
-    Stream { file: &'a StreamFile, units: Units<'a>, decoder: Box<Decoder<'a>>, expected: u32 },
+    Stream(Box<Decoding<'a>>),
     /// Read as they are asked for.
     Files { files: Box<FrameFiles>, next: u32 },
+}
+
+/// A stream that is decoded frame by frame; decoding goes on after errors.
+pub(crate) struct Decoding<'a> {
+    file: &'a StreamFile,
+    units: Units<'a>,
+    decoder: Decoder<'a>,
+    expected: u32,
 }
 
 impl Opened {
@@ -35,6 +44,14 @@ impl Opened {
             return StreamFile::read(path).map(Self::Stream);
         }
         Ok(Self::Scene(path.to_path_buf()))
+    }
+
+    /// What a stream says about its scene.
+    pub(crate) fn description(&self, limits: &Limits) -> Option<SceneDescription> {
+        match self {
+            Self::Stream(file) => file.description(limits),
+            Self::Scene(_) => None,
+        }
     }
 
     /// Its frames, from the first; of a stream those of an operating point, which files do not have.
@@ -50,8 +67,8 @@ impl Opened {
                 file.check_point(operating_point, limits)?;
                 let options = Options { limits: *limits, operating_point, ..Options::default() };
                 let expected = file.sequence(limits).map_or(0, |sequence| sequence.frame_count);
-                let decoder = Box::new(Decoder::new(stream.header(), options));
-                Ok(Frames::Stream { file, units: stream.units(), decoder, expected })
+                let decoder = Decoder::new(stream.header(), options);
+                Ok(Frames::Stream(Box::new(Decoding { file, units: stream.units(), decoder, expected })))
             }
             Self::Scene(path) if point.is_some() => Err(Failure::Usage(format!(
                 "{}: only a stream has operating points; leave --op out",
@@ -69,21 +86,16 @@ impl Frames<'_> {
     /// How many there should be; 0 if that is not known.
     pub(crate) fn expected(&self) -> u32 {
         match self {
-            Self::Stream { expected, .. } => *expected,
+            Self::Stream(decoding) => decoding.expected,
             Self::Files { files, .. } => files.len(),
         }
     }
 
-    /// The next frame and its display index. A stream may lack frames, in particular at an operating point.
+    /// The next frame and its display index. A stream may lack frames, in particular at an operating point; those of which
+    /// nothing is known are left out.
     pub(crate) fn next(&mut self) -> Result<Option<(u32, GaussianFrame)>, Failure> {
         match self {
-            Self::Stream { file, units, decoder, .. } => {
-                let decoded = next_decoded(units, decoder).map_err(|error| file.fault(error))?;
-                let shown = |(frame, sequence): (DecodedFrame, &_)| {
-                    (frame.number, to_gaussians(frame.into_shown(), sequence))
-                };
-                Ok(decoded.zip(decoder.sequence()).map(shown))
-            }
+            Self::Stream(decoding) => Ok(decoding.next()),
             Self::Files { files, next } => {
                 if *next >= files.len() {
                     return Ok(None);
@@ -94,17 +106,53 @@ impl Frames<'_> {
             }
         }
     }
-}
 
-/// Feeds units until a frame is complete.
-fn next_decoded<'a>(
-    units: &mut Units<'a>,
-    decoder: &mut Decoder<'a>,
-) -> splatstream_format::Result<Option<DecodedFrame>> {
-    for unit in units {
-        if let Some(frame) = decoder.unit(&unit?)? {
-            return Ok(Some(frame));
+    /// What is wrong with the stream, as far as it has been decoded.
+    pub(crate) fn faults(&self) -> Vec<StreamFault> {
+        self.errors().iter().copied().map(StreamFault::from).collect()
+    }
+
+    /// The verdict on the stream, as far as it has been decoded.
+    pub(crate) fn verdict(&self) -> Result<(), Failure> {
+        match (self, self.errors().first()) {
+            (Self::Stream(decoding), Some(&error)) => Err(decoding.file.fault(error)),
+            _ => Ok(()),
         }
     }
-    Ok(None)
+
+    fn errors(&self) -> &[Error] {
+        match self {
+            Self::Stream(decoding) => decoding.decoder.errors(),
+            Self::Files { .. } => &[],
+        }
+    }
+}
+
+impl Decoding<'_> {
+    fn next(&mut self) -> Option<(u32, GaussianFrame)> {
+        loop {
+            let frame = self.decoded()?;
+            if let (false, Some(sequence)) = (frame.is_lost, self.decoder.sequence()) {
+                return Some((frame.index, to_gaussians(frame.into_shown(), sequence)));
+            }
+        }
+    }
+
+    /// Feeds units until a frame is complete; where the end of a unit is not known, from the next intact gop_header on.
+    fn decoded(&mut self) -> Option<DecodedFrame> {
+        while let Some(unit) = self.units.next_unit() {
+            let frame = match unit {
+                Ok(unit) => self.decoder.unit(&unit),
+                Err(error) => {
+                    let frame = self.decoder.unreadable(error);
+                    self.units.scan_for(self.decoder.wanted());
+                    frame
+                }
+            };
+            if frame.is_some() {
+                return frame;
+            }
+        }
+        self.decoder.finish()
+    }
 }

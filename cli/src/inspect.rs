@@ -14,9 +14,9 @@ use clap::Args;
 use splatstream_format::Error;
 use std::path::PathBuf;
 
-/// Show the elements of a stream: place, value, meaning, clause. Works on damaged streams.
+/// Show the elements of a stream: offset, value, meaning, clause. Works on damaged streams.
 ///
-/// Places are byte offsets; 0x1a4+3 is bit 3 of byte 0x1a4. The clauses are those of the specification.
+/// Offsets are those of bytes; 0x1a4+3 is bit 3 of byte 0x1a4. The clauses are those of the specification.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream inspect talk.gss | less\n  \
     splatstream inspect talk.gss --units\n  splatstream inspect talk.gss --ops --json\n  \
@@ -41,13 +41,13 @@ struct View {
     /// Every element of every unit (this is what is shown if nothing is asked for).
     #[arg(long)]
     tree: bool,
-    /// One line a unit.
+    /// One line per unit.
     #[arg(long)]
     units: bool,
-    /// The operating points: bytes, Gaussians and bits a Gaussian of each.
+    /// The operating points: bytes, Gaussians and bits per Gaussian of each.
     #[arg(long)]
     ops: bool,
-    /// The units of each group and frame, and what each needs to be decoded.
+    /// The units of each GOP and frame, and what each needs to be decoded.
     #[arg(long)]
     deps: bool,
     /// What each attribute and each kind of unit costs.

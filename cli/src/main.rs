@@ -5,7 +5,6 @@
 mod cameras;
 mod chart;
 mod compare;
-mod completeness;
 mod conformance;
 mod console;
 mod costs;
@@ -47,7 +46,7 @@ use std::process::ExitCode;
         The keys that --json prints are described in cli/json.md."
 )]
 struct Cli {
-    /// Threads to use; default is one a processor. The result is the same with any number.
+    /// Threads to use; default is one per processor. The result is the same with any number.
     #[arg(long, global = true, display_order = 100, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print the result as JSON on standard output.

@@ -6,8 +6,8 @@ use std::num::ParseIntError;
 pub(crate) fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);
@@ -20,7 +20,7 @@ pub(crate) fn hex_digest(digest: u64) -> String {
     format!("{digest:016x}")
 }
 
-/// Bits a Gaussian.
+/// Bits per Gaussian.
 pub(crate) fn bits_per_gaussian(bytes: u64, gaussians: u64) -> f64 {
     bytes as f64 * 8.0 / gaussians.max(1) as f64
 }
@@ -48,7 +48,7 @@ impl FrameRange {
         frame >= self.first && !self.is_over(frame)
     }
 
-    /// Whether `frame` and all after it lie behind it.
+    /// Whether `frame` and all after it come after it.
     pub(crate) fn is_over(&self, frame: u32) -> bool {
         self.end.is_some_and(|end| frame >= end)
     }
@@ -73,7 +73,7 @@ impl FrameRange {
     }
 }
 
-/// Frames a second as ticks a second and ticks a frame: `30`, `29.97` or `30000/1001`.
+/// Frames per second as ticks per second and ticks per frame: `30`, `29.97` or `30000/1001`.
 pub(crate) fn parse_frame_rate(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("'{text}' is not a frame rate; write 30, 29.97 or 30000/1001");
     let positive = |part: &str| part.parse::<u32>().ok().filter(|&number| number > 0).ok_or_else(wrong);

@@ -1,13 +1,16 @@
-//! Files appear whole or not at all: written beside their place, then renamed.
+//! Files appear whole or not at all: written under another name beside it, then renamed.
 
 use crate::failure::Failure;
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
+use tempfile::TempPath;
 
-/// A file on its way to its place. Dropped before [`OutputFile::finish`], it leaves nothing behind.
+/// A file that is being written. Dropped before [`OutputFile::finish`], it leaves nothing on the disk.
 pub(crate) struct OutputFile {
-    writer: BufWriter<NamedTempFile>,
+    writer: BufWriter<File>,
+    /// The name that it has until it is whole.
+    temporary: TempPath,
     path: PathBuf,
 }
 
@@ -31,15 +34,15 @@ impl OutputFile {
             )));
         }
         let file = builder().tempfile_in(parent).map_err(|error| Failure::file("write", path, &error))?;
-        Ok(Self { writer: BufWriter::with_capacity(1 << 20, file), path: path.to_path_buf() })
+        let (file, temporary) = file.into_parts();
+        Ok(Self { writer: BufWriter::with_capacity(1 << 20, file), temporary, path: path.to_path_buf() })
     }
 
-    /// Moves the file to its place, over one that may be there.
+    /// Gives the file its name, in place of one that may be there.
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let failed = |error: std::io::Error| Failure::file("write", &self.path, &error);
-        let file = self.writer.into_inner().map_err(|error| failed(error.into_error()))?;
-        file.persist(&self.path).map_err(|error| failed(error.error))?;
-        Ok(())
+        self.writer.into_inner().map_err(|error| failed(error.into_error()))?;
+        self.temporary.persist(&self.path).map_err(|error| failed(error.error))
     }
 
     /// Writes a whole file.

@@ -1,8 +1,8 @@
 //! `splatstream render`: frames to pictures.
 
-use crate::cameras::{CameraArgs, Views};
+use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::Opened;
 use crate::numbers::{FrameRange, grouped};
 use crate::output_file::{OutputFile, make_directory};
@@ -11,6 +11,7 @@ use crate::stream_file::LimitArgs;
 use clap::Args;
 use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_render::{Camera, render};
 use splatstream_scene::GaussianFrame;
 use std::path::{Path, PathBuf};
@@ -28,19 +29,17 @@ pub(crate) struct Render {
     /// A stream, a scene file, or a directory of frames.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame.
-    #[arg(
-        long,
-        visible_alias = "cameras",
-        value_name = "CAMS.json|ring:N|forward:N",
-        default_value = "ring:8"
-    )]
-    camera: Views,
+    /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame. Default are the cameras
+    /// of the stream, or ring:8.
+    #[arg(long, visible_alias = "cameras", value_name = "CAMS.json|ring:N|forward:N")]
+    camera: Option<Views>,
     /// A directory for the pictures: VIEW.png, of sequences frame_0000_VIEW.png and so on.
     #[arg(short, long = "out", value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     cameras: CameraArgs,
+    #[command(flatten)]
+    background: BackgroundArg,
     /// The operating point of a stream; default is everything.
     #[arg(long, value_name = "sS,tT,rR")]
     op: Option<OperatingPoint>,
@@ -62,6 +61,11 @@ struct Drawn {
     pictures: Vec<Picture>,
     /// Of drawing alone.
     seconds: f64,
+    /// Errors of the stream.
+    errors: Vec<StreamFault>,
+    /// Whether nobody said what points up in pictures from cameras that were made.
+    #[serde(skip)]
+    up_is_guessed: bool,
 }
 
 /// One picture.
@@ -79,46 +83,69 @@ impl Render {
     /// Draws every frame from every camera.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let opened = Opened::open(&self.input)?;
-        let mut frames = opened.frames(&self.limits.limits(), self.op)?;
+        let limits = self.limits.limits();
+        let description = opened.description(&limits).unwrap_or_default();
+        let mut frames = opened.frames(&limits, self.op)?;
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));
-        let mut drawn = Drawn { output: self.out.clone(), frames: 0, pictures: Vec::new(), seconds: 0.0 };
+        let mut drawn = self.nothing(&description);
+        let background = self.background.colour(&description);
         let mut cameras: Vec<Camera> = Vec::new();
         let mut next = 0;
         while !span.is_over(next) {
             let Some((number, frame)) = frames.next()? else { break };
-            if next == 0 {
-                cameras = named(self.cameras.cameras(&self.camera, &frame)?);
+            if cameras.is_empty() {
+                cameras = named(self.cameras.cameras(self.camera.as_ref(), &frame, &description)?);
             }
             if span.contains(number) {
                 let antialiased = frame.antialiased() || self.antialiased;
                 let frame = frame.with_antialiased(antialiased);
-                self.draw(&frame, number, expected > 1, &cameras, &mut drawn)?;
+                self.draw(&frame, (number, expected > 1), &cameras, background, &mut drawn)?;
                 progress.at(drawn.frames);
             }
             next = number.saturating_add(1);
         }
         drop(progress);
         if drawn.frames == 0 {
+            frames.verdict()?;
             return Err(Failure::Usage(format!("{}: it has no such frame", self.input.display())));
         }
         drawn.seconds = drawn.pictures.iter().map(|picture| picture.seconds).sum();
-        console.report(&drawn, || drawn.text())
+        drawn.errors = frames.faults();
+        console.report(&drawn, || drawn.text())?;
+        frames.verdict()
+    }
+
+    /// The report before anything is drawn.
+    fn nothing(&self, description: &SceneDescription) -> Drawn {
+        let are_made = match &self.camera {
+            Some(Views::File(_)) => false,
+            Some(_) => true,
+            None => description.cameras.is_empty(),
+        };
+        Drawn {
+            output: self.out.clone(),
+            frames: 0,
+            pictures: Vec::new(),
+            seconds: 0.0,
+            errors: Vec::new(),
+            up_is_guessed: are_made && self.cameras.up_axis(description) == UpAxis::Unknown,
+        }
     }
 
     fn draw(
         &self,
         frame: &GaussianFrame,
-        number: u32,
-        sequence: bool,
+        (number, sequence): (u32, bool),
         cameras: &[Camera],
+        background: [f32; 3],
         drawn: &mut Drawn,
     ) -> Result<(), Failure> {
         make_directory(&self.out)?;
         for camera in cameras {
             let start = Instant::now();
-            let rendering = render(frame, camera, [0.0; 3]);
+            let rendering = render(frame, camera, background);
             let seconds = start.elapsed().as_secs_f64();
             let view = &camera.name;
             let file = if sequence { format!("frame_{number:04}_{view}.png") } else { format!("{view}.png") };
@@ -148,12 +175,17 @@ fn named(cameras: Vec<Camera>) -> Vec<Camera> {
 impl Drawn {
     fn text(&self) -> String {
         let count = self.pictures.len() as u64;
+        let hint = match self.up_is_guessed {
+            true => "  up           -y, a guess: if the pictures are upside down, give --up\n",
+            false => "",
+        };
         format!(
-            "{}: {} pictures of {} frames; {:.3} seconds a picture\n",
+            "{}: {} pictures of {} frames; {:.3} seconds per picture\n{hint}{}",
             self.output.display(),
             grouped(count),
             grouped(self.frames.into()),
             self.seconds / count.max(1) as f64,
+            faults_text(&self.errors),
         )
     }
 }

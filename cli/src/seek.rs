@@ -5,12 +5,12 @@ use serde::Serialize;
 use splatstream_format::Limits;
 use splatstream_format::payload::Index;
 use splatstream_format::syntax::{EndOfStream, GopHeader, IndexEntry, UnitHeader, UnitType};
-use splatstream_format::unit::{Delivery, Stream, Unit};
+use splatstream_format::unit::{Stream, Unit};
 
 /// Bytes of the end unit, the last of a stream.
 const END_SIZE: usize = UnitHeader::SIZE + EndOfStream::SIZE;
 
-/// The group at which decoding starts.
+/// The GOP at which decoding starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) struct Seek {
     /// Display index of its first frame.
@@ -19,9 +19,9 @@ pub(crate) struct Seek {
     pub(crate) byte: u64,
 }
 
-/// The group that holds `frame`, by the index of the stream. None where decoding starts at the first group: that
+/// The GOP that holds `frame`, by the index of the stream. None where decoding starts at the first GOP: that
 /// is the right one, or the stream has no index, is cut, or its index does not say what is there.
-pub(crate) fn group_of(file: &StreamFile, frame: u32, limits: &Limits) -> Option<Seek> {
+pub(crate) fn gop_of(file: &StreamFile, frame: u32, limits: &Limits) -> Option<Seek> {
     let stream = Stream::open(&file.bytes, limits).ok()?;
     file.sequence(limits)?;
     let end_at = u64::try_from(file.bytes.len().checked_sub(END_SIZE)?).ok()?;
@@ -29,20 +29,18 @@ pub(crate) fn group_of(file: &StreamFile, frame: u32, limits: &Limits) -> Option
     let end = EndOfStream::parse_payload(end.payload, end.payload_at).ok()?;
     let index = unit_at(&stream, end.index_offset, UnitType::Index)?;
     let index = Index::parse(index.payload, index.payload_at).ok()?;
-    let place = index.entries.iter().rposition(|entry| entry.frame <= frame)?;
-    let entry = index.entries.get(place).filter(|_| place > 0)?;
+    let last = index.entries.iter().rposition(|entry| entry.frame <= frame)?;
+    let entry = index.entries.get(last).filter(|_| last > 0)?;
     holds(&stream, entry, frame).then_some(Seek { frame: entry.frame, byte: entry.offset })
 }
 
-/// The unit of a type at an offset, if it is there and whole.
+/// The unit of a type at an offset, if it is there and intact.
 fn unit_at<'a>(stream: &Stream<'a>, at: u64, unit_type: UnitType) -> Option<Unit<'a>> {
-    match stream.units_from(at).next_unit()?.ok()? {
-        Delivery::Intact(unit) if unit.header.unit_type() == unit_type => Some(unit),
-        _ => None,
-    }
+    let unit = stream.units_from(at).next()?.ok()?;
+    (unit.header.unit_type() == unit_type).then_some(unit)
 }
 
-/// Whether the group that an entry points at has the frame.
+/// Whether the GOP that an entry points at has the frame.
 fn holds(stream: &Stream<'_>, entry: &IndexEntry, frame: u32) -> bool {
     let Some(unit) = unit_at(stream, entry.offset, UnitType::GopHeader) else { return false };
     let header = GopHeader::parse_payload(unit.payload, unit.payload_at, stream.header().profile());

@@ -1,9 +1,9 @@
-//! How the command line spells what the encoder can be told.
+//! How the command line spells the settings of the encoder.
 
 use clap::ValueEnum;
 use splatstream_decoder::predictor::Predictor;
 use splatstream_encoder::{
-    Fidelity, Importance, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice,
+    Anchor, Fidelity, Importance, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice,
 };
 
 /// How much to search.
@@ -89,10 +89,19 @@ impl From<PredictorChoiceName> for PredictorChoice {
 /// What predicted frames of untracked sequences are true to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FidelityName {
-    /// The pictures: what they do not need is carried over.
+    /// The pictures: what they do not need is not sent.
     Pictures,
     /// The attributes: every difference of a step is sent.
     Attributes,
+}
+
+/// What of the I frame of a predicted GOP the first refinements hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AnchorName {
+    /// The same refinements as of every other frame.
+    Nested,
+    /// All of it, with all spatial layers.
+    Whole,
 }
 
 /// A tool of the encoder that can be left out.
@@ -167,6 +176,15 @@ impl From<ShName> for ShChoice {
             ShName::Auto => Self::Auto,
             ShName::Coefficients => Self::Coefficients,
             ShName::Vq => Self::VectorQuantised,
+        }
+    }
+}
+
+impl From<AnchorName> for Anchor {
+    fn from(name: AnchorName) -> Self {
+        match name {
+            AnchorName::Nested => Self::Nested,
+            AnchorName::Whole => Self::Whole,
         }
     }
 }

@@ -1,26 +1,25 @@
 //! What each part of a stream costs. From decoding its symbols again.
 
 mod frames;
-mod increments;
+mod models;
 mod symbols;
 
 use frames::FrameCosts;
-use increments::Increments;
+use models::Models;
 use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::gop::Gop;
-use splatstream_decoder::unit::{CodedUnit, PreparedUnit};
 use splatstream_format::entropy::layout::{Attribute, Layout, Section};
 use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::levels::Levels;
-use splatstream_format::payload::Refinement;
+use splatstream_format::payload::{FramePayload, Increment};
 use splatstream_format::syntax::{
     FrameHeader, FrameType, GopHeader, Profile, SequenceParameters, UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Limits, Result};
-use symbols::{BitsOfPlanes, symbol_bits};
+use symbols::symbol_bits;
 
-/// Bits spent on one attribute in one section over a whole stream; a refinement unit is one section.
+/// Bits spent on one attribute in one section over a whole stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SectionCost {
     /// The section.
@@ -55,15 +54,13 @@ pub(crate) struct FrameTypeCost {
     pub(crate) frames: u32,
     /// Bytes of their units, headers included.
     pub(crate) bytes: u64,
-    /// Their Gaussians; what is carried over is not counted.
+    /// Their Gaussians; carried ones are not counted.
     pub(crate) gaussians: u64,
 }
 
 /// What a stream spends on what.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Statistics {
-    /// The profile of the stream.
-    pub(crate) profile: Profile,
     /// Gaussians over all frames.
     pub(crate) gaussians: u64,
     /// Bytes of the stream.
@@ -82,115 +79,109 @@ pub(crate) struct Statistics {
 /// As decoding, digests not verified.
 pub(crate) fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
     let stream = Stream::open(bytes, limits)?;
-    let profile = stream.header().profile();
     let mut statistics = Statistics {
-        profile,
         gaussians: 0,
         bytes: u64::try_from(bytes.len()).unwrap_or(u64::MAX),
         sections: Vec::new(),
         units: Vec::new(),
         frame_types: Vec::new(),
     };
-    let (mut state, mut frames) = (State::default(), FrameCosts::default());
-    for unit in stream.units() {
+    let (profile, mut units) = (stream.header().profile(), stream.units());
+    let mut state = State::new(profile, *limits);
+    while let Some(unit) = units.next_unit() {
         let unit = unit?;
+        unit.check_header(profile)?;
         statistics.count(&unit.header);
-        if !unit.header.unit_type().is_known_in(profile) {
-            continue;
-        }
-        let is_decoded = state.unit(&unit, profile, limits, &mut statistics)?;
-        frames.unit(&unit, profile, state.sequence.as_ref(), is_decoded)?;
+        state.unit(&unit, &mut statistics)?;
     }
-    statistics.frame_types = frames.finish();
+    statistics.frame_types = state.frames.finish();
     statistics.gaussians = statistics.frame_types.iter().map(|cost| cost.gaussians).sum();
     statistics.sections.sort_by_key(|cost| (cost.section, cost.attribute));
     Ok(statistics)
 }
 
-#[derive(Default)]
 struct State {
+    profile: Profile,
+    limits: Limits,
     sequence: Option<SequenceParameters>,
     gop: Option<Gop>,
     frame: Option<FrameHeader>,
-    models: Option<(Layout, Vec<PlaneModel>)>,
-    increments: Increments,
+    models: Models,
     levels: Levels,
+    frames: FrameCosts,
 }
 
 impl State {
-    /// Adds what a unit costs; gives whether it is decoded and not passed over.
-    fn unit(
-        &mut self,
-        unit: &Unit<'_>,
-        profile: Profile,
-        limits: &Limits,
-        statistics: &mut Statistics,
-    ) -> Result<bool> {
-        self.levels.follow(unit, profile);
+    fn new(profile: Profile, limits: Limits) -> Self {
+        Self {
+            profile,
+            limits,
+            sequence: None,
+            gop: None,
+            frame: None,
+            models: Models::default(),
+            levels: Levels::default(),
+            frames: FrameCosts::default(),
+        }
+    }
+
+    /// Adds what a unit costs. The payload of one that decoders discard may be anything.
+    fn unit(&mut self, unit: &Unit<'_>, statistics: &mut Statistics) -> Result<()> {
+        if !self.levels.takes(&unit.header) {
+            self.frames.unit(unit, None);
+            return Ok(());
+        }
+        unit.check_payload()?;
+        self.levels.follow(unit, self.profile);
+        let (payload, at) = (unit.payload, unit.payload_at);
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
-                let parsed = SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
-                self.sequence = Some(parsed);
+                self.sequence = Some(SequenceParameters::parse_payload(payload, at, self.profile)?);
             }
             UnitType::GopHeader => {
-                let header = GopHeader::parse_payload(unit.payload, unit.payload_at, profile)?;
-                self.start_gop(header, unit.header.frame);
-            }
-            UnitType::FrameHeader => {
-                self.frame = Some(FrameHeader::parse_payload(unit.payload, unit.payload_at, profile)?);
-                self.models = None;
-                if let Some(gop) = &self.gop {
-                    self.increments.start_frame(unit.header.frame, gop);
-                }
+                let header = GopHeader::parse_payload(payload, at, self.profile)?;
+                self.models = Models::default();
+                self.gop = Some(Gop::new(header, unit.header.frame));
             }
             UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
                 if let (Some(gop), Some(sequence)) = (&mut self.gop, &self.sequence) {
-                    gop.tool(unit, sequence, profile, limits)?;
+                    gop.tool(unit, sequence, &self.limits)?;
                 }
             }
-            UnitType::Refinement if profile == Profile::Intra => {
-                self.refinement(unit, limits, statistics)?;
-            }
-            UnitType::Increment if profile == Profile::Dynamic => {
-                if !self.levels.takes(&unit.header) {
-                    return Ok(false);
-                }
-                if let (Some(sequence), Some(gop), Some(frame)) = (&self.sequence, &self.gop, &self.frame) {
-                    let tools = gop.transforms(frame, unit.payload_at)?;
-                    self.increments.unit(unit, sequence, tools, limits, statistics)?;
-                }
-            }
+            UnitType::FrameHeader => self.frame_header(unit, statistics)?,
+            UnitType::Increment => self.increment(unit, statistics)?,
             _ => {}
         }
-        Ok(true)
+        Ok(())
     }
 
-    fn start_gop(&mut self, header: GopHeader, first: u32) {
-        self.increments = Increments::default();
-        self.gop = Some(Gop::new(header, first));
+    fn frame_header(&mut self, unit: &Unit<'_>, statistics: &mut Statistics) -> Result<()> {
+        let (Some(sequence), Some(gop)) = (&self.sequence, &self.gop) else { return Ok(()) };
+        let frame = FramePayload::parse(unit.payload, unit.payload_at, sequence, &self.limits)?;
+        self.models.start_frame(unit.header.frame, gop);
+        if let Some(cells) = &frame.cells {
+            self.models.cells(cells, sequence, statistics)?;
+        }
+        self.frames.start_frame(frame.header.kind().unwrap_or(FrameType::Intra));
+        self.frames.unit(unit, None);
+        self.frame = Some(frame.header);
+        Ok(())
     }
 
-    fn refinement(&mut self, unit: &Unit<'_>, limits: &Limits, statistics: &mut Statistics) -> Result<()> {
+    fn increment(&mut self, unit: &Unit<'_>, statistics: &mut Statistics) -> Result<()> {
         let (Some(sequence), Some(gop), Some(frame)) = (&self.sequence, &self.gop, &self.frame) else {
             return Ok(());
         };
-        let refinement = Refinement::parse(unit.payload, unit.payload_at, sequence, limits)?;
-        let transforms = gop.transforms(frame, unit.payload_at)?;
-        let coded = CodedUnit { refinement: &refinement, payload_at: unit.payload_at };
-        let mut trace = BitsOfPlanes::default();
-        let before = self.models.as_ref().map(|(layout, models)| (layout, models.as_slice()));
-        let prepared = PreparedUnit::new(coded, gop, transforms, before, &mut trace)?;
-        let blocks = prepared.coded_blocks(sequence)?;
-        let planes = Planes { layout: &prepared.layout, models: &prepared.models, blocks: &blocks };
-        statistics.add(refinement.header.gaussian_count, &planes, &trace.bits);
-        if !prepared.models.is_empty() {
-            self.models = Some((prepared.layout.clone(), prepared.models.clone()));
-        }
+        let (at, refinement) = (unit.payload_at, unit.header.refinement);
+        let increment = Increment::parse(unit.payload, at, sequence, self.profile, &self.limits)?;
+        let tools = gop.transforms(frame, at)?;
+        self.models.increment(&increment, refinement, tools, sequence, statistics)?;
+        self.frames.unit(unit, Some(increment.header.list_size()));
         Ok(())
     }
 }
 
-/// The planes of a section of a unit, decoded.
+/// The planes of a section, decoded.
 struct Planes<'a> {
     layout: &'a Layout,
     models: &'a [PlaneModel],
@@ -214,17 +205,17 @@ impl Statistics {
     fn add(&mut self, entries: u32, planes: &Planes<'_>, model_bits: &[u64]) {
         let all = planes.layout.planes().iter().zip(planes.models).zip(model_bits);
         for (plane, ((&info, model), &model_bits)) in all.enumerate() {
-            let place = self.place(info.section, info.attribute);
-            let Some(cost) = self.sections.get_mut(place) else { continue };
+            let index = self.index_of(info.section, info.attribute);
+            let Some(cost) = self.sections.get_mut(index) else { continue };
             // The planes of an attribute have as many values; they are counted with the first.
-            cost.entries += if info.place == 0 { u64::from(entries) } else { 0 };
+            cost.entries += if info.index == 0 { u64::from(entries) } else { 0 };
             cost.model_bits = cost.model_bits.saturating_add(model_bits);
             let bits = planes.blocks.iter().map(|block| symbol_bits(model, info, plane, block));
             cost.symbol_bits += bits.sum::<f64>();
         }
     }
 
-    fn place(&mut self, section: Section, attribute: Attribute) -> usize {
+    fn index_of(&mut self, section: Section, attribute: Attribute) -> usize {
         let known =
             self.sections.iter().position(|cost| (cost.section, cost.attribute) == (section, attribute));
         known.unwrap_or_else(|| {

@@ -3,8 +3,9 @@
 use crate::failure::Failure;
 use clap::Args;
 use splatstream_decoder::operating_point::OperatingPoint;
-use splatstream_format::syntax::{SIGNATURE, SequenceParameters, UnitType};
-use splatstream_format::unit::Stream;
+use splatstream_format::payload::SceneDescription;
+use splatstream_format::syntax::{FileHeader, SIGNATURE, SequenceParameters, UnitType};
+use splatstream_format::unit::{Landmark, Stream};
 use splatstream_format::{Error, Limits};
 use std::fs::File;
 use std::io::Read;
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct LimitArgs {
     /// Gaussians that a frame may have; a stream that asks for more is refused (exit code 13).
     #[arg(long, value_name = "N", default_value_t = Limits::default().max_gaussians)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     max_gaussians: u32,
 }
 
@@ -45,12 +47,25 @@ impl StreamFile {
         Failure::stream(&self.path, error)
     }
 
-    /// The sequence parameters, if the stream starts as it should.
+    /// The first sequence parameters that are intact.
     pub(crate) fn sequence(&self, limits: &Limits) -> Option<SequenceParameters> {
         let stream = Stream::open(&self.bytes, limits).ok()?;
-        let (unit, profile) = (stream.units().next()?.ok()?, stream.header().profile());
-        (unit.header.unit_type() == UnitType::SequenceParameters)
-            .then(|| SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile).ok())?
+        let at = Landmark::SequenceParameters.find(&self.bytes, FileHeader::SIZE)?;
+        let (unit, profile) = (stream.units_from(at as u64).next()?.ok()?, stream.header().profile());
+        SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile).ok()
+    }
+
+    /// What the stream says about its scene.
+    pub(crate) fn description(&self, limits: &Limits) -> Option<SceneDescription> {
+        let stream = Stream::open(&self.bytes, limits).ok()?;
+        let before_gops = stream.units().map_while(|unit| match unit {
+            Ok(unit) if unit.header.unit_type() == UnitType::GopHeader => None,
+            unit => Some(unit),
+        });
+        let mut found =
+            before_gops.flatten().filter(|unit| unit.header.unit_type() == UnitType::SceneDescription);
+        let unit = found.next()?;
+        SceneDescription::parse(unit.payload, unit.payload_at).ok()
     }
 
     /// Refuses an operating point that the stream cannot have: it would silently be another one.
@@ -59,25 +74,18 @@ impl StreamFile {
             return Ok(());
         };
         let has = |value: u8, count: u8| value == u8::MAX || value < count;
-        let path = self.path.display();
         if has(point.spatial, sequence.spatial_layer_count)
             && has(point.temporal, sequence.temporal_layer_count)
             && has(point.refinement, sequence.refinement_count)
         {
-            if point.temporal == 0 || point.spatial.saturating_add(1) >= sequence.spatial_layer_count {
-                return Ok(());
-            }
-            let (top, base) = (sequence.spatial_layer_count.saturating_sub(1), point.spatial);
-            return Err(Failure::Usage(format!(
-                "{path}: there is no operating point {point}: predicted frames are of spatial layer {top} alone, so that \
-                 s{base} goes with t0; `splatstream inspect --ops {path}` lists the points"
-            )));
+            return Ok(());
         }
         let last = OperatingPoint {
             spatial: sequence.spatial_layer_count.saturating_sub(1),
             temporal: sequence.temporal_layer_count.saturating_sub(1),
             refinement: sequence.refinement_count.saturating_sub(1),
         };
+        let path = self.path.display();
         Err(Failure::Usage(format!(
             "{path}: there is no operating point {point}; the points go from s0,t0,r0 to {last}: \
              `splatstream inspect --ops {path}` lists them"

@@ -1,13 +1,16 @@
-//! The groups and frames of a stream and the units that they are made of, from headers alone. Works on damaged and on
-//! cut streams.
+//! The GOPs and frames of a stream and the units that they are made of, from headers alone. Works on damaged and on cut
+//! streams, in time linear in the number of units.
 
 use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_format::levels::Levels;
+use splatstream_format::payload::OperatingPoints;
 use splatstream_format::syntax::{
-    CodebookHeader, FrameHeader, GopHeader, IncrementHeader, PlaceInGop, Profile, RefinementHeader,
-    SequenceParameters, ShHeader, TransformHeader, TransformKind, UnitHeader, UnitType,
+    CodebookHeader, FrameHeader, FrameRole, GopHeader, IncrementHeader, OperatingPointEntry, Profile,
+    SequenceParameters, TransformHeader, TransformKind, UnitHeader, UnitType,
 };
-use splatstream_format::unit::{Delivery, Stream, Unit};
-use splatstream_format::{Error, Limits};
+use splatstream_format::unit::{Landmark, Stream, Unit};
+use splatstream_format::{Error, Limits, Result};
+use std::collections::BTreeMap;
 
 /// What a stream is made of.
 #[derive(Default)]
@@ -16,74 +19,81 @@ pub(crate) struct Structure {
     pub(crate) profile: Option<Profile>,
     /// The sequence parameters, once they have come.
     pub(crate) sequence: Option<SequenceParameters>,
-    /// The groups.
-    pub(crate) groups: Vec<Group>,
-    /// The first error of headers, check sums and lengths.
+    /// The GOPs.
+    pub(crate) gops: Vec<Gop>,
+    /// The operating points that it lists.
+    pub(crate) points: Vec<OperatingPoint>,
+    /// The first error of headers, checksums and lengths.
     pub(crate) error: Option<Error>,
+    /// Whether units belong to the last GOP: not after a damaged gop_header.
+    in_gop: bool,
     definitions: Definitions,
+    levels: Levels,
 }
 
 /// Where a unit is.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct UnitPlace {
+pub(crate) struct UnitSpan {
     /// Counted from 0.
     pub(crate) unit: usize,
     /// Offset of its header.
     pub(crate) at: u64,
     /// Header and payload.
     pub(crate) bytes: u64,
-    /// The payload has another check sum.
+    /// Whether its header or its payload is not the one that was written.
     pub(crate) damaged: bool,
 }
 
 /// A group of pictures.
-pub(crate) struct Group {
-    pub(crate) place: UnitPlace,
+pub(crate) struct Gop {
+    pub(crate) span: UnitSpan,
     pub(crate) header: GopHeader,
     /// Display index of the first frame.
     pub(crate) first_frame: u32,
     /// Transforms, codebooks and weights.
     pub(crate) tools: Vec<Tool>,
     pub(crate) frames: Vec<Frame>,
+    /// Where in `frames` the frame with a display index is.
+    by_index: BTreeMap<u32, usize>,
 }
 
 /// A transform, codebook or weights unit.
 pub(crate) struct Tool {
-    pub(crate) place: UnitPlace,
+    pub(crate) span: UnitSpan,
     pub(crate) unit_type: UnitType,
     pub(crate) temporal_layer: u8,
-    /// Frames of the group that stand before it.
+    /// Frames of the GOP that stand before it.
     pub(crate) frames_before: usize,
 }
 
 /// A frame.
 pub(crate) struct Frame {
     /// Display index.
-    pub(crate) number: u32,
-    pub(crate) place: UnitPlace,
+    pub(crate) index: u32,
+    pub(crate) span: UnitSpan,
     /// Type, temporal layer and reference.
-    pub(crate) coding: PlaceInGop,
+    pub(crate) role: FrameRole,
     /// The transform units that its header names.
     pub(crate) transforms: Vec<usize>,
-    /// Refinement units or increments.
-    pub(crate) units: Vec<LayerUnit>,
-    /// Whether another unit stands behind the frame, so that it has no more than these.
-    pub(crate) ended: bool,
+    /// Increments.
+    pub(crate) increments: Vec<Increment>,
+    /// The number of the unit of each spatial layer and refinement.
+    by_layer: BTreeMap<(u8, u8), usize>,
 }
 
-/// A refinement unit or increment.
-pub(crate) struct LayerUnit {
-    pub(crate) place: UnitPlace,
+/// An increment.
+pub(crate) struct Increment {
+    pub(crate) span: UnitSpan,
     pub(crate) header: UnitHeader,
     pub(crate) tools: UsedTools,
 }
 
-/// The tool units that a refinement unit or increment uses.
+/// The tool units that an increment uses.
 #[derive(Default)]
 pub(crate) struct UsedTools {
     /// Codebook units.
     pub(crate) codebooks: Vec<usize>,
-    /// The weights unit of the group, if new Gaussians have predictors.
+    /// The weights unit of the GOP, if new Gaussians have predictors.
     pub(crate) weights: Option<usize>,
 }
 
@@ -96,20 +106,32 @@ struct Definitions {
     weights: Option<usize>,
 }
 
-impl Group {
+impl Gop {
     /// Display index of the frame that a frame refers to.
     pub(crate) fn reference(&self, frame: &Frame) -> Option<u32> {
-        frame.coding.reference.and_then(|place| self.first_frame.checked_add(place))
+        frame.role.reference.and_then(|index| self.first_frame.checked_add(index))
     }
 
     /// A frame by its display index.
-    pub(crate) fn frame(&self, number: u32) -> Option<&Frame> {
-        self.frames.iter().find(|frame| frame.number == number)
+    pub(crate) fn frame(&self, index: u32) -> Option<&Frame> {
+        self.by_index.get(&index).and_then(|&at| self.frames.get(at))
+    }
+
+    /// The display index after those that it announces.
+    pub(crate) fn end(&self) -> u32 {
+        self.first_frame.saturating_add(self.header.gop_frame_count)
+    }
+}
+
+impl Frame {
+    /// The number of the unit of a spatial layer and refinement.
+    pub(crate) fn unit(&self, spatial_layer: u8, refinement: u8) -> Option<usize> {
+        self.by_layer.get(&(spatial_layer, refinement)).copied()
     }
 }
 
 impl Structure {
-    /// Reads a stream up to the first error behind which units cannot be told apart or belong to no group.
+    /// Reads a stream. Where the end of a unit is not known it goes on at the next intact gop_header.
     pub(crate) fn of(bytes: &[u8], limits: &Limits) -> Self {
         let mut structure = Self::default();
         let stream = match Stream::open(bytes, limits) {
@@ -119,21 +141,18 @@ impl Structure {
         structure.profile = Some(stream.header().profile());
         let mut units = stream.units();
         let mut number = 0;
-        while let Some(delivery) = units.next_unit() {
-            let taken = match delivery {
-                Ok(Delivery::Intact(unit)) => structure.take(&unit, number),
-                Ok(Delivery::Damaged(damaged)) => {
-                    let error = Some(damaged.error).filter(|_| !damaged.passed_over);
-                    structure.error = structure.error.or(error);
-                    structure.damaged(&damaged.unit, number)
+        while let Some(unit) = units.next_unit() {
+            match unit {
+                Ok(unit) => {
+                    structure.unit(&unit, number);
+                    number += 1;
                 }
-                Err(error) => Err(error),
-            };
-            if let Err(error) = taken {
-                structure.error = structure.error.or(Some(error));
-                break;
+                Err(error) => {
+                    structure.note(Err(error));
+                    structure.in_gop = false;
+                    units.scan_for(Landmark::GopHeader);
+                }
             }
-            number += 1;
         }
         structure
     }
@@ -143,167 +162,138 @@ impl Structure {
         self.sequence.map_or(0, |sequence| sequence.spatial_layer_count.saturating_sub(1))
     }
 
-    /// Whether a frame is output at an operating point (7.19).
-    pub(crate) fn belongs(&self, frame: &Frame, point: OperatingPoint) -> bool {
-        let layer = if frame.coding.reference.is_some() { self.top() } else { 0 };
-        frame.coding.temporal_layer <= point.temporal && layer <= point.spatial
+    fn note(&mut self, checked: Result<()>) {
+        self.error = self.error.or(checked.err());
     }
 
-    /// Whether a unit of a frame, of a spatial layer and refinement, belongs to an operating point (7.19).
-    pub(crate) fn takes(
-        &self,
-        point: OperatingPoint,
-        group: &Group,
-        frame: &Frame,
-        (spatial, refinement): (u8, u8),
-    ) -> bool {
-        let anchor = group.header.is_predicted() && frame.number == group.first_frame;
-        let whole = anchor && point.spatial >= self.top();
-        spatial <= point.spatial && (whole || refinement <= point.refinement)
+    fn unit(&mut self, unit: &Unit<'_>, number: usize) {
+        let profile = self.profile.unwrap_or(Profile::Intra);
+        // What decoders discard may hold anything.
+        let is_discarded = !self.levels.takes(&unit.header);
+        let checked = unit.check_header(profile).and_then(|()| match is_discarded {
+            true => Ok(()),
+            false => unit.check_payload(),
+        });
+        if checked.is_ok() {
+            self.levels.follow(unit, profile);
+        }
+        let taken = self.take(unit, UnitSpan::new(number, unit, checked.is_err()), profile);
+        self.note(checked.and(taken));
     }
 
-    /// The spatial layers and refinements that a frame can have.
-    pub(crate) fn possible_units(&self, frame: &Frame) -> Vec<(u8, u8)> {
-        let refinements = self.sequence.map_or(0, |sequence| sequence.refinement_count);
-        let top = self.top();
-        let lowest = if frame.coding.reference.is_some() { top } else { 0 };
-        (lowest..=top).flat_map(|layer| (0..refinements).map(move |refinement| (layer, refinement))).collect()
-    }
-
-    fn take(&mut self, unit: &Unit<'_>, number: usize) -> Result<(), Error> {
-        let place = UnitPlace::new(number, unit.at, &unit.header, false);
-        let (payload, at, profile) = (unit.payload, unit.payload_at, self.profile.unwrap_or(Profile::Intra));
+    /// A unit; of one with a damaged payload only what its header says.
+    fn take(&mut self, unit: &Unit<'_>, span: UnitSpan, profile: Profile) -> Result<()> {
+        let (payload, at) = (unit.payload, unit.payload_at);
         match unit.header.unit_type() {
-            UnitType::SequenceParameters => {
+            UnitType::SequenceParameters if !span.damaged => {
                 self.sequence = Some(SequenceParameters::parse_payload(payload, at, profile)?);
             }
             UnitType::GopHeader => {
-                self.end_frame();
-                let header = GopHeader::parse_payload(payload, at, profile)?;
-                let (tools, frames) = (Vec::new(), Vec::new());
-                self.definitions = Definitions::default();
-                self.groups.push(Group { place, header, first_frame: unit.header.frame, tools, frames });
+                self.in_gop = false;
+                if !span.damaged {
+                    let header = GopHeader::parse_payload(payload, at, profile)?;
+                    self.definitions = Definitions::default();
+                    self.gops.push(Gop::new(span, header, unit.header.frame));
+                    self.in_gop = true;
+                }
             }
-            UnitType::Transform | UnitType::Codebook | UnitType::Weights => self.tool(unit, place)?,
+            UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
+                self.add_tool(&unit.header, span);
+                if !span.damaged {
+                    self.define(unit, span.unit)?;
+                }
+            }
             UnitType::FrameHeader => {
-                self.end_frame();
-                let header = FrameHeader::parse_payload(payload, at, profile)?;
-                let transforms = self.definitions.transforms(&header);
-                self.frame(&unit.header, place, transforms);
+                let header = (!span.damaged).then(|| FrameHeader::parse(payload, at)).transpose()?;
+                let transforms = header.map(|(header, _)| self.definitions.transforms(&header));
+                self.add_frame(&unit.header, span, transforms.unwrap_or_default());
             }
-            unit_type if is_of_frame(unit_type, profile) => {
-                let tools = self.tools_of(unit);
-                self.layer_unit(unit.header, place, tools);
+            UnitType::OperatingPoints if !span.damaged => {
+                let point = |entry: &OperatingPointEntry| {
+                    let (spatial, temporal, refinement) = entry.key();
+                    OperatingPoint { spatial, temporal, refinement }
+                };
+                self.points = OperatingPoints::parse(payload, at)?.entries.iter().map(point).collect();
             }
-            UnitType::OperatingPoints | UnitType::Index | UnitType::End => self.end_frame(),
+            UnitType::Increment => {
+                let tools = if span.damaged { None } else { self.tools_of(unit, profile) };
+                self.add_increment(unit.header, span, tools.unwrap_or_default());
+            }
             _ => {}
         }
         Ok(())
     }
 
-    /// A unit with a damaged payload: what its header says. Behind a damaged group header nothing has a place.
-    fn damaged(&mut self, unit: &Unit<'_>, number: usize) -> Result<(), Error> {
-        let header = &unit.header;
-        let place = UnitPlace::new(number, unit.at, header, true);
-        match header.unit_type() {
-            UnitType::GopHeader | UnitType::SequenceParameters => self.error.map_or(Ok(()), Err),
-            UnitType::FrameHeader => {
-                self.end_frame();
-                self.frame(header, place, Vec::new());
-                Ok(())
-            }
-            UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
-                self.add_tool(header, place);
-                Ok(())
-            }
-            unit_type if is_of_frame(unit_type, self.profile.unwrap_or(Profile::Intra)) => {
-                self.layer_unit(*header, place, UsedTools::default());
-                Ok(())
-            }
-            _ => Ok(()),
-        }
+    fn gop(&mut self) -> Option<&mut Gop> {
+        self.gops.last_mut().filter(|_| self.in_gop)
     }
 
-    fn end_frame(&mut self) {
-        if let Some(frame) = self.groups.last_mut().and_then(|group| group.frames.last_mut()) {
-            frame.ended = true;
-        }
-    }
-
-    fn tool(&mut self, unit: &Unit<'_>, place: UnitPlace) -> Result<(), Error> {
+    /// Takes note of the identifier that a tool unit defines.
+    fn define(&mut self, unit: &Unit<'_>, number: usize) -> Result<()> {
         let Some(sequence) = &self.sequence else { return Ok(()) };
         let Definitions { dc, sh, codebooks, weights } = &mut self.definitions;
-        if unit.header.unit_type() == UnitType::Weights {
-            *weights = Some(place.unit);
-            self.add_tool(&unit.header, place);
-            return Ok(());
-        }
-        let (slots, id) = if unit.header.unit_type() == UnitType::Transform {
-            let (header, _) = TransformHeader::parse(unit.payload, unit.payload_at, sequence)?;
-            (if header.kind() == Some(TransformKind::Sh) { sh } else { dc }, header.transform_id)
-        } else {
-            let (header, _) = CodebookHeader::parse(unit.payload, unit.payload_at)?;
-            (codebooks, header.codebook_id)
+        let (slots, id) = match unit.header.unit_type() {
+            UnitType::Weights => {
+                *weights = Some(number);
+                return Ok(());
+            }
+            UnitType::Transform => {
+                let (header, _) = TransformHeader::parse(unit.payload, unit.payload_at, sequence)?;
+                (if header.kind() == Some(TransformKind::Sh) { sh } else { dc }, header.transform_id)
+            }
+            _ => {
+                let (header, _) = CodebookHeader::parse(unit.payload, unit.payload_at)?;
+                (codebooks, header.codebook_id)
+            }
         };
         if let Some(slot) = slots.get_mut(usize::from(id)) {
-            *slot = Some(place.unit);
+            *slot = Some(number);
         }
-        self.add_tool(&unit.header, place);
         Ok(())
     }
 
-    fn add_tool(&mut self, header: &UnitHeader, place: UnitPlace) {
-        let Some(group) = self.groups.last_mut() else { return };
-        if let Some(frame) = group.frames.last_mut() {
-            frame.ended = true;
-        }
-        group.tools.push(Tool {
-            place,
-            unit_type: header.unit_type(),
-            temporal_layer: header.temporal_layer,
-            frames_before: group.frames.len(),
-        });
-    }
-
-    fn frame(&mut self, header: &UnitHeader, place: UnitPlace, transforms: Vec<usize>) {
-        let Some(group) = self.groups.last_mut() else { return };
-        let number = header.frame;
-        let coding = group.header.place(number.saturating_sub(group.first_frame));
-        group.frames.push(Frame { number, place, coding, transforms, units: Vec::new(), ended: false });
-    }
-
-    fn layer_unit(&mut self, header: UnitHeader, place: UnitPlace, tools: UsedTools) {
-        let frame = self.groups.last_mut().and_then(|group| group.frames.last_mut());
-        if let Some(frame) = frame.filter(|frame| frame.number == header.frame) {
-            frame.units.push(LayerUnit { place, header, tools });
+    fn add_tool(&mut self, header: &UnitHeader, span: UnitSpan) {
+        let (unit_type, temporal_layer) = (header.unit_type(), header.temporal_layer);
+        if let Some(gop) = self.gop() {
+            let frames_before = gop.frames.len();
+            gop.tools.push(Tool { span, unit_type, temporal_layer, frames_before });
         }
     }
 
-    /// The tools that a unit uses; none where its header cannot be read, which is no error in a unit that decoders pass
-    /// over.
-    fn tools_of(&self, unit: &Unit<'_>) -> UsedTools {
-        let Some(sequence) = &self.sequence else { return UsedTools::default() };
-        let (payload, at) = (unit.payload, unit.payload_at);
-        let elements: Result<(ShHeader, bool), Error> = match unit.header.unit_type() {
-            UnitType::Increment => IncrementHeader::parse(payload, at, sequence)
-                .map(|(header, _)| (header.sh(), header.predictor_count() > 0)),
-            _ => RefinementHeader::parse(payload, at, sequence).map(|(header, _)| (header.sh(), false)),
-        };
-        let Ok((sh, predicts)) = elements else { return UsedTools::default() };
-        let mut codebooks: Vec<usize> = sh
-            .codebooks()
-            .filter_map(|id| self.definitions.codebooks.get(usize::from(id)).copied().flatten())
-            .collect();
+    fn add_frame(&mut self, header: &UnitHeader, span: UnitSpan, transforms: Vec<usize>) {
+        let Some(gop) = self.gop() else { return };
+        let index = header.frame;
+        let role = gop.header.role(index.saturating_sub(gop.first_frame));
+        gop.by_index.entry(index).or_insert(gop.frames.len());
+        let (increments, by_layer) = (Vec::new(), BTreeMap::new());
+        gop.frames.push(Frame { index, span, role, transforms, increments, by_layer });
+    }
+
+    fn add_increment(&mut self, header: UnitHeader, span: UnitSpan, tools: UsedTools) {
+        let frame = self.gop().and_then(|gop| gop.frames.last_mut());
+        if let Some(frame) = frame.filter(|frame| frame.index == header.frame) {
+            frame.by_layer.entry((header.spatial_layer, header.refinement)).or_insert(span.unit);
+            frame.increments.push(Increment { span, header, tools });
+        }
+    }
+
+    /// The tools that an increment uses; none where its header cannot be read, which is no error in a unit that decoders
+    /// discard.
+    fn tools_of(&self, unit: &Unit<'_>, profile: Profile) -> Option<UsedTools> {
+        let sequence = self.sequence.as_ref()?;
+        let (header, _) = IncrementHeader::parse(unit.payload, unit.payload_at, sequence, profile).ok()?;
+        let defined = |id| self.definitions.codebooks.get(usize::from(id)).copied().flatten();
+        let mut codebooks: Vec<usize> = header.sh().codebooks().filter_map(defined).collect();
         codebooks.dedup();
-        UsedTools { codebooks, weights: self.definitions.weights.filter(|_| predicts) }
+        let predicts = header.predictor_count() > 0;
+        Some(UsedTools { codebooks, weights: self.definitions.weights.filter(|_| predicts) })
     }
 }
 
-/// Whether units of a type make up the frames of a profile.
-fn is_of_frame(unit_type: UnitType, profile: Profile) -> bool {
-    match profile {
-        Profile::Intra => unit_type == UnitType::Refinement,
-        Profile::Dynamic => unit_type == UnitType::Increment,
+impl Gop {
+    fn new(span: UnitSpan, header: GopHeader, first_frame: u32) -> Self {
+        let (tools, frames, by_index) = (Vec::new(), Vec::new(), BTreeMap::new());
+        Self { span, header, first_frame, tools, frames, by_index }
     }
 }
 
@@ -315,13 +305,9 @@ impl Definitions {
     }
 }
 
-impl UnitPlace {
-    fn new(unit: usize, at: u64, header: &UnitHeader, damaged: bool) -> Self {
-        Self { unit, at, bytes: UnitHeader::SIZE as u64 + u64::from(header.payload_length), damaged }
-    }
-
-    /// Offset of the byte after it.
-    pub(crate) fn end(&self) -> u64 {
-        self.at.saturating_add(self.bytes)
+impl UnitSpan {
+    fn new(unit: usize, of: &Unit<'_>, damaged: bool) -> Self {
+        let bytes = UnitHeader::SIZE as u64 + of.payload.len() as u64;
+        Self { unit, at: of.at, bytes, damaged }
     }
 }

@@ -1,15 +1,15 @@
 //! `splatstream validate`: whether a stream obeys the specification, every frame decoded.
 
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, StreamFault, faults_text};
 use crate::numbers::grouped;
 use crate::progress::Progress;
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
 use serde::Serialize;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream;
-use splatstream_format::{Class, Error};
+use splatstream_decoder::stream::{Summary, decode_stream};
+use splatstream_format::Class;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -36,10 +36,12 @@ struct Verdict {
     message: Option<String>,
     frames: u32,
     gaussians: u64,
+    /// Every error, in the order of the stream; the first is the verdict.
+    errors: Vec<StreamFault>,
 }
 
 impl Validate {
-    /// Decodes strictly; the exit code is the verdict.
+    /// Decodes all of the stream, also after errors; the exit code is the verdict, the first of them.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
@@ -49,18 +51,19 @@ impl Validate {
         let options = Options { limits, ..Options::default() };
         let summary = decode_stream(&stream.bytes, &options, |_, frame| {
             gaussians += frame.planes.len() as u64;
-            progress.at(frame.number.saturating_add(1));
+            progress.at(frame.index.saturating_add(1));
             ControlFlow::Continue(())
         });
         drop(progress);
-        let verdict = Verdict::new(summary.end, summary.frames, gaussians);
+        let verdict = Verdict::new(&summary, gaussians);
         console.report(&verdict, || verdict.text(&self.input))?;
-        summary.end.map_or(Ok(()), |error| Err(stream.fault(error)))
+        summary.verdict().map_or(Ok(()), |error| Err(stream.fault(error)))
     }
 }
 
 impl Verdict {
-    fn new(error: Option<Error>, frames: u32, gaussians: u64) -> Self {
+    fn new(summary: &Summary, gaussians: u64) -> Self {
+        let error = summary.verdict();
         let class = error.map(|error| error.class());
         Self {
             outcome: outcome(class),
@@ -69,8 +72,9 @@ impl Verdict {
             clause: error.map(|error| error.clause),
             byte: error.map(|error| error.at),
             message: error.map(|error| error.kind.to_string()),
-            frames,
+            frames: summary.frames,
             gaussians,
+            errors: summary.errors.iter().copied().map(StreamFault::from).collect(),
         }
     }
 
@@ -79,7 +83,9 @@ impl Verdict {
             (path.display(), grouped(self.frames.into()), grouped(self.gaussians));
         match self.class {
             None => format!("{path}: accept ({frames} frames, {gaussians} Gaussians, every digest agrees)"),
-            Some(class) => format!("{path}: {class}, {frames} frames decoded up to there"),
+            Some(class) => {
+                format!("{path}: {class}, {frames} frames decoded\n{}", faults_text(&self.errors))
+            }
         }
     }
 }

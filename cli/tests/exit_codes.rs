@@ -21,7 +21,7 @@ fn changed(change: impl FnOnce(&mut Vec<u8>)) -> (TempDir, PathBuf) {
     (directory, path)
 }
 
-/// The place of the first unit of a type.
+/// The offset of the first unit of a type.
 fn unit(bytes: &[u8], unit_type: u8) -> usize {
     let mut at = FILE_HEADER;
     while bytes[at] != unit_type {
@@ -89,18 +89,18 @@ fn malformed_is_10() {
 
 #[test]
 fn invalid_is_11() {
-    let mut place = 0;
+    let mut offset = 0;
     let said = verdict(11, |bytes| {
         let at = unit(bytes, 1);
-        place = at + UNIT_HEADER;
-        bytes[place] = 4;
+        offset = at + UNIT_HEADER;
+        bytes[offset] = 4;
         seal(bytes, at);
     });
     assert_eq!((&said["outcome"], &said["class"]), (&"reject".into(), &"invalid".into()));
-    assert_eq!((&said["clause"], &said["byte"]), (&"6.4".into(), &place.into()));
+    assert_eq!((&said["clause"], &said["byte"]), (&"6.4".into(), &offset.into()));
     let said = verdict(11, |bytes| {
         let at = unit(bytes, 6);
-        bytes[at + UNIT_HEADER] ^= 1;
+        bytes[at + UNIT_HEADER + 2] ^= 1;
         seal(bytes, at);
     });
     assert_eq!(said["code"], "DIGEST");
@@ -150,15 +150,24 @@ fn a_damaged_refinement_costs_no_more_than_it_must() {
     let whole = json(&["decode", text(&fixture()), "--dry-run"]);
     assert_eq!(report["frames"], whole["frames"]);
     assert_eq!(report["digests"][1], whole["digests"][1]);
-    let lost = report["lost"].as_array().unwrap();
-    assert_eq!(lost.len(), 1);
-    assert_eq!((&lost[0]["frame"], &lost[0]["refinements"]), (&0.into(), &1.into()));
+    let reduced = report["reduced"].as_array().unwrap();
+    assert_eq!(
+        (reduced.len(), &report["lost"], &report["complete"]),
+        (1, &serde_json::json!([]), &false.into())
+    );
+    assert_eq!((&reduced[0]["frame"], &reduced[0]["level"]), (&0.into(), &1.into()));
     assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
+    // Who does not take the damaged refinement does not notice.
+    let part = directory.path().join("part.gss");
+    for (op, code) in [("s0,t0,r0", 0), ("s0,t0,r1", 10)] {
+        assert_eq!(run(&["extract", text(&path), "--op", op, "-o", text(&part)]).status.code(), Some(0));
+        assert_eq!(run(&["validate", text(&part)]).status.code(), Some(code), "{op}");
+    }
     let strict = run(&["decode", text(&path), "--dry-run", "--strict", "--json"]);
     assert_eq!(strict.status.code(), Some(10));
     let strict: Value = serde_json::from_slice(&strict.stdout).unwrap();
-    assert_eq!(strict["error"]["code"], "CHECK_SUM");
-    assert!(strict["frames"].as_u64().unwrap() < 2, "nothing behind the damage: {strict}");
+    assert_eq!((&strict["errors"][0]["code"], &strict["complete"]), (&"CHECKSUM".into(), &false.into()));
+    assert!(strict["frames"].as_u64().unwrap() < 2, "nothing after the damage: {strict}");
 }
 
 #[test]
@@ -168,5 +177,5 @@ fn a_cut_stream_gives_the_frames_that_are_there() {
     let output = run(&["decode", text(&path), "-o", text(&out), "--json"]);
     assert_eq!(output.status.code(), Some(14));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((&report["frames"], &report["error"]["class"]), (&2.into(), &"truncated".into()));
+    assert_eq!((&report["frames"], &report["errors"][0]["class"]), (&2.into(), &"truncated".into()));
 }

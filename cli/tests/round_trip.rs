@@ -81,8 +81,8 @@ fn a_scene_is_itself_by_order_and_by_position() {
 fn decoding_an_extracted_stream_is_decoding_at_its_operating_point() {
     let directory = directory();
     let stream = write_stream(directory.path());
-    // In each of the two groups an intra frame; below the highest spatial layer no other.
-    for (op, frames) in [("s0,t0,r0", 2), ("s0,t0,r2", 2), ("s2,t0,r4", 2), ("s2,t1,r1", 3), ("s2,t1,r4", 3)]
+    // Two GOPs: an I frame and a B frame, an I frame.
+    for (op, frames) in [("s0,t0,r0", 2), ("s2,t0,r4", 2), ("s0,t1,r2", 3), ("s2,t1,r1", 3), ("s2,t1,r4", 3)]
     {
         let part = directory.path().join("part.gss");
         succeed(&["extract", text(&stream), "--op", op, "-o", text(&part)]);
@@ -174,4 +174,38 @@ fn every_command_has_help_with_an_example() {
         assert!(example.contains(&format!("splatstream {command}")), "{help}");
     }
     assert_eq!(run(&["--version"]).status.code(), Some(0));
+}
+
+#[test]
+fn what_is_said_about_a_scene_is_in_the_stream_and_viewers_take_it() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let [stream, pictures, cameras] =
+        ["up.gss", "pictures", "cameras.json"].map(|name| directory.path().join(name));
+    let camera = r#"[{"id": 0, "img_name": "left", "width": 64, "height": 48, "position": [0, 0, -8],
+        "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "fx": 50, "fy": 50}]"#;
+    fs::write(&cameras, camera).unwrap();
+    let said = ["--title", "A talk", "--up", "y", "--metres-per-unit", "0.5", "--background", "1,0.5,0"];
+    let encode =
+        ["encode", text(&frames), "-o", text(&stream), "--preset", "fast", "--cameras", text(&cameras)];
+    succeed(&[&encode[..], &said].concat());
+    let tree = succeed(&["inspect", text(&stream), "--tree"]);
+    for value in ["3 (+y)", "\"A talk\"", "[1, 0.5, 0]", "bounds_min", "vertical_field_of_view"] {
+        assert!(tree.contains(value), "{value}: {tree}");
+    }
+    let drawn = json(&["render", text(&stream), "-o", text(&pictures), "--height", "9", "--frames", "0..1"]);
+    assert_eq!(
+        (&drawn["pictures"][0]["view"], &drawn["pictures"][0]["width"]),
+        (&"camera_00".into(), &16.into())
+    );
+    let corner =
+        splatstream_render::Image::from_png(&fs::read(files(&pictures)[0].clone()).unwrap()).unwrap();
+    let orange =
+        corner.pixels()[0].iter().zip([1.0, 0.5, 0.0]).all(|(part, asked)| (part - asked).abs() < 0.05);
+    assert!(orange, "{:?}", corner.pixels()[0]);
+    let said =
+        succeed(&["render", text(&frames), "-o", text(&pictures), "--camera", "ring:1", "--height", "9"]);
+    assert!(said.contains("give --up"), "{said}");
+    let said = fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&stream)]);
+    assert!(said.contains("another file"), "{said}");
 }

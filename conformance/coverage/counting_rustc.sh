@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# The compiler as measure.sh has cargo call it for the crates of this repository: the two that are measured, and those in
-# which generic functions of them end up, count what runs. All else is compiled as ever, so that it is there already.
+# The compiler as .ci/reports has cargo call it for the crates of this repository: the two that are measured, and those that
+# contain instances of their generic functions, count what runs. All others are compiled as usual.
 set -euo pipefail
 case " $* " in
 *" --crate-name splatstream_format "* | *" --crate-name splatstream_decoder "* | \
-    *" --crate-name splatstream_conformance "* | *" --crate-name vectors "*)
-    # Branches are counted behind an option that a stable compiler has to be told to take.
+    *" --crate-name splatstream_conformance "* | *" --crate-name cases "* | *" --crate-name streams "*)
+    # Counting branches is an unstable option of the compiler.
     export RUSTC_BOOTSTRAP=1
     exec "$@" -Cinstrument-coverage -Zcoverage-options=branch
     ;;

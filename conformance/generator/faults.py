@@ -3,9 +3,10 @@
 A change is a function of the file_header and the units of the parent; it gives new ones. Selectors tell which units.
 """
 
-import oracle_path  # noqa: F401
-from units import stream_of, units_of
-from vector import Vector
+import struct
+
+from .synth.units import stream_of, units_of
+from .vector import Vector
 
 
 def kind(*kinds, nth=0):
@@ -33,12 +34,12 @@ def changed(select, **values):
     return change
 
 
-def element(select, name, value, place=0):
+def element(select, name, value, index=0):
     """One element of a payload; the value may be a function of the old one."""
     def change(head, units):
         i = select(units)
         u = units[i].copy()
-        u.set(name, value(u.get(name, place)) if callable(value) else value, place)
+        u.set(name, value(u.get(name, index)) if callable(value) else value, index)
         return head, units[:i] + [u] + units[i + 1:]
     return change
 
@@ -47,8 +48,25 @@ def payload(select, function):
     return changed(select, payload=lambda u: function(u.payload))
 
 
+def entry(at, kind_of_value, value):
+    """A function of a payload: an element of an entry of the variable part, by its offset."""
+    def change(data):
+        old = struct.unpack_from("<" + kind_of_value, data, at)[0]
+        new = struct.pack("<" + kind_of_value, value(old) if callable(value) else value)
+        return data[:at] + new + data[at + len(new):]
+    return change
+
+
+def cut(size):
+    return lambda data: data[:size]
+
+
+def longer(data):
+    return data + b"\x00"
+
+
 def flipped(select, at=-1, value=0x10):
-    """A byte of the written unit changed without its check sum."""
+    """A byte of the written unit changed without its checksum."""
     return changed(select, raw=((at, value),))
 
 
@@ -93,7 +111,7 @@ def copy_of(select, **values):
 
 
 def together(*changes):
-    """Changes that make one fault, or, where the order of errors is asked for, one behind the other."""
+    """Changes that make one fault, or several in one unit, or one after the other."""
     def change(head, units):
         for one in changes:
             head, units = one(head, units)
@@ -120,8 +138,9 @@ def apply(change, parent):
 
 
 def invalid(area, recipe, rows):
-    """Vectors of rows (name, parent, code, requirements, fault, change)."""
+    """Vectors of rows (name, parent, code, requirements, fault, change); a tuple of codes: each of them is right."""
     for name, parent, code, requirements, fault, change in rows:
-        yield Vector("invalid", area, name, None, requirements,
-                     lambda data, change=change: apply(change, data), recipe, 0, parent, fault, code)
+        acceptable, code = (code, None) if isinstance(code, tuple) else ((), code)
+        yield Vector("invalid", area, name, None, requirements, lambda data, change=change: apply(change, data), recipe, 0,
+                     parent, fault, code, acceptable)
 

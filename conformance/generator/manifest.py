@@ -1,5 +1,4 @@
-#!/usr/bin/env python3
-"""Writes MANIFEST beside a folder of vectors: manifest.py FOLDER [--check]
+"""Writes MANIFEST beside a folder of vectors: python3 -m generator.manifest FOLDER [--check]
 
 How many vectors there are, and SHA-256 over a line `sha256 name` for each in the order of the names; the digest in it is that
 of vector.json, which has that of the stream. With it the runner notices a suite that is not whole.
@@ -13,10 +12,10 @@ import sys
 def text_of(folder):
     """What MANIFEST says of the vectors that are there."""
     lines = []
-    for place, _, files in os.walk(folder):
+    for part, _, files in os.walk(folder):
         if "vector.json" in files:
-            with open(os.path.join(place, "vector.json"), "rb") as f:
-                lines.append((os.path.basename(place), hashlib.sha256(f.read()).hexdigest()))
+            with open(os.path.join(part, "vector.json"), "rb") as f:
+                lines.append((os.path.basename(part), hashlib.sha256(f.read()).hexdigest()))
     whole = "".join("%s %s\n" % (sha256, name) for name, sha256 in sorted(lines))
     return "%d\n%s\n" % (len(lines), hashlib.sha256(whole.encode()).hexdigest())
 
@@ -30,7 +29,7 @@ def problems(folder):
     path = path_of(folder)
     if os.path.exists(path) and open(path).read() == text_of(folder):
         return []
-    return ["differs: %s; python3 conformance/generator/manifest.py FOLDER writes it" % path]
+    return ["differs: %s; make.py writes it" % path]
 
 
 def write(folder):

@@ -2,8 +2,7 @@
 
 from difflib import SequenceMatcher
 
-import oracle_path  # noqa: F401
-from constants import FILE_HEADER_BYTES
+from oracle.constants import FILE_HEADER_BYTES
 
 
 def apply(parent, patch):
@@ -62,11 +61,11 @@ def runs(a, b, at):
 
 def equal_length(a, b, at):
     """Edits of bytes that differ; those less than four bytes apart are one edit."""
-    places = [i for i in range(min(len(a), len(b))) if a[i] != b[i]]
+    differing = [i for i in range(min(len(a), len(b))) if a[i] != b[i]]
     result, start = [], 0
-    for k, place in enumerate(places):
-        if k + 1 == len(places) or places[k + 1] - place >= 4:
-            low, high = places[start], place + 1
+    for k, position in enumerate(differing):
+        if k + 1 == len(differing) or differing[k + 1] - position >= 4:
+            low, high = differing[start], position + 1
             result.append(edit(at + low, a[low:high], b[low:high]))
             start = k + 1
     if len(a) != len(b):                            # a header that the end of the data cuts

@@ -1,5 +1,4 @@
-#!/usr/bin/env python3
-"""Coverage of the syntax: syntax_coverage.py
+"""Coverage of the syntax: python3 -m generator.syntax_coverage, in the folder conformance
 
 Decodes all vectors that are accepted and writes conformance/coverage/syntax.csv: for each element of the tables of
 clause 5 whether its smallest, its largest and a middle value occur, for elements of few values each of them,
@@ -12,21 +11,24 @@ import glob
 import os
 import sys
 
-import oracle_path
-import decoding
-import increment  # noqa: F401
-import models
-import network
-import parsing
-import semantics
-import semantics_dynamic
-import syntax
-from conventions import TYPE_BYTES, BitReader
-from syntax_ranges import CONDITIONS, RANGES
+from oracle import decoding, increment, models, network, parsing, semantics, syntax
+from oracle.conventions import BitReader, bl
+from .syntax_ranges import CONDITIONS, RANGES
+from .text import CONFORMANCE, HERE
 
 FEW = 10                                            # each value is asked for of integers that have at most so many
-TABLES = {id(table): name.lower().replace("_fixed", "") for name,
-          table in vars(syntax).items() if isinstance(table, list)}
+PARTS = (("INCREMENT_", "increment"), ("FRAME_", "frame_header"), ("SCENE_", "scene_description"))
+
+
+def record_of(table):
+    """The record of a table of the oracle; parts that may be absent have tables of their own."""
+    for prefix, record in PARTS:
+        if table.startswith(prefix):
+            return record
+    return table.lower().replace("_fixed", "")
+
+
+TABLES = {id(table): record_of(name) for name, table in vars(syntax).items() if isinstance(table, list)}
 
 
 class Seen:
@@ -97,16 +99,25 @@ def on_codebook(book, _):
     SEEN.add("codebook", "entries as i8" if book.value_bytes == 1 else "entries as i16", book.values)
 
 
-def on_refinement(u, _):
-    SEEN.add("refinement", "model_length", u.model_length)
-    SEEN.add("refinement", "block_length", u.block_length)
-    SEEN.condition("refinement: gaussian_count == 0", u.gaussian_count == 0)
-
-
-def on_increment(u, _):
+def on_increment(_, args):
+    u = args[0]
+    SEEN.add("increment", "codebook_ids", u.codebook_ids)
     present = {section.name for section in u.sections}
-    for name in semantics_dynamic.SECTIONS:
+    for name in semantics.SECTIONS:
         SEEN.condition("increment: section %s is present" % name, name in present)
+    for bit, part in enumerate(syntax.INCREMENT_PARTS):
+        SEEN.condition("increment: %s is present" % part[0][0], u.increment_flags >> bit & 1)
+    SEEN.condition("increment: sh_mode == 2", u.sh_mode == 2)
+
+
+def on_frame_header(frame, _):
+    SEEN.condition("frame_header: carried_digest is present", frame.frame_flags & 1)
+    SEEN.condition("frame_header: cell_count is present", frame.frame_flags & 2)
+
+
+def on_scene(scene, _):
+    for bit, part in enumerate(("metres_per_unit", "background", "bounds_min", "title_length", "camera_count")):
+        SEEN.condition("scene_description: %s is present" % part, scene.description_flags >> bit & 1)
 
 
 def on_division(_, args):
@@ -159,7 +170,7 @@ def walk_model(bits, plane):
     if plane.alphabet == "signed":
         read(bits, "bias", "se")
     name = "direct_log2_minus2 of position" if plane.alphabet == "position" else "direct_log2_minus2"
-    read(bits, name, 3)
+    direct_log2 = read(bits, name, 3) + 2
     contexts = 1
     for letter in "ab":
         source = read(bits, "source_" + letter, 4)
@@ -173,17 +184,25 @@ def walk_model(bits, plane):
             read(bits, "threshold_%s_step_minus1" % letter, "ue")
         contexts *= count + 2
     for _ in range(contexts):
-        walk_table(bits)
+        walk_table(bits, plane.alphabet == "signed", bl(plane.largest_token(direct_log2)))
 
 
-def walk_table(bits):
+def walk_table(bits, signed, token_bits):
     kind = read(bits, "table_kind", 2)
     if kind == 1:
         reference = read(bits, "is_reference", 1)
         SEEN.condition("plane_model: is_reference == 1", reference == 1)
-        read(bits, "table_place" if reference else "token", 6 if reference else 8)
+        read(bits, "table_index" if reference else "token", 6 if reference else token_bits)
     if kind == 3:
-        last, mode, length = read(bits, "last", 8), read(bits, "mode", 8), 0
+        is_parametric, last = read(bits, "is_parametric", 1), read(bits, "last", token_bits)
+        SEEN.condition("plane_model: is_parametric == 1", is_parametric == 1)
+        if is_parametric:
+            for element, width in (("shape", 2), ("zero_level", 4), ("scale", 6)):
+                read(bits, element, width)
+            if signed:
+                read(bits, "centre", "se")
+            return
+        mode, length = read(bits, "mode", bl(last)), 0
         SEEN.condition("plane_model: mode == last", mode == last)
         for t in range(last + 1):
             if t != mode:
@@ -192,12 +211,13 @@ def walk_table(bits):
 
 
 def hook():
-    wrapped(syntax.Record, "__init__", on_record)
+    wrapped(syntax.Record, "read", on_record)
     wrapped(semantics, "parse_transform", on_transform)
     wrapped(semantics, "parse_codebook", on_codebook)
-    wrapped(semantics, "parse_refinement", on_refinement)
-    wrapped(increment, "parse_increment", on_increment)
-    wrapped(semantics_dynamic.Division, "__init__", on_division)
+    wrapped(semantics, "parse_frame_header", on_frame_header)
+    wrapped(increment, "divide_increment", on_increment)
+    wrapped(decoding, "parse_scene_description", on_scene)
+    wrapped(semantics.Division, "__init__", on_division)
     wrapped(network, "parse_network", on_network)
     wrapped(parsing.BlockDecoder, "__init__", on_block)
     wrapped(models, "parse_models", on_models)
@@ -206,7 +226,7 @@ def hook():
 
 
 def waivers():
-    with open(os.path.join(oracle_path.HERE, "syntax_waivers.csv"), encoding="utf-8", newline="") as f:
+    with open(os.path.join(HERE, "syntax_waivers.csv"), encoding="utf-8", newline="") as f:
         return {(row["element"], row["value"]): row["reason"] for row in csv.DictReader(f)}
 
 
@@ -238,7 +258,7 @@ def report(path):
 
 def main():
     hook()
-    root = oracle_path.CONFORMANCE
+    root = CONFORMANCE
     for kind in ("valid", "either"):
         for path in sorted(glob.glob(os.path.join(root, "vectors", kind, "*", "*", "in.gss"))):
             with open(path, "rb") as f:

@@ -13,11 +13,11 @@ def some(low, high, *holes):
 
 
 def free(high):
-    """A check sum or digest: its ends cannot be asked for."""
+    """A checksum or digest: its ends cannot be asked for."""
     return 0, high, (), True
 
 
-FILE_HEADER = {"signature": some(0x0A, 0x89), "version_major": some(1, 1), "version_minor": some(0, U8),
+FILE_HEADER = {"signature": some(0x0A, 0x89), "version_major": some(130, 130), "version_minor": some(1, 1),
                "profile": some(0, 1),
                "level": some(1, 4), "header_crc": free(U32)}
 UNIT_HEADER = {"unit_type": some(1, U8), "unit_flags": some(0, 1), "spatial_layer": some(0, 3),
@@ -28,7 +28,7 @@ SEQUENCE_PARAMETERS = {
     "sh_degree": some(0, 3), "spatial_layer_count": some(1, 4), "temporal_layer_count": some(1, 4),
     "refinement_count": some(1, 10),
     "refinement_percent": some(0, 100), "position_bits": some(1, 20), "block_log2": some(6, 16),
-    "sequence_flags": some(0, 3),
+    "sequence_flags": some(0, 7),
     "rotation_threshold": some(0, U8), "frame_count": some(0, U32), "ticks_per_second": some(1, U32),
     "ticks_per_frame": some(0, U32),
     "position_offset": some(-FAR, FAR), "position_step": STEP, "log_scale_offset": some(-FAR, FAR),
@@ -39,29 +39,30 @@ GOP_HEADER = {"gop_index": some(0, U32), "gop_frame_count": some(1, U32), "gop_s
               "temporal_depth": some(0, 3),
               "reserved_zero": some(0, 0)}
 FRAME_HEADER = {"frame_type": some(0, 2), "dc_transform_id": some(0, 15), "sh_transform_id": some(0, 15, 255),
-                "reserved_zero": some(0, 0), "gaussian_count": some(0, 2 ** 24)}
+                "frame_flags": some(0, 3), "gaussian_count": some(0, 2 ** 24), "carried_digest": free(U64),
+                "cell_count": some(1, 2 ** 20), "cell_log2": some(0, 20)}
 TRANSFORM = {"transform_id": some(0, 15), "transform_kind": some(0, 1), "dimension": some(3, 45, 9, 24),
              "rank": some(1, 45),
              "mean": some(-2 ** 30, 2 ** 30), "basis": some(-4096, 4096)}
 CODEBOOK = {"codebook_id": some(0, 15), "component_count": some(1, 45), "entry_count_minus1": some(0, U16),
             "value_bytes": some(1, 2),
             "entries as i8": some(-128, 127), "entries as i16": some(-2 ** 15, 2 ** 15 - 1)}
-SH_ELEMENTS = {"sh_mode": some(0, 2), "vq_stage_count": some(0, 4), "codebook_ids": some(0, 15, 255)}
-REFINEMENT = {"refinement_digest": free(U64), "gaussian_count": some(0, 2 ** 24), "position_shift": some(0, 19),
-              "lanes_log2": some(0, 5),
-              **SH_ELEMENTS, "model_length": some(0, U32), "block_length": some(5, U32)}
 INDEX = {"entry_count": some(0, U32)}
 INDEX_ENTRY = {"frame": some(0, U32), "reserved_zero": some(0, 0), "offset": some(112, U64)}
 END = {"frame_count": some(0, U32), "unit_count": some(1, U32), "index_offset": some(0, U64)}
-INCREMENT = {"refinement_digest": free(U64), "carried_digest": free(U64), "parent_count": some(0, 2 ** 24),
-             "cell_count": some(0, 2 ** 20),
-             "move_count": some(0, 2 ** 24), "update_count": some(0, 2 ** 24), "remove_count": some(0, 2 ** 24),
-             "new_count": some(0, 2 ** 24),
-             "position_shift": some(0, 19), "attribute_shift": some(0, 7), "cell_log2": some(0, 20),
-             "predictor_block_log2": some(0, 16, 255),
-             "neighbour_count": some(1, 16), "bilateral_spatial": some(0, U8), "bilateral_feature": some(0, U8),
-             **SH_ELEMENTS,
-             "compensation_log_scale": some(-128, 127), "compensation_opacity": some(-128, 127)}
+COUNT = some(1, 2 ** 24)
+INCREMENT = {"increment_flags": some(0, 1023), "refinement_digest": free(U64), "parent_count": COUNT, "move_count": COUNT,
+             "update_count": COUNT, "remove_count": COUNT, "new_count": COUNT, "position_shift": some(0, 19),
+             "attribute_shift": some(0, 7), "predictor_block_log2": some(0, 16), "neighbour_count": some(1, 16),
+             "bilateral_spatial": some(0, U8), "bilateral_feature": some(0, U8), "sh_mode": some(1, 2),
+             "vq_stage_count": some(1, 4), "codebook_ids": some(0, 15), "compensation_log_scale": some(-128, 127),
+             "compensation_opacity": some(-128, 127)}
+SCENE = {"up_axis": some(0, 6), "kernel": some(0, 0), "colour_space": some(0, 1), "projection": some(0, 0),
+         "sorting": some(0, 1), "description_flags": some(0, 31), "metres_per_unit": some(2.0 ** -149, FAR),
+         "background": some(0.0, 1.0), "bounds_min": some(-FAR, FAR), "bounds_max": some(-FAR, FAR),
+         "title_length": some(1, 1024), "camera_count": some(1, 64)}
+CAMERA = {"position": some(-FAR, FAR), "rotation": some(-FAR, FAR),
+          "vertical_field_of_view": some(2.0 ** -149, 13176794 * 2.0 ** -22)}
 SECTION = {"lanes_log2": some(0, 5), "model_length": some(1, U32), "block_length": some(5, U32)}
 POINTS = {"point_count": some(0, 160), "reserved_zero": some(0, 0)}
 OPERATING_POINT = {"spatial_layer": some(0, 3), "temporal_layer": some(0, 3), "refinement": some(0, 9),
@@ -82,12 +83,15 @@ PLANE_MODEL = {
     "threshold_a_first": some(-2 ** 31 + 1, 2 ** 31 - 1), "threshold_b_first": some(-2 ** 31 + 1, 2 ** 31 - 1),
     "threshold_a_step_minus1": some(0, 2 ** 32 - 3), "threshold_b_step_minus1": some(0, 2 ** 32 - 3),
     "table_kind": some(0, 3),
-    "is_reference": some(0, 1), "table_place": some(0, 62), "token": some(0, 251), "last": some(1, 251),
+    "is_reference": some(0, 1), "table_index": some(0, 62), "token": some(0, 251),
+    "is_parametric": some(0, 1), "last": some(0, 251), "shape": some(0, 3), "zero_level": some(0, 15),
+    "scale": some(0, 63), "centre": some(-32768, 32767),
     "mode": some(0, 251),
     "length_delta": some(-12, 12), "mantissa": some(0, 7)}
 RECORDS = {"file_header": FILE_HEADER, "unit_header": UNIT_HEADER, "sequence_parameters": SEQUENCE_PARAMETERS,
            "gop_header": GOP_HEADER,
-           "frame_header": FRAME_HEADER, "transform": TRANSFORM, "codebook": CODEBOOK, "refinement": REFINEMENT,
+           "frame_header": FRAME_HEADER, "transform": TRANSFORM, "codebook": CODEBOOK,
+           "scene_description": SCENE, "camera": CAMERA,
            "index": INDEX,
            "index_entry": INDEX_ENTRY, "end": END, "increment": INCREMENT, "section": SECTION, "points": POINTS,
            "operating_point": OPERATING_POINT, "weights": {"model_source": some(0, 1)}, "network": NETWORK,
@@ -99,13 +103,18 @@ RANGES = {"%s.%s" % (record, element): row for record, elements in RECORDS.items
 ARRAYS = ("geometry", "geometry_bias", "geometry_embedding", "query", "fourier", "gain", "gain_bias", "widening",
           "widening_bias", "narrowing",
           "narrowing_bias")
-CONDITIONS = ["transform: transform_kind == 1", "refinement: gaussian_count == 0", "weights: model_source == 1",
+CONDITIONS = ["transform: transform_kind == 1", "weights: model_source == 1",
               "block: raw_bits is empty",
               "plane_model: reuse == 0", "plane_model: the alphabet is signed", "plane_model: source_a != 0",
               "plane_model: source_b != 0",
               "plane_model: threshold_a_count_minus1 == 0", "plane_model: threshold_b_count_minus1 == 0",
-              "plane_model: is_reference == 1",
+              "plane_model: is_reference == 1", "plane_model: is_parametric == 1",
               "plane_model: mode == last"]
-CONDITIONS += ["increment: section %s is present" % name for name in ("cells", "modes", "moves", "updates",
-                                                                      "predictors", "new")]
+CONDITIONS += ["increment: section %s is present" % name for name in ("modes", "moves", "updates", "predictors", "new")]
+CONDITIONS += ["increment: %s is present" % name for name in (
+    "parent_count", "move_count", "update_count", "remove_count", "new_count", "position_shift", "attribute_shift",
+    "predictor_block_log2", "sh_mode", "compensation_log_scale")]
+CONDITIONS += ["increment: sh_mode == 2", "frame_header: carried_digest is present", "frame_header: cell_count is present"]
+CONDITIONS += ["scene_description: %s is present" % name for name in ("metres_per_unit", "background", "bounds_min",
+                                                                      "title_length", "camera_count")]
 CONDITIONS += ["network: array %s is present" % name for name in ARRAYS]

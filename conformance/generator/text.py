@@ -4,8 +4,8 @@ import glob
 import os
 import re
 
-from oracle_path import CONFORMANCE
-
+HERE = os.path.dirname(os.path.abspath(__file__))
+CONFORMANCE = os.path.dirname(HERE)
 SPEC = os.path.join(os.path.dirname(CONFORMANCE), "spec")
 HEADING = re.compile(r"^#+ (?:Annex )?([A-Z0-9]+(?:\.\d+)*) ")
 REQUIREMENT = re.compile(r"\*\*\[(SS-[A-Z]+-\d+)\]\*\*")

@@ -3,29 +3,31 @@
 import json
 import os
 
-import expectation
-import patches
-from conventions import crc32
+from oracle.conventions import crc32
+from oracle.errors import CLASS_OF
+from . import expectation, patches
 
 LICENSE = "CC0-1.0"
 IN_ORDER = ("schema", "name", "area", "kind", "purpose", "clauses", "requirements", "features", "profile", "level",
-            "license", "bytes", "sha256", "expect", "acceptable", "states", "points", "units", "parent", "patch",
-            "fault",
-            "generator")
+            "license", "bytes", "sha256", "inside", "expect", "acceptable", "sweep", "states", "points", "units", "parent",
+            "patch", "fault", "generator")
 
 
 class Vector:
     """A row of a catalogue. `build` gives the bytes; that of an invalid vector takes the bytes of its parent.
 
     requirements: the ids that it is about, its clauses follow from them; code: that of the first error, to be sure
-    that the fault is the one that was meant; the purpose of an invalid vector follows from code and fault.
+    that the fault is the one that was meant; the purpose of an invalid vector follows from code and fault. acceptable: codes
+    of which each is right, because the faults stand in one unit. inside: a function of the bytes that gives the offset at
+    which decoding starts. sweep: whether the stream is cut at every byte.
     """
 
     def __init__(self, kind, area, name, purpose, requirements, build, recipe, seed=0, parent=None, fault=None,
-                 code=None, acceptable=None):
+                 code=None, acceptable=(), inside=None, sweep=False):
         self.kind, self.area, self.name, self.purpose = kind, area, name, purpose
         self.requirements, self.build, self.recipe, self.seed = sorted(set(requirements.split())), build, recipe, seed
-        self.parent, self.fault, self.code, self.acceptable = parent, fault, code, acceptable
+        self.parent, self.fault, self.code = parent, fault, code
+        self.acceptable, self.inside, self.sweep = acceptable, inside, sweep
 
     @property
     def folder(self):
@@ -38,17 +40,26 @@ class Vector:
                "clauses": sorted({clause_of[r] for r in self.requirements}, key=clause_key),
                "license": LICENSE, "bytes": len(data), "sha256": expectation.sha256(data),
                "generator": {"recipe": self.recipe, "seed": self.seed}}
+        if self.inside:
+            row["inside"] = self.inside(data)
         if self.kind == "invalid":
-            row.update(expectation.rejected(data), parent=self.parent, patch=patches.difference(parent, data),
-                       fault=self.fault, **{key: parent_record[key] for key in ("features", "profile", "level")})
-            row["purpose"] = "Rejected as %s: %s" % (row["expect"]["code"], self.fault)
-            if self.code not in (None, row["expect"]["code"]):
-                raise ValueError("%s: %s, not %s" % (self.name, row["expect"], self.code))
+            self.add_fault(row, data, parent, parent_record)
         else:
-            row.update(expectation.accepted(data))
+            row.update(expectation.accepted(data, row.get("inside")))
         if self.acceptable:
-            row["acceptable"] = self.acceptable
+            row["acceptable"] = [{"class": CLASS_OF[code], "code": code} for code in self.acceptable]
         return {key: row[key] for key in IN_ORDER if key in row}
+
+    def add_fault(self, row, data, parent, parent_record):
+        row.update(expectation.swept(data) if self.sweep else expectation.rejected(data, row.get("inside")))
+        row.update(parent=self.parent, fault=self.fault,
+                   **{key: parent_record[key] for key in ("features", "profile", "level")})
+        if not self.sweep:
+            row["patch"] = patches.difference(parent, data)
+        found = row["expect"]["code"]
+        row["purpose"] = "Rejected as %s: %s" % (" or ".join(self.acceptable) or found, self.fault)
+        if self.code not in (None, found) or self.acceptable and found not in self.acceptable:
+            raise ValueError("%s: %s, not %s" % (self.name, row["expect"], self.code or self.acceptable))
 
 
 def seed_of(name):

@@ -1,20 +1,20 @@
-"""Clause 7.15: cells and displacement."""
+"""Clause 7.5: cells and displacement."""
 
 from fractions import Fraction
 from math import floor, isqrt
 
-from constants import TRANSLATION_MAX, TURN_MAX
-from conventions import Round, clamp, cross, dot
-from errors import require
-from homes import canonical, position_limit
+from .constants import CELL_ROTATION_MAX, TRANSLATION_MAX
+from .conventions import Round, clamp, cross, dot
+from .errors import require
+from .lists import canonical, position_limit
 
 
 class Cell:
-    """translation, turn (three integers each) and stale of one cell."""
+    """translation, rotation (three integers each) and stale of one cell."""
 
-    def __init__(self, translation, turn, stale):
+    def __init__(self, translation, rotation, stale):
         self.translation = translation
-        self.turn = turn
+        self.rotation = rotation
         self.stale = stale
 
 
@@ -24,53 +24,54 @@ class Cells:
     def __init__(self, cell_log2, seq):
         self.cell_log2 = cell_log2
         self.seq = seq
-        self.by_place = {}
+        self.by_coordinates = {}
         self.unity = unity(seq.rotation_step)
 
     def cell_of(self, gaussian):
-        """7.15.2: the cell in which a Gaussian lies, None if it is not among the cells."""
-        place = tuple(x >> self.cell_log2 for x in canonical(gaussian.position_fine))
-        return place, self.by_place.get(place)
+        """7.5.2: the coordinates of the cell in which a Gaussian lies; the cell, None if it is not among the cells."""
+        X = tuple(x >> self.cell_log2 for x in canonical(gaussian.position_fine))
+        return X, self.by_coordinates.get(X)
 
     def displaced(self, gaussian):
-        place, cell = self.cell_of(gaussian)
+        """SS-MO-004: everything is computed from the values before the displacement."""
+        X, cell = self.cell_of(gaussian)
         if cell is None:
             return gaussian
-        v = cell.turn
+        v = cell.rotation
         w = isqrt(2 ** 28 - dot(v, v))
-        return gaussian._replace(position_fine=self.position(gaussian.position_fine, place, cell, w),
+        return gaussian._replace(position_fine=self.position(gaussian.position_fine, X, cell, w),
                                  rotation_fine=self.rotation(gaussian.rotation_fine, v, w))
 
-    def position(self, fine, place, cell, w):
+    def position(self, fine, X, cell, w):
         log2 = self.cell_log2
-        centre = [(X << (log2 + 6)) + (1 << (log2 + 5)) for X in place]
-        d = [fine[a] - centre[a] for a in range(3)]
-        m = cross(cell.turn, d)
-        u = cross(cell.turn, m)
+        centre = [(x << (log2 + 6)) + (1 << (log2 + 5)) for x in X]
+        d = [fine[k] - centre[k] for k in range(3)]
+        m = cross(cell.rotation, d)
+        u = cross(cell.rotation, m)
         result = []
-        for a in range(3):
-            p = centre[a] + d[a] + Round(w * m[a] + u[a], 27) + cell.translation[a] * 8
-            result.append(clamp(p, 0, position_limit(self.seq)))
+        for k in range(3):
+            moved = centre[k] + d[k] + Round(w * m[k] + u[k], 27) + cell.translation[k] * 8
+            result.append(clamp(moved, 0, position_limit(self.seq)))
         return tuple(result)
 
     def rotation(self, r, v, w):
         W = isqrt(max(0, (64 * self.unity) * (64 * self.unity) - dot(r, r)))
-        turned = cross(v, r)
+        product = cross(v, r)
         negative = w * W - dot(v, r) < 0
         result = []
         for k in range(3):
-            n = Round(w * r[k] + v[k] * W + turned[k], 14)
+            n = Round(w * r[k] + v[k] * W + product[k], 14)
             if negative:
                 n = -n
             result.append(clamp(n, -32767 * 64, 32767 * 64))
         return tuple(result)
 
-    def carried(self, gaussians):
-        """7.18.1: a carried list in the next frame."""
+    def carried(self, gaussians, without_stale):
+        """SS-CA-001: a carried list in the next frame, stale cells left out if asked for."""
         result = []
         for gaussian in gaussians:
             cell = self.cell_of(gaussian)[1]
-            if cell is None or not cell.stale:
+            if cell is None or not (cell.stale and without_stale):
                 result.append(self.displaced(gaussian))
         return result
 
@@ -80,36 +81,35 @@ def unity(rotation_step):
     return min(32767, floor(1 / Fraction(rotation_step) + Fraction(1, 2)))
 
 
-def decode_cells(increment, section, seq):
-    """7.15.1 from the values of section cells, which may be None; checks in the order of 8.7."""
-    cells = Cells(increment.cell_log2, seq)
+def decode_cells(cell_log2, section, seq):
+    """7.5.1 from the values of section cells, which is None in a frame without cells."""
+    cells = Cells(cell_log2, seq)
     if section is None:
         return cells
-    bits = max(seq.position_bits - increment.cell_log2, 1)
+    bits = max(seq.position_bits - cell_log2, 1)
     delta = section.values("cell")[0]
     stale = section.values("stale")[0]
     v_translation = section.values("translation")
-    v_turn = section.values("turn")
+    v_rotation = section.values("cell_rotation")
     before = -1                                     # code of the cell before, over all blocks
     for i in range(section.count):
         at = section.at(i)
         if section.starts_block(i):
-            code, translation, turn = 0, [0, 0, 0], [0, 0, 0]
+            code, translation, rotation = 0, [0, 0, 0], [0, 0, 0]
         code += delta[i]
-        require(code < 2 ** (3 * bits), "CONSTRAINT", "7.15", at)                 # SS-MO-001
-        require(code > before, "CONSTRAINT", "7.15", at)
+        require(code < 2 ** (3 * bits), "CONSTRAINT", "7.5.1", at)                     # SS-MO-001
+        require(code > before, "CONSTRAINT", "7.5.1", at)
         before = code
-        translation = [translation[a] + v_translation[a][i] for a in range(3)]
-        turn = [turn[a] + v_turn[a][i] for a in range(3)]
-        require(0 <= stale[i] <= 1, "OUT_OF_RANGE", "7.15", at)                   # SS-MO-002
-        for a in range(3):
-            require(abs(translation[a]) <= TRANSLATION_MAX, "OUT_OF_RANGE", "7.15", at)
-        for a in range(3):
-            require(abs(turn[a]) <= TURN_MAX, "OUT_OF_RANGE", "7.15", at)
-        cells.by_place[coordinates(code, bits)] = Cell(translation, turn, stale[i])
+        translation = [translation[k] + v_translation[k][i] for k in range(3)]
+        rotation = [rotation[k] + v_rotation[k][i] for k in range(3)]
+        require(0 <= stale[i] <= 1, "OUT_OF_RANGE", "7.5.1", at)                       # SS-MO-002
+        for k in range(3):
+            require(abs(translation[k]) <= TRANSLATION_MAX, "OUT_OF_RANGE", "7.5.1", at)
+            require(abs(rotation[k]) <= CELL_ROTATION_MAX, "OUT_OF_RANGE", "7.5.1", at)
+        cells.by_coordinates[coordinates(code, bits)] = Cell(translation, rotation, stale[i])
     return cells
 
 
 def coordinates(code, bits):
-    """The three coordinates of a Morton code (7.3, 7.15.1)."""
-    return tuple(sum(((code >> (3 * b + a)) & 1) << b for b in range(bits)) for a in range(3))
+    """The three coordinates of a Morton code (7.5.1, 7.6.4)."""
+    return tuple(sum(((code >> (3 * b + k)) & 1) << b for b in range(bits)) for k in range(3))

@@ -1,7 +1,7 @@
 """Clause 3: symbols and constants, and the limits of annex A."""
 
 SIGNATURE = bytes([0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A])
-VERSION_MAJOR = 1
+VERSION = (130, 1)                                  # SS-FH-003: version_major, version_minor
 PROFILE_INTRA = 0
 PROFILE_DYNAMIC = 1
 FILE_HEADER_BYTES = 16
@@ -9,12 +9,12 @@ UNIT_HEADER_BYTES = 20
 MAX_REFINEMENTS = 10
 MAX_LAYERS = 4
 MAX_PREDICTED_FRAMES = 1024
-MAX_CELLS = 2 ** 20
 MAX_NEIGHBOURS = 16
+NEIGHBOUR_WINDOW = 16
 MAX_ATTRIBUTE_SHIFT = 7
 FINE_BITS = 6
 TRANSLATION_MAX = 2 ** 20
-TURN_MAX = 8192
+CELL_ROTATION_MAX = 8192
 OUTPUT_MAX = 2 ** 30
 MAX_ID = 15
 NONE_ID = 255
@@ -30,24 +30,21 @@ STATE_LOW = 65536
 MAX_CONTEXTS = 64
 MAX_TOKEN = 255
 
-# 6.3: unit types
+# 6.3: unit types, known in every profile
 UT_SEQUENCE, UT_GOP, UT_FRAME, UT_TRANSFORM = 1, 2, 3, 4
-UT_CODEBOOK, UT_REFINEMENT, UT_INDEX, UT_END = 5, 6, 7, 8
-UT_WEIGHTS, UT_INCREMENT, UT_POINTS = 9, 10, 11
-
-
-def known_unit_types(profile):
-    """6.3: types 9 and 10 are known in profile 1 only."""
-    known = tuple(range(1, 9)) + (UT_POINTS,)
-    return known + (UT_WEIGHTS, UT_INCREMENT) if profile == PROFILE_DYNAMIC else known
-
+UT_CODEBOOK, UT_INCREMENT, UT_INDEX, UT_END = 5, 6, 7, 8
+UT_WEIGHTS, UT_SCENE, UT_POINTS = 9, 10, 11
+KNOWN_UNIT_TYPES = tuple(range(1, 12))
 
 # 6.6: frame types
 TYPE_I, TYPE_P, TYPE_B = 0, 1, 2
 
-# A.2
+# A.2, by level
 MAX_GAUSSIANS = {1: 2 ** 18, 2: 2 ** 20, 3: 2 ** 22, 4: 2 ** 24}
+MAX_GAUSSIAN_RATE = {1: 2 ** 24, 2: 2 ** 26, 3: 2 ** 28, 4: 2 ** 30}
+MAX_CELLS = {1: 2 ** 16, 2: 2 ** 18, 3: 2 ** 20, 4: 2 ** 20}
 MAX_LEARNED = {1: 2 ** 17, 2: 2 ** 19, 3: 2 ** 21, 4: 2 ** 23}
+MAX_CODEBOOK_VALUES = {1: 2 ** 21, 2: 2 ** 22, 3: 2 ** 23, 4: 2 ** 23}
+MAX_NEW_PER_BYTE = 16
 MAX_PAYLOAD_LENGTH = 2 ** 30
 MAX_UNITS = 2 ** 24
-MAX_CODEBOOK_VALUES = 2 ** 23

@@ -2,7 +2,7 @@
 
 import struct
 
-from errors import StreamError
+from .errors import StreamError
 
 # ---- 4.2 operators (Python's //, % and >> already round towards negative infinity) ----
 
@@ -55,10 +55,10 @@ class ByteReader:
         return self.end - self.pos
 
     def values(self, kind, count, clause):
-        """`count` places of a descriptor, as a list; SHORT_SECTION if they do not fit."""
+        """`count` values of a descriptor, as a list; SHORT_SECTION if they do not fit."""
         size = TYPE_BYTES[kind] * count
         if size > self.left():
-            raise StreamError("SHORT_SECTION", clause, self.pos)
+            raise StreamError("SHORT_SECTION", clause, self.pos)                      # SS-ER-003
         result = list(struct.unpack_from("<%d%s" % (count, STRUCT_CODE[kind]), self.data, self.pos))
         self.pos += size
         return result
@@ -93,7 +93,7 @@ class ByteReader:
 
     def check_end(self, clause):
         if self.left() > 0:
-            raise StreamError("TRAILING_BYTES", clause, self.pos)
+            raise StreamError("TRAILING_BYTES", clause, self.pos)                     # SS-ER-003
 
 
 # ---- 4.4 bit descriptors ----
@@ -163,7 +163,7 @@ def _crc_of_byte(c):
     return c
 
 
-# The eight turns of the loop for each low byte of c, tabulated.
+# The eight rounds of the loop for each low byte of c, tabulated.
 _CRC_TABLE = [_crc_of_byte(c) for c in range(256)]
 
 

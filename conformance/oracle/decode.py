@@ -7,18 +7,20 @@ Exit code: that of the class of the verdict (9.1), 0 if the stream is accepted, 
 import argparse
 import hashlib
 import json
+import os
 import re
 import sys
 import time
 
-from decoding import Decoder
-from dynamic import DynamicFrame
-from errors import EXIT_CODE
-from extraction import extract
-from homes import canonical_planes
-from output import write_frame
-from points import EVERYTHING
-from reconstruction import i32le
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+
+from oracle.decoding import Decoder
+from oracle.errors import EXIT_CODE
+from oracle.extraction import extract
+from oracle.lists import canonical_planes, lists_digest
+from oracle.output import write_frame
+from oracle.points import EVERYTHING
+from oracle.reconstruction import i32le
 
 
 def operating_point(text):
@@ -36,28 +38,26 @@ def report(decoder, subset=False):
     if verdict:
         result.update(verdict.as_dict())
     result["frames"] = [frame_record(f, subset) for f in decoder.frames]
+    if decoder.lost:
+        result["lost"] = decoder.lost
     if len(errors) > 1:
         result["errors"] = [error.as_dict() for error in errors]
     return result
 
 
 def hexadecimal(digest):
-    return None if digest is None else "%016x" % digest
+    return "%016x" % digest
 
 
 def frame_record(frame, subset):
-    if not isinstance(frame, DynamicFrame):
-        return {"frame": frame.number, "gaussians": frame.gaussians, "refinements": frame.refinements,
-                "digest": hexadecimal(frame.digest())}
-    at = frame.shown_at()
     shown = frame.shown(subset)
-    digest, carried_digest = frame.shown_digests()
+    exact = frame.exact_lists()
     planes = canonical_planes(shown.gaussians, frame.plane_count)
-    return {"frame": frame.number, "type": "IPB"[frame.frame_type], "lost": frame.lost,
-            "spatial_layer": at[0] if at else None, "refinements": at[1] + 1 if at else 0,
+    carried = frame.carried_digest() if frame.has_carried() else None
+    return {"frame": frame.number, "type": "IPB"[frame.frame_type], "lost": frame.lost, "refinements": len(exact),
             "gaussians": len(shown.gaussians), "exact": shown.exact, "carried": shown.carried,
-            "digest": hexadecimal(digest), "carried_digest": hexadecimal(carried_digest),
-            "shown": sha256_of_planes(planes)}
+            "digest": hexadecimal(lists_digest(exact, frame.plane_count)),
+            "carried_digest": None if carried is None else hexadecimal(carried), "shown": sha256_of_planes(planes)}
 
 
 def sha256_of_planes(planes):
@@ -72,9 +72,9 @@ def main():
     parser.add_argument("--out", help="folder for the canonical planes")
     parser.add_argument("--float", action="store_true", help="with --out: also the f32 attributes")
     parser.add_argument("--json", action="store_true", help="print the result as JSON (always done)")
-    parser.add_argument("--inside", action="store_true", help="the input starts at a later GOP (B.3)")
+    parser.add_argument("--inside", type=int, metavar="OFFSET", help="start at the gop_header at this offset (B.3)")
     parser.add_argument("--extract", metavar="FILE", help="write the extraction at --op (7.11)")
-    parser.add_argument("--subset", action="store_true", help="profile 1: show exact Gaussians only (7.18.2)")
+    parser.add_argument("--subset", action="store_true", help="show exact Gaussians only (7.8.2)")
     parser.add_argument("--time", action="store_true", help="print the speed on stderr")
     options = parser.parse_args()
     with open(options.input, "rb") as f:
@@ -89,8 +89,7 @@ def main():
         print("%.2f s, %.0f Gaussians/s" % (seconds, count / seconds), file=sys.stderr)
     if options.out:
         for frame in decoder.frames:
-            planes = (canonical_planes(frame.shown(options.subset).gaussians, frame.plane_count)
-                      if isinstance(frame, DynamicFrame) else frame.planes)
+            planes = canonical_planes(frame.shown(options.subset).gaussians, frame.plane_count)
             write_frame(options.out, frame.number, planes, decoder.sequence, options.float)
     if options.extract and not decoder.errors:
         with open(options.extract, "wb") as f:

@@ -2,7 +2,7 @@
 
 import struct
 
-from conventions import xxh64
+from .conventions import xxh64
 
 
 def entropy_state(sections):

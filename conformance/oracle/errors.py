@@ -1,11 +1,12 @@
 """Clause 9: classes, codes and the exception that carries them."""
 
+# SS-ER-006
 EXIT_CODE = {"malformed": 10, "invalid": 11, "unsupported": 12, "over-limit": 13, "truncated": 14}
 
 CLASS_OF = {
     "TRUNCATED": "truncated",
     "SIGNATURE": "malformed",
-    "CHECK_SUM": "malformed",
+    "CHECKSUM": "malformed",
     "SHORT_SECTION": "malformed",
     "TRAILING_BYTES": "malformed",
     "NUMBER": "malformed",
@@ -31,7 +32,7 @@ class StreamError(Exception):
         self.code = code
         self.clause = clause
         self.byte = byte
-        self.of_carried = False                     # SS-DG-007: who shows a subset does not look for it
+        self.of_carried = False                     # SS-DG-005: a decoder that shows subsets does not look for it
 
     @property
     def error_class(self):

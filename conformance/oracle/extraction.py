@@ -1,13 +1,13 @@
-"""Clause 7.11: extraction, for a conforming stream; in profile 1 with 7.19."""
+"""Clause 7.11: extraction, for a conforming stream."""
 
 import struct
 
-import constants as c
-from conventions import ByteReader, crc32
-from dynamic import Gop
-from points import belongs
-from semantics import parse_file_header, parse_gop_header, parse_sequence_parameters, parse_unit_header
-from semantics_dynamic import parse_points
+from . import constants as c
+from .conventions import ByteReader, crc32
+from .frame import Gop
+from .points import belongs
+from .semantics import (parse_file_header, parse_gop_header, parse_points, parse_sequence_parameters,
+                        parse_unit_header)
 
 
 def rewritten(data, unit, payload):
@@ -25,7 +25,7 @@ def extract(data, point):
     seq, gop = None, None
     pos = c.FILE_HEADER_BYTES
     while True:
-        unit = parse_unit_header(data, pos, 0, profile)
+        unit = parse_unit_header(data, pos)
         pos = unit.end
         kind = unit.unit_type
         whole = data[unit.start:unit.end]
@@ -37,8 +37,7 @@ def extract(data, point):
             seq = parse_sequence_parameters(reader, profile)
         if kind == c.UT_GOP:
             gops.append((unit.frame, len(out)))
-            header = parse_gop_header(reader, unit, None, profile, seq.temporal_layer_count)
-            gop = Gop(header, unit.frame) if profile == c.PROFILE_DYNAMIC else None
+            gop = Gop(parse_gop_header(reader, unit, profile, seq.temporal_layer_count), unit.frame)
         if kind == c.UT_POINTS:
             kept = b"".join(data[entry.at("spatial_layer"):entry.at("spatial_layer") + 24]
                             for entry in parse_points(reader)

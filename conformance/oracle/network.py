@@ -3,11 +3,11 @@
 import hashlib
 import os
 
-import syntax
-from conventions import TYPE_BYTES, ByteReader
-from errors import require
-from semantics import in_range, one_of
-from syntax import Record
+from . import syntax
+from .conventions import TYPE_BYTES, ByteReader
+from .errors import require
+from .semantics import in_range, one_of
+from .syntax import Record
 
 DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "spec", "data")
 
@@ -38,13 +38,13 @@ def parse_weights(reader, defined):
     """The network of a weights unit; `defined` tells whether the GOP has one already (SS-WT-002)."""
     unit = Record(syntax.WEIGHTS_FIXED, reader)
     one_of(unit, "model_source", (0, 1), "6.17", "RESERVED")
-    require(not defined, "CONSTRAINT", "6.17", unit.at("model_source"))
+    require(not defined, "CONSTRAINT", "6.17", unit.at("model_source"))               # SS-WT-002
     if unit.model_source == 0:
         return parse_network(reader)
     at = reader.pos
     digest = bytes(reader.values("u8", 32, "6.17"))
     reader.check_end("5.17")
-    require(digest in REGISTRY, "RESERVED", "6.17", at)
+    require(digest in REGISTRY, "RESERVED", "6.17", at)                               # SS-WT-001
     return parse_network(ByteReader(REGISTRY[digest], 0, len(REGISTRY[digest])))
 
 
@@ -55,7 +55,7 @@ def parse_network(reader):
     """A Record with the elements of 5.17.1, the flags and widths by name, and the arrays of 6.17.2."""
     u = Record(syntax.NETWORK_FIXED, reader)
     q = "6.17"
-    require(u.network_flags & 0xF0 == 0, "RESERVED_BITS", q, u.at("network_flags"))
+    require(u.network_flags & 0xF0 == 0, "RESERVED_BITS", q, u.at("network_flags"))   # SS-WT-003
     in_range(u, "width_log2", 3, 6, q)
     in_range(u, "feed_forward_width", 0, 128, q)
     in_range(u, "geometry_width", 0, 32, q)
@@ -73,7 +73,7 @@ def parse_network(reader):
     u.d, u.e, u.g = 2 ** u.width_log2, u.feed_forward_width, u.geometry_width
     u.n = u.dc_count + u.sh_count
     u.f = u.n + 8
-    require(u.n > 0, "OUT_OF_RANGE", q, u.at("sh_count"))
+    require(u.n > 0, "OUT_OF_RANGE", q, u.at("sh_count"))                             # SS-WT-003
     table = arrays(u)
     size = sum(TYPE_BYTES[kind] * rows * columns for _, kind, rows, columns in table)
     require(size <= reader.left(), "SHORT_SECTION", q, reader.pos)                # SS-WT-004

@@ -9,7 +9,7 @@ import math
 import os
 import struct
 
-from reconstruction import i32le
+from .reconstruction import i32le
 
 
 def fl(x):
@@ -17,7 +17,7 @@ def fl(x):
 
 
 def float_planes(seq, planes):
-    """Name -> list of values for each f32 attribute of a frame; `planes` are the canonical planes."""
+    """SS-OUT-001: name -> list of values for each f32 attribute of a frame; `planes` are the canonical planes."""
     out = {}
 
     def affine(name, offset, step, integers):
@@ -48,7 +48,7 @@ def rotations(step, planes):
         y = fl(step * fl(r1))
         z = fl(step * fl(r2))
         total = fl(fl(fl(x * x) + fl(y * y)) + fl(z * z))
-        rest = fl(1.0 - total)
+        rest = fl(1.0 - total)                      # SS-OUT-003: x, y and z stay as they are
         w = fl(math.sqrt(rest)) if rest > 0 else 0.0
         for plane, value in zip(result, (w, x, y, z)):
             plane.append(value)

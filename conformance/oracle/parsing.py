@@ -2,13 +2,13 @@
 
 from bisect import bisect_right
 
-from constants import STATE_LOW
-from conventions import BitReader, bl, unzigzag
-from errors import require
+from .constants import STATE_LOW
+from .conventions import BitReader, bl, unzigzag
+from .errors import require
 
 
 class BlockDecoder:
-    """decode_block of 8.4 for one block of n Gaussians."""
+    """decode_block of 8.4 for one block of n entries."""
 
     def __init__(self, section, planes, models, lanes, n):
         self.planes = planes
@@ -20,20 +20,21 @@ class BlockDecoder:
         self.e = []                                 # e[p][i], coded values
         self.word_count = section.leb128("6.13")
         self.x = section.values("u32", lanes, "6.13")
-        require(2 * self.word_count <= section.left(), "SHORT_SECTION", "6.13", section.pos)
+        fits = 2 * self.word_count <= section.left()                                  # SS-BL-001
+        require(fits, "SHORT_SECTION", "6.13", section.pos)
         self.words = section.values("u16", self.word_count, "6.13")
         self.next_word = 0
         self.raw = BitReader(section.data, section.pos, section.end, "6.13")
         for state in self.x:
-            require(state >= STATE_LOW, "ENTROPY_FINAL_STATE", "6.13", self.start)
+            require(state >= STATE_LOW, "ENTROPY_FINAL_STATE", "6.13", self.start)    # SS-BL-002
 
     def decode(self):
         for plane, model in zip(self.planes, self.models):
             self.decode_plane(plane, model)
         for state in self.x:
-            require(state == STATE_LOW, "ENTROPY_FINAL_STATE", "8.4", self.start)
-        require(self.next_word == self.word_count, "ENTROPY_FINAL_STATE", "8.4", self.start)
-        self.raw.check_end()
+            require(state == STATE_LOW, "ENTROPY_FINAL_STATE", "8.4", self.start)     # SS-EC-003
+        require(self.next_word == self.word_count, "ENTROPY_FINAL_STATE", "8.4", self.start)  # SS-EC-003
+        self.raw.check_end()                                                          # SS-BL-003
         return self.e
 
     def decode_plane(self, plane, model):
@@ -57,14 +58,14 @@ class BlockDecoder:
             return table.tokens[0]
         x = self.x[lane]
         slot = x & 4095
-        place = bisect_right(table.cum, slot) - 1   # cum[t] <= slot < cum[t] + freq[t]
-        x = table.freq[place] * (x >> 12) + slot - table.cum[place]
+        found = bisect_right(table.cum, slot) - 1   # cum[x] <= slot < cum[x] + freq[x]
+        x = table.freq[found] * (x >> 12) + slot - table.cum[found]
         if x < STATE_LOW:
             word = self.words[self.next_word] if self.next_word < self.word_count else 0
             x = (x << 16) + word
             self.next_word += 1
         self.x[lane] = x
-        return table.tokens[place]
+        return table.tokens[found]
 
     def value(self, token, k):
         """8.2"""
@@ -103,7 +104,7 @@ class BlockDecoder:
         if code == 3:
             values = self.e[p - 1]
         elif code == 4:
-            group = self.e[p - plane.place:p]
+            group = self.e[p - plane.index:p]
             values = [sum(abs(e[i]) for e in group) for i in range(self.n)]
         elif code == 5:
             values = self.log_scale_q(0)

@@ -1,17 +1,18 @@
-"""Clause 7.17: reference sets, neighbours, and the predictors of new Gaussians."""
+"""Clause 7.7: reference sets, neighbours, and the predictors of new Gaussians."""
 
-import heapq
+from bisect import bisect_left
 from collections import namedtuple
 
-from conventions import Round
-from errors import require
-from homes import canonical
-from tables import EXP
-from transformer import Transformer
+from .constants import NEIGHBOUR_WINDOW
+from .conventions import Round
+from .errors import require
+from .lists import canonical
+from .tables import EXP
+from .transformer import Transformer
 
 NONE, KNN, BILATERAL, TRANSFORMER = range(4)
 
-# Values of a Gaussian of a reference set (SS-PR-004): position and rotation are canonical
+# Values of a Gaussian of a reference set (SS-PR-005): position and rotation are canonical
 Reference = namedtuple("Reference", "position q o rotation dc sh")
 
 
@@ -20,62 +21,46 @@ def reference(gaussian):
                      canonical(gaussian.rotation_fine), gaussian.dc, gaussian.sh)
 
 
-# ---- 7.17.2 ----
+# ---- 7.7.2 ----
 
 
 class Neighbours:
-    """SS-PR-004, by a tree that halves the reference set along one axis after the other."""
-
-    LEAF = 8
+    """SS-PR-005: neighbours among the references around a position in the order of Morton codes."""
 
     def __init__(self, references):
         self.references = references
-        self.tree = self.build(list(range(len(references))), 0)
-
-    def build(self, indices, axis):
-        if len(indices) <= self.LEAF:
-            return indices
-        indices.sort(key=lambda g: self.references[g].position[axis])
-        half = len(indices) // 2
-        border = self.references[indices[half]].position[axis]      # below: <= border; above: >= border
-        after = (axis + 1) % 3
-        return (axis, border, self.build(indices[:half], after), self.build(indices[half:], after))
+        self.sorted = sorted((morton(g.position), index) for index, g in enumerate(references))
 
     def find(self, position, neighbour_count):
         """[(D2, index)] of the neighbours in order."""
-        k = min(neighbour_count, len(self.references))
-        worst_first = []                            # heap of (-D2, -index)
-        self.visit(self.tree, position, k, worst_first)
-        return sorted((-d2, -index) for d2, index in worst_first)
+        first = bisect_left(self.sorted, (morton(position), 0))
+        candidates = self.sorted[max(0, first - NEIGHBOUR_WINDOW):first + NEIGHBOUR_WINDOW]
+        by_distance = sorted((self.squared_distance(position, index), index) for _, index in candidates)
+        return by_distance[:neighbour_count]
 
-    def visit(self, node, position, k, worst_first):
-        if isinstance(node, list):
-            for index in node:
-                d2 = sum((a - b) * (a - b) for a, b in zip(position, self.references[index].position))
-                if len(worst_first) < k:
-                    heapq.heappush(worst_first, (-d2, -index))
-                else:
-                    heapq.heappushpop(worst_first, (-d2, -index))
-            return
-        axis, border, below, above = node
-        near, far = (below, above) if position[axis] < border else (above, below)
-        self.visit(near, position, k, worst_first)
-        gap = position[axis] - border
-        # equal distances are visited too: there the index decides
-        if len(worst_first) < k or gap * gap <= -worst_first[0][0]:
-            self.visit(far, position, k, worst_first)
+    def squared_distance(self, position, index):
+        return sum((a - b) * (a - b) for a, b in zip(position, self.references[index].position))
+
+
+def morton(position):
+    """Bit b of position[k] is bit 3b + k of the code."""
+    code = 0
+    for k, x in enumerate(position):
+        for b in range(x.bit_length()):
+            code |= (x >> b & 1) << (3 * b + k)
+    return code
 
 
 def check_predictors(section, network):
-    """SS-PR-002, entry by entry."""
+    """SS-PR-002"""
     for i, value in enumerate(section.values("predictor")[0]):
-        require(NONE <= value <= TRANSFORMER, "OUT_OF_RANGE", "7.17", section.at(i))
-        require(value != TRANSFORMER or network is not None, "UNDEFINED", "7.17", section.at(i))
+        require(NONE <= value <= TRANSFORMER, "OUT_OF_RANGE", "7.7.2", section.at(i))
+        require(value != TRANSFORMER or network is not None, "UNDEFINED", "7.7.2", section.at(i))
 
 
 def predictor_of_entries(count, increment, values, references):
-    """The predictor of each new Gaussian; SS-PR-003. `values` are those of section predictors."""
-    if increment.predictor_block_log2 == 255 or not references:
+    """The predictor of each new Gaussian; `values` are those of section predictors."""
+    if not increment.predictors or not references:                                    # SS-PR-003
         return [NONE] * count
     return [values[i >> increment.predictor_block_log2] for i in range(count)]
 
@@ -90,13 +75,13 @@ class NewPredictions:
         self.increment = increment
         self.context = context
         self.neighbours = [None] * len(kinds)
-        self.learned = {}                           # place of a new Gaussian -> its p.dc and p.sh
+        self.learned = {}                           # entry -> its prediction of dc and sh
         if TRANSFORMER in kinds:
             self.transformer = Transformer(context.network, context.dc_transform, context.sh_transform)
-        tree = Neighbours(references) if any(kinds) else None
+        search = Neighbours(references) if any(kinds) else None
         for i, kind in enumerate(kinds):
             if kind != NONE:
-                self.neighbours[i] = tree.find(positions[i], increment.neighbour_count)
+                self.neighbours[i] = search.find(positions[i], increment.neighbour_count)
 
     def __call__(self, attribute, i, values):
         kind = self.kinds[i]
@@ -110,7 +95,7 @@ class NewPredictions:
             p = self.bilateral(attribute, self.neighbours[i], values)
         return tuple(x << 6 for x in p) if attribute == "rotation" else p
 
-    # ---- 7.16.1 ----
+    # ---- 7.6.1 ----
 
     def none(self, attribute):
         if attribute == "opacity":
@@ -123,7 +108,7 @@ class NewPredictions:
             return self.context.sh_transform.mean
         return (0, 0, 0)
 
-    # ---- 7.17.3 ----
+    # ---- 7.7.3 ----
 
     def knn(self, attribute, neighbours):
         nearest = neighbours[0][0]
@@ -141,9 +126,10 @@ class NewPredictions:
             return mean(weight, values)
         return tuple(mean(weight, column) for column in zip(*values))
 
-    # ---- 7.17.4 ----
+    # ---- 7.7.4 ----
 
     def bilateral(self, attribute, neighbours, values):
+        """SS-PR-007: no exception for a neighbour at distance 0"""
         return self.means(attribute, self.weights(attribute, neighbours, values), neighbours)
 
     def weights(self, attribute, neighbours, values):
@@ -156,7 +142,7 @@ class NewPredictions:
             weight.append(EXP[min(255, xs + xf)])
         return weight
 
-    # ---- 7.17.6 ----
+    # ---- 7.7.6 ----
 
     def transformed(self, attribute, i, values):
         """p.dc and p.sh are found at once, before dc is decoded."""
@@ -172,14 +158,14 @@ class NewPredictions:
 
 
 def mean(weight, x):
-    """SS-PR-005"""
+    """SS-PR-006"""
     W = sum(weight)
     total = sum(w * value for w, value in zip(weight, x))
     return (2 * total + W) // (2 * W)
 
 
 def feature_distance(attribute, values, neighbour):
-    """f of 7.17.4; `values` are those of the new Gaussian so far."""
+    """f of 7.7.4; `values` are those of the new Gaussian so far."""
     f = 0
     if attribute in ("opacity", "rotation", "dc", "sh"):
         f += squares(values.q, neighbour.q)

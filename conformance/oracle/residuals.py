@@ -1,12 +1,12 @@
-"""Clause 7.16: predictions, residuals and reconstruction of section updates and section new."""
+"""Clause 7.6: predictions, residuals and reconstruction of section updates and section new."""
 
-from constants import COLOUR_SHIFT, COMPONENT_MAX, FINE_BITS, OUTPUT_MAX, VALUE_MAX, VALUE_MIN
-from conventions import Round, clamp
-from errors import require
+from .constants import COLOUR_SHIFT, COMPONENT_MAX, FINE_BITS, OUTPUT_MAX, VALUE_MAX, VALUE_MIN
+from .conventions import Round, clamp
+from .errors import require
 
 
 class Values:
-    """Values of one entry; attributes join in the order of 7.17.4. rotation_fine is in 64ths."""
+    """Values of one entry; attributes join in the order of 7.7.4. rotation_fine is in 64ths."""
 
     q = o = rotation_fine = dc = sh = None
 
@@ -15,8 +15,7 @@ class Residuals:
     """Reconstructs `count` entries.
 
     predict(attribute, i, values) gives the prediction of an attribute of entry i, whose attributes before
-    it are in `values`. take(attribute, predictions) gives the planes of the attribute. Predictions and
-    checks are made attribute by attribute in the order of 8.7.
+    it are in `values`. take(attribute, predictions) gives the planes of the attribute.
     """
 
     def __init__(self, count, predict, take, increment, context, at):
@@ -25,7 +24,7 @@ class Residuals:
         self.values = [Values() for _ in range(count)]
 
     def check(self, condition, code):
-        require(condition, code, "7.16", self.at)
+        require(condition, code, "7.6", self.at)
 
     def check_planes(self, planes, low, high):
         for plane in planes:
@@ -39,7 +38,7 @@ class Residuals:
             getattr(self, attribute)(p, v)
         return self.values
 
-    # ---- 7.16.2 ----
+    # ---- 7.6.2 ----
 
     def log_scale(self, p, v):
         shift = self.increment.attribute_shift[0]
@@ -52,45 +51,46 @@ class Residuals:
             q[1].append(q[0][i] - d1)
             q[2].append(q[1][i] - d2)
             steps += [d1, d2]
-        self.check_planes(x, VALUE_MIN, VALUE_MAX)
+        self.check_planes(x, VALUE_MIN, VALUE_MAX)                                    # SS-RC-001
         self.check_planes(q, VALUE_MIN, VALUE_MAX)
         if self.context.seq.canonical_axes == 1:
             for d in steps:
-                self.check(d >= 0, "CONSTRAINT")
+                self.check(d >= 0, "CONSTRAINT")                                      # SS-RC-002
         for i, values in enumerate(self.values):
             values.q = (q[0][i], q[1][i], q[2][i])
 
     def opacity(self, p, v):
         shift = self.increment.attribute_shift[1]
         o = [p[i] + (v[0][i] << shift) for i in range(self.count)]
-        self.check_planes([o], VALUE_MIN, VALUE_MAX)
+        self.check_planes([o], VALUE_MIN, VALUE_MAX)                                  # SS-RC-001
         for values, value in zip(self.values, o):
             values.o = value
 
-    # ---- 7.16.3 ----
+    # ---- 7.6.3 ----
 
     def rotation(self, p, v):
         shift = self.increment.attribute_shift[2]
         coarser = [rotation_coarseness(self.context.seq, values.q) for values in self.values]
         fine = []
         for k in range(3):
-            self.check_planes([v[k]], VALUE_MIN, VALUE_MAX)
+            self.check_planes([v[k]], VALUE_MIN, VALUE_MAX)                           # SS-RC-003
             plane = [p[i][k] + (v[k][i] << (coarser[i] + shift + FINE_BITS)) for i in range(self.count)]
             self.check_planes([plane], -32767 * 64, 32767 * 64)
             fine.append(plane)
         for i, values in enumerate(self.values):
             values.rotation_fine = (fine[0][i], fine[1][i], fine[2][i])
 
-    # ---- 7.16.5 ----
+    # ---- 7.6.5 ----
 
     def dc(self, p, v):
         shift = self.increment.attribute_shift[3]
         component = [[value << shift for value in plane] for plane in v]
-        self.check_planes(component, -COMPONENT_MAX, COMPONENT_MAX)
+        self.check_planes(component, -COMPONENT_MAX, COMPONENT_MAX)                   # SS-RC-005
         for values, out in zip(self.values, self.transformed(p, component, self.context.dc_transform)):
             values.dc = out
 
     def sh(self, p, v):
+        """SS-RC-004"""
         mode, shift = self.increment.sh_mode, self.increment.attribute_shift[4]
         if mode == 0:
             out = [tuple(one) for one in p]
@@ -110,17 +110,16 @@ class Residuals:
             plane = []
             for i in range(self.count):
                 total = sum(weight * component[k][i] for k, weight in enumerate(column))
-                plane.append(p[i][j] + Round(total, COLOUR_SHIFT))
-            self.check_planes([plane], -OUTPUT_MAX, OUTPUT_MAX)
+                plane.append(p[i][j] + Round(total, COLOUR_SHIFT))                    # SS-AT-002
+            self.check_planes([plane], -OUTPUT_MAX, OUTPUT_MAX)                       # SS-RC-006
             out.append(plane)
         return list(zip(*out))
 
     def looked_up(self, v):
-        """SS-SH-003 without the transform: sums of codebook entries, clamped."""
-        books = [self.context.codebooks[identifier]
-                 for identifier in self.increment.codebook_ids[:self.increment.vq_stage_count]]
+        """SS-SH-001 without the transform: sums of codebook entries, clamped."""
+        books = [self.context.codebooks[identifier] for identifier in self.increment.codebook_ids]
         for book, plane in zip(books, v):
-            self.check_planes([plane], 0, book.entry_count - 1)
+            self.check_planes([plane], 0, book.entry_count - 1)                       # SS-RC-005
         component = []
         for k in range(self.context.sh_transform.rank):
             totals = [sum(book.values[v[s][i] * book.component_count + k] for s, book in enumerate(books))
@@ -130,6 +129,7 @@ class Residuals:
 
 
 def rotation_coarseness(seq, q):
-    """c of 7.6"""
+    """`shift` of 7.6.3"""
     d = q[0] - q[2]
+    # SS-AT-001: a threshold of 0 never counts
     return sum(1 for threshold in seq.rotation_threshold if threshold > 0 and d < threshold)

@@ -1,50 +1,38 @@
-"""Clause 6: the records with their constraints, in the order of 9.3 step 3.
+"""Clause 6: the records with their constraints, one after the other.
 
-Each parse_* function takes the reader of a payload and the state it relates to, and returns a Record.
-Order in a payload: presence of the fixed part; its elements in the order of the table, ranges and
-reserved values; then the relations to other records; then limits; then the variable part; then
-bytes left over.
+Each parse_* function takes the reader of a payload and the state it relates to, and returns a Record. Every
+element is checked before something is read or computed by means of it.
 """
 
-import constants as c
-import syntax
-from conventions import TYPE_BYTES, ByteReader, ceil_div, crc32
-from errors import StreamError, require
-from syntax import Record
+from . import constants as c, syntax
+from .conventions import TYPE_BYTES, ByteReader, ceil_div, crc32
+from .errors import StreamError, require
+from .syntax import Record
 
 
 def in_range(record, element, low, high, clause, code="OUT_OF_RANGE"):
-    """Range of one element, or of each place of an array."""
+    """SS-ER-001: range of one element, or of each value of an array."""
     value = getattr(record, element)
-    for place in value if isinstance(value, list) else [value]:
+    for one in value if isinstance(value, list) else [value]:
         # NaN fails both comparisons, infinities fail one: outside every range (6.1).
-        require(low <= place <= high, code, clause, record.at(element))
+        require(low <= one <= high, code, clause, record.at(element))
 
 
-def reserved_zero(record, element, clause):
+def reserved_zero(record, element, clause, mask=0xFFFFFFFF):
+    """SS-ER-002: the bits of `mask` are reserved."""
     value = getattr(record, element)
-    for place in value if isinstance(value, list) else [value]:
-        require(place == 0, "RESERVED_BITS", clause, record.at(element))
+    for one in value if isinstance(value, list) else [value]:
+        require(one & mask == 0, "RESERVED_BITS", clause, record.at(element))
 
 
 def one_of(record, element, allowed, clause, code):
     require(getattr(record, element) in allowed, code, clause, record.at(element))
 
 
-def sh_elements(record, clause):
-    """sh_mode, vq_stage_count and codebook_ids, which refinements and increments share."""
-    one_of(record, "sh_mode", (0, 1, 2), clause, "RESERVED")
-    low, high = (1, c.MAX_STAGES) if record.sh_mode == 2 else (0, 0)
-    in_range(record, "vq_stage_count", low, high, clause)
-    for place, identifier in enumerate(record.codebook_ids):
-        good = identifier <= c.MAX_ID if place < record.vq_stage_count else identifier == c.NONE_ID
-        require(good, "OUT_OF_RANGE", clause, record.at("codebook_ids") + place)
-
-
 def element_at_end(table, start, end):
     """Offset of the element of a record in which the data end."""
-    for _, kind, places, _ in table:
-        size = TYPE_BYTES[kind] * places
+    for _, kind, count, _ in table:
+        size = TYPE_BYTES[kind] * count
         if start + size > end:
             return start
         start += size
@@ -55,80 +43,101 @@ def element_at_end(table, start, end):
 
 
 def parse_file_header(data):
+    """SS-FH-005: the order of the checks"""
     present = data[:8]
-    require(present == c.SIGNATURE[:len(present)], "SIGNATURE", "6.2", 0)
+    require(present == c.SIGNATURE[:len(present)], "SIGNATURE", "6.2", 0)             # SS-FH-001
     if len(data) < c.FILE_HEADER_BYTES:
         raise StreamError("TRUNCATED", "6.2", element_at_end(syntax.FILE_HEADER, 0, len(data)))
     header = Record(syntax.FILE_HEADER, ByteReader(data, 0, c.FILE_HEADER_BYTES))
-    require(header.header_crc == crc32(data[:12]), "CHECK_SUM", "6.2", header.at("header_crc"))
-    one_of(header, "version_major", (c.VERSION_MAJOR,), "6.2", "RESERVED")
-    one_of(header, "profile", (c.PROFILE_INTRA, c.PROFILE_DYNAMIC), "6.2", "RESERVED")
+    require(header.header_crc == crc32(data[:12]), "CHECKSUM", "6.2", header.at("header_crc"))      # SS-FH-002
+    one_of(header, "version_major", (c.VERSION[0],), "6.2", "RESERVED")               # SS-FH-003
+    one_of(header, "version_minor", (c.VERSION[1],), "6.2", "RESERVED")
+    one_of(header, "profile", (c.PROFILE_INTRA, c.PROFILE_DYNAMIC), "6.2", "RESERVED")              # SS-FH-004
     one_of(header, "level", (1, 2, 3, 4), "6.2", "RESERVED")
     return header
 
 
-# ---- 6.3 unit_header: 9.3 steps 2.1 to 2.8 ----
+# ---- 6.3 unit_header ----
 
 
-def parse_unit_header(data, start, units_before, profile=c.PROFILE_INTRA):
+def read_unit_header(data, start, units_before=0):
+    """The unit_header at `start`, if its extent is usable (7.1.3): `end` is the offset after the payload."""
     if len(data) - start < c.UNIT_HEADER_BYTES:
         raise StreamError("TRUNCATED", "5.3", element_at_end(syntax.UNIT_HEADER, start, len(data)))
     reader = ByteReader(data, start, start + c.UNIT_HEADER_BYTES)
     unit = Record(syntax.UNIT_HEADER, reader)
     unit.start = start
     unit.payload_start = reader.pos
+    unit.end = unit.payload_start + unit.payload_length
+    unit.known = unit.unit_type in c.KNOWN_UNIT_TYPES
     covered = data[start:start + 6] + data[start + 8:start + 20]
-    require(unit.header_check == crc32(covered) & 0xFFFF, "CHECK_SUM", "6.3", unit.at("header_check"))
-    require(unit.unit_type != 0, "NUMBER", "6.3", unit.at("unit_type"))
-    require(unit.unit_flags & 0xFE == 0, "RESERVED_BITS", "6.3", unit.at("unit_flags"))
-    reserved_zero(unit, "reserved_zero", "6.3")
-    unit.known = unit.unit_type in c.known_unit_types(profile)
-    if not unit.known:
-        require(unit.unit_flags & 1 == 0, "RESERVED", "6.3", unit.at("unit_type"))
-    else:
-        kind, dynamic = unit.unit_type, profile == c.PROFILE_DYNAMIC      # SS-UH-006, SS-UH-007
-        spatial = dynamic and kind in (c.UT_FRAME, c.UT_INCREMENT)
-        temporal = dynamic and kind in (c.UT_FRAME, c.UT_INCREMENT, c.UT_CODEBOOK)
-        in_range(unit, "spatial_layer", 0, c.MAX_LAYERS - 1 if spatial else 0, "6.3")
-        in_range(unit, "temporal_layer", 0, c.MAX_LAYERS - 1 if temporal else 0, "6.3")
-        refined = kind in (c.UT_REFINEMENT, c.UT_INCREMENT)
-        in_range(unit, "refinement", 0, c.MAX_REFINEMENTS - 1 if refined else 0, "6.3")
-        if kind in (c.UT_SEQUENCE, c.UT_POINTS, c.UT_INDEX, c.UT_END):
-            in_range(unit, "frame", 0, 0, "6.3")
+    require(unit.header_check == crc32(covered) & 0xFFFF, "CHECKSUM", "6.3", unit.at("header_check"))   # SS-UH-001
     require(units_before + 1 <= c.MAX_UNITS, "OVER_LIMIT", "A.2", start)
     require(unit.payload_length <= c.MAX_PAYLOAD_LENGTH, "OVER_LIMIT", "A.2", unit.at("payload_length"))
-    unit.end = unit.payload_start + unit.payload_length
     require(unit.end <= len(data), "TRUNCATED", "B.1", unit.payload_start)
+    return unit
+
+
+def check_unit_type(unit, profile):
+    """unit_type and reserved bits of a unit_header, SS-UH-003"""
+    require(unit.unit_type != 0, "NUMBER", "6.3", unit.at("unit_type"))               # SS-UH-002
+    reserved_zero(unit, "unit_flags", "6.3", 0xFE)
+    reserved_zero(unit, "reserved_zero", "6.3")
+    require(unit.known or unit.unit_flags & 1 == 0, "RESERVED", "6.3", unit.at("unit_type"))         # SS-UH-005
+    if profile != c.PROFILE_DYNAMIC:                                                  # SS-UH-006
+        require(unit.unit_type != c.UT_WEIGHTS, "RESERVED", "6.3", unit.at("unit_type"))
+
+
+def check_elements(unit):
+    """The numbers in the unit_header of a unit of known type, SS-UH-007, SS-UH-008"""
+    kind = unit.unit_type
+    temporal = kind in (c.UT_FRAME, c.UT_INCREMENT, c.UT_CODEBOOK)
+    refined = kind == c.UT_INCREMENT
+    in_range(unit, "spatial_layer", 0, c.MAX_LAYERS - 1 if refined else 0, "6.3")
+    in_range(unit, "temporal_layer", 0, c.MAX_LAYERS - 1 if temporal else 0, "6.3")
+    in_range(unit, "refinement", 0, c.MAX_REFINEMENTS - 1 if refined else 0, "6.3")
+    if kind in (c.UT_SEQUENCE, c.UT_SCENE, c.UT_POINTS, c.UT_INDEX, c.UT_END):
+        in_range(unit, "frame", 0, 0, "6.3")
+
+
+def check_layers(unit, seq):
+    """SS-UH-008, the part that needs the sequence_parameters"""
+    in_range(unit, "spatial_layer", 0, seq.spatial_layer_count - 1, "6.3")
+    in_range(unit, "temporal_layer", 0, seq.temporal_layer_count - 1, "6.3")
+
+
+def parse_unit_header(data, start, profile=c.PROFILE_DYNAMIC):
+    """A unit_header with all checks of 6.3."""
+    unit = read_unit_header(data, start)
+    check_unit_type(unit, profile)
+    if unit.known:
+        check_elements(unit)
     return unit
 
 
 # ---- 6.4 sequence_parameters ----
 
 
-def parse_sequence_parameters(reader, profile=c.PROFILE_INTRA):
+def parse_sequence_parameters(reader, profile=c.PROFILE_DYNAMIC):
     seq = Record(syntax.SEQUENCE_PARAMETERS, reader)
     q = "6.4"
-    layers = c.MAX_LAYERS if profile == c.PROFILE_DYNAMIC else 1
+    dynamic = profile == c.PROFILE_DYNAMIC
+    layers = c.MAX_LAYERS if dynamic else 1
     in_range(seq, "sh_degree", 0, 3, q)
     in_range(seq, "spatial_layer_count", 1, layers, q)
     in_range(seq, "temporal_layer_count", 1, layers, q)
     in_range(seq, "refinement_count", 1, c.MAX_REFINEMENTS, q)
-    percent, count = seq.refinement_percent, seq.refinement_count
-    good = percent[0] >= 1 and percent[count - 1] == 100
-    for r in range(1, count):
-        good = good and percent[r] > percent[r - 1]
-    for r in range(count, 10):
-        good = good and percent[r] == 0
-    require(good, "OUT_OF_RANGE", q, seq.at("refinement_percent"))
+    check_percent(seq)
     in_range(seq, "position_bits", 1, 20, q)
     in_range(seq, "block_log2", 6, 16, q)
-    require(seq.sequence_flags & 0xFC == 0, "RESERVED_BITS", q, seq.at("sequence_flags"))
+    reserved_zero(seq, "sequence_flags", q, 0xF8 if dynamic else 0xFC)                # SS-SP-004
     threshold = seq.rotation_threshold
-    require(threshold[0] >= threshold[1] >= threshold[2], "OUT_OF_RANGE", q, seq.at("rotation_threshold"))
+    good = threshold[0] >= threshold[1] >= threshold[2]
+    require(good, "OUT_OF_RANGE", q, seq.at("rotation_threshold"))                    # SS-SP-002
     in_range(seq, "ticks_per_second", 1, 2 ** 32 - 1, q)
     for element in ("position_offset", "position_step", "log_scale_offset", "log_scale_step", "rotation_step",
                     "opacity_offset", "opacity_step", "dc_step", "sh_step"):
-        if element.endswith("_offset"):
+        if element.endswith("_offset"):                                               # SS-SP-003
             in_range(seq, element, -2.0 ** 40, 2.0 ** 40, q, "CONSTRAINT")
         else:
             largest = 1.0 if element == "rotation_step" else 2.0 ** 20
@@ -136,29 +145,37 @@ def parse_sequence_parameters(reader, profile=c.PROFILE_INTRA):
     reader.check_end("5.4")
     seq.sh_planes = 3 * ((seq.sh_degree + 1) * (seq.sh_degree + 1) - 1)
     seq.canonical_axes = seq.sequence_flags & 1
+    seq.whole_anchor = seq.sequence_flags >> 2 & 1
     seq.top = seq.spatial_layer_count - 1
     return seq
+
+
+def check_percent(seq):
+    """SS-SP-001"""
+    percent, count = seq.refinement_percent, seq.refinement_count
+    good = percent[0] >= 1 and percent[count - 1] == 100
+    for r in range(1, count):
+        good = good and percent[r] > percent[r - 1]
+    for r in range(count, 10):
+        good = good and percent[r] == 0
+    require(good, "OUT_OF_RANGE", "6.4", seq.at("refinement_percent"))
 
 
 # ---- 6.5 gop_header ----
 
 
-def parse_gop_header(reader, unit, next_gop, profile=c.PROFILE_INTRA, temporal_layer_count=1):
-    """next_gop is None for the first GOP of a decoder that starts inside a stream (B.3)."""
+def parse_gop_header(reader, unit, profile, temporal_layer_count):
+    """The unit against the GOPs before it (SS-GH-001) is checked in decoding.py."""
     gop = Record(syntax.GOP_HEADER, reader)
-    dynamic = profile == c.PROFILE_DYNAMIC
+    structures = (0, 1) if profile == c.PROFILE_DYNAMIC else (0,)
     in_range(gop, "gop_frame_count", 1, 2 ** 32 - 1, "6.5")
-    one_of(gop, "gop_structure", (0, 1) if dynamic else (0,), "6.5", "RESERVED")
-    if dynamic:                                                           # SS-GH-006
-        in_range(gop, "temporal_depth", 0, c.MAX_LAYERS - 1 if gop.gop_structure == 1 else 0, "6.5")
-    else:
-        reserved_zero(gop, "temporal_depth", "6.5")
+    one_of(gop, "gop_structure", structures, "6.5", "RESERVED")                       # SS-GH-002
+    depths = min(c.MAX_LAYERS, temporal_layer_count) if gop.gop_structure == 1 else 1
+    in_range(gop, "temporal_depth", 0, depths - 1, "6.5")                             # SS-GH-006
     reserved_zero(gop, "reserved_zero", "6.5")
-    if gop.gop_structure == 1:                                            # SS-GH-005, SS-GH-006
+    if gop.gop_structure == 1:                                                        # SS-GH-005
         in_range(gop, "gop_frame_count", 1, c.MAX_PREDICTED_FRAMES, "6.5")
-        in_range(gop, "temporal_depth", 0, temporal_layer_count - 1, "6.5")
-    require(next_gop is None or gop.gop_index == next_gop, "MISMATCH", "6.5", gop.at("gop_index"))
-    require(unit.frame + gop.gop_frame_count <= 2 ** 32, "OUT_OF_RANGE", "6.5", gop.at("gop_frame_count"))
+    require(unit.frame + gop.gop_frame_count <= 2 ** 32, "OUT_OF_RANGE", "6.5", gop.at("gop_frame_count"))  # SS-GH-003
     reader.check_end("5.5")
     return gop
 
@@ -166,20 +183,34 @@ def parse_gop_header(reader, unit, next_gop, profile=c.PROFILE_INTRA, temporal_l
 # ---- 6.6 frame_header ----
 
 
-def parse_frame_header(reader, dc_transforms, sh_transforms, level, frame_type=None):
-    """frame_type is what 7.13.1 gives the frame in profile 1, None in profile 0."""
+def parse_frame_header(reader, seq, level, frame_type, dc_transforms, sh_transforms):
+    """frame_type is that of 7.3.1; `cells` is the division of the section cells, or None."""
     frame = Record(syntax.FRAME_HEADER, reader)
-    types = (c.TYPE_I,) if frame_type is None else (c.TYPE_I, c.TYPE_P, c.TYPE_B)
-    one_of(frame, "frame_type", types, "6.6", "RESERVED")
-    in_range(frame, "dc_transform_id", 0, c.MAX_ID, "6.6")
-    one_of(frame, "sh_transform_id", tuple(range(c.MAX_ID + 1)) + (c.NONE_ID,), "6.6", "OUT_OF_RANGE")
-    reserved_zero(frame, "reserved_zero", "6.6")
-    if frame_type is not None:                                            # SS-FR-004
-        one_of(frame, "frame_type", (frame_type,), "6.6", "MISMATCH")
-    one_of(frame, "dc_transform_id", dc_transforms, "6.6", "UNDEFINED")
+    q = "6.6"
+    one_of(frame, "frame_type", (c.TYPE_I, c.TYPE_P, c.TYPE_B), q, "RESERVED")        # SS-FR-001
+    one_of(frame, "frame_type", (frame_type,), q, "MISMATCH")                         # SS-FR-002
+    in_range(frame, "dc_transform_id", 0, c.MAX_ID, q)
+    one_of(frame, "sh_transform_id", tuple(range(c.MAX_ID + 1)) + (c.NONE_ID,), q, "OUT_OF_RANGE")
+    reserved_zero(frame, "frame_flags", q, 0xFC)                                      # SS-FR-004
+    if frame_type == c.TYPE_I:
+        one_of(frame, "frame_flags", (0,), q, "MISMATCH")
+    one_of(frame, "dc_transform_id", dc_transforms, q, "UNDEFINED")                   # SS-FR-003
     if frame.sh_transform_id != c.NONE_ID:
-        one_of(frame, "sh_transform_id", sh_transforms, "6.6", "UNDEFINED")
-    in_range(frame, "gaussian_count", 0, c.MAX_GAUSSIANS[level], "6.6", "OVER_LIMIT")
+        one_of(frame, "sh_transform_id", sh_transforms, q, "UNDEFINED")
+    in_range(frame, "gaussian_count", 0, c.MAX_GAUSSIANS[level], q, "OVER_LIMIT")     # SS-FR-005
+    if seq.ticks_per_frame != 0:                                                      # SS-FR-006
+        slow = frame.gaussian_count * seq.ticks_per_second <= c.MAX_GAUSSIAN_RATE[level] * seq.ticks_per_frame
+        require(slow, "OVER_LIMIT", "A.2", frame.at("gaussian_count"))
+    frame.carried_digest = None
+    if frame.frame_flags & 1:
+        frame.read(syntax.FRAME_CARRIED_DIGEST, reader)
+    frame.cell_count, frame.cell_log2, frame.cells = 0, 0, None
+    if frame.frame_flags & 2:
+        frame.read(syntax.FRAME_CELLS, reader)
+        in_range(frame, "cell_count", 1, 2 ** 32 - 1, q)                              # SS-FR-007
+        in_range(frame, "cell_count", 1, c.MAX_CELLS[level], "A.2", "OVER_LIMIT")
+        in_range(frame, "cell_log2", 0, seq.position_bits, q)
+        frame.cells = Division("cells", frame.cell_count, reader, seq.block_log2)     # SS-FR-008
     reader.check_end("5.6")
     return frame
 
@@ -190,17 +221,17 @@ def parse_frame_header(reader, dc_transforms, sh_transforms, level, frame_type=N
 def parse_transform(reader, sh_planes, dc_transforms, sh_transforms):
     t = Record(syntax.TRANSFORM_FIXED, reader)
     in_range(t, "transform_id", 0, c.MAX_ID, "6.7")
-    one_of(t, "transform_kind", (0, 1), "6.7", "RESERVED")
-    one_of(t, "dimension", (3 if t.transform_kind == 0 else sh_planes,), "6.7", "MISMATCH")
+    one_of(t, "transform_kind", (0, 1), "6.7", "RESERVED")                            # SS-TF-001
+    one_of(t, "dimension", (3 if t.transform_kind == 0 else sh_planes,), "6.7", "MISMATCH")  # SS-TF-002
     in_range(t, "rank", 1, t.dimension, "6.7")
     defined = sh_transforms if t.transform_kind == 1 else dc_transforms
-    require(t.transform_id not in defined, "CONSTRAINT", "6.7", t.at("transform_id"))
+    require(t.transform_id not in defined, "CONSTRAINT", "6.7", t.at("transform_id"))  # SS-TF-003
     mean_at = reader.pos
     t.mean = reader.values("i32", t.dimension, "5.7")
     basis_at = reader.pos
     t.basis = reader.values("i16", t.rank * t.dimension, "5.7")
     reader.check_end("5.7")
-    for j, value in enumerate(t.mean):
+    for j, value in enumerate(t.mean):                                                # SS-TF-004
         require(abs(value) <= c.MEAN_MAX, "OUT_OF_RANGE", "6.7", mean_at + 4 * j)
     for k, value in enumerate(t.basis):
         require(abs(value) <= c.BASIS_MAX, "OUT_OF_RANGE", "6.7", basis_at + 2 * k)
@@ -210,88 +241,205 @@ def parse_transform(reader, sh_planes, dc_transforms, sh_transforms):
 # ---- 6.8 codebook ----
 
 
-def parse_codebook(reader, codebooks, temporal_layer=None):
-    """temporal_layer is that of the unit header in profile 1, None in profile 0."""
+def parse_codebook(reader, codebooks, temporal_layer, level):
+    """temporal_layer is that of the unit header; `codebooks` are the definitions in force before the unit."""
     book = Record(syntax.CODEBOOK_FIXED, reader)
     in_range(book, "codebook_id", 0, c.MAX_ID, "6.8")
     in_range(book, "component_count", 1, 45, "6.8")
     one_of(book, "value_bytes", (1, 2), "6.8", "OUT_OF_RANGE")
     old = codebooks.get(book.codebook_id)
-    good = old is None or (temporal_layer is not None and old.temporal_layer == temporal_layer)
-    require(good, "CONSTRAINT", "6.8", book.at("codebook_id"))            # SS-CB-001, SS-CB-003
+    good = old is None or old.temporal_layer == temporal_layer
+    require(good, "CONSTRAINT", "6.8", book.at("codebook_id"))                        # SS-CB-001
     book.temporal_layer = temporal_layer
     book.entry_count = book.entry_count_minus1 + 1
     book.value_count = book.entry_count * book.component_count
     total = book.value_count + sum(other.value_count for other in codebooks.values() if other is not old)
-    require(total <= c.MAX_CODEBOOK_VALUES, "OVER_LIMIT", "A.2", book.at("entry_count_minus1"))
+    require(total <= c.MAX_CODEBOOK_VALUES[level], "OVER_LIMIT", "A.2", book.at("entry_count_minus1"))  # SS-CB-002
     book.values = reader.values("i8" if book.value_bytes == 1 else "i16", book.value_count, "5.8")
     reader.check_end("5.8")
     return book
-
-
-# ---- 6.9 refinement: the fixed part and the division into sections ----
-
-
-def parse_refinement(reader, seq, frame, expected_count, sh_transform, codebooks):
-    """sh_transform is the frame's sh transform or None."""
-    u = Record(syntax.REFINEMENT_FIXED, reader)
-    q = "6.9"
-    in_range(u, "position_shift", 0, seq.position_bits - 1, q)
-    in_range(u, "lanes_log2", 0, 5, q)
-    sh_elements(u, q)
-    # relations to other records
-    require(u.gaussian_count == expected_count, "MISMATCH", "7.2", u.at("gaussian_count"))
-    if sh_transform is None:
-        in_range(u, "sh_mode", 0, 0, q)
-    for stage in range(u.vq_stage_count):
-        book = codebooks.get(u.codebook_ids[stage])
-        at = u.at("codebook_ids") + stage
-        require(book is not None, "UNDEFINED", q, at)
-        require(book.component_count == sh_transform.rank, "MISMATCH", q, at)
-    # division into sections
-    at = reader.pos
-    u.model_length = reader.leb128("5.9")
-    if u.gaussian_count == 0:
-        require(u.model_length == 0, "MISMATCH", q, at)
-    u.models_section = reader.section(u.model_length, "5.9")
-    block_count = ceil_div(u.gaussian_count, 2 ** seq.block_log2)
-    u.block_length = [reader.leb128("5.9") for _ in range(block_count)]
-    u.block_sections = [reader.section(length, "5.9") for length in u.block_length]
-    reader.check_end("5.9")
-    return u
 
 
 # ---- 6.10 index ----
 
 
 def parse_index(reader, gops):
-    """gops: (frame, offset) of each gop_header unit so far; None for a decoder inside a stream."""
+    """gops: (frame, offset) of each gop_header unit of the stream, or None if they are not compared."""
     index = Record(syntax.INDEX_FIXED, reader)
-    if gops is not None:
+    if gops is not None:                                                              # SS-IX-001
         require(index.entry_count == len(gops), "MISMATCH", "6.10", index.at("entry_count"))
     require(16 * index.entry_count <= reader.left(), "SHORT_SECTION", "5.10", reader.pos)
-    entries = [Record(syntax.INDEX_ENTRY, reader) for _ in range(index.entry_count)]
+    index.entries = [Record(syntax.INDEX_ENTRY, reader) for _ in range(index.entry_count)]
     reader.check_end("5.10")
-    for entry in entries:
+    for entry in index.entries:
         reserved_zero(entry, "reserved_zero", "6.10")
-    if gops is not None:
-        for k, entry in enumerate(entries):
-            require(entry.frame == gops[k][0], "MISMATCH", "6.10", entry.at("frame"))
-            require(entry.offset == gops[k][1], "MISMATCH", "6.10", entry.at("offset"))
+    for before, entry in zip(index.entries, index.entries[1:]):                       # SS-IX-002
+        for element in ("frame", "offset"):
+            good = getattr(before, element) < getattr(entry, element)
+            require(good, "MISMATCH", "6.10", entry.at(element))
+    for entry, (frame, offset) in zip(index.entries, gops or []):                     # SS-IX-001
+        require(entry.frame == frame, "MISMATCH", "6.10", entry.at("frame"))
+        require(entry.offset == offset, "MISMATCH", "6.10", entry.at("offset"))
     return index
 
 
 # ---- 6.11 end ----
 
 
-def parse_end(reader, seq, frame_count, gop_frames, unit_count, index_offset, inside):
-    """gop_frames is the sum of gop_frame_count over the gop_header units."""
+def parse_end(reader):
     end = Record(syntax.END, reader)
-    if not inside:
-        require(end.frame_count == frame_count, "MISMATCH", "6.11", end.at("frame_count"))
-        require(end.unit_count == unit_count, "MISMATCH", "6.11", end.at("unit_count"))
-        require(end.index_offset == index_offset, "MISMATCH", "6.11", end.at("index_offset"))
-        if seq.frame_count != 0:                                          # SS-SP-005
-            require(seq.frame_count == gop_frames, "MISMATCH", "6.4", end.at("frame_count"))
     reader.check_end("5.11")
     return end
+
+
+def check_end(end, seq, frame_count, unit_count, index_offset, gop_frames):
+    """gop_frames is the sum of gop_frame_count over the gop_header units of the stream."""
+    require(end.frame_count == frame_count, "MISMATCH", "6.11", end.at("frame_count"))              # SS-EN-001
+    require(end.unit_count == unit_count, "MISMATCH", "6.11", end.at("unit_count"))
+    require(end.index_offset == index_offset, "MISMATCH", "6.11", end.at("index_offset"))
+    if seq.frame_count != 0:                                                          # SS-SP-006
+        require(seq.frame_count == gop_frames, "MISMATCH", "6.4", end.at("frame_count"))
+
+
+# ---- 6.14 increment ----
+
+# The bits of increment_flags
+PARENTS, MOVES, UPDATES, REMOVALS, NEW, POSITION_SHIFT, ATTRIBUTE_SHIFT, PREDICTORS, SH, COMPENSATION = (
+    1 << bit for bit in range(10))
+ABSENT = {"parent_count": 0, "move_count": 0, "update_count": 0, "remove_count": 0, "new_count": 0,
+          "position_shift": 0, "attribute_shift": (0, 0, 0, 0, 0), "sh_mode": 0, "vq_stage_count": 0,
+          "codebook_ids": (), "compensation_log_scale": 0, "compensation_opacity": 0}
+
+# SS-IN-011
+SECTIONS = ("modes", "moves", "updates", "predictors", "new")
+
+
+def parse_increment(reader, unit, frame, context, parent_count):
+    """The elements of 5.14 up to the sections.
+
+    `context` has the sequence, the level, the profile, and what the GOP defines; parent_count is that of 7.4.2.
+    """
+    u = Record(syntax.INCREMENT_FIXED, reader)
+    q, flags = "6.14", u.increment_flags
+    reserved_zero(u, "increment_flags", q, 0xFC00)                                    # SS-IN-002
+    flags_at = u.at("increment_flags")
+    dynamic = context.profile == c.PROFILE_DYNAMIC
+    require(not flags & PREDICTORS or dynamic, "RESERVED", q, flags_at)               # SS-IN-004
+    require(not flags & PREDICTORS or flags & NEW, "CONSTRAINT", q, flags_at)         # SS-IN-003
+    u.predictors = bool(flags & PREDICTORS)
+    for element, value in ABSENT.items():                                             # SS-IN-001
+        setattr(u, element, value)
+    for bit, part in enumerate(syntax.INCREMENT_PARTS):
+        if flags >> bit & 1:
+            u.read(part, reader)
+            if 1 << bit == SH:
+                read_sh(u, reader)
+    check_counts(u, unit, frame, context.level, parent_count)
+    if u.has("position_shift"):
+        in_range(u, "position_shift", 0, context.seq.position_bits - 1, q)
+    if u.has("attribute_shift"):
+        in_range(u, "attribute_shift", 0, c.MAX_ATTRIBUTE_SHIFT, q)
+    if u.predictors:
+        in_range(u, "predictor_block_log2", 0, 16, q)
+        in_range(u, "neighbour_count", 1, c.MAX_NEIGHBOURS, q)
+    check_sh(u, unit, context)
+    return u
+
+
+def divide_increment(u, reader, block_log2):
+    """The division into sections, SS-IN-011"""
+    u.sections = [Division(name, count, reader, block_log2) for name, count in section_counts(u) if count > 0]
+    reader.check_end("5.14")
+
+
+def read_sh(u, reader):
+    """The part `sh` with the ranges that its reading needs (SS-IN-010)"""
+    one_of(u, "sh_mode", (0, 1, 2), "6.14", "RESERVED")
+    in_range(u, "sh_mode", 1, 2, "6.14")
+    if u.sh_mode == 2:
+        u.read(syntax.INCREMENT_STAGES, reader)
+        in_range(u, "vq_stage_count", 1, c.MAX_STAGES, "6.14")
+        u.codebook_ids_at = reader.pos
+        u.codebook_ids = reader.values("u8", u.vq_stage_count, "6.14")
+
+
+def check_counts(u, unit, frame, level, parent_count):
+    """What is known of the counts before a section is read"""
+    q = "6.14"
+    for element in ("parent_count", "move_count", "update_count", "remove_count", "new_count"):
+        if u.has(element):                                                            # SS-IN-001
+            in_range(u, element, 1, 2 ** 32 - 1, q)
+    for element in ("parent_count", "new_count"):                                     # SS-IN-008
+        if u.has(element):
+            in_range(u, element, 1, c.MAX_GAUSSIANS[level], "A.2", "OVER_LIMIT")
+    if u.has("new_count"):                                                            # SS-IN-009
+        in_range(u, "new_count", 1, c.MAX_NEW_PER_BYTE * unit.payload_length, "A.2", "OVER_LIMIT")
+    parents_at = u.at("parent_count" if u.has("parent_count") else "increment_flags")
+    require(u.parent_count == parent_count, "MISMATCH", q, parents_at)                # SS-IN-005
+    for element in ("move_count", "update_count", "remove_count"):                    # SS-IN-006
+        if u.has(element):
+            in_range(u, element, 1, u.parent_count, q, "MISMATCH")
+    if frame.intra and u.has("remove_count"):                                         # SS-IN-007
+        raise StreamError("MISMATCH", q, u.at("remove_count"))
+
+
+def check_sh(u, unit, context):
+    """SS-IN-010 against the frame and the definitions in force"""
+    q = "6.14"
+    if u.sh_mode != 0:
+        require(context.sh_transform is not None, "OUT_OF_RANGE", q, u.at("sh_mode"))
+    for stage, identifier in enumerate(u.codebook_ids):
+        at = u.codebook_ids_at + stage
+        require(identifier <= c.MAX_ID, "OUT_OF_RANGE", q, at)
+        book = context.codebooks.get(identifier)
+        require(book is not None, "UNDEFINED", q, at)
+        require(book.temporal_layer <= unit.temporal_layer, "CONSTRAINT", q, at)
+        require(book.component_count == context.sh_transform.rank, "MISMATCH", q, at)
+
+
+def section_counts(u):
+    """The table of SS-IN-011: (section, count) in order."""
+    changed = u.increment_flags & (MOVES | UPDATES | REMOVALS)
+    predictor_count = ceil_div(u.new_count, 2 ** u.predictor_block_log2) if u.predictors else 0
+    return list(zip(SECTIONS, (u.parent_count if changed else 0, u.move_count, u.update_count,
+                               predictor_count, u.new_count)))
+
+
+# ---- 6.15 section ----
+
+
+class Division:
+    """A section of 5.15 divided into its parts."""
+
+    def __init__(self, name, count, reader, block_log2):
+        self.name, self.count = name, count
+        at = reader.pos
+        lanes_log2 = reader.value("u8", "5.15")
+        require(lanes_log2 <= 5, "OUT_OF_RANGE", "6.15", at)
+        self.lanes = 2 ** lanes_log2
+        self.models_section = reader.section(reader.leb128("5.15"), "5.15")
+        lengths = [reader.leb128("5.15") for _ in range(ceil_div(count, 2 ** block_log2))]
+        self.block_sections = [reader.section(length, "5.15") for length in lengths]
+
+
+# ---- 6.16 operating_points ----
+
+
+def parse_points(reader):
+    """The entries as far as they are checked without the stream before them."""
+    q = "6.16"
+    u = Record(syntax.POINTS_FIXED, reader)
+    reserved_zero(u, "reserved_zero", q)
+    require(24 * u.point_count <= reader.left(), "SHORT_SECTION", "5.16", reader.pos)
+    entries = [Record(syntax.OPERATING_POINT, reader) for _ in range(u.point_count)]
+    reader.check_end("5.16")
+    before = None
+    for entry in entries:
+        in_range(entry, "spatial_layer", 0, c.MAX_LAYERS - 1, q)
+        in_range(entry, "temporal_layer", 0, c.MAX_LAYERS - 1, q)
+        in_range(entry, "refinement", 0, c.MAX_REFINEMENTS - 1, q)
+        reserved_zero(entry, "reserved_zero", q)
+        entry.point = (entry.spatial_layer, entry.temporal_layer, entry.refinement)
+        require(before is None or before < entry.point, "CONSTRAINT", q, entry.at("spatial_layer"))   # SS-PL-001
+        before = entry.point
+    return entries

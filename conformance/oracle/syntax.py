@@ -1,6 +1,6 @@
 """Clause 5: the tables of the records, as data, and the reader of a fixed part.
 
-A row is (element, type, places, clause). Elements of the variable part are read in semantics.py,
+A row is (element, type, number of values, clause). Elements of the variable part are read in semantics.py,
 in the order of the tables of clause 5.
 """
 
@@ -58,13 +58,16 @@ GOP_HEADER = [
     ("reserved_zero", "u8", 2, "6.5"),
 ]
 
+# 5.6; then the parts whose bits of frame_flags are set, the section of the cells last
 FRAME_HEADER = [
     ("frame_type", "u8", 1, "6.6"),
     ("dc_transform_id", "u8", 1, "6.6"),
     ("sh_transform_id", "u8", 1, "6.6"),
-    ("reserved_zero", "u8", 1, "6.6"),
+    ("frame_flags", "u8", 1, "6.6"),
     ("gaussian_count", "u32", 1, "6.6"),
 ]
+FRAME_CARRIED_DIGEST = [("carried_digest", "u64", 1, "6.6")]
+FRAME_CELLS = [("cell_count", "leb128", 1, "6.6"), ("cell_log2", "u8", 1, "6.6")]
 
 TRANSFORM_FIXED = [
     ("transform_id", "u8", 1, "6.7"),
@@ -80,14 +83,24 @@ CODEBOOK_FIXED = [
     ("value_bytes", "u8", 1, "6.8"),
 ]
 
-REFINEMENT_FIXED = [
-    ("refinement_digest", "u64", 1, "6.9"),
-    ("gaussian_count", "u32", 1, "6.9"),
-    ("position_shift", "u8", 1, "6.9"),
-    ("lanes_log2", "u8", 1, "6.9"),
-    ("sh_mode", "u8", 1, "6.9"),
-    ("vq_stage_count", "u8", 1, "6.9"),
-    ("codebook_ids", "u8", 4, "6.9"),
+# 5.9; then the parts whose bits of description_flags are set
+SCENE_FIXED = [
+    ("up_axis", "u8", 1, "6.9"),
+    ("kernel", "u8", 1, "6.9"),
+    ("colour_space", "u8", 1, "6.9"),
+    ("projection", "u8", 1, "6.9"),
+    ("sorting", "u8", 1, "6.9"),
+    ("description_flags", "u8", 1, "6.9"),
+]
+SCENE_METRES = [("metres_per_unit", "f32", 1, "6.9")]
+SCENE_BACKGROUND = [("background", "f32", 3, "6.9")]
+SCENE_BOUNDS = [("bounds_min", "f32", 3, "6.9"), ("bounds_max", "f32", 3, "6.9")]
+SCENE_TITLE = [("title_length", "leb128", 1, "6.9")]
+SCENE_CAMERAS = [("camera_count", "leb128", 1, "6.9")]
+CAMERA = [
+    ("position", "f32", 3, "6.9"),
+    ("rotation", "f32", 4, "6.9"),
+    ("vertical_field_of_view", "f32", 1, "6.9"),
 ]
 
 INDEX_FIXED = [("entry_count", "u32", 1, "6.10")]
@@ -104,27 +117,33 @@ END = [
     ("index_offset", "u64", 1, "6.11"),
 ]
 
+# 5.14; then the parts of INCREMENT_PARTS whose bits of increment_flags are set, in order
 INCREMENT_FIXED = [
+    ("increment_flags", "u16", 1, "6.14"),
     ("refinement_digest", "u64", 1, "6.14"),
-    ("carried_digest", "u64", 1, "6.14"),
-    ("parent_count", "u32", 1, "6.14"),
-    ("cell_count", "u32", 1, "6.14"),
-    ("move_count", "u32", 1, "6.14"),
-    ("update_count", "u32", 1, "6.14"),
-    ("remove_count", "u32", 1, "6.14"),
-    ("new_count", "u32", 1, "6.14"),
-    ("position_shift", "u8", 1, "6.14"),
-    ("attribute_shift", "u8", 5, "6.14"),
-    ("cell_log2", "u8", 1, "6.14"),
+]
+INCREMENT_PARENTS = [("parent_count", "leb128", 1, "6.14")]
+INCREMENT_MOVES = [("move_count", "leb128", 1, "6.14")]
+INCREMENT_UPDATES = [("update_count", "leb128", 1, "6.14")]
+INCREMENT_REMOVALS = [("remove_count", "leb128", 1, "6.14")]
+INCREMENT_NEW = [("new_count", "leb128", 1, "6.14")]
+INCREMENT_POSITION_SHIFT = [("position_shift", "u8", 1, "6.14")]
+INCREMENT_ATTRIBUTE_SHIFT = [("attribute_shift", "u8", 5, "6.14")]
+INCREMENT_PREDICTORS = [
     ("predictor_block_log2", "u8", 1, "6.14"),
     ("neighbour_count", "u8", 1, "6.14"),
     ("bilateral_spatial", "u8", 1, "6.14"),
     ("bilateral_feature", "u8", 1, "6.14"),
-    ("sh_mode", "u8", 1, "6.14"),
-    ("vq_stage_count", "u8", 1, "6.14"),
-    ("codebook_ids", "u8", 4, "6.14"),
+]
+INCREMENT_SH = [("sh_mode", "u8", 1, "6.14")]
+INCREMENT_STAGES = [("vq_stage_count", "u8", 1, "6.14")]       # in the part `sh`, if sh_mode is 2
+INCREMENT_COMPENSATION = [
     ("compensation_log_scale", "i8", 1, "6.14"),
     ("compensation_opacity", "i8", 1, "6.14"),
+]
+INCREMENT_PARTS = [                                 # in the order of the bits
+    INCREMENT_PARENTS, INCREMENT_MOVES, INCREMENT_UPDATES, INCREMENT_REMOVALS, INCREMENT_NEW,
+    INCREMENT_POSITION_SHIFT, INCREMENT_ATTRIBUTE_SHIFT, INCREMENT_PREDICTORS, INCREMENT_SH, INCREMENT_COMPENSATION,
 ]
 
 POINTS_FIXED = [
@@ -164,12 +183,21 @@ class Record:
 
     def __init__(self, table, reader):
         self._offset = {}
-        for element, kind, places, clause in table:
+        self.read(table, reader)
+
+    def read(self, table, reader):
+        for element, kind, count, clause in table:
             self._offset[element] = reader.pos
-            if places == 1:
+            if kind == "leb128":
+                setattr(self, element, reader.leb128(clause))
+            elif count == 1:
                 setattr(self, element, reader.value(kind, clause))
             else:
-                setattr(self, element, reader.values(kind, places, clause))
+                setattr(self, element, reader.values(kind, count, clause))
+
+    def has(self, element):
+        """Whether the element is present."""
+        return element in self._offset
 
     def at(self, element):
         return self._offset[element]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Unit checks from the examples in the text; python3 -m unittest test_oracle"""
+"""Unit checks from the examples in the text; python3 -m unittest oracle.test_oracle"""
 
 import hashlib
 import math
@@ -9,24 +9,22 @@ import struct
 import sys
 import unittest
 
-sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "generator"))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 
-import models as pm
-import prediction
-import tables
-import transformer
-from cells import Cell, Cells, unity
-from conventions import BitReader, ByteReader, Round, crc32, tz, unzigzag, xxh64
-from dynamic import Gop
-from encoding import Bits
-from entropy_state import entropy_state
-from errors import StreamError
-from homes import Gaussian
-from network import REGISTRY, arrays, parse_network, parse_weights
-from parsing import BlockDecoder
-from reconstruction import prefix_count
-from semantics import parse_file_header, parse_unit_header
-from synth_network import NetworkWriter
+from generator.synth.encoding import Bits
+from generator.synth.network import NetworkWriter
+from oracle import models as pm, prediction, tables, transformer
+from oracle.cells import Cell, Cells, unity
+from oracle.conventions import BitReader, ByteReader, Round, crc32, tz, unzigzag, xxh64
+from oracle.entropy_state import entropy_state
+from oracle.errors import StreamError
+from oracle.frame import Gop
+from oracle.lists import Gaussian
+from oracle.network import REGISTRY, arrays, parse_network, parse_weights
+from oracle.parsing import BlockDecoder
+from oracle.reconstruction import prefix_count
+from oracle.scene_description import parse_scene_description
+from oracle.semantics import parse_file_header, parse_unit_header
 
 
 class Conventions(unittest.TestCase):
@@ -76,10 +74,10 @@ class Conventions(unittest.TestCase):
 
 class Parsing(unittest.TestCase):
     def test_headers_of_annex_b(self):
-        data = bytes.fromhex("89475353 0d0a1a0a 01000002 00aa0ee1 020100000000 e4a2 00000000 0c000000 f1c67fb7"
+        data = bytes.fromhex("89475353 0d0a1a0a 82010002 e2d9201f 020100000000 e4a2 00000000 0c000000 f1c67fb7"
                              "0000000001000000 00000000")
         self.assertEqual(parse_file_header(data).level, 2)
-        unit = parse_unit_header(data, 16, 0)
+        unit = parse_unit_header(data, 16)
         self.assertEqual((unit.unit_type, crc32(data[36:48])), (2, unit.payload_crc))
 
     def test_prefix(self):
@@ -114,13 +112,21 @@ class Parsing(unittest.TestCase):
         """Lengths 1, 2, 3, 4, 5 and 12 with the largest mantissa: 1, 3, 7, 15, 30, 3840"""
         for length, freq in ((1, 1), (2, 3), (3, 7), (4, 15), (5, 30), (12, 3840)):
             bits = Bits()
-            bits.u(1, 8)
-            bits.u(0, 8)
+            bits.u(0, 1)                            # mode; last is 1
             bits.se(length)
             bits.u(2 ** min(length - 1, 3) - 1, min(length - 1, 3))
             data = bits.bytes()
-            table = pm.explicit_table(BitReader(data, 0, len(data), "8.3"), 100)
+            table = pm.explicit_table(BitReader(data, 0, len(data), "8.3"), 1)
             self.assertEqual((table.tokens, table.freq), ([0, 1], [4096 - freq, freq]))
+
+    def test_parametric_tables(self):
+        """The examples of 8.3"""
+        freq = pm.parametric_table(True, 2, 9, 2, 0, 3, 0).freq
+        self.assertEqual(freq, [2952, 520, 520, 44, 43, 6, 6, 2, 1, 2])
+        freq = pm.parametric_table(True, 3, 12, 1, 6, 5, -2).freq
+        self.assertEqual(freq, [307, 1120, 111, 820, 49, 1120, 24, 307, 123, 56, 28, 15, 16])
+        freq = pm.parametric_table(False, 2, 20, 0, 0, 9, 0).freq
+        self.assertEqual(freq, [602, 902, 542, 361, 259, 194, 151, 122, 181, 130, 97, 76, 111, 76, 57, 43, 62, 42, 31, 24, 33])
 
 
 class Sequence:
@@ -129,11 +135,11 @@ class Sequence:
     position_bits, rotation_step = 10, 0.02
 
 
-class Dynamic(unittest.TestCase):
-    """Clauses 7.13 to 7.17, part by part."""
+class Frames(unittest.TestCase):
+    """Clauses 7.3 to 7.7, part by part."""
 
     def test_order_of_frames(self):
-        """The table of 7.13.1"""
+        """The table of 7.3.1"""
         rows = {0: ("I0 P0 P0 P0 P0 P0 P0 P0 P0", [0, 1, 2, 3, 4, 5, 6, 7]),
                 1: ("I0 B1 P0 B1 P0 B1 P0 B1 P0", [0, 0, 2, 2, 4, 4, 6, 6]),
                 2: ("I0 B2 B1 B2 P0 B2 B1 B2 P0", [0, 0, 2, 0, 4, 4, 6, 4]),
@@ -142,7 +148,7 @@ class Dynamic(unittest.TestCase):
             gop = Gop(type("Header", (), {"gop_structure": 1, "temporal_depth": depth}), 100)
             order = [gop.order(100 + k) for k in range(9)]
             self.assertEqual(" ".join("IPB"[kind] + str(layer) for kind, layer, _ in order), names)
-            self.assertEqual([place for _, _, place in order[1:]], references)
+            self.assertEqual([index for _, _, index in order[1:]], references)
 
     def test_tz(self):
         self.assertEqual([tz(1), tz(12)], [0, 2])
@@ -153,17 +159,17 @@ class Dynamic(unittest.TestCase):
 
     def displaced(self, fine, rotation, cell, cell_log2=9):
         cells = Cells(cell_log2, Sequence)
-        place = tuple(Round(x, 6) >> cell_log2 for x in fine)
-        cells.by_place[place] = cell
+        X = tuple(Round(x, 6) >> cell_log2 for x in fine)
+        cells.by_coordinates[X] = cell
         moved = cells.displaced(Gaussian(fine, (0, 0, 0), 0, rotation, (0, 0, 0), (), 1))
         return moved.position_fine, moved.rotation_fine
 
-    def test_displacement_without_turn(self):
+    def test_displacement_without_rotation(self):
         fine, rotation = self.displaced((640, 1000, 33), (100, -7, 3200), Cell([8, -16, -80000], [0, 0, 0], 0))
         self.assertEqual((fine, rotation), ((704, 872, 0), (100, -7, 3200)))
 
-    def test_turn(self):
-        """60 degrees about z: the turn is the sine of 30 degrees, 8192 in Q14; the root for w is rounded down."""
+    def test_rotation_of_a_cell(self):
+        """60 degrees about z: the rotation is the sine of 30 degrees, 8192 in Q14; the root for w is rounded down."""
         centre = 256 << 6
         fine, rotation = self.displaced((centre + 6400, centre, centre), (0, 0, 0), Cell([0] * 3, [0, 0, 8192], 0))
         self.assertEqual(fine, (centre + 3200, centre + math.floor(6400 * math.sin(math.pi / 3)), centre))
@@ -173,28 +179,46 @@ class Dynamic(unittest.TestCase):
         self.assertEqual(tables.EXP, [round(4096 * math.exp(-x / 32)) for x in range(256)])
 
     def test_neighbours(self):
-        """SS-PR-004 against a sort of all Gaussians, with many equal distances."""
+        """SS-PR-005, with equal codes and distances: among 16 or fewer the nearest, else of those around the code."""
         rng = random.Random(7)
-        for size in (1, 2, 9, 100, 400):
+        for size in (1, 2, 9, 16, 100, 400):
             references = [prediction.Reference(tuple(rng.randrange(12) for _ in range(3)), 0, 0, 0, 0, 0)
                           for _ in range(size)]
-            tree = prediction.Neighbours(references)
+            search = prediction.Neighbours(references)
             for _ in range(30):
-                position = tuple(rng.randrange(-1, 14) for _ in range(3))
-                every = sorted((sum((a - b) ** 2 for a, b in zip(position, g.position)), index)
-                               for index, g in enumerate(references))
+                position = tuple(rng.randrange(14) for _ in range(3))
+                around = sorted((prediction.morton(g.position), index) for index, g in enumerate(references))
+                below = [index for code, index in around if code < prediction.morton(position)]
+                others = [index for code, index in around if code >= prediction.morton(position)]
+                every = sorted((sum((a - b) ** 2 for a, b in zip(position, references[index].position)), index)
+                               for index in below[-16:] + others[:16])
                 count = rng.randint(1, 16)
-                self.assertEqual(tree.find(position, count), every[:count])
+                self.assertEqual(search.find(position, count), every[:count])
+
+    def test_morton(self):
+        self.assertEqual([prediction.morton(x) for x in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (3, 0, 2))], [1, 2, 4, 41])
 
     def test_mean(self):
-        """SS-PR-005: halves towards positive infinity"""
+        """SS-PR-006: halves towards positive infinity"""
         self.assertEqual([prediction.mean([1, 1], x) for x in ([0, 1], [-1, 0], [-3, 0], [-2, 0])], [1, 0, -1, -1])
 
-    def test_sources_of_sections(self):
-        """SS-EC-007"""
-        planes = pm.section_planes("cells", 3, 0, 0, 0)
-        available = [[s for s in range(11) if pm.source_available_in_section(s, plane)] for plane in planes]
-        self.assertEqual(available, [[0, 1], [0, 1, 2]] + [[0, 1, 2, 3], [0, 1, 2, 3, 4], [0, 1, 2, 3, 4]] * 2)
+    def test_sources(self):
+        """The second table of 8.5"""
+        def sources(section, *shape):
+            return [[s for s in range(11) if pm.source_available(s, plane)]
+                    for plane in pm.section_planes(section, *shape)]
+        up_to = [list(range(k + 1)) for k in range(11)]
+        self.assertEqual(sources("cells"), [up_to[1], up_to[2]] + [up_to[3], up_to[4], up_to[4]] * 2)
+        self.assertEqual(sources("modes") + sources("predictors"), [up_to[2]] * 2)
+        self.assertEqual(sources("moves"), [up_to[2], up_to[4], up_to[4]])
+        expected = [up_to[2], up_to[4], up_to[4], up_to[3], up_to[3], up_to[4], up_to[4], up_to[3], up_to[4]]
+        self.assertEqual(sources("updates", 2, 1, 2), expected + [up_to[3], up_to[4]])
+        self.assertEqual(sources("updates", 2, 2, 2, 2), expected + [[0], [0, 3, 4]])
+        first = up_to[3] + [5, 6, 7, 8, 9, 10]
+        expected = [up_to[1], up_to[2] + [10], up_to[5] + [10], up_to[6] + [10], up_to[3] + [5, 6, 7, 8, 10],
+                    first, up_to[10], up_to[10], first, up_to[10]]
+        self.assertEqual(sources("new", 2, 1, 2), expected + [first, up_to[10]])
+        self.assertEqual(sources("new", 2, 2, 2, 2), expected + [[0, 5, 6, 7, 8, 9, 10], [0] + up_to[10][3:]])
 
 
 def small_network(**asked):
@@ -218,7 +242,7 @@ def neighbour(position, dc):
 
 
 class Learned(unittest.TestCase):
-    """Clauses 6.17 and 7.17.6, with values worked out by hand or in floats."""
+    """Clauses 6.17 and 7.7.6, with values worked out by hand or in floats."""
 
     def test_sine(self):
         self.assertEqual(tables.SINE, [round(127 * math.sin(math.pi * x / 256)) for x in range(129)])
@@ -301,7 +325,7 @@ class Learned(unittest.TestCase):
             count = rng.randint(2, 16)
             tokens = [[rng.randint(-60, 60) for _ in range(net.f)] for _ in range(count)]
             near = [[rng.randint(-127, 127) for _ in range(3)] for _ in range(count)]
-            h = [t.embedded(j, token, place) for j, (token, place) in enumerate(zip(tokens, near))]
+            h = [t.embedded(j, token, near_j) for j, (token, near_j) in enumerate(zip(tokens, near))]
             x = [t.fed_forward(t.normalised(t.attended(*pair, h, near))) for pair in zip(*t.rows(h, near))]
             expected = FloatNetwork(net).outputs(tokens, near)
             errors = [abs(a - b) for a, b in zip(t.outputs(x), expected)]
@@ -322,7 +346,7 @@ class Learned(unittest.TestCase):
             self.assertEqual(parse_network(ByteReader(data, 0, len(data))).gated, k >> 1 & 1)
 
     def test_registry(self):
-        """A digest in the place of a network gives the registered one."""
+        """A digest instead of a network gives the registered one."""
         data = NetworkWriter(random.Random(5), {}).bytes()
         digest = hashlib.sha256(data).digest()
         with self.assertRaises(StreamError) as caught:
@@ -342,16 +366,16 @@ class FloatNetwork:
     def __init__(self, net):
         self.net = net
 
-    def layer(self, weights, x, bias, place):
-        shift = 2.0 ** self.net.layer_shift[place]
+    def layer(self, weights, x, bias, layer):
+        shift = 2.0 ** self.net.layer_shift[layer]
         sums = [sum(w * v for w, v in zip(row, x)) + b for row, b in zip(weights, bias)]
         return [max(-127.0, min(127.0, total / shift)) for total in sums]
 
     def outputs(self, tokens, near):
         net = self.net
         h = []
-        for j, (token, place) in enumerate(zip(tokens, near)):
-            hidden = [max(0.0, v) for v in self.layer(net.geometry, place, net.geometry_bias[0], 0)]
+        for j, (token, near_j) in enumerate(zip(tokens, near)):
+            hidden = [max(0.0, v) for v in self.layer(net.geometry, near_j, net.geometry_bias[0], 0)]
             weights = [a + b for a, b in zip(net.embedding, net.geometry_embedding)]
             h.append(self.layer(weights, token + hidden, net.rank[min(j, net.rank_count - 1)], 1))
         rows, origins = h, near
@@ -367,8 +391,8 @@ class FloatNetwork:
     def row(self, row, origin, h, near):
         net = self.net
         u = self.layer(net.attention, row, [0] * net.d, 2)
-        logit = [(sum(a * b for a, b in zip(u, h_j)) + self.fourier(place, origin)) / 2.0 ** net.layer_shift[3]
-                 for h_j, place in zip(h, near)]
+        logit = [(sum(a * b for a, b in zip(u, h_j)) + self.fourier(near_j, origin)) / 2.0 ** net.layer_shift[3]
+                 for h_j, near_j in zip(h, near)]
         e = [math.exp(x / 32 - max(logit) / 32) for x in logit]
         z = [sum(a * b for a, b in zip(e, column)) / sum(e) for column in zip(*h)]
         x = self.added(row, self.layer(net.value, z, net.value_bias[0], 4))
@@ -385,10 +409,10 @@ class FloatNetwork:
     def added(self, x, y):
         return [max(-127, min(127, a + b)) for a, b in zip(x, y)]
 
-    def fourier(self, place, origin):
+    def fourier(self, near_j, origin):
         total = 0
         for i, weight in enumerate(self.net.fourier[0]):
-            angle = 2 * math.pi * (place[i % 6 // 2] - origin[i % 6 // 2]) * 2 ** (i // 6) / 512
+            angle = 2 * math.pi * (near_j[i % 6 // 2] - origin[i % 6 // 2]) * 2 ** (i // 6) / 512
             total += weight * 127 * (math.cos(angle) if i % 2 else math.sin(angle))
         return total
 

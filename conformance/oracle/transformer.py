@@ -1,11 +1,11 @@
-"""Clauses 7.17.6 and 7.17.7: the learned predictor of dc and sh, for one new Gaussian at a time."""
+"""Clauses 7.7.6 and 7.7.7: the learned predictor of dc and sh, for one new Gaussian at a time."""
 
 from math import isqrt
 from operator import mul
 
-from constants import OUTPUT_MAX
-from conventions import Round, clamp
-from tables import EXP, SINE
+from .constants import OUTPUT_MAX
+from .conventions import Round, clamp
+from .tables import EXP, SINE
 
 
 def act(x, s):
@@ -27,7 +27,7 @@ def rounded_mean(values):
 
 
 def sine(x):
-    """7.17.7"""
+    """7.7.7"""
     r = x % 128
     quarter = (x % 512) // 128
     return (SINE[r], SINE[128 - r], -SINE[r], -SINE[128 - r])[quarter]
@@ -48,7 +48,7 @@ class Transformer:
         """
         tokens = self.tokens(own, neighbours, affinity, base)
         near = self.near(own[0], neighbours)
-        h = [self.embedded(j, token, place) for j, (token, place) in enumerate(zip(tokens, near))]
+        h = [self.embedded(j, token, near_j) for j, (token, near_j) in enumerate(zip(tokens, near))]
         rows, origins = self.rows(h, near)
         x = [self.fed_forward(self.normalised(self.attended(row, origin, h, near)))
              for row, origin in zip(rows, origins)]
@@ -93,9 +93,9 @@ class Transformer:
 
     # ---- SS-TR-003 ----
 
-    def embedded(self, j, token, place):
+    def embedded(self, j, token, near_j):
         net = self.network
-        hidden = [max(0, act(product(row, place) + bias, net.layer_shift[0]))
+        hidden = [max(0, act(product(row, near_j) + bias, net.layer_shift[0]))
                   for row, bias in zip(net.geometry, net.geometry_bias[0])]
         rank = net.rank[min(j, net.rank_count - 1)]
         return [act(product(net.embedding[i], token) + product(net.geometry_embedding[i], hidden) + rank[i],
@@ -115,8 +115,8 @@ class Transformer:
     def attended(self, row, origin, h, near):
         net = self.network
         u = [act(product(weights, row), net.layer_shift[2]) for weights in net.attention]
-        logit = [Round(product(u, h_j) + self.fourier(place, origin), net.layer_shift[3])
-                 for h_j, place in zip(h, near)]
+        logit = [Round(product(u, h_j) + self.fourier(near_j, origin), net.layer_shift[3])
+                 for h_j, near_j in zip(h, near)]
         largest = max(logit)
         e = [EXP[min(255, largest - x)] for x in logit]
         r = 2 ** 26 // sum(e)
@@ -125,12 +125,12 @@ class Transformer:
         return [saturated(row[i] + act(product(net.value[i], z) + net.value_bias[0][i], net.layer_shift[4]))
                 for i in range(net.d)]
 
-    def fourier(self, place, origin):
+    def fourier(self, near_j, origin):
         weights = self.network.fourier[0]
         total = 0
         for a in range(3):
             for k in range(self.network.fourier_count):
-                phase = (place[a] - origin[a]) << k
+                phase = (near_j[a] - origin[a]) << k
                 total += weights[6 * k + 2 * a] * sine(phase) + weights[6 * k + 2 * a + 1] * sine(phase + 128)
         return total
 

@@ -20,7 +20,7 @@ fn random(state: &mut u64) -> u32 {
     (*state >> 40) as u32
 }
 
-/// Points near the surface of a ball in a lattice of 16 bits, in Morton order as they are coded.
+/// Points near the surface of a ball in a grid of 16 bits, in Morton order as they are coded.
 fn shell(seed: u64) -> [Vec<u32>; 3] {
     let mut state = seed;
     let mut points: Vec<[u32; 3]> = (0..POINTS)
@@ -61,12 +61,13 @@ fn eight_nearest_of_equal_points(bencher: Bencher) {
     bencher.bench(|| search.nearest_to_all(black_box(slices(&points)), NEIGHBOURS));
 }
 
-/// Every Gaussian in a cell that turns and shifts; cells of 2^11 lattice steps.
+/// Every Gaussian in a cell that turns and shifts; cells of 2^11 grid steps.
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn displacement(bencher: Bencher) {
     let points = shell(1);
     let cell_log2 = 11;
-    let motion = Cell { stale: false, coordinates: [0; 3], translation: [3, -5, 8], turn: [100, -80, 60] };
+    let motion =
+        Cell { stale: false, coordinates: [0; 3], translation: [3, -5, 8], rotation: [100, -80, 60] };
     let [xs, ys, zs] = &points;
     let mut cells: Vec<(u64, Cell)> = xs
         .iter()

@@ -37,7 +37,7 @@ impl CodedBlock {
 
     /// Adds the next plane in coding order.
     pub fn push(&mut self, info: PlaneInfo, coded: Vec<i32>) {
-        let before = if info.place > 0 { self.magnitudes.last() } else { None };
+        let before = if info.index > 0 { self.magnitudes.last() } else { None };
         let sums = match before {
             Some(before) => before
                 .iter()
@@ -69,10 +69,12 @@ impl CodedBlock {
 /// What the elements of the sequence and of the unit say about every block of the unit.
 #[derive(Debug, Clone, Copy)]
 pub struct UnitParameters<'a> {
-    /// Bits an axis.
+    /// Bits of a coordinate.
     pub position_bits: u8,
-    /// Bits an axis that the unit leaves out.
+    /// Low bits of coordinates that the unit leaves out.
     pub position_shift: u8,
+    /// Low bits that the unit leaves out of log_scale, opacity, rotation, dc, sh.
+    pub attribute_shift: [u8; 5],
     /// Whether the axes are sorted.
     pub canonical_axes: bool,
     /// rotation_threshold of the sequence.
@@ -85,7 +87,7 @@ pub struct UnitParameters<'a> {
     pub colour: Colour<'a>,
 }
 
-/// Clause 7.3 to 7.8 for one block at absolute offset `at`, of as many Gaussians as `out` holds.
+/// Clause 7.6.3 for one block of new Gaussians without predictors at absolute offset `at`, of as many Gaussians as `out` holds.
 ///
 /// # Errors
 /// Malformed or invalid as the clauses say.
@@ -154,17 +156,17 @@ fn read_plane(
 fn read_serial(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, known: [&[u8]; 2], out: &mut [i32]) {
     let [first, second] = decoder.axes().each_ref().map(|axis| axis.source);
     let [known_first, known_second] = known;
-    let at = |known: &[u8], place: usize| known.get(place).copied().unwrap_or(0);
+    let at = |known: &[u8], index: usize| known.get(index).copied().unwrap_or(0);
     match (is_serial(first), is_serial(second)) {
         (true, false) => {
-            let context = |place: usize, neighbours: &Neighbours| {
-                decoder.context(decoder.first_context(neighbours.value(first)), at(known_second, place))
+            let context = |index: usize, neighbours: &Neighbours| {
+                decoder.context(decoder.first_context(neighbours.value(first)), at(known_second, index))
             };
             reader.signed_serial(decoder, following(context), out);
         }
         (false, _) => {
-            let context = |place: usize, neighbours: &Neighbours| {
-                decoder.context(at(known_first, place), decoder.second_context(neighbours.value(second)))
+            let context = |index: usize, neighbours: &Neighbours| {
+                decoder.context(at(known_first, index), decoder.second_context(neighbours.value(second)))
             };
             reader.signed_serial(decoder, following(context), out);
         }
@@ -182,19 +184,19 @@ fn read_serial(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, known: [&[u
 #[inline(always)]
 fn following(context: impl Fn(usize, &Neighbours) -> u8) -> impl FnMut(usize, i32) -> u8 {
     let mut neighbours = Neighbours::default();
-    move |place, previous| {
-        if place > 0 {
+    move |index, previous| {
+        if index > 0 {
             neighbours.push(previous);
         }
-        context(place, &neighbours)
+        context(index, &neighbours)
     }
 }
 
 fn read_deltas(reader: &mut BlockReader<'_>, decoder: &PlaneDecoder, deltas: &mut [u64]) {
     let [has_first, has_second] = decoder.axes().each_ref().map(|axis| axis.source != Source::None);
     let mut neighbours = DeltaNeighbours::default();
-    let context = |place: usize, previous: u64| {
-        if place > 0 {
+    let context = |index: usize, previous: u64| {
+        if index > 0 {
             neighbours.push(previous);
         }
         let value = neighbours.value();
@@ -210,7 +212,7 @@ fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, bias: i32) {
     let Some(coded) = block.coded.last() else { return };
     let [largest, middle, smallest] = &mut block.log_scale;
     let values = || attribute::unbias(coded, bias);
-    match (info.attribute, info.place) {
+    match (info.attribute, info.index) {
         (Attribute::LogScale, 0) => *largest = values(),
         (Attribute::LogScale, 1) => *middle = attribute::next_log_scale(largest, &values()),
         (Attribute::LogScale, _) => *smallest = attribute::next_log_scale(middle, &values()),
@@ -219,7 +221,7 @@ fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, bias: i32) {
     }
 }
 
-/// Places of the attributes among the planes of a [`FrameSlice`].
+/// Index of the first plane of an attribute of a [`FrameSlice`].
 const OPACITY: usize = 3;
 const ROTATION: usize = 4;
 const DC: usize = 7;
@@ -238,33 +240,51 @@ pub fn reconstruct(
     out: &mut FrameSlice<'_>,
 ) -> Result<()> {
     position::positions(&block.deltas, unit.position_bits, unit.position_shift, &mut out.position, at)?;
-    for (plane, log_scale) in (1..).zip(&block.log_scale) {
-        let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-        let values = attribute::unbias(coded, biases.get(plane).copied().unwrap_or(0));
-        attribute::check_log_scale(&values, log_scale, unit.canonical_axes && plane > 1, at)?;
+    let [log_scale_shift, opacity_shift, rotation_shift, dc_shift, sh_shift] = unit.attribute_shift;
+    let log_scales = log_scales(block, unit, biases, log_scale_shift, at)?;
+    let opacity = attribute::shifted(&block.opacity, opacity_shift);
+    in_range(&opacity, &ATTRIBUTE_RANGE, "opacity", "7.6.2", at)?;
+    for (index, plane) in log_scales.iter().enumerate() {
+        out.write(index, plane);
     }
-    in_range(&block.opacity, &ATTRIBUTE_RANGE, "opacity", "7.5", at)?;
-    for (place, plane) in block.log_scale.iter().enumerate() {
-        out.write(place, plane);
-    }
-    out.write(OPACITY, &block.opacity);
+    out.write(OPACITY, &opacity);
     let mut dc_components = Vec::new();
     let mut sh_components = Vec::new();
-    let [largest, _, smallest] = &block.log_scale;
+    let [largest, _, smallest] = &log_scales;
     for ((info, coded), &bias) in unit.layout.planes().iter().zip(&block.coded).zip(biases) {
         match info.attribute {
             Attribute::Rotation => {
                 let values = attribute::unbias(coded, bias);
                 let thresholds = unit.rotation_thresholds;
-                let fine = attribute::rotations(&values, largest, smallest, thresholds, at)?;
-                out.write(ROTATION.wrapping_add(usize::from(info.place)), &fine);
+                let rotation =
+                    attribute::rotations(&values, largest, smallest, thresholds, rotation_shift, at)?;
+                out.write(ROTATION.wrapping_add(usize::from(info.index)), &rotation);
             }
-            Attribute::Dc => dc_components.push(attribute::unbias(coded, bias)),
-            Attribute::Sh => sh_components.push(attribute::unbias(coded, bias)),
-            // Known already; the others are in no refinement.
+            Attribute::Dc => dc_components.push(attribute::unbias_shifted(coded, bias, dc_shift)),
+            // Indices of codebook entries are whole: their entries are shifted.
+            Attribute::Sh if info.alphabet == Alphabet::Index => sh_components.push(coded.clone()),
+            Attribute::Sh => sh_components.push(attribute::unbias_shifted(coded, bias, sh_shift)),
+            // Known already; the others are not in this section.
             _ => {}
         }
     }
     let colour = out.planes.get_mut(DC..).unwrap_or_default();
-    unit.colour.reconstruct(&dc_components, &sh_components, colour, at)
+    unit.colour.reconstruct(&dc_components, &sh_components, sh_shift, colour, at)
+}
+
+/// The log-scales of a block. They are sums of values, so that shifting the sums shifts the values.
+fn log_scales(
+    block: &CodedBlock,
+    unit: &UnitParameters<'_>,
+    biases: &[i32],
+    shift: u8,
+    at: u64,
+) -> Result<[Vec<i32>; 3]> {
+    let log_scales = block.log_scale.each_ref().map(|plane| attribute::shifted(plane, shift));
+    for (plane, log_scale) in (1..).zip(&log_scales) {
+        let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+        let values = attribute::unbias_shifted(coded, biases.get(plane).copied().unwrap_or(0), shift);
+        attribute::check_log_scale(&values, log_scale, unit.canonical_axes && plane > 1, at)?;
+    }
+    Ok(log_scales)
 }

@@ -1,6 +1,6 @@
-//! Clauses 7.7 and 7.8: colour components to colour, by an integer transform.
+//! Clause 7.6.5: colour components to colour, by an integer transform.
 
-use crate::attribute::in_range;
+use crate::attribute::{self, in_range};
 use crate::layout::ShCoding;
 use core::ops::RangeInclusive;
 use splatstream_format::payload::{Codebook, Transform};
@@ -9,10 +9,13 @@ use splatstream_format::{Error, ErrorKind, Result};
 /// The values of a component.
 pub const COMPONENT_RANGE: RangeInclusive<i32> = -8191..=8191;
 
+/// The values of colour in output steps.
+pub(crate) const COLOUR_RANGE: RangeInclusive<i32> = -(1 << 30)..=1 << 30;
+
 /// Gaussians transformed at a time: their sums stay in registers.
 const TILE: usize = 32;
 
-/// Everything a unit needs to turn components into colour.
+/// Everything a unit needs to compute colour from components.
 #[derive(Debug, Clone, Copy)]
 pub struct Colour<'a> {
     /// The dc transform.
@@ -26,14 +29,16 @@ pub struct Colour<'a> {
 }
 
 impl Colour<'_> {
-    /// Writes red, green, blue and the SH planes of a block to `out`.
+    /// Writes red, green, blue and the SH planes of a block to `out`. The components have been
+    /// shifted; `entry_shift` is the shift of sums of codebook entries.
     ///
     /// # Errors
-    /// Invalid if a component is out of range or an index names no entry.
+    /// Invalid if a component or a colour is out of range or an index names no entry.
     pub fn reconstruct(
         &self,
         dc: &[Vec<i32>],
         sh: &[Vec<i32>],
+        entry_shift: u8,
         out: &mut [&mut [i32]],
         at: u64,
     ) -> Result<()> {
@@ -42,7 +47,10 @@ impl Colour<'_> {
         match (self.mode, self.sh) {
             (ShCoding::Coefficients { .. }, Some(transform)) => inverse(transform, sh, sh_out, at),
             (ShCoding::VectorQuantised { .. }, Some(transform)) => {
-                inverse(transform, &self.entries(sh, usize::from(transform.header.rank), at)?, sh_out, at)
+                let entries = self.entries(sh, usize::from(transform.header.rank), at)?;
+                let shifted: Vec<_> =
+                    entries.iter().map(|plane| attribute::shifted(plane, entry_shift)).collect();
+                inverse(transform, &shifted, sh_out, at)
             }
             _ => {
                 sh_out.iter_mut().for_each(|plane| plane.fill(0));
@@ -51,7 +59,7 @@ impl Colour<'_> {
         }
     }
 
-    /// Clause 7.8. Adds up the codebook entries of the stages; the sum is clamped.
+    /// Clause 7.6.5. Adds up the codebook entries of the stages; the sum is clamped.
     pub(crate) fn entries(&self, indices: &[Vec<i32>], rank: usize, at: u64) -> Result<Vec<Vec<i32>>> {
         let count = indices.first().map_or(0, Vec::len);
         let mut components = vec![vec![0_i32; count]; rank];
@@ -60,8 +68,8 @@ impl Colour<'_> {
             in_entries(stage, largest, at)?;
             for (component, plane) in components.iter_mut().enumerate() {
                 for (sum, &index) in plane.iter_mut().zip(stage) {
-                    let place = (index as usize).wrapping_mul(rank).wrapping_add(component);
-                    let value = codebook.entries.get(place).copied().unwrap_or(0);
+                    let index = (index as usize).wrapping_mul(rank).wrapping_add(component);
+                    let value = codebook.entries.get(index).copied().unwrap_or(0);
                     *sum = sum.wrapping_add(i32::from(value));
                 }
             }
@@ -79,7 +87,7 @@ fn in_entries(stage: &[i32], largest: usize, at: u64) -> Result<()> {
         None => Ok(()),
         Some(&index) => Err(Error::new(
             at,
-            "7.8",
+            "7.6.5",
             ErrorKind::OutOfRange { element: "vq_index", value: i64::from(index), min: 0, max },
         )),
     }
@@ -88,15 +96,19 @@ fn in_entries(stage: &[i32], largest: usize, at: u64) -> Result<()> {
 /// out_j = mean_j + Round(sum over k of basis[k][j] * component_k, 6).
 ///
 /// # Errors
-/// Invalid if a component leaves -8191..=8191. With |basis| at most 4096 and at most 45 components the sum
-/// stays below 2^31.
+/// Invalid if a component leaves -8191..=8191 or a colour its range. With |basis| at most 4096 and at most 45 components
+/// the sum stays below 2^31.
 pub fn inverse(
     transform: &Transform,
     components: &[Vec<i32>],
     out: &mut [&mut [i32]],
     at: u64,
 ) -> Result<()> {
-    transformed(transform, components, out, at, |_, mean, change| mean.wrapping_add(change))
+    transformed(transform, components, out, at, |_, mean, change| mean.wrapping_add(change))?;
+    // A sum is below 2^25 after rounding, so that only extreme means can leave the range.
+    let near_limit = transform.mean.iter().any(|mean| mean.unsigned_abs() > (1 << 30) - (1 << 25));
+    let mut planes = out.iter().filter(|_| near_limit);
+    planes.try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "colour", "7.6", at))
 }
 
 /// out_j += Round(sum over k of basis[k][j] * component_k, 6): a residual on top of what `out` holds.
@@ -122,7 +134,7 @@ fn transformed(
 ) -> Result<()> {
     let dimension = usize::from(transform.header.dimension);
     for plane in components {
-        in_range(plane, &COMPONENT_RANGE, "component", "7.7", at)?;
+        in_range(plane, &COMPONENT_RANGE, "component", "7.6.5", at)?;
     }
     let count = out.first().map_or(0, |plane| plane.len());
     let mut tile = vec![[0_i16; TILE]; components.len()];

@@ -52,7 +52,7 @@ impl DeltaNeighbours {
     }
 }
 
-/// 0 for 0, else one more than the place of the leading one.
+/// 0 for 0, else one more than the index of the leading one.
 #[inline(always)]
 pub fn bit_length(value: u64) -> u32 {
     u64::BITS.wrapping_sub(value.leading_zeros())

@@ -1,15 +1,15 @@
-//! Clause 7.9: the reconstruction digest.
+//! Clause 7.9: the digests of lists of Gaussians.
 
 use crate::frame::QuantizedFrame;
 use rayon::prelude::*;
 use xxhash_rust::xxh64::{Xxh64, xxh64};
 
-/// The XXH64 digests of the planes of one refinement unit, in canonical order.
+/// The XXH64 digests of the canonical planes of one list, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct UnitDigest(Vec<u64>);
+pub struct ListDigest(Vec<u64>);
 
-/// Digests the planes of the Gaussians `range` of a frame, plane p with seed p.
-pub fn unit_digest(frame: &QuantizedFrame, range: core::ops::Range<usize>) -> UnitDigest {
+/// The digest of the list that the Gaussians `range` of some planes are; plane p is hashed with seed p.
+pub fn list_digest(frame: &QuantizedFrame, range: core::ops::Range<usize>) -> ListDigest {
     let positions = frame.position.iter().map(|plane| {
         let part = plane.get(range.clone()).unwrap_or_default();
         Plane::Unsigned(part)
@@ -17,7 +17,7 @@ pub fn unit_digest(frame: &QuantizedFrame, range: core::ops::Range<usize>) -> Un
     let others =
         frame.signed_planes().map(|plane| Plane::Signed(plane.get(range.clone()).unwrap_or_default()));
     let planes: Vec<(u64, Plane<'_>)> = (0_u64..).zip(positions.chain(others)).collect();
-    UnitDigest(planes.par_iter().map(|(seed, plane)| plane.digest(*seed)).collect())
+    ListDigest(planes.par_iter().map(|(seed, plane)| plane.digest(*seed)).collect())
 }
 
 enum Plane<'a> {
@@ -47,10 +47,10 @@ fn digest_words<T>(values: &[T], seed: u64, bytes_of: impl Fn(&T) -> [u8; 4]) ->
     hasher.digest()
 }
 
-/// The digest of a frame of which the given refinement units are there.
-pub fn frame_digest(units: &[UnitDigest]) -> u64 {
+/// The digest of several lists, one after the other.
+pub fn lists_digest(lists: &[ListDigest]) -> u64 {
     let bytes: Vec<u8> =
-        units.iter().flat_map(|unit| unit.0.iter().flat_map(|digest| digest.to_le_bytes())).collect();
+        lists.iter().flat_map(|list| list.0.iter().flat_map(|digest| digest.to_le_bytes())).collect();
     xxh64(&bytes, 0)
 }
 
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn any_change_of_value_order_or_plane_changes_the_digest() {
         let original = frame();
-        let digest = |frame: &QuantizedFrame| frame_digest(&[unit_digest(frame, 0..3000)]);
+        let digest = |frame: &QuantizedFrame| lists_digest(&[list_digest(frame, 0..3000)]);
         let mut changed = original.clone();
         changed.dc[2][2999] ^= 1;
         assert_ne!(digest(&original), digest(&changed));

@@ -1,6 +1,6 @@
-//! Clause 7.15: cells that move, and the Gaussians that move with them.
+//! Clause 7.5: cells that move, and the Gaussians that move with them.
 //!
-//! A fine position is in lattice step / 64, a fine rotation in rotation_step / 64.
+//! A fine position is in 64ths of a grid step, a fine rotation in 64ths of rotation_step.
 
 use crate::motion::{Motion, UNIT_MAX};
 use crate::position::morton;
@@ -9,13 +9,13 @@ use rayon::prelude::*;
 /// Gaussians displaced by one task.
 const RUN: usize = 4096;
 
-/// The square root, rounded down. Clause 7.15.
+/// The square root, rounded down. Clause 7.5.
 pub fn isqrt(value: u64) -> u64 {
     value.isqrt()
 }
 
 /// U: the integer that stands for 1 in units of rotation_step, min(32767, floor(1 / rotation_step + 1 / 2)).
-/// Clause 7.15.
+/// Clause 7.5.
 ///
 /// `rotation_step` is the bit pattern of the element, a binary32 of 2^-40 to 1.
 pub fn rotation_unit(rotation_step: u32) -> i64 {
@@ -26,32 +26,32 @@ pub fn rotation_unit(rotation_step: u32) -> i64 {
     i64::try_from(unit).unwrap_or(UNIT_MAX).min(UNIT_MAX)
 }
 
-/// A cell of the lattice and its motion. Clause 7.15.
+/// A cell of the position grid and its motion. Clause 7.5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cell {
-    /// Cell coordinates x, y, z: lattice coordinates divided by 2^cell_log2.
+    /// Cell coordinates x, y, z: grid coordinates divided by 2^cell_log2.
     pub coordinates: [u32; 3],
-    /// True if Gaussians carried over from the reference frame are left out here.
+    /// True if carried Gaussians in this cell are dropped once the frame has units that replace them.
     pub stale: bool,
-    /// Shift in lattice step / 8; -2^20 to 2^20.
+    /// Shift in eighths of a grid step; -2^20 to 2^20.
     pub translation: [i32; 3],
     /// Vector part of a unit quaternion of positive real part, times 2^14; -8192 to 8192.
-    pub turn: [i32; 3],
+    pub rotation: [i32; 3],
 }
 
-/// The cells of a frame that move; what lies in no other stays. Clause 7.15.
+/// The cells of a frame that move; a Gaussian in no listed cell stays. Clause 7.5.
 #[derive(Debug, Clone, Default)]
 pub struct CellField {
     cell_log2: u8,
     position_bits: u8,
     unit: i64,
-    /// Morton codes of the cells, rising; the cells in the same order.
+    /// Morton codes of the cells, increasing; the cells in the same order.
     codes: Vec<u64>,
     cells: Vec<Cell>,
 }
 
 impl CellField {
-    /// A field of cells, each with the Morton code of its coordinates, codes strictly rising.
+    /// A field of cells, each with the Morton code of its coordinates, codes strictly increasing.
     ///
     /// `cell_log2` is 0 to position_bits, `position_bits` at most 20, `unit` that of [`rotation_unit`].
     pub fn new(cell_log2: u8, position_bits: u8, unit: i64, cells: Vec<(u64, Cell)>) -> Self {
@@ -62,6 +62,11 @@ impl CellField {
     /// True if nothing moves.
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty()
+    }
+
+    /// Cells that are listed.
+    pub fn len(&self) -> usize {
+        self.cells.len()
     }
 
     /// The listed cell in which a fine position lies.
@@ -80,7 +85,7 @@ impl CellField {
         (motion.position(position_fine, self.position_max()), motion.rotation(rotation_fine, self.unit))
     }
 
-    /// Displaces every Gaussian by its cell, and tells of each if that cell is stale.
+    /// Displaces every Gaussian by its cell and returns for each whether that cell is stale.
     ///
     /// The planes hold fine positions and fine rotations and have the same length.
     pub fn displace_planes(&self, position: &mut [Vec<i32>; 3], rotation: &mut [Vec<i32>; 3]) -> Vec<bool> {
@@ -95,7 +100,7 @@ impl CellField {
         stale
     }
 
-    /// Neighbours in a list mostly share a cell, so the cell of the one before is kept.
+    /// Neighbours in a list mostly share a cell, so the last cell found is kept.
     fn displace_run(&self, stale: &mut [bool], position: [&mut [i32]; 3], rotation: [&mut [i32]; 3]) {
         let ([xs, ys, zs], [r0, r1, r2]) = (position, rotation);
         let positions = xs.iter_mut().zip(ys).zip(zs);
@@ -122,9 +127,9 @@ impl CellField {
 
     fn at(&self, coordinates: [u32; 3]) -> Option<&Cell> {
         let [x, y, z] = coordinates;
-        let place = self.codes.binary_search(&morton(x, y, z)).ok()?;
-        // A Morton code has 21 bits of a coordinate: what is far outside the lattice is in no cell.
-        self.cells.get(place).filter(|cell| cell.coordinates == coordinates)
+        let index = self.codes.binary_search(&morton(x, y, z)).ok()?;
+        // A Morton code has 21 bits of a coordinate: a position far outside the grid is in no cell.
+        self.cells.get(index).filter(|cell| cell.coordinates == coordinates)
     }
 
     /// The largest fine position.
@@ -156,8 +161,8 @@ mod tests {
         CellField::new(17, 20, 128, cells)
     }
 
-    fn turned(turn: [i32; 3]) -> CellField {
-        field(vec![Cell { coordinates: [3; 3], turn, ..Cell::default() }])
+    fn rotated(rotation: [i32; 3]) -> CellField {
+        field(vec![Cell { coordinates: [3; 3], rotation, ..Cell::default() }])
     }
 
     /// A fine position at an offset from the middle of cell 3, 3, 3.
@@ -182,14 +187,14 @@ mod tests {
 
     #[test]
     fn a_third_of_a_turn_about_the_diagonal_exchanges_the_axes() {
-        let field = turned([8192; 3]);
+        let field = rotated([8192; 3]);
         let (position, rotation) = field.displace(&field.cells[0], beside([100, 200, -300]), [0; 3]);
         assert_eq!((position, rotation), (beside([-300, 100, 200]), [64 * 64; 3]));
     }
 
     #[test]
     fn a_quarter_turn_about_z_takes_x_to_y() {
-        let field = turned([0, 0, 11_585]);
+        let field = rotated([0, 0, 11_585]);
         let ([x, y, z], _) = field.displace(&field.cells[0], beside([6400, 0, 640]), [0; 3]);
         let [middle_x, end_y, same_z] = beside([0, 6400, 640]);
         assert!(x.abs_diff(middle_x) <= 1 && y.abs_diff(end_y) <= 1 && z == same_z, "{x} {y} {z}");
@@ -198,7 +203,7 @@ mod tests {
     #[test]
     fn a_rotation_keeps_its_real_part_positive() {
         // Two thirds of a turn about the diagonal are a third of a turn back.
-        let field = turned([8192; 3]);
+        let field = rotated([8192; 3]);
         let (_, rotation) = field.displace(&field.cells[0], beside([0; 3]), [64 * 64; 3]);
         assert_eq!(rotation, [-64 * 64; 3]);
         let (_, rotation) = field.displace(&field.cells[0], beside([0; 3]), [5000; 3]);
@@ -207,19 +212,19 @@ mod tests {
 
     fn small_cells() -> impl Strategy<Value = Vec<Cell>> {
         let parts = ([0_u32..8, 0..8, 0..8], any::<bool>(), [-9000..9000, -9000..9000, -9000..9000]);
-        let turn = [-8192..=8192, -8192..=8192, -8192..=8192];
-        let cell = (parts, turn).prop_map(|((coordinates, stale, translation), turn)| Cell {
+        let rotation = [-8192..=8192, -8192..=8192, -8192..=8192];
+        let cell = (parts, rotation).prop_map(|((coordinates, stale, translation), rotation)| Cell {
             coordinates,
             stale,
             translation,
-            turn,
+            rotation,
         });
         proptest::collection::vec(cell, 0..64)
     }
 
     proptest! {
         #[test]
-        fn without_a_turn_a_cell_only_shifts(
+        fn without_a_rotation_a_cell_only_shifts(
             fine in [0..=TOP, 0..=TOP, 0..=TOP], rotation in [-4096..=4096, -4096..=4096, -4096..=4096],
             translation in [-1_048_576..=1_048_576, -1_048_576..=1_048_576, -1_048_576..=1_048_576],
         ) {
@@ -241,12 +246,12 @@ mod tests {
             let mut position = [plane(|g| g.0[0]), plane(|g| g.0[1]), plane(|g| g.0[2])];
             let mut rotation = [plane(|g| g.1[0]), plane(|g| g.1[1]), plane(|g| g.1[2])];
             let stale = field.displace_planes(&mut position, &mut rotation);
-            for (at, &(before, turn)) in fine.iter().enumerate() {
+            for (at, &(before, start)) in fine.iter().enumerate() {
                 let cell = field.find(before);
-                let (moved, turned) = cell.map_or((before, turn), |cell| field.displace(cell, before, turn));
+                let (moved, rotated) = cell.map_or((before, start), |cell| field.displace(cell, before, start));
                 prop_assert_eq!(stale[at], cell.is_some_and(|cell| cell.stale));
                 prop_assert_eq!([position[0][at], position[1][at], position[2][at]], moved);
-                prop_assert_eq!([rotation[0][at], rotation[1][at], rotation[2][at]], turned);
+                prop_assert_eq!([rotation[0][at], rotation[1][at], rotation[2][at]], rotated);
             }
         }
     }

@@ -1,14 +1,10 @@
 //! How the sections of a unit were decoded, as one number: two decoders that compare it unit by unit find the unit at which
-//! they part. Defined in `conformance/README.md`; no part of the decoding process, and nothing is computed unless
+//! they differ. Defined in `conformance/README.md`; no part of the decoding process, and nothing is computed unless
 //! [`Options::entropy`](crate::process::Options::entropy) asks for it.
 
-use crate::attribute::unbias;
-use crate::block::CodedBlock;
 use crate::increment::values::UnitValues;
-use crate::layout::Layout;
 use splatstream_format::entropy::STATE_LOW;
-use splatstream_format::entropy::model::PlaneModel;
-use splatstream_format::payload::{Increment, Refinement};
+use splatstream_format::payload::CodedSection;
 use xxhash_rust::xxh64::Xxh64;
 
 /// The entropy state of a unit.
@@ -20,39 +16,17 @@ pub struct UnitEntropy {
     pub state: u64,
 }
 
-/// The number of an increment all of whose blocks were decoded; none if it has no sections.
-pub(crate) fn of_increment(increment: &Increment<'_>, values: &UnitValues) -> Option<u64> {
+/// The number of a unit from its sections, all of which were decoded; none if it has none.
+pub(crate) fn of_sections(sections: &[CodedSection<'_>], values: &UnitValues) -> Option<u64> {
     let mut hash = Xxh64::new(0);
-    for coded in &increment.sections {
+    for coded in sections {
         add_blocks(&mut hash, coded.lanes_log2, &coded.blocks);
         let values = values.section(coded.section);
         // The plane of the position alphabet is the first.
         add_deltas(&mut hash, &values.deltas);
         values.planes.iter().for_each(|plane| add_values(&mut hash, plane));
     }
-    (!increment.sections.is_empty()).then(|| hash.digest())
-}
-
-/// The number of a refinement from its decoded blocks; none if it has no Gaussian.
-pub(crate) fn of_refinement(
-    refinement: &Refinement<'_>,
-    layout: &Layout,
-    models: &[PlaneModel],
-    blocks: &[CodedBlock],
-) -> Option<u64> {
-    let mut hash = Xxh64::new(0);
-    add_blocks(&mut hash, refinement.header.lanes_log2, &refinement.blocks);
-    for (plane, (info, model)) in layout.planes().iter().zip(models).enumerate() {
-        for block in blocks {
-            if info.is_position() {
-                add_deltas(&mut hash, &block.deltas);
-            } else {
-                let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-                add_values(&mut hash, &unbias(coded, model.bias));
-            }
-        }
-    }
-    (!blocks.is_empty()).then(|| hash.digest())
+    (!sections.is_empty()).then(|| hash.digest())
 }
 
 /// The final states and the length of each block. A block of another final state is an error (8.4), so that those of a

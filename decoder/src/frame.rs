@@ -1,11 +1,11 @@
 //! Clause 7.9: the canonical integer planes of a frame.
 
-/// A reconstructed frame: integers on the lattices of the sequence, Gaussians in coded order.
+/// A reconstructed frame: integers on the grids of the sequence, Gaussians in coded order.
 ///
 /// All planes have the same length.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct QuantizedFrame {
-    /// Lattice position x, y, z; below 2^position_bits.
+    /// Grid position x, y, z; below 2^position_bits.
     pub position: [Vec<u32>; 3],
     /// Log-scales in units of log_scale_step.
     pub log_scale: [Vec<i32>; 3],
@@ -22,7 +22,7 @@ pub struct QuantizedFrame {
 /// A run of Gaussians of a frame, to be written.
 #[derive(Debug)]
 pub struct FrameSlice<'a> {
-    /// Lattice position x, y, z.
+    /// Grid position x, y, z.
     pub position: Vec<&'a mut [u32]>,
     /// The other planes in canonical order: log-scale, opacity, rotation, dc, sh.
     pub planes: Vec<&'a mut [i32]>,
@@ -100,10 +100,25 @@ impl QuantizedFrame {
         self.signed_planes_mut().for_each(|plane| plane.truncate(count));
     }
 
+    /// A copy of the Gaussians in a range.
+    #[must_use]
+    pub fn part(&self, range: core::ops::Range<usize>) -> Self {
+        let unsigned = |plane: &Vec<u32>| plane.get(range.clone()).unwrap_or_default().to_vec();
+        let signed = |plane: &Vec<i32>| plane.get(range.clone()).unwrap_or_default().to_vec();
+        Self {
+            position: self.position.each_ref().map(unsigned),
+            log_scale: self.log_scale.each_ref().map(signed),
+            opacity: signed(&self.opacity),
+            rotation: self.rotation.each_ref().map(signed),
+            dc: self.dc.each_ref().map(signed),
+            sh: self.sh.iter().map(signed).collect(),
+        }
+    }
+
     /// Keeps the Gaussians whose flag is set.
     pub fn retain(&mut self, keep: &[bool]) {
-        self.position.iter_mut().for_each(|plane| crate::home::retain(plane, keep));
-        self.signed_planes_mut().for_each(|plane| crate::home::retain(plane, keep));
+        self.position.iter_mut().for_each(|plane| crate::list::retain(plane, keep));
+        self.signed_planes_mut().for_each(|plane| crate::list::retain(plane, keep));
     }
 
     /// Appends the Gaussians of another frame with as many SH planes.

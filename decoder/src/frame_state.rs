@@ -1,76 +1,28 @@
-//! Clause 7.18: a frame as later ones refer to it, and what is carried into it.
+//! A decoded frame of a predicted GOP as later frames refer to it.
 
-use crate::digest::{UnitDigest, frame_digest, unit_digest};
-use crate::displacement::CellField;
-use crate::frame::QuantizedFrame;
-use crate::home::Home;
-use crate::process::Compensation;
+use crate::carried::Carried;
+use crate::list::GaussianList;
+use crate::process::Shift;
 use splatstream_format::entropy::in_force::ModelsInForce;
-use splatstream_format::syntax::IncrementHeader;
 use std::sync::Arc;
 
-/// A frame as later ones refer to it.
-#[derive(Debug, Clone)]
-pub struct FrameState {
+/// A frame that others may refer to.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FrameState {
     /// Its display index.
-    pub number: u32,
-    /// The homes, from 0 on, as far as they were decoded.
-    pub homes: Vec<Home>,
-    /// The homes of the intra frame of the GOP.
-    pub anchor: Arc<Vec<Home>>,
-    /// The cells of the predicted frames from the intra frame to this one.
-    pub fields: Vec<Arc<CellField>>,
-    /// What is carried of each home, where it has been shown.
-    pub carried: Vec<Option<Home>>,
-    /// What was added before output.
-    pub compensation: Compensation,
-    /// The plane models in force for unit 0 of a frame that refers to this one.
-    pub models: ModelsInForce,
-}
-
-impl FrameState {
-    /// Clause 7.18: what is carried of a home into this frame.
-    fn carried_of(&self, home: usize) -> Home {
-        if let Some(Some(known)) = self.carried.get(home) {
-            return known.clone();
-        }
-        let anchor = self.anchor.get(home).cloned().unwrap_or_default();
-        self.fields.iter().fold(anchor, |home, field| home.carried(field))
-    }
-
-    /// Carries what was not decoded of `refinements` homes from the frame this one refers to.
-    pub fn carry_from(&mut self, reference: &Self, refinements: usize) {
-        let Some(field) = self.fields.last() else { return };
-        let decoded = self.homes.len();
-        let carried =
-            (0..refinements).map(|home| (home >= decoded).then(|| reference.carried_of(home).carried(field)));
-        self.carried = carried.collect();
-    }
-
-    /// The Gaussians that are shown: those decoded, then those carried; and how many are decoded.
-    pub fn shown(&self, sh_planes: usize, subset: bool) -> (QuantizedFrame, usize) {
-        let mut planes = QuantizedFrame::zeroed(0, sh_planes);
-        self.homes.iter().for_each(|home| planes.append(&home.planes));
-        let decoded = planes.len();
-        let carried = self.carried.iter().flatten().filter(|_| !subset);
-        carried.for_each(|home| planes.append(&home.planes));
-        (planes, decoded)
-    }
-
-    /// The digest of what is carried.
-    pub fn carried_digest(&self) -> u64 {
-        let digests: Vec<UnitDigest> =
-            self.carried.iter().flatten().map(|home| unit_digest(&home.planes, 0..home.len())).collect();
-        frame_digest(&digests)
-    }
-
-    /// What a header adds to all decoded Gaussians, or to those that are not of the intra frame.
-    pub(crate) fn compensation(&self, header: &IncrementHeader, all: bool) -> Compensation {
-        let (log_scale, opacity) = (header.compensation_log_scale, header.compensation_opacity);
-        if log_scale == 0 && opacity == 0 {
-            return Compensation::default();
-        }
-        let of_home = |home: &Home| home.anchor.iter().map(|&anchor| all || !anchor).collect::<Vec<_>>();
-        Compensation { log_scale, opacity, applies: self.homes.iter().flat_map(of_home).collect() }
-    }
+    pub(crate) index: u32,
+    /// How many exact lists frames that refer to this one can have (clause 7.3.3).
+    pub(crate) level: u8,
+    /// The exact lists; of an I frame those that it shows.
+    pub(crate) lists: Vec<Arc<GaussianList>>,
+    /// The carried lists; none if they are not available.
+    pub(crate) carried: Option<Carried>,
+    /// The lists of the I frame of the GOP, if they are a whole anchor: units predict from them.
+    pub(crate) anchor: Option<Arc<[Arc<GaussianList>]>>,
+    /// Whether the I frame is complete, and this frame and every P or B frame on the way from it has a level above 0.
+    pub(crate) is_exact: bool,
+    /// What compensated the I frame of the GOP, and compensates carried lists.
+    pub(crate) carried_shift: Shift,
+    /// The plane models in force in a frame that refers to this one: for its cells, and for its unit of refinement 0.
+    pub(crate) models: ModelsInForce,
 }

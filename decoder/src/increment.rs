@@ -1,6 +1,6 @@
-//! Increments: clauses 7.14 to 7.17. Entropy-coded [values](values) in, a [home](crate::home) out.
+//! Increments: clauses 7.4 to 7.7. Entropy-coded [values](values) in, a [list](crate::list) of Gaussians out.
 //!
-//! [`values::PreparedIncrement::decode`] parses a unit without knowing any other frame; [`apply`] then changes the
+//! [`values::PreparedSections::decode`] parses a unit without knowing any other frame; [`apply`] then changes the
 //! parents and adds the new Gaussians. The encoder calls [`apply`] with the values it has chosen.
 
 pub mod prediction;

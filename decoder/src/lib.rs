@@ -2,22 +2,33 @@
 //!
 //! | clause | module |
 //! |---|---|
-//! | 7.1 state, order of units, lost units | [`process`] |
-//! | 7.2 counts of a refinement | [`SequenceParameters`](splatstream_format::syntax::SequenceParameters) |
-//! | 7.3 positions | [`position`] |
-//! | 7.4 - 7.6 log-scales, opacity, rotation | [`attribute`] |
-//! | 7.7, 7.8 colour | [`colour`] |
-//! | 7.9 canonical planes and digest | [`frame`], [`digest`] |
+//! | 7.1, 9 state, phases, errors and losses | [`process`] |
+//! | 7.2, 7.11 operating points, extraction | [`operating_point`] |
+//! | 7.3 frames of a GOP | [`process`] |
+//! | 7.4 lists, parents and modes | [`list`], [`increment`] |
+//! | 7.5 cells | [`displacement`] |
+//! | 7.6 values | [`attribute`], [`position`], [`colour`], [`increment::residual`] |
+//! | 7.7 prediction | [`neighbours`], [`predictor`], [`transformer`], [`increment::prediction`] |
+//! | 7.8 what is shown | [`process::DecodedFrame`] |
+//! | 7.9 canonical planes and digests | [`frame`], [`digest`] |
 //! | 7.10 output | [`output`] |
-//! | 7.11, 7.19 operating points | [`operating_point`] |
-//! | 7.14 homes and modes | [`home`], [`increment`] |
-//! | 7.15 cells | [`displacement`] |
-//! | 7.16 residuals | [`increment::residual`] |
-//! | 7.17 prediction | [`neighbours`], [`predictor`], [`transformer`], [`increment::prediction`] |
-//! | 7.18 carried Gaussians | [`frame_state`] |
 //! | 8.5 contexts | [`context`] |
 //!
 //! The encoder calls the same functions: what it reconstructs is what a decoder reconstructs.
+//!
+//! ```
+//! use splatstream_decoder::{output::to_gaussians, process::Options, stream::Frames};
+//!
+//! fn count(bytes: &[u8]) -> splatstream_format::Result<usize> {
+//!     let mut frames = Frames::open(bytes, &Options::default())?;
+//!     let mut gaussians = 0;
+//!     while let Some(frame) = frames.next_frame() {
+//!         let Some(sequence) = frames.sequence() else { break };
+//!         gaussians += to_gaussians(frame.into_shown(), sequence).len();
+//!     }
+//!     frames.summary().verdict().map_or(Ok(gaussians), Err)
+//! }
+//! ```
 #![deny(
     clippy::arithmetic_side_effects,
     clippy::expect_used,
@@ -31,16 +42,18 @@ pub use splatstream_format::entropy::layout;
 
 pub mod attribute;
 pub mod block;
+mod carried;
 pub mod colour;
 pub mod context;
 pub mod digest;
+mod direct;
 pub mod displacement;
 pub mod entropy_state;
 pub mod frame;
-pub mod frame_state;
+mod frame_state;
 pub mod gop;
-pub mod home;
 pub mod increment;
+pub mod list;
 mod motion;
 pub mod neighbours;
 pub mod operating_point;
@@ -50,4 +63,3 @@ pub mod predictor;
 pub mod process;
 pub mod stream;
 pub mod transformer;
-pub mod unit;

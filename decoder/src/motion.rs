@@ -1,21 +1,21 @@
-//! Clause 7.15: the motion of one cell, applied to a fine position and a fine rotation.
+//! Clause 7.5: the motion of one cell, applied to a fine position and a fine rotation.
 //!
 //! Nothing here overflows: a position lies below 2^26, a centre within 2^27, so an offset is below 2^28; a
-//! component of a turn is at most 2^14; then |v x d| < 2^43 and |w t + v x t| < 2^59. A fine rotation is below
+//! component of a cell rotation is at most 2^14; then |v x d| < 2^43 and |w t + v x t| < 2^59. A fine rotation is below
 //! 2^21, so that sums of products with it stay below 2^38. Values out of range, which a stream cannot have,
 //! wrap.
 
 use crate::displacement::{Cell, isqrt};
 
-/// The largest integer of a rotation component, and of the unit of rotations. Clause 7.6.
+/// The largest integer of a rotation component, and of the unit of rotations. Clause 7.6.3.
 pub(crate) const UNIT_MAX: i64 = 32_767;
 
 /// A cell made ready to move Gaussians.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Motion {
-    /// Middle of the cell, lattice step / 64.
+    /// Middle of the cell, in 64ths of a grid step.
     centre: [i64; 3],
-    /// Lattice step / 64.
+    /// In 64ths of a grid step.
     translation: [i64; 3],
     /// The quaternion, times 2^14: vector and real part.
     vector: [i64; 3],
@@ -26,7 +26,7 @@ impl Motion {
     pub(crate) fn of(cell: &Cell, cell_log2: u8) -> Self {
         let size = u32::from(cell_log2).wrapping_add(6);
         let half = 1_i64.wrapping_shl(size) >> 1;
-        let vector = cell.turn.map(i64::from);
+        let vector = cell.rotation.map(i64::from);
         let real = isqrt((1_u64 << 28).saturating_sub(dot(vector, vector).unsigned_abs()));
         Self {
             centre: cell.coordinates.map(|at| i64::from(at).wrapping_shl(size).wrapping_add(half)),
@@ -36,19 +36,19 @@ impl Motion {
         }
     }
 
-    /// Turns about the centre of the cell, then shifts; a point that would leave the lattice stays at its edge.
+    /// Rotates about the centre of the cell, then shifts; a point that would leave the grid stays at its edge.
     pub(crate) fn position(&self, fine: [i32; 3], max: i64) -> [i32; 3] {
         let fine = fine.map(i64::from);
         let across = cross(self.vector, join(fine, self.centre, i64::wrapping_sub));
         let again = cross(self.vector, across);
-        let turned = join(across, again, |across, again| {
+        let rotated = join(across, again, |across, again| {
             round(self.real.wrapping_mul(across).wrapping_add(again), 27)
         });
-        let shift = join(turned, self.translation, i64::wrapping_add);
+        let shift = join(rotated, self.translation, i64::wrapping_add);
         join(fine, shift, i64::wrapping_add).map(|moved| moved.clamp(0, max.max(0)) as i32)
     }
 
-    /// The quaternion product of the turn and a rotation, of the sign that makes its real part positive.
+    /// The quaternion product of the rotation of the cell and that of a Gaussian, of the sign that makes its real part positive.
     pub(crate) fn rotation(&self, fine: [i32; 3], unit: i64) -> [i32; 3] {
         let fine = fine.map(i64::from);
         let one = unit.wrapping_mul(64);
@@ -56,10 +56,10 @@ impl Motion {
         let parts = join(fine, self.vector, |fine, vector| {
             self.real.wrapping_mul(fine).wrapping_add(vector.wrapping_mul(real))
         });
-        let turned = join(parts, cross(self.vector, fine), i64::wrapping_add).map(|sum| round(sum, 14));
+        let rotated = join(parts, cross(self.vector, fine), i64::wrapping_add).map(|sum| round(sum, 14));
         let negative = self.real.wrapping_mul(real) < dot(self.vector, fine);
         let limit = UNIT_MAX.wrapping_mul(64);
-        turned.map(|part| {
+        rotated.map(|part| {
             if negative { part.wrapping_neg() } else { part }.clamp(limit.wrapping_neg(), limit) as i32
         })
     }

@@ -1,4 +1,4 @@
-//! Clauses 7.11 and 7.19: operating points, and the stream that holds just one.
+//! Clause 7.2: operating points, and the stream that holds just one.
 
 mod tally;
 
@@ -29,12 +29,13 @@ impl OperatingPoint {
     /// Everything in the stream.
     pub const ALL: Self = Self { spatial: u8::MAX, temporal: u8::MAX, refinement: u8::MAX };
 
-    /// Clauses 7.11 and 7.19: whether a unit belongs to the operating point. `anchor` is the number of spatial layers
-    /// if the unit is of the intra frame of a predicted GOP: who plays that GOP has all of the frame.
-    pub fn takes_of(&self, header: &UnitHeader, anchor: Option<u8>) -> bool {
-        let whole = anchor.is_some_and(|layers| self.spatial.saturating_add(1) >= layers);
-        let refinement = if whole { u8::MAX } else { self.refinement };
-        Self { refinement, ..*self }.takes(header)
+    /// Clause 7.2: whether a unit belongs to the operating point. `whole_anchor` is the number of spatial
+    /// layers if the unit is an increment of a whole anchor: a receiver of all layers takes all of it.
+    pub fn takes(&self, header: &UnitHeader, whole_anchor: Option<u8>) -> bool {
+        let takes_all = whole_anchor.is_some_and(|layers| self.spatial.saturating_add(1) >= layers);
+        header.spatial_layer <= self.spatial
+            && header.temporal_layer <= self.temporal
+            && (takes_all || header.refinement <= self.refinement)
     }
 
     /// Whether an entry of the list is of a point that this one holds.
@@ -42,13 +43,6 @@ impl OperatingPoint {
         entry.spatial_layer <= self.spatial
             && entry.temporal_layer <= self.temporal
             && entry.refinement <= self.refinement
-    }
-
-    /// Whether a unit of profile Intra belongs to the operating point.
-    pub fn takes(&self, header: &UnitHeader) -> bool {
-        header.spatial_layer <= self.spatial
-            && header.temporal_layer <= self.temporal
-            && header.refinement <= self.refinement
     }
 }
 
@@ -87,24 +81,32 @@ impl FromStr for OperatingPoint {
     }
 }
 
-/// The stream that holds just the units of an operating point; index, operating points and end are made anew.
+/// The stream that holds just the units of an operating point; index, operating points and end are written again.
 ///
 /// # Errors
-/// What delimiting the units finds; a damaged unit is an error.
+/// What delimiting the units finds, and damage in units that belong to the point. Increments are copied as they are:
+/// decoders discard some of them, whose payload may be anything.
 pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatResult<Vec<u8>> {
     let stream = Stream::open(bytes, limits)?;
     let mut out = bytes.get(..FileHeader::SIZE).unwrap_or_default().to_vec();
-    let mut belonging = Belonging::new(stream.header().profile());
+    let (profile, mut reader) = (stream.header().profile(), stream.units());
+    let mut belonging = Belonging::new(profile);
     let mut units = 0_u32;
     let mut frames = 0_u32;
     let mut entries = Vec::new();
     let mut index_offset = 0;
-    for unit in stream.units() {
+    while let Some(unit) = reader.next_unit() {
         let unit = unit?;
+        if !belonging.takes(point, &unit.header) {
+            continue;
+        }
+        unit.check_header(profile)?;
+        if unit.header.unit_type() != UnitType::Increment {
+            unit.check_payload()?;
+        }
         belonging.follow(&unit);
         let here = u64::try_from(out.len()).unwrap_or(u64::MAX);
         match unit.header.unit_type() {
-            _ if !belonging.takes(point, &unit.header) => continue,
             UnitType::Index => {
                 index_offset = here;
                 let index = Index { entries: core::mem::take(&mut entries) };

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::{GaussianFrame, Planes};
 
-/// dc and sh integers are on a lattice 64 times finer than their step.
+/// dc and sh integers are on a grid 64 times finer than their step.
 const COLOUR_FRACTION: f32 = 1.0 / 64.0;
 
 /// The frame as Gaussians in PLY's domain. The planes of integers become the planes of f32: no third copy of a
@@ -22,7 +22,7 @@ pub fn to_gaussians(frame: QuantizedFrame, sequence: &SequenceParameters) -> Gau
     let dc_step = sequence.dc_step() * COLOUR_FRACTION;
     let sh_step = sequence.sh_step() * COLOUR_FRACTION;
     let mut planes = Planes {
-        position: placed(position, sequence),
+        position: scene_positions(position, sequence),
         log_scale: log_scale.map(|plane| affine(plane, log_scale_offset, log_scale_step)),
         rotation: [const { Vec::new() }; 4],
         opacity_logit: affine(opacity, opacity_offset, opacity_step),
@@ -35,7 +35,7 @@ pub fn to_gaussians(frame: QuantizedFrame, sequence: &SequenceParameters) -> Gau
     frame.with_antialiased(sequence.antialiased())
 }
 
-fn placed(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {
+fn scene_positions(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {
     let step = sequence.position_step();
     let mut offsets = sequence.position_offset().into_iter();
     position.map(|plane| {

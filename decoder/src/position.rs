@@ -1,4 +1,4 @@
-//! Clause 7.3: Morton deltas to lattice positions.
+//! Clause 7.6.4: Morton deltas to grid positions.
 
 use splatstream_format::{Error, ErrorKind, Result};
 
@@ -28,7 +28,7 @@ pub fn morton(x: u32, y: u32, z: u32) -> u64 {
     spread(x) | spread(y) << 1 | spread(z) << 2
 }
 
-/// The lattice coordinate at the middle of a coarse cell.
+/// The grid coordinate at the middle of a coarse cell.
 #[inline(always)]
 pub fn refine(coarse: u32, shift: u8) -> u32 {
     let shift = u32::from(shift);
@@ -40,7 +40,7 @@ pub fn refine(coarse: u32, shift: u8) -> u32 {
 /// `bits` is position_bits, `shift` position_shift of the unit; `at` goes into the error.
 ///
 /// # Errors
-/// Invalid if a code leaves the lattice.
+/// Invalid if a code leaves the grid.
 pub fn positions(deltas: &[u64], bits: u8, shift: u8, out: &mut [&mut [u32]], at: u64) -> Result<()> {
     let coarse_bits = u32::from(bits.saturating_sub(shift));
     let [xs, ys, zs] = out else { return Ok(()) };
@@ -54,8 +54,8 @@ pub fn positions(deltas: &[u64], bits: u8, shift: u8, out: &mut [&mut [u32]], at
         *z = refine(collect(code >> 2), shift);
     }
     if outside != 0 {
-        let rule = "a position lies outside the lattice";
-        return Err(Error::new(at, "7.3", ErrorKind::Constraint { rule }));
+        let rule = "a position lies outside the grid";
+        return Err(Error::new(at, "7.6.4", ErrorKind::Constraint { rule }));
     }
     Ok(())
 }

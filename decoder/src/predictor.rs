@@ -1,12 +1,12 @@
-//! Clause 7.17: the predictors of new Gaussians, and what their neighbours weigh.
+//! Clause 7.7: the predictors of new Gaussians, and what their neighbours weigh.
 
 use crate::neighbours::Neighbour;
 use splatstream_format::{Error, ErrorKind, Result};
 
-/// Neighbours of a Gaussian, at most. Clause 7.17.
+/// Neighbours of a Gaussian, at most. Clause 7.7.
 pub const NEIGHBOURS_MAX: usize = 16;
 
-/// round(4096 exp(-x / 32)): the weight of a neighbour at a distance x of 0 to 255. Clause 7.17.
+/// round(4096 exp(-x / 32)): the weight of a neighbour at a distance x of 0 to 255. Clause 7.7.
 pub const EXP: [u16; 256] = [
     4096, 3970, 3848, 3729, 3615, 3503, 3396, 3291, 3190, 3092, 2997, 2904, 2815, 2729, 2645, 2563, 2484,
     2408, 2334, 2262, 2192, 2125, 2060, 1996, 1935, 1875, 1818, 1762, 1707, 1655, 1604, 1555, 1507, 1460,
@@ -21,7 +21,7 @@ pub const EXP: [u16; 256] = [
     4, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1,
 ];
 
-/// How a block of new Gaussians is predicted: the element predictor. Clause 7.17.
+/// How a block of new Gaussians is predicted: the element predictor. Clause 7.7.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Predictor {
     /// Not at all.
@@ -46,7 +46,7 @@ impl Predictor {
     pub fn from_code(code: i32, at: u64) -> Result<Self> {
         let kind = ErrorKind::OutOfRange { element: "predictor", value: code.into(), min: 0, max: 3 };
         let known = usize::try_from(code).ok().and_then(|code| Self::ALL.get(code)).copied();
-        known.ok_or(Error::new(at, "7.17", kind))
+        known.ok_or(Error::new(at, "7.7", kind))
     }
 
     /// The code of the predictor, 0 to 3.
@@ -60,7 +60,7 @@ impl Predictor {
     }
 }
 
-/// Weights of neighbours by the inverse of their squared distance; 1 to 2^16. Clause 7.17.
+/// Weights of neighbours by the inverse of their squared distance; 1 to 2^16. Clause 7.7.
 ///
 /// A nearest neighbour at distance 0 has all the weight. Neighbours that are not there have weight 0.
 pub fn knn_weights(neighbours: &[Neighbour]) -> [i64; NEIGHBOURS_MAX] {
@@ -74,7 +74,7 @@ pub fn knn_weights(neighbours: &[Neighbour]) -> [i64; NEIGHBOURS_MAX] {
     weights
 }
 
-/// Weights of neighbours by distance and by squared difference of attributes; 1 to 4096. Clause 7.17.
+/// Weights of neighbours by distance and by squared difference of attributes; 1 to 4096. Clause 7.7.
 ///
 /// `features` are the differences summed so far, in squared steps, one a neighbour. Neighbours that are not
 /// there have weight 0.
@@ -92,7 +92,7 @@ pub fn bilateral_weights(
     weights
 }
 
-/// What distance adds to the place in [`EXP`] of each neighbour; 0 to 255.
+/// What distance adds to the index in [`EXP`] of each neighbour; 0 to 255.
 pub(crate) fn spatial_terms(neighbours: &[Neighbour], spatial: u8) -> [u64; NEIGHBOURS_MAX] {
     let mut terms = [0; NEIGHBOURS_MAX];
     let last = neighbours.last().map_or(0, |neighbour| neighbour.distance).saturating_add(1);
@@ -106,11 +106,11 @@ pub(crate) fn spatial_terms(neighbours: &[Neighbour], spatial: u8) -> [u64; NEIG
 #[inline(always)]
 pub(crate) fn bilateral_weight(near: u64, difference: u64, feature: u8) -> i64 {
     let like = (difference.saturating_mul(feature.into()) >> 6).min(255);
-    let place = near.saturating_add(like).min(255) as usize;
-    EXP.get(place).copied().unwrap_or(1).into()
+    let index = near.saturating_add(like).min(255) as usize;
+    EXP.get(index).copied().unwrap_or(1).into()
 }
 
-/// Means with the same weights. Clause 7.17.
+/// Means with the same weights. Clause 7.7.
 ///
 /// Values have 2^31 added while they are summed: unsigned products of 32 bits are what every machine has in vectors. With
 /// weights up to 2^16 and at most 16 values all sums stay below 2^54.
@@ -123,7 +123,7 @@ pub struct WeightedMean {
     reciprocal: u64,
 }
 
-/// The sign bit, which adds 2^31 to an `i32` if it is turned over and seen as unsigned.
+/// The sign bit, which adds 2^31 to an `i32` if it is flipped and the value read as unsigned.
 const SIGN: u32 = 1 << 31;
 
 /// Planes of an attribute, at most: those of SH of degree 3.

@@ -1,96 +1,147 @@
 //! A whole stream through a [`Decoder`].
 
 use crate::process::{DecodedFrame, Decoder, Options};
-use core::ops::ControlFlow;
-use splatstream_format::syntax::SequenceParameters;
-use splatstream_format::unit::{Delivery, Stream, Units};
+use core::ops::{ControlFlow, RangeInclusive};
+use splatstream_format::syntax::{SequenceParameters, UnitType};
+use splatstream_format::unit::{Stream, Unit, Units};
 use splatstream_format::{Error, Result};
 
 /// How decoding a stream went.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[must_use]
 pub struct Summary {
     /// Frames handed out.
     pub frames: u32,
-    /// Why decoding ended before the end of the stream, if it did.
-    pub end: Option<Error>,
+    /// Every error, in stream order.
+    pub errors: Vec<Error>,
+    /// Display indices of frames that were lost and not handed out.
+    pub lost: Vec<RangeInclusive<u32>>,
+}
+
+impl Summary {
+    /// The error that the verdict of clause 9 names; none if the stream is accepted.
+    pub fn verdict(&self) -> Option<Error> {
+        self.errors.first().copied()
+    }
+}
+
+/// The frames of a stream, one after the other.
+pub struct Frames<'a> {
+    stream: Stream<'a>,
+    units: Units<'a>,
+    decoder: Decoder<'a>,
+    frames: u32,
+}
+
+impl<'a> Frames<'a> {
+    /// The frames of the stream that `bytes` is.
+    ///
+    /// # Errors
+    /// What clause 6.2 says of the file header; nothing can be decoded then.
+    pub fn open(bytes: &'a [u8], options: &Options) -> Result<Self> {
+        let stream = Stream::open(bytes, &options.limits)?;
+        let decoder = Decoder::new(stream.header(), *options);
+        Ok(Self { stream, units: stream.units(), decoder, frames: 0 })
+    }
+
+    /// The frames from the GOP on whose header stands at the absolute offset `gop`, as an index gives it (B.3). What stands
+    /// before it is not looked at, but for the units up to the first sequence parameters.
+    ///
+    /// # Errors
+    /// As [`Frames::open`].
+    pub fn open_inside(bytes: &'a [u8], gop: u64, options: &Options) -> Result<Self> {
+        let stream = Stream::open(bytes, &options.limits)?;
+        let decoder = Decoder::starting_inside(stream.header(), *options);
+        let mut frames = Self { stream, units: stream.units(), decoder, frames: 0 };
+        while let Some(unit) = frames.units.next_unit() {
+            let is_sequence = unit.is_ok_and(|unit| unit.header.unit_type() == UnitType::SequenceParameters);
+            frames.take(unit);
+            if is_sequence {
+                break;
+            }
+        }
+        frames.units = stream.units_from(gop);
+        Ok(frames)
+    }
+
+    /// The next frame; none after the last.
+    pub fn next_frame(&mut self) -> Option<DecodedFrame> {
+        loop {
+            let unit = self.units.next_unit()?;
+            if let Some(frame) = self.take(unit) {
+                self.frames = self.frames.saturating_add(1);
+                return Some(frame);
+            }
+        }
+    }
+
+    /// Takes a unit, or looks for the next one after bytes that are none; gives the frame that this ends, if it does.
+    fn take(&mut self, unit: Result<Unit<'a>>) -> Option<DecodedFrame> {
+        match unit {
+            Ok(unit) => {
+                let frame = self.decoder.unit(&unit);
+                let is_end = unit.header.unit_type() == UnitType::End;
+                // An end unit with a fault is not the end.
+                if is_end && !self.decoder.has_stopped() {
+                    self.units = self.stream.units_from(self.units.position());
+                }
+                frame
+            }
+            Err(error) => {
+                let frame = self.decoder.unreadable(error);
+                // Where there is nothing to go on with, the next unit is none.
+                if !self.decoder.has_stopped() {
+                    self.units.scan_for(self.decoder.wanted());
+                }
+                frame
+            }
+        }
+    }
+
+    /// The sequence parameters, once they have come: from the first frame on.
+    pub fn sequence(&self) -> Option<&SequenceParameters> {
+        self.decoder.sequence()
+    }
+
+    /// How decoding went so far.
+    pub fn summary(&self) -> Summary {
+        let (errors, lost) = (self.decoder.errors().to_vec(), self.decoder.lost().to_vec());
+        Summary { frames: self.frames, errors, lost }
+    }
 }
 
 /// Decodes a stream; hands out each frame as it is complete, until `on_frame` breaks off.
-///
-/// When the stream breaks off or turns out wrong, the frame that was arriving is handed out as far as it is
-/// there, provided the options are tolerant.
 pub fn decode_stream(
     bytes: &[u8],
     options: &Options,
-    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+    on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
-    let mut summary = Summary::default();
-    summary.end = run(bytes, None, options, &mut summary.frames, &mut on_frame).err();
-    summary
+    run(Frames::open(bytes, options), on_frame)
 }
 
-/// The same from the group on whose header stands at the absolute offset `gop`, as an index gives it (B.3).
-///
-/// What stands before it is not looked at, but for the units up to the sequence parameters.
+/// The same from a GOP on, see [`Frames::open_inside`].
 pub fn decode_stream_inside(
     bytes: &[u8],
     gop: u64,
     options: &Options,
-    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+    on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
-    let mut summary = Summary::default();
-    summary.end = run(bytes, Some(gop), options, &mut summary.frames, &mut on_frame).err();
-    summary
-}
-
-/// A decoder and the units that it takes: all, or those from a group on.
-fn start<'a>(stream: &Stream<'a>, gop: Option<u64>, options: &Options) -> Result<(Decoder<'a>, Units<'a>)> {
-    let Some(gop) = gop else { return Ok((Decoder::new(stream.header(), *options), stream.units())) };
-    let mut decoder = Decoder::starting_inside(stream.header(), *options);
-    for unit in stream.units() {
-        decoder.unit(&unit?)?;
-        if decoder.sequence().is_some() {
-            break;
-        }
-    }
-    Ok((decoder, stream.units_from(gop)))
+    run(Frames::open_inside(bytes, gop, options), on_frame)
 }
 
 fn run(
-    bytes: &[u8],
-    gop: Option<u64>,
-    options: &Options,
-    frames: &mut u32,
-    on_frame: &mut impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
-) -> Result<()> {
-    let stream = Stream::open(bytes, &options.limits)?;
-    let (mut decoder, mut units) = start(&stream, gop, options)?;
-    let mut hand_out = |decoder: &Decoder<'_>, frame: Option<DecodedFrame>| match (decoder.sequence(), frame)
-    {
-        (Some(sequence), Some(frame)) => {
-            *frames = frames.wrapping_add(1);
-            on_frame(sequence, frame)
-        }
-        _ => ControlFlow::Continue(()),
+    frames: Result<Frames<'_>>,
+    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+) -> Summary {
+    let mut frames = match frames {
+        Ok(frames) => frames,
+        Err(error) => return Summary { errors: vec![error], ..Summary::default() },
     };
-    while let Some(delivery) = units.next_unit() {
-        let step = match delivery {
-            Ok(Delivery::Intact(unit)) => decoder.unit(&unit),
-            Ok(Delivery::Damaged(damaged)) => decoder.damaged(&damaged).map(|()| None),
-            Err(error) => Err(error),
-        };
-        let frame = match step {
-            Ok(frame) => frame,
-            // An error in the frame that was arriving stands before this one in the stream.
-            Err(error) => {
-                let frame = decoder.cut()?;
-                let _ = hand_out(&decoder, frame);
-                return Err(error);
-            }
-        };
-        if hand_out(&decoder, frame).is_break() {
-            return Ok(());
+    while let Some(frame) = frames.next_frame() {
+        let Some(sequence) = frames.sequence() else { break };
+        if on_frame(sequence, frame).is_break() {
+            break;
         }
     }
-    Ok(())
+    frames.summary()
 }

@@ -1,4 +1,4 @@
-//! Clause 7.17.6: the learned predictor, a network over the neighbours of a new Gaussian.
+//! Clause 7.7.6: the learned predictor, a network over the neighbours of a new Gaussian.
 //!
 //! A [`Batch`] holds what the network sees of [`LANES`] Gaussians, one a lane. [`scalar`] is the text line by line for
 //! one of them; [`lanes`] computes all at once and gives the same integers.
@@ -19,7 +19,7 @@ pub const INPUTS_MAX: usize = OUTPUTS_MAX + 8;
 /// Neighbours, at most.
 pub(crate) const RANKS: usize = crate::predictor::NEIGHBOURS_MAX;
 
-/// 127 sin(pi x / 256), rounded. Clause 7.17.7.
+/// 127 sin(pi x / 256), rounded. Clause 7.7.7.
 pub const SINE: [i8; 129] = [
     0, 2, 3, 5, 6, 8, 9, 11, 12, 14, 16, 17, 19, 20, 22, 23, 25, 26, 28, 29, 31, 32, 34, 35, 37, 38, 40, 41,
     43, 44, 46, 47, 49, 50, 51, 53, 54, 56, 57, 58, 60, 61, 63, 64, 65, 67, 68, 69, 71, 72, 73, 74, 76, 77,
@@ -29,7 +29,7 @@ pub const SINE: [i8; 129] = [
     127, 127, 127, 127, 127, 127, 127, 127,
 ];
 
-/// 127 times the sine of `x` of 512 parts of a circle, rounded. Clause 7.17.7.
+/// 127 times the sine of `x` of 512 parts of a circle, rounded. Clause 7.7.7.
 pub fn sine(x: i32) -> i32 {
     let place = x.rem_euclid(128).unsigned_abs();
     let quarter = x.rem_euclid(512) >> 7;
@@ -43,7 +43,7 @@ pub(crate) fn round(x: i32, shift: u32) -> i32 {
     x.wrapping_add(1_i32.wrapping_shl(shift.wrapping_sub(1))).wrapping_shr(shift)
 }
 
-/// An activation: rounded and clamped. Clause 7.17.6.
+/// An activation: rounded and clamped. Clause 7.7.6.
 pub(crate) fn act(x: i32, shift: u32) -> i32 {
     round(x, shift).clamp(-127, 127)
 }

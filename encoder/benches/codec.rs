@@ -1,4 +1,4 @@
-//! Encode and decode speed, Gaussians a second, memory to memory.
+//! Encode and decode speed, Gaussians per second, memory to memory.
 //!
 //! `cargo bench -p splatstream-encoder` runs the built-in scene, and real scenes where `../shared/data` has them.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed benchmark")]
@@ -56,9 +56,9 @@ fn decode_verify<const VERIFY: usize>(bencher: Bencher, name: &str) {
     let options = Options { verify: VERIFY == 1, ..Options::default() };
     bencher.counter(ItemsCount::new(frame.len())).bench(|| {
         let summary = decode_stream(black_box(&bytes), &options, |sequence, frame| {
-            black_box(to_gaussians(frame.planes, sequence));
+            black_box(to_gaussians(frame.into_shown(), sequence));
             ControlFlow::Continue(())
         });
-        assert_eq!(summary.end, None);
+        assert_eq!(summary.verdict(), None);
     });
 }

@@ -6,7 +6,7 @@
 
 use crate::colour;
 use crate::entropy_cost::entropy_of;
-use crate::lattice::{Spacing, inner_side, nearest_integer};
+use crate::grid::{Spacing, inner_side, nearest_integer};
 use crate::pca::Components;
 use crate::settings::{Settings, Steps};
 use splatstream_format::syntax::TransformKind;
@@ -109,7 +109,7 @@ impl Scene {
         Self { views: views.collect(), inner_side, spacing, frame }
     }
 
-    /// Mean squared error of the pictures with these attributes on their lattices, by the mean of decibels.
+    /// Mean squared error of the pictures with these attributes on their grids, by the mean of decibels.
     fn error(&self, attributes: &[Attribute], steps: &Steps) -> f64 {
         let mut frame = self.frame.clone();
         for &attribute in attributes {
@@ -161,7 +161,7 @@ impl Scene {
         (self.inner_side / libm::exp2f(steps.position_bits)).max(f32::MIN_POSITIVE)
     }
 
-    /// Bits a Gaussian that halving the step costs.
+    /// Bits per Gaussian that halving the step costs.
     fn bits_an_octave(&self, attribute: Attribute, steps: &Steps) -> f64 {
         // Every bit of a sorted position costs one bit an axis.
         if attribute == Attribute::Position {
@@ -175,7 +175,7 @@ impl Scene {
         (finer - coarser) / 0.5
     }
 
-    /// Zero-order bits a Gaussian of an attribute, on a sample.
+    /// Zero-order bits per Gaussian of an attribute, on a sample.
     fn bits(&self, attribute: Attribute, steps: &Steps) -> f64 {
         let stride = self.frame.len().div_ceil(SAMPLE).max(1);
         let rows: Vec<u32> = (0..self.frame.len() as u32).step_by(stride).collect();
@@ -210,16 +210,16 @@ impl Scene {
     }
 }
 
-/// SH planes whose principal components are on a lattice.
+/// SH planes whose principal components are on a grid.
 fn rounded_components(planes: &[Vec<f32>], step: f32, spacing: &Spacing) -> Vec<Vec<f32>> {
     let slices: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
     let basis = Components::of(&slices);
     let transform = colour::transform(TransformKind::Sh, &basis, step);
     let components = colour::components(&transform, &slices, step, spacing);
-    let plane = |place: usize| {
-        let mut plane = vec![basis.mean[place] as f32; slices[place].len()];
+    let plane = |index: usize| {
+        let mut plane = vec![basis.mean[index] as f32; slices[index].len()];
         for (row, component) in basis.rows.iter().zip(&components) {
-            let weight = row[place] as f32 * step;
+            let weight = row[index] as f32 * step;
             for (value, &component) in plane.iter_mut().zip(component) {
                 *value += weight * component as f32;
             }

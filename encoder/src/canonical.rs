@@ -56,9 +56,9 @@ fn smallest_turn(q: [f32; 4]) -> [f32; 4] {
 
 fn largest(values: [f32; 4]) -> usize {
     let mut best = 0;
-    for place in 1..4 {
-        if values[place] > values[best] {
-            best = place;
+    for index in 1..4 {
+        if values[index] > values[best] {
+            best = index;
         }
     }
     best

@@ -45,7 +45,7 @@ pub(crate) fn cluster(histograms: Vec<Histogram>, width: usize) -> Clustering {
         }
         owner.iter_mut().filter(|owner| **owner == gone).for_each(|owner| *owner = kept);
         for (pair, saved) in pairs.iter_mut().zip(&mut savings) {
-            let touched = [pair.0, pair.1].iter().any(|&place| place == gone || place == kept);
+            let touched = [pair.0, pair.1].iter().any(|&index| index == gone || index == kept);
             if touched {
                 *pair = (owner[pair.0].min(owner[pair.1]), owner[pair.0].max(owner[pair.1]));
                 *saved = if pair.0 == pair.1 { f64::NEG_INFINITY } else { saving(&tables, &bits, *pair) };
@@ -61,11 +61,11 @@ fn renumbered<T: PartialEq + Copy>(owner: &[T]) -> Vec<u8> {
     owner
         .iter()
         .map(|&owner| {
-            let place = seen.iter().position(|&known| known == owner).unwrap_or_else(|| {
+            let index = seen.iter().position(|&known| known == owner).unwrap_or_else(|| {
                 seen.push(owner);
                 seen.len() - 1
             });
-            place as u8
+            index as u8
         })
         .collect()
 }
@@ -77,13 +77,13 @@ impl Clustering {
         let rows: Vec<&[u8]> = self.table_of_context.chunks(self.width).collect();
         let kept_rows: Vec<usize> =
             (0..rows.len()).filter(|&row| row == 0 || rows[row] != rows[row - 1]).collect();
-        let column = |place: usize| rows.iter().map(|row| row[place]).collect::<Vec<u8>>();
+        let column = |index: usize| rows.iter().map(|row| row[index]).collect::<Vec<u8>>();
         let kept_columns: Vec<usize> =
-            (0..self.width).filter(|&place| place == 0 || column(place) != column(place - 1)).collect();
+            (0..self.width).filter(|&index| index == 0 || column(index) != column(index - 1)).collect();
         let table_of_context: Vec<u8> = kept_rows
             .iter()
-            .flat_map(|&row| kept_columns.iter().map(move |&place| (row, place)))
-            .map(|(row, place)| rows[row][place])
+            .flat_map(|&row| kept_columns.iter().map(move |&index| (row, index)))
+            .map(|(row, index)| rows[row][index])
             .collect();
         let first = keep_thresholds(first, &kept_rows);
         let second = keep_thresholds(second, &kept_columns);

@@ -1,7 +1,7 @@
 //! Colour on its way in: transforms, components, and the choice between coefficients and codebooks.
 
 use crate::entropy_cost::entropy_of;
-use crate::lattice::{Spacing, nearest_integer};
+use crate::grid::{Spacing, nearest_integer};
 use crate::pca::Components;
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
@@ -12,7 +12,7 @@ use splatstream_format::syntax::{TransformHeader, TransformKind};
 
 /// A basis entry of 1.
 const UNIT: f64 = 4096.0;
-/// Means are on a lattice this much finer than the step.
+/// Means are on a grid this much finer than the step.
 const FRACTION: f64 = 64.0;
 /// The largest mean the syntax carries.
 const MEAN_LIMIT: f64 = 16_777_215.0;
@@ -42,7 +42,7 @@ pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32)
 /// Gaussians projected at a time: their planes stay in the second-level cache.
 const TILE: usize = 1 << 12;
 
-/// Components in units of the step, turned into `V` by `map`, which is given the row as well; one plane a component.
+/// Components in units of the step, turned into `V` by `map`, which is given the row as well; one plane per component.
 fn project<V: Send + Sync + Copy>(
     transform: &Transform,
     planes: &[&[f32]],
@@ -69,7 +69,7 @@ fn project<V: Send + Sync + Copy>(
         transform.rows().map(row).collect()
     };
     let tiles: Vec<Vec<Vec<V>>> = starts.par_iter().map(tile).collect();
-    let component = |place: usize| tiles.iter().flat_map(|tile| tile[place].iter().copied()).collect();
+    let component = |index: usize| tiles.iter().flat_map(|tile| tile[index].iter().copied()).collect();
     (0..transform.rows().len()).into_par_iter().map(component).collect()
 }
 
@@ -95,12 +95,12 @@ pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<i32>>)
     transform.header.rank = used as u8;
 }
 
-/// How SH of a GOP is coded, and the figures behind the choice.
+/// How SH of a GOP is coded, and the figures that the choice rests on.
 #[derive(Debug, Clone)]
 pub(crate) struct ShPlan {
     /// The codebooks; none: coefficients.
     pub(crate) codebooks: Vec<Codebook>,
-    /// Bits a Gaussian and mean squared error (in steps) of coefficients, then of vector quantisation, on the
+    /// Bits per Gaussian and mean squared error (in steps) of coefficients, then of vector quantisation, on the
     /// sample; none if not compared.
     pub(crate) trial: Option<[(f64, f64); 2]>,
 }
@@ -135,7 +135,7 @@ pub(crate) fn plan_sh(
     ShPlan { codebooks: vec![vq::train(&all, rank, entries.min(count))], trial }
 }
 
-/// Bits a Gaussian and squared error of coefficients and of a codebook, on the rows of a sample that the codebook was
+/// Bits per Gaussian and squared error of coefficients and of a codebook, on the rows of a sample that the codebook was
 /// not trained on; and whether the codebook has the lower cost. Its entries are shared by `gaussians`.
 pub(crate) fn compare(
     rows: &[f32],
@@ -155,7 +155,7 @@ pub(crate) fn compare(
     ([by_coefficients, by_vq], cost(by_vq) < cost(by_coefficients))
 }
 
-/// The components of every `stride`-th Gaussian, one behind the other.
+/// The components of every `stride`-th Gaussian, one after the other.
 pub(crate) fn sampled_rows(transform: &Transform, planes: &[&[f32]], step: f32, stride: usize) -> Vec<f32> {
     let sampled: Vec<Vec<f32>> =
         planes.iter().map(|plane| plane.iter().step_by(stride).copied().collect()).collect();
@@ -163,7 +163,7 @@ pub(crate) fn sampled_rows(transform: &Transform, planes: &[&[f32]], step: f32, 
     vq::rows(&project(transform, &sampled, step, |_, value| value))
 }
 
-/// Bits and squared error a Gaussian of rounding every component.
+/// Bits and squared error per Gaussian of rounding every component.
 fn coefficient_cost(rows: &[f32], rank: usize) -> (f64, f64) {
     let gaussians = (rows.len() / rank).max(1) as f64;
     let mut bits = 0.0;
@@ -180,8 +180,23 @@ fn coefficient_cost(rows: &[f32], rank: usize) -> (f64, f64) {
     (bits / gaussians, error / gaussians)
 }
 
-/// The codebook index of every Gaussian.
-pub(crate) fn indices(transform: &Transform, planes: &[&[f32]], step: f32, codebook: &Codebook) -> Vec<i32> {
+/// The codebook indices of every Gaussian, one plane per stage: the nearest entry of the first codebook, then of each
+/// other that of what is left.
+pub(crate) fn stages(
+    transform: &Transform,
+    planes: &[&[f32]],
+    step: f32,
+    codebooks: &[&Codebook],
+) -> Vec<Vec<i32>> {
     let rank = usize::from(transform.header.rank);
-    vq::assign(codebook, &sampled_rows(transform, planes, step, 1), rank).0
+    let mut rows = sampled_rows(transform, planes, step, 1);
+    let mut stage = |book: &&Codebook| {
+        let (indices, _) = vq::assign(book, &rows, rank);
+        for (row, &index) in rows.chunks_exact_mut(rank.max(1)).zip(&indices) {
+            let entry = &book.entries[index as usize * rank..];
+            row.iter_mut().zip(entry).for_each(|(part, &value)| *part -= f32::from(value));
+        }
+        indices
+    };
+    codebooks.iter().map(&mut stage).collect()
 }

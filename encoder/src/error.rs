@@ -30,9 +30,21 @@ pub enum Error {
         /// The most that a frame holds.
         max: u32,
     },
-    /// An attribute cannot be put on its lattice.
+    /// A frame has so many Gaussians that those of one second are more than a stream can carry.
+    #[error(
+        "frame {frame} has {count} Gaussians, which is too many at this frame rate: one second holds at most {max}"
+    )]
+    TooManyPerSecond {
+        /// The frame.
+        frame: u32,
+        /// Its Gaussians.
+        count: usize,
+        /// The most that one second holds.
+        max: u64,
+    },
+    /// An attribute cannot be put on its quantisation grid.
     #[error("frame {frame}: {attribute} of Gaussian {row} is {value}, too far out for a step of {step}")]
-    OutOfLattice {
+    OutOfGrid {
         /// The frame.
         frame: u32,
         /// The attribute.
@@ -41,7 +53,7 @@ pub enum Error {
         row: usize,
         /// Its value.
         value: f32,
-        /// The step of the lattice.
+        /// The step of the grid.
         step: f32,
     },
     /// A frame could not be read.

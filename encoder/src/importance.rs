@@ -1,6 +1,6 @@
 //! Which Gaussians come first.
 
-use crate::lattice::Spacing;
+use crate::grid::Spacing;
 use crate::settings::{Importance, Preset, Settings};
 use splatstream_format::syntax::prefix_length;
 use splatstream_render::Camera;
@@ -11,7 +11,7 @@ use splatstream_scene::{GaussianFrame, importance};
 /// Orders the frames of a sequence, most important Gaussian first.
 pub(crate) struct Ranking {
     importance: Importance,
-    /// Shares of the Gaussians at which what is kept is weighed anew, percent; falling.
+    /// Shares of the Gaussians at which what is kept is weighed again, percent; falling.
     rounds: Vec<u8>,
     cameras: Vec<Camera>,
     preset: Preset,
@@ -89,7 +89,7 @@ impl Ranking {
         &self.cameras
     }
 
-    /// From the last to the first: what pictures miss least goes, the rest is weighed anew without it.
+    /// From the last to the first: what pictures miss least goes, the rest is weighed again without it.
     ///
     /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
     /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what

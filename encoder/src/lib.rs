@@ -1,25 +1,31 @@
 //! The SplatStream encoder (informative: any stream that the specification accepts is a stream).
 //!
-//! Two passes over the frames: [`sequence`] finds lattices and what the scene needs, then each GOP gets its
-//! [colour](mod@colour) transforms and codebooks and each [frame](mod@frame) its units. Prediction, contexts and
-//! reconstruction are the decoder's own functions. Same frames and settings, same bytes, on every machine
-//! and with any number of threads.
+//! Read it from the top: [`encode`](fn@encode) in [stream](mod@stream) looks at every frame once
+//! ([sequence](mod@sequence)), writes the beginning of the stream, its GOPs and its end ([writer](mod@writer)).
+//! [gop](mod@gop) goes from frame to frame: each GOP gets its colour transforms and codebooks
+//! ([gop_tools](mod@gop_tools)), each [frame](mod@frame) its units, and each unit its sections
+//! ([section](mod@section), [models](mod@models), [blocks](mod@blocks)). An I frame of one layer and a predicted frame
+//! take the same way. Prediction, contexts and reconstruction are the decoder's own functions. Same frames and
+//! settings, same bytes, on every machine and with any number of threads.
 
 mod allocation;
 mod blocks;
 pub mod canonical;
 mod clusters;
 mod colour;
-mod dynamic;
 mod entropy_cost;
 mod error;
 mod frame;
+mod gop;
+mod gop_tools;
+mod grid;
 mod importance;
-mod lattice;
 mod matching;
 mod models;
 mod motion;
+mod parametric_fit;
 mod pca;
+mod report;
 mod section;
 mod sequence;
 mod settings;
@@ -27,12 +33,14 @@ mod source;
 mod stream;
 pub mod transformer;
 mod vq;
+mod writer;
 
-pub use dynamic::learning::{nearer, samples, train_network};
 pub use error::Error;
+pub use frame::learning::{nearer, samples, train_network};
+pub use report::{FrameReport, Report};
 pub use settings::{
-    Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings, ShChoice,
-    Steps, Structure, Tools,
+    Anchor, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings,
+    ShChoice, Steps, Structure, Tools,
 };
 pub use source::FrameSource;
-pub use stream::{FrameReport, Progress, Report, encode};
+pub use stream::{Progress, encode};

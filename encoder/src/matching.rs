@@ -31,7 +31,7 @@ const MUCH: f32 = 0.6;
 /// Gaussians as matching sees them; all planes of one length.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cloud<'a> {
-    /// In lattice steps; those of a reference may already be displaced by a guess of its motion.
+    /// In grid steps; those of a reference may already be displaced by a guess of its motion.
     pub(crate) position: [&'a [f32]; 3],
     /// Natural log of the semi-axes in scene units, in any order.
     pub(crate) log_scale: [&'a [f32]; 3],
@@ -39,7 +39,7 @@ pub(crate) struct Cloud<'a> {
     pub(crate) opacity: &'a [f32],
     /// As in PLY.
     pub(crate) dc: [&'a [f32]; 3],
-    /// The row of each in its file; empty: the place is the row.
+    /// The row of each in its file; empty: the index is the row.
     pub(crate) row: &'a [u32],
     /// Rows of the file, those left out included.
     pub(crate) row_count: u32,
@@ -52,30 +52,30 @@ impl Cloud<'_> {
     }
 
     /// Position of one.
-    pub(crate) fn at(&self, place: u32) -> [f32; 3] {
-        self.position.map(|plane| plane[place as usize])
+    pub(crate) fn at(&self, index: u32) -> [f32; 3] {
+        self.position.map(|plane| plane[index as usize])
     }
 
-    fn log_volume(&self, place: u32) -> f32 {
-        self.log_scale.iter().map(|plane| plane[place as usize]).sum()
+    fn log_volume(&self, index: u32) -> f32 {
+        self.log_scale.iter().map(|plane| plane[index as usize]).sum()
     }
 
     /// The geometric mean of the two largest axes, scene units.
-    pub(crate) fn size(&self, place: u32) -> f32 {
-        let [a, b, c] = self.log_scale.map(|plane| plane[place as usize]);
+    pub(crate) fn size(&self, index: u32) -> f32 {
+        let [a, b, c] = self.log_scale.map(|plane| plane[index as usize]);
         libm::expf(0.5 * (a + b + c - a.min(b).min(c)))
     }
 
     /// Opacity times area in scene units, what it covers at most.
-    pub(crate) fn coverage(&self, place: u32) -> f32 {
-        let size = self.size(place);
-        size * size / (1.0 + libm::expf(-self.opacity[place as usize]))
+    pub(crate) fn coverage(&self, index: u32) -> f32 {
+        let size = self.size(index);
+        size * size / (1.0 + libm::expf(-self.opacity[index as usize]))
     }
 
-    /// Rows with their places, by row.
+    /// Rows with their indices, by row.
     fn by_row(&self) -> Vec<(u32, u32)> {
-        let row = |place: u32| self.row.get(place as usize).copied().unwrap_or(place);
-        let mut rows: Vec<(u32, u32)> = (0..self.len() as u32).map(|place| (row(place), place)).collect();
+        let row = |index: u32| self.row.get(index as usize).copied().unwrap_or(index);
+        let mut rows: Vec<(u32, u32)> = (0..self.len() as u32).map(|index| (row(index), index)).collect();
         rows.sort_unstable();
         rows
     }
@@ -84,7 +84,7 @@ impl Cloud<'_> {
 /// In what units attributes are compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Measure {
-    /// Scene units in a lattice step.
+    /// Scene units in a grid step.
     pub(crate) position_step: f32,
     /// Quantiser steps.
     pub(crate) steps: Steps,
@@ -132,7 +132,7 @@ pub(crate) fn shares_much(matching: &Matching) -> bool {
 ///
 /// Such rows agree in opacity, colour and volume, whatever moves. If nearly all of two files of equal length do,
 /// so are those that changed the same Gaussians; else only runs of rows that agree are trusted. Unrelated Gaussians
-/// that look alike are told by how they move.
+/// that look alike are told apart by how they move.
 pub(crate) fn by_index(reference: &Cloud<'_>, target: &Cloud<'_>, measure: &Measure) -> Matching {
     let common = common_rows(reference, target);
     let agree: Vec<bool> = common.iter().map(|&pair| agrees(reference, target, measure, pair)).collect();
@@ -164,10 +164,10 @@ fn common_rows(reference: &Cloud<'_>, target: &Cloud<'_>) -> Vec<(u32, u32)> {
     let others = target.by_row();
     let mut rest = others.iter().peekable();
     let mut common = Vec::new();
-    for (row, place) in reference.by_row() {
+    for (row, index) in reference.by_row() {
         while rest.next_if(|&&(other, _)| other < row).is_some() {}
         if let Some(&(_, other)) = rest.next_if(|&&(other, _)| other == row) {
-            common.push((place, other));
+            common.push((index, other));
         }
     }
     common
@@ -212,7 +212,7 @@ fn coherent(reference: &Cloud<'_>, target: &Cloud<'_>, pairs: &[(u32, u32)]) -> 
 }
 
 impl Matching {
-    /// Pairs what is left by place and attributes, up to a cost of at most [`LIMIT`], and tells what it paired.
+    /// Pairs what is left by place and attributes, up to a cost of at most [`LIMIT`], and returns what it paired.
     pub(crate) fn add_nearest(
         &mut self,
         reference: &Cloud<'_>,

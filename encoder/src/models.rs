@@ -2,14 +2,16 @@
 
 use crate::clusters::{Clustering, cluster};
 use crate::entropy_cost::Histogram;
+use crate::parametric_fit::fitted;
 use crate::settings::{Preset, Tools};
+use core::slice;
 use rayon::prelude::*;
 use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context::{self, DeltaNeighbours, Neighbours, is_serial};
 use splatstream_decoder::layout::{Attribute, PlaneInfo, Section, is_available};
 use splatstream_format::bits::BitWriter;
 use splatstream_format::entropy::frequencies::Frequencies;
-use splatstream_format::entropy::model::{AxisLookup, ContextAxis, PlaneModel, Source};
+use splatstream_format::entropy::model::{AxisLookup, ContextAxis, PlaneModel, Source, write_models};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 
 /// Gaussians after which only every other block is looked at.
@@ -50,7 +52,7 @@ fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
     if !tools.contexts {
         return Vec::new();
     }
-    let listed: &[Source] = match (preset, info.attribute, info.place) {
+    let listed: &[Source] = match (preset, info.attribute, info.index) {
         (Preset::Small, _, _) => &Source::ALL[1..],
         _ if info.section == Section::Updates => &[GroupMagnitude, NeighbourMagnitude, PreviousPlane],
         (_, Attribute::Position, _) => &[NeighbourSum],
@@ -64,7 +66,7 @@ fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
         (_, Attribute::Sh, _) => &[GroupMagnitude, Opacity, LargestLogScale],
         (_, Attribute::Cell | Attribute::Mode, _) => &[NeighbourSum],
         (_, Attribute::Stale | Attribute::Predictor, _) => &[NeighbourSum],
-        (_, Attribute::Translation | Attribute::Turn, _) => &[NeighbourMagnitude, GroupMagnitude],
+        (_, Attribute::Translation | Attribute::CellRotation, _) => &[NeighbourMagnitude, GroupMagnitude],
         (_, Attribute::Move, _) => &[NeighbourMagnitude, GroupMagnitude, NeighbourSum],
     };
     let few = if preset == Preset::Fast { 1 } else { listed.len() };
@@ -137,8 +139,8 @@ impl PlaneView<'_> {
         let [first, second] = &axes;
         let count = first.contexts() * second.contexts();
         let mut histograms = vec![Histogram::default(); count];
-        for (place, &token) in self.tokens.iter().enumerate() {
-            histograms[usize::from(contexts.get(place).copied().unwrap_or(0))].add(token);
+        for (index, &token) in self.tokens.iter().enumerate() {
+            histograms[usize::from(contexts.get(index).copied().unwrap_or(0))].add(token);
         }
         let clustering = cluster(histograms, second.contexts());
         let bits = clustering.bits + axis_bits(first) + axis_bits(second);
@@ -158,7 +160,7 @@ impl PlaneView<'_> {
         let values: Vec<Vec<i32>> = sources.iter().map(|&source| self.values(source)).collect();
         let mut best = self.candidate([ContextAxis::NONE, ContextAxis::NONE], &[]);
         let mut first = None;
-        for (place, (&source, values)) in sources.iter().zip(&values).enumerate() {
+        for (index, (&source, values)) in sources.iter().zip(&values).enumerate() {
             let axis = axis(source, values, FIRST_THRESHOLDS);
             if axis.thresholds.is_empty() {
                 continue;
@@ -167,13 +169,13 @@ impl PlaneView<'_> {
             let candidate = self.candidate([axis.clone(), ContextAxis::NONE], &contexts);
             if candidate.bits < best.bits {
                 best = candidate;
-                first = Some((place, axis, contexts));
+                first = Some((index, axis, contexts));
             }
         }
         let Some((taken, first, on_first)) = first.filter(|_| two_axes) else { return best };
-        for (place, (&source, values)) in sources.iter().zip(&values).enumerate() {
+        for (index, (&source, values)) in sources.iter().zip(&values).enumerate() {
             let second = axis(source, values, SECOND_THRESHOLDS);
-            if place == taken || second.thresholds.is_empty() {
+            if index == taken || second.thresholds.is_empty() {
                 continue;
             }
             let contexts = context::combine(&on_first, &on_axis(&second, values), second.contexts());
@@ -227,13 +229,31 @@ fn tables(model: &PlaneModel, info: PlaneInfo, plane: usize, blocks: &[CodedBloc
     let mut histograms = vec![Histogram::default(); count];
     for block in blocks {
         let contexts = contexts(model, info, plane, block);
-        for (place, value) in unsigned_values(info, plane, block).enumerate() {
-            let context = usize::from(contexts.get(place).copied().unwrap_or(0));
+        for (index, value) in unsigned_values(info, plane, block).enumerate() {
+            let context = usize::from(contexts.get(index).copied().unwrap_or(0));
             let table = usize::from(model.table_of_context[context]);
             histograms[table].add(split(value, model.direct_log2).token);
         }
     }
-    histograms.iter().map(|histogram| Frequencies::from_counts(&histogram.counts())).collect()
+    histograms.iter().map(|histogram| table(&histogram.counts(), info.alphabet, model.direct_log2)).collect()
+}
+
+/// The explicit table of the counts, or a parametric one if that saves bits.
+fn table(counts: &[u64], alphabet: Alphabet, direct_log2: u8) -> Frequencies {
+    let explicit = Frequencies::from_counts(counts);
+    if explicit.single_token().is_some() {
+        return explicit;
+    }
+    let Some(parameters) = fitted(counts, alphabet, direct_log2) else { return explicit };
+    let parametric = Frequencies::parametric(parameters, alphabet, direct_log2);
+    let largest = alphabet.last_token(direct_log2).unwrap_or(u8::MAX);
+    let bits = |table: &Frequencies| {
+        let mut carried = BitWriter::new();
+        table.write(&mut carried, alphabet, largest);
+        let cost = |(&count, cost): (&u64, f64)| if count > 0 { count as f64 * cost } else { 0.0 };
+        carried.len_bits() as f64 + counts.iter().zip(token_costs(table)).map(cost).sum::<f64>()
+    };
+    if bits(&parametric) < bits(&explicit) { parametric } else { explicit }
 }
 
 /// Models for all planes of a unit.
@@ -251,26 +271,40 @@ pub(crate) fn choose_all(
         .collect()
 }
 
-/// For each plane its own model, or the one before if that saves its tables.
+/// For each plane its own model, or the one before if that has the same bias and saves its tables.
 pub(crate) fn cheapest(
-    own: Vec<PlaneModel>,
+    own: &[PlaneModel],
     before: Option<&[PlaneModel]>,
     planes: &[PlaneInfo],
     blocks: &[CodedBlock],
 ) -> Vec<PlaneModel> {
-    let Some(before) = before else { return own };
-    let choose = |(plane, own): (usize, PlaneModel)| {
-        let Some(before) = before.get(plane) else { return own };
+    let Some(before) = before else { return own.to_vec() };
+    let choose = |(plane, own): (usize, &PlaneModel)| {
+        let Some(before) = before.get(plane).filter(|before| before.bias == own.bias) else {
+            return own.clone();
+        };
         let bits = |model: &PlaneModel| -> Option<f64> {
             blocks.iter().map(|block| symbol_bits(model, planes[plane], plane, block)).sum()
         };
-        let own_bits = bits(&own).map(|bits| bits + table_bits(&own));
+        let own_bits = bits(own).map(|bits| bits + model_bits(own, planes[plane].alphabet));
         match (bits(before), own_bits) {
             (Some(reused), Some(own_bits)) if reused <= own_bits => before.clone(),
-            _ => own,
+            _ => own.clone(),
         }
     };
-    own.into_par_iter().enumerate().map(choose).collect()
+    own.par_iter().enumerate().map(choose).collect()
+}
+
+/// Makes each value of a plane take more than half a bit: one of the four smallest values becomes as frequent as all
+/// values together.
+pub(crate) fn dilute(model: &mut PlaneModel) {
+    for table in &mut model.tables {
+        let mut counts: Vec<u64> = table.of_token().iter().map(|&frequency| frequency.into()).collect();
+        counts.resize(counts.len().max(4), 0);
+        let rarest = (0..4).min_by_key(|&token: &usize| counts[token]).unwrap_or(0);
+        counts[rarest] += 4096;
+        *table = Frequencies::from_counts(&counts);
+    }
 }
 
 /// Bits of a plane's symbols under a model; none if a token cannot be coded.
@@ -278,8 +312,8 @@ fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedB
     let contexts = contexts(model, info, plane, block);
     let costs: Vec<Vec<f64>> = model.tables.iter().map(token_costs).collect();
     let mut bits = 0.0;
-    for (place, value) in unsigned_values(info, plane, block).enumerate() {
-        let context = usize::from(contexts.get(place).copied().unwrap_or(0));
+    for (index, value) in unsigned_values(info, plane, block).enumerate() {
+        let context = usize::from(contexts.get(index).copied().unwrap_or(0));
         let token = split(value, model.direct_log2);
         let costs = &costs[usize::from(model.table_of_context[context])];
         let cost = costs.get(usize::from(token.token)).copied().filter(|cost| cost.is_finite())?;
@@ -288,10 +322,9 @@ fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedB
     Some(bits)
 }
 
-fn table_bits(model: &PlaneModel) -> f64 {
-    let mut bits = BitWriter::new();
-    model.tables.iter().for_each(|table| table.write(&mut bits));
-    bits.len_bits() as f64
+/// Bits of a model that is carried, to the next byte.
+fn model_bits(model: &PlaneModel, alphabet: Alphabet) -> f64 {
+    8.0 * write_models(slice::from_ref(model), &[alphabet], None).len() as f64
 }
 
 fn token_costs(table: &Frequencies) -> Vec<f64> {

@@ -16,16 +16,16 @@ use rigid::{Point, Vector};
 use splatstream_decoder::position::morton;
 use tree::{Tree, centre};
 
-/// Coded units of translation in a lattice step.
+/// Coded units of translation in a grid step.
 const TRANSLATION: f64 = 8.0;
 
-/// One, as turns are coded.
-const TURN: f64 = 16_384.0;
+/// One, as rotations are coded.
+const ROTATION: f64 = 16_384.0;
 
-/// Units of a fine position in a lattice step.
+/// Units of a fine position in a grid step.
 const FINE: f64 = 64.0;
 
-/// A Gaussian this near its target on every axis, lattice steps, needs no move. Beyond half a step rounding would
+/// A Gaussian this near its target on every axis, grid steps, needs no move. Beyond half a step rounding would
 /// move it; a little more saves many moves and costs little error.
 const DEAD_ZONE: f64 = 0.75;
 
@@ -41,29 +41,29 @@ const PAIRS_IN_COARSE_CELL: usize = 128;
 /// A Gaussian of the reference and where the target has it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pair {
-    /// Fine position in the reference, 1/64 of a lattice step.
+    /// Fine position in the reference, 1/64 of a grid step.
     pub(crate) from: [i32; 3],
-    /// Position in the target, lattice steps.
+    /// Position in the target, grid steps.
     pub(crate) to: [f32; 3],
 }
 
 /// A listed cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Cell {
-    /// Morton code of its place, in cells.
+    /// Morton code of its coordinates, in cells.
     pub(crate) code: u64,
     /// What is carried in it is not shown.
     pub(crate) stale: bool,
-    /// Translation in eighths of a lattice step.
+    /// Translation in eighths of a grid step.
     pub(crate) translation: [i32; 3],
-    /// Vector part of the turn's quaternion, Q14.
-    pub(crate) turn: [i32; 3],
+    /// Vector part of the rotation's quaternion, Q14.
+    pub(crate) rotation: [i32; 3],
 }
 
 /// Cells of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CellMotion {
-    /// The side of a cell is 2 to this, lattice steps.
+    /// The side of a cell is 2 to this, grid steps.
     pub(crate) cell_log2: u8,
     /// In Morton order.
     pub(crate) cells: Vec<Cell>,
@@ -71,7 +71,7 @@ pub(crate) struct CellMotion {
     pub(crate) bits: [f64; 2],
 }
 
-fn lattice(fine: [i32; 3]) -> Vector {
+fn grid_position(fine: [i32; 3]) -> Vector {
     fine.map(|value| f64::from(value) / FINE)
 }
 
@@ -79,9 +79,9 @@ fn lattice(fine: [i32; 3]) -> Vector {
 ///
 /// `unmatched` are those without a pair: who has nothing newer is shown them where these cells bring them.
 pub(crate) fn cell_motion(pairs: &[Pair], unmatched: &[[i32; 3]], position_bits: u8) -> CellMotion {
-    let point = |pair: &Pair| Point { from: lattice(pair.from), to: pair.to.map(f64::from) };
+    let point = |pair: &Pair| Point { from: grid_position(pair.from), to: pair.to.map(f64::from) };
     let points: Vec<Point> = pairs.iter().map(point).collect();
-    let others: Vec<Vector> = unmatched.iter().copied().map(lattice).collect();
+    let others: Vec<Vector> = unmatched.iter().copied().map(grid_position).collect();
     let mut tree = Tree::new(&points, &others, position_bits);
     let mut best: Option<(f64, CellMotion)> = None;
     loop {
@@ -103,23 +103,23 @@ pub(crate) fn cell_motion(pairs: &[Pair], unmatched: &[[i32; 3]], position_bits:
 }
 
 impl CellMotion {
-    /// The place, in cells, of the cell that holds a fine position, and the place's Morton code.
+    /// The coordinates, in cells, of the cell that holds a fine position, and their Morton code.
     fn cell(&self, fine: [i32; 3]) -> ([u32; 3], u64) {
-        let place = fine.map(|value| ((value + 32) >> 6 >> self.cell_log2).max(0) as u32);
-        (place, morton(place[0], place[1], place[2]))
+        let index = fine.map(|value| ((value + 32) >> 6 >> self.cell_log2).max(0) as u32);
+        (index, morton(index[0], index[1], index[2]))
     }
 
-    /// Where a Gaussian of the reference is carried, lattice steps: the decoder's within its rounding.
+    /// Where a Gaussian of the reference is carried, grid steps: the decoder's within its rounding.
     pub(crate) fn displaced(&self, fine: [i32; 3]) -> [f32; 3] {
-        let (place, code) = self.cell(fine);
+        let (index, code) = self.cell(fine);
         let coded = match self.cells.binary_search_by_key(&code, |cell| cell.code) {
             Ok(found) => {
-                let Cell { translation, turn, .. } = self.cells[found];
-                Coded { translation, turn }
+                let Cell { translation, rotation, .. } = self.cells[found];
+                Coded { translation, rotation }
             }
             Err(_) => Coded::STILL,
         };
-        coded.apply(centre(place, u32::from(self.cell_log2)), lattice(fine)).map(|value| value as f32)
+        coded.apply(centre(index, u32::from(self.cell_log2)), grid_position(fine)).map(|value| value as f32)
     }
 
     /// With these cells, by code, marked stale; cells that were not listed are added and do not move.
@@ -127,8 +127,9 @@ impl CellMotion {
         for &code in codes {
             match self.cells.binary_search_by_key(&code, |cell| cell.code) {
                 Ok(found) => self.cells[found].stale = true,
-                Err(place) => {
-                    self.cells.insert(place, Cell { code, stale: true, translation: [0; 3], turn: [0; 3] });
+                Err(index) => {
+                    self.cells
+                        .insert(index, Cell { code, stale: true, translation: [0; 3], rotation: [0; 3] });
                 }
             }
         }

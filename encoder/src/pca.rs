@@ -17,7 +17,7 @@ pub(crate) struct Components {
 impl Components {
     /// Zero mean, the axes themselves.
     pub(crate) fn identity(dimension: usize) -> Self {
-        let row = |place| (0..dimension).map(|axis| if axis == place { 1.0 } else { 0.0 }).collect();
+        let row = |index| (0..dimension).map(|axis| if axis == index { 1.0 } else { 0.0 }).collect();
         Self { mean: vec![0.0; dimension], rows: (0..dimension).map(row).collect() }
     }
 
@@ -84,7 +84,7 @@ fn eigenvectors(mut matrix: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     }
     let mut order: Vec<usize> = (0..dimension).collect();
     order.sort_by(|&a, &b| matrix[b][b].total_cmp(&matrix[a][a]));
-    order.into_iter().map(|place| with_positive_peak(vectors[place].clone())).collect()
+    order.into_iter().map(|index| with_positive_peak(vectors[index].clone())).collect()
 }
 
 /// One Jacobi rotation in the plane of axes `p` and `q`; rows of `vectors` turn along.
@@ -104,10 +104,10 @@ fn rotate(matrix: &mut [Vec<f64>], vectors: &mut [Vec<f64>], p: usize, q: usize)
         row[q] = sine * a + cosine * b;
     }
     for rows in [matrix, vectors] {
-        for place in 0..rows[p].len() {
-            let (a, b) = (rows[p][place], rows[q][place]);
-            rows[p][place] = cosine * a - sine * b;
-            rows[q][place] = sine * a + cosine * b;
+        for index in 0..rows[p].len() {
+            let (a, b) = (rows[p][index], rows[q][index]);
+            rows[p][index] = cosine * a - sine * b;
+            rows[q][index] = sine * a + cosine * b;
         }
     }
 }

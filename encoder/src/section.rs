@@ -1,4 +1,4 @@
-//! Codes a section of an increment: values to models and blocks.
+//! Codes a section: values to models and blocks.
 
 use crate::blocks::code_blocks;
 use crate::error::Error;
@@ -9,9 +9,12 @@ use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Attribute, Layout, PlaneInfo, Section};
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
-use splatstream_format::entropy::model::write_models;
+use splatstream_format::entropy::model::{PlaneModel, write_models};
 use splatstream_format::entropy::token::Alphabet;
 use splatstream_format::payload::SectionBytes;
+
+/// Values of a plane above which tables of its own always pay.
+const MANY: usize = 1 << 15;
 
 /// How sections are coded.
 #[derive(Debug, Clone, Copy)]
@@ -24,51 +27,106 @@ pub(crate) struct SectionPlan {
     pub(crate) tools: Tools,
 }
 
-/// Codes the values of a section and puts its models in force.
-///
-/// # Errors
-/// A value that no token codes.
-pub(crate) fn code_section(
-    section: Section,
-    layout: &Layout,
-    values: &SectionValues,
-    plan: &SectionPlan,
-    in_force: &mut ModelsInForce,
-) -> Result<SectionBytes, Error> {
-    let known = in_force.get(section).filter(|known| plan.tools.table_reuse && known.layout == *layout);
-    let biases = biases(section, layout, values, known);
-    let blocks = blocks(layout, values, &biases, 1 << plan.block_log2);
-    let own = models::choose_all(layout.planes(), &blocks, &biases, plan.preset, plan.tools);
-    let before = known.map(|known| known.models.as_slice());
-    let chosen = models::cheapest(own, before, layout.planes(), &blocks);
-    let model = write_models(&chosen, &layout.alphabets(), before);
-    let (lanes_log2, blocks) = code_blocks(layout.planes(), &chosen, &blocks)?;
-    in_force.replace(section, SectionModels { layout: layout.clone(), models: chosen });
-    Ok(SectionBytes { lanes_log2, model, blocks })
+/// A section with models of its own. These need nothing of other units, so that those of all units of a frame are
+/// chosen at once.
+pub(crate) struct SectionDraft {
+    layout: Layout,
+    blocks: Vec<CodedBlock>,
+    own: Vec<PlaneModel>,
 }
 
-/// What is taken off each plane: the mean for whole Gaussians, nothing for residuals. Those of the models in
-/// force, so that they can be used again.
-fn biases(
+impl SectionDraft {
+    /// Divides values into blocks and chooses models for them.
+    pub(crate) fn new(layout: Layout, values: &SectionValues, biases: &[i32], plan: &SectionPlan) -> Self {
+        let blocks = blocks(&layout, values, biases, 1 << plan.block_log2);
+        let own = match blocks.is_empty() {
+            true => Vec::new(),
+            false => models::choose_all(layout.planes(), &blocks, biases, plan.preset, plan.tools),
+        };
+        Self { layout, blocks, own }
+    }
+
+    /// Codes the section, each plane with its own model or with the one in force, and puts its models in force.
+    ///
+    /// # Errors
+    /// A value that no token codes.
+    pub(crate) fn code(
+        &self,
+        section: Section,
+        plan: &SectionPlan,
+        in_force: &mut ModelsInForce,
+    ) -> Result<SectionBytes, Error> {
+        let before = known(section, &self.layout, in_force, plan);
+        let tried = before.filter(|_| self.blocks.iter().map(CodedBlock::len).sum::<usize>() <= MANY);
+        let chosen = models::cheapest(&self.own, tried, self.layout.planes(), &self.blocks);
+        let model = write_models(&chosen, &self.layout.alphabets(), before);
+        self.code_with(section, chosen, model, in_force)
+    }
+
+    /// The same with more bits than are needed: A.2 allows no more than so many new Gaussians in a byte.
+    ///
+    /// # Errors
+    /// A value that no token codes.
+    pub(crate) fn code_at_length(
+        &self,
+        section: Section,
+        in_force: &mut ModelsInForce,
+    ) -> Result<SectionBytes, Error> {
+        let mut longer = self.own.clone();
+        let first = value_plane(&self.layout);
+        longer.iter_mut().skip(first).take(1).for_each(models::dilute);
+        let model = write_models(&longer, &self.layout.alphabets(), None);
+        self.code_with(section, longer, model, in_force)
+    }
+
+    fn code_with(
+        &self,
+        section: Section,
+        models: Vec<PlaneModel>,
+        model: Vec<u8>,
+        in_force: &mut ModelsInForce,
+    ) -> Result<SectionBytes, Error> {
+        let (lanes_log2, blocks) = code_blocks(self.layout.planes(), &models, &self.blocks)?;
+        in_force.replace(section, SectionModels { layout: self.layout.clone(), models });
+        Ok(SectionBytes { lanes_log2, model, blocks })
+    }
+}
+
+/// The models in force that a section may use again.
+fn known<'m>(
     section: Section,
     layout: &Layout,
-    values: &SectionValues,
-    known: Option<&SectionModels>,
+    in_force: &'m ModelsInForce,
+    plan: &SectionPlan,
+) -> Option<&'m [PlaneModel]> {
+    let known = in_force.get(section).filter(|known| plan.tools.table_reuse && known.layout == *layout);
+    known.map(|known| known.models.as_slice())
+}
+
+/// What is taken off each plane of a section of which `parts` are coded one after the other: the biases of the models
+/// in force, so that these can be used again; else the mean of whole Gaussians, and nothing of residuals.
+pub(crate) fn biases(
+    section: Section,
+    layout: &Layout,
+    parts: &[&SectionValues],
+    in_force: &ModelsInForce,
+    plan: &SectionPlan,
 ) -> Vec<i32> {
-    if let Some(known) = known {
-        return known.models.iter().map(|model| model.bias).collect();
+    if let Some(known) = known(section, layout, in_force, plan) {
+        return known.iter().map(|model| model.bias).collect();
     }
     let first = value_plane(layout);
     let mean = |(plane, info): (usize, &PlaneInfo)| {
-        let values = plane.checked_sub(first).and_then(|plane| values.planes.get(plane));
-        let values = values.filter(|_| section == Section::New && info.alphabet == Alphabet::Attribute);
-        values.map_or(0, |values| {
-            let count = values.len().max(1) as i64;
-            let sum: i64 = values.iter().map(|&value| i64::from(value)).sum();
-            (2 * sum + count).div_euclid(2 * count) as i32
-        })
+        let Some(plane) = plane.checked_sub(first) else { return 0 };
+        if section != Section::New || info.alphabet != Alphabet::Attribute {
+            return 0;
+        }
+        let values = || parts.iter().filter_map(|part| part.planes.get(plane)).flatten();
+        let count = values().count().max(1) as i64;
+        let sum: i64 = values().map(|&value| i64::from(value)).sum();
+        (2 * sum + count).div_euclid(2 * count) as i32
     };
-    layout.planes().iter().enumerate().map(mean).collect()
+    layout.planes().par_iter().enumerate().map(mean).collect()
 }
 
 /// The first plane that is not of the position alphabet.
@@ -99,13 +157,13 @@ fn blocks(layout: &Layout, values: &SectionValues, biases: &[i32], size: usize) 
 
 /// Clause 8.5: log-scales and opacity as contexts see them, without prediction or shift.
 fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, coded: &[i32], bias: i32) {
-    let place = usize::from(info.place);
+    let index = usize::from(info.index);
     let values = coded.iter().map(|value| value + bias);
     match info.attribute {
-        Attribute::LogScale if place == 0 => block.log_scale[0] = values.collect(),
+        Attribute::LogScale if index == 0 => block.log_scale[0] = values.collect(),
         Attribute::LogScale => {
-            block.log_scale[place] =
-                block.log_scale[place - 1].iter().zip(values).map(|(a, v)| a - v).collect();
+            block.log_scale[index] =
+                block.log_scale[index - 1].iter().zip(values).map(|(a, v)| a - v).collect();
         }
         Attribute::Opacity => block.opacity = values.collect(),
         _ => {}

@@ -1,9 +1,9 @@
-//! The first pass: what holds for all frames. Steps and lattices, SH degree, sorted axes or not.
+//! The first pass: what holds for all frames. Steps and grids, SH degree, sorted axes or not.
 
 use crate::canonical::{canonicalise, visible};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
-use crate::lattice::{Extent, inner_side, nearest_integer, position_lattice};
+use crate::grid::{Extent, check_reach, inner_side, nearest_integer, position_grid};
 use crate::settings::{Settings, Structure};
 use crate::source::FrameSource;
 use splatstream_format::Limits;
@@ -21,14 +21,16 @@ pub(crate) struct Analysis {
     pub(crate) level: u8,
     /// SH degree of the source.
     pub(crate) source_sh_degree: u8,
-    /// Bits a Gaussian of scale and rotation with sorted axes, and as they come.
+    /// Bits per Gaussian of scale and rotation with sorted axes, and as they come.
     pub(crate) axes_trial: [f64; 2],
+    /// The corners of the box of all Gaussians that can be seen, scene units.
+    pub(crate) bounds: Option<[[f32; 3]; 2]>,
 }
 
 /// Looks at every frame once.
 ///
 /// # Errors
-/// A source that cannot be read or has no frame, settings the bitstream cannot carry.
+/// A source that cannot be read or has no frame, settings and frames the bitstream cannot carry.
 pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Result<Analysis, Error> {
     check(settings)?;
     let frames = source.len();
@@ -37,41 +39,50 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
     }
     let mut extent = Extent::NONE;
     let mut inner = 0.0_f32;
-    let mut level = 1;
+    let mut largest = (0, 0);
     let mut degree = 0;
     let mut antialiased = false;
     let mut source_degree = 0;
     let mut axes_trial = [0.0; 2];
     for number in 0..frames {
         let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
-        level = level.max(level_of(&frame, number)?);
-        extent = extent.with(&frame);
+        let shown = visible(&frame, settings.keep_invisible);
+        check_reach(&frame, &shown, &settings.steps, number)?;
+        if shown.len() > largest.1 {
+            largest = (number, shown.len());
+        }
+        extent = extent.with(&frame, &shown);
         source_degree = source_degree.max(frame.sh_degree());
         degree = degree.max(needed_degree(&frame, settings.steps.sh));
         antialiased |= frame.antialiased();
         if number == 0 {
             inner = inner_side(&frame);
-            axes_trial = try_axes(&frame, settings);
+            axes_trial = try_axes(&frame, &shown, settings);
         }
     }
     let degree = settings.sh_degree.unwrap_or(degree).min(source_degree);
-    let (offset, step, bits) = position_lattice(extent, inner, &settings.steps);
+    let (offset, step, bits) = position_grid(extent, inner, &settings.steps);
     let [sorted, unsorted] = axes_trial;
     // A Gaussian that changes keeps the names of its axes, so that predicted frames are not sorted.
     let sorts = settings.tools.axis_sort && settings.profile() == Profile::Intra;
     let canonical_axes = sorts && sorted <= unsorted;
-    let flags = SequenceParameters::flags(canonical_axes, antialiased);
+    let flags = SequenceParameters::flags(canonical_axes, antialiased, settings.whole_anchor());
     let parameters = parameters(settings, frames, degree, flags, (offset, step, bits));
-    Ok(Analysis { parameters, level, source_sh_degree: source_degree, axes_trial })
+    let level = level(&parameters, largest)?;
+    Ok(Analysis { parameters, level, source_sh_degree: source_degree, axes_trial, bounds: extent.bounds() })
 }
 
-fn level_of(frame: &GaussianFrame, number: u32) -> Result<u8, Error> {
-    let level = u32::try_from(frame.len()).ok().and_then(Limits::level_of);
-    level.ok_or(Error::TooManyGaussians {
-        frame: number,
-        count: frame.len(),
-        max: Limits::gaussians_of_level(4),
-    })
+/// The lowest level for frames of which the largest has so many Gaussians.
+fn level(sequence: &SequenceParameters, (frame, count): (u32, usize)) -> Result<u8, Error> {
+    let highest = Limits::of_level(*Limits::LEVELS.end());
+    let gaussians = u32::try_from(count).ok().filter(|&count| count <= highest.max_gaussians);
+    let Some(gaussians) = gaussians else {
+        return Err(Error::TooManyGaussians { frame, count, max: highest.max_gaussians });
+    };
+    let rate = sequence.gaussian_rate(gaussians);
+    let asked = Limits { max_gaussians: gaussians, max_gaussian_rate: rate, ..Limits::of_level(1) };
+    let max = highest.max_gaussian_rate;
+    Limits::lowest_level(asked).ok_or(Error::TooManyPerSecond { frame, count, max })
 }
 
 fn check(settings: &Settings) -> Result<(), Error> {
@@ -122,8 +133,7 @@ fn needed_degree(frame: &GaussianFrame, step: f32) -> u8 {
 }
 
 /// Zero-order bits of scale and rotation with sorted axes and as they come, on a sample.
-fn try_axes(frame: &GaussianFrame, settings: &Settings) -> [f64; 2] {
-    let shown = visible(frame, settings.keep_invisible);
+fn try_axes(frame: &GaussianFrame, shown: &[u32], settings: &Settings) -> [f64; 2] {
     let sample: Vec<u32> = shown.iter().step_by(shown.len().div_ceil(TRIAL).max(1)).copied().collect();
     [true, false].map(|sort| {
         let canonical = canonicalise(frame, &sample, sort);

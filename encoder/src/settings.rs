@@ -2,7 +2,7 @@
 
 use crate::transformer::Architecture;
 use splatstream_decoder::predictor::Predictor;
-use splatstream_format::payload::Network;
+use splatstream_format::payload::{Network, SceneDescription};
 use splatstream_format::syntax::Profile;
 use splatstream_render::Camera;
 
@@ -84,7 +84,7 @@ pub enum ShChoice {
 /// What puts Gaussians into the first refinements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Importance {
-    /// The geometric mean of contribution and of what the pictures lose without a Gaussian; weighed anew at each
+    /// The geometric mean of contribution and of what the pictures lose without a Gaussian; weighed again at each
     /// refinement, from the last down.
     Removal,
     /// Transmittance times alpha, summed over the pixels of all views.
@@ -107,8 +107,18 @@ pub enum Structure {
     },
 }
 
+/// What of the I frame of a predicted GOP those receive who take some of the refinements only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Anchor {
+    /// The same refinements as of every other frame.
+    #[default]
+    Nested,
+    /// All of it, with all spatial layers: the paper's anchor.
+    Whole,
+}
+
 /// Neighbours of a prediction, unless others are asked for.
-pub(crate) const NEIGHBOURS: u8 = 8;
+const NEIGHBOURS: u8 = 8;
 
 /// The predictors that new Gaussians may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -190,7 +200,7 @@ pub struct Tools {
     pub sh_transform: bool,
     /// Plane models taken over from the refinement before; without it each refinement carries its own.
     pub table_reuse: bool,
-    /// Every second point of the lattices only, for the scale, rotation and colour of the last refinement, where the
+    /// Every second point of the grids only, for the scale, rotation and colour of the last refinement, where the
     /// order goes by what pictures show.
     pub coarse_tail: bool,
     /// Predicted frames: cells that move what is in them; without it only residuals move Gaussians.
@@ -226,6 +236,8 @@ pub struct Settings {
     pub gop: u32,
     /// What the frames of a GOP refer to.
     pub structure: Structure,
+    /// What of I frames belongs to the first refinements of predicted GOPs.
+    pub anchor: Anchor,
     /// Spatial layers, 1 to 4.
     pub spatial_layers: u8,
     /// How new Gaussians are predicted, where frames refer to others or there are spatial layers.
@@ -260,6 +272,8 @@ pub struct Settings {
     pub block_log2: u8,
     /// Ticks in a second, and from one frame to the next.
     pub ticks: (u32, u32),
+    /// What the stream says about its scene. The bounds are those of the Gaussians, whatever stands here.
+    pub description: SceneDescription,
 }
 
 impl Settings {
@@ -278,6 +292,19 @@ impl Settings {
             _ => Profile::Dynamic,
         }
     }
+
+    /// Temporal layers; 0 where no frame refers to another.
+    pub(crate) fn temporal_layers(&self) -> u8 {
+        match self.structure {
+            Structure::Intra => 0,
+            Structure::Predicted { layers } => layers,
+        }
+    }
+
+    /// Whether predicted GOPs have whole anchors.
+    pub(crate) fn whole_anchor(&self) -> bool {
+        self.anchor == Anchor::Whole && self.structure != Structure::Intra
+    }
 }
 
 impl Default for Settings {
@@ -288,6 +315,7 @@ impl Default for Settings {
             psnr: None,
             gop: 16,
             structure: Structure::default(),
+            anchor: Anchor::default(),
             spatial_layers: 1,
             predictors: Predictors::ALL,
             predictor_choice: PredictorChoice::default(),
@@ -304,6 +332,7 @@ impl Default for Settings {
             tools: Tools::default(),
             block_log2: 14,
             ticks: (30, 1),
+            description: SceneDescription::default(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Vector quantisation of SH components: k-means++ seeding, Lloyd iterations, empty cells seeded anew.
+//! Vector quantisation of SH components: k-means++ seeding, Lloyd iterations, empty cells seeded again.
 
 use rayon::prelude::*;
 use splatstream_format::payload::Codebook;
@@ -23,10 +23,10 @@ pub(crate) fn entry_count(gaussians: usize, forced: bool) -> usize {
 /// Component planes as rows.
 pub(crate) fn rows(planes: &[Vec<f32>]) -> Vec<f32> {
     let count = planes.first().map_or(0, Vec::len);
-    (0..count).flat_map(|place| planes.iter().map(move |plane| plane[place])).collect()
+    (0..count).flat_map(|index| planes.iter().map(move |plane| plane[index])).collect()
 }
 
-/// Rows of even and of odd place.
+/// Rows of even and of odd index.
 pub(crate) fn halves(rows: &[f32], rank: usize) -> (Vec<f32>, Vec<f32>) {
     let half = |odd: usize| rows.chunks(rank).skip(odd).step_by(2).flatten().copied().collect();
     (half(0), half(1))
@@ -56,7 +56,7 @@ pub(crate) fn nearest_entry(codebook: &Codebook, row: &[f32]) -> i32 {
             .sum()
     };
     let entries = codebook.entries.chunks_exact(row.len().max(1)).map(square).enumerate();
-    entries.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(place, _)| place as i32)
+    entries.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index as i32)
 }
 
 /// Entries compared at a time: their distances stay in registers.
@@ -91,7 +91,7 @@ fn side_by_side(entries: &[f32], rank: usize) -> Vec<[f32; LANES]> {
     let group = |group: &[f32]| {
         let lane = |coordinate: usize, lane: usize| group.get(lane * rank + coordinate).copied();
         let of =
-            move |coordinate| core::array::from_fn(|place| lane(coordinate, place).unwrap_or(f32::INFINITY));
+            move |coordinate| core::array::from_fn(|index| lane(coordinate, index).unwrap_or(f32::INFINITY));
         (0..rank).map(of).collect::<Vec<[f32; LANES]>>()
     };
     entries.chunks(rank * LANES).flat_map(group).collect()
@@ -118,9 +118,9 @@ pub(crate) fn train(rows: &[f32], rank: usize, entries: usize) -> Codebook {
     }
     let mut uses = vec![0_u32; centres.len() / rank];
     owners.iter().for_each(|&(index, _)| uses[index as usize] += 1);
-    let mut order: Vec<usize> = (0..uses.len()).filter(|&place| uses[place] > 0).collect();
-    order.sort_by_key(|&place| (core::cmp::Reverse(uses[place]), place));
-    let sorted = order.iter().flat_map(|&place| &centres[place * rank..(place + 1) * rank]);
+    let mut order: Vec<usize> = (0..uses.len()).filter(|&index| uses[index] > 0).collect();
+    order.sort_by_key(|&index| (core::cmp::Reverse(uses[index]), index));
+    let sorted = order.iter().flat_map(|&index| &centres[index * rank..(index + 1) * rank]);
     let entries: Vec<i16> = sorted.map(|&value| libm::rintf(value).clamp(-8191.0, 8191.0) as i16).collect();
     let small = entries.iter().all(|&value| i8::try_from(value).is_ok());
     let header = CodebookHeader {

@@ -1,96 +1,153 @@
 //! Random streams that obey the syntax: one generator for the property tests and for fuzzing.
 //!
-//! Valid by construction up to the sections: every header, order, count and check sum is right, and the bytes
-//! inside models and blocks are arbitrary. What finds an error there has passed everything before. Those of profile
-//! Intra are here, those of profile Dynamic in [`dynamic`].
+//! Valid by construction up to the sections: every header, order, count and checksum is right. Digests, and some of
+//! the models and blocks, are arbitrary. What finds an error there has passed everything before.
 
-use crate::payload::{Codebook, Index, Transform, write_refinement};
+use crate::payload::{
+    CellsBytes, Codebook, ColourSpace, Index, OperatingPoints, SceneDescription, SectionBytes, Sorting,
+    Transform, UpAxis, Weights, write_frame, write_increment,
+};
 use crate::syntax::{
-    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, MAX_ID, NO_CODEBOOK, Profile,
-    RefinementHeader, SequenceParameters, ShMode, TransformHeader, TransformKind, UnitId, UnitType, after,
+    Camera, CodebookHeader, EndOfStream, FrameHeader, GopHeader, IncrementHeader, IndexEntry, MAX_ID,
+    MAX_LAYERS, OperatingPointEntry, Profile, SequenceParameters, TransformHeader, TransformKind, UnitId,
+    UnitType, after,
 };
 use crate::unit::{write_file_header, write_unit};
 use arbitrary::{Arbitrary, Result, Unstructured};
+use frames::Tools;
 
 mod coded;
-pub mod dynamic;
-mod increments;
+mod frames;
 mod network;
 
 pub use network::weights;
 
-/// Most Gaussians of a frame: enough for several blocks.
-const MAX_GAUSSIANS: u32 = 2000;
-/// Most bytes of a section.
+/// Most bytes of a part of a section.
 const MAX_SECTION: usize = 80;
 
 /// A stream that obeys the syntax.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ArbitraryStream {
+    /// Annex A.
+    pub profile: Profile,
     /// Annex A.
     pub level: u8,
     /// The parameters of all frames.
     pub sequence: SequenceParameters,
-    /// The groups in order.
+    /// What viewers may want to know.
+    pub scene: Option<SceneDescription>,
+    /// The GOPs in order.
     pub gops: Vec<ArbitraryGop>,
+    /// What stands in the list of operating points, if there is one. The numbers in it are not those of the stream.
+    pub points: Option<Vec<OperatingPointEntry>>,
     /// Whether there is an index.
     pub has_index: bool,
 }
 
-/// A group of pictures.
+/// A GOP.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArbitraryGop {
+    /// Whether a copy of the sequence parameters comes before it.
+    pub repeats_sequence: bool,
+    /// The payload of the GOP header unit.
+    pub header: GopHeader,
+    /// The payload of a private unit after the header.
+    pub private: Option<Vec<u8>>,
     /// Transforms with different identifiers; the first is a dc transform.
     pub transforms: Vec<Transform>,
-    /// Codebooks with different identifiers.
-    pub codebooks: Vec<Codebook>,
-    /// One frame or more.
+    /// The payload of the weights unit, if there is one.
+    pub weights: Option<Weights>,
+    /// One frame or more, in display order.
     pub frames: Vec<ArbitraryFrame>,
-    /// The payload of a private unit behind the header of the group.
-    pub private: Option<Vec<u8>>,
 }
 
-/// A frame with all its refinements, or with the first of them.
+/// A codebook, and the temporal layer that defines it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LayeredCodebook {
+    /// The least layer that may use it.
+    pub temporal_layer: u8,
+    /// The payload.
+    pub codebook: Codebook,
+}
+
+/// A frame with all its increments, or with the first of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArbitraryFrame {
-    /// The payload of the frame header unit.
+    /// Its index in the GOP.
+    pub index: u32,
+    /// Codebooks before it: those that it may use, or new definitions of them.
+    pub codebooks: Vec<LayeredCodebook>,
+    /// The fixed part of the frame header.
     pub header: FrameHeader,
-    /// One refinement or more.
-    pub refinements: Vec<ArbitraryRefinement>,
+    /// A digest of carried lists, which are not those of the frame.
+    pub carried_digest: Option<u64>,
+    /// How cells move.
+    pub cells: Option<CellsBytes>,
+    /// One increment or more in an I frame.
+    pub increments: Vec<ArbitraryIncrement>,
 }
 
-/// A refinement whose sections hold arbitrary bytes.
+/// An increment whose sections hold arbitrary bytes, or small values that most processes accept.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ArbitraryRefinement {
-    /// The fixed part.
-    pub header: RefinementHeader,
-    /// What stands in the place of the models.
-    pub model: Vec<u8>,
-    /// What stands in the place of each block.
-    pub blocks: Vec<Vec<u8>>,
+pub struct ArbitraryIncrement {
+    /// The layer that the increment belongs to.
+    pub spatial_layer: u8,
+    /// The list that it changes.
+    pub refinement: u8,
+    /// The elements before the sections.
+    pub header: IncrementHeader,
+    /// The sections with a count above 0.
+    pub sections: Vec<SectionBytes>,
 }
 
 impl<'a> Arbitrary<'a> for ArbitraryStream {
     fn arbitrary(u: &mut Unstructured<'a>) -> Result<Self> {
-        let sequence = sequence_parameters(u)?;
-        let gop_count = u.int_in_range(0..=3)?;
-        let gops = (0..gop_count).map(|_| gop(u, &sequence)).collect::<Result<Vec<_>>>()?;
-        Ok(Self { level: u.int_in_range(1..=4)?, sequence, gops, has_index: u.arbitrary()? })
+        let profile = if u.ratio(1_u8, 4_u8)? { Profile::Intra } else { Profile::Dynamic };
+        Self::of_profile(profile, u)
     }
 }
 
 impl ArbitraryStream {
+    /// A stream of a profile.
+    pub fn of_profile(profile: Profile, u: &mut Unstructured<'_>) -> Result<Self> {
+        let mut sequence = sequence_parameters(u, profile)?;
+        // Few values happen to be sorted.
+        if u.ratio(7_u8, 8_u8)? {
+            let (antialiased, whole_anchor) = (sequence.antialiased(), sequence.whole_anchor());
+            sequence.sequence_flags = SequenceParameters::flags(false, antialiased, whole_anchor);
+        }
+        let scene = if u.ratio(1_u8, 4_u8)? { Some(scene_description(u)?) } else { None };
+        let gop_count = if u.ratio(1_u8, 16_u8)? { 0 } else { u.int_in_range(1..=2)? };
+        let gops = (0..gop_count).map(|index| gop(u, index, profile, &sequence)).collect::<Result<_>>()?;
+        let points = if u.ratio(1_u8, 4_u8)? { Some(points(u)?) } else { None };
+        let (level, has_index) = (u.int_in_range(1..=4)?, u.arbitrary()?);
+        Ok(Self { profile, level, sequence, scene, gops, points, has_index })
+    }
+
     /// The bytes of the stream.
     pub fn to_bytes(&self) -> crate::Result<Vec<u8>> {
-        let mut out =
-            Output { bytes: write_file_header(Profile::Intra, self.level)?, frame_count: 0, unit_count: 0 };
-        out.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
-        let mut entries = Vec::new();
-        for (gop_index, gop) in (0..).zip(&self.gops) {
-            entries.push(IndexEntry { frame: out.frame_count, reserved_zero: 0, offset: out.position() });
-            out.gop(gop_index, gop, &self.sequence)?;
+        let bytes = write_file_header(self.profile, self.level)?;
+        let mut out = Output { bytes, frame_count: 0, unit_count: 0 };
+        let sequence = self.sequence.to_bytes()?;
+        out.unit(UnitId::stream(UnitType::SequenceParameters), &sequence)?;
+        if let Some(scene) = &self.scene {
+            out.unit(UnitId::stream(UnitType::SceneDescription), &scene.to_bytes()?)?;
         }
-        let index_offset = if self.has_index { out.position() } else { 0 };
+        let mut entries = Vec::new();
+        let mut first = 0_u32;
+        for gop in &self.gops {
+            if gop.repeats_sequence {
+                out.unit(UnitId::stream(UnitType::SequenceParameters), &sequence)?;
+            }
+            entries.push(IndexEntry { frame: first, reserved_zero: 0, offset: after(0, out.bytes.len()) });
+            gop.write(first, &self.sequence, &mut out)?;
+            first = first.saturating_add(gop.header.gop_frame_count);
+        }
+        if let Some(entries) = &self.points {
+            let points = OperatingPoints { entries: entries.clone() };
+            out.unit(UnitId::stream(UnitType::OperatingPoints), &points.to_bytes()?)?;
+        }
+        let index_offset = if self.has_index { after(0, out.bytes.len()) } else { 0 };
         if self.has_index {
             out.unit(UnitId::stream(UnitType::Index), &Index { entries }.to_bytes()?)?;
         }
@@ -109,73 +166,80 @@ struct Output {
 }
 
 impl Output {
-    fn position(&self) -> u64 {
-        after(0, self.bytes.len())
-    }
-
     fn unit(&mut self, id: UnitId, payload: &[u8]) -> crate::Result<()> {
         self.unit_count = self.unit_count.saturating_add(1);
         write_unit(&mut self.bytes, id, payload)
     }
+}
 
-    fn gop(
-        &mut self,
-        gop_index: u32,
-        gop: &ArbitraryGop,
-        sequence: &SequenceParameters,
-    ) -> crate::Result<()> {
-        let first = self.frame_count;
-        let frames = u32::try_from(gop.frames.len()).unwrap_or(u32::MAX);
-        let header = GopHeader::intra(gop_index, frames).to_bytes()?;
-        self.unit(UnitId::of_frame(UnitType::GopHeader, first), &header)?;
-        if let Some(private) = &gop.private {
-            self.unit(UnitId::stream(UnitType::User(200)), private)?;
+impl ArbitraryGop {
+    fn write(&self, first: u32, sequence: &SequenceParameters, out: &mut Output) -> crate::Result<()> {
+        out.unit(UnitId::of_frame(UnitType::GopHeader, first), &self.header.to_bytes()?)?;
+        if let Some(private) = &self.private {
+            out.unit(UnitId::stream(UnitType::User(200)), private)?;
         }
-        for transform in &gop.transforms {
-            self.unit(UnitId::of_frame(UnitType::Transform, first), &transform.to_bytes(sequence)?)?;
+        for transform in &self.transforms {
+            out.unit(UnitId::of_frame(UnitType::Transform, first), &transform.to_bytes(sequence)?)?;
         }
-        for codebook in &gop.codebooks {
-            self.unit(UnitId::of_frame(UnitType::Codebook, first), &codebook.to_bytes()?)?;
+        if let Some(weights) = &self.weights {
+            out.unit(UnitId::of_frame(UnitType::Weights, first), &weights.to_bytes()?)?;
         }
-        gop.frames.iter().try_for_each(|frame| self.frame(frame, sequence))
-    }
-
-    fn frame(&mut self, frame: &ArbitraryFrame, sequence: &SequenceParameters) -> crate::Result<()> {
-        let place = self.frame_count;
-        self.frame_count = place.saturating_add(1);
-        self.unit(UnitId::of_frame(UnitType::FrameHeader, place), &frame.header.to_bytes()?)?;
-        for (number, refinement) in (0..).zip(&frame.refinements) {
-            self.unit(UnitId::of_refinement(place, number), &refinement.to_bytes(sequence)?)?;
+        for frame in &self.frames {
+            for LayeredCodebook { temporal_layer, codebook } in &frame.codebooks {
+                let id = UnitId::of_frame(UnitType::Codebook, first).on_layers(0, *temporal_layer);
+                out.unit(id, &codebook.to_bytes()?)?;
+            }
+            let temporal_layer = self.header.role(frame.index).temporal_layer;
+            frame.write(first.saturating_add(frame.index), temporal_layer, sequence, out)?;
         }
         Ok(())
     }
 }
 
-impl ArbitraryRefinement {
-    /// The bytes of the payload.
-    pub fn to_bytes(&self, sequence: &SequenceParameters) -> crate::Result<Vec<u8>> {
-        write_refinement(&self.header, sequence, &self.model, &self.blocks)
+impl ArbitraryFrame {
+    fn write(
+        &self,
+        number: u32,
+        temporal_layer: u8,
+        sequence: &SequenceParameters,
+        out: &mut Output,
+    ) -> crate::Result<()> {
+        let id = UnitId::of_frame(UnitType::FrameHeader, number).on_layers(0, temporal_layer);
+        out.unit(id, &write_frame(&self.header, self.carried_digest, self.cells.as_ref(), sequence)?)?;
+        out.frame_count = out.frame_count.saturating_add(1);
+        for increment in &self.increments {
+            let id = UnitId::of_increment(number, increment.refinement);
+            let id = id.on_layers(increment.spatial_layer, temporal_layer);
+            out.unit(id, &write_increment(&increment.header, sequence, &increment.sections)?)?;
+        }
+        Ok(())
     }
 }
 
-/// Any parameters that are accepted.
-pub fn sequence_parameters(u: &mut Unstructured<'_>) -> Result<SequenceParameters> {
+/// Any parameters that are accepted in a profile.
+pub fn sequence_parameters(u: &mut Unstructured<'_>, profile: Profile) -> Result<SequenceParameters> {
     let refinement_count = u.int_in_range(1..=crate::syntax::MAX_REFINEMENTS)?;
+    let layers = if profile == Profile::Intra { 1 } else { MAX_LAYERS };
     let mut rotation_threshold: [u8; 3] = u.arbitrary()?;
     rotation_threshold.sort_unstable_by(|a, b| b.cmp(a));
+    let ticks_per_second: u32 = u.int_in_range(1..=u32::MAX)?;
+    // Up to 100,000 frames in a second: the small frames made here stay within the rate of every level.
+    let least_ticks = ticks_per_second.div_ceil(100_000);
+    let ticks_per_frame = if u.arbitrary()? { 0 } else { u.int_in_range(least_ticks..=u32::MAX)? };
+    let whole_anchor = u.ratio(1_u8, 4_u8)? && profile == Profile::Dynamic;
     Ok(SequenceParameters {
         sh_degree: u.int_in_range(0..=3)?,
-        spatial_layer_count: 1,
-        temporal_layer_count: 1,
+        spatial_layer_count: u.int_in_range(1..=layers)?,
+        temporal_layer_count: u.int_in_range(1..=layers)?,
         refinement_count,
         refinement_percent: percents(u, refinement_count)?,
         position_bits: u.int_in_range(1..=20)?,
         block_log2: u.int_in_range(6..=16)?,
-        sequence_flags: SequenceParameters::flags(u.arbitrary()?, u.arbitrary()?),
+        sequence_flags: SequenceParameters::flags(u.arbitrary()?, u.arbitrary()?, whole_anchor),
         rotation_threshold,
         frame_count: 0,
-        ticks_per_second: u.int_in_range(1..=u32::MAX)?,
-        ticks_per_frame: u.arbitrary()?,
+        ticks_per_second,
+        ticks_per_frame,
         position_offset: [offset(u)?, offset(u)?, offset(u)?],
         position_step: step(u, MAX_STEP)?,
         log_scale_offset: offset(u)?,
@@ -216,81 +280,91 @@ pub fn codebook(u: &mut Unstructured<'_>, codebook_id: u8, component_count: u8) 
     Ok(Codebook { header, entries })
 }
 
-/// Any refinement with a number of Gaussians. `stages` are the codebooks it may use; `has_sh` says whether the
-/// frame has an sh transform.
-pub fn refinement(
-    u: &mut Unstructured<'_>,
-    sequence: &SequenceParameters,
-    gaussian_count: u32,
-    stages: &[u8],
-    has_sh: bool,
-) -> Result<ArbitraryRefinement> {
-    let modes = match (has_sh, stages.is_empty()) {
-        (false, _) => ShMode::None,
-        (true, true) => ShMode::Coefficients,
-        (true, false) => ShMode::VectorQuantised,
+/// Any scene description with few cameras.
+pub fn scene_description(u: &mut Unstructured<'_>) -> Result<SceneDescription> {
+    let number = |u: &mut Unstructured<'_>| offset(u).map(f32::from_bits);
+    let numbers = |u: &mut Unstructured<'_>| Ok([number(u)?, number(u)?, number(u)?]);
+    let unit = |u: &mut Unstructured<'_>| step(u, 1.0).map(f32::from_bits);
+    let mut scene = SceneDescription {
+        up_axis: *u.choose(UpAxis::ALL)?,
+        colour_space: *u.choose(ColourSpace::ALL)?,
+        sorting: *u.choose(Sorting::ALL)?,
+        ..SceneDescription::default()
     };
-    let sh_mode = u.int_in_range(0..=modes.code())?;
-    let vq_stage_count = if sh_mode == ShMode::VectorQuantised.code() { u.int_in_range(1..=4)? } else { 0 };
-    let mut codebook_ids = [NO_CODEBOOK; 4];
-    for id in codebook_ids.iter_mut().take(vq_stage_count.into()) {
-        *id = *u.choose(stages)?;
+    if u.arbitrary()? {
+        scene.metres_per_unit = Some(f32::from_bits(step(u, MAX_OFFSET)?));
     }
-    let header = RefinementHeader {
-        refinement_digest: u.arbitrary()?,
-        gaussian_count,
-        position_shift: u.int_in_range(0..=sequence.position_bits.saturating_sub(1))?,
-        lanes_log2: u.int_in_range(0..=5)?,
-        sh_mode,
-        vq_stage_count,
-        codebook_ids,
+    if u.arbitrary()? {
+        scene.background = Some([unit(u)?, unit(u)?, unit(u)?]);
+    }
+    if u.arbitrary()? {
+        let mut bounds: [[f32; 3]; 2] = [numbers(u)?, numbers(u)?];
+        let [min, max] = &mut bounds;
+        for (min, max) in min.iter_mut().zip(max) {
+            if *min > *max {
+                core::mem::swap(min, max);
+            }
+        }
+        scene.bounds = Some(bounds);
+    }
+    if u.arbitrary()? {
+        let letters = u.int_in_range(1..=20)?;
+        scene.title = Some((0..letters).map(|_| char::arbitrary(u)).collect::<Result<_>>()?);
+    }
+    let cameras = u.int_in_range(0..=3)?;
+    let camera = |u: &mut Unstructured<'_>| {
+        let rotation = [number(u)?, number(u)?, number(u)?, number(u)?];
+        Ok(Camera { position: numbers(u)?, rotation, vertical_field_of_view: unit(u)? })
     };
-    let model = if gaussian_count == 0 { Vec::new() } else { section(u)? };
-    let blocks = (0..header.block_count(sequence)).map(|_| section(u)).collect::<Result<_>>()?;
-    Ok(ArbitraryRefinement { header, model, blocks })
+    scene.cameras = (0..cameras).map(|_| camera(u)).collect::<Result<_>>()?;
+    Ok(scene)
 }
 
-fn gop(u: &mut Unstructured<'_>, sequence: &SequenceParameters) -> Result<ArbitraryGop> {
+/// A list of operating points, mostly empty: a decoder that has seen all of the stream refuses other numbers.
+fn points(u: &mut Unstructured<'_>) -> Result<Vec<OperatingPointEntry>> {
+    let count = u.int_in_range(0..=7)?;
+    let entry = |refinement: u8| {
+        Ok(OperatingPointEntry {
+            spatial_layer: 0,
+            temporal_layer: 0,
+            refinement,
+            reserved_zero: 0,
+            frame_count: u.arbitrary()?,
+            gaussian_count: u.arbitrary()?,
+            byte_count: u.arbitrary()?,
+        })
+    };
+    (0..u8::saturating_sub(count, 5)).map(entry).collect()
+}
+
+fn gop(
+    u: &mut Unstructured<'_>,
+    index: u32,
+    profile: Profile,
+    sequence: &SequenceParameters,
+) -> Result<ArbitraryGop> {
+    let frame_count = u.int_in_range(1..=6)?;
+    let dynamic = profile == Profile::Dynamic;
+    let header = if dynamic && u.ratio(3_u8, 4_u8)? {
+        let deepest = sequence.temporal_layer_count.saturating_sub(1);
+        GopHeader::predicted(index, frame_count, u.int_in_range(0..=deepest)?)
+    } else {
+        GopHeader::intra(index, frame_count)
+    };
     let dc = u.int_in_range(0..=MAX_ID)?;
     let mut transforms = vec![transform(u, dc, TransformKind::Dc, sequence)?];
-    let mut codebooks = Vec::new();
     if sequence.sh_degree > 0 && u.arbitrary()? {
-        let sh = transform(u, (dc ^ 1) & MAX_ID, TransformKind::Sh, sequence)?;
-        let codebook_count = u.int_in_range(0..=3)?;
-        codebooks = (0..codebook_count).map(|id| codebook(u, id, sh.header.rank)).collect::<Result<_>>()?;
-        transforms.push(sh);
+        transforms.push(transform(u, (dc ^ 1) & MAX_ID, TransformKind::Sh, sequence)?);
     }
-    let frame_count = u.int_in_range(1..=3)?;
-    let frames =
-        (0..frame_count).map(|_| frame(u, sequence, &transforms, &codebooks)).collect::<Result<_>>()?;
-    let private = if u.arbitrary()? { Some(section(u)?) } else { None };
-    Ok(ArbitraryGop { transforms, codebooks, frames, private })
+    let weights = if dynamic && u.ratio(1_u8, 3_u8)? { Some(weights(u)?) } else { None };
+    let tools = Tools::new(&transforms, profile, weights.is_some());
+    let frames = frames::frames(u, &header, sequence, tools)?;
+    let repeats_sequence = index > 0 && u.arbitrary()?;
+    let private = if u.ratio(1_u8, 8_u8)? { Some(section(u)?) } else { None };
+    Ok(ArbitraryGop { repeats_sequence, header, private, transforms, weights, frames })
 }
 
-fn frame(
-    u: &mut Unstructured<'_>,
-    sequence: &SequenceParameters,
-    transforms: &[Transform],
-    codebooks: &[Codebook],
-) -> Result<ArbitraryFrame> {
-    let id_of = |kind| {
-        let found = transforms.iter().find(|transform| transform.header.kind() == Some(kind));
-        found.map(|transform| transform.header.transform_id)
-    };
-    let gaussian_count = u.int_in_range(0..=MAX_GAUSSIANS)?;
-    let sh = id_of(TransformKind::Sh);
-    let header = FrameHeader::intra(id_of(TransformKind::Dc).unwrap_or(0), sh, gaussian_count);
-    let stages: Vec<u8> = codebooks.iter().map(|codebook| codebook.header.codebook_id).collect();
-    // A frame may stop at any refinement.
-    let refinement_count = u.int_in_range(1..=sequence.refinement_count)?;
-    let refinements = (0..refinement_count).map(|number| {
-        let added = sequence.refinement_length(number, gaussian_count);
-        refinement(u, sequence, added, &stages, sh.is_some())
-    });
-    Ok(ArbitraryFrame { header, refinements: refinements.collect::<Result<_>>()? })
-}
-
-/// Strictly increasing to 100 in `refinement_count` places, then zero.
+/// `refinement_count` numbers that increase strictly to 100, then zeros.
 fn percents(u: &mut Unstructured<'_>, refinement_count: u8) -> Result<[u8; 10]> {
     let mut percents = [0; 10];
     let mut before: u8 = 0;

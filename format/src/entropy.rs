@@ -8,6 +8,7 @@ pub mod frequencies;
 pub mod in_force;
 pub mod layout;
 pub mod model;
+pub mod parametric;
 pub mod reader;
 pub mod token;
 pub mod writer;

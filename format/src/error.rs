@@ -6,7 +6,7 @@ pub type Result<T> = core::result::Result<T, Error>;
 /// What a caller can do about an error (clause 9.1); the number is the exit code of the tools.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Class {
-    /// The bytes do not parse: signature, check sum, length, entropy state.
+    /// The bytes do not parse: signature, checksum, length, entropy state.
     Malformed,
     /// The bytes parse, and break a constraint of the specification.
     Invalid,
@@ -76,10 +76,10 @@ pub enum ErrorKind {
     /// The eight signature bytes are wrong.
     #[error("not a SplatStream file: the signature is wrong")]
     Signature,
-    /// A check sum does not fit the bytes it covers.
+    /// A checksum does not fit the bytes it covers.
     #[error("{element} is {stored:#x}, the bytes it covers give {computed:#x}")]
-    CheckSum {
-        /// The syntax element holding the check sum.
+    Checksum {
+        /// The syntax element holding the checksum.
         element: &'static str,
         /// The value in the stream.
         stored: u32,
@@ -159,7 +159,7 @@ pub enum ErrorKind {
         /// The rule in a few words.
         rule: &'static str,
     },
-    /// A unit at a place where it may not stand.
+    /// A unit where it may not stand.
     #[error("a {unit} unit may not stand here")]
     UnexpectedUnit {
         /// The kind of unit.
@@ -199,7 +199,7 @@ impl ErrorKind {
         match self {
             Self::Truncated { .. } => Class::Truncated,
             Self::Signature
-            | Self::CheckSum { .. }
+            | Self::Checksum { .. }
             | Self::ShortSection { .. }
             | Self::TrailingBytes { .. }
             | Self::Number { .. }
@@ -221,7 +221,7 @@ impl ErrorKind {
         match self {
             Self::Truncated { .. } => "TRUNCATED",
             Self::Signature => "SIGNATURE",
-            Self::CheckSum { .. } => "CHECK_SUM",
+            Self::Checksum { .. } => "CHECKSUM",
             Self::ShortSection { .. } => "SHORT_SECTION",
             Self::TrailingBytes { .. } => "TRAILING_BYTES",
             Self::Number { .. } => "NUMBER",

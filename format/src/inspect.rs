@@ -1,30 +1,32 @@
-//! Every syntax element of a stream with its place, for people who look for a mistake.
+//! Every syntax element of a stream with its offset, for people who look for a mistake.
 //!
 //! The rows of the syntax tables give names, widths and meanings, so that what is printed cannot drift from
 //! what is read. A damaged stream gives the elements up to the damage, and the first error.
 
 use crate::levels::Levels;
 use crate::payload::{
-    Codebook, Index, OperatingPoints, Refinement, Transform, VARIABLE_ROWS, VariableRow, Weights, leb128,
+    Codebook, FramePayload, Increment, Index, OperatingPoints, SceneDescription, Transform, VARIABLE_ROWS,
+    VariableRow, Weights,
 };
+use crate::syntax::reader::{Reader, Traced};
 use crate::syntax::{
-    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader, NetworkHeader,
-    OperatingPointEntry, OperatingPointsHeader, Profile, RefinementHeader, Row, SequenceParameters, Table,
-    TransformHeader, UnitHeader, UnitType, WeightsHeader, after,
+    Camera, CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IncrementHeader, IndexEntry,
+    IndexHeader, NetworkHeader, OperatingPointEntry, OperatingPointsHeader, Profile, Row,
+    SceneDescriptionHeader, SequenceParameters, TABLES, Table, TransformHeader, UnitHeader, UnitType,
+    WeightsHeader, after,
 };
-use crate::unit::{Delivery, Unit, Units};
+use crate::unit::{Unit, Units};
 use crate::{Error, ErrorKind, Limits, Result};
 use section::Coding;
 use std::borrow::Cow;
 
-mod increment;
 mod section;
 mod value;
 
 /// One syntax element of a stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Element {
-    /// Absolute place of the first bit.
+    /// Absolute offset of the first bit.
     pub at_bit: u64,
     /// How many bits it takes.
     pub bits: u64,
@@ -40,8 +42,8 @@ pub struct Element {
     pub clause: &'static str,
 }
 
-/// Visits every element of a stream in order, and gives the first error. Behind a damaged payload it goes on
-/// with the next unit.
+/// Visits every element of a stream in order, and gives the first error. After a damaged unit it goes on
+/// with the next one, as long as its end is known.
 pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) -> Option<Error> {
     let mut inspector = Inspector {
         visit,
@@ -89,17 +91,27 @@ impl Inspector<'_> {
                 self.fixed(&UnitHeader::TABLE, rest.unwrap_or_default(), at);
             }
             match units.next_unit() {
-                Some(Ok(Delivery::Intact(unit))) => {
-                    self.levels.follow(&unit, self.profile);
-                    let checked = self.payload(&unit);
+                Some(Ok(unit)) => {
+                    let checked = self.unit(&unit);
                     self.note(checked);
                 }
-                Some(Ok(Delivery::Damaged(damaged))) if damaged.passed_over => {}
-                Some(Ok(Delivery::Damaged(damaged))) => self.note(Err(damaged.error)),
                 Some(Err(error)) => self.note(Err(error)),
                 None => return,
             }
         }
+    }
+
+    /// Checks of a unit and the elements of its payload, if it is the one that was written.
+    fn unit(&mut self, unit: &Unit<'_>) -> Result<()> {
+        unit.check_header(self.profile)?;
+        if !self.levels.takes(&unit.header) {
+            let meaning = "discarded: the reference frame has fewer refinements";
+            self.opaque(unit, meaning, "5.14");
+            return Ok(());
+        }
+        unit.check_payload()?;
+        self.levels.follow(unit, self.profile);
+        self.payload(unit)
     }
 
     /// The elements of a payload, and then the checks of its parser.
@@ -116,33 +128,37 @@ impl Inspector<'_> {
                 self.coding = Coding::of_gop(header, unit.header.frame);
                 header.validate_from(at, unit.header.frame)?;
             }
-            UnitType::FrameHeader => {
-                self.fixed(&FrameHeader::TABLE, payload, at);
-                let header = FrameHeader::parse_payload(payload, at, self.profile)?;
-                self.coding.start_frame(&header, unit.header.frame);
-                header.within(at, &self.limits)?;
-            }
+            UnitType::FrameHeader => self.frame_header(unit)?,
             UnitType::Transform => self.transform(payload, at)?,
             UnitType::Codebook => self.codebook(payload, at)?,
-            UnitType::Refinement => self.refinement(payload, at)?,
-            UnitType::Weights if self.profile == Profile::Dynamic => self.weights(payload, at)?,
-            UnitType::Increment if self.profile == Profile::Dynamic => self.increment(unit)?,
+            UnitType::Weights => self.weights(payload, at)?,
+            UnitType::Increment => self.increment(unit)?,
+            UnitType::SceneDescription => self.scene_description(payload, at)?,
             UnitType::OperatingPoints => self.operating_points(payload, at)?,
             UnitType::Index => self.index(payload, at)?,
             UnitType::End => {
                 self.fixed(&EndOfStream::TABLE, payload, at);
                 EndOfStream::parse_payload(payload, at)?;
             }
-            unknown @ (UnitType::Weights
-            | UnitType::Increment
-            | UnitType::Reserved(_)
-            | UnitType::User(_)) => {
-                let value = format!("{} bytes", payload.len());
-                let meaning = "skipped by decoders of this version";
-                self.show(at, payload.len(), "payload".into(), value, meaning, "5.3", unknown.name());
+            UnitType::Reserved(_) | UnitType::User(_) => {
+                self.opaque(unit, "skipped by decoders of this version", "5.3");
             }
         }
         Ok(())
+    }
+
+    /// A payload that is not looked at.
+    fn opaque(&mut self, unit: &Unit<'_>, meaning: &'static str, clause: &'static str) {
+        let (bytes, record) = (unit.payload.len(), unit.header.unit_type().name());
+        self.show(
+            unit.payload_at,
+            bytes,
+            "payload".into(),
+            format!("{bytes} bytes"),
+            meaning,
+            clause,
+            record,
+        );
     }
 
     fn transform(&mut self, payload: &[u8], at: u64) -> Result<()> {
@@ -174,7 +190,7 @@ impl Inspector<'_> {
         if header == WeightsHeader::CARRIED {
             self.fixed(&NetworkHeader::TABLE, model, model_at);
         }
-        let weights = Weights::parse_behind(header, model, at)?;
+        let weights = Weights::parse_rest(header, model, at)?;
         match &weights {
             Weights::Carried(_) => {
                 let bytes = model.len().saturating_sub(NetworkHeader::SIZE);
@@ -190,30 +206,70 @@ impl Inspector<'_> {
         weights.network(at).map(drop)
     }
 
-    /// Walks the sections itself: before an error there are elements to show.
-    fn refinement(&mut self, payload: &[u8], at: u64) -> Result<()> {
-        self.fixed(&RefinementHeader::TABLE, payload, at);
-        let sequence = self.sequence_at(at)?;
-        let parsed = Refinement::parse(payload, at, &sequence, &self.limits);
-        let mut rest = payload.get(RefinementHeader::SIZE..).unwrap_or_default();
-        let place = |rest: &[u8]| after(at, payload.len().saturating_sub(rest.len()));
-        let model_length = self.number("refinement", "model_length", None, &mut rest, place)?;
-        let model = usize::try_from(model_length).ok().and_then(|length| rest.split_at_checked(length));
-        let Some((model, after_model)) = model else {
-            return parsed.map(drop);
+    fn frame_header(&mut self, unit: &Unit<'_>) -> Result<()> {
+        let mut trace = Vec::new();
+        let mut reader = Reader::tracing(unit.payload, unit.payload_at, &mut trace);
+        let parsed = self
+            .sequence_at(unit.payload_at)
+            .and_then(|sequence| FramePayload::read(&mut reader, &sequence, &self.limits));
+        let frame = match parsed {
+            Ok(frame) => frame,
+            Err(error) => return self.broken(&FrameHeader::TABLE, unit, &trace, error),
         };
-        self.refinement_models(&parsed, model, place(rest));
-        rest = after_model;
-        // The count of a header that was refused is not to be trusted.
-        let Refinement { header, blocks, .. } = parsed?;
-        let lanes_log2 = header.lanes_log2;
-        for block in 0..blocks.len() {
-            self.number("refinement", "block_length", Some(block), &mut rest, place)?;
-        }
-        for (place, (block, at)) in blocks.into_iter().enumerate() {
-            self.block("refinement", place, block, at, lanes_log2);
-        }
+        self.coding.start_frame(&frame.header, unit.header.frame);
+        let sections: Vec<_> = frame.cells.into_iter().map(|cells| cells.coded).collect();
+        self.record_and_sections(&trace, |inspector, of_sections| {
+            inspector.sections(of_sections, &sections, &IncrementHeader::PLAIN.sh(), None);
+        });
         Ok(())
+    }
+
+    fn increment(&mut self, unit: &Unit<'_>) -> Result<()> {
+        let mut trace = Vec::new();
+        let mut reader = Reader::tracing(unit.payload, unit.payload_at, &mut trace);
+        let parsed = self
+            .sequence_at(unit.payload_at)
+            .and_then(|sequence| Increment::read(&mut reader, &sequence, self.profile, &self.limits));
+        let Increment { header, sections } = match parsed {
+            Ok(increment) => increment,
+            Err(error) => return self.broken(&IncrementHeader::TABLE, unit, &trace, error),
+        };
+        self.record_and_sections(&trace, |inspector, of_sections| {
+            inspector.sections(of_sections, &sections, &header.sh(), Some(unit.header.refinement));
+        });
+        Ok(())
+    }
+
+    /// The elements of a record up to its sections, and then those.
+    fn record_and_sections(&mut self, trace: &[Traced<'_>], sections: impl FnOnce(&mut Self, &[Traced<'_>])) {
+        let start = trace.iter().position(|traced| traced.record == "section").unwrap_or(trace.len());
+        let (record, of_sections) = trace.split_at_checked(start).unwrap_or_default();
+        record.iter().for_each(|traced| self.plain(traced));
+        sections(self, of_sections);
+    }
+
+    /// What was read of a payload before an error; of one that was not read at all, its fixed part.
+    fn broken(&mut self, table: &Table, unit: &Unit<'_>, trace: &[Traced<'_>], error: Error) -> Result<()> {
+        if trace.is_empty() {
+            self.fixed(table, unit.payload, unit.payload_at);
+        }
+        trace.iter().for_each(|traced| self.plain(traced));
+        Err(error)
+    }
+
+    fn scene_description(&mut self, payload: &[u8], at: u64) -> Result<()> {
+        self.fixed(&SceneDescriptionHeader::TABLE, payload, at);
+        let (header, rest) = SceneDescriptionHeader::parse(payload, at)?;
+        let mut trace = Vec::new();
+        let mut reader = Reader::tracing(rest, after(at, SceneDescriptionHeader::SIZE), &mut trace);
+        let parsed = SceneDescription::read(&header, &mut reader);
+        for traced in &trace {
+            match traced.element {
+                "cameras" => self.fixed(&Camera::TABLE, traced.bytes, traced.at),
+                _ => self.plain(traced),
+            }
+        }
+        parsed.map(drop)
     }
 
     fn index(&mut self, payload: &[u8], at: u64) -> Result<()> {
@@ -238,41 +294,37 @@ impl Inspector<'_> {
         OperatingPoints::parse(payload, at).map(drop)
     }
 
-    /// One LEB128 element of a record; `rest` moves behind it.
-    fn number(
-        &mut self,
-        record: &'static str,
-        name: &'static str,
-        place: Option<usize>,
-        rest: &mut &[u8],
-        at: impl Fn(&[u8]) -> u64,
-    ) -> Result<u32> {
-        let start = at(rest);
-        let row = variable_row(record, name);
-        let syntax = row.map_or(RefinementHeader::TABLE.syntax, |row| row.clause);
-        let (value, behind) = leb128(rest, start, name, syntax)?;
-        let bytes = rest.len().saturating_sub(behind.len());
-        *rest = behind;
-        if let Some(row) = row {
-            let name = place.map_or(name.into(), |place| format!("{name}[{place}]").into());
-            self.show(start, bytes, name, value.to_string(), row.meaning, row.clause, row.record);
-        }
-        Ok(value)
-    }
-
     /// The rows of a record that lie within `bytes`.
     fn fixed(&mut self, table: &Table, bytes: &[u8], at: u64) {
         let (mut rest, mut at) = (bytes, at);
         for row in table.rows {
-            let Some((raw, behind)) = rest.split_at_checked(row.bytes) else {
+            let Some((raw, after_row)) = rest.split_at_checked(row.bytes) else {
                 return;
             };
-            let value = value::of_row(table.name, row, raw);
+            let value = value::of(table.name, row.name, row.type_name, raw);
             let Row { name, meaning, clause, .. } = *row;
             self.show(at, row.bytes, name.into(), value, meaning, clause, table.name);
-            rest = behind;
+            rest = after_row;
             at = after(at, row.bytes);
         }
+    }
+
+    /// An element with its value by its type.
+    fn plain(&mut self, traced: &Traced<'_>) {
+        let Traced { record, element, bytes, .. } = *traced;
+        let value = match (element, columns(record, element)) {
+            ("models" | "blocks", _) | (_, None) => format!("{} bytes", bytes.len()),
+            (_, Some((type_name, ..))) => value::of(record, element, type_name, bytes),
+        };
+        self.traced(traced, value);
+    }
+
+    /// An element with a value.
+    fn traced(&mut self, traced: &Traced<'_>, value: String) {
+        let Traced { record, element, index, at, bytes } = *traced;
+        let name = index.map_or(element.into(), |index| format!("{element}[{index}]").into());
+        let (_, meaning, clause) = columns(record, element).unwrap_or_default();
+        self.show(at, bytes.len(), name, value, meaning, clause, record);
     }
 
     fn variable(&mut self, record: &str, name: &'static str, at: u64, bytes: usize, value: String) {
@@ -308,4 +360,12 @@ impl Inspector<'_> {
 
 fn variable_row(record: &str, name: &str) -> Option<&'static VariableRow> {
     VARIABLE_ROWS.iter().find(|row| row.record == record && row.name == name)
+}
+
+/// Type, meaning and clause of an element.
+fn columns(record: &str, element: &str) -> Option<(&'static str, &'static str, &'static str)> {
+    let variable = variable_row(record, element).map(|row| (row.type_name, row.meaning, row.clause));
+    let table = TABLES.iter().find(|table| table.name == record);
+    let fixed = || table?.rows.iter().find(|row| row.name == element);
+    variable.or_else(|| fixed().map(|row| (row.type_name, row.meaning, row.clause)))
 }

@@ -7,6 +7,8 @@ use crate::{Error, ErrorKind, Result};
 pub struct Limits {
     /// Gaussians in one frame.
     pub max_gaussians: u32,
+    /// Gaussians in one second.
+    pub max_gaussian_rate: u64,
     /// Bytes in the payload of one unit.
     pub max_payload: u32,
     /// Units in one stream.
@@ -22,37 +24,52 @@ pub struct Limits {
 impl Default for Limits {
     /// The limits of level 3, annex A.
     fn default() -> Self {
-        Self {
-            max_gaussians: 1 << 22,
-            max_payload: 1 << 30,
-            max_units: 1 << 24,
-            max_codebook_values: 1 << 23,
-            max_cells: 1 << 20,
-            max_learned: 1 << 21,
-        }
+        Self::of_level(3)
     }
 }
 
 impl Limits {
-    /// Gaussians of a frame that a level allows, table of annex A.2; 0 for a level that is not defined.
-    pub const fn gaussians_of_level(level: u8) -> u32 {
-        match level {
-            1 => 1 << 18,
-            2 => 1 << 20,
-            3 => 1 << 22,
-            4 => 1 << 24,
-            _ => 0,
+    /// New Gaussians of an increment for each byte of its payload, at most: an amplification that every level has.
+    pub const NEW_PER_BYTE: u64 = 16;
+    /// The levels of annex A.2.
+    pub const LEVELS: core::ops::RangeInclusive<u8> = 1..=4;
+
+    /// The limits of a level, table of annex A.2; those of level 4 for a level that is not defined.
+    pub const fn of_level(level: u8) -> Self {
+        let (max_gaussians, max_gaussian_rate, max_cells, max_codebook_values) = match level {
+            1 => (1 << 18, 1 << 24, 1 << 16, 1 << 21),
+            2 => (1 << 20, 1 << 26, 1 << 18, 1 << 22),
+            3 => (1 << 22, 1 << 28, 1 << 20, 1 << 23),
+            _ => (1 << 24, 1 << 30, 1 << 20, 1 << 23),
+        };
+        Self {
+            max_gaussians,
+            max_gaussian_rate,
+            max_payload: 1 << 30,
+            max_units: 1 << 24,
+            max_codebook_values,
+            max_cells,
+            max_learned: max_gaussians / 2,
         }
     }
 
-    /// New Gaussians of an increment that the network predicts that a level allows, table of annex A.2.
-    pub const fn learned_of_level(level: u8) -> u32 {
-        Self::gaussians_of_level(level) / 2
+    /// The smaller of each two limits.
+    #[must_use]
+    pub fn at_most(self, other: Self) -> Self {
+        Self {
+            max_gaussians: self.max_gaussians.min(other.max_gaussians),
+            max_gaussian_rate: self.max_gaussian_rate.min(other.max_gaussian_rate),
+            max_payload: self.max_payload.min(other.max_payload),
+            max_units: self.max_units.min(other.max_units),
+            max_codebook_values: self.max_codebook_values.min(other.max_codebook_values),
+            max_cells: self.max_cells.min(other.max_cells),
+            max_learned: self.max_learned.min(other.max_learned),
+        }
     }
 
-    /// The lowest level that allows frames of `gaussians`.
-    pub fn level_of(gaussians: u32) -> Option<u8> {
-        (1..=4).find(|&level| gaussians <= Self::gaussians_of_level(level))
+    /// The lowest level that allows all that `asked` asks for, if there is one.
+    pub fn lowest_level(asked: Self) -> Option<u8> {
+        Self::LEVELS.into_iter().find(|&level| asked.at_most(Self::of_level(level)) == asked)
     }
 
     /// Refuses `asked` above `allowed`; `at` and `limit` go into the error.

@@ -15,7 +15,8 @@ mod gop_header;
 mod increment;
 mod index;
 mod operating_points;
-mod refinement;
+pub(crate) mod reader;
+mod scene_description;
 mod sequence_parameters;
 mod sh_header;
 mod transform;
@@ -26,15 +27,16 @@ pub use codebook::CodebookHeader;
 pub use end::EndOfStream;
 pub use file_header::{FileHeader, Profile, SIGNATURE};
 pub use frame_header::{FrameHeader, FrameType, NO_TRANSFORM};
-pub use gop_header::{GopHeader, PlaceInGop};
-pub use increment::{IncrementHeader, MAX_NEIGHBOURS, NO_PREDICTOR};
+pub use gop_header::{FrameRole, GopHeader};
+pub use increment::{IncrementHeader, ListSizes, MAX_NEIGHBOURS, NO_PREDICTOR};
 pub use index::{IndexEntry, IndexHeader};
 pub use operating_points::{OperatingPointEntry, OperatingPointsHeader};
-pub use refinement::RefinementHeader;
+pub(crate) use scene_description::in_range;
+pub use scene_description::{Camera, SceneDescriptionHeader};
 pub use sequence_parameters::{MAX_LAYERS, MAX_REFINEMENTS, SequenceParameters, prefix_length};
 pub use sh_header::{NO_CODEBOOK, ShHeader, ShMode};
 pub use transform::{TransformHeader, TransformKind};
-pub use unit_header::{UnitHeader, UnitId, UnitType};
+pub use unit_header::{ErrorScope, UnitHeader, UnitId, UnitType};
 pub use weights::{NetworkHeader, WeightsHeader};
 
 /// Largest identifier of a transform or a codebook.
@@ -47,10 +49,10 @@ pub struct Row {
     pub name: &'static str,
     /// Its type as the specification spells it: `u8`, `u32`, `f32[3]`.
     pub type_name: &'static str,
-    /// Bytes of the element, all places of an array together.
+    /// Bytes of the element, an array as a whole.
     pub bytes: usize,
-    /// Places of an array; 1 for a single number.
-    pub places: usize,
+    /// Numbers of an array; 1 for a single number.
+    pub count: usize,
     /// What it is, in a line.
     pub meaning: &'static str,
     /// The clause of its syntax table.
@@ -71,7 +73,7 @@ pub struct Table {
 }
 
 /// Every fixed record, in the order of clause 5.
-pub const TABLES: [Table; 16] = [
+pub const TABLES: [Table; 17] = [
     FileHeader::TABLE,
     UnitHeader::TABLE,
     SequenceParameters::TABLE,
@@ -79,7 +81,8 @@ pub const TABLES: [Table; 16] = [
     FrameHeader::TABLE,
     TransformHeader::TABLE,
     CodebookHeader::TABLE,
-    RefinementHeader::TABLE,
+    SceneDescriptionHeader::TABLE,
+    Camera::TABLE,
     IndexHeader::TABLE,
     IndexEntry::TABLE,
     EndOfStream::TABLE,
@@ -98,29 +101,29 @@ macro_rules! table {
     (
         $(#[doc = $doc:literal])+
         $syntax:literal $semantics:literal $name:ident $Record:ident {
-            $( #[doc = $meaning:literal] $field:ident : $ty:ident $([$places:literal])?, )+
+            $( #[doc = $meaning:literal] $field:ident : $ty:ident $([$count:literal])?, )+
         }
     ) => {
         $(#[doc = $doc])+
         #[derive(Debug, Clone, Copy, PartialEq, Eq, deku::DekuRead, deku::DekuWrite)]
         #[deku(endian = "little")]
         pub struct $Record {
-            $( #[doc = $meaning] pub $field: $crate::syntax::table!(@type $ty $($places)?), )+
+            $( #[doc = $meaning] pub $field: $crate::syntax::table!(@type $ty $($count)?), )+
         }
 
         impl $Record {
             /// The rows of the syntax table.
             pub const ROWS: &'static [$crate::syntax::Row] = &[ $( $crate::syntax::Row {
                 name: stringify!($field),
-                type_name: concat!(stringify!($ty) $(, "[", $places, "]")?),
-                bytes: size_of::<$crate::syntax::table!(@type $ty $($places)?)>(),
-                places: $crate::syntax::table!(@places $($places)?),
+                type_name: concat!(stringify!($ty) $(, "[", $count, "]")?),
+                bytes: size_of::<$crate::syntax::table!(@type $ty $($count)?)>(),
+                count: $crate::syntax::table!(@count $($count)?),
                 meaning: $meaning.trim_ascii(),
                 clause: $syntax,
             }, )+ ];
 
             /// Bytes of the record.
-            pub const SIZE: usize = 0 $( + size_of::<$crate::syntax::table!(@type $ty $($places)?)>() )+;
+            pub const SIZE: usize = 0 $( + size_of::<$crate::syntax::table!(@type $ty $($count)?)>() )+;
 
             /// The syntax table.
             pub const TABLE: $crate::syntax::Table = $crate::syntax::Table {
@@ -132,11 +135,11 @@ macro_rules! table {
         }
     };
     (@type f32) => { u32 };
-    (@type f32 $places:literal) => { [u32; $places] };
+    (@type f32 $count:literal) => { [u32; $count] };
     (@type $ty:ident) => { $ty };
-    (@type $ty:ident $places:literal) => { [$ty; $places] };
-    (@places) => { 1 };
-    (@places $places:literal) => { $places };
+    (@type $ty:ident $count:literal) => { [$ty; $count] };
+    (@count) => { 1 };
+    (@count $count:literal) => { $count };
 }
 pub(crate) use table;
 
@@ -228,15 +231,6 @@ pub(crate) fn encode<T: DekuContainerWrite>(table: &Table, record: &T) -> Result
         .map_err(|_| Error::new(0, table.syntax, ErrorKind::ShortSection { element: table.name }))
 }
 
-/// 6.1: a payload ends with its last element.
-pub(crate) fn nothing_after(table: &Table, rest: &[u8], at: u64) -> Result<()> {
-    if rest.is_empty() {
-        return Ok(());
-    }
-    let kind = ErrorKind::TrailingBytes { element: table.name, bytes: after(0, rest.len()) };
-    Err(Error::new(at, table.syntax, kind))
-}
-
 /// The offset `bytes` after `at`. Saturates: no stream is near 2^64 bytes.
 pub(crate) fn after(at: u64, bytes: usize) -> u64 {
     at.saturating_add(u64::try_from(bytes).unwrap_or(u64::MAX))
@@ -255,10 +249,14 @@ impl Table {
 
     /// 6.1: nothing is left of a payload at offset `at` that is this record alone; `rest` is what comes after it.
     pub fn ends(&self, rest: &[u8], at: u64) -> Result<()> {
-        nothing_after(self, rest, after(at, self.size()))
+        if rest.is_empty() {
+            return Ok(());
+        }
+        let kind = ErrorKind::TrailingBytes { element: self.name, bytes: after(0, rest.len()) };
+        Err(Error::new(after(at, self.size()), self.syntax, kind))
     }
 
-    /// The checks of one record at a place in the stream.
+    /// The checks of one record at an offset in the stream.
     pub(crate) const fn check(&'static self, at: u64) -> Check {
         Check { table: self, at }
     }
@@ -281,6 +279,47 @@ impl Table {
     }
 }
 
+/// An element in the stream, to be checked by clause 6.
+#[derive(Clone, Copy)]
+pub(crate) struct Spot {
+    /// Absolute offset.
+    pub(crate) at: u64,
+    /// The clause of its semantics.
+    pub(crate) clause: &'static str,
+    /// The element, as the specification spells it.
+    pub(crate) element: &'static str,
+}
+
+impl Spot {
+    /// `value` shall be within `min..=max`.
+    pub(crate) fn range(self, value: impl Into<i64>, min: impl Into<i64>, max: impl Into<i64>) -> Result<()> {
+        let (value, min, max) = (value.into(), min.into(), max.into());
+        let kind = ErrorKind::OutOfRange { element: self.element, value, min, max };
+        self.holds((min..=max).contains(&value), kind)
+    }
+
+    /// `value` shall be zero in this version.
+    pub(crate) fn reserved_bits(self, value: impl Into<u64>) -> Result<()> {
+        let value = value.into();
+        self.holds(value == 0, ErrorKind::ReservedBits { element: self.element, value })
+    }
+
+    /// `value` shall be what the elements before it imply.
+    pub(crate) fn equal(self, value: u64, expected: u64) -> Result<()> {
+        self.holds(value == expected, ErrorKind::Mismatch { element: self.element, value, expected })
+    }
+
+    /// A rule without a single number.
+    pub(crate) fn rule(self, holds: bool, rule: &'static str) -> Result<()> {
+        self.holds(holds, ErrorKind::Constraint { rule })
+    }
+
+    /// An error of the kind, unless `holds`.
+    pub(crate) fn holds(self, holds: bool, kind: ErrorKind) -> Result<()> {
+        if holds { Ok(()) } else { Err(Error::new(self.at, self.clause, kind)) }
+    }
+}
+
 /// The checks of clause 6 on one record: each names an element and finds its offset in the rows.
 #[derive(Clone, Copy)]
 pub(crate) struct Check {
@@ -289,6 +328,11 @@ pub(crate) struct Check {
 }
 
 impl Check {
+    /// Number `index` of an element.
+    pub(crate) fn spot(self, element: &'static str, index: usize) -> Spot {
+        Spot { at: self.offset(element, index), clause: self.table.semantics, element }
+    }
+
     /// `value` shall be within `min..=max`.
     pub(crate) fn range(
         self,
@@ -297,43 +341,39 @@ impl Check {
         min: impl Into<i64>,
         max: impl Into<i64>,
     ) -> Result<()> {
-        self.range_in(element, 0, value, min, max)
+        self.spot(element, 0).range(value, min, max)
     }
 
-    /// The place `place` of an array shall be within `min..=max`.
+    /// Number `index` of an array shall be within `min..=max`.
     pub(crate) fn range_in(
         self,
         element: &'static str,
-        place: usize,
+        index: usize,
         value: impl Into<i64>,
         min: impl Into<i64>,
         max: impl Into<i64>,
     ) -> Result<()> {
-        let (value, min, max) = (value.into(), min.into(), max.into());
-        let kind = ErrorKind::OutOfRange { element, value, min, max };
-        self.holds((min..=max).contains(&value), element, place, kind)
+        self.spot(element, index).range(value, min, max)
     }
 
     /// `value` shall be zero in this version.
     pub(crate) fn reserved_bits(
         self,
         element: &'static str,
-        place: usize,
+        index: usize,
         value: impl Into<u64>,
     ) -> Result<()> {
-        let value = value.into();
-        let kind = ErrorKind::ReservedBits { element, value };
-        self.holds(value == 0, element, place, kind)
+        self.spot(element, index).reserved_bits(value)
     }
 
     /// `value` is kept for a later version unless `known`.
     pub(crate) fn known(self, known: bool, element: &'static str, value: u8) -> Result<()> {
-        self.holds(known, element, 0, ErrorKind::Reserved { element, value: value.into() })
+        self.spot(element, 0).holds(known, ErrorKind::Reserved { element, value: value.into() })
     }
 
     /// `value` shall be what the elements before it imply.
     pub(crate) fn equal(self, element: &'static str, value: u64, expected: u64) -> Result<()> {
-        self.holds(value == expected, element, 0, ErrorKind::Mismatch { element, value, expected })
+        self.spot(element, 0).equal(value, expected)
     }
 
     /// A rule without a single number.
@@ -341,35 +381,28 @@ impl Check {
         self,
         holds: bool,
         element: &'static str,
-        place: usize,
+        index: usize,
         rule: &'static str,
     ) -> Result<()> {
-        self.holds(holds, element, place, ErrorKind::Constraint { rule })
+        self.spot(element, index).rule(holds, rule)
     }
 
-    /// The check sum `stored` in the record shall be that of the bytes it covers.
-    pub(crate) fn check_sum(self, element: &'static str, stored: u32, computed: u32) -> Result<()> {
-        // Fuzzing must reach what lies behind the check sums.
-        if stored == computed || cfg!(fuzzing) {
-            return Ok(());
-        }
-        let kind = ErrorKind::CheckSum { element, stored, computed };
-        Err(Error::new(self.offset(element, 0), self.table.syntax, kind))
+    /// The checksum `stored` in the record shall be that of the bytes it covers.
+    pub(crate) fn checksum(self, element: &'static str, stored: u32, computed: u32) -> Result<()> {
+        // Fuzzing must reach what is checked after the checksums.
+        let holds = stored == computed || cfg!(fuzzing);
+        self.well_formed(holds, element, ErrorKind::Checksum { element, stored, computed })
     }
 
     /// Malformed, unless `holds`: cites the clause of the syntax.
     pub(crate) fn well_formed(self, holds: bool, element: &'static str, kind: ErrorKind) -> Result<()> {
-        if holds { Ok(()) } else { Err(Error::new(self.offset(element, 0), self.table.syntax, kind)) }
+        Spot { clause: self.table.syntax, ..self.spot(element, 0) }.holds(holds, kind)
     }
 
-    fn holds(self, holds: bool, element: &'static str, place: usize, kind: ErrorKind) -> Result<()> {
-        if holds { Ok(()) } else { Err(Error::new(self.offset(element, place), self.table.semantics, kind)) }
-    }
-
-    /// Absolute offset of a place of an element.
-    pub(crate) fn offset(self, element: &str, place: usize) -> u64 {
+    /// Absolute offset of number `index` of an element.
+    pub(crate) fn offset(self, element: &str, index: usize) -> u64 {
         let row = self.table.rows.iter().find(|row| row.name == element);
-        let one = row.and_then(|row| row.bytes.checked_div(row.places)).unwrap_or(0);
-        after(self.at, self.table.offset(element).saturating_add(one.saturating_mul(place)))
+        let one = row.and_then(|row| row.bytes.checked_div(row.count)).unwrap_or(0);
+        after(self.at, self.table.offset(element).saturating_add(one.saturating_mul(index)))
     }
 }

@@ -5,7 +5,7 @@
 mod sample;
 
 use sample::case::{Case, assert_refused, case, put};
-use sample::{CODEBOOK, DC, END, FRAME, GOP, INDEX, REFINEMENT, SEQUENCE, SH, Units, WEIGHTS};
+use sample::{CODEBOOK, DC, END, FRAME, GOP, INCREMENT, INDEX, P_FRAME, SCENE, SEQUENCE, SH, Units, WEIGHTS};
 use splatstream_format::Limits;
 use splatstream_format::syntax::Profile;
 
@@ -24,7 +24,7 @@ fn assert_refused_of(profile: Profile, units: &Units, cases: &[Case]) {
     }
 }
 
-// covers: SS-ER-001, SS-SP-001, SS-SP-002, SS-SP-003
+// covers: SS-ER-001, SS-SP-001, SS-SP-002, SS-SP-003, SS-SP-004
 #[test]
 fn broken_sequence_parameters_are_refused() {
     const NAN: [u8; 4] = f32::NAN.to_le_bytes();
@@ -47,7 +47,9 @@ fn broken_sequence_parameters_are_refused() {
         case(SEQUENCE, |p| p[14] = 21, "OUT_OF_RANGE", "6.4", 14),
         case(SEQUENCE, |p| p[15] = 5, "OUT_OF_RANGE", "6.4", 15),
         case(SEQUENCE, |p| p[15] = 17, "OUT_OF_RANGE", "6.4", 15),
+        // whole_anchor, in profile Intra.
         case(SEQUENCE, |p| p[16] = 4, "RESERVED_BITS", "6.4", 16),
+        case(SEQUENCE, |p| p[16] = 8, "RESERVED_BITS", "6.4", 16),
         case(SEQUENCE, |p| p[18] = 31, "OUT_OF_RANGE", "6.4", 18),
         case(SEQUENCE, |p| p[19] = 21, "OUT_OF_RANGE", "6.4", 19),
         case(SEQUENCE, |p| put(p, 24, [0; 4]), "OUT_OF_RANGE", "6.4", 24),
@@ -82,20 +84,20 @@ fn the_ends_of_the_ranges_are_accepted() {
     assert_eq!(sample::verdict(&sample::stream(&units)), None);
 }
 
-// covers: SS-GH-002, SS-GH-003, SS-FR-001
+// covers: SS-GH-002, SS-GH-003, SS-FR-001, SS-FR-004
 #[test]
 fn broken_gop_and_frame_headers_are_refused() {
     assert_payloads_refused(&[
         case(GOP, |p| put(p, 4, [0; 4]), "OUT_OF_RANGE", "6.5", 4),
         case(GOP, |p| p[8] = 1, "RESERVED", "6.5", 8),
-        case(GOP, |p| p[9] = 1, "RESERVED_BITS", "6.5", 9),
+        case(GOP, |p| p[9] = 1, "OUT_OF_RANGE", "6.5", 9),
         case(GOP, |p| p[11] = 1, "RESERVED_BITS", "6.5", 11),
-        case(FRAME, |p| p[0] = 1, "RESERVED", "6.6", 0),
-        case(FRAME, |p| p[0] = 2, "RESERVED", "6.6", 0),
+        case(FRAME, |p| p[0] = 3, "RESERVED", "6.6", 0),
         case(FRAME, |p| p[1] = 16, "OUT_OF_RANGE", "6.6", 1),
         case(FRAME, |p| p[1] = 255, "OUT_OF_RANGE", "6.6", 1),
         case(FRAME, |p| p[2] = 16, "OUT_OF_RANGE", "6.6", 2),
-        case(FRAME, |p| p[3] = 1, "RESERVED_BITS", "6.6", 3),
+        case(FRAME, |p| p[3] = 1, "MISMATCH", "6.6", 3),
+        case(FRAME, |p| p[3] = 4, "RESERVED_BITS", "6.6", 3),
         case(FRAME, |p| put(p, 4, u32::MAX.to_le_bytes()), "OVER_LIMIT", "A.2", 4),
     ]);
     let mut units = sample::units();
@@ -137,45 +139,121 @@ fn broken_transforms_are_refused() {
     ]);
 }
 
-// covers: SS-RU-002; SS-RU-003 and SS-RU-004 as far as one unit shows them
+// covers: SS-IX-002; SS-IN-010 as far as one unit shows it
 #[test]
-fn broken_codebooks_and_refinements_are_refused() {
+fn broken_codebooks_and_indexes_are_refused() {
     assert_payloads_refused(&[
         case(CODEBOOK, |p| p[0] = 16, "OUT_OF_RANGE", "6.8", 0),
         case(CODEBOOK, |p| p[1] = 0, "OUT_OF_RANGE", "6.8", 1),
         case(CODEBOOK, |p| p[1] = 46, "OUT_OF_RANGE", "6.8", 1),
         case(CODEBOOK, |p| p[4] = 0, "OUT_OF_RANGE", "6.8", 4),
         case(CODEBOOK, |p| p[4] = 3, "OUT_OF_RANGE", "6.8", 4),
-        case(REFINEMENT, |p| p[12] = 16, "OUT_OF_RANGE", "6.9", 12),
-        case(REFINEMENT, |p| p[13] = 6, "OUT_OF_RANGE", "6.9", 13),
-        case(REFINEMENT, |p| p[14] = 3, "RESERVED", "6.9", 14),
-        case(REFINEMENT, |p| p[15] = 0, "OUT_OF_RANGE", "6.9", 15),
-        case(REFINEMENT, |p| p[15] = 5, "OUT_OF_RANGE", "6.9", 15),
-        case(REFINEMENT, |p| p[14] = 1, "OUT_OF_RANGE", "6.9", 15),
-        case(REFINEMENT, |p| p[16] = 16, "OUT_OF_RANGE", "6.9", 16),
-        case(REFINEMENT, |p| p[17] = 0, "OUT_OF_RANGE", "6.9", 17),
-        case(REFINEMENT, |p| p[19] = 7, "OUT_OF_RANGE", "6.9", 19),
-        case(REFINEMENT, |p| put(p, 8, [0; 4]), "MISMATCH", "6.9", 20),
-        case(REFINEMENT, |p| drop(p.splice(20..21, [0x83, 0])), "NUMBER", "5.9", 20),
-        case(REFINEMENT, |p| drop(p.splice(20..21, [0x80, 0x80, 0x80, 0x80, 16])), "NUMBER", "5.9", 20),
-        case(REFINEMENT, |p| drop(p.splice(25..26, [0x85, 0])), "NUMBER", "5.9", 25),
-        // More blocks than bytes: refused before room is made for them.
-        case(REFINEMENT, |p| put(p, 8, (1_u32 << 22).to_le_bytes()), "SHORT_SECTION", "5.9", 24),
-        case(REFINEMENT, |p| put(p, 8, u32::MAX.to_le_bytes()), "OVER_LIMIT", "A.2", 8),
         case(INDEX, |p| p[8] = 1, "RESERVED_BITS", "6.10", 8),
-        case(
-            INDEX,
-            |p| {
-                p.extend([0; 16]);
-                p[0] = 2;
-                p[24] = 1;
-            },
-            "RESERVED_BITS",
-            "6.10",
-            24,
-        ),
         case(INDEX, |p| put(p, 0, u32::MAX.to_le_bytes()), "SHORT_SECTION", "5.10", 4),
+        // A second entry that does not come after the first.
+        case(INDEX, |p| double(p, |entry| entry[8] += 1), "MISMATCH", "6.10", 20),
+        case(INDEX, |p| double(p, |entry| entry[0] += 1), "MISMATCH", "6.10", 28),
     ]);
+}
+
+/// An increment that changes one of 2^21 parents, with nothing after the models of its section of modes.
+fn many_parents() -> Vec<u8> {
+    [&[3, 0][..], &[0; 8], &[0x80, 0x80, 0x80, 1], &[1], &[0], &[0]].concat()
+}
+
+/// Adds a changed copy of the only entry to an index.
+fn double(index: &mut Vec<u8>, change: fn(&mut [u8])) {
+    let mut entry = index[4..].to_vec();
+    change(&mut entry);
+    index.extend(entry);
+    index[0] = 2;
+}
+
+// covers: SS-IN-008, SS-IN-010, SS-IN-002, SS-IN-001, SS-IN-003, SS-IN-004, SS-IN-009
+#[test]
+fn broken_increments_are_refused() {
+    // Flags, digest, new_count at 10, shifts at 11 and 12, sh at 17 to 19, compensation at 20, the section at 22.
+    assert_payloads_refused(&[
+        case(INCREMENT, |p| p[1] |= 4, "RESERVED_BITS", "6.14", 0),
+        case(INCREMENT, |p| p[1] |= 128, "RESERVED_BITS", "6.14", 0),
+        case(INCREMENT, |p| p[0] |= 128, "RESERVED", "6.14", 0),
+        case(INCREMENT, |p| p[10] = 0, "OUT_OF_RANGE", "6.14", 10),
+        case(INCREMENT, |p| drop(p.splice(10..11, [0xE4, 0])), "NUMBER", "5.14", 10),
+        case(INCREMENT, |p| drop(p.splice(10..11, [0x80, 0x80, 0x80, 0x80, 16])), "NUMBER", "5.14", 10),
+        case(INCREMENT, |p| p[11] = 16, "OUT_OF_RANGE", "6.14", 11),
+        case(INCREMENT, |p| p[16] = 8, "OUT_OF_RANGE", "6.14", 16),
+        case(INCREMENT, |p| p[17] = 0, "OUT_OF_RANGE", "6.14", 17),
+        case(INCREMENT, |p| p[17] = 3, "RESERVED", "6.14", 17),
+        case(INCREMENT, |p| p[18] = 0, "OUT_OF_RANGE", "6.14", 18),
+        case(INCREMENT, |p| p[18] = 5, "OUT_OF_RANGE", "6.14", 18),
+        case(INCREMENT, |p| p[19] = 16, "OUT_OF_RANGE", "6.14", 19),
+        case(INCREMENT, |p| p[22] = 6, "OUT_OF_RANGE", "6.15", 22),
+        case(INCREMENT, |p| drop(p.splice(23..24, [0x83, 0])), "NUMBER", "5.15", 23),
+        // More blocks than bytes: refused before room is made for them.
+        case(INCREMENT, |p| *p = many_parents(), "SHORT_SECTION", "5.15", 17),
+        // 16 new Gaussians a byte, of 39 bytes.
+        case(INCREMENT, |p| drop(p.splice(10..11, [0xF1, 4])), "OVER_LIMIT", "A.2", 10),
+        case(INCREMENT, |p| drop(p.splice(10..11, [0xFF, 0xFF, 0xFF, 0xFF, 15])), "OVER_LIMIT", "A.2", 10),
+        // Without the flags of new Gaussians and their section: nothing is left for what follows.
+        case(INCREMENT, |p| put(p, 0, [0, 0]), "TRAILING_BYTES", "5.14", 10),
+    ]);
+    let units = sample::units();
+    let predicted = case(INCREMENT, |p| put(p, 0, [128, 0]), "CONSTRAINT", "6.14", 0);
+    assert_refused_of(Profile::Dynamic, &units, &[predicted]);
+}
+
+// covers: SS-FR-007
+#[test]
+fn broken_cells_are_refused() {
+    let cells = |edit, code, clause, fault| case(P_FRAME, edit, code, clause, fault);
+    assert_refused_of(
+        Profile::Dynamic,
+        &sample::dynamic_units(),
+        &[
+            cells(|p| p[3] = 1, "TRAILING_BYTES", "5.6", 16),
+            cells(|p| p.truncate(12), "SHORT_SECTION", "5.6", 8),
+            cells(|p| p[16] = 0, "OUT_OF_RANGE", "6.6", 16),
+            cells(|p| drop(p.splice(16..17, [0x81, 0x80, 0x40])), "OVER_LIMIT", "A.2", 16),
+            cells(|p| p[17] = 17, "OUT_OF_RANGE", "6.6", 17),
+            cells(|p| p[18] = 6, "OUT_OF_RANGE", "6.15", 18),
+            cells(|p| p[19] = 6, "SHORT_SECTION", "5.15", 20),
+            cells(|p| p[22] = 2, "SHORT_SECTION", "5.15", 23),
+            cells(|p| p.push(0), "TRAILING_BYTES", "5.6", 24),
+        ],
+    );
+}
+
+// covers: SS-SD-002, SS-SD-003, SS-SD-004, SS-SD-005, SS-SD-006
+#[test]
+fn broken_scene_descriptions_are_refused() {
+    // Metres at 6, background at 10, bounds at 22 and 34, the title at 46, cameras at 50.
+    const NAN: [u8; 4] = f32::NAN.to_le_bytes();
+    let scene = |edit, code, clause, fault| case(SCENE, edit, code, clause, fault);
+    assert_payloads_refused(&[
+        scene(|p| p[0] = 7, "RESERVED", "6.9", 0),
+        scene(|p| p[1] = 1, "RESERVED", "6.9", 1),
+        scene(|p| p[2] = 2, "RESERVED", "6.9", 2),
+        scene(|p| p[3] = 1, "RESERVED", "6.9", 3),
+        scene(|p| p[4] = 2, "RESERVED", "6.9", 4),
+        scene(|p| p[5] |= 32, "RESERVED_BITS", "6.9", 5),
+        scene(|p| put(p, 6, [0; 4]), "CONSTRAINT", "6.9", 6),
+        scene(|p| put(p, 6, 1.2e12_f32.to_le_bytes()), "CONSTRAINT", "6.9", 6),
+        scene(|p| put(p, 10, (-0.1_f32).to_le_bytes()), "CONSTRAINT", "6.9", 10),
+        scene(|p| put(p, 22, NAN), "CONSTRAINT", "6.9", 22),
+        scene(|p| put(p, 34, (-2_f32).to_le_bytes()), "CONSTRAINT", "6.9", 34),
+        scene(|p| p[46] = 0, "OUT_OF_RANGE", "6.9", 46),
+        scene(|p| drop(p.splice(46..47, [0x81, 8])), "OUT_OF_RANGE", "6.9", 46),
+        scene(|p| p[48] = b'x', "CONSTRAINT", "6.9", 47),
+        scene(|p| p[50] = 0, "OUT_OF_RANGE", "6.9", 50),
+        scene(|p| p[50] = 65, "OUT_OF_RANGE", "6.9", 50),
+        scene(|p| p[50] = 2, "SHORT_SECTION", "5.9", 83),
+        scene(|p| put(p, 51 + 12, NAN), "CONSTRAINT", "6.9", 51 + 12),
+        scene(|p| put(p, 51 + 28, [0; 4]), "CONSTRAINT", "6.9", 51 + 28),
+        scene(|p| put(p, 51 + 28, 0x4049_0FDB_u32.to_le_bytes()), "CONSTRAINT", "6.9", 51 + 28),
+    ]);
+    let mut units = sample::units();
+    put(&mut units[SCENE].1, 51 + 28, 0x4049_0FDA_u32.to_le_bytes());
+    assert_eq!(sample::verdict(&sample::stream(&units)), None);
 }
 
 // covers: SS-WT-001, SS-WT-003, SS-WT-004
@@ -256,12 +334,12 @@ fn a_payload_that_is_too_long_or_too_short_is_refused() {
     // The last element of each payload: its name is in the error, its first byte is the offset.
     let last = [
         (SEQUENCE, "5.4", 72),
+        (SCENE, "5.9", 51),
         (GOP, "5.5", 10),
         (DC, "5.7", 16),
         (SH, "5.7", 40),
         (CODEBOOK, "5.8", 5),
         (FRAME, "5.6", 4),
-        (REFINEMENT, "5.9", 30),
         (INDEX, "5.10", 4),
         (END, "5.11", 8),
     ];
@@ -275,7 +353,7 @@ fn a_payload_that_is_too_long_or_too_short_is_refused() {
     }
 }
 
-// covers: SS-LM-003
+// covers: SS-FR-005, SS-FR-006, SS-LM-003
 #[test]
 fn limits_of_the_caller_are_kept() {
     let bytes = sample::stream(&sample::units());
@@ -284,9 +362,11 @@ fn limits_of_the_caller_are_kept() {
         (error.class().name(), error.at)
     };
     let (all, units) = (Limits::default(), sample::units());
-    let place = |unit, offset| ("over-limit", sample::unit_at(&units, unit) + offset);
-    assert_eq!(refused(Limits { max_units: 3, ..all }), place(3, 0));
-    assert_eq!(refused(Limits { max_payload: 75, ..all }), place(SEQUENCE, 12));
-    assert_eq!(refused(Limits { max_codebook_values: 3, ..all }), place(CODEBOOK, 22));
-    assert_eq!(refused(Limits { max_gaussians: 499, ..all }), place(FRAME, 24));
+    let spot = |unit, offset| ("over-limit", sample::unit_at(&units, unit) + offset);
+    assert_eq!(refused(Limits { max_units: 3, ..all }), spot(3, 0));
+    assert_eq!(refused(Limits { max_payload: 75, ..all }), spot(SEQUENCE, 12));
+    assert_eq!(refused(Limits { max_codebook_values: 3, ..all }), spot(CODEBOOK, 22));
+    assert_eq!(refused(Limits { max_gaussians: 499, ..all }), spot(FRAME, 24));
+    // 500 Gaussians, 30 times a second.
+    assert_eq!(refused(Limits { max_gaussian_rate: 14_999, ..all }), spot(FRAME, 24));
 }

@@ -21,12 +21,13 @@ fn values(elements: &[Element], record: &str, name: &str) -> Vec<String> {
 
 #[test]
 fn codes_are_shown_with_what_they_stand_for() {
-    let (elements, error) = elements(&sample::stream(&sample::units()));
+    let units = sample::units();
+    let (elements, error) = elements(&sample::stream(&units));
     assert_eq!(error, None);
     let one = |record, name| values(&elements, record, name).join("; ");
     assert_eq!(one("file_header", "signature"), "[89, 47, 53, 53, 0D, 0A, 1A, 0A]");
     assert_eq!(one("file_header", "profile"), "0 (Intra)");
-    assert_eq!(values(&elements, "unit_header", "unit_type")[sample::REFINEMENT], "6 (refinement)");
+    assert_eq!(values(&elements, "unit_header", "unit_type")[sample::INCREMENT], "6 (increment)");
     assert_eq!(values(&elements, "unit_header", "unit_flags")[sample::END], "1 (critical)");
     assert_eq!(one("sequence_parameters", "sequence_flags"), "1 (canonical_axes)");
     assert_eq!(one("sequence_parameters", "position_offset"), "[-1, 0, 1]");
@@ -35,16 +36,27 @@ fn codes_are_shown_with_what_they_stand_for() {
     assert_eq!(one("transform", "mean"), "3 values, -1 to 1999; 9 values, -1 to 7999");
     assert_eq!(one("codebook", "entries"), "4 values, -128 to 127");
     assert_eq!(one("frame_header", "frame_type"), "0 (I)");
-    assert_eq!(one("refinement", "refinement_digest"), "0x0123456789abcdef");
-    assert_eq!(one("refinement", "sh_mode"), "2 (vector quantised)");
-    assert!(one("refinement", "models").starts_with("3 bytes, not readable: "));
-    assert_eq!(one("refinement", "block_length[1]"), "5");
-    assert_eq!(one("refinement", "blocks[1]"), "5 bytes");
-    assert_eq!(one("index_entry", "offset"), "112");
+    let present = "880 (has_new, has_position_shift, has_attribute_shift, has_sh, has_compensation)";
+    assert_eq!(one("increment", "increment_flags"), present);
+    assert_eq!(one("increment", "refinement_digest"), "0x0123456789abcdef");
+    assert_eq!(one("increment", "new_count"), "100");
+    assert_eq!(one("increment", "attribute_shift"), "[1, 2, 3, 4, 7]");
+    assert_eq!(one("increment", "sh_mode"), "2 (vector quantised)");
+    assert_eq!(one("increment", "codebook_ids"), "[7]");
+    assert_eq!(one("increment", "compensation_log_scale"), "-1");
+    assert_eq!(one("section", "lanes_log2"), "3 (new)");
+    assert!(one("section", "models").starts_with("3 bytes, not readable: "));
+    assert_eq!(one("section", "block_length[1]"), "5");
+    assert_eq!(one("section", "blocks[1]"), "5 bytes");
+    assert_eq!(one("scene_description", "up_axis"), "4 (-y)");
+    assert_eq!(one("scene_description", "bounds_min"), "[-1, 0, 0]");
+    assert_eq!(one("scene_description", "title"), "\"Kö\"");
+    assert_eq!(one("camera", "vertical_field_of_view"), "1");
+    assert_eq!(one("index_entry", "offset"), sample::unit_at(&units, sample::GOP).to_string());
 }
 
 #[test]
-fn an_element_has_its_place_its_clause_and_a_meaning() {
+fn an_element_has_its_offset_its_clause_and_a_meaning() {
     let units = sample::units();
     let (elements, _) = elements(&sample::stream(&units));
     let rank = elements.iter().find(|element| element.name == "rank").unwrap();
@@ -54,7 +66,7 @@ fn an_element_has_its_place_its_clause_and_a_meaning() {
 }
 
 #[test]
-fn the_elements_of_a_network_are_shown_and_its_parameters_counted() {
+fn networks_and_cells_are_shown() {
     let units = sample::dynamic_units();
     let bytes = sample::stream_of(Profile::Dynamic, &units);
     let (elements, error) = elements(&bytes);
@@ -65,9 +77,9 @@ fn the_elements_of_a_network_are_shown_and_its_parameters_counted() {
     assert_eq!(values(&elements, "network", "parameters"), [format!("{parameters} bytes")]);
     let shown: u64 = elements.iter().map(|element| element.bits).sum();
     assert_eq!(shown, 8 * u64::try_from(bytes.len()).unwrap());
-    // A unit of profile Intra is passed over.
-    let (elements, _) = self::elements(&sample::stream(&units));
-    assert!(values(&elements, "weights", "model_source").is_empty());
+    assert_eq!(values(&elements, "frame_header", "carried_digest"), ["0x000000000000fedc"]);
+    assert_eq!(values(&elements, "frame_header", "cell_count"), ["5"]);
+    assert_eq!(values(&elements, "section", "lanes_log2"), ["0 (cells)"]);
 }
 
 #[test]
@@ -84,13 +96,13 @@ fn a_cut_stream_shows_what_is_there() {
 }
 
 #[test]
-fn units_behind_a_broken_payload_are_still_shown() {
+fn units_after_a_broken_payload_are_still_shown() {
     let mut units = sample::units();
-    units[sample::REFINEMENT].1[20] = 200;
+    units[sample::INCREMENT].1[23] = 200;
     let (elements, error) = elements(&sample::stream(&units));
     assert_eq!(error.unwrap().kind.code(), "SHORT_SECTION");
-    assert_eq!(values(&elements, "refinement", "gaussian_count"), ["100"]);
-    assert_eq!(values(&elements, "end", "unit_count"), ["8"]);
+    assert_eq!(values(&elements, "increment", "new_count"), ["100"]);
+    assert_eq!(values(&elements, "end", "unit_count"), ["9"]);
 }
 
 #[test]
@@ -99,5 +111,5 @@ fn parameters_of_frames_need_those_of_the_sequence() {
     units.remove(sample::SEQUENCE);
     let (elements, error) = elements(&sample::stream(&units));
     assert_eq!(error.unwrap().kind.code(), "UNEXPECTED_UNIT");
-    assert_eq!(values(&elements, "refinement", "lanes_log2"), ["3"]);
+    assert_eq!(values(&elements, "increment", "increment_flags").len(), 1);
 }

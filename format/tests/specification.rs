@@ -24,27 +24,28 @@ fn specified(text: &str, table: &Table) -> Vec<Row> {
     rows
 }
 
-/// `| `element` | type | clause |`; the head of the table and other lines are none.
+/// `| `element` | type | clause |`, with dots before an element under a condition; the head of the table, conditions
+/// and other lines are none.
 fn row(line: &str) -> Option<Row> {
     let mut cells = line.strip_prefix('|')?.split('|').map(str::trim);
-    let name = cells.next()?.strip_prefix('`')?.strip_suffix('`')?;
+    let name = cells.next()?.trim_start_matches(['·', ' ']).strip_prefix('`')?.strip_suffix('`')?;
     Some((name.to_owned(), cells.next()?.to_owned(), cells.next()?.to_owned()))
 }
 
 /// An element whose semantics have another clause than those of its record.
 const SEMANTICS_ELSEWHERE: (&str, &str, &str) = ("network", "parameters", "6.17.2");
 
-/// The fixed rows of the code, and the variable ones behind them.
+/// The fixed rows of the code, and the variable ones after them.
 fn coded(table: &Table) -> Vec<Row> {
     let fixed = table.rows.iter().map(|row| (row.name, row.type_name));
-    let behind = VARIABLE_ROWS.iter().filter(|row| row.record == table.name);
-    let behind = behind.map(|row| (row.name, row.type_name));
+    let variable = VARIABLE_ROWS.iter().filter(|row| row.record == table.name);
+    let variable = variable.map(|row| (row.name, row.type_name));
     let (record, element, clause) = SEMANTICS_ELSEWHERE;
     let semantics =
         |name: &str| if (table.name, name) == (record, element) { clause } else { table.semantics };
     let row =
         |(name, type_name): (&str, &str)| (name.to_owned(), type_name.to_owned(), semantics(name).to_owned());
-    fixed.chain(behind).map(row).collect()
+    fixed.chain(variable).map(row).collect()
 }
 
 #[test]
@@ -52,8 +53,8 @@ fn every_syntax_table_is_that_of_the_specification() {
     let text = clause_5();
     for table in TABLES {
         let (specified, coded) = (specified(&text, &table), coded(&table));
-        for (place, (specified, coded)) in specified.iter().zip(&coded).enumerate() {
-            assert_eq!(specified, coded, "{}, row {}: specification, code", table.name, place + 1);
+        for (index, (specified, coded)) in specified.iter().zip(&coded).enumerate() {
+            assert_eq!(specified, coded, "{}, row {}: specification, code", table.name, index + 1);
         }
         let extra = specified.iter().skip(coded.len()).chain(coded.iter().skip(specified.len()));
         let extra: Vec<_> = extra.collect();
@@ -77,7 +78,7 @@ fn every_table_of_the_specification_is_in_the_code() {
 #[test]
 fn rows_and_sizes_agree() {
     let sizes = TABLES.map(|table| (table.name, table.size()));
-    let expected: [(&str, usize); 16] = [
+    let expected: [(&str, usize); 17] = [
         ("file_header", 16),
         ("unit_header", 20),
         ("sequence_parameters", 76),
@@ -85,11 +86,12 @@ fn rows_and_sizes_agree() {
         ("frame_header", 8),
         ("transform", 4),
         ("codebook", 5),
-        ("refinement", 20),
+        ("scene_description", 6),
+        ("camera", 32),
         ("index", 4),
         ("index_entry", 16),
         ("end", 16),
-        ("increment", 59),
+        ("increment", 10),
         ("operating_points", 4),
         ("operating_point", 24),
         ("weights", 1),

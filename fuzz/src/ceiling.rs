@@ -37,11 +37,11 @@ impl Ceiling {
     }
 
     fn claimed(&self, size: usize, request: impl FnOnce() -> *mut u8) -> *mut u8 {
-        let place = if self.claim(size) { request() } else { return null_mut() };
-        if place.is_null() {
+        let pointer = if self.claim(size) { request() } else { return null_mut() };
+        if pointer.is_null() {
             self.release(size);
         }
-        place
+        pointer
     }
 }
 
@@ -55,16 +55,16 @@ unsafe impl GlobalAlloc for Ceiling {
         self.claimed(layout.size(), || unsafe { System.alloc_zeroed(layout) })
     }
 
-    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        let place = self.claimed(size, || unsafe { System.realloc(place, layout, size) });
-        if !place.is_null() {
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let pointer = self.claimed(size, || unsafe { System.realloc(pointer, layout, size) });
+        if !pointer.is_null() {
             self.release(layout.size());
         }
-        place
+        pointer
     }
 
-    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         self.release(layout.size());
-        unsafe { System.dealloc(place, layout) }
+        unsafe { System.dealloc(pointer, layout) }
     }
 }

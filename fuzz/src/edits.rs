@@ -31,32 +31,32 @@ fn units(stream: &[u8]) -> Vec<Vec<u8>> {
     let mut rest = &stream[FileHeader::SIZE..];
     let mut units = Vec::new();
     for unit in opened.units().map_while(Result::ok) {
-        let (this, behind) = rest.split_at(UnitHeader::SIZE + unit.payload.len());
+        let (this, after) = rest.split_at(UnitHeader::SIZE + unit.payload.len());
         units.push(this.to_vec());
-        rest = behind;
+        rest = after;
     }
     units
 }
 
-fn apply(units: &mut Vec<Vec<u8>>, what: u8, unit: usize, place: usize, value: u8) {
+fn apply(units: &mut Vec<Vec<u8>>, what: u8, unit: usize, index: usize, value: u8) {
     let count = units.len();
     if count == 0 {
         return;
     }
     let unit = unit % count;
     let bytes = &mut units[unit];
-    let place = place % bytes.len();
+    let index = index % bytes.len();
     match what % 8 {
-        0 => bytes[place] = value,
-        1 => bytes[place] ^= 1 << (value % 8),
-        2 => bytes[place] = bytes[place].wrapping_add(value),
+        0 => bytes[index] = value,
+        1 => bytes[index] ^= 1 << (value % 8),
+        2 => bytes[index] = bytes[index].wrapping_add(value),
         // In the payload, and the header knows: the other units stay what they are.
         3 => {
-            bytes.insert(place.max(UnitHeader::SIZE), value);
+            bytes.insert(index.max(UnitHeader::SIZE), value);
             set_payload_length(bytes);
         }
         4 => {
-            bytes.truncate(place.max(UnitHeader::SIZE));
+            bytes.truncate(index.max(UnitHeader::SIZE));
             set_payload_length(bytes);
         }
         5 => drop(units.remove(unit)),

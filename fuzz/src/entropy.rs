@@ -36,8 +36,8 @@ fn coded(u: &mut Unstructured<'_>) -> Result<()> {
     assert_eq!(decoded(&planes, &block, lanes_log2).as_ref(), Some(&values), "symbols come back");
     // Changed, it is mostly refused.
     for _ in 0..u.int_in_range(0..=MOST_CHANGES)? {
-        let (place, value) = (u.choose_index(block.len())?, u.arbitrary::<u8>()?);
-        block[place] ^= value;
+        let (index, value) = (u.choose_index(block.len())?, u.arbitrary::<u8>()?);
+        block[index] ^= value;
     }
     if let Some(values) = decoded(&planes, &block, lanes_log2) {
         assert_eq!(encoded(&planes, &values, lanes_log2), block, "the same symbols are another block");
@@ -93,18 +93,18 @@ fn axis(u: &mut Unstructured<'_>) -> Result<ContextAxis> {
     Ok(ContextAxis { source, thresholds })
 }
 
-/// Each table once, in order of first use, and its place for each context.
+/// Each table once, in order of first use, and its index for each context.
 fn distinct(of_context: impl Iterator<Item = Frequencies>) -> (Vec<Frequencies>, Vec<u8>) {
     let mut tables: Vec<Frequencies> = Vec::new();
-    let places = of_context.map(|table| {
-        let place = tables.iter().position(|known| *known == table).unwrap_or(tables.len());
-        if place == tables.len() {
+    let indices = of_context.map(|table| {
+        let index = tables.iter().position(|known| *known == table).unwrap_or(tables.len());
+        if index == tables.len() {
             tables.push(table);
         }
-        place as u8
+        index as u8
     });
-    let places = places.collect();
-    (tables, places)
+    let indices = indices.collect();
+    (tables, indices)
 }
 
 fn models_come_back(planes: &[Plane]) {
@@ -147,7 +147,7 @@ fn read(reader: &mut BlockReader<'_>, plane: &Plane) -> Vec<u64> {
         }
         Alphabet::Position => {
             let mut deltas = vec![0; plane.contexts.len()];
-            reader.deltas(&decoder, |place, _| plane.contexts[place], &mut deltas);
+            reader.deltas(&decoder, |index, _| plane.contexts[index], &mut deltas);
             deltas
         }
     }

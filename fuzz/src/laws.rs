@@ -1,117 +1,146 @@
 //! What holds for every stream, valid or not, and for every valid one.
 
 use crate::LIMITS;
-use core::ops::ControlFlow;
-use splatstream_decoder::digest::{frame_digest, unit_digest};
+use core::ops::{ControlFlow, RangeInclusive};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::operating_point::{OperatingPoint, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
-use splatstream_decoder::stream::decode_stream;
+use splatstream_decoder::stream::{decode_stream, decode_stream_inside};
 use splatstream_format::Error;
 use splatstream_format::inspect::inspect;
-use splatstream_format::syntax::{FrameType, SequenceParameters};
+use splatstream_format::syntax::SequenceParameters;
 
 pub mod arrival;
+pub mod damage;
 pub mod extraction;
-pub mod parts;
+pub mod losses;
 
-/// Strict: the first fault ends decoding. Digests are not compared, as no edit could make them right again.
-pub const STRICT: Options = Options {
+/// The decoder goes on after errors. Digests are not compared, as no edit could make them right again.
+pub const PLAIN: Options = Options {
     limits: LIMITS,
     verify: false,
     operating_point: OperatingPoint::ALL,
-    tolerant: false,
+    stop_at_first_error: false,
     subset: false,
     entropy: false,
 };
-/// A damaged refinement ends its frame only.
-pub const TOLERANT: Options = Options { tolerant: true, ..STRICT };
-/// Strict, and digests are compared.
-pub const VERIFIED: Options = Options { verify: true, ..STRICT };
+/// The first error ends decoding.
+pub const STRICT: Options = Options { stop_at_first_error: true, ..PLAIN };
+/// Digests are compared.
+pub const VERIFIED: Options = Options { verify: true, ..PLAIN };
 
 /// What decoding a stream gave.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, PartialEq, Default)]
 pub struct Decoded {
     /// What holds for all frames, once one came out.
     pub sequence: Option<SequenceParameters>,
     /// The frames in the order in which they came out.
     pub frames: Vec<DecodedFrame>,
-    /// What ended decoding before the end of the stream.
-    pub end: Option<Error>,
+    /// Every error, in stream order.
+    pub errors: Vec<Error>,
+    /// Display indices of frames that never came out.
+    pub lost: Vec<RangeInclusive<u32>>,
 }
 
-/// Decodes a stream in every way; `choice` chooses an operating point, what is lost, and where to start.
+/// Decodes a stream in every way; `choice` chooses an operating point, what is lost or damaged, and where to start.
 pub fn hold(bytes: &[u8], choice: u32) {
-    let strict = decodes(bytes);
-    if strict.end.is_none() {
-        parts::hold(bytes, &strict, choice);
-        if let Some(sequence) = &strict.sequence {
-            extraction::holds_at(bytes, &strict, extraction::chosen(sequence, choice));
-        }
+    let plain = decodes(bytes);
+    arrival::holds(bytes, &plain, choice);
+    if !plain.errors.is_empty() {
+        return;
+    }
+    subsets(bytes, &plain);
+    from_inside(bytes, &plain, choice);
+    losses::hold(bytes, &plain, choice).expect("a valid stream has valid units");
+    damage::holds(bytes, &plain, choice);
+    if let Some(sequence) = &plain.sequence {
+        extraction::holds(bytes, &plain, sequence, choice);
     }
 }
 
-/// A stream decodes or is refused, the same however careful the decoder is; what a strict one gives.
+/// A stream decodes or is refused, the same however careful the decoder is; what it gives without digests.
 pub fn decodes(bytes: &[u8]) -> Decoded {
+    let plain = Decoded::of(bytes, &PLAIN);
     let strict = Decoded::of(bytes, &STRICT);
-    let tolerant = Decoded::of(bytes, &TOLERANT);
-    assert!(tolerant.frames.len() >= strict.frames.len(), "a tolerant decoder shows no less");
-    assert!(tolerant.frames.starts_with(&strict.frames), "it shows the same where there is no fault");
-    verified(bytes, &strict);
+    assert!(plain.frames.starts_with(&strict.frames), "what comes before the first error is the same");
+    assert_eq!(plain.errors.first(), strict.errors.first(), "the first error is the verdict");
+    verified(bytes, &plain);
     let _ = operating_points(bytes, &LIMITS);
-    if strict.end.is_none() {
-        assert_eq!(tolerant.frames, strict.frames, "without a fault there is nothing to tolerate");
-        assert_eq!(inspect(bytes, &LIMITS, &mut |_| ()), None, "the inspector refuses what decodes");
+    match plain.errors.first() {
+        None => assert_eq!(inspect(bytes, &LIMITS, &mut |_| ()), None, "the inspector refuses what decodes"),
+        Some(error) => is_of_first_faulty_unit(bytes, error),
     }
-    shown(tolerant);
-    strict
+    lies_in_order(&plain);
+    shown(&plain);
+    plain
 }
 
 impl Decoded {
     /// Decodes a stream as far as it goes.
     pub fn of(bytes: &[u8], options: &Options) -> Self {
-        let mut result = Self { sequence: None, frames: Vec::new(), end: None };
-        let summary = decode_stream(bytes, options, |sequence, frame| {
-            result.sequence = Some(*sequence);
-            result.frames.push(frame);
-            ControlFlow::Continue(())
-        });
-        assert_eq!(summary.frames as usize, result.frames.len());
-        Self { end: summary.end, ..result }
+        let mut result = Self::default();
+        let summary = decode_stream(bytes, options, |sequence, frame| result.take(*sequence, frame));
+        Self { errors: summary.errors, lost: summary.lost, ..result }
+    }
+
+    /// Decodes a stream from the GOP on whose header stands at an offset.
+    fn inside(bytes: &[u8], gop: u64, options: &Options) -> Self {
+        let mut result = Self::default();
+        let summary =
+            decode_stream_inside(bytes, gop, options, |sequence, frame| result.take(*sequence, frame));
+        Self { errors: summary.errors, lost: summary.lost, ..result }
+    }
+
+    fn take(&mut self, sequence: SequenceParameters, frame: DecodedFrame) -> ControlFlow<()> {
+        self.sequence = Some(sequence);
+        self.frames.push(frame);
+        ControlFlow::Continue(())
     }
 }
 
-/// What is accepted with digests is what comes without, and has the digests that it is said to have.
-fn verified(bytes: &[u8], strict: &Decoded) {
+/// What is accepted with digests is what comes without.
+fn verified(bytes: &[u8], plain: &Decoded) {
     let verified = Decoded::of(bytes, &VERIFIED);
-    if verified.end.is_some() {
+    if !verified.errors.is_empty() {
         return;
     }
-    assert_eq!(strict.end, None, "comparing digests forgives nothing");
-    for (with, without) in verified.frames.iter().zip(&strict.frames) {
-        assert_eq!(with.planes, without.planes);
-        let digest = verified.sequence.as_ref().and_then(|sequence| digest_of(sequence, with));
-        assert!(digest.is_none() || digest == with.digest, "the digest is not that of the planes");
+    assert!(plain.errors.is_empty(), "comparing digests forgives nothing");
+    assert_eq!(verified.frames.len(), plain.frames.len());
+    for (with, without) in verified.frames.iter().zip(&plain.frames) {
+        assert!(with.planes == without.planes, "frame {} depends on digests", with.index);
     }
 }
 
-/// The digest of a frame, computed from its planes. How many Gaussians each refinement holds is known of whole intra
-/// frames only.
-fn digest_of(sequence: &SequenceParameters, frame: &DecodedFrame) -> Option<u64> {
-    let is_top = frame.spatial_layer + 1 == sequence.spatial_layer_count;
-    let is_whole = frame.refinements == sequence.refinement_count && is_top;
-    if !is_whole || frame.frame_type != FrameType::Intra {
-        return None;
+/// The units before that of the first error have none: cut there, a stream lacks its end and nothing else.
+fn is_of_first_faulty_unit(bytes: &[u8], error: &Error) {
+    let mut start = 0;
+    for end in arrival::ends(bytes) {
+        if end as u64 > error.at {
+            break;
+        }
+        start = end;
     }
-    let count = frame.planes.len();
-    let end = |refinement| sequence.prefix_length(refinement, count as u32) as usize;
-    let ranges = (0..sequence.refinement_count).scan(0, |start, refinement| {
-        let from = core::mem::replace(start, end(refinement));
-        Some(from..*start)
-    });
-    let digests: Vec<_> = ranges.map(|range| unit_digest(&frame.planes, range)).collect();
-    Some(frame_digest(&digests))
+    // An error of the file header has no unit.
+    if let (Some(before), 1..) = (bytes.get(..start), start) {
+        let errors = Decoded::of(before, &PLAIN).errors;
+        assert!(errors.iter().all(arrival::is_truncation), "{errors:?} come before {error}");
+    }
+}
+
+/// Frames come in display order, and none of them is lost.
+fn lies_in_order(decoded: &Decoded) {
+    assert!(decoded.frames.is_sorted_by_key(|frame| frame.index), "frames come in display order");
+    let starts_and_ends = decoded.lost.iter().flat_map(|range| [*range.start(), *range.end()]);
+    assert!(starts_and_ends.is_sorted(), "ranges of lost frames are in order");
+    for frame in &decoded.frames {
+        assert!(
+            decoded.lost.iter().all(|range| !range.contains(&frame.index)),
+            "{} is lost and came",
+            frame.index
+        );
+        assert_eq!(frame.is_lost, frame.level == 0 && frame.carried_lists == 0);
+    }
 }
 
 /// The Gaussians of a frame that were decoded, not carried over.
@@ -121,25 +150,33 @@ fn exact(frame: &DecodedFrame) -> QuantizedFrame {
     planes
 }
 
-/// Every frame is one of the whole ones. What is decoded of it, unless on another spatial layer or frozen, is a prefix.
-fn is_less(parts: &[DecodedFrame], wholes: &[DecodedFrame]) {
-    for part in parts {
-        let whole = wholes.iter().find(|whole| whole.number == part.number).expect("no frame appears");
-        if part.frozen.is_some() || part.spatial_layer != whole.spatial_layer {
-            continue;
-        }
-        let (part, mut planes) = (exact(part), exact(whole));
-        planes.truncate(part.len());
-        assert!(part == planes, "frame {} is not a prefix of the whole one", whole.number);
+/// What a P or B frame shows as a subset is what of it is exact, if there is something.
+fn subsets(bytes: &[u8], plain: &Decoded) {
+    let subsets = Decoded::of(bytes, &Options { subset: true, ..PLAIN });
+    assert_eq!((&subsets.errors, subsets.frames.len()), (&Vec::new(), plain.frames.len()));
+    for (subset, frame) in subsets.frames.iter().zip(&plain.frames) {
+        let expected = if frame.level > 0 { exact(frame) } else { frame.planes.clone() };
+        assert!(subset.planes == expected, "frame {} as a subset is not what is exact", frame.index);
     }
 }
 
+/// Decoding starts at a GOP header: the frames from there on are the same.
+fn from_inside(bytes: &[u8], plain: &Decoded, choice: u32) {
+    let gops = damage::gops(bytes);
+    let Some(gop) = gops.get(choice as usize % gops.len().max(1)) else { return };
+    let inside = Decoded::inside(bytes, gop.bytes.start as u64, &PLAIN);
+    assert_eq!(inside.errors, [], "a decoder can start at any GOP header");
+    assert!(plain.frames.ends_with(&inside.frames), "frames depend on what is before their GOP");
+    let expected = plain.frames.iter().filter(|frame| frame.index >= gop.frames.start).count();
+    assert_eq!(inside.frames.len(), expected);
+}
+
 /// Every frame can be shown.
-fn shown(decoded: Decoded) {
-    let Some(sequence) = decoded.sequence else { return };
-    for frame in decoded.frames {
+fn shown(decoded: &Decoded) {
+    let Some(sequence) = &decoded.sequence else { return };
+    for frame in &decoded.frames {
         let count = frame.planes.len();
-        let gaussians = to_gaussians(frame.planes, &sequence);
+        let gaussians = to_gaussians(frame.clone().into_shown(), sequence);
         assert_eq!(gaussians.len(), count);
         assert_eq!(gaussians.validate(), Ok(()));
     }

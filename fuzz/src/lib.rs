@@ -5,22 +5,18 @@
 //! [`ceiling`] allows and an input that takes seconds.
 
 pub mod ceiling;
-pub mod chunks;
 pub mod decode;
 pub mod edits;
 pub mod encode;
 pub mod entropy;
-pub mod extraction;
-pub mod headers;
-pub mod increments;
 pub mod laws;
 pub mod oracle;
-pub mod payload;
-mod read_back;
+pub mod records;
 pub mod scene;
 pub mod seal;
 mod small_scene;
 pub mod streams;
+pub mod synthetic;
 pub mod targets;
 pub mod units;
 
@@ -29,6 +25,7 @@ use splatstream_format::Limits;
 /// Small, so that an input which keeps within them is cheap.
 pub const LIMITS: Limits = Limits {
     max_gaussians: 1 << 12,
+    max_gaussian_rate: 1 << 30,
     max_payload: 1 << 18,
     max_units: 1 << 9,
     max_codebook_values: 1 << 16,

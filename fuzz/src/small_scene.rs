@@ -62,15 +62,15 @@ fn change(u: &mut Unstructured<'_>, rows: &mut Vec<Row>, sh_degree: u8) -> Resul
         rows.push(row(u, sh_degree)?);
         return Ok(());
     }
-    let place = u.choose_index(rows.len())?;
+    let index = u.choose_index(rows.len())?;
     match u.int_in_range(0..=3)? {
-        0 => drop(rows.remove(place)),
-        1 => rows[place] = row(u, sh_degree)?,
-        2 => rows[place].opacity_logit = number(u, 1.0 / 2048.0)?,
+        0 => drop(rows.remove(index)),
+        1 => rows[index] = row(u, sh_degree)?,
+        2 => rows[index].opacity_logit = number(u, 1.0 / 2048.0)?,
         // All of them move, as a rigid body does.
         _ => {
             let by = number(u, 1.0 / 1024.0)?;
-            rows.iter_mut().skip(place).for_each(|row| row.position[place % 3] += by);
+            rows.iter_mut().skip(index).for_each(|row| row.position[index % 3] += by);
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 //! edit means does not depend on the encoder.
 
 /// Each uses other parts of the syntax.
-pub const ALL: [&[u8]; 10] = [
+pub const ALL: [&[u8]; 11] = [
     include_bytes!("../seeds/units/plain.bin"),
     include_bytes!("../seeds/units/groups.bin"),
     include_bytes!("../seeds/units/coefficients.bin"),
@@ -11,6 +11,7 @@ pub const ALL: [&[u8]; 10] = [
     include_bytes!("../seeds/units/contexts.bin"),
     include_bytes!("../seeds/units/predicted.bin"),
     include_bytes!("../seeds/units/layers.bin"),
+    include_bytes!("../seeds/units/anchors.bin"),
     include_bytes!("../seeds/units/residual-vectors.bin"),
     include_bytes!("../seeds/units/learned.bin"),
 ];

@@ -1,8 +1,6 @@
 //! The targets by name. One program holds them all: linking it once is much of what building costs.
 
-use crate::{
-    chunks, decode, encode, entropy, extraction, headers, increments, oracle, payload, scene, units,
-};
+use crate::{decode, encode, entropy, oracle, records, scene, synthetic, units};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -16,16 +14,13 @@ pub struct Target {
 }
 
 /// Every target, cheap ones first.
-pub const ALL: [Target; 11] = [
+pub const ALL: [Target; 8] = [
     Target { name: "units", run: units::run },
-    Target { name: "headers", run: headers::run },
-    Target { name: "payload", run: payload::run },
+    Target { name: "records", run: records::run },
     Target { name: "entropy", run: entropy::run },
     Target { name: "scene", run: scene::run },
     Target { name: "decode", run: decode::run },
-    Target { name: "chunks", run: chunks::run },
-    Target { name: "extraction", run: extraction::run },
-    Target { name: "increments", run: increments::run },
+    Target { name: "synthetic", run: synthetic::run },
     Target { name: "encode", run: encode::run },
     Target { name: "oracle", run: oracle::run },
 ];

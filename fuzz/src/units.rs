@@ -5,7 +5,7 @@ use crate::seal::sealed;
 use splatstream_format::Result;
 use splatstream_format::inspect::inspect;
 use splatstream_format::syntax::{FileHeader, UnitHeader};
-use splatstream_format::unit::{Delivery, Stream};
+use splatstream_format::unit::{Landmark, Stream, Units};
 
 /// Units lie back to back and within the stream; so do the elements that the inspector shows, and where it
 /// finds no fault they are the whole stream.
@@ -17,7 +17,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// Walks the units; gives the error that ends the walk.
+/// Walks the units; gives the first error.
 fn delimit(bytes: &[u8]) -> Result<()> {
     let end = bytes.len() as u64;
     let within = |error: splatstream_format::Error| {
@@ -25,37 +25,45 @@ fn delimit(bytes: &[u8]) -> Result<()> {
         error
     };
     let stream = Stream::open(bytes, &LIMITS).map_err(within)?;
+    let profile = stream.header().profile();
     let mut units = stream.units();
     let mut next = FileHeader::SIZE as u64;
-    let mut damage = Ok(());
+    let mut first = Ok(());
     loop {
         assert_eq!(units.position(), next);
-        let payload_at = next + UnitHeader::SIZE as u64;
         match units.next_unit() {
-            Some(Ok(Delivery::Intact(unit))) => {
+            Some(Ok(unit)) => {
+                let payload_at = next + UnitHeader::SIZE as u64;
                 assert_eq!((unit.at, unit.payload_at), (next, payload_at));
-                assert_eq!(
-                    stream.units_from(unit.at).next(),
-                    Some(Ok(unit)),
-                    "a unit is found by its offset"
-                );
+                let found = stream.units_from(unit.at).next_unit();
+                assert_eq!(found, Some(Ok(unit)), "a unit is found by its offset");
                 next = payload_at + unit.payload.len() as u64;
                 assert_eq!(bytes[payload_at as usize..next as usize], *unit.payload);
-            }
-            Some(Ok(Delivery::Damaged(damaged))) => {
-                next = payload_at + u64::from(damaged.unit.header.payload_length);
-                if !damaged.passed_over {
-                    damage = damage.and(Err(within(damaged.error)));
-                }
+                let checked = unit.check_header(profile).and_then(|()| unit.check_payload());
+                first = first.and(checked.map_err(within));
             }
             Some(Err(error)) => {
-                assert_eq!(units.next_unit(), None, "after an error nothing comes");
-                return Err(within(error));
+                assert_eq!(units.next_unit(), None, "the end of a unit is not known");
+                scans(&units, next);
+                return first.and(Err(within(error)));
             }
             None => {
                 assert_eq!(next, end, "bytes are left over");
-                return damage;
+                return first;
             }
+        }
+    }
+}
+
+/// A scan for a landmark goes forward, to a unit of its kind, or to the end.
+fn scans(units: &Units<'_>, from: u64) {
+    for landmark in [Landmark::GopHeader, Landmark::SequenceParameters] {
+        let mut units = units.clone();
+        if units.scan_for(landmark) {
+            assert!(units.position() > from, "a scan goes forward");
+            assert!(matches!(units.next_unit(), Some(Ok(_))), "a landmark is a unit");
+        } else {
+            assert_eq!(units.next_unit(), None, "nothing is left");
         }
     }
 }

@@ -1,12 +1,12 @@
 //! The dictionaries of libFuzzer: what stands in streams and in scene files, and is hard to hit byte by byte.
-//! `BLESS=1 cargo test --test dictionaries` writes them anew; without it, they are checked to be up to date.
+//! `BLESS=1 cargo test --test dictionaries` writes them again; without it, they are checked to be up to date.
 
 use splatstream_format::Limits;
 use splatstream_format::entropy::STATE_LOW;
 use splatstream_format::payload::write_leb128;
 use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, GopHeader, IncrementHeader, NO_CODEBOOK, Profile, Row, SIGNATURE, TABLES,
-    UnitHeader, UnitId, UnitType,
+    EndOfStream, FrameHeader, GopHeader, IncrementHeader, Profile, Row, SIGNATURE, TABLES, UnitHeader,
+    UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_scene::{GaussianFrame, Planes, ply};
@@ -31,7 +31,7 @@ fn is_up_to_date(name: &str, head: &str, tokens: &Tokens) {
         std::fs::write(&path, &made).unwrap();
     }
     let saved = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(saved == made, "{}: write it anew, with BLESS=1", path.display());
+    assert!(saved == made, "{}: write it again, with BLESS=1", path.display());
 }
 
 #[test]
@@ -73,17 +73,10 @@ fn records() -> Tokens {
     tokens.insert("gop_header_predicted".into(), GopHeader::predicted(0, 2, 0).to_bytes().unwrap());
     tokens.insert("frame_header".into(), FrameHeader::intra(0, None, 0).to_bytes().unwrap());
     tokens.insert("end".into(), end.to_bytes().unwrap());
-    tokens.insert("codebook_ids_none".into(), vec![NO_CODEBOOK; 4]);
-    tokens.insert("position_shift_to_codebook_ids".into(), plain_increment());
+    for (bit, name) in IncrementHeader::FLAG_NAMES.into_iter().enumerate() {
+        tokens.insert(format!("increment_{name}"), (1_u16 << bit).to_le_bytes().to_vec());
+    }
     tokens
-}
-
-/// The part of an increment behind its counts, where nothing is predicted and there is no SH.
-fn plain_increment() -> Vec<u8> {
-    let header = IncrementHeader::PLAIN;
-    let shifts = [header.position_shift, 0, 0, 0, 0, 0, header.cell_log2, header.predictor_block_log2];
-    let prediction = [header.neighbour_count, header.bilateral_spatial, header.bilateral_feature];
-    [&shifts[..], &prediction, &[header.sh_mode, header.vq_stage_count], &header.codebook_ids].concat()
 }
 
 /// A unit of each type without a payload, and its type with its flags.
@@ -101,20 +94,22 @@ fn units() -> Tokens {
 
 /// What annex A allows, and one more.
 fn limits() -> Tokens {
-    let Limits { max_gaussians, max_payload, max_units, max_codebook_values, max_cells, max_learned } =
-        Limits::default();
-    let of_level = |level| (format!("gaussians_of_level_{level}"), Limits::gaussians_of_level(level));
-    let named = [
-        ("max_gaussians", max_gaussians),
-        ("max_payload", max_payload),
-        ("max_units", max_units),
-        ("max_codebook_values", max_codebook_values),
-        ("max_cells", max_cells),
-        ("max_learned", max_learned),
-        ("state", STATE_LOW),
-    ];
-    let named = named.into_iter().map(|(name, value)| (name.to_owned(), value));
-    named.chain((1..=4).map(of_level)).flat_map(|(name, value)| beside(&name, value.into(), 4)).collect()
+    let mut tokens = Tokens::from([("state".into(), STATE_LOW.to_le_bytes().to_vec())]);
+    for level in Limits::LEVELS {
+        let Limits { max_gaussians, max_payload, max_units, max_codebook_values, max_cells, .. } =
+            Limits::of_level(level);
+        let named = [
+            ("max_gaussians", max_gaussians),
+            ("max_payload", max_payload),
+            ("max_units", max_units),
+            ("max_codebook_values", max_codebook_values),
+            ("max_cells", max_cells),
+        ];
+        for (name, value) in named {
+            tokens.extend(beside(&format!("{name}_of_level_{level}"), value.into(), 4));
+        }
+    }
+    tokens
 }
 
 /// leb128 at the ends of each length, and too long.
@@ -138,7 +133,7 @@ fn ranges() -> Tokens {
     let clause_6 = std::fs::read_to_string(here("../spec/06-semantics.md")).unwrap();
     let mut tokens = Tokens::new();
     let rows: Vec<&Row> = TABLES.iter().flat_map(|table| table.rows).collect();
-    let wide = rows.into_iter().filter(|row| row.bytes / row.places > 1);
+    let wide = rows.into_iter().filter(|row| row.bytes / row.count > 1);
     for (row, line) in wide.flat_map(|row| clause_6.lines().map(move |line| (row, line))) {
         let Some(range) = line.strip_prefix(&format!("| `{}` |", row.name)) else { continue };
         let cell = range.trim_end().trim_end_matches('|').rsplit('|').next().unwrap_or_default();
@@ -151,7 +146,7 @@ fn ranges() -> Tokens {
             if row.type_name.starts_with("f32") {
                 tokens.extend(beside(&name, i64::from((value as f32).to_bits()), 4));
             } else {
-                tokens.extend(beside(&name, value as i64, row.bytes / row.places));
+                tokens.extend(beside(&name, value as i64, row.bytes / row.count));
             }
         }
     }
@@ -184,7 +179,7 @@ fn ply_lines() -> Tokens {
     header
         .lines()
         .enumerate()
-        .map(|(place, line)| (format!("ply_{place}"), format!("{line}\n").into_bytes()))
+        .map(|(index, line)| (format!("ply_{index}"), format!("{line}\n").into_bytes()))
         .collect()
 }
 

@@ -6,7 +6,7 @@ mod generated;
 pub use files::{CameraError, read_cameras};
 pub use generated::{Up, forward, ring, spiral};
 
-use glam::Vec3;
+use glam::{Mat3, Quat, Vec3};
 
 /// A pinhole camera without distortion. Camera axes are x right, y down, z forward, as a frame's.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +52,31 @@ impl Camera {
             rotation: [right, ahead.cross(right), ahead].map(|axis| axis.to_array()),
             position: position.to_array(),
         }
+    }
+
+    /// A camera with a pose as scene descriptions have it: `rotation` is a quaternion w, x, y, z from the camera to the
+    /// scene, of any length; `field` is the vertical angle of view, radians.
+    #[must_use]
+    pub fn of_pose(name: String, position: [f32; 3], rotation: [f32; 4], field: f32, size: [u32; 2]) -> Self {
+        let [w, x, y, z] = rotation;
+        let length = Quat::from_xyzw(x, y, z, w).length();
+        let rotation = if length > 0.0 { Quat::from_xyzw(x, y, z, w) / length } else { Quat::IDENTITY };
+        let axes = Mat3::from_quat(rotation);
+        let camera = Self::look_at(name, Vec3::ZERO, Vec3::Z, Vec3::Y, field, size);
+        Self { rotation: axes.to_cols_array_2d(), position, ..camera }
+    }
+
+    /// The rotation of such a pose, a unit quaternion w, x, y, z.
+    #[must_use]
+    pub fn quaternion(&self) -> [f32; 4] {
+        let [x, y, z, w] = Quat::from_mat3(&Mat3::from_cols_array_2d(&self.rotation)).normalize().to_array();
+        [w, x, y, z]
+    }
+
+    /// The vertical angle of view, radians.
+    #[must_use]
+    pub fn vertical_field(&self) -> f32 {
+        2.0 * libm::atanf(0.5 * self.height as f32 / self.focal[1])
     }
 
     /// The same view in a picture of `height` rows; the width follows, rounded to the nearest pixel.

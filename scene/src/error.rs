@@ -63,9 +63,7 @@ pub enum SceneErrorKind {
         advice: &'static str,
     },
     /// The file asks for more than [`crate::ReadLimits`] allows.
-    #[error(
-        "{asked} {unit} asked for, at most {allowed} allowed; raise ReadLimits::{limit} if the file is trusted"
-    )]
+    #[error("it has {asked} {unit}; at most {allowed} are read ({limit})")]
     OverLimit {
         /// The field of `ReadLimits`.
         limit: &'static str,

@@ -1,6 +1,6 @@
 """Makes the printed specification from the same Markdown as the book: Markdown to Typst, Typst to PDF.
 
-build.py FOLDER writes FOLDER/splatstream-VERSION.pdf and prints its name. Clause numbers and requirements become links,
+build.py FOLDER writes FOLDER/splatstream-VERSION.pdf and prints its name; index.md says which version it is. Clause numbers and requirements become links,
 2^n in prose a power. The bytes depend on the text alone: the date is that of the last change, the fonts are in Typst.
 """
 
@@ -121,10 +121,16 @@ class Chapter:
             elif child.type == "code_inline":
                 parts.append(f"#raw({string(breakable(child.content) if in_table else child.content)})")
             elif child.type == "link_open":
-                parts.append(f"#link({string(child.attrGet('href'))})[")
+                parts.append(self.link(child.attrGet("href")))
+            elif child.type == "image":
+                parts.append(f"#image({string('/' + child.attrGet('src'))}, width: 100%, alt: {string(child.content)})")
             else:
                 parts.append(marks[child.type])
         return "".join(parts)
+
+    def link(self, target):
+        """Files of the book are other chapters here, or this document itself."""
+        return "#[" if target.endswith((".md", ".pdf")) else f"#link({string(target)})["
 
     def text(self, text):
         if re.fullmatch(rf"\[{REQUIREMENT}\]", text):
@@ -188,8 +194,8 @@ def source(version):
 
 
 def main():
-    version = re.search(r"version ([\d.]+) of the", (SPEC / "01-scope.md").read_text())[1]
-    output = Path(sys.argv[1]) / f"splatstream-{version}.pdf"
+    version = re.search(r"SplatStream ([\d.]+(?:, release candidate \d+)?)", (SPEC / "index.md").read_text())[1]
+    output = Path(sys.argv[1]) / f"splatstream-{version.replace(', release candidate ', '-rc')}.pdf"
     beside = output.with_suffix(".part")
     beside.write_bytes(typst.compile(source(version).encode(), root=str(SPEC), format="pdf", ignore_system_fonts=True))
     beside.replace(output)

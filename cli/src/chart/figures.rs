@@ -41,7 +41,7 @@ fn rate_plot(scene: &SceneChart, metric: &Metric) -> Plot {
         id: format!("{}-rate-{}", scene.name, metric.id),
         title: format!("{}: {} against rate", scene.name, metric.name),
         description: format!(
-            "{} of the decoded scene for each quality and refinement level against bits a Gaussian of the \
+            "{} of the decoded scene for each quality and refinement level against bits per Gaussian of the \
              source and Mbit/s; {} is better.",
             metric.name, metric.better
         ),
@@ -69,7 +69,7 @@ fn reordered(scene: &SceneChart, metric: &Metric) -> Vec<Series> {
 }
 
 fn hint(name: &str, rate: f64, value: f64, metric: &Metric) -> String {
-    format!("{name}: {rate:.2} bits a Gaussian, {} {value:.*}", metric.name, metric.decimals)
+    format!("{name}: {rate:.2} bits per Gaussian, {} {value:.*}", metric.name, metric.decimals)
 }
 
 /// The qualities at 100 %: what a sender chooses from who sends everything.
@@ -157,7 +157,7 @@ fn speed_plot(
         id: format!("{}-{verb}-speed-{}", scene.name, name.to_lowercase()),
         title: format!("{}: speed to {verb} and {name}", scene.name),
         description: format!(
-            "Each variant's speed to {verb}, in million Gaussians a second, against {axis}; the band joins \
+            "Each variant's speed to {verb}, in million Gaussians per second, against {axis}; the band joins \
              the variants that no other beats in both."
         ),
         x: format!("million Gaussians per second to {verb}"),

@@ -15,7 +15,7 @@ use crate::progress::Progress;
 pub(crate) use ablation::AblationRow;
 use decoded::{Shown, label, shown};
 use splatstream_decoder::operating_point::OperatingPoint;
-use splatstream_encoder::{Settings, Structure, encode};
+use splatstream_encoder::{Anchor, Settings, Structure, encode};
 use splatstream_render::metrics::Comparison;
 use splatstream_scene::GaussianFrame;
 use subset::Subset;
@@ -63,20 +63,20 @@ pub(crate) struct Level {
     pub(crate) total: u64,
     /// Gaussians received.
     pub(crate) gaussians: u64,
-    /// Bits a Gaussian received.
+    /// Bits per Gaussian received.
     pub(crate) bpg: f64,
     /// Means over all frames.
     pub(crate) all: Comparison,
     /// Means over predicted frames.
     pub(crate) inter: Comparison,
-    /// The same frames without anything carried over.
+    /// The same frames without anything that is carried.
     pub(crate) subset: Subset,
 }
 
 /// The settings of the GOP: those of the baseline, with the structure of the paper's experiment.
 pub(crate) fn settings(baseline: Settings, frames: u32) -> Settings {
     let structure = Structure::Predicted { layers: TEMPORAL };
-    Settings { structure, spatial_layers: SPATIAL, gop: frames, ..baseline }
+    Settings { structure, anchor: Anchor::Whole, spatial_layers: SPATIAL, gop: frames, ..baseline }
 }
 
 /// Whether a scene has a second frame in its first GOP.

@@ -10,7 +10,7 @@ use splatstream_render::metrics::Comparison;
 pub(super) fn text(chart: &SceneChart) -> String {
     let Some(gop) = &chart.gop else { return String::new() };
     format!(
-        "{name}: operating points of the first group, {frames} frames at {fps} frames a second\n{modes}\n\
+        "{name}: operating points of the first GOP, {frames} frames at {fps} frames per second\n{modes}\n\
          {name}: refinement levels of its predicted frames; carried: what is missing comes from the intra frame; \
          subset: it stays away\n{levels}\n\
          {name}: predicted frames with and without tools\n{tools}\n{ablation}",
@@ -94,7 +94,7 @@ fn units(level: &Level) -> String {
 }
 
 fn tools(gop: &Gop) -> String {
-    let mut table = Table::new(["tools", "bytes", "bytes a Gaussian", "more", "PSNR / SSIM"]);
+    let mut table = Table::new(["tools", "bytes", "bytes per Gaussian", "more", "PSNR / SSIM"]);
     let everything = gop.tools.first();
     for tool in &gop.tools {
         table.row([

@@ -35,7 +35,7 @@ pub(crate) struct Timing {
 impl Timing {
     fn of(mut seconds: Vec<f64>) -> Self {
         seconds.sort_by(f64::total_cmp);
-        let at = |place: usize| seconds.get(place).copied().unwrap_or(f64::NAN);
+        let at = |index: usize| seconds.get(index).copied().unwrap_or(f64::NAN);
         let middle = seconds.len() / 2;
         let low = if seconds.len().is_multiple_of(2) { middle.saturating_sub(1) } else { middle };
         Self { median: 0.5 * (at(low) + at(middle)), least: at(0), most: at(seconds.len().saturating_sub(1)) }
@@ -47,8 +47,8 @@ impl Timing {
 pub(crate) struct FramePoint {
     /// Gaussians shown.
     pub(crate) gaussians: u64,
-    /// Bytes of its refinement units up to the point, headers included.
-    pub(crate) refinement_bytes: u64,
+    /// Bytes of its increments up to the point, headers included.
+    pub(crate) increment_bytes: u64,
     /// Bytes of all its units up to the point, headers included.
     pub(crate) bytes: u64,
     /// Figures of each camera.
@@ -174,7 +174,7 @@ fn decoded(stream: &[u8], repeat: u32) -> Result<Timing, Failure> {
             ControlFlow::Continue(())
         });
         seconds.push(start.elapsed().as_secs_f64());
-        summary.end.map_or(Ok(()), |error| Err(fault(error)))?;
+        summary.verdict().map_or(Ok(()), |error| Err(fault(error)))?;
     }
     Ok(Timing::of(seconds))
 }
@@ -185,14 +185,14 @@ fn point(stream: &[u8], info: OperatingPointInfo, judge: &mut Judge<'_>) -> Resu
     let options = Options { operating_point: info.point, ..Options::default() };
     let summary = decode_stream(stream, &options, |sequence, frame| {
         let parameters = sequence.to_bytes().unwrap_or_default();
-        let key = (parameters, frame.number, frame.digest.unwrap_or_default());
+        let key = (parameters, frame.index, frame.digest.unwrap_or_default());
         let gaussians = to_gaussians(frame.into_shown(), sequence);
         let views = judge.views_of(key, &gaussians);
         let shown = gaussians.len() as u64;
-        frames.push(FramePoint { gaussians: shown, refinement_bytes: 0, bytes: 0, views });
+        frames.push(FramePoint { gaussians: shown, increment_bytes: 0, bytes: 0, views });
         ControlFlow::Continue(())
     });
-    summary.end.map_or(Ok(()), |error| Err(fault(error)))?;
+    summary.verdict().map_or(Ok(()), |error| Err(fault(error)))?;
     add_bytes(stream, info.point, &mut frames)?;
     let views: Vec<Comparison> = frames.iter().flat_map(|frame| frame.views.iter().copied()).collect();
     let figures =
@@ -207,11 +207,11 @@ fn add_bytes(stream: &[u8], point: OperatingPoint, frames: &mut [FramePoint]) ->
         let Some(frame) = frames.get_mut(unit.header.frame as usize) else { continue };
         let bytes = (UnitHeader::SIZE + unit.payload.len()) as u64;
         match unit.header.unit_type() {
-            _ if !point.takes(&unit.header) => {}
+            _ if !point.takes(&unit.header, None) => {}
             UnitType::FrameHeader => frame.bytes += bytes,
-            UnitType::Refinement => {
+            UnitType::Increment => {
                 frame.bytes += bytes;
-                frame.refinement_bytes += bytes;
+                frame.increment_bytes += bytes;
             }
             _ => {}
         }

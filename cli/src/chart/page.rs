@@ -118,7 +118,7 @@ impl Page<'_> {
                 h2 { "In short" }
                 (words::how_to_read(
                     "each row is one scene with the baseline settings and all Gaussians sent: fewer bits and \
-                     more dB are better; speeds are thousands (k) or millions (M) of Gaussians a second."
+                     more dB are better; speeds are thousands (k) or millions (M) of Gaussians per second."
                 ))
                 (words::table(&headings, &html! { @for chart in self.charts { (summary_row(chart)) } }))
                 @if !self.charts.iter().any(SceneChart::has_learned) {
@@ -164,7 +164,7 @@ impl Page<'_> {
                         @if !list(Group::Preset).is_empty() { "; presets " (list(Group::Preset).join(", ")) }
                         @if !list(Group::Without).is_empty() { "; " (list(Group::Without).join(", ")) }
                         ". All of these code every frame by itself; spatial and temporal layers and predictors are in the \
-                         tables of the first group of each sequence."
+                         tables of the first GOP of each sequence."
                     }
                     dt { "Numbers" } dd {
                         @for name in csv_files::names() {

@@ -84,9 +84,9 @@ pub(crate) struct PeerPoint {
     pub(crate) judged: usize,
     /// Bytes a frame over Gaussians a frame of the source, in bits.
     pub(crate) bpg: f64,
-    /// Gaussians a second; none if not measured.
+    /// Gaussians per second; none if not measured.
     pub(crate) encode_speed: Option<f64>,
-    /// Gaussians a second; none if not measured.
+    /// Gaussians per second; none if not measured.
     pub(crate) decode_speed: Option<f64>,
     /// How it was timed.
     pub(crate) timing: String,

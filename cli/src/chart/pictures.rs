@@ -90,11 +90,11 @@ fn typical_camera(point: &Point) -> Option<usize> {
 fn drawn(stream: &[u8], point: &Point, camera: &splatstream_render::Camera) -> Option<Image> {
     let mut image = None;
     let options = Options { operating_point: point.info.point, ..Options::default() };
-    decode_stream(stream, &options, |sequence, frame| {
+    let summary = decode_stream(stream, &options, |sequence, frame| {
         image = Some(render(&to_gaussians(frame.into_shown(), sequence), camera, BACKGROUND).colour);
         ControlFlow::Break(())
     });
-    image
+    image.filter(|_| summary.errors.is_empty())
 }
 
 /// The largest difference of a channel, amplified, in colours.

@@ -26,7 +26,7 @@ pub(crate) struct SceneChart {
     pub(crate) sh_degree: u8,
     /// Number of cameras, and pixels of the first.
     pub(crate) cameras: (usize, u32, u32),
-    /// Frames a second.
+    /// Frames per second.
     pub(crate) fps: f64,
     /// The quality at which variants are compared.
     pub(crate) quality: String,
@@ -77,7 +77,7 @@ impl SceneChart {
         self.baseline().find(|run| run.quality == self.quality)
     }
 
-    /// Bits a Gaussian of the source.
+    /// Bits per Gaussian of the source.
     pub(crate) fn rate(&self, point: &Point) -> f64 {
         bits_per_gaussian(point.info.bytes, self.gaussians)
     }
@@ -87,7 +87,7 @@ impl SceneChart {
         mbit_per_second(point.info.bytes, self.frames.0, self.fps)
     }
 
-    /// Mbit/s of one bit a Gaussian of the source.
+    /// Mbit/s of one bit per Gaussian of the source.
     pub(crate) fn mbit_per_bpg(&self) -> f64 {
         self.gaussians as f64 * self.fps / self.frames.0.max(1) as f64 / 1e6
     }

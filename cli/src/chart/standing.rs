@@ -11,9 +11,9 @@ pub(crate) struct Standing {
     pub(crate) name: String,
     /// What it is one of.
     pub(crate) group: Group,
-    /// Gaussians a second.
+    /// Gaussians per second.
     pub(crate) encode_speed: f64,
-    /// Gaussians a second.
+    /// Gaussians per second.
     pub(crate) decode_speed: f64,
     /// PSNR at the rate of the baseline, dB; none if its rates do not reach there.
     pub(crate) psnr_at_rate: Option<f64>,
@@ -21,7 +21,7 @@ pub(crate) struct Standing {
     pub(crate) bd_rate: Option<f64>,
 }
 
-/// A rate in bits a Gaussian of the source and a PSNR.
+/// A rate in bits per Gaussian of the source and a PSNR.
 pub(crate) fn rate_point(point: &Point, source_gaussians: u64) -> RatePoint {
     let rate = point.info.bytes as f64 * 8.0 / source_gaussians.max(1) as f64;
     RatePoint { rate, quality: point.figures.psnr_db }

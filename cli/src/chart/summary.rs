@@ -63,7 +63,7 @@ impl Summary {
     pub(super) fn text(&self) -> String {
         let mut table = Table::new([
             "scene",
-            "bits a Gaussian",
+            "bits per Gaussian",
             "Mbit/s",
             "PSNR dB",
             "SSIM",

@@ -17,7 +17,7 @@ pub(crate) struct RefinementRow {
     pub(crate) total_bytes: u64,
     /// Gaussians shown, over all frames.
     pub(crate) gaussians: u64,
-    /// Bits a Gaussian shown.
+    /// Bits per Gaussian shown.
     pub(crate) bpg: f64,
     /// Means over cameras and frames.
     pub(crate) figures: Comparison,
@@ -47,7 +47,7 @@ pub(crate) struct Mode {
 }
 
 impl Mode {
-    /// Bits a Gaussian received.
+    /// Bits per Gaussian received.
     pub(crate) fn bpg(&self) -> f64 {
         bits_per_gaussian(self.bytes, self.gaussians)
     }
@@ -61,7 +61,7 @@ pub(crate) fn mbit_per_second(bytes: u64, frames: usize, fps: f64) -> f64 {
 /// A row for each refinement level of a run.
 pub(crate) fn refinement_rows(run: &Run) -> Vec<RefinementRow> {
     let row = |point: &Point| {
-        let unit_bytes: Vec<u64> = point.frames.iter().map(|frame| frame.refinement_bytes).collect();
+        let unit_bytes: Vec<u64> = point.frames.iter().map(|frame| frame.increment_bytes).collect();
         RefinementRow {
             percent: point.info.percent,
             added_bytes: unit_bytes.iter().sum(),
@@ -155,7 +155,7 @@ mod tests {
     fn point(refinement: u8, percent: u8, bytes: u64) -> Point {
         let frame = |psnr| FramePoint {
             gaussians: 100,
-            refinement_bytes: bytes / 4,
+            increment_bytes: bytes / 4,
             bytes: bytes / 4 + 10,
             views: vec![figures(psnr)],
         };

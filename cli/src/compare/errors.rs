@@ -69,7 +69,7 @@ impl ErrorSums {
             rows.iter().for_each(|&(a, b)| sums.sh.push(values(small, a), values(large, b)));
         }
         for &(a, b) in rows {
-            let difference = turn_difference(rotation(small, a), rotation(large, b));
+            let difference = rotation_difference(rotation(small, a), rotation(large, b));
             difference.iter().for_each(|&part| sums.rotation.push(part, 0.0));
         }
         sums
@@ -136,11 +136,11 @@ fn rotation(frame: &GaussianFrame, row: usize) -> [f32; 4] {
 
 /// The difference of two rotations of an ellipsoid: the smallest over the half turns about its axes, which
 /// change nothing, and over the sign of a quaternion.
-pub(crate) fn turn_difference(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+pub(crate) fn rotation_difference(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     let [w, x, y, z] = b;
-    let turned = [[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]];
-    let signed = turned.into_iter().flat_map(|turn| [turn, turn.map(|part| -part)]);
-    let differences = signed.map(|turn| [0, 1, 2, 3].map(|part: usize| a[part] - turn[part]));
+    let same = [[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]];
+    let signed = same.into_iter().flat_map(|other| [other, other.map(|part| -part)]);
+    let differences = signed.map(|other| [0, 1, 2, 3].map(|part: usize| a[part] - other[part]));
     let square = |difference: &[f32; 4]| -> f32 { difference.iter().map(|part| part * part).sum() };
     differences.min_by(|one, other| square(one).total_cmp(&square(other))).unwrap_or_default()
 }
@@ -170,11 +170,11 @@ mod tests {
 
     #[test]
     fn half_turns_about_the_axes_are_no_difference() {
-        let turn = [0.8, 0.2, 0.4, 0.4];
-        let about_x = [-turn[1], turn[0], turn[3], -turn[2]];
-        for other in [turn, turn.map(|part| -part), about_x] {
-            assert_eq!(turn_difference(turn, other), [0.0; 4]);
+        let rotation = [0.8, 0.2, 0.4, 0.4];
+        let about_x = [-rotation[1], rotation[0], rotation[3], -rotation[2]];
+        for other in [rotation, rotation.map(|part| -part), about_x] {
+            assert_eq!(rotation_difference(rotation, other), [0.0; 4]);
         }
-        assert!(turn_difference(turn, [1.0, 0.0, 0.0, 0.0]).iter().any(|part| part.abs() > 0.1));
+        assert!(rotation_difference(rotation, [1.0, 0.0, 0.0, 0.0]).iter().any(|part| part.abs() > 0.1));
     }
 }

@@ -45,18 +45,18 @@ impl<'a> Grid<'a> {
 
     /// Counting sort: how many a cell has, where it starts, who is in it.
     fn fill(&mut self) {
-        let homes: Vec<usize> =
+        let buckets: Vec<usize> =
             (0..self.points[0].len()).map(|row| self.index_of(self.cell_of(self.point(row)))).collect();
         self.starts = vec![0; self.cells.iter().product::<usize>() + 1];
-        homes.iter().for_each(|&home| self.starts[home + 1] += 1);
+        buckets.iter().for_each(|&bucket| self.starts[bucket + 1] += 1);
         for cell in 1..self.starts.len() {
             self.starts[cell] += self.starts[cell - 1];
         }
         let mut free = self.starts.clone();
-        self.members = vec![0; homes.len()];
-        for (row, &home) in homes.iter().enumerate() {
-            self.members[free[home] as usize] = row as u32;
-            free[home] += 1;
+        self.members = vec![0; buckets.len()];
+        for (row, &bucket) in buckets.iter().enumerate() {
+            self.members[free[bucket] as usize] = row as u32;
+            free[bucket] += 1;
         }
     }
 
@@ -114,8 +114,8 @@ impl<'a> Grid<'a> {
     }
 
     fn cell_members(&self, cell: [usize; 3]) -> &[u32] {
-        let home = self.index_of(cell);
-        &self.members[self.starts[home] as usize..self.starts[home + 1] as usize]
+        let bucket = self.index_of(cell);
+        &self.members[self.starts[bucket] as usize..self.starts[bucket + 1] as usize]
     }
 
     fn neighbour(&self, index: u32, to: [f32; 3]) -> Neighbour {

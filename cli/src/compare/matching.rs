@@ -1,7 +1,7 @@
 //! Which Gaussian of one frame is which of another.
 
 use super::Match;
-use super::errors::turn_difference;
+use super::errors::rotation_difference;
 use super::grid::{Grid, inner_box};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -57,7 +57,7 @@ fn nearest(small: &GaussianFrame, large: &GaussianFrame) -> Vec<u32> {
         })
         .collect();
     let mut distances: Vec<f32> = closest.iter().map(|&(_, distance)| distance).collect();
-    // Rounding to a lattice moves the median point by 0.48 of its step and no point by more than 0.87.
+    // Rounding to a grid moves the median point by 0.48 of its step and no point by more than 0.87.
     let rounding = 2.0 * median(&mut distances);
     closest
         .into_par_iter()
@@ -65,7 +65,7 @@ fn nearest(small: &GaussianFrame, large: &GaussianFrame) -> Vec<u32> {
         .map(|(row, (index, distance))| {
             let mut best = (f32::INFINITY, f32::INFINITY, index);
             grid.within(position(small, row), rounding.max(distance), &mut |found| {
-                let unlike = unlikeness(small, row, large, found.index as usize);
+                let unlike = dissimilarity(small, row, large, found.index as usize);
                 let key = (unlike, found.squared, found.index);
                 if key.partial_cmp(&best).is_some_and(std::cmp::Ordering::is_lt) {
                     best = key;
@@ -76,19 +76,19 @@ fn nearest(small: &GaussianFrame, large: &GaussianFrame) -> Vec<u32> {
         .collect()
 }
 
-/// How unlike two Gaussians are apart from their places: squared differences, in about the units in which
+/// How dissimilar two Gaussians are apart from their positions: squared differences, in about the units in which
 /// each attribute shows.
-fn unlikeness(a: &GaussianFrame, row: usize, b: &GaussianFrame, partner: usize) -> f32 {
+fn dissimilarity(a: &GaussianFrame, row: usize, b: &GaussianFrame, partner: usize) -> f32 {
     let planes = |a: &[Vec<f32>; 3], b: &[Vec<f32>; 3]| -> f32 {
         a.iter().zip(b).map(|(a, b)| (a[row] - b[partner]) * (a[row] - b[partner])).sum()
     };
     let opacity = a.opacity_logit()[row] - b.opacity_logit()[partner];
-    let turn = |frame: &GaussianFrame, row: usize| frame.rotation().each_ref().map(|plane| plane[row]);
-    let turned = turn_difference(turn(a, row), turn(b, partner));
+    let rotation = |frame: &GaussianFrame, row: usize| frame.rotation().each_ref().map(|plane| plane[row]);
+    let between = rotation_difference(rotation(a, row), rotation(b, partner));
     planes(a.log_scale(), b.log_scale())
         + planes(a.dc(), b.dc())
         + opacity * opacity
-        + turned.iter().map(|part| part * part).sum::<f32>()
+        + between.iter().map(|part| part * part).sum::<f32>()
 }
 
 fn position(frame: &GaussianFrame, row: usize) -> [f32; 3] {

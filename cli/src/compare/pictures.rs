@@ -1,11 +1,12 @@
 //! How far apart two scenes look: renderings of both from the same cameras.
 
 use super::flicker::{Flicker, FlickerSums};
-use crate::cameras::{CameraArgs, Views};
+use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::failure::Failure;
 use crate::table::Table;
 use clap::Args;
 use serde::Serialize;
+use splatstream_format::payload::SceneDescription;
 use splatstream_render::metrics::{Comparison, StLpips, compare};
 use splatstream_render::{Camera, Image, Rendering, render};
 use splatstream_scene::GaussianFrame;
@@ -20,6 +21,8 @@ pub(crate) struct PictureArgs {
     cameras: Option<Views>,
     #[command(flatten)]
     views: CameraArgs,
+    #[command(flatten)]
+    background: BackgroundArg,
     /// Weights of the learned metric ST-LPIPS (an .npz file); without them it is left out.
     #[arg(long, value_name = "WEIGHTS.npz", requires = "cameras")]
     st_lpips: Option<PathBuf>,
@@ -57,6 +60,8 @@ pub(super) struct Figures {
 /// Compares pictures as frames come by.
 pub(super) struct Pictures<'a> {
     args: &'a PictureArgs,
+    /// What the streams say about the scene.
+    description: SceneDescription,
     learned: Option<StLpips>,
     cameras: Vec<Camera>,
     rendered: Vec<Comparison>,
@@ -68,11 +73,12 @@ pub(super) struct Pictures<'a> {
 
 impl PictureArgs {
     /// Ready for the first frame; the weights are read.
-    pub(super) fn start(&self) -> Result<Pictures<'_>, Failure> {
+    pub(super) fn start(&self, description: SceneDescription) -> Result<Pictures<'_>, Failure> {
         let learned = self.st_lpips.as_deref().map(read_weights).transpose()?;
         let photos = [const { Vec::new() }; 2];
         Ok(Pictures {
             args: self,
+            description,
             learned,
             cameras: Vec::new(),
             rendered: Vec::new(),
@@ -93,12 +99,13 @@ impl Pictures<'_> {
     pub(super) fn add(&mut self, a: &GaussianFrame, b: &GaussianFrame) -> Result<(), Failure> {
         let Some(views) = &self.args.cameras else { return Ok(()) };
         if self.cameras.is_empty() {
-            self.cameras = self.args.views.cameras(views, a)?;
+            self.cameras = self.args.views.cameras(Some(views), a, &self.description)?;
         }
+        let background = self.args.background.colour(&self.description);
         let before = core::mem::take(&mut self.before);
         let mut before = before.iter();
         for camera in &self.cameras {
-            let [a, b] = [a, b].map(|frame| render(frame, camera, [0.0; 3]));
+            let [a, b] = [a, b].map(|frame| render(frame, camera, background));
             if let Some(before) = before.next() {
                 self.flicker.add(before, [&a, &b]);
             }

@@ -6,6 +6,7 @@ use crate::failure::Failure;
 use crate::output_file::OutputFile;
 use crate::progress::Progress;
 use clap::Args;
+use splatstream_conformance::cancel::Cancel;
 use splatstream_conformance::capabilities::Capabilities;
 use splatstream_conformance::command::{Template, shell_word, split_persistent};
 use splatstream_conformance::expectations::Expectations;
@@ -14,7 +15,6 @@ use splatstream_conformance::reference;
 use splatstream_conformance::report::{Report, junit, markdown, summary};
 use splatstream_conformance::run::{Settings, run};
 use splatstream_conformance::session::Decoder;
-use splatstream_conformance::stop::Stop;
 use splatstream_conformance::suite::Suite;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -90,7 +90,7 @@ impl Run {
         if cases.iter().all(|case| settings.capabilities.missing(case).is_some()) {
             return Err(Failure::other("the capabilities claim none of the selected cases"));
         }
-        stop_on_signals(&settings.stop)?;
+        stop_on_signals(&settings.cancel)?;
         let progress = Progress::cases(u32::try_from(cases.len()).unwrap_or(u32::MAX));
         let mut results = run(&cases, &settings, |_| progress.advance()).map_err(refused)?;
         drop(progress);
@@ -139,8 +139,8 @@ impl Run {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         let limits = Limits { time: self.time, memory: self.memory.0, output: self.output.0 };
         let jobs = self.jobs.map_or(processors, usize::from);
-        let (strict, stop) = (self.strict, Stop::default());
-        Ok(Settings { decoder, capabilities, limits, strict, jobs, stop })
+        let (strict, cancel) = (self.strict, Cancel::default());
+        Ok(Settings { decoder, capabilities, limits, strict, jobs, cancel })
     }
 
     fn decoder(&self) -> Result<Decoder, Failure> {
@@ -184,9 +184,9 @@ fn name(words: &[String]) -> String {
 }
 
 /// Lets whoever interrupts or ends this program end the run instead: what was found so far is told, and nothing is left.
-fn stop_on_signals(stop: &Stop) -> Result<(), Failure> {
-    let stop = stop.clone();
-    ctrlc::set_handler(move || stop.set())
+fn stop_on_signals(cancel: &Cancel) -> Result<(), Failure> {
+    let cancel = cancel.clone();
+    ctrlc::set_handler(move || cancel.set())
         .map_err(|error| Failure::other(format!("cannot listen to signals: {error}")))
 }
 

@@ -1,11 +1,13 @@
-//! What `decode` tells: figures, frame by frame what is there, and what is not.
+//! What `decode` reports: figures, frame by frame what is there, and what is not.
 
-use crate::completeness::{self, Complete};
-use crate::failure::StreamFault;
+use super::loss::Loss;
+use crate::failure::{StreamFault, faults_text};
 use crate::numbers::{grouped, hex_digest};
 use crate::seek::Seek;
 use serde::Serialize;
+use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::DecodedFrame;
+use splatstream_format::Error;
 use splatstream_format::syntax::{FrameType, SequenceParameters};
 use std::path::PathBuf;
 
@@ -14,6 +16,8 @@ use std::path::PathBuf;
 pub(super) struct Report {
     pub(super) output: Option<PathBuf>,
     pub(super) frames: u32,
+    /// Frames that the stream says it has.
+    pub(super) frames_in_stream: Option<u32>,
     pub(super) gaussians: u64,
     pub(super) bytes: u64,
     pub(super) seconds: f64,
@@ -24,64 +28,99 @@ pub(super) struct Report {
     pub(super) seek: Option<Seek>,
     #[serde(flatten)]
     pub(super) shown: Shown,
-    pub(super) error: Option<StreamFault>,
-    pub(super) complete: Option<Vec<Complete>>,
+    #[serde(flatten)]
+    pub(super) loss: Loss,
+    pub(super) reduced: Vec<Reduced>,
+    pub(super) complete: bool,
 }
 
-/// The frames asked for; lists have a place a frame.
+/// The frames asked for; each list has an entry per frame.
 #[derive(Default, Serialize)]
 pub(super) struct Shown {
     numbers: Vec<u32>,
     types: Vec<&'static str>,
     pub(super) digests: Vec<Option<String>>,
     carried_digests: Vec<Option<String>>,
-    refinements: Vec<u8>,
+    levels: Vec<u8>,
     spatial_layers: Vec<u8>,
     carried: Vec<u64>,
-    frozen: Vec<Option<u32>>,
-    lost: Vec<Lost>,
+    /// What is known of each frame for the list of those that are reduced.
+    #[serde(skip)]
+    states: Vec<State>,
+}
+
+/// Whether a frame is all there, and what it shows in words.
+struct State {
+    is_intra: bool,
+    is_lost: bool,
+    /// The highest spatial layer of the sequence.
+    top: u8,
+    error: Option<Error>,
+    shows: String,
 }
 
 /// A frame that is not all there.
 #[derive(Serialize)]
-struct Lost {
+pub(super) struct Reduced {
     frame: u32,
     #[serde(rename = "type")]
     kind: &'static str,
-    /// Refinements that are there.
-    refinements: u8,
+    /// Exact lists that are shown.
+    level: u8,
     /// What is shown, in words.
     shows: String,
-    #[serde(flatten)]
-    fault: StreamFault,
+    /// What is wrong with the frame itself; none if a unit is missing, or wrong in a frame that it refers to.
+    error: Option<StreamFault>,
 }
 
 impl Shown {
     /// Takes note of a frame.
     pub(super) fn take(&mut self, sequence: &SequenceParameters, frame: &DecodedFrame) {
-        self.numbers.push(frame.number);
+        self.numbers.push(frame.index);
         self.types.push(frame.frame_type.name());
         self.digests.push(frame.digest.map(hex_digest));
         self.carried_digests.push(frame.carried_digest.map(hex_digest));
-        self.refinements.push(frame.refinements);
+        self.levels.push(frame.level);
         self.spatial_layers.push(frame.spatial_layer);
         self.carried.push(frame.carried as u64);
-        self.frozen.push(frame.frozen);
-        for error in frame.lost.into_iter().chain(frame.carried_fault) {
-            self.lost.push(Lost {
-                frame: frame.number,
-                kind: frame.frame_type.name(),
-                refinements: frame.refinements,
-                shows: shows(sequence, frame),
-                fault: StreamFault::from(error),
-            });
-        }
+        self.states.push(State {
+            is_intra: frame.frame_type == FrameType::Intra,
+            is_lost: frame.is_lost,
+            top: sequence.spatial_layer_count.saturating_sub(1),
+            error: frame.error,
+            shows: shows(sequence, frame),
+        });
     }
 
-    /// The last frame, in words; none if there is no frame.
-    fn last(&self) -> Option<String> {
-        let (number, kind) = (self.numbers.last()?, self.types.last()?);
-        Some(format!("the last frame, {number} ({kind}), has {} refinements", self.refinements.last()?))
+    /// How many frames there are.
+    pub(super) fn len(&self) -> usize {
+        self.numbers.len()
+    }
+
+    /// The most that frames show, up to an operating point.
+    pub(super) fn most(&self, point: OperatingPoint) -> OperatingPoint {
+        let most = |values: &[u8]| values.iter().max().copied().unwrap_or(0);
+        let refinement = most(&self.levels).saturating_sub(1).min(point.refinement);
+        OperatingPoint { spatial: most(&self.spatial_layers), refinement, ..point }
+    }
+
+    /// The frames of a stream with errors that are not all there: they have errors, or show less than an operating point
+    /// has. Predicted frames have refinements in the highest spatial layer alone.
+    pub(super) fn reduced(&self, point: OperatingPoint) -> Vec<Reduced> {
+        let is_reduced = |&frame: &usize| {
+            let State { is_intra, is_lost, top, error, .. } = self.states[frame];
+            let is_less = self.levels[frame] <= point.refinement && (is_intra || point.spatial >= top)
+                || is_intra && self.spatial_layers[frame] < point.spatial;
+            is_lost || error.is_some() || is_less
+        };
+        let one = |frame: usize| Reduced {
+            frame: self.numbers[frame],
+            kind: self.types[frame],
+            level: self.levels[frame],
+            shows: self.states[frame].shows.clone(),
+            error: self.states[frame].error.map(StreamFault::from),
+        };
+        (0..self.len()).filter(is_reduced).map(one).collect()
     }
 
     /// How many frames there are of each type, where not all are intra frames.
@@ -97,23 +136,19 @@ impl Shown {
     }
 }
 
-/// What a frame that is not all there shows, clause 7.20.
+/// What a frame shows, clause 7.20.
 fn shows(sequence: &SequenceParameters, frame: &DecodedFrame) -> String {
-    if frame.planes.is_empty() {
-        return "shows nothing".to_owned();
+    if frame.is_lost {
+        return "is lost: shows nothing".to_owned();
     }
-    if let Some(number) = frame.frozen {
-        return format!("is frozen: shows frame {number} again");
-    }
-    let mut text = format!("shows {} of {} refinements", frame.refinements, sequence.refinement_count);
+    let mut text = format!("shows {} of {} refinements", frame.level, sequence.refinement_count);
     if frame.spatial_layer.saturating_add(1) < sequence.spatial_layer_count
         && frame.frame_type == FrameType::Intra
     {
         text += &format!(" of spatial layer {}", frame.spatial_layer);
     }
     if frame.carried > 0 {
-        text +=
-            &format!(" and {} Gaussians carried over from the intra frame", grouped(frame.carried as u64));
+        text += &format!(" and {} Gaussians carried from the I frame", grouped(frame.carried as u64));
     }
     text
 }
@@ -121,14 +156,17 @@ fn shows(sequence: &SequenceParameters, frame: &DecodedFrame) -> String {
 impl Report {
     /// The report for people.
     pub(super) fn text(&self) -> String {
-        let place = match &self.output {
+        let output = match &self.output {
             Some(path) => path.display().to_string(),
             None => "nothing written (--dry-run)".to_owned(),
         };
-        let digests = self.digests();
+        let of_stream = match self.frames_in_stream {
+            Some(count) if count != self.frames => format!(" of {}", grouped(count.into())),
+            _ => String::new(),
+        };
         let mut text = format!(
-            "{place}\n  frames       {}{}\n  Gaussians    {}{}\n  decoding     {:.3} s, {} Gaussians a second\n  \
-             in all       {:.3} s\n  digests      {digests}\n",
+            "{output}\n  frames       {}{of_stream}{}\n  Gaussians    {}{}\n  \
+             decoding     {:.3} s, {} Gaussians per second\n  in all       {:.3} s\n  digests      {}\n",
             grouped(self.frames.into()),
             self.shown.types(),
             grouped(self.gaussians),
@@ -136,25 +174,27 @@ impl Report {
             self.seconds,
             grouped(self.gaussians_per_second as u64),
             self.seconds_total,
+            self.digests(),
         );
         if let Some(Seek { frame, byte }) = self.seek {
             text += &format!("  started      at frame {frame}, byte {byte:#x}, by the index\n");
         }
-        for lost in &self.shown.lost {
-            text += &format!("  frame {} ({}) {}; {}\n", lost.frame, lost.kind, lost.shows, lost.fault);
+        text += &faults_text(&self.loss.errors);
+        if let Some(frames) = self.loss.frames() {
+            text += &format!("  lost         {frames}\n");
         }
-        if let (Some(_), Some(last)) = (&self.error, self.shown.last()) {
-            text += &format!("  stopped early; {last}\n");
+        for Reduced { frame, kind, shows, .. } in &self.reduced {
+            text += &format!("  frame {frame} ({kind}) {shows}\n");
         }
-        text + &self.complete.as_deref().map(completeness::text).unwrap_or_default()
+        text
     }
 
     fn digests(&self) -> String {
-        let wrong = self.shown.lost.iter().filter(|lost| lost.fault.code == "DIGEST").count();
+        let wrong = self.loss.errors.iter().filter(|fault| fault.code == "DIGEST").count();
         match wrong {
             _ if !self.verified => "not compared (--no-verify)".to_owned(),
             0 => "agree with the frames shown".to_owned(),
-            wrong => format!("{wrong} wrong, as said below; the others agree with the frames shown"),
+            wrong => format!("{wrong} wrong; the others agree with the frames shown"),
         }
     }
 
@@ -162,7 +202,7 @@ impl Report {
         match self.shown.carried.iter().sum::<u64>() {
             0 if self.subset => ", those of the operating point alone (--subset)".to_owned(),
             0 => String::new(),
-            carried => format!(", {} of them carried over from intra frames", grouped(carried)),
+            carried => format!(", {} of them carried from I frames", grouped(carried)),
         }
     }
 }

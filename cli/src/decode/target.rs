@@ -13,11 +13,11 @@ pub(crate) enum Format {
     Ply,
     /// SPZ: quantises what it keeps.
     Spz,
-    /// 32 bytes a Gaussian: no spherical harmonics.
+    /// 32 bytes per Gaussian: no spherical harmonics.
     Splat,
 }
 
-/// A place for frames.
+/// Where frames go.
 pub(crate) struct Target {
     path: PathBuf,
     format: Format,
@@ -25,7 +25,7 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// The place that a user named; `frames` frames are expected there, 0 if that is not known.
+    /// The file or directory that a user named; `frames` frames are expected there, 0 if that is not known.
     pub(crate) fn new(path: &Path, format: Option<Format>, frames: u32) -> Result<Self, Failure> {
         let named = Format::of_name(path).filter(|_| !path.is_dir());
         let target = Self {

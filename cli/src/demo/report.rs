@@ -72,7 +72,7 @@ impl Demonstration {
         let place = self.directory.display();
         format!(
             "scene     {frames} frames, {} Gaussians in all, SH degree {sh_degree}: {} bytes as PLY\n\
-             encoded   {} bytes, {bpg:.2} bits a Gaussian, 1/{:.0} of the PLY; {seconds:.2} s, {} Gaussians a second\n\
+             encoded   {} bytes, {bpg:.2} bits per Gaussian, 1/{:.0} of the PLY; {seconds:.2} s, {} Gaussians per second\n\
              decoded   at every operating point; every frame has the digest that the encoder computed\n\n\
              {}\nerrors of frame 0 with everything decoded\n{}\n\
              files     {place}: demo.gss, source/, decoded-*/, report.txt, report.json\n\
@@ -93,9 +93,9 @@ impl Demonstration {
             "bytes",
             "Gaussians",
             "%",
-            "bits a Gaussian",
+            "bits per Gaussian",
             "decoding ms",
-            "Gaussians a second",
+            "Gaussians per second",
         ]);
         for point in &self.operating_points {
             table.row([

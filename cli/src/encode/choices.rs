@@ -26,7 +26,7 @@ impl Choice {
     }
 }
 
-/// Every decision that the report tells of.
+/// Every decision in the report.
 pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     let mut choices = vec![positions(report, settings), axes(report), degree(report, settings)];
     choices.extend(steps(report, settings));
@@ -45,7 +45,7 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
 
 fn positions(report: &Report, settings: &Settings) -> Choice {
     let bits = report.position_bits;
-    let choice = format!("{bits} bits an axis, cells of {}", report.position_step);
+    let choice = format!("{bits} bits per axis, grid step {}", report.position_step);
     let inner = report.steps.unwrap_or(settings.steps).position_bits;
     let why =
         format!("the inner 98 % span 2^{inner:.2} cells at this quality; the rest is for what lies outside");
@@ -71,7 +71,7 @@ fn steps(report: &Report, settings: &Settings) -> Option<Choice> {
 fn axes(report: &Report) -> Choice {
     let (sorted, [bits_sorted, bits_unsorted]) = report.canonical_axes;
     let why = format!(
-        "scale and rotation take {bits_sorted:.2} bits a Gaussian sorted, {bits_unsorted:.2} as they come"
+        "scale and rotation take {bits_sorted:.2} bits per Gaussian sorted, {bits_unsorted:.2} as they come"
     );
     Choice::new("axes", if sorted { "sorted by size" } else { "as they come" }, why)
 }
@@ -97,7 +97,7 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
     };
     let trial = report.sh_trial.map(|[(bits, error), (book_bits, book_error)]| {
         format!(
-            "coefficients take {bits:.2} bits a Gaussian (squared error {error:.3} steps), \
+            "coefficients take {bits:.2} bits per Gaussian (squared error {error:.3} steps), \
              a codebook {book_bits:.2} ({book_error:.3})"
         )
     });
@@ -115,7 +115,7 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
     let (choice, why) = match report.importance? {
         Importance::Removal => (
             "removal",
-            "what pictures gain by a Gaussian and lose without it, weighed anew at each refinement",
+            "what pictures gain by a Gaussian and lose without it, weighed again at each refinement",
         ),
         Importance::Contribution => {
             ("contribution", "transmittance times alpha over the pixels of all views")
@@ -130,7 +130,7 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
     Some(Choice::new("order", choice, format!("{why}{views}")))
 }
 
-/// Layers of a stream of profile Dynamic, and what its frames cost by type.
+/// Layers of a stream, and what its frames cost by type.
 fn layers(report: &Report, settings: &Settings) -> Option<Choice> {
     if report.coded.is_empty() {
         return None;
@@ -145,7 +145,7 @@ fn layers(report: &Report, settings: &Settings) -> Option<Choice> {
             .fold((0, 0), |(bytes, gaussians), f| (bytes + f.bytes, gaussians + u64::from(f.gaussians)));
         (gaussians > 0).then(|| {
             format!(
-                "{} frames take {:.2} bits a Gaussian",
+                "{} frames take {:.2} bits per Gaussian",
                 frame_type.name(),
                 bytes as f64 * 8.0 / gaussians as f64
             )
@@ -173,22 +173,20 @@ fn survivors(report: &Report) -> Option<Choice> {
         share(sum(|frame| frame.new)),
     );
     let cells = sum(|frame| frame.cells) / frames().count().max(1) as u64;
-    let why = format!("{} cells a frame move the rest where it belongs, or it stays", grouped(cells));
+    let why = format!("{} cells per frame move the rest where it belongs, or it stays", grouped(cells));
     Some(Choice::new("survivors", choice, why))
 }
 
 /// What untracked frames are true to.
 fn fidelity(report: &Report, settings: &Settings) -> Option<Choice> {
     let frames = report.coded.iter().filter(|frame| frame.by_pictures).count();
-    let why = format!(
-        "files are not tracked; what costs pictures less than {} dB is carried over",
-        settings.tolerance
-    );
+    let why =
+        format!("files are not tracked; what costs pictures less than {} dB is not sent", settings.tolerance);
     (frames > 0).then(|| Choice::new("fidelity", format!("pictures in {frames} frames"), why))
 }
 
 fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
-    let count = |place: usize| report.coded.iter().map(|frame| frame.predicted[place]).sum::<u64>();
+    let count = |index: usize| report.coded.iter().map(|frame| frame.predicted[index]).sum::<u64>();
     let counts = [0, 1, 2, 3].map(count);
     let all: u64 = counts.iter().sum();
     if all == 0 {

@@ -7,6 +7,7 @@ use crate::numbers::grouped;
 use crate::stream_file::StreamFile;
 use crate::table::Table;
 use splatstream_format::Limits;
+use splatstream_format::entropy::layout::Section;
 
 /// Shows where the bits go.
 pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> Shown {
@@ -20,9 +21,9 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
 
 fn text(costs: &Costs) -> String {
     let (bytes, gaussians, bpg) = (grouped(costs.bytes), grouped(costs.gaussians), costs.bpg);
-    let mut parts = vec![format!("{bytes} bytes, {gaussians} Gaussians, {bpg:.2} bits a Gaussian\n")];
+    let mut parts = vec![format!("{bytes} bytes, {gaussians} Gaussians, {bpg:.2} bits per Gaussian\n")];
     parts.push(attributes(costs));
-    if !costs.sections.is_empty() {
+    if costs.sections.iter().any(|part| part.section != Section::New.name()) {
         parts.push(sections(costs));
     }
     if costs.frame_types.len() > 1 {
@@ -33,7 +34,7 @@ fn text(costs: &Costs) -> String {
 }
 
 fn attributes(costs: &Costs) -> String {
-    let mut table = Table::new(["attribute", "bits a Gaussian", "symbols", "models"]);
+    let mut table = Table::new(["attribute", "bits per Gaussian", "symbols", "models"]);
     for cost in &costs.attributes {
         let [all, symbols, models] = bits(cost);
         table.row([cost.attribute.to_owned(), all, symbols, models]);
@@ -43,7 +44,7 @@ fn attributes(costs: &Costs) -> String {
 
 fn sections(costs: &Costs) -> String {
     let headings =
-        ["section", "attribute", "entries", "bits an entry", "bits a Gaussian", "symbols", "models"];
+        ["section", "attribute", "entries", "bits per entry", "bits per Gaussian", "symbols", "models"];
     let mut table = Table::new(headings);
     for part in &costs.sections {
         let [all, symbols, models] = bits(&part.cost);
@@ -61,7 +62,7 @@ fn sections(costs: &Costs) -> String {
 }
 
 fn frame_types(costs: &Costs) -> String {
-    let mut table = Table::new(["frame type", "frames", "bytes", "%", "Gaussians", "bits a Gaussian"]);
+    let mut table = Table::new(["frame type", "frames", "bytes", "%", "Gaussians", "bits per Gaussian"]);
     for cost in &costs.frame_types {
         table.row([
             cost.kind.to_owned(),
@@ -76,7 +77,7 @@ fn frame_types(costs: &Costs) -> String {
 }
 
 fn units(costs: &Costs) -> String {
-    let mut table = Table::new(["unit", "units", "bytes", "%", "bits a Gaussian"]);
+    let mut table = Table::new(["unit", "units", "bytes", "%", "bits per Gaussian"]);
     for cost in &costs.units {
         table.row([
             cost.kind.to_owned(),

@@ -1,4 +1,4 @@
-//! What each unit needs to be decoded, beside the units of the whole stream: clauses 7.13 to 7.17.
+//! What each unit needs to be decoded, beside the units of the whole stream: clauses 7.1 to 7.7.
 
 mod dot;
 mod text;
@@ -7,22 +7,23 @@ use super::Shown;
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault};
 use crate::stream_file::StreamFile;
-use crate::structure::{Frame, Group, LayerUnit, Structure, Tool};
+use crate::structure::{Frame, Gop, Increment, Structure, Tool};
 use serde::Serialize;
 use splatstream_format::Limits;
+use splatstream_format::syntax::{Profile, SequenceParameters};
 
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Dependencies {
     profile: Option<&'static str>,
-    groups: Vec<GroupRow>,
+    gops: Vec<GopRow>,
     error: Option<StreamFault>,
 }
 
 /// A group of pictures.
 #[derive(Serialize)]
-struct GroupRow {
-    group: u32,
+struct GopRow {
+    gop: u32,
     unit: usize,
     at: u64,
     first_frame: u32,
@@ -33,7 +34,7 @@ struct GroupRow {
     frames: Vec<FrameRow>,
 }
 
-/// A transform or codebook.
+/// A transform, codebook or weights unit.
 #[derive(Serialize)]
 struct ToolRow {
     unit: usize,
@@ -58,11 +59,12 @@ struct FrameRow {
     /// Whether the frame it refers to is in the stream.
     reference_present: Option<bool>,
     unit: usize,
+    damaged: bool,
     transforms: Vec<usize>,
     units: Vec<UnitRow>,
 }
 
-/// A refinement unit or increment.
+/// An increment.
 #[derive(Serialize)]
 struct UnitRow {
     unit: usize,
@@ -93,8 +95,8 @@ pub(super) fn show(stream: &StreamFile, as_dot: bool, limits: &Limits, console: 
     }
     let structure = Structure::of(&stream.bytes, limits);
     let dependencies = Dependencies {
-        profile: structure.profile.map(splatstream_format::syntax::Profile::name),
-        groups: structure.groups.iter().map(|group| GroupRow::new(&structure, group)).collect(),
+        profile: structure.profile.map(Profile::name),
+        gops: structure.gops.iter().map(|gop| GopRow::new(&structure, gop)).collect(),
         error: structure.error.map(StreamFault::from),
     };
     console.report(&dependencies, || {
@@ -103,18 +105,18 @@ pub(super) fn show(stream: &StreamFile, as_dot: bool, limits: &Limits, console: 
     Ok(structure.error)
 }
 
-impl GroupRow {
-    fn new(structure: &Structure, group: &Group) -> Self {
+impl GopRow {
+    fn new(structure: &Structure, gop: &Gop) -> Self {
         Self {
-            group: group.header.gop_index,
-            unit: group.place.unit,
-            at: group.place.at,
-            first_frame: group.first_frame,
-            frame_count: group.header.gop_frame_count,
-            predicted: group.header.is_predicted(),
-            temporal_depth: group.header.temporal_depth,
-            tools: group.tools.iter().map(ToolRow::from).collect(),
-            frames: group.frames.iter().map(|frame| FrameRow::new(structure, group, frame)).collect(),
+            gop: gop.header.gop_index,
+            unit: gop.span.unit,
+            at: gop.span.at,
+            first_frame: gop.first_frame,
+            frame_count: gop.header.gop_frame_count,
+            predicted: gop.header.is_predicted(),
+            temporal_depth: gop.header.temporal_depth,
+            tools: gop.tools.iter().map(ToolRow::from).collect(),
+            frames: gop.frames.iter().map(|frame| FrameRow::new(structure, gop, frame)).collect(),
         }
     }
 }
@@ -122,72 +124,68 @@ impl GroupRow {
 impl From<&Tool> for ToolRow {
     fn from(tool: &Tool) -> Self {
         Self {
-            unit: tool.place.unit,
+            unit: tool.span.unit,
             kind: tool.unit_type.name(),
-            at: tool.place.at,
-            bytes: tool.place.bytes,
+            at: tool.span.at,
+            bytes: tool.span.bytes,
             temporal_layer: tool.temporal_layer,
-            damaged: tool.place.damaged,
+            damaged: tool.span.damaged,
             frames_before: tool.frames_before,
         }
     }
 }
 
 impl FrameRow {
-    fn new(structure: &Structure, group: &Group, frame: &Frame) -> Self {
-        let reference = group.reference(frame);
-        let unit = |unit: &LayerUnit| UnitRow {
-            unit: unit.place.unit,
-            at: unit.place.at,
-            bytes: unit.place.bytes,
-            spatial_layer: unit.header.spatial_layer,
-            refinement: unit.header.refinement,
-            damaged: unit.place.damaged,
-            needs: needs(structure, group, frame, unit),
-            codebooks: unit.tools.codebooks.clone(),
-            weights: unit.tools.weights,
+    fn new(structure: &Structure, gop: &Gop, frame: &Frame) -> Self {
+        let reference = gop.reference(frame);
+        let unit = |increment: &Increment| UnitRow {
+            unit: increment.span.unit,
+            at: increment.span.at,
+            bytes: increment.span.bytes,
+            spatial_layer: increment.header.spatial_layer,
+            refinement: increment.header.refinement,
+            damaged: increment.span.damaged,
+            needs: needs(structure, gop, frame, increment),
+            codebooks: increment.tools.codebooks.clone(),
+            weights: increment.tools.weights,
         };
         Self {
-            frame: frame.number,
-            kind: frame.coding.frame_type.name(),
-            temporal_layer: frame.coding.temporal_layer,
+            frame: frame.index,
+            kind: frame.role.frame_type.name(),
+            temporal_layer: frame.role.temporal_layer,
             reference,
-            reference_present: reference.map(|number| group.frame(number).is_some()),
-            unit: frame.place.unit,
+            reference_present: reference.map(|index| gop.frame(index).is_some()),
+            unit: frame.span.unit,
+            damaged: frame.span.damaged,
             transforms: frame.transforms.clone(),
-            units: frame.units.iter().map(unit).collect(),
+            units: frame.increments.iter().map(unit).collect(),
         }
     }
 }
 
-/// What a unit needs at once. In an intra frame the refinement before it and its parents, one layer below; in other
-/// frames the refinement before it and the same refinement of the reference frame, of an intra frame all units,
-/// which the last of them stands for.
-fn needs(structure: &Structure, group: &Group, frame: &Frame, unit: &LayerUnit) -> Vec<Need> {
-    let (spatial, refinement) = (unit.header.spatial_layer, unit.header.refinement);
+/// What an increment needs at once: the refinement before it; in an I frame its parents, one layer below; in other frames
+/// the same refinement of the reference frame, or all units of a whole anchor, which the last of them stands for.
+fn needs(structure: &Structure, gop: &Gop, frame: &Frame, increment: &Increment) -> Vec<Need> {
+    let (spatial, refinement) = (increment.header.spatial_layer, increment.header.refinement);
     let mut needs = Vec::new();
-    let mut add = |number: u32, spatial_layer: u8, refinement: u8| {
-        let same = |unit: &&LayerUnit| {
-            (unit.header.spatial_layer, unit.header.refinement) == (spatial_layer, refinement)
-        };
-        let found = group.frame(number).and_then(|frame| frame.units.iter().find(same));
-        let unit = found.map(|unit| unit.place.unit);
-        needs.push(Need { frame: number, spatial_layer, refinement, unit });
+    let mut add = |index: u32, spatial_layer: u8, refinement: u8| {
+        let unit = gop.frame(index).and_then(|frame| frame.unit(spatial_layer, refinement));
+        needs.push(Need { frame: index, spatial_layer, refinement, unit });
     };
     if let Some(before) = refinement.checked_sub(1) {
-        add(frame.number, spatial, before);
+        add(frame.index, spatial, before);
     }
-    match group.reference(frame) {
-        None => {
+    let whole_anchor = structure.sequence.filter(SequenceParameters::whole_anchor);
+    match (gop.reference(frame), whole_anchor) {
+        (None, _) => {
             if let Some(below) = spatial.checked_sub(1) {
-                add(frame.number, below, refinement);
+                add(frame.index, below, refinement);
             }
         }
-        Some(number) if number == group.first_frame => {
-            let refinements = structure.sequence.map_or(1, |sequence| sequence.refinement_count);
-            add(number, structure.top(), refinements.saturating_sub(1));
+        (Some(index), Some(sequence)) if index == gop.first_frame => {
+            add(index, structure.top(), sequence.refinement_count.saturating_sub(1));
         }
-        Some(number) => add(number, structure.top(), refinement),
+        (Some(index), _) => add(index, structure.top(), refinement),
     }
     needs
 }

@@ -1,6 +1,6 @@
 //! The bytes of one unit beside its elements.
 
-use super::tree::{Branch, Elements, Row, place};
+use super::tree::{Branch, Row, each_unit, offset};
 use super::{Shown, span};
 use crate::console::Console;
 use crate::failure::Failure;
@@ -33,15 +33,20 @@ struct Bytes {
 
 /// Dumps one unit.
 pub(super) fn show(stream: &StreamFile, number: usize, limits: &Limits, console: &Console) -> Shown {
-    let Elements { mut units, error, .. } = Elements::of(stream, limits);
-    if number >= units.len() {
+    let (mut found, mut count) = (None, 0);
+    let error = each_unit(stream, limits, &mut |unit| {
+        count += 1;
+        if unit.unit == number {
+            found = Some(unit);
+        }
+    });
+    let Some(Branch { unit, kind, at, bytes, elements }) = found else {
         if error.is_some() {
             return Ok(error);
         }
-        let (path, count) = (stream.path.display(), units.len());
+        let path = stream.path.display();
         return Err(Failure::Usage(format!("{path}: there is no unit {number}, the stream has {count}")));
-    }
-    let Branch { unit, kind, at, bytes, elements } = units.swap_remove(number);
+    };
     let elements = elements.into_iter().map(|row| Bytes { hex: hex(stream, &row), row }).collect();
     let dump = Dump { unit, kind, at, bytes, elements };
     console.report(&dump, || dump.text())?;
@@ -79,7 +84,7 @@ impl Bytes {
             let pairs: Vec<&str> = digits.chunks(2).filter_map(|pair| str::from_utf8(pair).ok()).collect();
             let at = row.at_bit + (line * WIDTH * 8) as u64;
             let beside = if line == 0 { name.as_str() } else { "" };
-            let shown = format!("{:<10} {:<47}  {beside}", place(at), pairs.join(" "));
+            let shown = format!("{:<10} {:<47}  {beside}", offset(at), pairs.join(" "));
             *text += shown.trim_end();
             text.push('\n');
         }

@@ -6,13 +6,13 @@ use crate::numbers::{bits_per_gaussian, grouped, hex_digest};
 use crate::stream_file::StreamFile;
 use crate::table::Table;
 use serde::Serialize;
-use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, Tally};
+use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::payload::OperatingPoints;
-use splatstream_format::syntax::{OperatingPointEntry, SequenceParameters, UnitType};
+use splatstream_format::syntax::{OperatingPointEntry, UnitType};
 use splatstream_format::unit::Stream;
-use splatstream_format::{Error, Limits};
+use splatstream_format::{Error, Limits, Result};
 use std::ops::ControlFlow;
 
 /// One entry of what `--json` prints.
@@ -39,7 +39,8 @@ struct FrameDigest {
     frame: u32,
     #[serde(rename = "type")]
     kind: &'static str,
-    refinements: u8,
+    /// Exact lists that are shown.
+    level: u8,
     digest: Option<String>,
     carried_digest: Option<String>,
 }
@@ -52,63 +53,49 @@ struct List {
 
 /// Lists the operating points, smallest first.
 pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> Shown {
-    let (tally, list) = match tally(&stream.bytes, limits) {
+    let found =
+        operating_points(&stream.bytes, limits).and_then(|infos| Ok((infos, list(&stream.bytes, limits)?)));
+    let (infos, list) = match found {
         Ok(found) => found,
         Err(error) => return Ok(Some(error)),
     };
-    let infos: Vec<OperatingPointInfo> = tally.points().into_iter().map(|point| tally.info(point)).collect();
     let mut points: Vec<Point> = infos.iter().map(|info| Point::new(info, list.as_ref())).collect();
     let mut error = None;
     if console.is_json() {
         for (point, info) in points.iter_mut().zip(&infos) {
-            let fault = point.decode(&stream.bytes, info.point, limits);
-            error = error.or(fault);
+            error = error.or(point.decode(&stream.bytes, info.point, limits));
         }
     }
     console
-        .report(&points, || text(&points) + &list.map(|list| list.agreement(&tally)).unwrap_or_default())?;
+        .report(&points, || text(&points) + &list.map(|list| list.agreement(&infos)).unwrap_or_default())?;
     Ok(error)
 }
 
-/// What the units imply, and what the stream says of them.
-fn tally(bytes: &[u8], limits: &Limits) -> Result<(Tally, Option<List>), Error> {
-    let stream = Stream::open(bytes, limits)?;
-    let profile = stream.header().profile();
-    let (mut tally, mut list) = (Tally::new(profile), None);
-    for unit in stream.units() {
+/// What the stream says of its points, if it does.
+fn list(bytes: &[u8], limits: &Limits) -> Result<Option<List>> {
+    let mut units = Stream::open(bytes, limits)?.units();
+    while let Some(unit) = units.next_unit() {
         let unit = unit?;
-        let (payload, at) = (unit.payload, unit.payload_at);
-        match unit.header.unit_type() {
-            // Without them there are no points.
-            UnitType::SequenceParameters => {
-                SequenceParameters::parse_payload(payload, at, profile)?;
-            }
-            UnitType::OperatingPoints => {
-                list = Some(List { at: unit.at, entries: OperatingPoints::parse(payload, at)?.entries });
-            }
-            _ => {}
+        if unit.header.unit_type() == UnitType::OperatingPoints {
+            unit.check_payload()?;
+            let entries = OperatingPoints::parse(unit.payload, unit.payload_at)?.entries;
+            return Ok(Some(List { at: unit.at, entries }));
         }
-        tally.unit(&unit);
     }
-    Ok((tally, list))
+    Ok(None)
 }
 
 impl List {
     /// Whether the list says of a point what the units imply; none if it does not name it.
     fn agrees(&self, info: &OperatingPointInfo) -> Option<bool> {
-        let OperatingPoint { spatial, temporal, refinement } = info.point;
-        let entry = self.entries.iter().find(|entry| entry.key() == (spatial, temporal, refinement))?;
+        let entry = self.entries.iter().find(|entry| point_of(entry) == info.point)?;
         Some(says(entry) == (info.frames, info.gaussians, info.bytes))
     }
 
     /// What the list says beside what the units imply.
-    fn agreement(&self, tally: &Tally) -> String {
-        let is_wrong = |entry: &&OperatingPointEntry| {
-            let info = tally.info(point_of(entry));
-            says(entry) != (info.frames, info.gaussians, info.bytes)
-        };
-        let wrong = self.entries.iter().filter(is_wrong).map(|entry| point_of(entry).to_string());
-        let wrong: Vec<String> = wrong.collect();
+    fn agreement(&self, infos: &[OperatingPointInfo]) -> String {
+        let wrong = infos.iter().filter(|info| self.agrees(info) == Some(false));
+        let wrong: Vec<String> = wrong.map(|info| info.point.to_string()).collect();
         let text =
             format!("\nthe operating_points unit at {:#x} lists {} points", self.at, self.entries.len());
         match wrong.as_slice() {
@@ -147,25 +134,24 @@ impl Point {
 
     /// Decodes at the point, for the digests; gives the first error.
     fn decode(&mut self, bytes: &[u8], operating_point: OperatingPoint, limits: &Limits) -> Option<Error> {
-        let options = Options { limits: *limits, operating_point, tolerant: true, ..Options::default() };
-        let mut lost = None;
+        let options = Options { limits: *limits, operating_point, ..Options::default() };
         let summary = decode_stream(bytes, &options, |_, frame| {
             self.digests.push(FrameDigest {
-                frame: frame.number,
+                frame: frame.index,
                 kind: frame.frame_type.name(),
-                refinements: frame.refinements,
+                level: frame.level,
                 digest: frame.digest.map(hex_digest),
                 carried_digest: frame.carried_digest.map(hex_digest),
             });
-            lost = lost.or(frame.lost);
             ControlFlow::Continue(())
         });
-        lost.or(summary.end)
+        summary.verdict()
     }
 }
 
 fn text(points: &[Point]) -> String {
-    let mut table = Table::new(["point", "bytes", "frames", "Gaussians", "% of a frame", "bits a Gaussian"]);
+    let mut table =
+        Table::new(["point", "bytes", "frames", "Gaussians", "% of a frame", "bits per Gaussian"]);
     for point in points {
         table.row([
             point.op.clone(),

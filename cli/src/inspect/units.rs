@@ -1,4 +1,4 @@
-//! One line a unit.
+//! One line per unit.
 
 use super::{Shown, span};
 use crate::console::Console;
@@ -9,10 +9,11 @@ use crate::table::Table;
 use serde::Serialize;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::levels::Levels;
+use splatstream_format::payload::FramePayload;
 use splatstream_format::syntax::{
-    FrameHeader, FrameType, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
+    FrameType, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
 };
-use splatstream_format::unit::{Damaged, Delivery, Stream, Unit};
+use splatstream_format::unit::{Landmark, Stream, Unit};
 use splatstream_format::{Error, Limits};
 
 /// What `--json` prints.
@@ -35,17 +36,18 @@ struct Line {
     refinement: u8,
     critical: bool,
     damaged: bool,
-    /// Of a frame and its units.
+    /// Of a frame and its increments.
     frame_type: Option<&'static str>,
+    /// Of a frame_header: cells that move or are stale.
+    cells: Option<u32>,
     /// Of an increment.
     increment: Option<Counts>,
 }
 
-/// What an increment does, from its fixed part.
+/// What an increment does, from the elements before its sections.
 #[derive(Serialize)]
 struct Counts {
     parents: u32,
-    cells: u32,
     moves: u32,
     updates: u32,
     removed: u32,
@@ -56,6 +58,7 @@ struct Counts {
 /// What lines need of the units before.
 struct Context {
     profile: Profile,
+    limits: Limits,
     sequence: Option<SequenceParameters>,
     frame_type: Option<FrameType>,
     levels: Levels,
@@ -70,7 +73,8 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
     Ok(error)
 }
 
-/// Adds a line a unit as far as units can be told apart; gives the first error.
+/// Adds a line per unit; gives the first error. Where the end of a unit is not known it goes on at the next intact
+/// gop_header.
 fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<Error> {
     let opened = match Stream::open(&stream.bytes, limits) {
         Ok(opened) => opened,
@@ -78,31 +82,26 @@ fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<E
     };
     let mut context = Context {
         profile: opened.header().profile(),
+        limits: *limits,
         sequence: None,
         frame_type: None,
         levels: Levels::default(),
     };
     let mut units = opened.units();
     let mut first = None;
-    while let Some(delivery) = units.next_unit() {
-        match delivery {
-            Ok(Delivery::Intact(unit)) => {
-                let increment = context.take(&unit);
-                let line = Line::new(lines.len(), unit.at, &unit.header);
-                let frame_type = context.frame_type_of(&unit.header);
-                lines.push(Line { frame_type, increment, ..line });
+    while let Some(unit) = units.next_unit() {
+        let error = match unit {
+            Ok(unit) => {
+                let (line, error) = context.line(lines.len(), &unit);
+                lines.push(line);
+                error
             }
-            Ok(Delivery::Damaged(Damaged { unit, error, passed_over })) => {
-                if unit.header.unit_type() == UnitType::FrameHeader {
-                    context.frame_type = None;
-                }
-                let line = Line::new(lines.len(), unit.at, &unit.header);
-                let frame_type = context.frame_type_of(&unit.header);
-                lines.push(Line { damaged: true, frame_type, ..line });
-                first = first.or((!passed_over).then_some(error));
+            Err(error) => {
+                units.scan_for(Landmark::GopHeader);
+                Some(error)
             }
-            Err(error) => first = first.or(Some(error)),
-        }
+        };
+        first = first.or(error);
     }
     first
 }
@@ -121,19 +120,23 @@ impl Line {
             critical: header.is_critical(),
             damaged: false,
             frame_type: None,
+            cells: None,
             increment: None,
         }
     }
 
-    /// What stands behind the columns.
+    /// What stands after the columns.
     fn note(&self) -> String {
         if self.damaged {
             return "damaged".to_owned();
         }
-        let Some(counts) = &self.increment else { return String::new() };
+        let frame_type = self.frame_type.unwrap_or("?");
+        let Some(counts) = &self.increment else {
+            let cells = self.cells.map(|cells| format!("{frame_type}: {} cells", grouped(cells.into())));
+            return cells.unwrap_or_default();
+        };
         let named = [
             ("parents", counts.parents),
-            ("cells", counts.cells),
             ("moved", counts.moves),
             ("updated", counts.updates),
             ("removed", counts.removed),
@@ -144,46 +147,56 @@ impl Line {
             .filter(|(_, count)| *count > 0)
             .map(|(name, count)| format!("{} {name}", grouped(count.into())))
             .collect();
-        format!("{}: {}", self.frame_type.unwrap_or("?"), parts.join(", "))
+        format!("{frame_type}: {}", if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") })
     }
 }
 
 impl Context {
-    /// Takes note of a unit; gives the counts of an increment.
-    fn take(&mut self, unit: &Unit<'_>) -> Option<Counts> {
-        let (payload, at) = (unit.payload, unit.payload_at);
-        self.levels.follow(unit, self.profile);
-        match unit.header.unit_type() {
-            UnitType::SequenceParameters => {
-                self.sequence = SequenceParameters::parse_payload(payload, at, self.profile).ok();
+    /// The line of a unit, and what is wrong with it.
+    fn line(&mut self, number: usize, unit: &Unit<'_>) -> (Line, Option<Error>) {
+        let mut line = Line::new(number, unit.at, &unit.header);
+        let mut error = unit.check_header(self.profile).err();
+        // What decoders discard may hold anything.
+        if self.levels.takes(&unit.header) {
+            error = error.or(unit.check_payload().err());
+            line.damaged = error.is_some();
+            self.take(unit, &mut line);
+        }
+        let of_frame = matches!(unit.header.unit_type(), UnitType::FrameHeader | UnitType::Increment);
+        line.frame_type = self.frame_type.filter(|_| of_frame).map(FrameType::name);
+        (line, error)
+    }
+
+    /// Takes note of a unit that is not discarded, and of what it says into its line.
+    fn take(&mut self, unit: &Unit<'_>, line: &mut Line) {
+        let (payload, at, profile) = (unit.payload, unit.payload_at, self.profile);
+        if !line.damaged {
+            self.levels.follow(unit, profile);
+        }
+        match (unit.header.unit_type(), &self.sequence) {
+            (UnitType::SequenceParameters, _) if !line.damaged => {
+                self.sequence = SequenceParameters::parse_payload(payload, at, profile).ok();
             }
-            UnitType::FrameHeader => {
-                let header = FrameHeader::parse_payload(payload, at, self.profile).ok();
-                self.frame_type = header.and_then(|header| header.kind());
+            (UnitType::FrameHeader, Some(sequence)) => {
+                let parsed = FramePayload::parse(payload, at, sequence, &self.limits).ok();
+                let frame = parsed.filter(|_| !line.damaged);
+                self.frame_type = frame.as_ref().and_then(|frame| frame.header.kind());
+                line.cells = frame.and_then(|frame| Some(frame.cells?.coded.count));
             }
-            // What is passed over by decoders may hold anything.
-            UnitType::Increment if self.profile == Profile::Dynamic && self.levels.takes(&unit.header) => {
-                let (header, _) = IncrementHeader::parse(payload, at, self.sequence.as_ref()?).ok()?;
-                return Some(Counts::of(&header));
+            (UnitType::Increment, Some(sequence)) if !line.damaged => {
+                let parsed = IncrementHeader::parse(payload, at, sequence, profile).ok();
+                line.increment = parsed.map(|(header, _)| Counts::of(&header));
             }
             _ => {}
         }
-        None
-    }
-
-    fn frame_type_of(&self, header: &UnitHeader) -> Option<&'static str> {
-        let unit_type = header.unit_type();
-        let of_frame = unit_type == UnitType::FrameHeader || unit_type.has_refinement();
-        self.frame_type.filter(|_| of_frame).map(FrameType::name)
     }
 }
 
 impl Counts {
     fn of(header: &IncrementHeader) -> Self {
-        let present = Section::ALL.into_iter().filter(|&section| header.count(section) > 0);
+        let present = Section::OF_INCREMENT.into_iter().filter(|&section| header.count(section) > 0);
         Self {
             parents: header.parent_count,
-            cells: header.cell_count,
             moves: header.move_count,
             updates: header.update_count,
             removed: header.remove_count,
@@ -195,7 +208,7 @@ impl Counts {
 
 impl Listing {
     fn text(&self) -> String {
-        let mut table = Table::new(["unit", "type", "place", "bytes", "frame", "layer", "refinement", ""]);
+        let mut table = Table::new(["unit", "type", "bytes at", "bytes", "frame", "layer", "refinement", ""]);
         for line in &self.units {
             table.row([
                 line.unit.to_string(),

@@ -1,12 +1,9 @@
 //! Bytes and Gaussians by type of frame.
 
 use super::FrameTypeCost;
-use splatstream_format::Result;
-use splatstream_format::syntax::{
-    FrameHeader, FrameType, IncrementHeader, Profile, RefinementHeader, SequenceParameters, UnitHeader,
-    UnitType,
-};
+use splatstream_format::syntax::{FrameType, UnitHeader};
 use splatstream_format::unit::Unit;
+use std::collections::BTreeMap;
 
 /// The frames so far.
 #[derive(Default)]
@@ -19,44 +16,26 @@ pub(super) struct FrameCosts {
 struct FrameCost {
     frame_type: FrameType,
     bytes: u64,
-    /// Gaussians of each spatial layer.
-    layers: [u64; 4],
+    /// Gaussians of each list, of the highest spatial layer that has it.
+    lists: BTreeMap<u8, u64>,
 }
 
 impl FrameCosts {
-    /// Takes note of a unit; the Gaussians of one that is passed over do not count.
-    pub(super) fn unit(
-        &mut self,
-        unit: &Unit<'_>,
-        profile: Profile,
-        sequence: Option<&SequenceParameters>,
-        is_decoded: bool,
-    ) -> Result<()> {
-        let (payload, at) = (unit.payload, unit.payload_at);
-        let gaussians = match (unit.header.unit_type(), sequence) {
-            (UnitType::FrameHeader, _) => {
-                self.end_frame();
-                let header = FrameHeader::parse_payload(payload, at, profile)?;
-                let frame_type = header.kind().unwrap_or(FrameType::Intra);
-                self.current = Some(FrameCost { frame_type, bytes: 0, layers: [0; 4] });
-                0
-            }
-            (UnitType::Refinement, Some(sequence)) => {
-                RefinementHeader::parse(payload, at, sequence)?.0.gaussian_count
-            }
-            (UnitType::Increment, _) if !is_decoded => 0,
-            (UnitType::Increment, Some(sequence)) => {
-                IncrementHeader::parse(payload, at, sequence)?.0.home_count()
-            }
-            _ => return Ok(()),
-        };
+    /// A frame starts.
+    pub(super) fn start_frame(&mut self, frame_type: FrameType) {
+        self.end_frame();
+        self.current = Some(FrameCost { frame_type, bytes: 0, lists: BTreeMap::new() });
+    }
+
+    /// Takes note of a frame_header or an increment, after which its list has so many Gaussians; none of one that is
+    /// discarded.
+    pub(super) fn unit(&mut self, unit: &Unit<'_>, gaussians: Option<u32>) {
         if let Some(frame) = &mut self.current {
-            frame.bytes += (UnitHeader::SIZE + payload.len()) as u64;
-            if let Some(layer) = frame.layers.get_mut(usize::from(unit.header.spatial_layer)) {
-                *layer += u64::from(gaussians);
+            frame.bytes += (UnitHeader::SIZE + unit.payload.len()) as u64;
+            if let Some(gaussians) = gaussians {
+                frame.lists.insert(unit.header.refinement, gaussians.into());
             }
         }
-        Ok(())
     }
 
     /// The costs of all frames, I before P before B.
@@ -67,17 +46,16 @@ impl FrameCosts {
     }
 
     fn end_frame(&mut self) {
-        let Some(FrameCost { frame_type, bytes, layers }) = self.current.take() else { return };
-        let place = self.types.iter().position(|cost| cost.frame_type == frame_type);
-        let place = place.unwrap_or_else(|| {
+        let Some(FrameCost { frame_type, bytes, lists }) = self.current.take() else { return };
+        let known = self.types.iter().position(|cost| cost.frame_type == frame_type);
+        let index = known.unwrap_or_else(|| {
             self.types.push(FrameTypeCost { frame_type, frames: 0, bytes: 0, gaussians: 0 });
             self.types.len() - 1
         });
-        if let Some(cost) = self.types.get_mut(place) {
+        if let Some(cost) = self.types.get_mut(index) {
             cost.frames += 1;
             cost.bytes += bytes;
-            // A layer holds all Gaussians of the layers below it; the highest that came is shown.
-            cost.gaussians += layers.iter().rev().find(|&&layer| layer > 0).copied().unwrap_or(0);
+            cost.gaussians += lists.values().sum::<u64>();
         }
     }
 }

@@ -23,7 +23,7 @@ impl ModelTrace for BitsOfPlanes {
     }
 }
 
-/// The information of a plane's symbols: 12 - log2(frequency) bits a token, and the raw bits.
+/// The information of a plane's symbols: 12 - log2(frequency) bits per token, and the raw bits.
 pub(super) fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> f64 {
     let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
     let (contexts, values): (Vec<u8>, Vec<u64>) = match info.alphabet {
@@ -36,9 +36,9 @@ pub(super) fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, blo
             (plane_contexts(&model.axes, plane, block, coded), coded.iter().map(unsigned).collect())
         }
     };
-    let cost = |(place, &value): (usize, &u64)| {
+    let cost = |(index, &value): (usize, &u64)| {
         let token = split(value, model.direct_log2);
-        let context = usize::from(contexts.get(place).copied().unwrap_or(0));
+        let context = usize::from(contexts.get(index).copied().unwrap_or(0));
         let frequency = model
             .table_of_context
             .get(context)

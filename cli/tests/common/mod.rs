@@ -83,7 +83,7 @@ pub(crate) fn payload_length(bytes: &[u8], at: usize) -> usize {
     u32::from_le_bytes(length) as usize
 }
 
-/// Makes both check sums of a unit right again: the change is then seen behind them.
+/// Makes both checksums of a unit right again, so that the change itself is found.
 pub(crate) fn seal(bytes: &mut [u8], at: usize) {
     let payload = at + UNIT_HEADER..at + UNIT_HEADER + payload_length(bytes, at);
     let crc = crc32fast::hash(&bytes[payload]);

@@ -13,12 +13,12 @@
 /* Clause 9.1. */
 enum verdict { ACCEPT = 0, MALFORMED = 10, INVALID = 11, UNSUPPORTED = 12, OVER_LIMIT = 13, TRUNCATED = 14 };
 
-/* What is asked: units up to these layers (7.11, 7.19), carried Gaussians shown or not (7.18.2). */
+/* What is asked: units up to these layers (7.2), frames as subsets (7.8.2), a stream that starts inside another one (B.3). */
 struct request {
     const uint8_t *stream;
     size_t bytes;
     unsigned op_s, op_t, op_r;
-    int subset;
+    int subset, inside;
     const char *out; /* where write_attribute() puts files */
 };
 
@@ -29,8 +29,9 @@ static int write_attribute(const struct request *request, uint32_t frame, const 
  *
  *   position 3 planes, log_scale 3, opacity 1, rotation 3, dc 3, sh S (only if S > 0)
  *
- * with the canonical planes of 7.9, Gaussians in the order of 7.18.2, log_scale and opacity compensated (7.18.3).
- * Frames without Gaussians have empty files. Frames before an error are written too. */
+ * with the canonical planes of 7.9, Gaussians in the order of 7.8.2, log_scale and opacity compensated (7.8.3).
+ * Frames without Gaussians have empty files. Frames before and after an error are written too. With `inside`, next_gop and
+ * next_frame come from the first gop_header, and nothing is compared with the stream as a whole. */
 static enum verdict decode(const struct request *request)
 {
     (void)request;
@@ -87,6 +88,7 @@ static int answer(const char *in, const char *op, const char *mode, const char *
     if (stream == NULL) return 1;
     request.stream = stream;
     request.subset = strcmp(mode, "subset") == 0;
+    request.inside = strcmp(mode, "inside") == 0;
     request.out = out;
     int verdict = decode(&request);
     free(stream);

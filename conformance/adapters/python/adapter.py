@@ -13,17 +13,16 @@ import os
 import struct
 import sys
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "oracle"))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 
-import constants as c
-from decode import operating_point
-from decoding import Decoder
-from dynamic import DynamicFrame
-from entropy_state import entropy_state
-from errors import EXIT_CODE, StreamError
-from homes import canonical_planes
-from output import float_planes
-from semantics import parse_unit_header
+from oracle import constants as c
+from oracle.decode import operating_point
+from oracle.decoding import Decoder
+from oracle.entropy_state import entropy_state
+from oracle.errors import EXIT_CODE, StreamError
+from oracle.lists import canonical_planes
+from oracle.output import float_planes
+from oracle.semantics import parse_unit_header
 
 # Canonical planes (7.9) of each attribute: first, and first of the next
 ATTRIBUTES = (("position", 0, 3), ("log_scale", 3, 6), ("opacity", 6, 7), ("rotation", 7, 10), ("dc", 10, 13),
@@ -35,23 +34,23 @@ class Result:
 
     def __init__(self):
         self.exit_code = 0
-        self.diagnosis = None                       # dict: class, code, clause, byte
+        self.diagnosis = None                       # dict: class, code, clause, byte, lost
         self.frames = {}                            # display index -> canonical planes, compensated
         self.floats = {}                            # display index -> output of 7.10, plane after plane; optional
         self.entropy = {}                           # index of a unit -> XXH64 of its entropy decoding; optional
 
 
-def decode(data, point, subset):
-    """A Result: the stream `data` at an operating point (s, t, r), shown in full or as a subset (7.18.2)."""
-    decoder = Decoder(data, point).decode()
+def decode(data, point, mode):
+    """A Result: the stream `data` at an operating point (s, t, r); mode: `full`, `subset` (7.8.2) or `inside` (B.3)."""
+    inside = parse_unit_header(data, c.FILE_HEADER_BYTES).end if mode == "inside" else None
+    decoder = Decoder(data, point, inside).decode()
     result = Result()
-    errors = decoder.found(subset)
+    errors = decoder.found(mode == "subset")
     if errors:
-        result.diagnosis = errors[0].as_dict()
+        result.diagnosis = {**errors[0].as_dict(), "lost": decoder.lost}
         result.exit_code = EXIT_CODE[errors[0].error_class]
     for frame in decoder.frames:
-        planes = (canonical_planes(frame.shown(subset).gaussians, frame.plane_count)
-                  if isinstance(frame, DynamicFrame) else frame.planes)
+        planes = canonical_planes(frame.shown(mode == "subset").gaussians, frame.plane_count)
         result.frames[frame.number] = planes
         result.floats[frame.number] = float_planes(decoder.sequence, planes).values()
     result.entropy = dict(entropy_states(data, decoder))
@@ -65,7 +64,7 @@ def entropy_states(data, decoder):
         if decoder.coded.get(at):
             yield index, entropy_state(decoder.coded[at])
         try:
-            at = parse_unit_header(data, at, 0, decoder.file_header.profile).end
+            at = parse_unit_header(data, at).end
         except StreamError:
             return
         index += 1
@@ -86,7 +85,7 @@ def write(folder, name, content):
 def answer(path, op, mode, out):
     """Decodes a file, writes what is shown, gives exit code and diagnosis."""
     with open(path, "rb") as f:
-        result = decode(f.read(), operating_point(op), mode == "subset")
+        result = decode(f.read(), operating_point(op), mode)
     for number, planes in result.frames.items():
         for name, first, end in ATTRIBUTES:
             if name != "sh" or len(planes) > first:
@@ -110,7 +109,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--in", dest="path")
     parser.add_argument("--op", default="s3,t3,r9")
-    parser.add_argument("--mode", default="full", choices=("full", "subset"))
+    parser.add_argument("--mode", default="full", choices=("full", "subset", "inside"))
     parser.add_argument("--out")
     parser.add_argument("--stdio", action="store_true")
     options = parser.parse_args()

@@ -9,11 +9,14 @@ here=$(CDPATH='' cd -- "$(dirname -- "$0")" && pwd)
 planes=$(mktemp -d)
 trap 'rm -rf "$planes"' EXIT
 
-# 1. Run the decoder. What it says on standard error goes on; its last line may be the diagnosis.
-subset=''
-[ "$mode" = subset ] && subset=--subset
+# 1. Run the decoder. What it says on standard error goes on; its last line may be the diagnosis. In mode `inside` the units
+#    after sequence_parameters, which ends at byte 36 + its payload_length, start with some gop_header (B.3).
+options=''
+[ "$mode" = subset ] && options=--subset
+[ "$mode" = inside ] && options="--inside $((36 + $(od -An -tu4 -j28 -N4 "$in")))"
 code=0
-python3 "$here/../../oracle/decode.py" "$in" --op "$op" --out "$planes" $subset >/dev/null || code=$?
+# shellcheck disable=SC2086 # two words or none
+python3 "$here/../../oracle/decode.py" "$in" --op "$op" --out "$planes" $options >/dev/null || code=$?
 # Where a decoder has exit codes of its own, translate them:
 # 0 accept, 10 malformed, 11 invalid, 12 unsupported, 13 over a limit, 14 truncated; all else is a crash.
 case $code in 0 | 10 | 11 | 12 | 13 | 14) ;; *) exit 1 ;; esac

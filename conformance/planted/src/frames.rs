@@ -1,9 +1,9 @@
-//! What faults do to frames.
+//! Changes of decoded frames.
 
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::process::{Compensation, DecodedFrame};
 
-/// Applies `change` to the planes as they are shown: compensated, and not compensated again.
+/// Applies `change` to the planes after compensation.
 fn change_shown(frames: &mut [DecodedFrame], change: impl Fn(&mut QuantizedFrame)) {
     for frame in frames {
         let mut shown = frame.clone().into_shown();
@@ -21,7 +21,7 @@ fn change_values(planes: &mut QuantizedFrame, mut change: impl FnMut(i32) -> i32
     planes.signed_planes_mut().flatten().for_each(|value| *value = change(*value));
 }
 
-/// Values that have nothing to do with the right ones, the same in every run.
+/// Values unrelated to the right ones, the same in every run.
 pub(crate) fn fill_with_noise(frames: &mut [DecodedFrame]) {
     change_shown(frames, |planes| {
         let mut state = 1_u32;
@@ -39,7 +39,7 @@ pub(crate) fn fill_with_zeros(frames: &mut [DecodedFrame]) {
 
 /// Adds one to the last opacity of the last frame that has any, in display order.
 pub(crate) fn flip_last_bit(frames: &mut [DecodedFrame]) {
-    let last = frames.iter_mut().filter(|frame| !frame.planes.is_empty()).max_by_key(|frame| frame.number);
+    let last = frames.iter_mut().filter(|frame| !frame.planes.is_empty()).max_by_key(|frame| frame.index);
     change_shown(last.map_or(&mut [], std::slice::from_mut), |planes| {
         if let Some(value) = planes.opacity.last_mut() {
             *value = value.wrapping_add(1);
@@ -65,7 +65,7 @@ pub(crate) fn keep_all_but_b(frames: &mut Vec<DecodedFrame>) {
     frames.retain(|frame| frame.frame_type.name() != "B");
 }
 
-/// The values before clause 7.18.3.
+/// The values before compensation (7.8.3).
 pub(crate) fn forget_compensation(frames: &mut [DecodedFrame]) {
     frames.iter_mut().for_each(|frame| frame.compensation = Compensation::default());
 }

@@ -1,21 +1,20 @@
-//! Decoders with one planted fault each, built on the reference decoder: what the conformance runner has to catch.
-//!
-//! A runner that has never seen a wrong decoder is not tested. `tests/caught.rs` runs every fault and demands that it is
-//! caught for what it is.
+//! Decoders with one planted error each, built on the reference decoder: they test the conformance runner. `tests/caught.rs`
+//! runs each of them and checks that it is found, and found for its own error.
 
 mod fault;
 mod frames;
+mod streams;
 
 use clap::Parser;
 use fault::Fault;
 use splatstream_conformance::protocol::Request;
 use splatstream_conformance::serve::serve;
 use splatstream_conformance::vector::Mode;
-use std::io;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// A decoder with a planted fault.
+/// A decoder with a planted error.
 #[derive(Parser)]
 #[command(after_help = "Example:\n  \
     splatstream conformance run --decoder 'planted one-lsb-in-last-frame --in {in} --op {op} --mode {mode} --out {out}'")]
@@ -29,7 +28,7 @@ struct Planted {
     /// The operating point.
     #[arg(long, default_value = splatstream_conformance::protocol::EVERYTHING)]
     op: String,
-    /// full or subset.
+    /// full, subset or inside.
     #[arg(long, default_value = "full")]
     mode: Mode,
     /// A folder for the planes.
@@ -44,10 +43,13 @@ fn main() -> io::Result<ExitCode> {
     let planted = Planted::parse();
     let fault = planted.fault;
     let (Some(input), Some(out)) = (planted.input, planted.out) else {
-        serve(io::stdin().lock(), io::stdout().lock(), |request| Ok((fault.answer(request)?, None)))?;
+        serve(io::stdin().lock(), io::stdout().lock(), |request| fault.answer(request))?;
         return Ok(ExitCode::SUCCESS);
     };
     let request = Request { input, op: planted.op, mode: planted.mode, out };
-    let code = fault.answer(&request)?;
+    let (code, diagnosis) = fault.answer(&request)?;
+    if let Some(diagnosis) = diagnosis {
+        writeln!(io::stderr(), "{}", serde_json::to_string(&diagnosis)?)?;
+    }
     Ok(ExitCode::from(u8::try_from(code).unwrap_or(1)))
 }

@@ -1,4 +1,4 @@
-//! What a decoder answered, as it is: how it ended, what it said. Whether that is right is for [`crate::judge`].
+//! The answer of a decoder: how it ended and what it reported. [`crate::judge`] decides whether that is right.
 
 use crate::protocol::Said;
 use std::process::ExitStatus;
@@ -13,14 +13,14 @@ pub enum Ending {
     Signal(i32),
     /// Not within the time; it was killed.
     TimedOut,
-    /// It took too much memory and was killed.
+    /// It used too much memory and was killed.
     TooMuchMemory,
     /// It wrote too much and was killed.
     TooMuchOutput,
-    /// A persistent process said something that is no answer.
+    /// A persistent process wrote a line that is not an answer.
     NoAnswer,
-    /// The run was stopped; of the case nothing is known.
-    Stopped,
+    /// The run was cancelled before the case ended.
+    Cancelled,
 }
 
 /// The answer to a case.
@@ -28,12 +28,12 @@ pub enum Ending {
 pub struct Answer {
     /// How it ended.
     pub ending: Ending,
-    /// What it said about its verdict.
+    /// What it reported about its verdict.
     pub said: Said,
-    /// How it broke the protocol or passed a limit, in words.
+    /// How it violated the protocol or exceeded a limit, in words.
     pub fault: Option<String>,
     /// The end of its standard error.
-    pub complaint: String,
+    pub stderr: String,
     /// Wall time.
     pub took: Duration,
 }

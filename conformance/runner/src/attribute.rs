@@ -1,4 +1,4 @@
-//! The attributes of a frame as files: the canonical planes of clause 7.9 in groups.
+//! The attributes of a frame as files: groups of the canonical planes of clause 7.9.1.
 
 use serde::{Deserialize, Serialize};
 use splatstream_decoder::frame::QuantizedFrame;
@@ -8,9 +8,9 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Attribute {
-    /// Planes 0 to 2: lattice positions.
+    /// Planes 0 to 2: positions in steps of the grid.
     Position,
-    /// Planes 3 to 5, steps, compensated (7.18.3).
+    /// Planes 3 to 5, steps, compensated (7.8.3).
     LogScale,
     /// Plane 6, steps, compensated.
     Opacity,

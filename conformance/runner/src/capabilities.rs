@@ -1,9 +1,9 @@
-//! What a decoder claims to do. What it does not claim is not asked of it, and counts as nothing.
+//! What a decoder claims to support. Cases that need more are not run, and count neither as passed nor as failed.
 
 use crate::case::Case;
 use crate::error::{Error, Result, read_json};
 use crate::feature;
-use crate::nearest::nearest;
+use crate::suggest::closest;
 use crate::vector::Mode;
 use serde::{Deserialize, Serialize};
 use splatstream_format::Class;
@@ -12,13 +12,13 @@ use std::path::Path;
 /// What `schema` of a claim says.
 const SCHEMA: &str = "splatstream-capabilities/1";
 
-/// The claim of a decoder, `conformance/schema/capabilities.schema.json`. What is left out is claimed.
+/// The claim of a decoder, `conformance/schema/capabilities.schema.json`. Keys that are left out claim everything.
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Capabilities {
     /// The schema's name and version.
     pub schema: String,
-    /// Of the decoder, as reports shall call it.
+    /// The name of the decoder in reports.
     pub name: String,
     /// Profiles of annex A.
     #[serde(default = "all_profiles")]
@@ -26,16 +26,16 @@ pub struct Capabilities {
     /// The highest level of annex A.
     #[serde(default = "highest_level")]
     pub level: u8,
-    /// Features as vectors name them; none is all.
+    /// Features as vectors name them; none: all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub features: Option<Vec<String>>,
-    /// What can be shown.
+    /// Modes.
     #[serde(default = "all_modes")]
     pub modes: Vec<Mode>,
-    /// Operating points that can be asked for.
+    /// Operating points.
     #[serde(default)]
     pub points: Points,
-    /// Whether it writes the states of its entropy decoder, `u%04d.entropy`.
+    /// Whether it writes entropy states, `u%04d.entropy`.
     #[serde(default)]
     pub entropy: bool,
     /// Whether it writes the output of 7.10, `f%04d.f32`.
@@ -43,21 +43,21 @@ pub struct Capabilities {
     pub output: bool,
 }
 
-/// Operating points that a decoder can be asked for.
+/// Operating points that a decoder supports.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Points {
     /// Any.
     #[default]
     All,
-    /// The highest of a stream alone.
+    /// Only the highest of a stream.
     Full,
-    /// The lowest of a stream alone.
+    /// Only the lowest of a stream.
     Base,
 }
 
 impl Capabilities {
-    /// The claim of a decoder that claims everything but what is optional.
+    /// The claim of everything but the optional files.
     pub fn everything(name: &str) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
@@ -75,8 +75,7 @@ impl Capabilities {
     /// Reads a claim.
     ///
     /// # Errors
-    /// The file cannot be read, or is no claim, or claims what there is not: a word that nobody knows would be passed over, and
-    /// the cases with it.
+    /// The file cannot be read, is not a claim, or has unknown words: with those, cases would be left out by mistake.
     pub fn read(path: &Path) -> Result<Self> {
         let claim: Self = read_json(path)?;
         if claim.schema != SCHEMA {
@@ -91,7 +90,7 @@ impl Capabilities {
         }
     }
 
-    /// What is claimed and does not exist, and what does.
+    /// What is claimed but does not exist, and what exists.
     fn unknown(&self) -> Option<String> {
         if self.name.trim().is_empty() {
             return Some("the name is empty; reports need one".to_owned());
@@ -105,20 +104,23 @@ impl Capabilities {
         let claimed = self.features.iter().flatten();
         let stranger = claimed.into_iter().find(|claimed| feature::names().all(|name| name != *claimed))?;
         let all: Vec<&str> = feature::names().collect();
-        let near = nearest(stranger, feature::names());
-        let near = near.first().map_or("", |name| name);
-        Some(format!("there is no feature '{stranger}', perhaps {near}; there are {}", all.join(", ")))
+        let similar = closest(stranger, feature::names());
+        let similar = similar.first().map_or("", |name| name);
+        Some(format!(
+            "there is no feature '{stranger}'; did you mean {similar}? There are {}",
+            all.join(", ")
+        ))
     }
 
-    /// What a case needs that is not claimed; none if everything is. A stream that every decoder shall call
-    /// unsupported needs nothing.
+    /// What a case needs that is not claimed; none if everything is. A stream of a claimed profile that every decoder shall
+    /// call unsupported, and of which nothing is shown, needs nothing else.
     pub fn missing(&self, case: &Case<'_>) -> Option<String> {
         let vector = case.vector;
-        if vector.expect.class == Some(Class::Unsupported) {
-            return None;
-        }
         if !self.profiles.contains(&vector.profile) {
             return Some(format!("profile {}", vector.profile));
+        }
+        if vector.expect.class == Some(Class::Unsupported) && vector.states.is_empty() {
+            return None;
         }
         if vector.level > self.level {
             return Some(format!("level {}", vector.level));
@@ -149,5 +151,5 @@ fn highest_level() -> u8 {
 }
 
 fn all_modes() -> Vec<Mode> {
-    vec![Mode::Full, Mode::Subset]
+    Mode::ALL.to_vec()
 }

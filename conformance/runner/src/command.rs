@@ -1,4 +1,4 @@
-//! The command of a decoder under test. It is split as a shell splits it, and no shell runs.
+//! The command of a decoder under test. It is split as a shell splits it, but no shell runs.
 
 use crate::capabilities::{Capabilities, Points};
 use crate::error::{Error, Result};
@@ -8,10 +8,10 @@ use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::process::Command;
 
-/// What stands in a command for what is asked.
-const PLACES: [&str; 4] = ["{in}", "{op}", "{mode}", "{out}"];
+/// The placeholders of a command.
+const PLACEHOLDERS: [&str; 4] = ["{in}", "{op}", "{mode}", "{out}"];
 
-/// A command with places for what is asked: `{in}`, `{op}`, `{mode}`, `{out}`.
+/// A command with the placeholders `{in}`, `{op}`, `{mode}`, `{out}`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Template {
     words: Vec<String>,
@@ -21,18 +21,20 @@ impl Template {
     /// A command that is run for each case.
     ///
     /// # Errors
-    /// A quote is left open, `{in}` or `{out}` has no place, or something else is in braces.
+    /// A quote is left open, `{in}` or `{out}` is missing, or something else is in braces.
     pub fn parse(text: &str) -> Result<Self> {
         let words = split(text)?;
-        if let Some(name) = words.iter().flat_map(|word| names_in_braces(word)).find(|name| !is_place(name)) {
-            let message = format!("'{{{name}}}' is no placeholder; there are {}", PLACES.join(" "));
+        if let Some(name) =
+            words.iter().flat_map(|word| names_in_braces(word)).find(|name| !is_placeholder(name))
+        {
+            let message = format!("'{{{name}}}' is not a placeholder; there are {}", PLACEHOLDERS.join(" "));
             return Err(Error::Usage(message));
         }
         let template = Self { words };
-        for place in ["{in}", "{out}"] {
-            if !template.has(place) {
+        for placeholder in ["{in}", "{out}"] {
+            if !template.has(placeholder) {
                 let message = format!(
-                    "the command has no {place}; write --decoder 'CMD {{in}} {{op}} {{mode}} {{out}}'"
+                    "the command has no {placeholder}; write --decoder 'CMD {{in}} {{op}} {{mode}} {{out}}'"
                 );
                 return Err(Error::Usage(message));
             }
@@ -40,20 +42,20 @@ impl Template {
         Ok(template)
     }
 
-    /// Whether the decoder is told all that its claim lets it be asked.
+    /// Whether the decoder gets all parts of the requests that its claim permits.
     ///
     /// # Errors
-    /// `{op}` or `{mode}` has no place, and the claim is not of one point or mode alone.
+    /// `{op}` or `{mode}` is missing, and the claim is not limited to one point or mode.
     pub fn check_claim(&self, claim: &Capabilities) -> Result<()> {
         let lacks = [
             ("{op}", "operating point", "\"points\": \"full\"", claim.points == Points::Full),
             ("{mode}", "mode", "\"modes\": [\"full\"]", claim.modes == [Mode::Full]),
         ];
-        for (place, what, narrow, is_narrow) in lacks {
-            if !self.has(place) && !is_narrow {
+        for (placeholder, what, narrow, is_narrow) in lacks {
+            if !self.has(placeholder) && !is_narrow {
                 let message = format!(
-                    "the command has no {place}, so that the decoder is not told the {what}\n  \
-                    add {place}, or claim {narrow} alone in a file for --capabilities"
+                    "the command has no {placeholder}, so the decoder does not get the {what}\n  \
+                    add {placeholder}, or claim only {narrow} in a file for --capabilities"
                 );
                 return Err(Error::Usage(message));
             }
@@ -61,8 +63,8 @@ impl Template {
         Ok(())
     }
 
-    fn has(&self, place: &str) -> bool {
-        self.words.iter().any(|word| word.contains(place))
+    fn has(&self, placeholder: &str) -> bool {
+        self.words.iter().any(|word| word.contains(placeholder))
     }
 
     /// The words of the command for a request.
@@ -77,17 +79,19 @@ impl Template {
         self.words.iter().map(fill).collect()
     }
 
-    /// The words with their places.
+    /// The words with their placeholders.
     pub fn raw_words(&self) -> &[String] {
         &self.words
     }
 }
 
-fn is_place(name: &str) -> bool {
-    PLACES.iter().any(|place| place.strip_prefix('{').and_then(|place| place.strip_suffix('}')) == Some(name))
+fn is_placeholder(name: &str) -> bool {
+    PLACEHOLDERS.iter().any(|placeholder| {
+        placeholder.strip_prefix('{').and_then(|placeholder| placeholder.strip_suffix('}')) == Some(name)
+    })
 }
 
-/// What stands in braces in a text and looks like a name. `${NAME}` is a shell's.
+/// Names in braces in a text. `${NAME}` belongs to a shell.
 fn names_in_braces(text: &str) -> impl Iterator<Item = &str> {
     let is_name =
         |name: &&str| name.starts_with(char::is_alphabetic) && !name.contains(|c: char| !c.is_alphanumeric());
@@ -102,7 +106,7 @@ fn names_in_braces(text: &str) -> impl Iterator<Item = &str> {
 /// The words of a command.
 ///
 /// # Errors
-/// A quote is left open, or there is no word.
+/// A quote is left open, or there are no words.
 pub fn split(text: &str) -> Result<Vec<String>> {
     let words = shlex::split(text).filter(|words| !words.is_empty());
     words.ok_or_else(|| {
@@ -110,20 +114,23 @@ pub fn split(text: &str) -> Result<Vec<String>> {
     })
 }
 
-/// The words of a command whose process answers many requests.
+/// The words of the command of a process that answers many requests.
 ///
 /// # Errors
-/// As [`split`]; or there are places, which nobody would fill.
+/// As [`split`]; or there are placeholders.
 pub fn split_persistent(text: &str) -> Result<Vec<String>> {
     let words = split(text)?;
-    if let Some(place) = PLACES.into_iter().find(|place| words.iter().any(|word| word.contains(place))) {
-        let message = format!("--stdio has no {place}: requests come on standard input; --decoder has");
+    if let Some(placeholder) =
+        PLACEHOLDERS.into_iter().find(|placeholder| words.iter().any(|word| word.contains(placeholder)))
+    {
+        let message =
+            format!("--stdio takes no {placeholder}: requests come on standard input; --decoder takes it");
         return Err(Error::Usage(message));
     }
     Ok(words)
 }
 
-/// A word that means something to a shell alone, if there is one and no shell is asked to run.
+/// A word that only a shell understands, if there is one and the command is not a shell's.
 pub fn shell_word(words: &[String]) -> Option<&str> {
     const OPERATORS: [&str; 10] = ["|", "||", "&", "&&", ";", "<", ">", ">>", "2>", "2>&1"];
     if words.get(1).is_some_and(|word| word == "-c") {
@@ -145,22 +152,22 @@ pub(crate) fn of(words: &[String]) -> Command {
 
 /// Why a command does not start, and what to do.
 pub(crate) fn cannot_start(words: &[String], source: &io::Error) -> Error {
-    /// The error of a file that is no program of this machine.
+    /// The error for a file that is not a program of this machine.
     const ENOEXEC: i32 = 8;
     let program = words.first().cloned().unwrap_or_default();
     let path = Path::new(&program);
     let why = if let Some(word) = shell_word(words) {
-        format!("'{word}' is for a shell, and no shell runs; use sh -c '...'")
+        format!("'{word}' is for a shell, but no shell runs; use sh -c '...'")
     } else if path.is_dir() {
-        "it is a folder\n  name the program in it".to_owned()
+        "it is a folder\n  give the program in it".to_owned()
     } else if source.kind() == ErrorKind::NotFound && path.is_file() {
-        "the interpreter that its first line names is not there".to_owned()
+        "the interpreter in its first line does not exist".to_owned()
     } else if source.kind() == ErrorKind::NotFound {
         "there is no such program\n  check the path; a name without / is looked for in PATH".to_owned()
     } else if source.kind() == ErrorKind::PermissionDenied {
         format!("it is not executable\n  chmod +x {program}")
     } else if source.raw_os_error() == Some(ENOEXEC) {
-        "it is no program for this machine and no script\n  a script starts with #! and its interpreter, as in \
+        "it is neither a program for this machine nor a script\n  a script starts with #! and its interpreter, as in \
             #!/usr/bin/env python3"
             .to_owned()
     } else {
@@ -174,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_filled_inside_words_and_quotes_hold_words_together() {
+    fn placeholders_are_filled_inside_words_and_quotes_keep_words_together() {
         let template = Template::parse("'my decoder' --in={in} --show \"{mode} {op}\" {out}").unwrap();
         let request = Request {
             input: "a b.gss".into(),
@@ -187,18 +194,18 @@ mod tests {
     }
 
     #[test]
-    fn a_command_without_places_or_with_an_open_quote_is_refused() {
+    fn a_command_without_placeholders_or_with_an_open_quote_is_refused() {
         for wrong in ["", "decoder {in}", "decoder {out}", "'decoder {in} {out}"] {
             assert!(Template::parse(wrong).is_err(), "{wrong}");
         }
         let error = Template::parse("decoder {in} {mod} {out}").unwrap_err().to_string();
-        assert_eq!(error, "'{mod}' is no placeholder; there are {in} {op} {mode} {out}");
+        assert_eq!(error, "'{mod}' is not a placeholder; there are {in} {op} {mode} {out}");
         assert!(Template::parse("sh -c 'echo ${HOME} {} {\"a\":1}' {in} {out}").is_ok());
         assert!(split_persistent("decoder {in}").is_err());
     }
 
     #[test]
-    fn who_is_not_told_point_or_mode_claims_one_of_them() {
+    fn a_decoder_that_does_not_get_point_or_mode_claims_one_of_them() {
         let narrow = |points, modes: &[Mode]| Capabilities {
             points,
             modes: modes.to_vec(),
@@ -221,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_does_not_start_is_told_why() {
+    fn a_command_that_does_not_start_is_explained() {
         let folder = tempfile::tempdir().unwrap();
         let script = folder.path().join("script");
         std::fs::write(&script, "exit 0\n").unwrap();

@@ -1,23 +1,23 @@
-//! Where wrong planes part from the right ones, and what the fault resembles.
+//! The first value that differs in wrong planes, and what the error resembles.
 //!
-//! A vector holds digests and no values, so the right values come from the reference decoder, and only where its
-//! digest is that of the vector.
+//! A vector has digests instead of values, so the right values come from the reference decoder, provided that its digest
+//! is that of the vector.
 
 use crate::attribute::{Attribute, from_bytes, to_bytes};
-use crate::carrier::{Carrier, Carriers};
 use crate::case::{Case, states_of};
 use crate::digest;
 use crate::judge::Files;
 use crate::output::Output;
 use crate::reference::Decoded;
 use crate::resemblance;
+use crate::source_unit::{SourceUnit, SourceUnits};
 use crate::symptom::Symptom;
 use crate::vector::{Point, State};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The first value that differs: of the first wrong frame in the order of coding, since faults spread from there, the
-/// first attribute, and of that the first Gaussian.
+/// The first value that differs: in the first wrong frame in coding order, since errors spread from there, the first
+/// attribute, and in that the first Gaussian.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Difference {
@@ -28,18 +28,18 @@ pub struct Difference {
     pub frame_type: Option<String>,
     /// The attribute.
     pub attribute: Attribute,
-    /// Gaussians that the frame has.
+    /// Gaussians of the frame.
     pub gaussians: u64,
-    /// Bytes of the decoder's file, where they are not those of so many Gaussians.
+    /// Size of the decoder's file, if it is wrong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bytes_found: Option<u64>,
-    /// The value, if the reference decoder could tell.
+    /// The value, if the reference decoder gives the right one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<Value>,
-    /// The unit that carries the Gaussian.
+    /// The unit from which the Gaussian was decoded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub carrier: Option<Carrier>,
-    /// Clauses to read: those of the attribute in such a unit, then those of the vector.
+    pub unit: Option<SourceUnit>,
+    /// Clauses to read: those that define the attribute, then those of the vector.
     pub read: Vec<String>,
 }
 
@@ -47,7 +47,7 @@ pub struct Difference {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Value {
-    /// Place of the Gaussian in the frame, from 0.
+    /// Index of the Gaussian in the frame, from 0.
     pub gaussian: u64,
     /// Plane of the attribute, from 0.
     pub component: u64,
@@ -55,20 +55,20 @@ pub struct Value {
     pub expected: i32,
     /// The decoder's.
     pub found: i32,
-    /// Values of the attribute in this frame that differ.
+    /// Number of values of the attribute in this frame that differ.
     pub differing: u64,
 }
 
-/// Looks at the files of a case that failed by them.
+/// Explains a failure by the files of a case.
 pub(crate) fn explain(case: &Case<'_>, output: &Output) -> (Option<Symptom>, Option<Difference>) {
     let files = Files::compare(case, output);
     let whole = symptom_of_files(case, output, &files);
-    let Ok(stream) = std::fs::read(case.stream) else { return (whole, None) };
-    let carriers = Carriers::of(&stream);
+    let Ok(stream) = case.input() else { return (whole, None) };
+    let units = SourceUnits::of(&stream);
     let Some(&(state, attribute)) = files
         .wrong
         .iter()
-        .min_by_key(|(state, attribute)| (carriers.coding_order(state.frame), state.frame, *attribute))
+        .min_by_key(|(state, attribute)| (units.coding_order(state.frame), state.frame, *attribute))
     else {
         return (whole, None);
     };
@@ -82,17 +82,17 @@ pub(crate) fn explain(case: &Case<'_>, output: &Output) -> (Option<Symptom>, Opt
         gaussians: state.gaussians,
         bytes_found: None,
         value: None,
-        carrier: None,
+        unit: None,
         read: Vec::new(),
     };
     let decoded = case.op().parse().map(|point| Decoded::of(&stream, point, case.mode())).unwrap_or_default();
-    let symptom = difference.compare(&decoded, state, &found, &carriers);
+    let symptom = difference.compare(&decoded, state, &found, &units);
     let more = case.vector.clauses.iter().filter(|clause| !difference.read.contains(clause)).cloned();
     let more: Vec<String> = more.collect();
     difference.read.extend(more);
     let of_values = symptom.filter(|&symptom| symptom != Symptom::Unrelated || files.wrong.len() > 1);
-    // Values before compensation are those of a higher point too, as far as that has the same Gaussians; the other mode
-    // differs in compensation too, and in more.
+    // Values before compensation are also those of a higher point, if that has the same Gaussians; the other mode differs
+    // in more than compensation.
     let is_other_mode = whole == Some(Symptom::OtherMode);
     let uncompensated = of_values.filter(|&symptom| symptom == Symptom::Uncompensated && !is_other_mode);
     let best = uncompensated.or(whole).or(of_values);
@@ -100,18 +100,18 @@ pub(crate) fn explain(case: &Case<'_>, output: &Output) -> (Option<Symptom>, Opt
 }
 
 impl Difference {
-    /// Finds the first value that differs; gives what the file resembles.
+    /// Finds the first value that differs; returns what the file resembles.
     fn compare(
         &mut self,
         decoded: &Decoded,
         state: &State,
         found: &[u8],
-        carriers: &Carriers,
+        units: &SourceUnits,
     ) -> Option<Symptom> {
-        let frame = decoded.frames.iter().find(|frame| frame.number == state.frame)?;
+        let frame = decoded.frames.iter().find(|frame| frame.index == state.frame)?;
         let shown = frame.clone().into_shown();
         let expected = self.attribute.values(&shown);
-        // The values of a reference that is wrong itself would mislead.
+        // Values of a reference that is wrong itself would mislead.
         if state.planes.get(&self.attribute) != Some(&digest::sha256(&to_bytes(&expected))) {
             return None;
         }
@@ -119,17 +119,17 @@ impl Difference {
             resemblance::of_file(&expected, found, shown.len(), &self.attribute.values(&frame.planes));
         if found.len() != expected.len().saturating_mul(4) {
             self.bytes_found = Some(found.len() as u64);
-            self.read.extend(["7.9", "7.18.2"].map(str::to_owned));
+            self.read.extend(["7.9.1", "7.8.2"].map(str::to_owned));
             return symptom;
         }
         self.value = first(&expected, &from_bytes(found), shown.len());
         let gaussian = self.value.map_or(0, |value| value.gaussian);
-        let (carrier, clauses) = carriers.find(frame, gaussian, self.attribute);
-        self.carrier = carrier;
+        let (unit, clauses) = units.find(frame, gaussian, self.attribute);
+        self.unit = unit;
         let first = match symptom {
-            Some(Symptom::Uncompensated) => &["7.18.3"][..],
-            Some(Symptom::OtherOrder) => &["7.9", "7.18.2"],
-            Some(Symptom::OtherPlanes | Symptom::Interleaved | Symptom::BigEndian) => &["7.9"],
+            Some(Symptom::Uncompensated) => &["7.8.3"][..],
+            Some(Symptom::OtherOrder) => &["7.9.1", "7.8.2"],
+            Some(Symptom::OtherPlanes | Symptom::Interleaved | Symptom::BigEndian) => &["7.9.1"],
             _ => clauses,
         };
         self.read.extend(first.iter().map(|&clause| clause.to_owned()));
@@ -142,10 +142,10 @@ fn first(expected: &[i32], found: &[i32], gaussians: usize) -> Option<Value> {
     let gaussians = gaussians.max(1);
     let differing =
         || expected.iter().zip(found).enumerate().filter(|(_, (expected, found))| expected != found);
-    let (place, (&expected, &found)) = differing().min_by_key(|(place, _)| place % gaussians)?;
+    let (index, (&expected, &found)) = differing().min_by_key(|(index, _)| index % gaussians)?;
     Some(Value {
-        gaussian: (place % gaussians) as u64,
-        component: (place / gaussians) as u64,
+        gaussian: (index % gaussians) as u64,
+        component: (index / gaussians) as u64,
         expected,
         found,
         differing: differing().count() as u64,
@@ -179,7 +179,7 @@ fn symptom_of_files(case: &Case<'_>, output: &Output, files: &Files<'_>) -> Opti
     others().any(|point| shows(&point)).then_some(Symptom::OtherPoint)
 }
 
-/// Whether the planes that were written are those of these frames, called as those of others.
+/// Whether the planes that were written are those of these frames under other indices.
 fn are_renumbered(states: &[&State], output: &Output) -> bool {
     let mut found: BTreeMap<u32, BTreeMap<Attribute, &String>> = BTreeMap::new();
     for (&(frame, attribute), planes) in &output.planes {
@@ -195,7 +195,7 @@ fn are_renumbered(states: &[&State], output: &Output) -> bool {
     found == wanted
 }
 
-/// Whether the frames that are missing are all those of a type and no others.
+/// Whether the missing frames are all those of a type and no others.
 fn is_a_type_missing(states: &[&State], files: &Files<'_>) -> bool {
     let is_missing = |state: &State| files.missing.iter().any(|(missing, _)| missing.frame == state.frame);
     let (missing, there): (Vec<&State>, Vec<&State>) = states.iter().partition(|state| is_missing(state));
@@ -204,7 +204,7 @@ fn is_a_type_missing(states: &[&State], files: &Files<'_>) -> bool {
     missing.iter().all(of_kind) && !there.iter().any(of_kind)
 }
 
-/// Whether the planes that were written are those of these frames, neither more nor fewer.
+/// Whether the planes that were written are exactly those of these frames.
 fn is_output(states: &[&State], output: &Output) -> bool {
     let wanted = states
         .iter()
@@ -212,6 +212,6 @@ fn is_output(states: &[&State], output: &Output) -> bool {
     let mut count = 0_usize;
     let all = wanted
         .inspect(|_| count = count.saturating_add(1))
-        .all(|(place, sha256)| output.planes.get(&place).is_some_and(|planes| planes.sha256 == *sha256));
+        .all(|(key, sha256)| output.planes.get(&key).is_some_and(|planes| planes.sha256 == *sha256));
     all && count == output.planes.len()
 }

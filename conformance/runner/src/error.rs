@@ -1,12 +1,12 @@
-//! Why a run cannot be made: files and settings. What a decoder does wrong is no error but a result.
+//! Errors of files and settings. What a decoder does wrong is a result instead.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The result of what needs files or settings.
+/// The result of an operation that needs files or settings.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Why a run cannot be made.
+/// An error of files or settings.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file system refused.

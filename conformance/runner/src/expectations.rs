@@ -1,12 +1,12 @@
-//! Cases that a decoder is known to fail: a list that cannot go stale.
+//! The list of expected failures.
 //!
-//! A line is `vector[@op[/mode]] outcome  # why`. It stands for every case of the vector, or of its operating point, and
-//! there are no patterns. Each of these cases has to end in just that outcome, or the run fails.
+//! A line is `vector[@op[/mode]] outcome  # why`. It stands for every case of the vector, or of its operating point; there
+//! are no patterns. Each of these cases has to have this outcome, or the run fails, so that the list stays up to date.
 
 use crate::case::Case;
 use crate::error::{Error, Result, read_text};
-use crate::nearest::nearest;
 use crate::result::{CaseResult, Outcome};
+use crate::suggest::closest;
 use crate::suite::Suite;
 use std::path::Path;
 
@@ -39,13 +39,13 @@ impl Expectations {
             None => Ok(list),
             Some(Entry { line, case, .. }) => {
                 let name = case.split('@').next().unwrap_or_default();
-                let near = match cases.iter().any(|known| known.split('@').next() == Some(name)) {
-                    true => nearest(case, cases.iter().map(String::as_str)),
-                    false => nearest(name, suite.vectors.iter().map(|located| located.vector.name.as_str())),
+                let similar = match cases.iter().any(|known| known.split('@').next() == Some(name)) {
+                    true => closest(case, cases.iter().map(String::as_str)),
+                    false => closest(name, suite.vectors.iter().map(|located| located.vector.name.as_str())),
                 };
                 Err(refused(format!(
-                    "line {line}: there is no case {case}; the nearest are {}",
-                    near.join(", ")
+                    "line {line}: there is no case {case}; similar ones are {}",
+                    similar.join(", ")
                 )))
             }
         }
@@ -53,9 +53,9 @@ impl Expectations {
 
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut entries = Vec::new();
-        for (place, line) in text.lines().enumerate() {
+        for (index, line) in text.lines().enumerate() {
             let (entry, why) = line.split_once('#').unwrap_or((line, ""));
-            let line = place.saturating_add(1);
+            let line = index.saturating_add(1);
             let words: Vec<&str> = entry.split_whitespace().collect();
             let [case, outcome] = words.as_slice() else {
                 if words.is_empty() {
@@ -70,14 +70,14 @@ impl Expectations {
                 return Err(format!("line {line}: patterns are not allowed: name each vector"));
             }
             if !Outcome::FAILURES.contains(outcome) {
-                return Err(format!("line {line}: {outcome} is none of {}", Outcome::FAILURES.join(", ")));
+                return Err(format!("line {line}: {outcome} is not one of {}", Outcome::FAILURES.join(", ")));
             }
             entries.push(Entry { line, case: (*case).to_owned(), outcome: (*outcome).to_owned() });
         }
         Ok(Self { entries })
     }
 
-    /// Marks the failures that were expected; gives what is stale in the list, in words.
+    /// Marks the failures that were expected; returns the entries that no longer hold, in words.
     pub fn apply(&self, results: &mut [CaseResult]) -> Vec<String> {
         self.entries.iter().flat_map(|entry| entry.apply(results)).collect()
     }

@@ -1,4 +1,4 @@
-//! Whether an answer is right.
+//! Whether an answer is correct.
 
 use crate::answer::{Answer, Ending};
 use crate::attribute::Attribute;
@@ -10,18 +10,18 @@ use crate::vector::{Acceptance, State, Verdict};
 use splatstream_format::Class;
 use std::time::Duration;
 
-/// How to judge.
+/// What is compared.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Rules {
-    /// A wrong code is a failure and not a warning.
+    /// A wrong code is a failure instead of a warning.
     pub strict: bool,
-    /// The decoder claims to write the states of its entropy decoder.
+    /// The decoder claims to write entropy states.
     pub entropy: bool,
     /// The decoder claims to write the output of 7.10.
     pub output: bool,
 }
 
-/// The files that a case should have and what is there.
+/// How the files of a case differ from those that it should have.
 #[derive(Debug, Default)]
 pub(crate) struct Files<'a> {
     /// Frames and attributes that were not written.
@@ -32,7 +32,7 @@ pub(crate) struct Files<'a> {
     pub(crate) extra: Vec<String>,
 }
 
-/// A case that was not asked: `missing` is not claimed.
+/// The result of a case that was not run: `missing` is not claimed.
 pub(crate) fn not_claimed(case: &Case<'_>, missing: String) -> CaseResult {
     let mut result = blank(case);
     result.outcome = Outcome::NotClaimed;
@@ -51,26 +51,36 @@ pub fn judge(case: &Case<'_>, answer: &Answer, output: &Output, rules: Rules) ->
         result.detail = explanation(answer);
         return result;
     };
-    let Some(place) = verdicts.iter().position(|verdict| verdict.exit_code() == code) else {
+    let right: Vec<&Verdict> = verdicts.iter().filter(|verdict| verdict.exit_code() == code).collect();
+    let Some(verdict) = matching(&right, &answer.said) else {
         (result.outcome, result.reason) = contradiction(&verdicts, code);
         result.detail = explanation(answer);
         return result;
     };
-    if let Some(verdict) = verdicts.get(place) {
-        compare_words(&mut result, verdict, &answer.said, rules);
-        if let Some(fault) = &output.fault {
-            fail(&mut result, Reason::MissingFiles, fault.clone());
-        // What another right outcome shows is not recorded, unless it shows everything.
-        } else if place == 0 || verdict.outcome == Acceptance::Accept {
-            compare_files(&mut result, case, output, rules);
-        }
+    compare_diagnosis(&mut result, case, &right, verdict, &answer.said, rules);
+    // The record says what is output if the stream is accepted, or if every right answer is a rejection.
+    let is_recorded =
+        verdict.outcome == Acceptance::Accept || case.vector.expect.outcome == Acceptance::Reject;
+    if let Some(fault) = &output.fault {
+        fail(&mut result, Reason::MissingFiles, fault.clone());
+    } else if is_recorded {
+        compare_files(&mut result, case, output, rules);
     }
     result
 }
 
-/// A result that is right so far.
+/// The verdict that a decoder means: of several with its exit code the one with its code.
+fn matching<'a>(right: &[&'a Verdict], said: &Said) -> Option<&'a Verdict> {
+    let code = match said {
+        Said::Diagnosis(diagnosis) => diagnosis.code.as_ref(),
+        Said::Nothing | Said::Unclear(_) => None,
+    };
+    let named = right.iter().find(|verdict| code.is_some() && verdict.code.as_ref() == code);
+    named.or(right.first()).copied()
+}
+
+/// The result of a case before anything was compared.
 fn blank(case: &Case<'_>) -> CaseResult {
-    let expected: Vec<String> = case.verdicts().iter().map(ToString::to_string).collect();
     CaseResult {
         vector: case.vector.name.clone(),
         area: case.vector.area.clone(),
@@ -80,7 +90,7 @@ fn blank(case: &Case<'_>) -> CaseResult {
         outcome: Outcome::Pass,
         reason: None,
         failed_as: None,
-        expected: expected.join(" or "),
+        expected: joined(case.verdicts().iter().map(ToString::to_string)),
         answer: None,
         detail: None,
         symptom: None,
@@ -108,7 +118,7 @@ fn words(ending: Ending) -> String {
         Ending::TimedOut => "killed: too long".to_owned(),
         Ending::TooMuchMemory => "killed: too much memory".to_owned(),
         Ending::TooMuchOutput => "killed: wrote too much".to_owned(),
-        Ending::NoAnswer | Ending::Stopped => "no answer".to_owned(),
+        Ending::NoAnswer | Ending::Cancelled => "no answer".to_owned(),
     }
 }
 
@@ -117,12 +127,12 @@ fn broken_off(ending: Ending) -> (Outcome, Option<Reason>) {
         Ending::TimedOut => (Outcome::Timeout, None),
         Ending::TooMuchMemory => (Outcome::Fail, Some(Reason::TooMuchMemory)),
         Ending::TooMuchOutput => (Outcome::Fail, Some(Reason::TooMuchOutput)),
-        Ending::Code(_) | Ending::Signal(_) | Ending::NoAnswer | Ending::Stopped => (Outcome::Crash, None),
+        Ending::Code(_) | Ending::Signal(_) | Ending::NoAnswer | Ending::Cancelled => (Outcome::Crash, None),
     }
 }
 
-/// An answer that no verdict of the case allows.
-fn contradiction(verdicts: &[&Verdict], code: i32) -> (Outcome, Option<Reason>) {
+/// The outcome for an answer that is not right.
+fn contradiction(verdicts: &[Verdict], code: i32) -> (Outcome, Option<Reason>) {
     let accepts = verdicts.first().is_some_and(|verdict| verdict.outcome == Acceptance::Accept);
     match Class::of_exit_code(code) {
         Some(Class::Unsupported) if accepts => (Outcome::Unsupported, None),
@@ -133,18 +143,31 @@ fn contradiction(verdicts: &[&Verdict], code: i32) -> (Outcome, Option<Reason>) 
     }
 }
 
-/// Compares what the decoder says of a rejection. The code counts, and the class if it is named; clause and byte are told to
-/// people.
-fn compare_words(result: &mut CaseResult, verdict: &Verdict, said: &Said, rules: Rules) {
+/// Compares what the decoder reports. The code counts, and class and lost frames if they are given; differences of clause
+/// and byte are notes for people.
+fn compare_diagnosis(
+    result: &mut CaseResult,
+    case: &Case<'_>,
+    right: &[&Verdict],
+    verdict: &Verdict,
+    said: &Said,
+    rules: Rules,
+) {
+    if let Said::Diagnosis(said) = said {
+        compare_lost(result, case, said);
+    }
     if verdict.outcome == Acceptance::Accept {
         return;
     }
     let silence = match said {
         Said::Diagnosis(said) => {
-            compare_diagnosis(result, verdict, said, rules);
+            compare_code(result, right, verdict, said, rules);
+            if case.is_whole() {
+                compare_location(result, verdict, said);
+            }
             said.code.is_none().then(|| "the JSON object has no code".to_owned())
         }
-        Said::Nothing => Some("no code: the last line on standard error is no JSON object".to_owned()),
+        Said::Nothing => Some("no code: the last line on standard error is not a JSON object".to_owned()),
         Said::Unclear(why) => Some(format!("no code: {why}")),
     };
     if let (Some(why), true) = (silence, rules.strict) {
@@ -152,20 +175,40 @@ fn compare_words(result: &mut CaseResult, verdict: &Verdict, said: &Said, rules:
     }
 }
 
-fn compare_diagnosis(result: &mut CaseResult, verdict: &Verdict, said: &Diagnosis, rules: Rules) {
+/// Compares the ranges of lost frames where both the decoder and the record have them.
+fn compare_lost(result: &mut CaseResult, case: &Case<'_>, said: &Diagnosis) {
+    if let (Some(point), Some(found)) = (case.point, &said.lost)
+        && *found != point.lost
+    {
+        let wanted = &point.lost;
+        fail(result, Reason::WrongLost, format!("the lost frames are {found:?} and should be {wanted:?}"));
+    }
+}
+
+fn compare_code(
+    result: &mut CaseResult,
+    right: &[&Verdict],
+    verdict: &Verdict,
+    said: &Diagnosis,
+    rules: Rules,
+) {
     let mut complain = |message: String| match rules.strict {
         true => fail(result, Reason::WrongCode, message),
         false => result.warnings.push(message),
     };
     let class = verdict.class.map_or("", Class::name);
     if let Some(found) = said.class.as_deref().filter(|&found| found != class) {
-        complain(format!("the JSON object says {found} and the exit code {class}"));
+        complain(format!("the JSON object says {found}, the exit code {class}"));
     }
-    if let (Some(wanted), Some(found)) = (&verdict.code, &said.code)
-        && wanted != found
+    if let (Some(_), Some(found)) = (&verdict.code, &said.code)
+        && verdict.code != said.code
     {
+        let wanted = joined(right.iter().filter_map(|verdict| verdict.code.clone()));
         complain(format!("the code is {found} and should be {wanted}"));
     }
+}
+
+fn compare_location(result: &mut CaseResult, verdict: &Verdict, said: &Diagnosis) {
     if let (Some(wanted), Some(found)) = (&verdict.clause, &said.clause)
         && wanted != found
     {
@@ -178,7 +221,11 @@ fn compare_diagnosis(result: &mut CaseResult, verdict: &Verdict, said: &Diagnosi
     }
 }
 
-/// Makes a failure of a result; the first thing that is wrong with it is told.
+fn joined(texts: impl Iterator<Item = String>) -> String {
+    texts.collect::<Vec<_>>().join(" or ")
+}
+
+/// Turns a result into a failure, unless it is one already: only the first reason is reported.
 fn fail(result: &mut CaseResult, reason: Reason, detail: String) {
     if result.outcome == Outcome::Pass {
         (result.outcome, result.reason, result.detail) = (Outcome::Fail, Some(reason), Some(detail));
@@ -203,7 +250,7 @@ fn compare_files(result: &mut CaseResult, case: &Case<'_>, output: &Output, rule
     }
 }
 
-/// Compares the output of 7.10: all that is there, and all of the case if it is claimed.
+/// Compares the output of 7.10: files that exist, and all that should exist if it is claimed.
 fn compare_floats(case: &Case<'_>, output: &Output, rules: Rules) -> Option<String> {
     let states = case.states()?;
     let is_wrong = |state: &&&State| match (output.floats.get(&state.frame), &state.f32) {
@@ -214,16 +261,16 @@ fn compare_floats(case: &Case<'_>, output: &Output, rules: Rules) -> Option<Stri
     states.iter().find(is_wrong).map(|state| {
         let name = floats_name(state.frame);
         let fault =
-            if output.floats.contains_key(&state.frame) { "differs" } else { "is claimed and not there" };
+            if output.floats.contains_key(&state.frame) { "differs" } else { "is claimed and missing" };
         format!("{name} {fault}; the planes are right: read 7.10")
     })
 }
 
-/// Compares the states of the entropy decoder: all that are there, and if they are claimed all of the vector at its highest
-/// point.
+/// Compares entropy states: files that exist, and if they are claimed all of the vector at its highest point. Those of a
+/// decoder that starts inside a stream are not compared.
 fn compare_entropy(case: &Case<'_>, output: &Output, rules: Rules) -> Option<String> {
     let units = &case.vector.units;
-    if units.is_empty() {
+    if units.is_empty() || case.vector.inside.is_some() {
         return None;
     }
     let wanted_of = |unit: usize| units.get(unit).and_then(|record| record.entropy.as_ref());
@@ -242,10 +289,10 @@ fn compare_entropy(case: &Case<'_>, output: &Output, rules: Rules) -> Option<Str
     let name = entropy_name(unit);
     Some(match (output.entropy.get(&unit), wanted_of(unit)) {
         _ if is_shifted => "the entropy states are those of the units before: units count from 0".to_owned(),
-        (None, _) => format!("{name} is claimed and not there; the planes are right"),
+        (None, _) => format!("{name} is claimed and missing; the planes are right"),
         (Some(_), None) => format!("{name}: unit {unit} has no entropy state; the planes are right"),
         (Some(found), Some(wanted)) if found.to_lowercase() == *wanted => {
-            format!("{name} is {found}: write lower-case letters")
+            format!("{name} is {found}: use lower-case digits")
         }
         (Some(found), Some(wanted)) => {
             let all = wrong.len();
@@ -255,7 +302,7 @@ fn compare_entropy(case: &Case<'_>, output: &Output, rules: Rules) -> Option<Str
 }
 
 impl<'a> Files<'a> {
-    /// Compares the folder of a case with its vector. Where that does not say what is shown, only names are looked at.
+    /// Compares the folder of a case with its vector. If the vector does not say what is shown, only names are checked.
     pub(crate) fn compare(case: &Case<'a>, output: &Output) -> Self {
         let mut files = Self { extra: output.extra.clone(), ..Self::default() };
         let Some(states) = case.states() else { return files };
@@ -283,7 +330,7 @@ fn file_name((state, attribute): &(&State, Attribute)) -> String {
     attribute.file_name(state.frame)
 }
 
-/// What is missing, and what is there in its place by the look of it.
+/// What is missing, and which unexpected files may be meant instead.
 fn missing(files: &Files<'_>) -> String {
     let missing = naming("missing", files.missing.iter().map(file_name));
     if files.extra.is_empty() {
@@ -303,15 +350,15 @@ fn naming(what: &str, names: impl Iterator<Item = String>) -> String {
     }
 }
 
-/// What is wrong with an answer: what the runner found, and what the decoder says last.
+/// What is wrong with an answer: what the runner found, and the decoder's last message.
 fn explanation(answer: &Answer) -> Option<String> {
-    let said = last_line(&answer.complaint);
+    let said = last_line(&answer.stderr);
     let parts: Vec<String> = answer.fault.iter().cloned().chain(said).collect();
     (!parts.is_empty()).then(|| parts.join("; "))
 }
 
-/// The last line of what a decoder said.
-fn last_line(complaint: &str) -> Option<String> {
-    let line = complaint.trim_end().lines().next_back()?.trim();
-    (!line.is_empty()).then(|| format!("it says: {}", line.chars().take(200).collect::<String>()))
+/// The last line of the decoder's messages.
+fn last_line(stderr: &str) -> Option<String> {
+    let line = stderr.trim_end().lines().next_back()?.trim();
+    (!line.is_empty()).then(|| format!("last message: {}", line.chars().take(200).collect::<String>()))
 }

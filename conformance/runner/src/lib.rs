@@ -1,18 +1,17 @@
-//! Runs a decoder on the vectors of the conformance suite and says, of every case, whether it is right and where it
-//! is not.
+//! Runs a decoder on the vectors of the conformance suite and reports which cases are wrong and where.
 //!
-//! A [`case`] is a [`vector`] at an operating point, shown in a mode. A [`session`] asks the decoder under test, within
-//! [`limits`]; [`judge`] compares its answer and its files with the record; [`difference`] says where wrong values part
-//! from right ones. [`mod@run`] does all of it for many cases; [`report`] tells people and machines.
+//! A [`case`] is a [`vector`] at an operating point in a mode. A [`session`] runs the decoder under test within [`limits`];
+//! [`judge`] compares its answer and its files with the record; [`difference`] finds the first wrong value. [`mod@run`] does
+//! this for many cases; [`report`] presents the results to people and programs.
 //!
-//! The runner believes nothing: it hashes the files itself, ends whole process groups, and tells apart a stream that was
-//! rejected, one that was rejected as something else, a crash and a timeout. `conformance/planted` holds decoders with
-//! one fault each, and the tests of this crate demand that each is caught for its own fault.
+//! The runner trusts nothing that a decoder reports: it hashes the files itself, kills whole process groups, and
+//! distinguishes a rejection, a rejection with the wrong class, a crash and a timeout. `conformance/planted` has decoders
+//! with one error each; its tests check that each is found for its own error.
 
 pub mod answer;
 pub mod attribute;
+pub mod cancel;
 pub mod capabilities;
-mod carrier;
 pub mod case;
 pub mod command;
 pub mod difference;
@@ -20,13 +19,12 @@ mod digest;
 pub mod error;
 pub mod expectations;
 pub mod feature;
-mod group;
-mod guard;
+mod inside;
 pub mod judge;
 pub mod limits;
 pub mod matrix;
-pub mod nearest;
 pub mod output;
+mod process_group;
 pub mod protocol;
 pub mod reference;
 pub mod report;
@@ -36,9 +34,11 @@ pub mod run;
 pub mod selection;
 pub mod serve;
 pub mod session;
-pub mod stop;
+mod source_unit;
+pub mod suggest;
 pub mod suite;
 pub mod symptom;
 pub mod vector;
+mod watchdog;
 
-pub use carrier::Carrier;
+pub use source_unit::SourceUnit;

@@ -1,4 +1,4 @@
-//! How much a decoder under test may take of the machine.
+//! How many resources a decoder under test may use.
 
 use crate::answer::Ending;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -8,9 +8,9 @@ use std::time::Duration;
 
 /// Limits of one case.
 ///
-/// Memory is what processes of the decoder hold resident together, and output is what it has written, its complaints
-/// included; both are looked at every few milliseconds. What grows faster than we look meets limits of the kernel, on
-/// Linux: data segments of twice the memory, and files as large as the output.
+/// Memory is the resident memory of all processes of the decoder, and output is what it has written, standard error
+/// included; both are checked every few milliseconds. On Linux the kernel stops what grows faster: data segments of twice
+/// the memory, and files as large as the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -20,7 +20,7 @@ pub struct Limits {
     /// Resident memory, bytes.
     #[serde(rename = "memory_bytes")]
     pub memory: u64,
-    /// Files and complaints, bytes.
+    /// Files and standard error, bytes.
     #[serde(rename = "output_bytes")]
     pub output: u64,
 }
@@ -32,14 +32,14 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Which of them a decoder has passed that ended so, and how to allow more.
-    pub(crate) fn passed(&self, ending: Ending) -> Option<String> {
+    /// Which limit a decoder has exceeded that ended so, and how to raise it.
+    pub(crate) fn exceeded(&self, ending: Ending) -> Option<String> {
         match ending {
             Ending::TimedOut => {
-                Some(format!("not done within {} s; --time SECONDS allows more", self.time.as_secs_f64()))
+                Some(format!("no answer within {} s; --time SECONDS allows more", self.time.as_secs_f64()))
             }
             Ending::TooMuchMemory => {
-                Some(format!("it held more than {}; --memory SIZE allows more", Size(self.memory)))
+                Some(format!("it used more than {}; --memory SIZE allows more", Size(self.memory)))
             }
             Ending::TooMuchOutput => {
                 Some(format!("it wrote more than {}; --output SIZE allows more", Size(self.output)))

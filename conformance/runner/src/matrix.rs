@@ -1,17 +1,17 @@
-//! Which decoder does what: a page of features and decoders. Every word of it comes from reports.
+//! A page of features and decoders, made from reports.
 
 use crate::report::{Report, Tally};
 use crate::result::{CaseResult, Outcome};
 use std::collections::BTreeSet;
 
-const HEAD: &str = "# What decoders do\n\nMade by `splatstream conformance matrix` from reports of runs. Yes: every case with this \
-    feature in the valid vectors of the whole suite was run and passed. Cells are as true as the reports: whoever doubts one runs \
-    the suite again.\n\n";
+const HEAD: &str = "# Decoders and features\n\nMade by `splatstream conformance matrix` from reports of runs. Yes: every case with this \
+    feature in the valid vectors of the whole suite was run and passed. The page is as reliable as the reports; anyone can \
+    run the suite again.\n\n";
 
 /// The page.
 ///
-/// A Yes means that every valid case with the feature in the whole suite was run and passed. The last rows are about broken
-/// streams and about the runs themselves.
+/// Yes means that every valid case with the feature in the whole suite was run and passed. The last rows are about streams
+/// with errors and about the runs.
 pub fn page(reports: &[Report]) -> String {
     let mut page = HEAD.to_owned();
     let mut row = |first: &str, cell: &dyn Fn(&Report) -> String| {
@@ -20,8 +20,8 @@ pub fn page(reports: &[Report]) -> String {
     };
     let names = names(reports);
     let name = |report: &Report| {
-        let place = reports.iter().position(|other| std::ptr::eq(other, report));
-        place.and_then(|place| names.get(place)).cloned().unwrap_or_default()
+        let index = reports.iter().position(|other| std::ptr::eq(other, report));
+        index.and_then(|index| names.get(index)).cloned().unwrap_or_default()
     };
     row("Feature", &name);
     row("---", &|_| "---".to_owned());
@@ -29,7 +29,7 @@ pub fn page(reports: &[Report]) -> String {
     for feature in features {
         row(feature, &|report| word(report, report.features.get(feature).copied().unwrap_or_default()));
     }
-    row("broken streams refused, and rightly", &|report| word(report, report.broken));
+    row("streams with errors", &|report| word(report, report.broken));
     row("no crash, no timeout", &|report| word(report, steadiness(report)));
     row("suite", &suite);
     row("day", &|report| report.date.clone());
@@ -40,18 +40,18 @@ pub fn page(reports: &[Report]) -> String {
     page
 }
 
-/// What decoders are called; of reports with the same name the later ones are numbered.
+/// The names of decoders; of those with the same name the later ones are numbered.
 fn names(reports: &[Report]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
-    for (place, Report { decoder, .. }) in reports.iter().enumerate() {
+    for (index, Report { decoder, .. }) in reports.iter().enumerate() {
         let name = decoder.name.replace('|', "\\|");
-        let before = reports.iter().take(place).filter(|other| other.decoder.name == decoder.name).count();
+        let before = reports.iter().take(index).filter(|other| other.decoder.name == decoder.name).count();
         names.push(if before == 0 { name } else { format!("{name} ({})", before.saturating_add(1)) });
     }
     names
 }
 
-/// What a tally amounts to.
+/// A tally as text.
 fn word(report: &Report, tally: Tally) -> String {
     let Tally { cases, claimed, run, pass } = tally;
     let failed = run.saturating_sub(pass);
@@ -74,7 +74,7 @@ fn word(report: &Report, tally: Tally) -> String {
     }
 }
 
-/// All cases, those that ended in a crash or a timeout as failed.
+/// All cases; those that ended in a crash or a timeout count as failed.
 fn steadiness(report: &Report) -> Tally {
     let is = |case: &CaseResult, outcome: Outcome| {
         case.outcome == outcome || case.failed_as.as_deref() == Some(outcome.name())

@@ -1,4 +1,4 @@
-//! What a decoder left in its folder. The runner hashes the files itself and believes nothing that is said about them.
+//! The files that a decoder wrote. The runner hashes them itself and trusts no digests of the decoder.
 
 use crate::attribute::Attribute;
 use crate::digest;
@@ -8,9 +8,9 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// What `u%04d.entropy` is called after its number.
+/// The end of the name of `u%04d.entropy`.
 const ENTROPY: &str = ".entropy";
-/// What a decoder may write for itself.
+/// A file that a decoder may write for its own use.
 const META: &str = "meta.json";
 
 /// The files in the folder of a case.
@@ -20,11 +20,11 @@ pub struct Output {
     pub planes: BTreeMap<(u32, Attribute), Planes>,
     /// SHA-256 of the output of 7.10 by frame.
     pub floats: BTreeMap<u32, String>,
-    /// Digest of each unit's entropy decoding, as it was written.
+    /// Entropy states by unit, as they were written.
     pub entropy: BTreeMap<usize, String>,
-    /// What has no business there.
+    /// Names of unexpected files.
     pub extra: Vec<String>,
-    /// What the decoder did to the folder so that it cannot be read.
+    /// Why the folder cannot be read, if the decoder is to blame.
     pub fault: Option<String>,
 }
 
@@ -43,10 +43,10 @@ impl Output {
     /// Reads a folder.
     ///
     /// # Errors
-    /// The folder or a file in it cannot be read, and not because of what the decoder did.
+    /// The folder or a file in it cannot be read, and the decoder is not to blame.
     pub fn read(folder: &Path) -> Result<Self> {
         match Self::read_whole(folder) {
-            Err(Error::File { path, source, .. }) if is_of_the_decoder(&source) => {
+            Err(Error::File { path, source, .. }) if is_caused_by_decoder(&source) => {
                 let fault = match path == folder && source.kind() != ErrorKind::PermissionDenied {
                     true => "the decoder removed its output folder".to_owned(),
                     false => format!("{} cannot be read: {source}", path.display()),
@@ -64,7 +64,7 @@ impl Output {
             fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>).map_err(failed)?;
         for entry in entries {
             let name = entry.file_name().to_string_lossy().into_owned();
-            // Links are not followed: what they lead to was not written by the decoder.
+            // Links are not followed: the decoder did not write what they lead to.
             let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
             output.take(entry.path(), name, is_file)?;
         }
@@ -74,10 +74,10 @@ impl Output {
 
     fn take(&mut self, path: PathBuf, name: String, is_file: bool) -> Result<()> {
         let read = |path: &Path| fs::read(path).map_err(Error::file("read", path));
-        if let (Some(place), true) = (Attribute::of_file_name(&name), is_file) {
+        if let (Some(key), true) = (Attribute::of_file_name(&name), is_file) {
             let bytes = read(&path)?;
             let (length, sha256) = (bytes.len() as u64, digest::sha256(&bytes));
-            self.planes.insert(place, Planes { path, bytes: length, sha256 });
+            self.planes.insert(key, Planes { path, bytes: length, sha256 });
         } else if let (Some(frame), true) = (floats_frame(&name), is_file) {
             self.floats.insert(frame, digest::sha256(&read(&path)?));
         } else if let (Some(unit), true) = (entropy_unit(&name), is_file) {
@@ -89,8 +89,8 @@ impl Output {
     }
 }
 
-/// Whether a decoder can have brought this about in its folder.
-fn is_of_the_decoder(error: &io::Error) -> bool {
+/// Whether a decoder can have caused this in its folder.
+fn is_caused_by_decoder(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::PermissionDenied)
 }
 
@@ -109,7 +109,7 @@ pub fn entropy_name(unit: usize) -> String {
     format!("u{unit:04}{ENTROPY}")
 }
 
-/// The unit whose entropy decoding a file is about, by its name.
+/// The unit whose entropy state a file has, by its name.
 fn entropy_unit(name: &str) -> Option<usize> {
     let unit: usize = name.strip_prefix('u')?.strip_suffix(ENTROPY)?.parse().ok()?;
     (name == entropy_name(unit)).then_some(unit)

@@ -1,15 +1,15 @@
-//! What runner and decoder say to each other: exit codes, the last line of standard error, lines of a process that
-//! answers many requests.
+//! The protocol between runner and decoder: requests, exit codes, the last line of standard error, and the lines of a
+//! process that answers many requests.
 
 use crate::vector::Mode;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The operating point of a decoder that is not told one: every unit of known type belongs to it (SS-OP-006).
+/// The highest operating point: every unit belongs to it.
 pub const EVERYTHING: &str = "s3,t3,r9";
 
-/// What a decoder may say about its verdict: the last line of its standard error, or the end of its answer.
-/// What else the object holds is the decoder's own business.
+/// What a decoder may report besides its verdict: the last line of its standard error, or the end of its answer. Other
+/// keys of the object are ignored.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Diagnosis {
     /// Class of clause 9.1, in words.
@@ -18,26 +18,29 @@ pub struct Diagnosis {
     /// Code of clause 9.2.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub code: Option<String>,
-    /// The broken clause.
+    /// The violated clause.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clause: Option<String>,
-    /// Index of the unit at fault.
+    /// Index of the unit with the error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<u64>,
-    /// Absolute offset of the fault.
+    /// Absolute offset of the error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub byte: Option<u64>,
+    /// Display indices of lost frames that are not output, as ranges with both ends included.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost: Option<Vec<[u32; 2]>>,
 }
 
-/// What a decoder said beside its verdict.
+/// What a decoder reports besides its verdict.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Said {
     /// Nothing.
     #[default]
     Nothing,
-    /// What can be understood.
+    /// A JSON object that can be understood.
     Diagnosis(Diagnosis),
-    /// Something else: where it stands and what is wrong with it.
+    /// Something else: what is wrong with it.
     Unclear(String),
 }
 
@@ -48,7 +51,7 @@ impl Said {
         Self::of("the last line on standard error", line)
     }
 
-    fn of(place: &str, text: &str) -> Self {
+    fn of(source: &str, text: &str) -> Self {
         let text = text.trim();
         if text.is_empty() {
             return Self::Nothing;
@@ -57,40 +60,40 @@ impl Said {
         let is_object = text.starts_with('{');
         match serde_json::from_str(text) {
             Ok(diagnosis) if is_object => Self::Diagnosis(diagnosis),
-            Err(error) if is_object => Self::Unclear(format!("{place}, {}: {error}", quoted(text))),
-            _ => Self::Unclear(format!("{place} is no JSON object: {}", quoted(text))),
+            Err(error) if is_object => Self::Unclear(format!("{source}, {}: {error}", quoted(text))),
+            _ => Self::Unclear(format!("{source} is not a JSON object: {}", quoted(text))),
         }
     }
 }
 
-/// A text in quotes, not too long.
+/// A text in quotes, shortened.
 fn quoted(text: &str) -> String {
-    const MOST: usize = 80;
-    let start: String = text.chars().take(MOST).collect();
-    let rest = if text.chars().nth(MOST).is_some() { "..." } else { "" };
+    const MAX: usize = 80;
+    let start: String = text.chars().take(MAX).collect();
+    let rest = if text.chars().nth(MAX).is_some() { "..." } else { "" };
     format!("{start:?}{rest}")
 }
 
-/// One thing that a decoder is asked to do.
+/// One request to a decoder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Request {
     /// The stream.
     pub input: PathBuf,
-    /// An operating point as 7.11 writes it.
+    /// An operating point as 7.2 writes it.
     pub op: String,
-    /// What to show.
+    /// The mode.
     pub mode: Mode,
-    /// An empty folder for what is shown.
+    /// An empty folder for the output.
     pub out: PathBuf,
 }
 
 impl Request {
-    /// The line that asks a persistent process.
+    /// The line that a persistent process reads.
     pub fn line(&self) -> String {
         format!("{}\t{}\t{}\t{}\n", self.input.display(), self.op, self.mode, self.out.display())
     }
 
-    /// The request that a line asks; none if it is not one.
+    /// The request in a line; none if it is not one.
     pub fn parse(line: &str) -> Option<Self> {
         let mut parts = line.trim_end_matches(['\r', '\n']).split('\t');
         let (input, op, mode) = (parts.next()?, parts.next()?, parts.next()?.parse().ok()?);
@@ -100,17 +103,17 @@ impl Request {
     }
 }
 
-/// The answer of a persistent process: an exit code, and a diagnosis if it follows after a tab.
+/// The answer of a persistent process: an exit code, and a diagnosis if one follows after a tab.
 ///
 /// # Errors
-/// Why the line is no answer.
+/// Why the line is not an answer.
 pub fn parse_answer(line: &str) -> Result<(i32, Said), String> {
     let line = line.trim_end_matches(['\r', '\n']);
     let (code, rest) = line.split_once('\t').unwrap_or((line, ""));
     let code = code.trim().parse().map_err(|_| {
         let first = line.split_whitespace().next().unwrap_or_default();
         match first.parse::<i32>() {
-            Ok(_) => format!("the answer {} has no tab behind the exit code", quoted(line)),
+            Ok(_) => format!("the answer {} has no tab after the exit code", quoted(line)),
             Err(_) => {
                 let advice = "standard output is for answers only";
                 format!("the answer {} does not start with an exit code; {advice}", quoted(line))
@@ -145,7 +148,7 @@ mod tests {
         assert_eq!(parse_answer("11\t{\"code\":\"RANGE\",\"byte\":7}\n"), Ok((11, said)));
         assert_eq!(parse_answer("0\r\n"), Ok((0, Said::Nothing)));
         assert!(matches!(parse_answer("11\tbroken"), Ok((11, Said::Unclear(_)))));
-        assert!(parse_answer("11 {}\n").unwrap_err().ends_with("has no tab behind the exit code"));
+        assert!(parse_answer("11 {}\n").unwrap_err().ends_with("has no tab after the exit code"));
         let error = parse_answer("decoding in.gss\n").unwrap_err();
         assert!(
             error.starts_with("the answer \"decoding in.gss\" does not start with an exit code"),
@@ -163,8 +166,8 @@ mod tests {
         assert_eq!(code("warning\n{\"code\":\"X\",\"mine\":1}\n"), "X");
         assert_eq!(code(""), "nothing");
         for (text, why) in [
-            ("{\"code\":\"X\"}\nbye\n", "is no JSON object: \"bye\""),
-            ("[\"invalid\",\"X\",null,null,null]", "is no JSON object"),
+            ("{\"code\":\"X\"}\nbye\n", "is not a JSON object: \"bye\""),
+            ("[\"invalid\",\"X\",null,null,null]", "is not a JSON object"),
             ("{\"code\":5}", "invalid type"),
         ] {
             assert!(code(text).contains(why), "{}", code(text));

@@ -1,55 +1,63 @@
-//! The reference decoder behind the protocol: what the runner compares values with, and what is tested if no other
-//! decoder is given.
+//! The reference decoder with the interface of the protocol. The runner takes right values from it, and tests it if no
+//! other decoder is given.
 
 use crate::attribute::{Attribute, to_bytes};
 use crate::capabilities::Capabilities;
+use crate::inside;
 use crate::output::{entropy_name, floats_name};
 use crate::protocol::{Diagnosis, Request};
 use crate::vector::Mode;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
-use splatstream_decoder::stream::decode_stream;
+use splatstream_decoder::stream::{decode_stream, decode_stream_inside};
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_format::unit::{Delivery, Stream};
+use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Error, Limits};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// A stream as the reference decoder shows it.
+/// What the reference decoder makes of a stream.
 #[derive(Debug, Default)]
 pub struct Decoded {
-    /// Frames, in the order in which they came out.
+    /// Frames, in output order.
     pub frames: Vec<DecodedFrame>,
-    /// What holds for the whole sequence, once a frame came out.
+    /// The sequence parameters; none if no frame is output.
     pub sequence: Option<SequenceParameters>,
-    /// The verdict: the first error, confined or fatal.
+    /// The verdict: the first error.
     pub error: Option<Error>,
-    /// Entropy states by unit, counted from 0.
+    /// Display indices of lost frames that are not output.
+    pub lost: Vec<[u32; 2]>,
+    /// Entropy states with the indices of their units.
     pub entropy: Vec<(usize, u64)>,
 }
 
 impl Decoded {
-    /// Decodes a stream as far as it goes (clause 7.20).
+    /// Decodes a stream in a mode, also after errors.
     pub fn of(bytes: &[u8], operating_point: OperatingPoint, mode: Mode) -> Self {
-        let limits = Limits { max_gaussians: Limits::gaussians_of_level(4), ..Limits::default() };
         let subset = mode == Mode::Subset;
-        let options =
-            Options { limits, operating_point, subset, tolerant: true, entropy: true, ..Options::default() };
+        let limits = Limits::of_level(4);
+        let options = Options { limits, operating_point, subset, entropy: true, ..Options::default() };
         let mut decoded = Self::default();
-        let summary = decode_stream(bytes, &options, |sequence, frame| {
+        let on_frame = |sequence: &SequenceParameters, frame| {
             decoded.sequence.get_or_insert(*sequence);
             decoded.frames.push(frame);
             ControlFlow::Continue(())
-        });
+        };
+        let summary = match mode {
+            Mode::Full | Mode::Subset => decode_stream(bytes, &options, on_frame),
+            Mode::Inside => decode_stream_inside(bytes, inside::first_gop(bytes), &options, on_frame),
+        };
         decoded.entropy = entropy_states(bytes, &decoded.frames);
-        decoded.error = decoded.frames.iter().find_map(|frame| frame.lost).or(summary.end);
+        decoded.error = summary.verdict();
+        decoded.lost = summary.lost.iter().map(|range| [*range.start(), *range.end()]).collect();
         decoded
     }
 
-    /// Writes every frame as the protocol says, planes and output of 7.10, and entropy states.
+    /// Writes the files of the protocol: planes, output of 7.10 and entropy states.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -61,12 +69,12 @@ impl Decoded {
         // Frames have the attributes of their sequence, even frames without Gaussians.
         let has_sh = sequence.sh_dimension() > 0;
         for frame in self.frames {
-            let number = frame.number;
+            let index = frame.index;
             let shown = frame.into_shown();
             for attribute in
                 Attribute::ALL.into_iter().filter(|&attribute| attribute != Attribute::Sh || has_sh)
             {
-                fs::write(folder.join(attribute.file_name(number)), to_bytes(&attribute.values(&shown)))?;
+                fs::write(folder.join(attribute.file_name(index)), to_bytes(&attribute.values(&shown)))?;
             }
             let gaussians = to_gaussians(shown, &sequence);
             let planes = gaussians.planes();
@@ -75,12 +83,12 @@ impl Decoded {
                 [&planes.position[..], &planes.log_scale, opacity, &planes.rotation, &planes.dc, &planes.sh]
                     .concat();
             let bytes: Vec<u8> = planes.concat().into_iter().flat_map(f32::to_le_bytes).collect();
-            fs::write(folder.join(floats_name(number)), bytes)?;
+            fs::write(folder.join(floats_name(index)), bytes)?;
         }
         Ok(())
     }
 
-    /// The answer: exit code, and what is wrong.
+    /// The answer: exit code and diagnosis.
     pub fn verdict(&self) -> (i32, Option<Diagnosis>) {
         let Some(error) = self.error else { return (0, None) };
         let diagnosis = Diagnosis {
@@ -89,6 +97,7 @@ impl Decoded {
             clause: Some(error.clause.to_owned()),
             unit: None,
             byte: Some(error.at),
+            lost: Some(self.lost.clone()),
         };
         (error.class().exit_code().into(), Some(diagnosis))
     }
@@ -99,10 +108,10 @@ pub fn capabilities() -> Capabilities {
     Capabilities { entropy: true, output: true, ..Capabilities::everything("reference") }
 }
 
-/// Does what is asked; makes the folder if it is not there.
+/// Answers a request; makes the output folder if it does not exist.
 ///
 /// # Errors
-/// The stream cannot be read, what is shown cannot be written, or the operating point is none.
+/// The stream cannot be read, files cannot be written, or the operating point is not valid.
 pub fn answer(request: &Request) -> io::Result<(i32, Option<Diagnosis>)> {
     let decoded = decode(request)?;
     let verdict = decoded.verdict();
@@ -111,32 +120,21 @@ pub fn answer(request: &Request) -> io::Result<(i32, Option<Diagnosis>)> {
     Ok(verdict)
 }
 
-/// The entropy states of frames with the places of their units in the stream.
+/// The entropy states of frames with the indices of their units, in stream order.
 fn entropy_states(bytes: &[u8], frames: &[DecodedFrame]) -> Vec<(usize, u64)> {
-    let Ok(stream) = Stream::open(bytes, &Limits::default()) else { return Vec::new() };
+    let Ok(stream) = Stream::open(bytes, &Limits::of_level(4)) else { return Vec::new() };
+    let states: BTreeMap<u64, u64> =
+        frames.iter().flat_map(|frame| &frame.entropy).map(|unit| (unit.payload_at, unit.state)).collect();
     let mut units = stream.units();
-    let starts: Vec<u64> = std::iter::from_fn(|| units.next_unit())
-        .map_while(|delivery| {
-            delivery.ok().map(|delivery| match delivery {
-                Delivery::Intact(unit) => unit.payload_at,
-                // A damaged unit has no state.
-                Delivery::Damaged(_) => 0,
-            })
-        })
-        .collect();
-    let states = frames.iter().flat_map(|frame| &frame.entropy);
-    states
-        .filter_map(|entropy| {
-            let unit = starts.iter().position(|&start| start == entropy.payload_at)?;
-            Some((unit, entropy.state))
-        })
-        .collect()
+    let units = std::iter::from_fn(|| units.next_unit()).map_while(Result::ok).enumerate();
+    let state = |(index, unit): (usize, Unit<'_>)| Some((index, *states.get(&unit.payload_at)?));
+    units.filter_map(state).collect()
 }
 
-/// The stream of a request, decoded as it asks.
+/// Decodes the stream of a request.
 ///
 /// # Errors
-/// The stream cannot be read, or the operating point is none.
+/// The stream cannot be read, or the operating point is not valid.
 pub fn decode(request: &Request) -> io::Result<Decoded> {
     let point = request.op.parse().map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
     let stream = fs::read(&request.input).map_err(naming("read", &request.input))?;

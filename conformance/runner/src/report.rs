@@ -1,6 +1,7 @@
-//! What a run found, for machines: `conformance/schema/report.schema.json`. Two runs of the same decoder on the same suite
-//! give the same bytes, but for `date`.
+//! The report of a run, `conformance/schema/report.schema.json`. Two runs of the same decoder on the same suite give the
+//! same bytes except for `date`.
 
+mod causes;
 pub mod junit;
 pub mod markdown;
 pub mod summary;
@@ -22,7 +23,7 @@ use std::path::Path;
 use tally::Tallies;
 
 /// What `schema` of a report says.
-const SCHEMA: &str = "splatstream-report/2";
+const SCHEMA: &str = "splatstream-report/3";
 
 /// A report.
 #[derive(Debug, Clone, Deserialize, Serialize)]
@@ -32,26 +33,26 @@ pub struct Report {
     pub schema: String,
     /// Day of the run, `YYYY-MM-DD`, UTC.
     pub date: String,
-    /// What was run.
+    /// The suite.
     pub suite: SuiteRecord,
-    /// What ran it.
+    /// The program that ran it.
     pub runner: Runner,
-    /// Where.
+    /// The machine.
     pub system: System,
-    /// The claim of the decoder under test, its name included.
+    /// The claim of the decoder under test, with its name.
     pub decoder: Capabilities,
-    /// How it was run.
+    /// The settings of the run.
     pub settings: SettingsRecord,
     /// Cases by outcome.
     pub summary: BTreeMap<Outcome, u64>,
-    /// Of a run that was ended early: the cases that were to be run.
+    /// If the run was cancelled: the number of cases that were selected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interrupted: Option<u64>,
     /// All cases of the suite.
     pub all: Tally,
     /// Those of kind invalid and either.
     pub broken: Tally,
-    /// Cases by feature of the stream; those of kind valid alone, so that a decoder that rejects everything has none.
+    /// Cases of kind valid by feature of the stream.
     pub features: BTreeMap<String, Tally>,
     /// Entries of the list of expectations that no longer hold.
     pub stale: Vec<String>,
@@ -69,7 +70,7 @@ pub struct SuiteRecord {
     /// Version of the specification.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specification: Option<String>,
-    /// How the vectors differ from those of the version, in words; none if they do not.
+    /// How the vectors differ from those of the version, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub changed: Option<String>,
     /// Vectors in the suite.
@@ -96,19 +97,19 @@ pub struct System {
     pub os: String,
     /// Processor architecture.
     pub arch: String,
-    /// Processors that were there.
+    /// Number of processors.
     pub processors: u64,
 }
 
-/// How a report came about.
+/// The settings of a run.
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SettingsRecord {
     /// Whether a wrong code was a failure.
     pub strict: bool,
-    /// Of a case.
+    /// Limits of a case.
     pub limits: Limits,
-    /// Which cases were run; none was left out if it is empty.
+    /// Which cases were selected; all if it is empty.
     pub selection: Selection,
 }
 
@@ -167,7 +168,7 @@ impl Report {
     /// Reads a report.
     ///
     /// # Errors
-    /// The file cannot be read, or is no report.
+    /// The file cannot be read or is not a report.
     pub fn read(path: &Path) -> Result<Self> {
         let wrong = |what: String| {
             let advice = "`splatstream conformance run --report FILE.json` writes one";
@@ -175,13 +176,13 @@ impl Report {
         };
         let text = read_text(path)?;
         let value: serde_json::Value =
-            serde_json::from_str(&text).map_err(|error| wrong(format!("no report of a run: {error}")))?;
+            serde_json::from_str(&text).map_err(|error| wrong(format!("not a report of a run: {error}")))?;
         match value.get("schema").and_then(serde_json::Value::as_str) {
             Some(SCHEMA) => {}
             Some(other) => {
-                return Err(wrong(format!("the schema is {other} and not that of a report, {SCHEMA}")));
+                return Err(wrong(format!("the schema is {other} instead of {SCHEMA}")));
             }
-            None => return Err(wrong("no report of a run: it has no schema".to_owned())),
+            None => return Err(wrong("not a report of a run: it has no schema".to_owned())),
         }
         serde_json::from_value(value).map_err(|error| wrong(error.to_string()))
     }
@@ -191,7 +192,7 @@ impl Report {
         self.summary.get(&outcome).copied().unwrap_or(0)
     }
 
-    /// Cases that failed without being expected to.
+    /// Cases that failed unexpectedly.
     pub fn failures(&self) -> u64 {
         Outcome::ALL
             .into_iter()
@@ -200,7 +201,7 @@ impl Report {
             .sum()
     }
 
-    /// Whether the decoder did all that it claims: some case passed, none failed, and the list of expectations holds.
+    /// Whether some case passed, none failed, and the list of expectations holds.
     pub fn is_good(&self) -> bool {
         self.failures() == 0 && self.stale.is_empty() && self.count(Outcome::Pass) > 0
     }

@@ -1,10 +1,10 @@
-//! What the bytes of a wrong file resemble: the right ones after a mistake that is easily made.
+//! What a wrong file resembles: the right one after a common mistake.
 
 use crate::attribute::from_bytes;
 use crate::symptom::Symptom;
 
 /// The symptom of a file, if it has one. `expected` are the right values, plane after plane; `uncompensated` those before
-/// 7.18.3.
+/// 7.8.3.
 pub(crate) fn of_file(
     expected: &[i32],
     found: &[u8],
@@ -19,7 +19,7 @@ pub(crate) fn of_file(
 
 fn of_other_length(expected: &[i32], found: &[u8]) -> Symptom {
     let (halves, rest) = found.as_chunks::<2>();
-    // What does not fit in two bytes can have become anything.
+    // A value that does not fit into two bytes can have become anything.
     let is_half = |(half, &value): (&[u8; 2], &i32)| {
         i16::try_from(value).map_or(true, |value| value == i16::from_le_bytes(*half))
     };
@@ -83,14 +83,14 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_in_the_order_of_values_are_told() {
+    fn mistakes_in_the_order_of_values_are_recognised() {
         assert_eq!(seen(&[1, 30, 5, 2, 400, -6]), Some(Symptom::Interleaved));
         assert_eq!(seen(&[5, -6, 30, 400, 1, 2]), Some(Symptom::OtherPlanes));
         assert_eq!(seen(&[2, 1, 400, 30, -6, 5]), Some(Symptom::OtherOrder));
     }
 
     #[test]
-    fn mistakes_in_the_bytes_of_values_are_told() {
+    fn mistakes_in_the_bytes_of_values_are_recognised() {
         assert_eq!(seen(&RIGHT.map(i32::swap_bytes)), Some(Symptom::BigEndian));
         let halves: Vec<u8> = RIGHT.iter().flat_map(|&value| (value as i16).to_le_bytes()).collect();
         assert_eq!(of_file(&RIGHT, &halves, 2, &[]), Some(Symptom::TwoBytes));
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_in_values_are_told() {
+    fn mistakes_in_values_are_recognised() {
         assert_eq!(seen(&[0; 6]), Some(Symptom::Uncompensated));
         assert_eq!(seen(&[1, 2, 31, 400, 5, -7]), Some(Symptom::OffByOne));
         assert_eq!(seen(&[9, 9, 9, 9, 9, 9]), Some(Symptom::Unrelated));

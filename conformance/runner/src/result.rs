@@ -1,30 +1,31 @@
-//! How a case went.
+//! The result of a case.
 
+use crate::case::Case;
 use crate::difference::Difference;
 use crate::symptom::Symptom;
 use crate::vector::{Kind, Mode};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// How a case went, in a word.
+/// The outcome of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// Just as the vector says.
+    /// As the vector says.
     Pass,
-    /// Otherwise; the reason says how.
+    /// Otherwise; there is a reason.
     Fail,
-    /// The decoder said that a stream is unsupported that it should decode.
+    /// The decoder called a stream unsupported that it should decode.
     Unsupported,
-    /// The decoder said that a stream is over a limit that it should decode.
+    /// The decoder called a stream over a limit that it should decode.
     OverLimit,
-    /// The decoder said that a stream is truncated that is not.
+    /// The decoder called a stream truncated that is complete.
     Truncated,
     /// A signal, or an exit code that the protocol does not have.
     Crash,
     /// It took too long.
     Timeout,
-    /// The decoder does not claim to do this: it was not asked.
+    /// The decoder does not claim to support this: the case was not run.
     NotClaimed,
     /// It failed as the list of expectations says.
     ExpectedFailure,
@@ -44,13 +45,14 @@ impl Outcome {
         Self::ExpectedFailure,
     ];
 
-    /// What a case can be expected to fail with: outcomes, and reasons of `fail`.
+    /// Failures that can be expected: outcomes, and reasons of `fail`.
     pub const FAILURES: &'static [&'static str] = &[
         "fail",
         "wrong-planes",
         "wrong-outcome",
         "wrong-class",
         "wrong-code",
+        "wrong-lost",
         "wrong-output",
         "wrong-entropy",
         "missing-files",
@@ -79,35 +81,37 @@ impl Outcome {
         }
     }
 
-    /// Whether the decoder is at fault, and nobody said so before.
+    /// Whether it is a failure that was not expected.
     pub const fn is_failure(self) -> bool {
         !matches!(self, Self::Pass | Self::NotClaimed | Self::ExpectedFailure)
     }
 }
 
-/// What is wrong where the outcome is `fail`.
+/// What is wrong if the outcome is `fail`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
-    /// Files that are right by name have other values.
+    /// Files with the right names have wrong contents.
     WrongPlanes,
     /// Accepted instead of rejected, or the reverse.
     WrongOutcome,
-    /// Rejected as something else.
+    /// Rejected with the wrong class.
     WrongClass,
-    /// Rejected with another code; only if that was asked for.
+    /// Rejected with the wrong code; only if codes count.
     WrongCode,
-    /// The planes are right, and the f32 values of 7.10 that come of them are not.
+    /// The ranges of lost frames are wrong.
+    WrongLost,
+    /// The planes are right, but the f32 values of 7.10 are not.
     WrongOutput,
-    /// The states of the entropy decoder are not those of the vector.
+    /// Entropy states are wrong.
     WrongEntropy,
     /// Frames or attributes were not written.
     MissingFiles,
-    /// Something else was written.
+    /// Unexpected files were written.
     ExtraFiles,
-    /// It was killed over the memory limit.
+    /// It was killed because it used too much memory.
     TooMuchMemory,
-    /// It was killed over the limit of what it may write.
+    /// It was killed because it wrote too much.
     TooMuchOutput,
 }
 
@@ -119,6 +123,7 @@ impl Reason {
             Self::WrongOutcome => "wrong-outcome",
             Self::WrongClass => "wrong-class",
             Self::WrongCode => "wrong-code",
+            Self::WrongLost => "wrong-lost",
             Self::WrongOutput => "wrong-output",
             Self::WrongEntropy => "wrong-entropy",
             Self::MissingFiles => "missing-files",
@@ -141,37 +146,37 @@ pub struct CaseResult {
     pub kind: Kind,
     /// Operating point.
     pub op: String,
-    /// What was shown.
+    /// The mode.
     pub mode: Mode,
-    /// How it went.
+    /// The outcome.
     pub outcome: Outcome,
-    /// What is wrong, of a failure.
+    /// What is wrong, if it is a failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<Reason>,
-    /// Of an expected failure: the word of the list.
+    /// The word of the list, if it is an expected failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed_as: Option<String>,
-    /// What is right: `accept`, or class and code.
+    /// The right answer: `accept`, or class and code.
     pub expected: String,
-    /// How the decoder ended, in words; none if it was not asked.
+    /// How the decoder ended, in words; none if it was not run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer: Option<String>,
     /// What is wrong, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
-    /// What the fault resembles.
+    /// What the error resembles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub symptom: Option<Symptom>,
     /// The first value that differs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub difference: Option<Difference>,
-    /// What is not quite right.
+    /// What should be corrected but is no failure.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
-    /// What differs from the reference and may differ.
+    /// Permitted differences from the reference.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// Wall time; not in reports that are to be compared.
+    /// Wall time; not in JSON reports, so that two runs give the same report.
     #[serde(skip)]
     pub took: Duration,
 }
@@ -187,7 +192,17 @@ impl CaseResult {
         self.reason.map_or(self.outcome.name(), Reason::name)
     }
 
-    /// Whether a word of the list of expectations says how it went.
+    /// Says in detail and warnings which prefix of the stream they are about.
+    pub(crate) fn name_prefix(&mut self, prefix: &Case<'_>) {
+        let Some(bytes) = prefix.cut else { return };
+        let texts = self.detail.iter_mut().chain(&mut self.warnings);
+        texts.for_each(|text| *text = format!("cut after {bytes} bytes: {text}"));
+        if self.outcome.is_failure() && self.detail.is_none() {
+            self.detail = Some(format!("cut after {bytes} bytes"));
+        }
+    }
+
+    /// Whether a word of the list of expectations describes the result.
     pub(crate) fn is_called(&self, word: &str) -> bool {
         self.outcome.is_failure() && (word == self.outcome.name() || word == self.label())
     }

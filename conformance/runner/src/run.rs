@@ -1,6 +1,7 @@
-//! A run: cases to decoders, answers to results.
+//! Runs cases: sends them to decoders and turns the answers into results.
 
 use crate::answer::Ending;
+use crate::cancel::Cancel;
 use crate::capabilities::Capabilities;
 use crate::case::Case;
 use crate::difference::explain;
@@ -8,12 +9,12 @@ use crate::error::Result;
 use crate::judge::{Rules, judge, not_claimed};
 use crate::limits::Limits;
 use crate::output::Output;
-use crate::result::{CaseResult, Reason};
+use crate::result::{CaseResult, Outcome, Reason};
 use crate::session::{Decoder, Session};
-use crate::stop::Stop;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
+use std::time::Duration;
 
 /// How to run.
 #[derive(Debug, Clone)]
@@ -22,21 +23,21 @@ pub struct Settings {
     pub decoder: Decoder,
     /// What it claims.
     pub capabilities: Capabilities,
-    /// How much it may take for a case.
+    /// Resources that it may use for a case.
     pub limits: Limits,
     /// Whether a wrong code is a failure.
     pub strict: bool,
-    /// Cases at a time.
+    /// Cases that run at the same time.
     pub jobs: usize,
     /// Ends the run early.
-    pub stop: Stop,
+    pub cancel: Cancel,
 }
 
-/// Runs cases; the results are in the order of the cases, and fewer if the run was stopped. `on_result` is told of each
-/// as it comes, from any thread.
+/// Runs cases; the results are in the order of the cases, and there are fewer if the run was cancelled. `on_result` gets
+/// each result as it comes, from any thread.
 ///
 /// # Errors
-/// The decoder does not start, or folders for what it writes cannot be made or read.
+/// The decoder does not start, or folders for its output cannot be made or read.
 pub fn run(
     cases: &[Case<'_>],
     settings: &Settings,
@@ -45,16 +46,17 @@ pub fn run(
     let next = AtomicUsize::new(0);
     let results = Mutex::new(Vec::with_capacity(cases.len()));
     let work = || -> Result<()> {
-        let mut session = Session::new(&settings.decoder, &settings.limits, &settings.stop)?;
+        let mut session = Session::new(&settings.decoder, &settings.limits, &settings.cancel)?;
         loop {
-            let place = next.fetch_add(1, Ordering::Relaxed);
-            let Some(case) = cases.get(place) else { return Ok(()) };
-            // Who cannot go on stops the others too: they find no more cases.
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let case = cases.get(index).filter(|_| !settings.cancel.is_set());
+            let Some(case) = case else { return Ok(()) };
+            // A worker that cannot go on ends the others too: they find no more cases.
             let result = ask(&mut session, case, settings)
                 .inspect_err(|_| next.store(cases.len(), Ordering::Relaxed))?;
             let Some(result) = result else { return Ok(()) };
             on_result(&result);
-            results.lock().unwrap_or_else(PoisonError::into_inner).push((place, result));
+            results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
         }
     };
     thread::scope(|scope| {
@@ -66,22 +68,54 @@ pub fn run(
         })
     })?;
     let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-    results.sort_unstable_by_key(|(place, _)| *place);
+    results.sort_unstable_by_key(|(index, _)| *index);
     Ok(results.into_iter().map(|(_, result)| result).collect())
 }
 
-/// Asks a case and judges the answer; none if the run was stopped.
+/// Runs a case and judges the answer; none if the run was cancelled.
 fn ask(session: &mut Session<'_>, case: &Case<'_>, settings: &Settings) -> Result<Option<CaseResult>> {
-    if settings.stop.is_set() {
-        return Ok(None);
-    }
     if let Some(missing) = settings.capabilities.missing(case) {
         return Ok(Some(not_claimed(case, missing)));
     }
+    match case.prefixes() {
+        Some(prefixes) => ask_prefixes(session, prefixes, settings),
+        None => ask_once(session, case, settings),
+    }
+}
+
+/// Runs the cases of the prefixes of a stream up to the first failure; the result is that of the first prefix with a
+/// failure, or else with a warning.
+fn ask_prefixes<'a>(
+    session: &mut Session<'_>,
+    prefixes: impl Iterator<Item = Case<'a>>,
+    settings: &Settings,
+) -> Result<Option<CaseResult>> {
+    let (mut first, mut took) = (None::<CaseResult>, Duration::ZERO);
+    for prefix in prefixes {
+        let Some(mut result) = ask_once(session, &prefix, settings)? else { return Ok(None) };
+        took = took.saturating_add(result.took);
+        result.took = took;
+        result.name_prefix(&prefix);
+        let has_failed = result.outcome != Outcome::Pass;
+        match &mut first {
+            Some(first) if !has_failed && !first.warnings.is_empty() => first.took = took,
+            first => *first = Some(result),
+        }
+        if has_failed {
+            break;
+        }
+    }
+    Ok(first)
+}
+
+fn ask_once(session: &mut Session<'_>, case: &Case<'_>, settings: &Settings) -> Result<Option<CaseResult>> {
+    if settings.cancel.is_set() {
+        return Ok(None);
+    }
     let Capabilities { entropy, output, .. } = settings.capabilities;
     let rules = Rules { strict: settings.strict, entropy, output };
-    let answer = session.ask(case.stream, case.op(), case.mode())?;
-    if answer.ending == Ending::Stopped {
+    let answer = session.ask(case)?;
+    if answer.ending == Ending::Cancelled {
         return Ok(None);
     }
     let output = Output::read(&session.out())?;

@@ -3,18 +3,18 @@
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::feature;
-use crate::nearest::nearest;
+use crate::suggest::closest;
 use crate::vector::Kind;
 use globset::{Glob, GlobMatcher};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// What a case has to be to be run; what is not given is not asked for.
+/// Conditions that a case has to meet to be run.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Selection {
-    /// Patterns, `*` and `?` as in file names, one of which shall match: the name of the vector, or if there is an `@` in the
-    /// pattern `vector@op` or `vector@op/mode`.
+    /// Patterns with `*` and `?` as in file names, one of which shall match the name of the vector, or, if the pattern has
+    /// an `@`, `vector@op` or `vector@op/mode`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub filter: Vec<String>,
     /// An area.
@@ -26,7 +26,7 @@ pub struct Selection {
     /// A feature that a decoder needs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature: Option<String>,
-    /// A rule that the vector is about, such as SS-PR-003.
+    /// A requirement that the vector tests, such as SS-PR-003.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub requirement: Option<String>,
 }
@@ -35,13 +35,13 @@ impl Selection {
     /// The cases to run.
     ///
     /// # Errors
-    /// A pattern is none, or selects nothing, or no case is left.
+    /// A pattern is not valid or selects nothing, or no case is left.
     pub fn of<'a>(&self, cases: Vec<Case<'a>>) -> Result<Vec<Case<'a>>> {
         let filter = self.filter.iter().map(|pattern| Pattern::new(pattern)).collect::<Result<Vec<_>>>()?;
         if let Some(idle) = filter.iter().find(|pattern| !cases.iter().any(|case| pattern.takes(case))) {
             let core: String = idle.text.split('@').next().unwrap_or_default().replace(['*', '?'], "");
-            let near = nearest(&core, cases.iter().map(|case| case.vector.name.as_str())).join(", ");
-            let message = format!("no case is called {}; the nearest vectors are {near}", idle.text);
+            let similar = closest(&core, cases.iter().map(|case| case.vector.name.as_str())).join(", ");
+            let message = format!("no case is called {}; similar vectors are {similar}", idle.text);
             return Err(Error::Usage(message));
         }
         self.check_words(&cases)?;
@@ -50,7 +50,7 @@ impl Selection {
         };
         let selected: Vec<Case<'a>> = cases.into_iter().filter(takes).collect();
         if selected.is_empty() {
-            let message = "each of these options selects cases, and no case is selected by all of them\n  \
+            let message = "each of these options selects cases, but no case is selected by all of them\n  \
                 `splatstream conformance list` shows names, areas, features and requirements";
             return Err(Error::Usage(message.to_owned()));
         }
@@ -73,11 +73,11 @@ impl Selection {
             && among(&self.requirement, &vector.requirements)
     }
 
-    /// Refuses an area, a feature or a rule that no vector has.
+    /// Refuses an area, a feature or a requirement that no vector has.
     fn check_words(&self, cases: &[Case<'_>]) -> Result<()> {
         let vectors = || cases.iter().map(|case| case.vector);
         let areas: BTreeSet<&str> = vectors().map(|vector| vector.area.as_str()).collect();
-        let rules: BTreeSet<&str> =
+        let requirements: BTreeSet<&str> =
             vectors().flat_map(|vector| &vector.requirements).map(String::as_str).collect();
         let is_known = |word: &Option<String>, known: &BTreeSet<&str>| {
             word.as_ref().is_none_or(|word| known.contains(word.as_str()))
@@ -92,9 +92,9 @@ impl Selection {
             Self { feature: Some(feature), .. } if !is_known(&self.feature, &features) => {
                 list("feature", feature, &features)
             }
-            Self { requirement: Some(rule), .. } if !is_known(&self.requirement, &rules) => {
-                let near = nearest(rule, rules).join(", ");
-                Err(Error::Usage(format!("no vector is about '{rule}'; the nearest rules are {near}")))
+            Self { requirement: Some(wanted), .. } if !is_known(&self.requirement, &requirements) => {
+                let similar = closest(wanted, requirements).join(", ");
+                Err(Error::Usage(format!("no vector tests '{wanted}'; similar requirements are {similar}")))
             }
             _ => Ok(()),
         }

@@ -1,12 +1,12 @@
-//! The other side of `--stdio`: a decoder that answers requests line by line.
+//! The decoder's side of `--stdio`: answers requests line by line.
 
 use crate::protocol::{Diagnosis, Request};
 use std::io::{self, BufRead, ErrorKind, Write};
 
-/// Answers every line of `requests` until they end. A line that is no request, and one that cannot be answered, ends it.
+/// Answers every line of `requests` until they end, or until a line that is not a request or cannot be answered.
 ///
 /// # Errors
-/// As `answer` gives; a line that is no request is [`ErrorKind::InvalidData`].
+/// Those of `answer`; [`ErrorKind::InvalidData`] for a line that is not a request.
 pub fn serve(
     requests: impl BufRead,
     mut answers: impl Write,
@@ -15,7 +15,7 @@ pub fn serve(
     for line in requests.lines() {
         let line = line?;
         let request = Request::parse(&line).ok_or_else(|| {
-            let message = format!("'{line}' is no request; a request is `in TAB op TAB mode TAB out`");
+            let message = format!("'{line}' is not a request; a request is `in TAB op TAB mode TAB out`");
             io::Error::new(ErrorKind::InvalidData, message)
         })?;
         let (code, diagnosis) = answer(&request)?;

@@ -3,7 +3,7 @@
 use crate::digest;
 use crate::error::{Error, Result};
 use crate::report::summary::counted;
-use crate::vector::{Kind, SCHEMA, Vector};
+use crate::vector::{Kind, Mode, SCHEMA, Vector};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ pub struct Suite {
     pub version: Option<String>,
     /// Version of the specification that it goes with, the second line.
     pub specification: Option<String>,
-    /// How it differs from its MANIFEST, in words; none if it is whole and as it was made.
+    /// How it differs from its MANIFEST, in words; none if it does not.
     pub changed: Option<String>,
     /// The vectors.
     pub vectors: Vec<Located>,
@@ -28,15 +28,22 @@ pub struct Located {
     pub vector: Vector,
     /// The stream.
     pub stream: PathBuf,
-    /// SHA-256 of the file of the record, which has that of the stream.
+    /// SHA-256 of the record, which contains that of the stream.
     pub sha256: String,
 }
 
 impl Suite {
+    /// The vectors of the repository that the current folder or this program is in; none if there are none.
+    pub fn locate() -> Option<PathBuf> {
+        let starts = [std::env::current_dir(), std::env::current_exe()].into_iter().flatten();
+        let above = starts.flat_map(|start| start.ancestors().map(Path::to_path_buf).collect::<Vec<_>>());
+        above.map(|folder| folder.join("conformance/vectors")).find(|vectors| vectors.is_dir())
+    }
+
     /// Reads a folder of vectors, or the folder that holds it as `vectors`. Every stream is compared with its record.
     ///
     /// # Errors
-    /// The folder is not there or has no vectors; a record cannot be understood or contradicts its place or its stream.
+    /// The folder does not exist or has no vectors; a record cannot be understood or contradicts its folder or its stream.
     pub fn read(folder: &Path) -> Result<Self> {
         let inner = folder.join("vectors");
         let (root, vectors) = match inner.is_dir() {
@@ -46,8 +53,8 @@ impl Suite {
         let mut suite = Self { version: None, specification: None, changed: None, vectors: Vec::new() };
         for kind in [Kind::Valid, Kind::Invalid, Kind::Either] {
             for area in folders(&vectors.join(kind.name()))? {
-                for place in folders(&area)? {
-                    suite.vectors.extend(Located::read(&place, kind, &area)?);
+                for folder in folders(&area)? {
+                    suite.vectors.extend(Located::read(&folder, kind, &area)?);
                 }
             }
         }
@@ -60,8 +67,8 @@ impl Suite {
         Ok(suite)
     }
 
-    /// SHA-256 over records and names: two runs with the same were made on the same vectors. A line `sha256 name` for each
-    /// vector, in the order of the names; the digest in it is that of its vector.json.
+    /// SHA-256 over names and records: equal for equal vectors. It covers a line `sha256 name` for each vector in the order
+    /// of the names, where sha256 is that of its vector.json.
     pub fn sha256(&self) -> String {
         let mut vectors: Vec<(&str, &str)> = self
             .vectors
@@ -73,19 +80,19 @@ impl Suite {
         digest::sha256(lines.collect::<String>().as_bytes())
     }
 
-    /// That the vectors are not those of the version, and why; none if they are.
+    /// The message that the vectors are not those of the version; none if they are.
     pub fn complaint(&self) -> Option<String> {
         let version = self.version.as_deref().unwrap_or("of a known version");
         self.changed.as_ref().map(|changed| format!("this is not suite {version}: {changed}"))
     }
 
-    /// Compares with MANIFEST, which the generator writes: the number of vectors, then what [`Suite::sha256`] gives.
+    /// Compares with MANIFEST, which the generator writes: the number of vectors, then [`Suite::sha256`].
     fn compare_manifest(&mut self, path: &Path) {
         let text = fs::read_to_string(path).unwrap_or_default();
         let mut words = text.split_whitespace();
         let count = words.next().and_then(|count| count.parse::<usize>().ok());
         let (Some(count), Some(sha256)) = (count, words.next()) else {
-            self.changed = Some("it has no MANIFEST beside the vectors".to_owned());
+            self.changed = Some("it has no MANIFEST next to the vectors".to_owned());
             return;
         };
         if sha256 == self.sha256() {
@@ -94,15 +101,15 @@ impl Suite {
         let are = |number: usize| counted(number, "vector") + if number == 1 { " is" } else { " are" };
         self.changed = Some(match self.vectors.len() {
             found if found < count => format!("{} missing", are(count.saturating_sub(found))),
-            found if found > count => format!("{} not of it", are(found.saturating_sub(count))),
+            found if found > count => format!("{} not part of it", are(found.saturating_sub(count))),
             _ => "vectors were changed".to_owned(),
         });
     }
 
     fn check_names(&self, folder: &Path) -> Result<()> {
-        let mut places = BTreeMap::new();
+        let mut streams = BTreeMap::new();
         for Located { vector, stream, .. } in &self.vectors {
-            if let Some(other) = places.insert(&vector.name, stream) {
+            if let Some(other) = streams.insert(&vector.name, stream) {
                 let message = format!(
                     "two vectors are called {}: {} and {}",
                     vector.name,
@@ -154,7 +161,7 @@ impl Located {
     }
 }
 
-/// Where the vectors are that are not in a folder: below it, above it, or elsewhere.
+/// The message for a folder without vectors, with the place where they may be: below it, above it, or elsewhere.
 fn nothing_here(folder: &Path) -> String {
     let has_vectors = |path: &Path| path.join("valid").is_dir() && path.join("invalid").is_dir();
     let below = ["vectors", "conformance/vectors"].map(|inner| folder.join(inner));
@@ -167,24 +174,31 @@ fn nothing_here(folder: &Path) -> String {
     format!("no vectors here: there should be folders valid/AREA/NAME with a vector.json\n  {advice}")
 }
 
-/// What a record says that cannot be.
+/// A contradiction in a record.
 fn inconsistency(vector: &Vector) -> Option<String> {
-    let mut verdicts = std::iter::once(&vector.expect)
-        .chain(&vector.acceptable)
-        .chain(vector.points.iter().filter_map(|point| point.expect.as_ref()));
+    let mut verdicts =
+        std::iter::once(&vector.expect).chain(vector.points.iter().filter_map(|point| point.expect.as_ref()));
     if !verdicts.all(|verdict| verdict.is_consistent()) {
-        return Some("a rejection has a class, and nothing else has one".to_owned());
+        return Some("a rejection has a class, an acceptance has none".to_owned());
     }
-    if !vector.acceptable.is_empty() && vector.kind != Kind::Either {
-        return Some("only vectors of kind either have acceptable outcomes".to_owned());
+    if !vector.acceptable.is_empty() && vector.kind == Kind::Valid {
+        return Some("a vector of kind valid has no acceptable rejections".to_owned());
     }
-    let mut states = vector.points.iter().filter_map(|point| point.states.as_ref()).flatten();
+    if vector.inside.is_some() && vector.points.iter().any(|point| point.mode != Mode::Full) {
+        return Some("points of a vector with inside have mode full".to_owned());
+    }
+    if vector.sweep.is_some() && (!vector.points.is_empty() || vector.inside.is_some()) {
+        return Some("a vector with sweep has neither points nor inside".to_owned());
+    }
+    let of_points = vector.points.iter().filter_map(|point| point.states.as_ref()).flatten();
+    let mut states =
+        of_points.chain(vector.sweep.iter().flat_map(|sweep| &sweep.steps).flat_map(|step| &step.states));
     states
         .any(|&state| state >= vector.states.len())
-        .then(|| "a point refers to a state that is not there".to_owned())
+        .then(|| "a point or step refers to a state that does not exist".to_owned())
 }
 
-/// The folders in a folder, by name; none if that is not there.
+/// The folders in a folder by name; none if it does not exist.
 fn folders(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(Vec::new());

@@ -1,8 +1,8 @@
-//! What a fault resembles.
+//! What an error resembles.
 
 use serde::{Deserialize, Serialize};
 
-/// What a fault resembles.
+/// What an error resembles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Symptom {
@@ -12,7 +12,7 @@ pub enum Symptom {
     OtherPoint,
     /// The files are right for the other mode.
     OtherMode,
-    /// The frames are right, and their files are called as those of other frames.
+    /// The frames are right, but their files have the names of other frames.
     OtherNumbers,
     /// All frames of a type are missing, and no others.
     TypeMissing,
@@ -22,19 +22,19 @@ pub enum Symptom {
     OtherOrder,
     /// The same planes in another order.
     OtherPlanes,
-    /// Gaussian after Gaussian, and not plane after plane.
+    /// Gaussian after Gaussian instead of plane after plane.
     Interleaved,
-    /// The bytes of each value the other way round.
+    /// The bytes of each value in reverse order.
     BigEndian,
     /// Values of two bytes.
     TwoBytes,
-    /// A length that no number of values has.
+    /// A length that is not a multiple of four.
     PartOfValue,
-    /// The values are those before compensation (7.18.3).
+    /// The values are those before compensation (7.8.3).
     Uncompensated,
     /// Every value that differs does so by one.
     OffByOne,
-    /// Nearly nothing is right.
+    /// Almost nothing is right.
     Unrelated,
 }
 
@@ -46,7 +46,7 @@ impl Symptom {
             Self::OtherPoint => "the files are right for another operating point",
             Self::OtherMode => "the files are right for the other mode",
             Self::OtherNumbers => {
-                "the frames are right under other numbers; %04d is the display index, from 0"
+                "the frames are right under other indices; %04d is the display index, from 0"
             }
             Self::TypeMissing => "all frames of one type are missing",
             Self::OtherCount => "another number of Gaussians",
@@ -55,10 +55,10 @@ impl Symptom {
             Self::Interleaved => "the values stand Gaussian after Gaussian; write plane after plane",
             Self::BigEndian => "the values are big-endian; write little-endian",
             Self::TwoBytes => "the values have two bytes; write i32",
-            Self::PartOfValue => "the length is no whole number of i32 values",
-            Self::Uncompensated => "the values are those before compensation, 7.18.3",
+            Self::PartOfValue => "the length is not a whole number of i32 values",
+            Self::Uncompensated => "the values are those before compensation (7.8.3)",
             Self::OffByOne => "what differs is off by one",
-            Self::Unrelated => "nearly nothing is right",
+            Self::Unrelated => "almost nothing is right",
         }
     }
 }

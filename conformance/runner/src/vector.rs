@@ -1,7 +1,7 @@
-//! The record of a vector, `vector.json`: what its stream is about and what a decoder shall make of it.
+//! The record of a vector, `vector.json`: what its stream tests and what a decoder shall make of it.
 //!
-//! The fields are those of `conformance/schema/vector.schema.json`. A field that is not known here is an error: a
-//! runner that passes over part of an expectation passes decoders that break it.
+//! The fields are those of `conformance/schema/vector.schema.json`. An unknown field is an error: a runner that ignores
+//! part of an expectation passes decoders that violate it.
 
 use crate::attribute::Attribute;
 use serde::de::Error;
@@ -26,14 +26,14 @@ pub struct Vector {
     pub area: String,
     /// The folder above that.
     pub kind: Kind,
-    /// One sentence for people.
+    /// What it tests, in one sentence.
     pub purpose: String,
     /// What to read in the specification.
     pub clauses: Vec<String>,
-    /// Rules that it is about.
+    /// Requirements that it tests.
     #[serde(default)]
     pub requirements: Vec<String>,
-    /// What a decoder has to know to decode it.
+    /// What a decoder has to support to decode it.
     #[serde(default)]
     pub features: Vec<String>,
     /// Profile that the stream states, annex A.
@@ -48,13 +48,18 @@ pub struct Vector {
     pub sha256: String,
     /// What a decoder shall answer.
     pub expect: Verdict,
-    /// What it may answer instead; of kind either alone.
+    /// Offset of the gop_header at which decoding starts (B.3); none for the whole stream.
+    pub inside: Option<u64>,
+    /// Rejections that are right: for kind either instead of accepting, for kind invalid instead of the one in `expect`,
+    /// because the unit has several faults.
     #[serde(default)]
-    pub acceptable: Vec<Verdict>,
+    pub acceptable: Vec<Rejection>,
+    /// The decoder is asked for every proper prefix of the stream.
+    pub sweep: Option<Sweep>,
     /// Frames as they are shown at some operating point; points refer to them by index.
     #[serde(default)]
     pub states: Vec<State>,
-    /// How the stream is decoded. None: everything, in full.
+    /// Operating points at which the stream is decoded. None: everything, in full.
     #[serde(default)]
     pub points: Vec<Point>,
     /// The units of the stream, in order.
@@ -66,7 +71,7 @@ pub struct Vector {
     pub patch: Option<Vec<Patch>>,
     /// What the patch breaks.
     pub fault: Option<String>,
-    /// What made it.
+    /// How it was generated.
     pub generator: Option<Generator>,
 }
 
@@ -78,7 +83,7 @@ pub enum Kind {
     Valid,
     /// A stream with one fault.
     Invalid,
-    /// A stream of which more than one outcome is right.
+    /// A stream that may be accepted or rejected.
     Either,
 }
 
@@ -97,14 +102,55 @@ pub struct Verdict {
     pub clause: Option<String>,
     /// The earliest byte at which the fault can be known.
     pub byte: Option<u64>,
-    /// Why this is right too, of an acceptable verdict.
-    pub why: Option<String>,
+}
+
+/// A rejection by class and code.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rejection {
+    /// Class of clause 9.1.
+    #[serde(deserialize_with = "known_class")]
+    pub class: Class,
+    /// Code of clause 9.2.
+    pub code: String,
+}
+
+/// A stream that is cut at every byte.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// Where it is cut.
+    pub cut: Cut,
+    /// What is shown of its prefixes.
+    pub steps: Vec<Step>,
+}
+
+/// Where a stream is cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub enum Cut {
+    /// After 0 bytes, after 1 byte, and so on up to the last byte but one.
+    #[serde(rename = "every byte")]
+    EveryByte,
+}
+
+/// What is shown of the prefixes of this length and longer ones, up to the next step.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Step {
+    /// Length of the first of these prefixes.
+    pub bytes: u64,
+    /// The frames that are output: indices into `states`.
+    pub states: Vec<usize>,
 }
 
 fn class_of_name<'d, D: Deserializer<'d>>(deserializer: D) -> Result<Option<Class>, D::Error> {
+    known_class(deserializer).map(Some)
+}
+
+fn known_class<'d, D: Deserializer<'d>>(deserializer: D) -> Result<Class, D::Error> {
     let name = String::deserialize(deserializer)?;
     let class = Class::ALL.into_iter().find(|class| class.name() == name);
-    class.map(Some).ok_or_else(|| D::Error::custom(format!("'{name}' is no class of clause 9.1")))
+    class.ok_or_else(|| D::Error::custom(format!("'{name}' is not a class of clause 9.1")))
 }
 
 /// Whether a stream is accepted.
@@ -128,9 +174,9 @@ pub struct State {
     pub frame_type: Option<String>,
     /// Gaussians in the frame.
     pub gaussians: u64,
-    /// Those among them that the frame's own units hold (7.18.2).
+    /// Gaussians in its exact lists (7.8.2).
     pub exact: Option<u64>,
-    /// Those that are carried over (7.18.1).
+    /// Gaussians in its carried lists (7.8.1).
     pub carried: Option<u64>,
     /// SHA-256 of the planes of each attribute.
     pub planes: BTreeMap<Attribute, String>,
@@ -150,18 +196,23 @@ pub struct Point {
     pub states: Option<Vec<usize>>,
     /// SHA-256 of the extraction (7.11).
     pub extraction: Option<String>,
-    /// Where it differs from `expect` of the vector: an error in a unit that does not belong is not found.
+    /// Display indices of lost frames that are not output, as ranges with both ends included (SS-ER-005).
+    #[serde(default)]
+    pub lost: Vec<[u32; 2]>,
+    /// Where it differs from `expect` of the vector: errors in units that do not belong are not found.
     pub expect: Option<Verdict>,
 }
 
-/// What of a predicted frame is shown (7.18.2).
+/// How a decoder starts, and what it shows of P and B frames (7.8.2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
     /// The exact and the carried Gaussians.
     Full,
-    /// The exact Gaussians alone.
+    /// Only the exact Gaussians of frames that have some.
     Subset,
+    /// Like full, but the input starts inside a stream (B.3).
+    Inside,
 }
 
 /// Where a unit stands.
@@ -187,25 +238,25 @@ pub struct UnitRecord {
     pub entropy: Option<String>,
 }
 
-/// A change to bytes of the parent.
+/// A change to the bytes of the parent.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Patch {
     /// Offset in the parent.
     pub at: u64,
-    /// Bytes taken out.
+    /// Number of bytes removed.
     pub remove: u64,
-    /// Bytes put in, hexadecimal.
+    /// Bytes inserted, hexadecimal.
     pub insert: String,
 }
 
-/// What made a vector.
+/// How a vector was generated.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Generator {
-    /// Of the generator.
+    /// The part of the generator.
     pub recipe: String,
-    /// Of its random numbers.
+    /// Seed of its random numbers.
     pub seed: Option<u64>,
 }
 
@@ -215,9 +266,21 @@ impl Verdict {
         self.class.map_or(0, |class| class.exit_code().into())
     }
 
-    /// Whether the class is there if and only if the stream is rejected.
+    /// Whether it has a class if and only if it is a rejection.
     pub(crate) fn is_consistent(&self) -> bool {
         (self.outcome == Acceptance::Reject) == self.class.is_some()
+    }
+}
+
+impl From<&Rejection> for Verdict {
+    fn from(rejection: &Rejection) -> Self {
+        Self {
+            outcome: Acceptance::Reject,
+            class: Some(rejection.class),
+            code: Some(rejection.code.clone()),
+            clause: None,
+            byte: None,
+        }
     }
 }
 
@@ -243,11 +306,15 @@ impl Kind {
 }
 
 impl Mode {
+    /// All modes.
+    pub const ALL: [Self; 3] = [Self::Full, Self::Subset, Self::Inside];
+
     /// The word in records and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Full => "full",
             Self::Subset => "subset",
+            Self::Inside => "inside",
         }
     }
 }
@@ -262,9 +329,9 @@ impl FromStr for Mode {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        [Self::Full, Self::Subset]
+        Self::ALL
             .into_iter()
             .find(|mode| mode.name() == text)
-            .ok_or_else(|| format!("'{text}' is not a mode; write full or subset"))
+            .ok_or_else(|| format!("'{text}' is not a mode; write full, subset or inside"))
     }
 }

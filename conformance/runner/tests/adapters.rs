@@ -1,4 +1,4 @@
-//! The adapters that a stranger starts from do what they say.
+//! The example adapters work.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
@@ -36,7 +36,7 @@ fn results(decoder: Decoder, capabilities: Capabilities) -> Vec<CaseResult> {
     run(&cases, &settings, |_| {}).unwrap()
 }
 
-/// Whether a program can be started here; people without it can still run the other tests.
+/// Whether a program can be started here; without it the other tests can still run.
 fn is_there(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }

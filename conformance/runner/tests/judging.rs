@@ -1,23 +1,24 @@
-//! What each answer is called.
+//! The verdict on each answer.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
 mod common;
 
 use common::{Vectors, WRITE, labels, results, settings};
-use serde_json::json;
+use serde_json::{Value, json};
 use splatstream_conformance::command::split;
 use splatstream_conformance::limits::Limits;
-use splatstream_conformance::report::Report;
+use splatstream_conformance::report::{Report, summary};
 use splatstream_conformance::result::CaseResult;
 use splatstream_conformance::run::Settings;
 use splatstream_conformance::selection::Selection;
 use splatstream_conformance::session::Decoder;
 use splatstream_conformance::symptom::Symptom;
+use splatstream_conformance::vector::Mode;
 use std::time::{Duration, Instant};
 
 #[test]
-fn the_right_answers_pass_and_of_two_right_ones_either_does() {
+fn right_answers_pass_and_each_of_several_right_ones() {
     let right = "case $(cat $1) in bad) exit 11;; esac;";
     assert_eq!(labels(&format!("{right} {WRITE}")), ["pass", "pass", "pass"]);
     assert_eq!(
@@ -64,7 +65,7 @@ fn files_are_judged_by_their_bytes_and_their_names() {
 }
 
 #[test]
-fn a_wrong_code_is_a_warning_and_if_asked_for_a_failure() {
+fn a_wrong_code_is_a_warning_or_in_a_strict_run_a_failure() {
     let vectors = Vectors::new();
     let script =
         "echo \"{\\\"code\\\":\\\"DIGEST\\\",\\\"clause\\\":\\\"6.2\\\",\\\"byte\\\":3}\" >&2; exit 11";
@@ -82,7 +83,7 @@ fn a_wrong_code_is_a_warning_and_if_asked_for_a_failure() {
 }
 
 #[test]
-fn who_is_strict_demands_a_code_and_the_class_of_the_exit_code() {
+fn a_strict_run_requires_a_code_and_the_class_of_the_exit_code() {
     let vectors = Vectors::new();
     let said = |line: &str, strict| {
         let settings = Settings { strict, ..settings(&format!("echo \"{line}\" >&2; exit 11")) };
@@ -91,13 +92,13 @@ fn who_is_strict_demands_a_code_and_the_class_of_the_exit_code() {
         (bad.label(), bad.detail.unwrap_or_default())
     };
     for (line, why) in [
-        ("", "no code: the last line on standard error is no JSON object"),
-        ("done", "is no JSON object: \"done\""),
-        ("7", "is no JSON object: \"7\""),
+        ("", "no code: the last line on standard error is not a JSON object"),
+        ("done", "is not a JSON object: \"done\""),
+        ("7", "is not a JSON object: \"7\""),
         ("{\\\"class\\\":\\\"invalid\\\"}", "the JSON object has no code"),
         (
             "{\\\"code\\\":\\\"RANGE\\\",\\\"class\\\":\\\"malformed\\\"}",
-            "says malformed and the exit code invalid",
+            "says malformed, the exit code invalid",
         ),
         ("{\\\"code\\\":3}", "invalid type"),
     ] {
@@ -109,7 +110,7 @@ fn who_is_strict_demands_a_code_and_the_class_of_the_exit_code() {
 }
 
 #[test]
-fn a_decoder_that_does_away_with_its_folder_fails_that_case_alone() {
+fn a_decoder_that_removes_its_folder_fails_only_that_case() {
     let vectors = Vectors::new();
     for change in ["rm -r $4", "rm -r $4; echo > $4", "rm -r $(dirname $4)"] {
         let script =
@@ -123,7 +124,7 @@ fn a_decoder_that_does_away_with_its_folder_fails_that_case_alone() {
 }
 
 #[test]
-fn files_with_other_names_are_told_with_those_that_are_right() {
+fn files_with_other_names_are_reported_with_the_right_names() {
     let vectors = Vectors::new();
     let first = |script: &str| results(&vectors.suite(), &settings(script)).remove(0);
     let shorter =
@@ -139,12 +140,12 @@ fn files_with_other_names_are_told_with_those_that_are_right() {
     assert_eq!(first("exit 0").symptom, Some(Symptom::NothingWritten));
 }
 
-/// What a decoder of one vector with states of the entropy decoder is told: units 1 and 2 have some.
+/// The verdict on a decoder of a vector whose units 1 and 2 have entropy states.
 fn entropy(script: &str, is_claimed: bool) -> (&'static str, String) {
     let vectors = Vectors::none();
     vectors.add("valid", "states", json!({"outcome": "accept"}), |record| {
         let unit = |state: Option<&str>| {
-            let mut unit = json!({"at": 16, "bytes": 20, "type": "refinement"});
+            let mut unit = json!({"at": 16, "bytes": 20, "type": "increment"});
             if let Some(state) = state {
                 unit["entropy"] = json!(state);
             }
@@ -165,8 +166,8 @@ fn states_of_the_entropy_decoder_are_compared_where_they_are_written_or_claimed(
     assert_eq!((entropy(&right, true).0, entropy("true", false).0), ("pass", "pass"));
     assert_eq!(entropy(&write(2, "00000000000000cd"), false).0, "pass");
     for (script, is_claimed, why) in [
-        ("true".to_owned(), true, "u0001.entropy is claimed and not there"),
-        (write(1, "00000000000000AB"), false, "u0001.entropy is 00000000000000AB: write lower-case letters"),
+        ("true".to_owned(), true, "u0001.entropy is claimed and missing"),
+        (write(1, "00000000000000AB"), false, "u0001.entropy is 00000000000000AB: use lower-case digits"),
         (write(2, "1"), false, "u0002.entropy is 1 and should be 00000000000000cd, 1 in all"),
         (write(0, "1"), false, "u0000.entropy: unit 0 has no entropy state"),
         (write(7, "1"), false, "u0007.entropy: unit 7 has no entropy state"),
@@ -183,9 +184,9 @@ fn states_of_the_entropy_decoder_are_compared_where_they_are_written_or_claimed(
 }
 
 #[test]
-fn a_process_that_breaks_the_protocol_is_told_how() {
+fn a_violation_of_the_protocol_is_explained() {
     let vectors = Vectors::new();
-    let told = |script: &str| {
+    let verdict = |script: &str| {
         let decoder = Decoder::Persistent(split(&format!("sh -c '{script}'")).unwrap());
         let limits = Limits { time: Duration::from_millis(300), ..Limits::default() };
         let all = results(&vectors.suite(), &Settings { decoder, limits, jobs: 1, ..settings("") });
@@ -198,16 +199,16 @@ fn a_process_that_breaks_the_protocol_is_told_how() {
         (
             "read line; printf 0; sleep 9",
             "timeout",
-            "not done within 0.3 s; --time SECONDS allows more; an answer is a line",
+            "no answer within 0.3 s; --time SECONDS allows more; an answer is a line",
         ),
     ] {
-        let (found, detail) = told(script);
+        let (found, detail) = verdict(script);
         assert!(found == label && detail.contains(why), "{script}: {found}: {detail}");
     }
 }
 
 #[test]
-fn a_run_that_is_stopped_ends_at_once_and_leaves_no_process() {
+fn a_cancelled_run_ends_at_once_and_leaves_no_process() {
     let vectors = Vectors::new();
     let suite = vectors.suite();
     let (folder, start) = (tempfile::tempdir().unwrap(), Instant::now());
@@ -217,13 +218,13 @@ fn a_run_that_is_stopped_ends_at_once_and_leaves_no_process() {
         alive.display()
     );
     let settings = Settings { jobs: 1, ..settings(&script) };
-    let stop = settings.stop.clone();
+    let cancel = settings.cancel.clone();
     let results = std::thread::scope(|scope| {
         scope.spawn(|| {
             while !alive.exists() && start.elapsed() < Duration::from_secs(9) {
                 std::thread::sleep(Duration::from_millis(5));
             }
-            stop.set();
+            cancel.set();
         });
         results(&suite, &settings)
     });
@@ -243,7 +244,7 @@ fn a_decoder_is_killed_with_all_that_it_started() {
     let limits = Limits { time: Duration::from_millis(200), ..Limits::default() };
     let sleeping = Settings { limits, ..settings("sleep 60; exit 0") };
     assert!(results(&vectors.suite(), &sleeping).iter().all(|result| result.label() == "timeout"));
-    // What it leaves behind does not keep the runner, nor does it live on.
+    // Processes that it leaves neither delay the runner nor go on.
     let leaving = settings("echo $$ > $4/meta.json; sleep 60 & exit 12");
     assert!(results(&vectors.suite(), &leaving).iter().all(|result| result.label() != "timeout"));
     assert!(start.elapsed() < Duration::from_secs(20), "{:?}", start.elapsed());
@@ -258,4 +259,93 @@ fn a_persistent_decoder_is_started_again_after_it_broke_off() {
     let answers: Vec<&str> = results.iter().filter_map(|result| result.answer.as_deref()).collect();
     // In the order of the suite: good, bad, big.
     assert_eq!(answers, ["unsupported", "no answer", "unsupported"]);
+}
+
+/// The results of a run over one changed vector.
+fn of_one(kind: &str, expect: Value, change: impl FnOnce(&mut Value), settings: &Settings) -> CaseResult {
+    let vectors = Vectors::none();
+    vectors.add(kind, "one", expect, change);
+    results(&vectors.suite(), settings).remove(0)
+}
+
+#[test]
+fn each_fault_of_a_unit_with_several_is_right() {
+    let expect = || json!({"outcome": "reject", "class": "invalid", "code": "RANGE"});
+    let change = |record: &mut Value| {
+        record["acceptable"] = json!([{"class": "invalid", "code": "RANGE"}, {"class": "invalid", "code": "MISMATCH"},
+                {"class": "malformed", "code": "NUMBER"}]);
+    };
+    for (code, exit, label) in [
+        ("RANGE", 11, "pass"),
+        ("MISMATCH", 11, "pass"),
+        ("NUMBER", 10, "pass"),
+        ("NUMBER", 11, "wrong-code"),
+        ("DIGEST", 11, "wrong-code"),
+        ("OVER_LIMIT", 13, "wrong-class"),
+    ] {
+        let script = format!("{WRITE}; echo \"{{\\\"code\\\":\\\"{code}\\\"}}\" >&2; exit {exit}");
+        let result = of_one("invalid", expect(), change, &Settings { strict: true, ..settings(&script) });
+        assert_eq!(result.label(), label, "{code}: {result:#?}");
+        assert_eq!(result.expected, "invalid RANGE or invalid MISMATCH or malformed NUMBER");
+    }
+}
+
+#[test]
+fn lost_frames_are_compared_if_the_decoder_reports_them() {
+    let expect = || json!({"outcome": "reject", "class": "invalid", "code": "RANGE"});
+    let change = |record: &mut Value| {
+        record["points"] = json!([{"op": "s0,t0,r0", "mode": "full", "states": [0], "lost": [[3, 5]]}]);
+    };
+    for (said, label) in
+        [("{}", "pass"), ("{\\\"lost\\\":[[3,5]]}", "pass"), ("{\\\"lost\\\":[]}", "wrong-lost")]
+    {
+        let script = format!("{WRITE}; echo \"{said}\" >&2; exit 11");
+        assert_eq!(of_one("invalid", expect(), change, &settings(&script)).label(), label, "{said}");
+    }
+}
+
+#[test]
+fn every_prefix_of_a_swept_stream_is_decoded_and_the_first_wrong_one_is_named() {
+    let expect = || json!({"outcome": "reject", "class": "truncated", "code": "TRUNCATED"});
+    // The stream is `one`: the frame comes out of the prefix of two bytes.
+    let change = |record: &mut Value| {
+        record["sweep"] =
+            json!({"cut": "every byte", "steps": [{"bytes": 0, "states": []}, {"bytes": 2, "states": [0]}]});
+    };
+    let right = format!("case $(cat $1) in on) {WRITE};; esac; exit 14");
+    assert_eq!(of_one("invalid", expect(), change, &settings(&right)).label(), "pass");
+    for (script, label, detail) in [
+        ("exit 14", "missing-files", "cut after 2 bytes: missing: "),
+        ("case $(cat $1) in o) exit 11;; esac; exit 14", "wrong-class", "cut after 1 bytes"),
+        ("exit 0", "wrong-outcome", "cut after 0 bytes"),
+    ] {
+        let result = of_one("invalid", expect(), change, &settings(script));
+        let found = result.detail.clone().unwrap_or_default();
+        assert!(result.label() == label && found.starts_with(detail), "{script}: {result:#?}");
+    }
+}
+
+#[test]
+fn a_decoder_that_starts_inside_gets_mode_inside_and_the_bytes_from_the_gop_header_on() {
+    let change = |record: &mut Value| record["inside"] = json!(2);
+    let script = format!("test $3 = inside && test $(cat $1) = e && {WRITE}");
+    let result = of_one("valid", json!({"outcome": "accept"}), change, &settings(&script));
+    assert_eq!((result.label(), result.case_name().as_str()), ("pass", "one@s3,t3,r9/inside"), "{result:#?}");
+    let mut narrow = settings(&script);
+    narrow.capabilities.modes = vec![Mode::Full];
+    let result = of_one("valid", json!({"outcome": "accept"}), change, &narrow);
+    assert_eq!(result.label(), "not-claimed");
+}
+
+#[test]
+fn failures_of_one_cause_are_listed_once() {
+    let vectors = Vectors::new();
+    vectors.add("valid", "great", json!({"outcome": "accept"}), |_| {});
+    let suite = vectors.suite();
+    let settings = settings("case $(cat $1) in bad) exit 11;; big) exit 7;; esac; exit 12");
+    let report =
+        Report::new(&suite, &settings, &Selection::default(), results(&suite, &settings), Vec::new());
+    let text = summary::text(&report);
+    assert_eq!(text.matches("FAIL").count(), 2, "{text}");
+    assert!(text.contains("likewise 1 case: great@s3,t3,r9/full"), "{text}");
 }

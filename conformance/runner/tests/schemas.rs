@@ -1,4 +1,4 @@
-//! What is written is what the schemas say.
+//! Reports, claims and vectors are valid by their schemas.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
@@ -11,19 +11,23 @@ use splatstream_conformance::reference;
 use splatstream_conformance::report::Report;
 use splatstream_conformance::result::Outcome;
 use splatstream_conformance::selection::Selection;
+use splatstream_conformance::suite::Suite;
 use splatstream_conformance::symptom::Symptom;
 use std::path::Path;
 
-/// What is wrong with a value by a schema of the suite.
-fn problems(schema: &str, value: &Value) -> Vec<String> {
+fn validator(schema: &str) -> jsonschema::Validator {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../schema").join(format!("{schema}.schema.json"));
     let schema = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let validator = jsonschema::validator_for(&schema).unwrap();
-    validator.iter_errors(value).map(|error| format!("{}: {error}", error.instance_path())).collect()
+    jsonschema::validator_for(&schema).unwrap()
+}
+
+/// What is wrong with a value by a schema of the suite.
+fn problems(schema: &str, value: &Value) -> Vec<String> {
+    validator(schema).iter_errors(value).map(|error| format!("{}: {error}", error.instance_path())).collect()
 }
 
 #[test]
-fn a_report_with_every_sort_of_result_is_what_its_schema_says() {
+fn a_report_with_all_kinds_of_results_is_valid() {
     let vectors = Vectors::new();
     vectors.add("valid", "slow", json!({"outcome": "accept"}), |_| {});
     vectors.add("valid", "gone", json!({"outcome": "accept"}), |record| record["level"] = json!(4));
@@ -41,9 +45,9 @@ fn a_report_with_every_sort_of_result_is_what_its_schema_says() {
         vec!["line 1".to_owned()],
     );
     let whole = json!({
-        "frame": 0, "type": "I", "attribute": "dc", "gaussians": 1, "bytes_found": 5, "read": ["7.7", "A.2"],
+        "frame": 0, "type": "I", "attribute": "dc", "gaussians": 1, "bytes_found": 5, "read": ["7.6.5", "A.2"],
         "value": {"gaussian": 0, "component": 2, "expected": -1, "found": 7, "differing": 1},
-        "carrier": {"unit": 3, "type": "refinement", "byte": 99, "bytes": 40, "frame": 0, "spatial_layer": 0, "refinement": 1},
+        "unit": {"unit": 3, "type": "increment", "byte": 99, "bytes": 40, "frame": 0, "spatial_layer": 0, "refinement": 1},
     });
     report.cases[0].difference = Some(serde_json::from_value(whole).unwrap());
     report.cases[0].symptom = Some(Symptom::OffByOne);
@@ -57,7 +61,7 @@ fn a_report_with_every_sort_of_result_is_what_its_schema_says() {
 }
 
 #[test]
-fn features_are_the_same_in_schemas_and_guide() {
+fn features_are_the_same_in_the_schemas_and_the_guide() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let names: Vec<&str> = feature::names().collect();
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
@@ -73,9 +77,25 @@ fn features_are_the_same_in_schemas_and_guide() {
 }
 
 #[test]
-fn the_claim_of_the_reference_is_what_its_schema_says() {
+fn the_claim_of_the_reference_is_valid() {
     let value = serde_json::to_value(reference::capabilities()).unwrap();
     assert_eq!(problems("capabilities", &value), Vec::<String>::new());
     let other = json!({"schema": "splatstream-capabilities/1", "name": "mine", "colour": true});
     assert!(!problems("capabilities", &other).is_empty());
+}
+
+#[test]
+fn every_vector_of_the_repository_is_valid() {
+    let vectors = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vectors");
+    let suite = Suite::read(&vectors).unwrap();
+    let validator = validator("vector");
+    for located in &suite.vectors {
+        let path = located.stream.with_file_name("vector.json");
+        let record = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        let problems: Vec<String> = validator
+            .iter_errors(&record)
+            .map(|error| format!("{}: {error}", error.instance_path()))
+            .collect();
+        assert_eq!(problems, Vec::<String>::new(), "{}", path.display());
+    }
 }

@@ -1,4 +1,4 @@
-//! What was not run, or is not of the suite, is no Yes.
+//! A Yes stands for all cases of a complete suite.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
@@ -47,7 +47,7 @@ fn a_yes_is_of_all_cases_of_the_suite() {
     let right = settings(&format!("{RIGHT} {WRITE}"));
     let whole = report(&suite, &right, &[]);
     assert_eq!(whole.features["predicted"], Tally { cases: 3, claimed: 3, run: 3, pass: 3 });
-    for row in ["predicted", "profile 1", "broken streams refused, and rightly", "no crash, no timeout"] {
+    for row in ["predicted", "profile 1", "streams with errors", "no crash, no timeout"] {
         assert_eq!(cell(&whole, row), "Yes", "{row}");
     }
     assert_eq!(cell(&whole, "suite"), "9");
@@ -55,7 +55,7 @@ fn a_yes_is_of_all_cases_of_the_suite() {
     let part = report(&suite, &right, &["better"]);
     assert_eq!(part.features["predicted"], Tally { cases: 3, claimed: 3, run: 1, pass: 1 });
     assert_eq!(cell(&part, "predicted"), "part: 1 of 3 run");
-    assert_eq!(cell(&part, "broken streams refused, and rightly"), "not run");
+    assert_eq!(cell(&part, "streams with errors"), "not run");
     assert_eq!(cell(&part, "no crash, no timeout"), "part: 1 of 5 run");
     assert_eq!(cell(&part, "suite"), "9, a part");
 }
@@ -85,11 +85,11 @@ fn two_decoders_of_one_name_have_two_columns() {
 }
 
 #[test]
-fn a_suite_that_is_not_whole_is_told_and_gives_no_yes() {
+fn a_changed_suite_is_reported_and_gives_no_yes() {
     let vectors = vectors();
     assert_eq!(vectors.suite().complaint(), None);
     vectors.add("valid", "more", json!({"outcome": "accept"}), |_| {});
-    assert_eq!(vectors.suite().complaint().unwrap(), "this is not suite 9: 1 vector is not of it");
+    assert_eq!(vectors.suite().complaint().unwrap(), "this is not suite 9: 1 vector is not part of it");
     for name in ["more", "better", "best"] {
         fs::remove_dir_all(vectors.path().join("valid/stream").join(name)).unwrap();
     }
@@ -121,13 +121,13 @@ fn the_folder_above_or_below_is_suggested() {
 }
 
 #[test]
-fn what_is_no_report_is_refused_with_what_writes_one() {
+fn a_file_that_is_not_a_report_is_refused_with_advice() {
     let file = tempfile::NamedTempFile::new().unwrap();
     for (text, why) in [
-        ("# a page", "no report of a run"),
+        ("# a page", "not a report of a run"),
         ("{}", "it has no schema"),
-        ("{\"schema\": \"splatstream-capabilities/1\"}", "and not that of a report"),
-        ("{\"schema\": \"splatstream-report/2\"}", "missing field"),
+        ("{\"schema\": \"splatstream-capabilities/1\"}", "instead of splatstream-report/3"),
+        ("{\"schema\": \"splatstream-report/3\"}", "missing field"),
     ] {
         fs::write(file.path(), text).unwrap();
         let error = Report::read(file.path()).unwrap_err().to_string();

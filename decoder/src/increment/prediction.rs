@@ -1,4 +1,4 @@
-//! Clause 7.17: new Gaussians predicted from their neighbours in the reference set.
+//! Clause 7.7: new Gaussians predicted from their neighbours in the reference set.
 //!
 //! Attributes are predicted in coding order, each just before its residual is added, because the bilateral
 //! predictor compares what is known of a Gaussian with its neighbours.
@@ -6,7 +6,7 @@
 use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
 use crate::colour::Colour;
 use crate::frame::QuantizedFrame;
-use crate::home::{FINE, canonical};
+use crate::list::{FINE, canonical};
 use crate::neighbours::{Neighbour, NeighbourSearch};
 use crate::predictor::{NEIGHBOURS_MAX, Predictor, WeightedMean, bilateral_weights, knn_weights};
 use crate::transformer::LaneNetwork;
@@ -78,7 +78,7 @@ impl<'s> Prediction<'s> {
         let predictor_of = |row: usize| predictors.get(row.checked_div(run)?).copied();
         let items: Vec<Item> = (0_u32..)
             .zip(x.iter().enumerate())
-            .filter_map(|(row, (place, _))| predictor_of(place).map(|predictor| Item { row, predictor }))
+            .filter_map(|(row, (index, _))| predictor_of(index).map(|predictor| Item { row, predictor }))
             .filter(|item| item.predictor != Predictor::None)
             .collect();
         if items.is_empty() || set.is_empty() {
@@ -116,7 +116,7 @@ impl<'s> Prediction<'s> {
         Ok(())
     }
 
-    /// Puts the prediction of one attribute in the place of what `attributes` holds for the predicted Gaussians.
+    /// Overwrites one attribute of the predicted Gaussians with its prediction.
     pub fn predict(&self, stage: Stage, attributes: &mut Attributes) {
         let unit = if stage == Stage::Rotation { FINE } else { 1 };
         self.means(stage, attributes.stage_mut(stage), unit);
@@ -127,17 +127,17 @@ impl<'s> Prediction<'s> {
         }
     }
 
-    /// Takes note of one attribute as it is reconstructed.
+    /// Updates the attribute differences with one attribute as it is reconstructed.
     pub fn learn(&mut self, stage: Stage, attributes: &Attributes) {
         let same: fn(i32) -> i32 = |value| value;
-        let lattice: [fn(i32) -> i32; 2] = match stage {
+        let grid: [fn(i32) -> i32; 2] = match stage {
             Stage::LogScale | Stage::Opacity => [same; 2],
             Stage::Rotation => [canonical, same],
             Stage::Dc => [canonical; 2],
             // Nothing is predicted after it.
             Stage::Sh => return,
         };
-        self.compare(stage, attributes.stage(stage), lattice);
+        self.compare(stage, attributes.stage(stage), grid);
     }
 
     /// The network, if a Gaussian takes it.
@@ -152,21 +152,21 @@ impl<'s> Prediction<'s> {
     /// The items that the network predicts, once all attributes before dc are known.
     pub fn targets(&self) -> Vec<Target<'_>> {
         let gated = self.network.as_ref().is_some_and(|network| network.header().gated());
-        let target = |(place, item): (usize, &Item)| {
-            let weights = self.weights(place, item.predictor);
+        let target = |(index, item): (usize, &Item)| {
+            let weights = self.weights(index, item.predictor);
             // No other network looks at them.
             let affinities =
-                if gated { self.weights(place, Predictor::Bilateral) } else { [0; NEIGHBOURS_MAX] };
-            let neighbours = self.neighbours.get(self.range(place)).unwrap_or_default();
-            let places = self.rows.places(self.range(place));
-            let position = self.position.each_ref().map(|plane| plane.get(place).copied().unwrap_or(0));
-            Target { row: item.row, position, neighbours, places, weights, affinities }
+                if gated { self.weights(index, Predictor::Bilateral) } else { [0; NEIGHBOURS_MAX] };
+            let neighbours = self.neighbours.get(self.range(index)).unwrap_or_default();
+            let indices = self.rows.indices(self.range(index));
+            let position = self.position.each_ref().map(|plane| plane.get(index).copied().unwrap_or(0));
+            Target { row: item.row, position, neighbours, indices, weights, affinities }
         };
         let items = self.items.par_iter().enumerate();
         items.filter(|(_, item)| item.predictor == Predictor::Transformer).map(target).collect()
     }
 
-    /// The places of an item's neighbours.
+    /// The indices of an item's neighbours.
     fn range(&self, item: usize) -> Range<usize> {
         let start = item.wrapping_mul(self.count);
         start..start.wrapping_add(self.count)
@@ -190,24 +190,24 @@ impl<'s> Prediction<'s> {
         bilateral_weights(neighbours, spatial, feature, features)
     }
 
-    /// Whether it matters how unlike an item's neighbours are.
+    /// Whether the attribute differences of an item's neighbours are used.
     fn is_compared(&self, item: &Item) -> bool {
         let header = self.network.as_ref().map(|network| network.header());
         let learned = header.is_some_and(|header| header.gated() || !header.knn_base());
         item.predictor == Predictor::Bilateral || item.predictor == Predictor::Transformer && learned
     }
 
-    /// Puts the means of the neighbours, times `unit`, in the place of what `out` holds for the items; not of those
-    /// whose colour the network predicts.
+    /// Overwrites the items in `out` with the means of their neighbours, times `unit`; except those whose colour the
+    /// network predicts.
     fn means(&self, stage: Stage, out: &mut [Vec<i32>], unit: i32) {
         let colour = matches!(stage, Stage::Dc | Stage::Sh);
         let columns = self.rows.columns(stage);
         let mut means = vec![0; self.items.len().wrapping_mul(out.len())];
         let each = means.par_chunks_exact_mut(out.len().max(1)).zip(&self.items).enumerate();
-        each.with_min_len(RUN).for_each(|(place, (means, item))| {
+        each.with_min_len(RUN).for_each(|(index, (means, item))| {
             if !(colour && item.predictor == Predictor::Transformer) {
-                let rows = self.rows.of(self.range(place)).filter_map(|row| row.get(columns.clone()));
-                let weighted = WeightedMean::new(&self.weights(place, item.predictor));
+                let rows = self.rows.of(self.range(index)).filter_map(|row| row.get(columns.clone()));
+                let weighted = WeightedMean::new(&self.weights(index, item.predictor));
                 weighted.of_rows(rows, means);
             }
         });
@@ -218,20 +218,20 @@ impl<'s> Prediction<'s> {
         }
     }
 
-    /// Adds the squared differences between the items and their neighbours in an attribute, both brought to one lattice.
-    fn compare(&mut self, stage: Stage, own: &[Vec<i32>], lattice: [fn(i32) -> i32; 2]) {
+    /// Adds the squared differences between the items and their neighbours in an attribute, both brought to one grid.
+    fn compare(&mut self, stage: Stage, own: &[Vec<i32>], grid: [fn(i32) -> i32; 2]) {
         let columns = self.rows.columns(stage);
         let mut mine = [0; 3];
-        for (place, item) in self.items.iter().enumerate() {
+        for (index, item) in self.items.iter().enumerate() {
             if !self.is_compared(item) {
                 continue;
             }
-            mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = lattice[0](at(plane, item.row)));
-            let range = self.range(place);
+            mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = grid[0](at(plane, item.row)));
+            let range = self.range(index);
             let rows = self.rows.of(range.clone()).filter_map(|row| row.get(columns.clone()));
             for (feature, row) in self.features.get_mut(range).unwrap_or_default().iter_mut().zip(rows) {
                 for (theirs, mine) in row.iter().zip(mine) {
-                    let difference = u64::from(mine.abs_diff(lattice[1](*theirs)));
+                    let difference = u64::from(mine.abs_diff(grid[1](*theirs)));
                     *feature = feature.saturating_add(difference.wrapping_mul(difference));
                 }
             }

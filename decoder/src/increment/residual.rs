@@ -1,17 +1,15 @@
-//! Clause 7.16: residuals on top of a prediction, attribute by attribute.
+//! Clause 7.6: residuals on top of a prediction, attribute by attribute.
 
-use crate::attribute::{ATTRIBUTE_RANGE, in_range, rotation_shift};
-use crate::colour::{Colour, add_inverse};
-use crate::home::{FINE, FRACTION_BITS, Home};
+use crate::attribute::{self, ATTRIBUTE_RANGE, in_range, rotation_shift};
+use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
 use crate::layout::ShCoding;
+use crate::list::{FINE, FRACTION_BITS, GaussianList};
 use core::ops::RangeInclusive;
 use splatstream_format::payload::Transform;
 use splatstream_format::{Error, ErrorKind, Result};
 
 /// The values of a fine rotation.
 const ROTATION_FINE_RANGE: RangeInclusive<i32> = -32_767 * FINE..=32_767 * FINE;
-/// The values of colour on the output lattice.
-const COLOUR_RANGE: RangeInclusive<i32> = -(1 << 30)..=1 << 30;
 
 /// How a unit codes attributes.
 #[derive(Debug, Clone, Copy)]
@@ -53,7 +51,7 @@ pub struct Attributes {
     pub log_scale: [Vec<i32>; 3],
     /// Opacity.
     pub opacity: Vec<i32>,
-    /// Quaternion x, y, z in rotation_step / 64.
+    /// Quaternion x, y, z in 64ths of rotation_step.
     pub rotation_fine: [Vec<i32>; 3],
     /// Red, green, blue.
     pub dc: [Vec<i32>; 3],
@@ -65,7 +63,7 @@ pub struct Attributes {
 #[derive(Debug, Clone, Copy)]
 pub struct AttributeValues<'v>(pub &'v [Vec<i32>]);
 
-/// Places of the attributes among the planes.
+/// Index of the first plane of an attribute.
 const OPACITY: usize = 3;
 const ROTATION: usize = 4;
 const DC: usize = 7;
@@ -77,8 +75,8 @@ impl<'v> AttributeValues<'v> {
             Stage::LogScale => self.planes(0, OPACITY),
             Stage::Opacity => self.planes(OPACITY, ROTATION),
             Stage::Rotation => self.planes(ROTATION, DC),
-            Stage::Dc => self.planes(DC, sh_place(colour)),
-            Stage::Sh => self.planes(sh_place(colour), self.0.len()),
+            Stage::Dc => self.planes(DC, first_sh(colour)),
+            Stage::Sh => self.planes(first_sh(colour), self.0.len()),
         }
     }
 
@@ -127,24 +125,24 @@ impl Attributes {
         }
     }
 
-    /// The attributes of some Gaussians of a home, which predict themselves.
-    pub fn of_home(home: &Home, rows: &[u32]) -> Self {
+    /// The attributes of some Gaussians of a list, which predict themselves.
+    pub fn of_list(list: &GaussianList, rows: &[u32]) -> Self {
         let pick = |plane: &Vec<i32>| -> Vec<i32> {
             let value = |&row: &u32| usize::try_from(row).ok().and_then(|row| plane.get(row)).copied();
             rows.iter().map(|row| value(row).unwrap_or(0)).collect()
         };
-        let planes = &home.planes;
+        let planes = &list.planes;
         Self {
             log_scale: planes.log_scale.each_ref().map(pick),
             opacity: pick(&planes.opacity),
-            rotation_fine: home.rotation_fine.each_ref().map(pick),
+            rotation_fine: list.rotation_fine.each_ref().map(pick),
             dc: planes.dc.each_ref().map(pick),
             sh: planes.sh.iter().map(pick).collect(),
         }
     }
 
-    /// Writes the attributes to the Gaussians of a home they were taken from; [`Home::settle`] has to follow.
-    pub fn write_to(&self, home: &mut Home, rows: &[u32]) {
+    /// Writes the attributes back to the Gaussians of the list; [`GaussianList::settle`] has to follow.
+    pub fn write_to(&self, list: &mut GaussianList, rows: &[u32]) {
         let write = |plane: &mut Vec<i32>, values: &[i32]| {
             for (&row, &value) in rows.iter().zip(values) {
                 if let Some(slot) = usize::try_from(row).ok().and_then(|row| plane.get_mut(row)) {
@@ -152,8 +150,8 @@ impl Attributes {
                 }
             }
         };
-        let planes = &mut home.planes;
-        let to = planes.log_scale.iter_mut().chain([&mut planes.opacity]).chain(&mut home.rotation_fine);
+        let planes = &mut list.planes;
+        let to = planes.log_scale.iter_mut().chain([&mut planes.opacity]).chain(&mut list.rotation_fine);
         let to = to.chain(&mut planes.dc).chain(&mut planes.sh);
         let from = self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation_fine);
         let from = from.chain(&self.dc).chain(&self.sh);
@@ -200,7 +198,7 @@ impl Attributes {
     ) -> Result<()> {
         let residuals = shifted(values.of_stage(Stage::LogScale, &coding.colour), coding.shift[0]);
         for plane in &residuals {
-            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.16", at)?;
+            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
         }
         let [first, second, third] = residuals.as_slice() else { return Ok(()) };
         let [largest, middle, smallest] = &mut self.log_scale;
@@ -219,11 +217,11 @@ impl Attributes {
             least = least.min(to_middle).min(to_smallest);
         }
         for plane in &self.log_scale {
-            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.16", at)?;
+            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
         }
         if coding.canonical_axes && least < 0 {
             let rule = "canonical axes are sorted from largest to smallest";
-            return Err(Error::new(at, "7.16", ErrorKind::Constraint { rule }));
+            return Err(Error::new(at, "7.6", ErrorKind::Constraint { rule }));
         }
         Ok(())
     }
@@ -241,7 +239,7 @@ impl Attributes {
         for residual in shifted(values.of_stage(Stage::Opacity, &coding.colour), coding.shift[1]) {
             add(&mut self.opacity, &residual);
         }
-        in_range(&self.opacity, &ATTRIBUTE_RANGE, "opacity", "7.16", at)
+        in_range(&self.opacity, &ATTRIBUTE_RANGE, "opacity", "7.6", at)
     }
 
     /// Residuals of the rotation, coarser where the log-scales say so.
@@ -258,7 +256,7 @@ impl Attributes {
         for (plane, residual) in
             self.rotation_fine.iter_mut().zip(values.of_stage(Stage::Rotation, &coding.colour))
         {
-            in_range(residual, &ATTRIBUTE_RANGE, "rotation", "7.16", at)?;
+            in_range(residual, &ATTRIBUTE_RANGE, "rotation", "7.6", at)?;
             for ((slot, &value), (&a, &c)) in plane.iter_mut().zip(residual).zip(largest.iter().zip(smallest))
             {
                 let coarser = rotation_shift(a.wrapping_sub(c), coding.rotation_thresholds);
@@ -268,7 +266,7 @@ impl Attributes {
                 let sum = i64::from(*slot).wrapping_add(change);
                 *slot = i32::try_from(sum).unwrap_or(i32::MAX);
             }
-            in_range(plane, &ROTATION_FINE_RANGE, "rotation", "7.16", at)?;
+            in_range(plane, &ROTATION_FINE_RANGE, "rotation", "7.6", at)?;
         }
         Ok(())
     }
@@ -281,7 +279,7 @@ impl Attributes {
         let components = shifted(values.of_stage(Stage::Dc, &coding.colour), coding.shift[3]);
         let mut out: Vec<&mut [i32]> = self.dc.iter_mut().map(Vec::as_mut_slice).collect();
         add_inverse(coding.colour.dc, &components, &mut out, at)?;
-        self.dc.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "dc", "7.16", at))
+        self.dc.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "dc", "7.6", at))
     }
 
     /// Residuals of sh, in components or as entries of codebooks.
@@ -301,19 +299,18 @@ impl Attributes {
         };
         let mut out: Vec<&mut [i32]> = self.sh.iter_mut().map(Vec::as_mut_slice).collect();
         add_inverse(transform, &components, &mut out, at)?;
-        self.sh.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "sh", "7.16", at))
+        self.sh.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "sh", "7.6", at))
     }
 }
 
 /// The first sh plane.
-fn sh_place(colour: &Colour<'_>) -> usize {
+fn first_sh(colour: &Colour<'_>) -> usize {
     DC.saturating_add(usize::from(colour.dc.header.rank))
 }
 
-/// Values times 2^shift: below 2^17 * 2^7.
+/// Planes times 2^shift.
 fn shifted(planes: &[Vec<i32>], shift: u8) -> Vec<Vec<i32>> {
-    let shift = u32::from(shift);
-    planes.iter().map(|plane| plane.iter().map(|value| value.wrapping_shl(shift)).collect()).collect()
+    planes.iter().map(|plane| attribute::shifted(plane, shift)).collect()
 }
 
 fn add(plane: &mut [i32], residual: &[i32]) {

@@ -8,17 +8,17 @@ use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
 use splatstream_format::entropy::layout::{Layout, Section, ShCoding};
 use splatstream_format::entropy::model::{ModelTrace, read_models};
 use splatstream_format::entropy::reader::PlaneDecoder;
-use splatstream_format::payload::{CodedSection, Increment};
+use splatstream_format::payload::CodedSection;
 use splatstream_format::syntax::SequenceParameters;
 
-/// The values of a section, bias added, the blocks one behind the other.
+/// The values of a section, bias added, the blocks one after the other.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SectionValues {
     /// Of the plane of the position alphabet: the deltas. Empty if the section has none.
     pub deltas: Vec<u64>,
     /// Of every other plane, in plane order.
     pub planes: Vec<Vec<i32>>,
-    /// Values of a plane in each block but the last, where deltas start anew.
+    /// Values of a plane in each block but the last, where deltas start again from 0.
     pub block: usize,
 }
 
@@ -31,14 +31,14 @@ pub struct UnitValues {
 impl UnitValues {
     /// The values of a section; none of a section that is absent.
     pub fn section(&self, section: Section) -> &SectionValues {
-        // There is a place for each.
+        // Every section has an index below 6.
         const ABSENT: &SectionValues = &SectionValues { deltas: Vec::new(), planes: Vec::new(), block: 0 };
-        self.sections.get(section.place()).unwrap_or(ABSENT)
+        self.sections.get(section.index()).unwrap_or(ABSENT)
     }
 
-    /// Puts the values of a section in its place.
+    /// Sets the values of a section.
     pub fn set(&mut self, section: Section, values: SectionValues) {
-        if let Some(slot) = self.sections.get_mut(section.place()) {
+        if let Some(slot) = self.sections.get_mut(section.index()) {
             *slot = values;
         }
     }
@@ -49,47 +49,57 @@ impl UnitValues {
     }
 }
 
-/// Planes, models and what is in force after a unit.
-pub struct PreparedIncrement<'r, 'a> {
-    increment: &'r Increment<'a>,
+/// Sections with their models read: blocks can be decoded in any order.
+#[derive(Debug)]
+pub struct PreparedSections<'r, 'a> {
+    sections: &'r [CodedSection<'a>],
     models: Vec<SectionModels>,
 }
 
-impl<'r, 'a> PreparedIncrement<'r, 'a> {
-    /// Reads the models of all sections; `in_force` are those before the unit, and become those after it.
+impl<'r, 'a> PreparedSections<'r, 'a> {
+    /// Reads the models of the sections of a unit; `in_force` are those before the unit, and become those after it.
     ///
     /// # Errors
     /// Malformed or invalid by clauses 5.12 and 6.12.
     pub fn new(
-        increment: &'r Increment<'a>,
+        sections: &'r [CodedSection<'a>],
         dc_rank: u8,
         sh: ShCoding,
         in_force: &mut ModelsInForce,
         trace: &mut impl ModelTrace,
     ) -> Result<Self> {
-        let mut models = Vec::with_capacity(increment.sections.len());
-        for coded in &increment.sections {
+        let mut models = Vec::with_capacity(sections.len());
+        for coded in sections {
             let layout = Layout::of_section(coded.section, dc_rank, sh);
             let reusable = in_force.reusable(coded.section, &layout);
             let read = read_models(coded.model, coded.model_at, &layout.alphabets(), &reusable, trace)?;
             layout.check(&read, coded.model_at)?;
             models.push(SectionModels { layout, models: read });
         }
-        for (coded, models) in increment.sections.iter().zip(&models) {
+        for (coded, models) in sections.iter().zip(&models) {
             in_force.replace(coded.section, models.clone());
         }
-        Ok(Self { increment, models })
+        Ok(Self { sections, models })
     }
 
     /// The sections with their planes and models.
     pub fn sections(&self) -> impl Iterator<Item = (&CodedSection<'a>, &SectionModels)> {
-        self.increment.sections.iter().zip(&self.models)
+        self.sections.iter().zip(&self.models)
     }
 
     /// Distinct tables of all planes.
     pub fn tables(&self) -> usize {
         let models = self.models.iter().flat_map(|section| &section.models);
         models.map(|model| model.tables.len()).fold(0, usize::wrapping_add)
+    }
+
+    /// Values of all sections.
+    pub(crate) fn values(&self) -> u64 {
+        let of_section = |(coded, models): (&CodedSection<'_>, &SectionModels)| {
+            let planes = u64::try_from(models.models.len()).unwrap_or(u64::MAX);
+            u64::from(coded.count).saturating_mul(planes)
+        };
+        self.sections().map(of_section).fold(0, u64::saturating_add)
     }
 
     /// Decodes the blocks of all sections.
@@ -107,7 +117,7 @@ impl<'r, 'a> PreparedIncrement<'r, 'a> {
     /// The coded values of the blocks of a section.
     ///
     /// # Errors
-    /// As [`PreparedIncrement::decode`].
+    /// As [`PreparedSections::decode`].
     pub fn blocks(
         &self,
         coded: &CodedSection<'a>,
@@ -115,16 +125,9 @@ impl<'r, 'a> PreparedIncrement<'r, 'a> {
         sequence: &SequenceParameters,
     ) -> Result<Vec<CodedBlock>> {
         let decoders: Vec<PlaneDecoder> = models.models.iter().map(PlaneDecoder::new).collect();
-        let size = block_size(sequence);
-        let last = coded.blocks.len().saturating_sub(1);
-        let total = usize::try_from(coded.count).unwrap_or(usize::MAX);
-        let decoded: Vec<Result<CodedBlock>> = coded
-            .blocks
-            .par_iter()
-            .enumerate()
-            .map(|(place, &(bytes, at))| {
-                let before = place.wrapping_mul(size);
-                let count = if place == last { total.wrapping_sub(before) } else { size };
+        let decoded: Vec<Result<CodedBlock>> = blocks_of(coded, sequence)
+            .into_par_iter()
+            .map(|(bytes, at, count)| {
                 decode_coded(bytes, at, count, &models.layout, coded.lanes_log2, &decoders)
             })
             .collect();
@@ -132,12 +135,27 @@ impl<'r, 'a> PreparedIncrement<'r, 'a> {
     }
 }
 
+/// Bytes, absolute offset and number of entries of each block of a section.
+pub(crate) fn blocks_of<'a>(
+    coded: &CodedSection<'a>,
+    sequence: &SequenceParameters,
+) -> Vec<(&'a [u8], u64, usize)> {
+    let mut left = usize::try_from(coded.count).unwrap_or(usize::MAX);
+    let size = block_size(sequence);
+    let with_count = |&(bytes, at): &(&'a [u8], u64)| {
+        let count = left.min(size);
+        left = left.wrapping_sub(count);
+        (bytes, at, count)
+    };
+    coded.blocks.iter().map(with_count).collect()
+}
+
 /// Values of a plane in a whole block.
 fn block_size(sequence: &SequenceParameters) -> usize {
     1_usize.wrapping_shl(u32::from(sequence.block_log2))
 }
 
-/// The blocks of a section one behind the other, biases added.
+/// The blocks of a section one after the other, biases added.
 fn joined(blocks: &[CodedBlock], models: &SectionModels, sequence: &SequenceParameters) -> SectionValues {
     let has_deltas = models.layout.planes().first().is_some_and(|plane| plane.is_position());
     let first = usize::from(has_deltas);

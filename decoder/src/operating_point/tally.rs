@@ -1,10 +1,13 @@
 //! What operating points cost and show, from the headers of units alone.
+//!
+//! Every unit is added once to sums by layer and refinement; what a point costs is the sum over all units that belong to
+//! it. A list of Gaussians that a unit of a higher spatial layer replaces is shown only below that layer, so that sums are
+//! kept for each highest spatial layer.
 
 use super::OperatingPoint;
-use splatstream_format::levels::Levels;
 use splatstream_format::payload::OperatingPoints;
 use splatstream_format::syntax::{
-    GopHeader, IncrementHeader, OperatingPointEntry, OperatingPointsHeader, Profile, RefinementHeader,
+    FrameRole, GopHeader, IncrementHeader, OperatingPointEntry, OperatingPointsHeader, Profile,
     SequenceParameters, UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Stream, Unit};
@@ -15,9 +18,9 @@ use splatstream_format::{Error, ErrorKind, Limits, Result};
 pub struct OperatingPointInfo {
     /// The operating point.
     pub point: OperatingPoint,
-    /// Bytes of the units of its frames and groups, headers included.
+    /// Bytes of the units of its frames and GOPs, headers included.
     pub bytes: u64,
-    /// Decoded Gaussians over all frames; what is carried over is not counted.
+    /// Exact Gaussians that are output, over all frames.
     pub gaussians: u64,
     /// Frames that are output.
     pub frames: u32,
@@ -31,13 +34,13 @@ pub(crate) struct Belonging {
     profile: Profile,
     /// The first sequence parameters.
     sequence: Option<SequenceParameters>,
-    /// The first frame of the GOP, if it is a predicted one.
-    anchor: Option<u32>,
+    /// The GOP in progress and its first frame.
+    gop: Option<(GopHeader, u32)>,
 }
 
 impl Belonging {
     pub(crate) const fn new(profile: Profile) -> Self {
-        Self { profile, sequence: None, anchor: None }
+        Self { profile, sequence: None, gop: None }
     }
 
     /// Takes note of sequence parameters and GOP headers.
@@ -49,48 +52,66 @@ impl Belonging {
             }
             UnitType::GopHeader => {
                 let parsed = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile);
-                let predicted = parsed.is_ok_and(|gop| gop.is_predicted());
-                self.anchor = predicted.then_some(unit.header.frame);
+                self.gop = parsed.ok().map(|gop| (gop, unit.header.frame));
             }
             _ => {}
         }
     }
 
-    /// The number of spatial layers, for an increment of the intra frame of a predicted GOP.
-    fn anchor_layers(&self, header: &UnitHeader) -> Option<u8> {
-        let is_anchor = header.unit_type() == UnitType::Increment && self.anchor == Some(header.frame);
-        is_anchor.then(|| self.sequence.map_or(1, |sequence| sequence.spatial_layer_count))
+    /// The number of spatial layers, for an increment of a whole anchor: the I frame of a predicted GOP, if the sequence
+    /// says that a receiver of all spatial layers takes all of it.
+    fn whole_anchor_layers(&self, header: &UnitHeader) -> Option<u8> {
+        let sequence = self.sequence.filter(SequenceParameters::whole_anchor)?;
+        let (gop, first_frame) = self.gop?;
+        let is_anchor = gop.is_predicted() && header.frame == first_frame;
+        (header.unit_type() == UnitType::Increment && is_anchor).then_some(sequence.spatial_layer_count)
     }
 
     /// Whether a unit belongs to an operating point.
     pub(crate) fn takes(&self, point: OperatingPoint, header: &UnitHeader) -> bool {
-        point.takes_of(header, self.anchor_layers(header))
+        point.takes(header, self.whole_anchor_layers(header))
     }
 }
 
-/// What a unit adds.
+/// Sums by highest spatial layer, temporal layer and refinement.
+type Sums = [[[u64; 10]; 4]; 4];
+
+/// A frame whose units are being added.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
-    header: UnitHeader,
-    /// As [`OperatingPoint::takes_of`] asks for it.
-    anchor: Option<u8>,
-    bytes: u64,
-    /// Gaussians of its home after the unit; of a refinement, those it adds.
-    gaussians: u32,
+struct TalliedFrame {
+    index: u32,
+    role: FrameRole,
+    /// Units of lists from this one on are discarded.
+    limit: u8,
+    /// Units of each spatial layer, and Gaussians of each list at the highest layer that has it.
+    counts: [u8; 4],
+    sizes: [u32; 10],
 }
 
-/// The pieces of a stream, unit by unit.
+/// The sums of a stream.
 #[derive(Debug, Clone)]
 pub struct Tally {
     belonging: Belonging,
-    levels: Levels,
-    pieces: Vec<Piece>,
+    bytes: Sums,
+    gaussians: Sums,
+    /// Frames of each temporal layer.
+    frames: [u32; 4],
+    frame: Option<TalliedFrame>,
+    /// Display index and level of the last frame of each temporal layer.
+    levels: [Option<(u32, u8)>; 4],
 }
 
 impl Tally {
     /// For a stream of a profile.
-    pub fn new(profile: Profile) -> Self {
-        Self { belonging: Belonging::new(profile), levels: Levels::default(), pieces: Vec::new() }
+    pub const fn new(profile: Profile) -> Self {
+        Self {
+            belonging: Belonging::new(profile),
+            bytes: [[[0; 10]; 4]; 4],
+            gaussians: [[[0; 10]; 4]; 4],
+            frames: [0; 4],
+            frame: None,
+            levels: [None; 4],
+        }
     }
 
     /// Whether a unit, which need not be counted, belongs to an operating point.
@@ -101,33 +122,69 @@ impl Tally {
     /// Takes note of a unit.
     pub fn unit(&mut self, unit: &Unit<'_>) {
         self.belonging.follow(unit);
-        let Belonging { profile, sequence, .. } = self.belonging;
-        let (payload, at) = (unit.payload, unit.payload_at);
-        if !unit.header.unit_type().is_known_in(profile) {
-            return;
+        let header = &unit.header;
+        match header.unit_type() {
+            UnitType::FrameHeader => self.begin_frame(header),
+            UnitType::Increment => self.increment(unit),
+            UnitType::GopHeader => (self.frame, self.levels) = (None, [None; 4]),
+            UnitType::Transform | UnitType::Codebook | UnitType::Weights => {}
+            _ => return,
         }
-        self.levels.follow(unit, profile);
-        // The payload of a unit that is passed over shows nothing, whatever it says.
-        let is_decoded = self.levels.takes(&unit.header);
-        let gaussians = match (unit.header.unit_type(), &sequence) {
-            (UnitType::Refinement, Some(sequence)) => {
-                RefinementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.gaussian_count)
-            }
-            (UnitType::Increment, _) if !is_decoded => 0,
-            (UnitType::Increment, Some(sequence)) => {
-                IncrementHeader::parse(payload, at, sequence).map_or(0, |(header, _)| header.home_count())
-            }
-            (kind, _) if !matches!(kind.code(), 2..=5 | 9) => return,
-            _ => 0,
+        let length = UnitHeader::SIZE.saturating_add(unit.payload.len());
+        let whole = self.belonging.whole_anchor_layers(header);
+        add(&mut self.bytes, header, header.spatial_layer..4, whole, size(length), u64::saturating_add);
+    }
+
+    fn begin_frame(&mut self, header: &UnitHeader) {
+        self.store_level();
+        let (Some(sequence), Some((gop, first))) = (self.belonging.sequence, self.belonging.gop) else {
+            return;
         };
-        let length = UnitHeader::SIZE.saturating_add(payload.len());
-        let bytes = u64::try_from(length).unwrap_or(u64::MAX);
-        self.pieces.push(Piece {
-            header: unit.header,
-            anchor: self.belonging.anchor_layers(&unit.header),
-            bytes,
-            gaussians,
-        });
+        let role = gop.role(header.frame.saturating_sub(first));
+        let reference = role.reference.map(|reference| first.saturating_add(reference));
+        let level_of = |reference: u32| {
+            let known = self.levels.iter().flatten().find(|(index, _)| *index == reference);
+            known.map_or(0, |(_, level)| *level)
+        };
+        let limit = reference.map_or(sequence.refinement_count, level_of);
+        let index = header.frame;
+        self.frame = Some(TalliedFrame { index, role, limit, counts: [0; 4], sizes: [0; 10] });
+        if let Some(frames) = self.frames.get_mut(usize::from(header.temporal_layer)) {
+            *frames = frames.saturating_add(1);
+        }
+    }
+
+    /// Keeps the level of the frame that ends.
+    fn store_level(&mut self) {
+        let (Some(frame), Some(sequence)) = (self.frame.take(), self.belonging.sequence) else { return };
+        let layers = usize::from(sequence.spatial_layer_count);
+        let complete = frame.counts.iter().take(layers).all(|&count| count == sequence.refinement_count);
+        let count = frame.counts.get(layers.saturating_sub(1)).copied().unwrap_or(0);
+        let is_whole = sequence.whole_anchor() && frame.role.reference.is_none();
+        let level = if is_whole && !complete { 0 } else { count };
+        if let Some(slot) = self.levels.get_mut(usize::from(frame.role.temporal_layer)) {
+            *slot = Some((frame.index, level));
+        }
+    }
+
+    /// The Gaussians of a unit, if it is decoded: they replace those of the spatial layer below.
+    fn increment(&mut self, unit: &Unit<'_>) {
+        let header = &unit.header;
+        let whole = self.belonging.whole_anchor_layers(header);
+        let (Some(frame), Some(sequence)) = (&mut self.frame, &self.belonging.sequence) else { return };
+        let (layer, refinement) = (usize::from(header.spatial_layer), usize::from(header.refinement));
+        let (Some(count), Some(slot)) = (frame.counts.get_mut(layer), frame.sizes.get_mut(refinement)) else {
+            return;
+        };
+        let is_next = header.refinement == *count && header.refinement < frame.limit;
+        let profile = self.belonging.profile;
+        let parsed = IncrementHeader::parse(unit.payload, unit.payload_at, sequence, profile);
+        let (true, true, Ok((increment, _))) = (is_next, header.frame == frame.index, parsed) else { return };
+        *count = count.saturating_add(1);
+        let before = core::mem::replace(slot, increment.list_size());
+        let layers = header.spatial_layer..4;
+        add(&mut self.gaussians, header, layers.clone(), whole, before.into(), u64::saturating_sub);
+        add(&mut self.gaussians, header, layers, whole, increment.list_size().into(), u64::saturating_add);
     }
 
     /// Every operating point of the sequence, lowest first.
@@ -137,34 +194,19 @@ impl Tally {
 
     /// What a point costs and shows.
     pub fn info(&self, point: OperatingPoint) -> OperatingPointInfo {
-        let takes = |piece: &&Piece| point.takes_of(&piece.header, piece.anchor);
-        let mut info = OperatingPointInfo {
-            point,
-            bytes: 0,
-            gaussians: 0,
-            frames: 0,
-            percent: self.percent(point.refinement),
+        let layers = usize::from(point.temporal).saturating_add(1);
+        let total = |sums: &Sums| {
+            let of_layer = sums.get(usize::from(point.spatial.min(3))).into_iter().flatten().take(layers);
+            let refinements = usize::from(point.refinement).saturating_add(1);
+            of_layer.flat_map(|sums| sums.iter().take(refinements)).copied().fold(0, u64::saturating_add)
         };
-        // Gaussians and units of each layer of the frame.
-        let mut frame: [(u64, u32); 4] = [(0, 0); 4];
-        for piece in self.pieces.iter().filter(takes) {
-            info.bytes = info.bytes.saturating_add(piece.bytes);
-            match piece.header.unit_type() {
-                UnitType::FrameHeader => {
-                    info.frames = info.frames.saturating_add(1);
-                    info.gaussians = info.gaussians.saturating_add(shown(&core::mem::take(&mut frame)));
-                }
-                UnitType::Refinement | UnitType::Increment => {
-                    if let Some((sum, units)) = frame.get_mut(usize::from(piece.header.spatial_layer)) {
-                        *sum = sum.saturating_add(piece.gaussians.into());
-                        *units = units.saturating_add(1);
-                    }
-                }
-                _ => {}
-            }
+        OperatingPointInfo {
+            point,
+            bytes: total(&self.bytes),
+            gaussians: total(&self.gaussians),
+            frames: self.frames.iter().take(layers).copied().fold(0, u32::saturating_add),
+            percent: self.percent(point.refinement),
         }
-        info.gaussians = info.gaussians.saturating_add(shown(&frame));
-        info
     }
 
     fn percent(&self, refinement: u8) -> u8 {
@@ -215,16 +257,37 @@ impl Tally {
     }
 }
 
+/// Adds what a unit has to the sums of some highest spatial layers. A receiver of all spatial layers takes every
+/// refinement of a whole anchor.
+fn add(
+    sums: &mut Sums,
+    header: &UnitHeader,
+    layers: core::ops::Range<u8>,
+    whole: Option<u8>,
+    value: u64,
+    join: fn(u64, u64) -> u64,
+) {
+    for layer in layers {
+        let has_all = whole.is_some_and(|count| layer.saturating_add(1) >= count);
+        let refinement = if has_all { 0 } else { usize::from(header.refinement) };
+        let of_layer = sums.get_mut(usize::from(layer));
+        let of_layer = of_layer.and_then(|sums| sums.get_mut(usize::from(header.temporal_layer)));
+        if let Some(sum) = of_layer.and_then(|sums| sums.get_mut(refinement)) {
+            *sum = join(*sum, value);
+        }
+    }
+}
+
 /// Every operating point of a sequence, lowest first.
 pub fn all_points(sequence: &SequenceParameters) -> Vec<OperatingPoint> {
     let mut points = Vec::new();
     for spatial in 0..sequence.spatial_layer_count {
-        // Below the highest spatial layer there are no predicted frames.
-        let has_all = spatial.saturating_add(1) == sequence.spatial_layer_count;
-        for temporal in 0..if has_all { sequence.temporal_layer_count } else { 1 } {
-            for refinement in 0..sequence.refinement_count {
-                points.push(OperatingPoint { spatial, temporal, refinement });
-            }
+        for temporal in 0..sequence.temporal_layer_count {
+            points.extend((0..sequence.refinement_count).map(|refinement| OperatingPoint {
+                spatial,
+                temporal,
+                refinement,
+            }));
         }
     }
     points
@@ -232,12 +295,6 @@ pub fn all_points(sequence: &SequenceParameters) -> Vec<OperatingPoint> {
 
 fn size(bytes: usize) -> u64 {
     u64::try_from(bytes).unwrap_or(u64::MAX)
-}
-
-/// The Gaussians of the highest layer with as many units as the lowest that has any: of what is shown.
-fn shown(layers: &[(u64, u32); 4]) -> u64 {
-    let complete = layers.iter().find(|(_, units)| *units > 0).map_or(0, |(_, units)| *units);
-    layers.iter().rev().find(|(_, units)| *units == complete).map_or(0, |(sum, _)| *sum)
 }
 
 /// The operating points of a stream, lowest first, from its headers alone.
@@ -248,10 +305,18 @@ pub fn operating_points(bytes: &[u8], limits: &Limits) -> Result<Vec<OperatingPo
     let stream = Stream::open(bytes, limits)?;
     let profile = stream.header().profile();
     let mut tally = Tally::new(profile);
-    for unit in stream.units() {
+    let mut units = stream.units();
+    while let Some(unit) = units.next_unit() {
         let unit = unit?;
-        if unit.header.unit_type() == UnitType::SequenceParameters {
-            SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
+        unit.check_header(profile)?;
+        match unit.header.unit_type() {
+            // Decoders discard some of them, whose payload may be anything.
+            UnitType::Increment => {}
+            UnitType::SequenceParameters => {
+                unit.check_payload()?;
+                SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
+            }
+            _ => unit.check_payload()?,
         }
         tally.unit(&unit);
     }

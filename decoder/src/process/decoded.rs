@@ -1,94 +1,146 @@
-//! What comes out of a decoder for a frame.
+//! What a decoder gives for a frame.
 
+use crate::attribute::ATTRIBUTE_RANGE;
 use crate::entropy_state::UnitEntropy;
 use crate::frame::QuantizedFrame;
 use splatstream_format::Error;
 use splatstream_format::syntax::FrameType;
 
-/// One frame as far as its units were there.
+/// One frame, as far as its units were decoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecodedFrame {
     /// Display index.
-    pub number: u32,
+    pub index: u32,
     /// How it is coded.
     pub frame_type: FrameType,
-    /// The integer planes that are shown.
+    /// The integer planes of the Gaussians that are shown: exact lists, then carried lists. Not compensated; see
+    /// [`DecodedFrame::into_shown`].
     pub planes: QuantizedFrame,
-    /// Refinement units decoded; in an intra frame with spatial layers, those of the layer shown.
-    pub refinements: u8,
-    /// Spatial layer shown.
+    /// Exact lists that are shown.
+    pub level: u8,
+    /// The spatial layer of the last exact list.
     pub spatial_layer: u8,
-    /// Gaussians at the end of `planes` that are carried over from the intra frame (7.18).
+    /// Carried lists that are shown (clause 7.8.1).
+    pub carried_lists: u8,
+    /// Gaussians of carried lists: the last ones of `planes`.
     pub carried: usize,
-    /// The frame that is shown in place of this one, of which nothing could be decoded (7.20.3).
-    pub frozen: Option<u32>,
-    /// Digest of the decoded planes, clause 7.9; none if it was not asked for, or nothing was decoded.
+    /// Whether nothing is known of the frame: it has no Gaussians and counts as lost (clause 7.8.1).
+    pub is_lost: bool,
+    /// Digest of the exact lists; none if digests are not verified or there is no exact list.
     pub digest: Option<u64>,
-    /// Digest of the carried planes, clause 7.18, under the same conditions.
+    /// Digest of all carried lists of the frame, where it was compared.
     pub carried_digest: Option<u64>,
     /// What is added before output.
     pub compensation: Compensation,
-    /// Bytes of the frame's units that were decoded, headers included.
+    /// Bytes of the units of the frame that were decoded, headers included.
     pub bytes: u64,
-    /// Entropy states of the frame's units that were decoded, if they were asked for.
+    /// Entropy states of the units of the frame that were decoded, if they were asked for.
     pub entropy: Vec<UnitEntropy>,
-    /// The first error of the frame: why the refinement after the last decoded one was lost, or that the carried
-    /// planes are not those of their digest.
-    pub lost: Option<Error>,
-    /// That the carried planes are not those of their digest, where another error comes before (SS-ER-007): `lost`, or
-    /// the one that ended decoding within the frame.
-    pub carried_fault: Option<Error>,
+    /// The first error that was found in the frame.
+    pub error: Option<Error>,
 }
 
-/// Clause 7.18: what fills the holes that missing refinements leave.
+/// What is added to log-scales and opacities, in steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Shift {
+    /// Added to each log-scale.
+    pub log_scale: i8,
+    /// Added to the opacity.
+    pub opacity: i8,
+}
+
+/// Clause 7.8.3: what fills the holes that missing Gaussians leave.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Compensation {
-    /// Added to each log-scale, steps.
-    pub log_scale: i8,
-    /// Added to the opacity, steps.
-    pub opacity: i8,
-    /// Which Gaussians, from the first on; those without a flag stay as they are.
-    pub applies: Vec<bool>,
+    /// Added to exact Gaussians.
+    pub exact: Shift,
+    /// To which of the exact ones, in order; empty: to all.
+    pub only: Vec<bool>,
+    /// Added to carried Gaussians.
+    pub carried: Shift,
 }
 
 impl DecodedFrame {
     /// A frame of which nothing is there.
-    pub(super) fn empty(number: u32, frame_type: FrameType) -> Self {
+    pub(super) fn empty(index: u32, frame_type: FrameType) -> Self {
         Self {
-            number,
+            index,
             frame_type,
             planes: QuantizedFrame::default(),
-            refinements: 0,
+            level: 0,
             spatial_layer: 0,
+            carried_lists: 0,
             carried: 0,
-            frozen: None,
+            is_lost: false,
             digest: None,
             carried_digest: None,
             compensation: Compensation::default(),
             bytes: 0,
             entropy: Vec::new(),
-            lost: None,
-            carried_fault: None,
+            error: None,
         }
     }
 
-    /// The planes that clause 7.10 makes output of: compensated.
+    /// The planes from which clause 7.10 computes the output: compensated.
     pub fn into_shown(self) -> QuantizedFrame {
-        let Self { mut planes, compensation, .. } = self;
-        compensation.apply(&mut planes);
+        let Self { mut planes, compensation, carried, .. } = self;
+        let exact = planes.len().saturating_sub(carried);
+        compensation.apply(&mut planes, exact);
         planes
     }
 }
 
+impl Shift {
+    /// True if nothing is added.
+    pub fn is_zero(self) -> bool {
+        self == Self::default()
+    }
+}
+
 impl Compensation {
-    fn apply(&self, planes: &mut QuantizedFrame) {
-        let range = crate::attribute::ATTRIBUTE_RANGE;
-        let shift = |plane: &mut Vec<i32>, by: i8| {
-            for (value, _) in plane.iter_mut().zip(&self.applies).filter(|(_, applies)| **applies) {
-                *value = value.wrapping_add(by.into()).clamp(*range.start(), *range.end());
-            }
+    /// Compensates planes of which the first `exact` Gaussians are exact.
+    fn apply(&self, planes: &mut QuantizedFrame, exact: usize) {
+        let applies = |index: usize| self.only.is_empty() || self.only.get(index).copied().unwrap_or(false);
+        let shift = |plane: &mut [i32], of_exact: i8, of_carried: i8| {
+            let (exact, carried) = plane.split_at_mut_checked(exact).unwrap_or_default();
+            let compensated = exact.iter_mut().enumerate().filter(|(index, _)| applies(*index));
+            compensated.for_each(|(_, value)| add(value, of_exact));
+            carried.iter_mut().for_each(|value| add(value, of_carried));
         };
-        planes.log_scale.iter_mut().for_each(|plane| shift(plane, self.log_scale));
-        shift(&mut planes.opacity, self.opacity);
+        if self.exact.is_zero() && self.carried.is_zero() {
+            return;
+        }
+        for plane in &mut planes.log_scale {
+            shift(plane, self.exact.log_scale, self.carried.log_scale);
+        }
+        shift(&mut planes.opacity, self.exact.opacity, self.carried.opacity);
+    }
+}
+
+fn add(value: &mut i32, by: i8) {
+    *value = value.wrapping_add(by.into()).clamp(*ATTRIBUTE_RANGE.start(), *ATTRIBUTE_RANGE.end());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_and_carried_gaussians_are_compensated_apart() {
+        let mut frame = DecodedFrame::empty(0, FrameType::Predicted);
+        frame.planes = QuantizedFrame::zeroed(4, 0);
+        frame.planes.opacity = vec![1, 32_767, 3, -32_768];
+        frame.carried = 1;
+        frame.compensation = Compensation {
+            exact: Shift { log_scale: 2, opacity: 5 },
+            only: vec![false, true, true],
+            carried: Shift { log_scale: -1, opacity: -5 },
+        };
+        let mut all = frame.clone();
+        all.compensation.only.clear();
+        let shown = frame.into_shown();
+        assert_eq!(shown.opacity, [1, 32_767, 8, -32_768]);
+        assert_eq!(shown.log_scale, [const { [0, 2, 2, -1] }; 3].map(Vec::from));
+        assert_eq!(all.into_shown().opacity, [6, 32_767, 8, -32_768]);
     }
 }

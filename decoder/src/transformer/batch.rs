@@ -26,7 +26,7 @@ pub struct Seen<'t> {
     pub components: &'t [i64],
     /// log_scale, opacity and rotation less those of the new Gaussian.
     pub geometry: [i32; 7],
-    /// Weight of 7.17.4 for dc.
+    /// Weight of 7.7.4 for dc.
     pub affinity: i64,
     /// Squared distance.
     pub distance: u64,

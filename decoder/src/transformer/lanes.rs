@@ -187,11 +187,11 @@ impl<P: Products> OneBatch<'_, P> {
     }
 
     #[inline(always)]
-    fn shift(&self, place: usize) -> u32 {
-        self.network.header.layer_shift.get(place).copied().unwrap_or(1).into()
+    fn shift(&self, index: usize) -> u32 {
+        self.network.header.layer_shift.get(index).copied().unwrap_or(1).into()
     }
 
-    /// SS-TR-003: the embeddings of all neighbours, one behind the other, in pairs.
+    /// SS-TR-003: the embeddings of all neighbours, one after the other, in pairs.
     #[inline(always)]
     fn embeddings(&self, sums: &mut Sums) -> Vec<Lane> {
         let (network, batch) = (self.network, self.batch);
@@ -202,15 +202,13 @@ impl<P: Products> OneBatch<'_, P> {
         let geometry = usize::from(network.header.geometry_width);
         let shift = self.shift(0);
         for (rank, row) in h.chunks_exact_mut(steps).enumerate() {
-            let (token, behind) = input.split_at_mut_checked(inputs).unwrap_or_default();
+            let (token, after) = input.split_at_mut_checked(inputs).unwrap_or_default();
             packed_bytes(batch.token(rank), token);
             if geometry > 0 {
                 let mut near = [ZERO; 2];
                 packed_bytes(batch.near(rank), &mut near);
                 network.geometry.multiply(self.by, &near, sums);
-                pairs(sums.get(..geometry).unwrap_or_default(), behind, |sum| {
-                    round(sum, shift).clamp(0, 127)
-                });
+                pairs(sums.get(..geometry).unwrap_or_default(), after, |sum| round(sum, shift).clamp(0, 127));
             }
             let ranks = network.ranks.get(rank).or(network.ranks.last()).map_or(&[][..], Vec::as_slice);
             network.embedding.multiply_from(self.by, ranks, &input, sums);
@@ -234,9 +232,9 @@ impl<P: Products> OneBatch<'_, P> {
             numerator.wrapping_mul(reciprocal.cast_signed()).wrapping_shr(18).wrapping_sub(128)
         };
         let width = out.len();
-        for (place, out) in out.iter_mut().enumerate() {
+        for (index, out) in out.iter_mut().enumerate() {
             let (mut first, mut second) = (ZERO, ZERO);
-            for row in rows.iter().skip(place).step_by(width.max(1)) {
+            for row in rows.iter().skip(index).step_by(width.max(1)) {
                 add(&mut first, &row.map(low));
                 add(&mut second, &row.map(high));
             }

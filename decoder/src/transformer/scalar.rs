@@ -34,8 +34,8 @@ fn lane_of(rows: &[[i8; super::LANES]], lane: usize) -> Row {
     rows.iter().map(|row| row.get(lane).copied().unwrap_or(0).into()).collect()
 }
 
-fn shift(header: &NetworkHeader, place: usize) -> u32 {
-    header.layer_shift.get(place).copied().unwrap_or(1).into()
+fn shift(header: &NetworkHeader, index: usize) -> u32 {
+    header.layer_shift.get(index).copied().unwrap_or(1).into()
 }
 
 fn dot(weights: &[i8], x: &[i32]) -> i32 {

@@ -33,18 +33,18 @@ const LOGIT: f32 = 7.0;
 pub(crate) struct Reach {
     /// Of its own size.
     pub(crate) scales: f32,
-    /// Lattice steps.
+    /// Grid steps.
     pub(crate) least: f32,
 }
 
 /// One Gaussian, ready to be compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Feature {
-    /// Its place in its frame.
+    /// Its index in its frame.
     index: u32,
-    /// Lattice steps.
+    /// Grid steps.
     position: [f32; 3],
-    /// Size in lattice steps: the geometric mean of the two largest axes.
+    /// Size in grid steps: the geometric mean of the two largest axes.
     size: f32,
     /// In steps.
     attributes: [f32; ATTRIBUTES],
@@ -62,15 +62,15 @@ pub(crate) struct Link {
 }
 
 /// Those of a cloud, ready to be compared.
-pub(crate) fn features(cloud: &Cloud<'_>, places: &[u32], measure: &Measure) -> Vec<Feature> {
+pub(crate) fn features(cloud: &Cloud<'_>, indices: &[u32], measure: &Measure) -> Vec<Feature> {
     let steps = &measure.steps;
     let feature = |&index: &u32| {
-        let place = index as usize;
-        let mut axes = cloud.log_scale.map(|plane| plane[place]);
+        let row = index as usize;
+        let mut axes = cloud.log_scale.map(|plane| plane[row]);
         axes.sort_unstable_by(f32::total_cmp);
         let [a, b, c] = axes.map(|axis| axis / steps.log_scale);
-        let [red, green, blue] = cloud.dc.map(|plane| plane[place] / steps.dc);
-        let opacity = cloud.opacity[place].clamp(-LOGIT, LOGIT) / steps.opacity;
+        let [red, green, blue] = cloud.dc.map(|plane| plane[row] / steps.dc);
+        let opacity = cloud.opacity[row].clamp(-LOGIT, LOGIT) / steps.opacity;
         Feature {
             index,
             position: cloud.at(index),
@@ -78,7 +78,7 @@ pub(crate) fn features(cloud: &Cloud<'_>, places: &[u32], measure: &Measure) -> 
             attributes: [a, b, c, opacity, red, green, blue],
         }
     };
-    places.par_iter().map(feature).collect()
+    indices.par_iter().map(feature).collect()
 }
 
 /// Gaussians of the reference by Morton code: those of a cell of any size follow each other.
@@ -87,15 +87,15 @@ struct Grid<'a> {
     members: Vec<&'a Feature>,
 }
 
-/// Whole lattice steps; what is outside is at the border.
+/// Whole grid steps; what is outside is at the border.
 fn whole(position: [f32; 3]) -> [u32; 3] {
     position.map(|value| value.clamp(0.0, 1_048_575.0) as u32)
 }
 
 /// The cell of size 2^level on one axis, and its neighbour on the nearer side.
-fn two_cells(place: u32, level: u32) -> [u32; 2] {
-    let cell = place >> level;
-    let upper = level > 0 && (place >> (level - 1)) & 1 == 1;
+fn two_cells(index: u32, level: u32) -> [u32; 2] {
+    let cell = index >> level;
+    let upper = level > 0 && (index >> (level - 1)) & 1 == 1;
     [cell, if upper { cell + 1 } else { cell.wrapping_sub(1).min(cell) }]
 }
 
@@ -108,13 +108,13 @@ impl<'a> Grid<'a> {
         let mut sorted: Vec<(u64, u32)> =
             features.par_iter().map(code).zip(0..features.len() as u32).collect();
         sorted.par_sort_unstable();
-        let members = sorted.iter().map(|&(_, place)| &features[place as usize]).collect();
+        let members = sorted.iter().map(|&(_, index)| &features[index as usize]).collect();
         Self { codes: sorted.into_iter().map(|(code, _)| code).collect(), members }
     }
 
     /// The eight cells of size 2^level about a place, as runs of members.
-    fn runs(&self, place: [u32; 3], level: u32) -> [(usize, usize); 8] {
-        let cells = place.map(|value| two_cells(value, level));
+    fn runs(&self, index: [u32; 3], level: u32) -> [(usize, usize); 8] {
+        let cells = index.map(|value| two_cells(value, level));
         let mut runs = [(0, 0); 8];
         for (corner, run) in runs.iter_mut().enumerate() {
             let [x, y, z] = [0, 1, 2].map(|axis: usize| cells[axis][(corner >> axis) & 1]);
@@ -132,12 +132,12 @@ impl<'a> Grid<'a> {
 
     /// Members within a radius or, where they are too many, within as much of it as holds few enough.
     fn about(&self, position: [f32; 3], radius: f32) -> impl Iterator<Item = &'a Feature> {
-        let place = whole(position);
+        let index = whole(position);
         let mut level = (0..20).find(|&level| 2.0 * radius <= (1_u32 << level) as f32).unwrap_or(20);
-        let mut runs = self.runs(place, level);
+        let mut runs = self.runs(index, level);
         while level > 0 && runs.iter().map(|(first, end)| end - first).sum::<usize>() > COMPARED {
             level -= 1;
-            runs = self.runs(place, level);
+            runs = self.runs(index, level);
         }
         runs.into_iter().flat_map(|(first, end)| &self.members[first..end]).take(COMPARED).copied()
     }
@@ -162,8 +162,8 @@ fn candidates(grid: &Grid<'_>, to: &Feature, reach: Reach) -> Vec<Link> {
         if !wanted {
             continue;
         }
-        let place = kept.partition_point(|link| link.cost <= cost);
-        kept.insert(place, Link { from: from.index, to: to.index, cost });
+        let index = kept.partition_point(|link| link.cost <= cost);
+        kept.insert(index, Link { from: from.index, to: to.index, cost });
         kept.truncate(KEPT);
     }
     kept

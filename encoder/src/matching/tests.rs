@@ -3,7 +3,7 @@
 use super::*;
 use crate::settings::Quality;
 
-/// A frame for tests: 1,000 lattice steps wide, sizes of 4 steps and more, one lattice step to the scene unit.
+/// A frame for tests: 1,000 grid steps wide, sizes of 4 steps and more, one grid step to the scene unit.
 #[derive(Clone, Default)]
 pub(crate) struct Scene {
     pub(crate) position: [Vec<f32>; 3],

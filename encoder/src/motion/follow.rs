@@ -66,32 +66,32 @@ fn points(reference: &Cloud<'_>, target: &Cloud<'_>, links: &[Link]) -> Vec<Poin
 /// Where the reference's Gaussians are if they move as the points about them.
 fn expected_places(reference: &Cloud<'_>, points: &[Point], position_bits: u8) -> [Vec<f32>; 3] {
     let all: Vec<Vector> =
-        (0..reference.len() as u32).map(|place| reference.at(place).map(f64::from)).collect();
+        (0..reference.len() as u32).map(|index| reference.at(index).map(f64::from)).collect();
     let mut tree = Tree::new(points, &all, position_bits);
     while tree.cell_log2 > 0 && tree.nodes.len() * PAIRS_IN_CELL < points.len() {
         tree.split();
     }
-    let mut places = [0, 1, 2].map(|_: usize| vec![0.0; all.len()]);
+    let mut indices = [0, 1, 2].map(|_: usize| vec![0.0; all.len()]);
     for node in &tree.nodes {
-        for &(position, place) in &tree.others[node.others.clone()] {
+        for &(position, index) in &tree.others[node.others.clone()] {
             let moved = node.motion.apply(position);
-            for (plane, value) in places.iter_mut().zip(moved) {
-                plane[place as usize] = value as f32;
+            for (plane, value) in indices.iter_mut().zip(moved) {
+                plane[index as usize] = value as f32;
             }
         }
     }
-    places
+    indices
 }
 
 /// One in `part` of these, those that cover most.
-fn largest(cloud: &Cloud<'_>, places: &[u32], part: usize) -> Vec<u32> {
-    let mut ranked: Vec<(f32, u32)> = places.iter().map(|&place| (-cloud.coverage(place), place)).collect();
+fn largest(cloud: &Cloud<'_>, indices: &[u32], part: usize) -> Vec<u32> {
+    let mut ranked: Vec<(f32, u32)> = indices.iter().map(|&index| (-cloud.coverage(index), index)).collect();
     ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let kept = (places.len() / part).max(FEWEST).min(places.len());
-    ranked[..kept].iter().map(|&(_, place)| place).collect()
+    let kept = (indices.len() / part).max(FEWEST).min(indices.len());
+    ranked[..kept].iter().map(|&(_, index)| index).collect()
 }
 
-/// The largest side of the box that holds the inner 90 % on each axis, lattice steps.
+/// The largest side of the box that holds the inner 90 % on each axis, grid steps.
 fn side(cloud: &Cloud<'_>) -> f32 {
     let of_axis = |plane: &[f32]| {
         let mut values = plane.to_vec();

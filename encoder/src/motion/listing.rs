@@ -1,8 +1,8 @@
 //! The cells worth listing at one size, and what they cost.
 
-use super::rigid::{Point, Vector, minus, plus, turned};
+use super::rigid::{Point, Vector, minus, plus, rotated};
 use super::tree::{Node, Tree, centre};
-use super::{Cell, DEAD_ZONE, TRANSLATION, TURN};
+use super::{Cell, DEAD_ZONE, ROTATION, TRANSLATION};
 use crate::entropy_cost::Histogram;
 use splatstream_decoder::position::morton;
 
@@ -19,12 +19,12 @@ const LISTED_BITS: f32 = 4.0;
 /// sees the rest where its cells bring it.
 const CARRIED: f32 = 0.25;
 
-/// A difference that the eye and the pairs do not see, lattice steps, at the border of a cell.
+/// A difference that the eye and the pairs do not see, grid steps, at the border of a cell.
 const UNSEEN: f64 = 0.25;
 
 /// The largest coded magnitudes.
 const TRANSLATION_LIMIT: u32 = 1 << 20;
-const TURN_LIMIT: u32 = 8191;
+const ROTATION_LIMIT: u32 = 8191;
 
 /// A motion as it is coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,37 +32,37 @@ pub(super) struct Coded {
     /// Eighths of a step.
     pub(super) translation: [i32; 3],
     /// Q14.
-    pub(super) turn: [i32; 3],
+    pub(super) rotation: [i32; 3],
 }
 
 impl Coded {
     /// Nothing moves: what a cell that is not listed does.
-    pub(super) const STILL: Self = Self { translation: [0; 3], turn: [0; 3] };
+    pub(super) const STILL: Self = Self { translation: [0; 3], rotation: [0; 3] };
 
     /// Where a point of the cell about `centre` goes.
     pub(super) fn apply(&self, centre: Vector, point: Vector) -> Vector {
         let shift = self.translation.map(|value| f64::from(value) / TRANSLATION);
         let moved = plus(point, shift);
-        if self.turn == [0; 3] {
+        if self.rotation == [0; 3] {
             return moved;
         }
         let arm = minus(point, centre);
-        plus(moved, minus(turned(self.turn.map(|value| f64::from(value) / TURN), arm), arm))
+        plus(moved, minus(rotated(self.rotation.map(|value| f64::from(value) / ROTATION), arm), arm))
     }
 
-    /// With this turn, a point must move by `shift`.
-    fn through(turn: [i32; 3], centre: Vector, point: Vector, shift: Vector) -> Option<Self> {
-        let only = Self { translation: [0; 3], turn };
+    /// With this rotation, a point must move by `shift`.
+    fn through(rotation: [i32; 3], centre: Vector, point: Vector, shift: Vector) -> Option<Self> {
+        let only = Self { translation: [0; 3], rotation };
         let rest = minus(shift, minus(only.apply(centre, point), point));
         let translation = rest.map(|value| libm::rint(value * TRANSLATION) as i32);
         let fits = translation.iter().all(|value| value.unsigned_abs() <= TRANSLATION_LIMIT)
-            && turn.iter().all(|value| value.unsigned_abs() <= TURN_LIMIT);
-        fits.then_some(Self { translation, turn })
+            && rotation.iter().all(|value| value.unsigned_abs() <= ROTATION_LIMIT);
+        fits.then_some(Self { translation, rotation })
     }
 
     /// Components that are nearly those of the cell before become them.
     fn snapped(&self, before: &Self, size: f64) -> Self {
-        let turn_tolerance = (UNSEEN * TURN / size) as i32;
+        let rotation_tolerance = (UNSEEN * ROTATION / size) as i32;
         let translation_tolerance = (UNSEEN * TRANSLATION) as i32;
         let snap = |own: [i32; 3], other: [i32; 3], tolerance: i32| {
             [0, 1, 2].map(|axis: usize| {
@@ -72,7 +72,7 @@ impl Coded {
         };
         Self {
             translation: snap(self.translation, before.translation, translation_tolerance),
-            turn: snap(self.turn, before.turn, turn_tolerance),
+            rotation: snap(self.rotation, before.rotation, rotation_tolerance),
         }
     }
 }
@@ -119,30 +119,30 @@ pub(super) fn listing(tree: &Tree) -> Listing {
     for node in &tree.nodes {
         let chosen = chosen(tree, node, &before);
         if chosen != Coded::STILL {
-            let [x, y, z] = node.place;
-            let Coded { translation, turn } = chosen;
-            cells.push(Cell { code: morton(x, y, z), stale: false, translation, turn });
+            let [x, y, z] = node.index;
+            let Coded { translation, rotation } = chosen;
+            cells.push(Cell { code: morton(x, y, z), stale: false, translation, rotation });
             before = chosen;
         }
         moves.push(chosen);
-        astray += f64::from(carried_bits(&chosen, node, centre(node.place, tree.cell_log2)));
+        astray += f64::from(carried_bits(&chosen, node, centre(node.index, tree.cell_log2)));
     }
     let bits = [list_bits(&cells), all_move_bits(tree, &moves)];
     Listing { cells, bits, astray }
 }
 
-/// The cheapest of: standing still, shifting, turning and shifting, each also nearly or wholly as the cell before.
+/// The cheapest of: standing still, shifting, rotating and shifting, each also nearly or wholly as the cell before.
 fn chosen(tree: &Tree, node: &Node, before: &Coded) -> Coded {
-    let centre = centre(node.place, tree.cell_log2);
+    let centre = centre(node.index, tree.cell_log2);
     let size = (1_u64 << tree.cell_log2) as f64;
     let points = &tree.points[node.points.clone()];
     let step = points.len().div_ceil(TRIED).max(1);
     let tried: Vec<Point> = points.iter().step_by(step).copied().collect();
     let pivot = middle(&tried).unwrap_or(centre);
     let shift = minus(node.motion.apply(pivot), pivot);
-    let turn = node.motion.turn.map(|value| libm::rint(value * TURN) as i32);
-    let through = |turn| Coded::through(turn, centre, pivot, shift);
-    let own = [through([0; 3]), through(turn), through(before.turn)];
+    let rotation = node.motion.rotation.map(|value| libm::rint(value * ROTATION) as i32);
+    let through = |rotation| Coded::through(rotation, centre, pivot, shift);
+    let own = [through([0; 3]), through(rotation), through(before.rotation)];
     let snapped = own.map(|coded| coded.map(|coded| coded.snapped(before, size)));
     let cost = |coded: &Coded| {
         let moves: f32 = tried.iter().map(|p| move_bits(minus(p.to, coded.apply(centre, p.from)))).sum();
@@ -162,7 +162,7 @@ fn chosen(tree: &Tree, node: &Node, before: &Coded) -> Coded {
 }
 
 fn coded_bits(coded: &Coded, before: &Coded) -> f32 {
-    difference_bits(coded.translation, before.translation) + difference_bits(coded.turn, before.turn)
+    difference_bits(coded.translation, before.translation) + difference_bits(coded.rotation, before.rotation)
 }
 
 /// What it costs that Gaussians are shown elsewhere than the fit would have them.
@@ -212,15 +212,15 @@ pub(super) fn list_bits(cells: &[Cell]) -> f64 {
             cell.translation[0] - before.1.translation[0],
             cell.translation[1] - before.1.translation[1],
             cell.translation[2] - before.1.translation[2],
-            cell.turn[0] - before.1.turn[0],
-            cell.turn[1] - before.1.turn[1],
-            cell.turn[2] - before.1.turn[2],
+            cell.rotation[0] - before.1.rotation[0],
+            cell.rotation[1] - before.1.rotation[1],
+            cell.rotation[2] - before.1.rotation[2],
             step,
         ];
         for (tally, value) in tallies.iter_mut().zip(values) {
             tally.add(value);
         }
-        before = (cell.code, Coded { translation: cell.translation, turn: cell.turn });
+        before = (cell.code, Coded { translation: cell.translation, rotation: cell.rotation });
     }
     tallies.iter().filter(|_| !cells.is_empty()).map(Tally::bits).sum()
 }
@@ -232,9 +232,9 @@ fn all_move_bits(tree: &Tree, moves: &[Coded]) -> f64 {
     let mut modes = Histogram::default();
     let mut seen = 0_u32;
     for (node, coded) in tree.nodes.iter().zip(moves) {
-        let centre = centre(node.place, tree.cell_log2);
+        let centre = centre(node.index, tree.cell_log2);
         let first = node.points.start.next_multiple_of(step);
-        for point in (first..node.points.end).step_by(step).map(|place| &tree.points[place]) {
+        for point in (first..node.points.end).step_by(step).map(|index| &tree.points[index]) {
             let rest = minus(point.to, coded.apply(centre, point.from));
             let moves = rest.iter().any(|value| value.abs() > DEAD_ZONE);
             seen += 1;

@@ -1,6 +1,6 @@
 //! Rigid motions, and those that bring points to their places best.
 
-/// Lattice steps.
+/// Grid steps.
 pub(super) type Vector = [f64; 3];
 
 /// A point of the reference and where it went.
@@ -41,49 +41,49 @@ fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// `d` turned by the unit quaternion with this vector part and a positive real part.
-pub(super) fn turned(turn: Vector, d: Vector) -> Vector {
-    let w = (1.0 - dot(turn, turn)).max(0.0).sqrt();
-    let t = cross(turn, d);
-    plus(d, scaled(plus(scaled(t, w), cross(turn, t)), 2.0))
+/// `d` rotated by the unit quaternion with this vector part and a positive real part.
+pub(super) fn rotated(rotation: Vector, d: Vector) -> Vector {
+    let w = (1.0 - dot(rotation, rotation)).max(0.0).sqrt();
+    let t = cross(rotation, d);
+    plus(d, scaled(plus(scaled(t, w), cross(rotation, t)), 2.0))
 }
 
-/// The vector part of one turn after another, with a positive real part.
+/// The vector part of one rotation after another, with a positive real part.
 fn after(second: Vector, first: Vector) -> Vector {
-    let real = |turn: Vector| (1.0 - dot(turn, turn)).max(0.0).sqrt();
+    let real = |rotation: Vector| (1.0 - dot(rotation, rotation)).max(0.0).sqrt();
     let (a, b) = (real(second), real(first));
     let vector = plus(plus(scaled(second, b), scaled(first, a)), cross(second, first));
     if a * b - dot(second, first) < 0.0 { scaled(vector, -1.0) } else { vector }
 }
 
-/// A turn about a centre, then a shift.
+/// A rotation about a centre, then a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rigid {
-    /// What stays while turning.
+    /// What stays while rotating.
     pub(super) centre: Vector,
     /// Vector part of the unit quaternion.
-    pub(super) turn: Vector,
+    pub(super) rotation: Vector,
     /// Shift of the centre.
     pub(super) shift: Vector,
 }
 
 impl Rigid {
     /// Nothing moves.
-    pub(super) const STILL: Self = Self { centre: [0.0; 3], turn: [0.0; 3], shift: [0.0; 3] };
+    pub(super) const STILL: Self = Self { centre: [0.0; 3], rotation: [0.0; 3], shift: [0.0; 3] };
 
     /// Where a point goes.
     pub(super) fn apply(&self, point: Vector) -> Vector {
-        plus(plus(self.centre, self.shift), turned(self.turn, minus(point, self.centre)))
+        plus(plus(self.centre, self.shift), rotated(self.rotation, minus(point, self.centre)))
     }
 
-    /// The same motion told of another centre.
+    /// The same motion about another centre.
     pub(super) fn about(&self, centre: Vector) -> Self {
-        Self { centre, turn: self.turn, shift: minus(self.apply(centre), centre) }
+        Self { centre, rotation: self.rotation, shift: minus(self.apply(centre), centre) }
     }
 
     /// This motion, corrected by what is left between points of a cell of this size and where they went.
     ///
-    /// The correction is a weighted least-squares fit of a small turn and a shift. Points far from the median count
+    /// The correction is a weighted least-squares fit of a small rotation and a shift. Points far from the median count
     /// little: pairs may be mistaken, and a cell may hold two bodies. With few points, or points in a row, it stays
     /// near the motion before.
     pub(super) fn refined(self, points: &[Point], size: f64) -> Self {
@@ -105,11 +105,15 @@ impl Rigid {
             scaled(sum, 1.0 / total)
         };
         let (pivot, shift) = (mean(|item| item.1), mean(|item| item.2));
-        let turn = small_turn(&weighted, pivot, shift, PRIOR * size * size / 16.0);
+        let rotation = small_turn(&weighted, pivot, shift, PRIOR * size * size / 16.0);
         let shift = scaled(shift, total / (total + PRIOR));
-        let correction = Self { centre: pivot, turn, shift };
+        let correction = Self { centre: pivot, rotation, shift };
         let moved = correction.apply(self.apply(self.centre));
-        Self { centre: self.centre, turn: after(turn, self.turn), shift: minus(moved, self.centre) }
+        Self {
+            centre: self.centre,
+            rotation: after(rotation, self.rotation),
+            shift: minus(moved, self.centre),
+        }
     }
 }
 
@@ -135,7 +139,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The turn about `pivot` that leaves least, half its angle as the vector part of a quaternion.
+/// The rotation about `pivot` that leaves least, half its angle as the vector part of a quaternion.
 fn small_turn(weighted: &[(f64, Vector, Vector)], pivot: Vector, shift: Vector, prior: f64) -> Vector {
     let mut inertia = [[prior, 0.0, 0.0], [0.0, prior, 0.0], [0.0, 0.0, prior]];
     let mut moment = [0.0; 3];
@@ -163,6 +167,6 @@ fn small_turn(weighted: &[(f64, Vector, Vector)], pivot: Vector, shift: Vector, 
     if size < 1e-12 {
         return [0.0; 3];
     }
-    // A linear fit finds the tangent; beyond half a turn it finds nothing.
+    // A linear fit finds the tangent; beyond half a rotation it finds nothing.
     scaled(angle, libm::sin(0.5 * libm::atan(size)) / size)
 }

@@ -11,7 +11,7 @@ const WRONG: f64 = 0.5;
 /// what its neighbours, shown as wrong as it is, leave open.
 const ASTRAY: f32 = 4.0;
 
-/// Lattice steps that no Gaussian is astray by.
+/// Grid steps that no Gaussian is astray by.
 const NEAR: f32 = 4.0;
 
 /// A reference's Gaussians as clients hold them.
@@ -35,19 +35,19 @@ pub(crate) fn stale_cells(
     let Held { carried, from, matching } = held;
     let mut sorted: Vec<(u64, u32)> = from.iter().map(|&fine| motion.cell(fine).1).zip(0..).collect();
     sorted.sort_unstable();
-    let wrong = |place: u32| {
-        let Some(to) = matching.target_of[place as usize] else { return true };
-        let (a, b) = (carried.at(place), target.at(to));
+    let wrong = |index: u32| {
+        let Some(to) = matching.target_of[index as usize] else { return true };
+        let (a, b) = (carried.at(index), target.at(to));
         let square: f32 = (0..3).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum();
-        let far = (ASTRAY * carried.size(place) / measure.position_step).max(NEAR);
+        let far = (ASTRAY * carried.size(index) / measure.position_step).max(NEAR);
         square > far * far
     };
     let is_stale = |members: &&[(u64, u32)]| {
         let (mut all, mut bad) = (0.0, 0.0);
-        for &(_, place) in *members {
-            let weight = f64::from(carried.coverage(place));
+        for &(_, index) in *members {
+            let weight = f64::from(carried.coverage(index));
             all += weight;
-            bad += if wrong(place) { weight } else { 0.0 };
+            bad += if wrong(index) { weight } else { 0.0 };
         }
         bad > WRONG * all
     };

@@ -3,7 +3,7 @@
 use super::follow::follow;
 use super::stale::{Held, stale_cells};
 use super::*;
-use crate::lattice::{Extent, inner_side, position_lattice};
+use crate::grid::{Extent, inner_side, position_grid};
 use crate::matching::tests::{Random, Scene, measure, shuffled};
 use crate::matching::{Cloud, Kind, Matching, Measure, shares_little};
 use crate::settings::Quality;
@@ -16,10 +16,10 @@ const BITS: u8 = 12;
 fn pairs(count: usize, motion: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<Pair> {
     let mut random = Random(1);
     (0..count)
-        .map(|place| {
+        .map(|index| {
             let mut from = [0; 3].map(|_: i32| ((1000.0 + 2000.0 * random.unit()) * 64.0) as i32);
-            from[place % 3] = 64_000;
-            Pair { from, to: motion(lattice(from)).map(|value| value as f32) }
+            from[index % 3] = 64_000;
+            Pair { from, to: motion(grid_position(from)).map(|value| value as f32) }
         })
         .collect()
 }
@@ -36,14 +36,14 @@ fn twisted(angle: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
 /// Root mean square distance from the targets, steps.
 fn rms(pairs: &[Pair], at: impl Fn([i32; 3]) -> [f32; 3]) -> f64 {
     let square = |pair: &Pair| {
-        let place = at(pair.from);
-        (0..3).map(|axis| f64::from(place[axis] - pair.to[axis])).map(|d| d * d).sum::<f64>()
+        let index = at(pair.from);
+        (0..3).map(|axis| f64::from(index[axis] - pair.to[axis])).map(|d| d * d).sum::<f64>()
     };
     (pairs.iter().map(square).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
 }
 
 fn undisplaced(fine: [i32; 3]) -> [f32; 3] {
-    lattice(fine).map(|value| value as f32)
+    grid_position(fine).map(|value| value as f32)
 }
 
 #[test]
@@ -61,7 +61,7 @@ fn a_twist_is_followed_by_turning_cells() {
     let motion = cell_motion(&pairs, &[], BITS);
     assert!(rms(&pairs, undisplaced) > 150.0);
     assert!(rms(&pairs, |fine| motion.displaced(fine)) < 0.5);
-    assert!(motion.cells.len() < 100 && motion.cells.iter().all(|cell| cell.turn[1] != 0));
+    assert!(motion.cells.len() < 100 && motion.cells.iter().all(|cell| cell.rotation[1] != 0));
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn what_stands_still_is_not_listed() {
 #[test]
 fn noise_is_no_motion() {
     let mut random = Random(2);
-    let mut pairs = pairs(10_000, |place| place);
+    let mut pairs = pairs(10_000, |index| index);
     pairs.iter_mut().flat_map(|pair| &mut pair.to).for_each(|value| *value += 0.4 * random.signed());
     assert_eq!(cell_motion(&pairs, &[], BITS).cells, []);
 }
@@ -94,7 +94,7 @@ fn mistaken_pairs_do_not_pull() {
     }
     let motion = cell_motion(&pairs, &[], BITS);
     let right: Vec<Pair> =
-        pairs.iter().enumerate().filter(|(place, _)| place % 10 != 0).map(|(_, &pair)| pair).collect();
+        pairs.iter().enumerate().filter(|(index, _)| index % 10 != 0).map(|(_, &pair)| pair).collect();
     assert!(rms(&right, |fine| motion.displaced(fine)) < 0.5);
 }
 
@@ -111,16 +111,16 @@ fn what_has_no_pair_moves_with_what_is_around_it() {
 }
 
 /// The integer formula of the decoder.
-fn exact(cell: &Cell, place: [u32; 3], cell_log2: u8, fine: [i32; 3]) -> [i64; 3] {
-    let [v0, v1, v2] = cell.turn.map(i64::from);
+fn exact(cell: &Cell, index: [u32; 3], cell_log2: u8, fine: [i32; 3]) -> [i64; 3] {
+    let [v0, v1, v2] = cell.rotation.map(i64::from);
     let w = ((1_i64 << 28) - v0 * v0 - v1 * v1 - v2 * v2).isqrt();
-    let centre = place.map(|place| (i64::from(place) << (cell_log2 + 6)) + (1 << (i64::from(cell_log2) + 5)));
+    let centre = index.map(|index| (i64::from(index) << (cell_log2 + 6)) + (1 << (i64::from(cell_log2) + 5)));
     let cross = |[a0, a1, a2]: [i64; 3]| [v1 * a2 - v2 * a1, v2 * a0 - v0 * a2, v0 * a1 - v1 * a0];
     let t = cross([0, 1, 2].map(|axis: usize| i64::from(fine[axis]) - centre[axis]));
     let u = cross(t);
     [0, 1, 2].map(|axis: usize| {
-        let turned = (w * t[axis] + u[axis] + (1 << 26)) >> 27;
-        i64::from(fine[axis]) + turned + i64::from(cell.translation[axis]) * 8
+        let rotated = (w * t[axis] + u[axis] + (1 << 26)) >> 27;
+        i64::from(fine[axis]) + rotated + i64::from(cell.translation[axis]) * 8
     })
 }
 
@@ -129,9 +129,9 @@ fn displacement_is_that_of_the_decoder() {
     let pairs = pairs(5000, twisted(0.3));
     let motion = cell_motion(&pairs, &[], BITS);
     for pair in &pairs {
-        let (place, code) = motion.cell(pair.from);
+        let (index, code) = motion.cell(pair.from);
         let Some(cell) = motion.cells.iter().find(|cell| cell.code == code) else { continue };
-        let exact = exact(cell, place, motion.cell_log2, pair.from);
+        let exact = exact(cell, index, motion.cell_log2, pair.from);
         let near = motion.displaced(pair.from);
         assert!(
             (0..3).all(|axis| (f64::from(near[axis]) * 64.0 - exact[axis] as f64).abs() < 1.5),
@@ -141,14 +141,14 @@ fn displacement_is_that_of_the_decoder() {
 }
 
 fn fine(cloud: &Cloud<'_>) -> Vec<[i32; 3]> {
-    (0..cloud.len() as u32).map(|place| cloud.at(place).map(|value| (value * 64.0) as i32)).collect()
+    (0..cloud.len() as u32).map(|index| cloud.at(index).map(|value| (value * 64.0) as i32)).collect()
 }
 
 /// Pairs, and what has none.
 fn parted(matching: &Matching, from: &[[i32; 3]], target: &Cloud<'_>) -> (Vec<Pair>, Vec<[i32; 3]>) {
     let pair = |(&from, to): (&[i32; 3], &Option<u32>)| to.map(|to| Pair { from, to: target.at(to) });
     let pairs = from.iter().zip(&matching.target_of).filter_map(pair).collect();
-    (pairs, matching.free().iter().map(|&place| from[place as usize]).collect())
+    (pairs, matching.free().iter().map(|&index| from[index as usize]).collect())
 }
 
 #[test]
@@ -157,8 +157,8 @@ fn what_moves_far_is_found_and_what_is_gone_is_stale() {
     let mut rows = shuffled(0, 12_000, 5);
     rows.retain(|&row| reference.position[0][row] < 1800.0);
     let mut target = reference.select(&rows).noisy(0, 6).moved([20.0, -60.0, 10.0]);
-    for place in 0..rows.len() {
-        target.position[2][place] += 0.1 * (target.position[0][place] - 1500.0);
+    for index in 0..rows.len() {
+        target.position[2][index] += 0.1 * (target.position[0][index] - 1500.0);
     }
     let (reference, target) = (reference.cloud(), target.cloud());
     let matching = follow(&reference, &target, &measure(), BITS);
@@ -199,8 +199,9 @@ fn real(number: u32) -> Option<GaussianFrame> {
 fn a_real_head() {
     let (Some(first), Some(second)) = (real(0), real(8)) else { return };
     let steps = Quality::High.steps();
-    let extent = Extent::NONE.with(&first).with(&second);
-    let (offset, step, bits) = position_lattice(extent, inner_side(&first), &steps);
+    let all = |frame: &GaussianFrame| (0..frame.len() as u32).collect::<Vec<_>>();
+    let extent = Extent::NONE.with(&first, &all(&first)).with(&second, &all(&second));
+    let (offset, step, bits) = position_grid(extent, inner_side(&first), &steps);
     let scene = |frame: &GaussianFrame| {
         let plane = |axis: usize| frame.position()[axis].iter().map(|v| (v - offset[axis]) / step).collect();
         Scene {

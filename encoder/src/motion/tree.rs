@@ -8,7 +8,7 @@ use splatstream_decoder::position::morton;
 #[derive(Debug, Clone)]
 pub(super) struct Node {
     /// Place of the cell, in cells.
-    pub(super) place: [u32; 3],
+    pub(super) index: [u32; 3],
     /// Points with a known destination.
     pub(super) points: Range<usize>,
     /// Points without.
@@ -19,21 +19,21 @@ pub(super) struct Node {
 
 /// All cells of one size that hold anything, in Morton order.
 pub(super) struct Tree {
-    /// The side of a cell is 2 to this, lattice steps.
+    /// The side of a cell is 2 to this, grid steps.
     pub(super) cell_log2: u32,
     /// The cells.
     pub(super) nodes: Vec<Node>,
     /// In Morton order.
     pub(super) points: Vec<Point>,
-    /// In Morton order; with the place that each was given in.
+    /// In Morton order; with the index that each was given at.
     pub(super) others: Vec<(Vector, u32)>,
     codes: [Vec<u64>; 2],
 }
 
-/// Orders by Morton code of the nearest lattice point.
+/// Orders by Morton code of the nearest grid point.
 fn sorted(positions: impl Iterator<Item = Vector>) -> Vec<(u64, u32)> {
     let code = |position: Vector| {
-        // The lattice has at most 20 bits, and its points are not negative.
+        // The grid has at most 20 bits, and its points are not negative.
         let [x, y, z] = position.map(|value| (value + 0.5).clamp(0.0, 1_048_575.0) as u32);
         morton(x, y, z)
     };
@@ -46,12 +46,12 @@ impl Tree {
     /// One cell that holds everything.
     pub(super) fn new(points: &[Point], others: &[Vector], position_bits: u8) -> Self {
         let [first, second] = [sorted(points.iter().map(|point| point.from)), sorted(others.iter().copied())];
-        let points: Vec<Point> = first.iter().map(|&(_, place)| points[place as usize]).collect();
+        let points: Vec<Point> = first.iter().map(|&(_, index)| points[index as usize]).collect();
         let others: Vec<(Vector, u32)> =
-            second.iter().map(|&(_, place)| (others[place as usize], place)).collect();
+            second.iter().map(|&(_, index)| (others[index as usize], index)).collect();
         let cell_log2 = u32::from(position_bits);
         let all = Node {
-            place: [0; 3],
+            index: [0; 3],
             points: 0..points.len(),
             others: 0..others.len(),
             motion: Rigid::STILL.about(centre([0; 3], cell_log2)),
@@ -80,15 +80,15 @@ impl Tree {
         let mut parts = Vec::new();
         for part in 0..8_u32 {
             let ends = (end(0, &points, u64::from(part)), end(1, &others, u64::from(part)));
-            let place = [0, 1, 2].map(|axis: usize| 2 * node.place[axis] + ((part >> axis) & 1));
+            let index = [0, 1, 2].map(|axis: usize| 2 * node.index[axis] + ((part >> axis) & 1));
             let (held, rest) = (points.start..ends.0, others.start..ends.1);
             points.start = ends.0;
             others.start = ends.1;
             if held.is_empty() && rest.is_empty() {
                 continue;
             }
-            let motion = node.motion.about(centre(place, self.cell_log2));
-            parts.push(Node { place, points: held, others: rest, motion });
+            let motion = node.motion.about(centre(index, self.cell_log2));
+            parts.push(Node { index, points: held, others: rest, motion });
         }
         parts
     }
@@ -101,7 +101,7 @@ impl Tree {
     }
 }
 
-/// The centre of a cell, lattice steps.
-pub(super) fn centre(place: [u32; 3], cell_log2: u32) -> Vector {
-    place.map(|place| (f64::from(place) + 0.5) * (1_u64 << cell_log2) as f64)
+/// The centre of a cell, grid steps.
+pub(super) fn centre(index: [u32; 3], cell_log2: u32) -> Vector {
+    index.map(|index| (f64::from(index) + 0.5) * (1_u64 << cell_log2) as f64)
 }

@@ -9,7 +9,7 @@ use splatstream_decoder::predictor::EXP;
 use splatstream_decoder::transformer::LANES;
 use splatstream_format::payload::Part;
 
-/// A place of [`EXP`] is this part of the exponent.
+/// An entry of [`EXP`] is this part of the exponent.
 const EXPONENT: f32 = 1.0 / 32.0;
 
 /// A share of all.
@@ -52,8 +52,8 @@ impl Model<'_> {
         let mut sum = ZERO;
         if self.layout.header.fourier_count > 0 {
             for (axis, table) in self.position.iter().enumerate() {
-                let places = places(trace, (m, j), axis);
-                sum.iter_mut().zip(places).for_each(|(sum, place)| *sum += table[place]);
+                let indices = indices(trace, (m, j), axis);
+                sum.iter_mut().zip(indices).for_each(|(sum, index)| *sum += table[index]);
             }
         }
         sum
@@ -147,14 +147,14 @@ impl Model<'_> {
     }
 }
 
-/// For each lane the place of what neighbour `j` is apart from row `m`.
+/// For each lane the index of what neighbour `j` is apart from row `m`.
 #[inline(always)]
-pub(super) fn places(trace: &Trace<'_>, (m, j): (usize, usize), axis: usize) -> [usize; LANES] {
+pub(super) fn indices(trace: &Trace<'_>, (m, j): (usize, usize), axis: usize) -> [usize; LANES] {
     let mut out = [0; LANES];
     // The row of the new Gaussian is at the origin.
     let from = if trace.full { trace.batch.near(m)[axis] } else { [0; LANES] };
-    for (place, (&near, from)) in out.iter_mut().zip(trace.batch.near(j)[axis].iter().zip(from)) {
-        *place = difference(near, from);
+    for (index, (&near, from)) in out.iter_mut().zip(trace.batch.near(j)[axis].iter().zip(from)) {
+        *index = difference(near, from);
     }
     out
 }
@@ -185,8 +185,8 @@ fn softmax<A: Arithmetic>(logits: &mut [Lane]) {
 #[inline(always)]
 fn exponential<A: Arithmetic>(below: f32) -> f32 {
     if A::ROUNDED {
-        let place = if below < 255.0 { below as usize } else { 255 };
-        EXP[place & 255].into()
+        let index = if below < 255.0 { below as usize } else { 255 };
+        EXP[index & 255].into()
     } else {
         libm::expf(-below * EXPONENT)
     }

@@ -3,7 +3,7 @@
 //! Rounding passes slopes on as if it were not there, and a clamp that acts passes none. The softmax has the slope of
 //! its exponential.
 
-use super::attention::places;
+use super::attention::indices;
 use super::lane::{
     Arithmetic, Lane, ZERO, add_product, add_rows, join, row, row_mut, stop, stop_act, total, unit,
 };
@@ -50,8 +50,8 @@ impl<'l> Gradient<'l> {
     #[inline(always)]
     pub(super) fn add_position(&mut self, trace: &Trace<'_>, pair: (usize, usize), slope: &Lane) {
         for (axis, sums) in self.differences.iter_mut().enumerate() {
-            let places = places(trace, pair, axis);
-            slope.iter().zip(places).for_each(|(slope, place)| sums[place] += slope);
+            let indices = indices(trace, pair, axis);
+            slope.iter().zip(indices).for_each(|(slope, index)| sums[index] += slope);
         }
     }
 

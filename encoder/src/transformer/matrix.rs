@@ -125,20 +125,20 @@ impl Outer<'_> {
         let line = self.columns * vectors;
         let gradient = &mut gradient[first * line..(first + N) * line];
         let own = first * vectors..(first + N) * vectors;
-        for place in 0..line {
-            let vector = place % vectors;
+        for index in 0..line {
+            let vector = index % vectors;
             let mut sums = [simd.splat_f32s(0.0); N];
             for (sum, line) in sums.iter_mut().zip(gradient.chunks_exact(line)) {
-                *sum = line[place];
+                *sum = line[index];
             }
             for (slopes, x) in slopes.chunks_exact(self.rows * vectors).zip(x.chunks_exact(line)) {
-                let x = x[place];
+                let x = x[index];
                 for (sum, slope) in sums.iter_mut().zip(slopes[own.clone()].chunks_exact(vectors)) {
                     *sum = simd.add_f32s(*sum, simd.mul_f32s(slope[vector], x));
                 }
             }
             for (line, sum) in gradient.chunks_exact_mut(line).zip(sums) {
-                line[place] = sum;
+                line[index] = sum;
             }
         }
     }

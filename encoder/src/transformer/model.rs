@@ -123,8 +123,8 @@ impl<'l> Model<'l> {
         &self.values[self.layout.bias(part)]
     }
 
-    pub(super) fn shift(&self, place: usize) -> u8 {
-        self.layout.header.layer_shift[place]
+    pub(super) fn shift(&self, index: usize) -> u8 {
+        self.layout.header.layer_shift[index]
     }
 
     pub(super) fn width(&self) -> usize {
@@ -287,7 +287,7 @@ fn position_bias(layout: &Layout, values: &[f32], axis: usize) -> Vec<f32> {
     layout.sines().iter().map(term).collect()
 }
 
-/// The place of the difference between two relative positions.
+/// The index of the difference between two relative positions.
 #[inline(always)]
 pub(super) fn difference(near: i8, from: i8) -> usize {
     usize::try_from(i32::from(near) - i32::from(from) + DIFFERENCES).unwrap_or(0)

@@ -1,4 +1,4 @@
-//! The parameters of a network, one behind the other in the order of 6.17.2, as numbers that can change a little.
+//! The parameters of a network, one after the other in the order of 6.17.2, as numbers that can change a little.
 
 use super::random::Random;
 use splatstream_decoder::transformer::sine;
@@ -40,12 +40,12 @@ impl Layout {
         Self { header, weights, bias, length, sines }
     }
 
-    /// The places of the `i8` of a part.
+    /// The offsets of the `i8` of a part.
     pub(super) fn weights(&self, part: Part) -> Range<usize> {
         self.weights[part as usize].clone()
     }
 
-    /// The places of its `i16`.
+    /// The offsets of its `i16`.
     pub(super) fn bias(&self, part: Part) -> Range<usize> {
         self.bias[part as usize].clone()
     }

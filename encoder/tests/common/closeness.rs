@@ -11,7 +11,7 @@ pub(crate) struct Bounds {
     pub(crate) value: f32,
     /// Of a component of a colour transform.
     pub(crate) colour: f32,
-    /// Of a position or a part of a rotation. Predicted ones lie between the points of their lattice and are rounded
+    /// Of a position or a part of a rotation. Predicted ones lie between the points of their grid and are rounded
     /// once more where they are shown.
     pub(crate) place: f32,
     /// Whether SH is compared; codebooks have no bound.

@@ -6,7 +6,7 @@ use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::Summary;
 use splatstream_encoder::{Preset, Quality, Report, Settings, Structure};
 use splatstream_format::Limits;
-use splatstream_format::syntax::{FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitType};
+use splatstream_format::syntax::{GopHeader, Profile, SequenceParameters, UnitHeader, UnitType};
 use splatstream_format::unit::{Stream, Unit};
 use splatstream_scene::GaussianFrame;
 use splatstream_scene::builtin::{BuiltinScene, Tracking};
@@ -46,7 +46,7 @@ pub(crate) fn coded(frames: &[GaussianFrame], settings: &Settings, what: &str) -
     let stream = Stream::open(&bytes, &strict().limits).unwrap();
     assert_eq!(stream.header().profile(), Profile::Dynamic, "{what}");
     let (shown, summary) = decoded(&bytes, &strict());
-    assert_eq!(summary.end, None, "{what}");
+    assert_eq!(summary.verdict(), None, "{what}");
     let counts: Vec<usize> = frames.iter().map(GaussianFrame::len).collect();
     assert_eq!(shown.iter().map(|frame| frame.planes.len()).collect::<Vec<_>>(), counts, "{what}");
     let digests: Vec<u64> = shown.iter().filter_map(|frame| frame.digest).collect();
@@ -67,41 +67,13 @@ pub(crate) fn range(unit: &Unit<'_>) -> core::ops::Range<usize> {
 
 /// Bytes of the units that operating points choose from: those of GOPs and frames.
 pub(crate) fn units_of_frames(bytes: &[u8]) -> u64 {
-    let counted = |code: u8| (2..=6).contains(&code) || code == UnitType::Increment.code();
+    let counted = |code: u8| (2..=6).contains(&code) || code == UnitType::Weights.code();
     let counted = units(bytes).into_iter().filter(|unit| counted(unit.header.unit_type));
     counted.map(|unit| range(&unit).len() as u64).sum()
 }
 
-/// What becomes of a unit on its way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Arrival {
-    Intact,
-    /// With a wrong payload, so that it still can be told which unit it is.
-    Damaged,
-    Missing,
-}
-
-/// The stream as it arrives; elements that count units or bytes stay as they were.
-pub(crate) fn arrived(bytes: &[u8], arrival: impl Fn(&UnitHeader) -> Arrival) -> Vec<u8> {
-    let mut out = bytes[..FileHeader::SIZE].to_vec();
-    for unit in units(bytes) {
-        let start = out.len();
-        match arrival(&unit.header) {
-            Arrival::Intact => out.extend_from_slice(&bytes[range(&unit)]),
-            Arrival::Damaged => {
-                out.extend_from_slice(&bytes[range(&unit)]);
-                let middle = (start + UnitHeader::SIZE + out.len()) / 2;
-                out[middle] ^= 0x55;
-            }
-            Arrival::Missing => {}
-        }
-    }
-    out
-}
-
 /// A stream that is whole, and what is decoded of it at every operating point.
 pub(crate) struct Whole<'a> {
-    pub(crate) bytes: &'a [u8],
     pub(crate) units: Vec<Unit<'a>>,
     pub(crate) sequence: SequenceParameters,
     /// GOP headers with their first frames.
@@ -123,16 +95,11 @@ impl<'a> Whole<'a> {
         let infos = operating_points(bytes, &Limits::default()).unwrap();
         let at = |point| {
             let (frames, summary) = decoded_at(bytes, point);
-            assert_eq!(summary.end, None, "at {point}");
+            assert_eq!(summary.verdict(), None, "at {point}");
             frames
         };
         let points = infos.iter().map(|info| (info.point, at(info.point))).collect();
-        Self { bytes, units, sequence, gops, points }
-    }
-
-    /// The highest spatial layer.
-    pub(crate) fn top(&self) -> u8 {
-        self.sequence.spatial_layer_count - 1
+        Self { units, sequence, gops, points }
     }
 
     /// The frames at a point.
@@ -144,29 +111,9 @@ impl<'a> Whole<'a> {
     pub(crate) fn all(&self) -> &[DecodedFrame] {
         self.points.values().last().unwrap()
     }
-
-    /// The GOP of a frame.
-    pub(crate) fn gop_of(&self, frame: u32) -> (u32, GopHeader) {
-        *self.gops.iter().rev().find(|(first, _)| *first <= frame).unwrap()
-    }
-
-    /// Headers of the increments, in stream order.
-    pub(crate) fn increments(&self) -> Vec<UnitHeader> {
-        let headers = self.units.iter().map(|unit| unit.header);
-        headers.filter(|header| header.unit_type() == UnitType::Increment).collect()
-    }
 }
 
 /// Strictly decoded at an operating point.
 pub(crate) fn decoded_at(bytes: &[u8], operating_point: OperatingPoint) -> (Vec<DecodedFrame>, Summary) {
     decoded(bytes, &Options { operating_point, ..strict() })
-}
-
-/// Clause 7.13.1: the temporal layer and the place of the reference of the frame at place `k`.
-pub(crate) fn place(gop: &GopHeader, k: u32) -> (u8, Option<u32>) {
-    if gop.gop_structure == 0 || k == 0 {
-        return (0, None);
-    }
-    let z = k.trailing_zeros().min(gop.temporal_depth.into());
-    (gop.temporal_depth - z as u8, Some(k - (1 << z)))
 }

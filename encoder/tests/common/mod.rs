@@ -3,7 +3,6 @@
 
 pub(crate) mod closeness;
 pub(crate) mod dynamic;
-pub(crate) mod remains;
 
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::process::{DecodedFrame, Options};
@@ -52,16 +51,16 @@ pub(crate) fn decoded(bytes: &[u8], options: &Options) -> (Vec<DecodedFrame>, Su
     (frames, summary)
 }
 
-/// Strict options with limits that suit small streams.
+/// Options with limits that suit small streams, to stop at the first error.
 pub(crate) fn strict() -> Options {
     let limits = Limits { max_gaussians: 1 << 20, ..Limits::default() };
-    Options { limits, ..Options::default() }
+    Options { limits, stop_at_first_error: true, ..Options::default() }
 }
 
 /// The planes of every frame of a stream that must be right.
 pub(crate) fn planes(bytes: &[u8]) -> Vec<QuantizedFrame> {
     let (frames, summary) = decoded(bytes, &strict());
-    assert_eq!(summary.end, None);
+    assert_eq!(summary.verdict(), None);
     frames.into_iter().map(|frame| frame.planes).collect()
 }
 
@@ -90,7 +89,7 @@ impl Random {
             0 => bytes[at] ^= 1 << self.below(8),
             1 => bytes[at] = bytes[at].wrapping_add(1 + self.below(255) as u8),
             2 => drop(bytes.drain(at..at + length)),
-            3 => drop(bytes.splice(at..at, (0..length).map(|place| place as u8))),
+            3 => drop(bytes.splice(at..at, (0..length).map(|index| index as u8))),
             4 => bytes[at..at + length].fill(0),
             5 => {
                 let to = self.below(bytes.len() - length);

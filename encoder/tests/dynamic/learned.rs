@@ -47,7 +47,7 @@ fn a_trained_network_is_carried_and_predicts() {
     for point in ["s0,t0,r0", "s1,t0,r1", "s1,t1,r0"] {
         let point: OperatingPoint = point.parse().unwrap();
         let direct = decoded(&bytes, &Options { operating_point: point, ..strict() });
-        assert_eq!(direct.1.end, None);
+        assert_eq!(direct.1.verdict(), None);
         let extracted = extract(&bytes, point, &Limits::default()).unwrap();
         assert_eq!(decoded(&extracted, &strict()).0, direct.0, "{point}");
     }

@@ -10,7 +10,7 @@
 mod chain;
 mod damage;
 mod learned;
-mod losses;
+mod nested;
 mod points;
 mod real;
 mod round_trip;

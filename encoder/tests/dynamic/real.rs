@@ -25,6 +25,6 @@ fn predicted_frames_of_a_tracked_head_take_less_than_six_bits_a_gaussian() {
     let (bytes, gaussians) =
         predicted.fold((0, 0), |(bytes, all), frame| (bytes + frame.bytes, all + u64::from(frame.gaussians)));
     let bpg = bytes as f64 * 8.0 / gaussians as f64;
-    println!("{bpg:.2} bits a Gaussian in predicted frames");
-    assert!(bpg < 6.0, "{bpg} bits a Gaussian in predicted frames");
+    println!("{bpg:.2} bits per Gaussian in predicted frames");
+    assert!(bpg < 6.0, "{bpg} bits per Gaussian in predicted frames");
 }

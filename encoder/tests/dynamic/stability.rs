@@ -21,7 +21,7 @@ fn close_with(frames: &[GaussianFrame], settings: &Settings, what: &str) -> Repo
     let (bytes, report) = coded(frames, settings, what);
     let whole = Whole::new(&bytes);
     for (frame, source) in whole.all().iter().zip(frames) {
-        let what = format!("{what}: frame {}", frame.number);
+        let what = format!("{what}: frame {}", frame.index);
         assert_close(source, &frame.planes, &whole.sequence, Bounds::PREDICTED, &what);
     }
     report
@@ -67,8 +67,8 @@ fn values_too_far_out_are_named_whatever_their_frame_and_others_are_carried_in_e
         let mut frames: Vec<GaussianFrame> = frames.into_iter().cloned().collect();
         let number = u32::from(frames[0] == calm);
         let error = encode(&mut frames, &settings, &mut Vec::new(), &mut |_, _| {}).unwrap_err();
-        let Error::OutOfLattice { frame, attribute, .. } = error else { panic!("{error}") };
-        assert_eq!((frame, attribute), (number, ["log_scale", "opacity"][number as usize]));
+        let Error::OutOfGrid { frame, attribute, row, .. } = error else { panic!("{error}") };
+        assert_eq!((frame, attribute, row), (number, ["log_scale", "opacity"][number as usize], 7));
     }
     let loudest = loud(-31_990.0 * opacity, 15_990.0 * log_scale);
     for frames in [[loudest.clone(), calm.clone()], [calm, loudest]] {
@@ -97,16 +97,16 @@ fn fewer_references_than_neighbours_still_predict() {
 }
 
 #[test]
-fn all_at_one_point_stay_at_one_lattice_point() {
+fn all_at_one_point_stay_at_one_grid_point() {
     let point = |t: f32| {
         changed(&still(120, 1), |planes| planes.position = [1.0, 2.0 + t, -3.0].map(|value| vec![value; 120]))
     };
     close(&[point(0.0), point(0.0), point(0.0)], "one point");
 }
 
-/// All steps of a lattice that holds one point in each frame and its way in 20 bits.
+/// All steps of a grid that holds one point in each frame and its way in 20 bits.
 #[test]
-fn one_point_that_moves_across_the_lattice_is_found_again() {
+fn one_point_that_moves_across_the_grid_is_found_again() {
     let point = |t: f32| {
         changed(&still(120, 1), |planes| planes.position = [1.0, 2.0 + t, -3.0].map(|value| vec![value; 120]))
     };

@@ -38,7 +38,7 @@ fn shown(bytes: &[u8]) -> Vec<GaussianFrame> {
         frames.push(to_gaussians(frame.into_shown(), sequence));
         ControlFlow::Continue(())
     });
-    assert_eq!(summary.end, None);
+    assert_eq!(summary.verdict(), None);
     frames
 }
 
@@ -162,7 +162,7 @@ fn a_cut_begins_a_group_and_empty_frames_stay_empty() {
         let numbers: Vec<f32> = (0..997).map(|k| (k * 71 % 997) as f32 / 500.0 - 1.0 + t).collect();
         frame_of(&numbers, 400, 0)
     };
-    // In another order, as if trained anew.
+    // In another order, as if trained again.
     let again = other(0.001).select(&(0..400).rev().collect::<Vec<_>>());
     let cut = [frames[0].clone(), frames[1].clone(), other(0.0), again];
     let settings = Settings { tolerance: 1.0, ..by_pictures(&frames) };

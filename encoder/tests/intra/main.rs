@@ -1,4 +1,4 @@
-//! Profile Intra, and what every frame is coded with: values, lattices, real scenes.
+//! Profile Intra, and what every frame is coded with: values, grids, real scenes.
 #![allow(
     clippy::unwrap_used,
     clippy::indexing_slicing,
@@ -7,7 +7,7 @@
     reason = "a panic is a failed test, and a test that is skipped says so"
 )]
 
-mod lattices;
+mod grids;
 mod meaning;
 mod real_scenes;
 mod round_trip;

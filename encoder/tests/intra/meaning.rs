@@ -78,10 +78,11 @@ fn through_a_stream(rows: &[Row]) -> (GaussianFrame, Vec<Row>) {
     };
     let (bytes, _) = encoded(vec![frame], &settings);
     let mut output = None;
-    decode_stream(&bytes, &strict(), |sequence, frame| {
+    let summary = decode_stream(&bytes, &strict(), |sequence, frame| {
         output = Some(to_gaussians(frame.planes, sequence));
         ControlFlow::Continue(())
     });
+    assert_eq!(summary.verdict(), None);
     let output = output.unwrap();
     let mut decoded = rows_of(&ply::write(&output));
     decoded.sort_by(|a, b| a["x"].total_cmp(&b["x"]));

@@ -65,27 +65,27 @@ fn frames() -> impl Strategy<Value = Vec<GaussianFrame>> {
 /// Bytes of the units that an operating point is made of, headers included: not what a stream has once.
 fn bytes_of_frames(stream: &[u8]) -> u64 {
     let units = Stream::open(stream, &Limits::default()).unwrap().units().map(Result::unwrap);
-    let of_frames = units.filter(|unit| matches!(unit.header.unit_type().code(), 2..=6 | 10));
+    let of_frames = units.filter(|unit| matches!(unit.header.unit_type().code(), 2..=6));
     of_frames.map(|unit| (UnitHeader::SIZE + unit.payload.len()) as u64).sum()
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
-    // covers: SS-RU-005, SS-DG-003
+    // covers: SS-DG-003, SS-DG-004
     #[test]
     fn the_decoder_finds_the_digests_of_the_encoder(frames in frames(), settings in settings()) {
         let counts: Vec<usize> = frames.iter().map(GaussianFrame::len).collect();
         let (bytes, report) = encoded(frames, &settings);
         prop_assert_eq!(report.bytes, bytes.len() as u64);
         let (decoded, summary) = decoded(&bytes, &strict());
-        prop_assert_eq!(summary.end, None);
+        prop_assert_eq!(summary.verdict(), None);
         prop_assert_eq!(decoded.iter().map(|frame| frame.planes.len()).collect::<Vec<_>>(), counts);
         let digests: Vec<u64> = decoded.iter().filter_map(|frame| frame.digest).collect();
         prop_assert_eq!(digests, report.digests);
     }
 
-    // covers: SS-OP-001, SS-OP-003, SS-OP-004, SS-OP-005
+    // covers: SS-OP-002, SS-OP-004, SS-OP-005, SS-OP-006
     #[test]
     fn an_extracted_stream_decodes_as_the_stream_at_that_point(frames in frames(), settings in settings()) {
         let (bytes, _) = encoded(frames, &settings);
@@ -97,7 +97,7 @@ proptest! {
             prop_assert_eq!(&extract(&small, info.point, &limits).unwrap(), &small);
             let options = Options { operating_point: info.point, ..strict() };
             let (at_point, summary) = decoded(&bytes, &options);
-            prop_assert_eq!(summary.end, None);
+            prop_assert_eq!(summary.verdict(), None);
             let extracted = planes(&small);
             for ((at_point, extracted), full) in at_point.iter().zip(&extracted).zip(&full) {
                 prop_assert_eq!(&at_point.planes, extracted);
@@ -132,10 +132,11 @@ fn every_attribute_is_within_half_a_step_of_the_source() {
     let settings = Settings { keep_invisible: true, tools, ..Settings::default() };
     let (bytes, report) = encoded(vec![source.clone()], &settings);
     let mut output = None;
-    decode_stream(&bytes, &strict(), |sequence, frame| {
+    let summary = decode_stream(&bytes, &strict(), |sequence, frame| {
         output = Some(to_gaussians(frame.planes, sequence));
         ControlFlow::Continue(())
     });
+    assert_eq!(summary.verdict(), None);
     let output = output.unwrap();
     let sorted = |frame: &GaussianFrame, i: usize| {
         let mut scales = [0, 1, 2].map(|axis| frame.log_scale()[axis][i]);
@@ -181,21 +182,55 @@ fn extremes_of_scale_and_opacity_are_coded() {
     assert_eq!((decoded.opacity.iter().max(), decoded.opacity.iter().min()), (Some(&200), Some(&-200)));
     assert!(
         decoded.position.iter().all(|plane| plane.iter().all(|&q| q == 0)),
-        "one point is one lattice point"
+        "one point is one grid point"
     );
+}
+
+fn refusal(frames: Vec<GaussianFrame>, settings: &Settings) -> String {
+    let mut frames = frames;
+    let error = splatstream_encoder::encode(&mut frames, settings, &mut Vec::new(), &mut |_, _| {});
+    error.unwrap_err().to_string()
+}
+
+#[test]
+fn values_beyond_every_grid_are_named_with_frame_gaussian_and_property() {
+    for (attribute, value) in [("log_scale", 1.0e9), ("log_scale", -1.0e9), ("position", 1.0e30)] {
+        let mut planes = builtin(100, 0).into_planes();
+        let plane = if attribute == "position" { &mut planes.position[1] } else { &mut planes.log_scale[1] };
+        plane[42] = value;
+        let frames = vec![builtin(100, 0), GaussianFrame::from_planes(0, planes).unwrap()];
+        for keep_invisible in [true, false] {
+            let settings = Settings { keep_invisible, ..Settings::default() };
+            let message = refusal(frames.clone(), &settings);
+            assert!(message.contains(&format!("frame 1: {attribute} of Gaussian 42 is")), "{message}");
+        }
+    }
+}
+
+/// A.2: no payload may stand for more than 16 Gaussians in a byte.
+#[test]
+fn gaussians_that_are_all_alike_take_as_many_bytes_as_they_must() {
+    let same = builtin(100, 1).select(&[5; 20_000]);
+    for sh in [ShChoice::Coefficients, ShChoice::VectorQuantised] {
+        let settings = Settings { sh, preset: Preset::Fast, keep_invisible: true, ..Settings::default() };
+        let (bytes, report) = encoded(vec![same.clone(); 2], &settings);
+        let (frames, summary) = decoded(&bytes, &strict());
+        assert_eq!(summary.verdict(), None);
+        assert!(frames.iter().all(|frame| frame.planes.len() == 20_000));
+        assert!((2 * 20_000 / 16..10_000).contains(&bytes.len()), "{} bytes", bytes.len());
+        assert_eq!(report.gaussians, 40_000);
+    }
+}
+
+#[test]
+fn a_frame_rate_that_no_level_allows_is_refused() {
+    let settings = Settings { ticks: (u32::MAX, 1), ..Settings::default() };
+    assert!(refusal(vec![builtin(1000, 0)], &settings).contains("frame rate"));
 }
 
 #[test]
 fn settings_that_no_stream_can_carry_are_refused_with_a_reason() {
-    let refused = |settings: Settings| {
-        let result = splatstream_encoder::encode(
-            &mut vec![builtin(100, 0)],
-            &settings,
-            &mut Vec::new(),
-            &mut |_, _| {},
-        );
-        result.unwrap_err().to_string()
-    };
+    let refused = |settings: Settings| refusal(vec![builtin(100, 0)], &settings);
     let refinements =
         |refinements: &[u8]| Settings { refinements: refinements.to_vec(), ..Settings::default() };
     for wrong in
@@ -205,11 +240,5 @@ fn settings_that_no_stream_can_carry_are_refused_with_a_reason() {
     }
     assert!(refused(Settings { gop: 0, ..Settings::default() }).contains("gop is 0"));
     assert!(refused(Settings { sh_degree: Some(4), ..Settings::default() }).contains("0 to 3"));
-    let none = splatstream_encoder::encode(
-        &mut Vec::<GaussianFrame>::new(),
-        &Settings::default(),
-        &mut Vec::new(),
-        &mut |_, _| {},
-    );
-    assert!(none.unwrap_err().to_string().contains("no frame"));
+    assert!(refusal(Vec::new(), &Settings::default()).contains("no frame"));
 }

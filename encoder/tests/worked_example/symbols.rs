@@ -1,63 +1,48 @@
-//! Clause 8.4 step by step, written anew: the table of D.4, and a check of the fast reader.
+//! Clause 8.4 step by step, written again: the table of D.4, and a check of the fast reader.
 
 use splatstream_decoder::context::{delta_contexts, plane_contexts};
-use splatstream_decoder::gop::Gop;
-use splatstream_decoder::unit::{CodedUnit, PreparedUnit};
+use splatstream_decoder::increment::values::PreparedSections;
 use splatstream_format::Limits;
 use splatstream_format::bits::BitReader;
-use splatstream_format::entropy::layout::{Attribute, Layout};
+use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
+use splatstream_format::entropy::layout::{Attribute, ShCoding};
 use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::entropy::token::{Alphabet, join, unzigzag};
-use splatstream_format::payload::Refinement;
-use splatstream_format::syntax::{FrameHeader, GopHeader, Profile, SequenceParameters, UnitType};
+use splatstream_format::payload::Increment;
+use splatstream_format::syntax::{Profile, SequenceParameters, UnitType};
 use splatstream_format::unit::Stream;
 use std::fmt::Write as _;
 
-/// Appends one table a block.
+/// Appends one table per block.
 pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
     text.push_str(
         "\n## D.4 The blocks symbol by symbol\n\nStates in hexadecimal. The coded value of the position plane is the \
          Morton delta, of the others `e` of 8.1; the bias is not yet added.\n",
     );
     let limits = Limits::default();
-    let (mut sequence, mut gop, mut frame, mut before) = (None, None, None, None);
+    let mut sequence = None;
+    let mut in_force = ModelsInForce::default();
     for unit in Stream::open(bytes, &limits).unwrap().units() {
         let unit = unit.unwrap();
         let (payload, at) = (unit.payload, unit.payload_at);
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
-                sequence = Some(SequenceParameters::parse_payload(payload, at, Profile::Intra).unwrap())
+                sequence = Some(SequenceParameters::parse_payload(payload, at, Profile::Intra).unwrap());
             }
-            UnitType::GopHeader => {
-                gop = Some(Gop::new(GopHeader::parse_payload(payload, at, Profile::Intra).unwrap(), 0))
-            }
-            UnitType::FrameHeader => {
-                frame = Some(FrameHeader::parse_payload(payload, at, Profile::Intra).unwrap())
-            }
-            UnitType::Transform => {
-                let (Some(gop), Some(sequence)) = (&mut gop, &sequence) else { panic!("order") };
-                gop.tool(&unit, sequence, Profile::Intra, &limits).unwrap();
-            }
-            UnitType::Refinement => {
-                let (Some(gop), Some(sequence), Some(frame)) = (&gop, &sequence, &frame) else {
-                    panic!("order")
+            UnitType::Increment => {
+                let sequence = sequence.as_ref().unwrap();
+                let increment = Increment::parse(payload, at, sequence, Profile::Intra, &limits).unwrap();
+                let prepared =
+                    PreparedSections::new(&increment.sections, 3, ShCoding::None, &mut in_force, &mut ())
+                        .unwrap();
+                let (coded, models) = prepared.sections().next().unwrap();
+                let fast = prepared.blocks(coded, models, sequence).unwrap();
+                let ([fast], [(block, _)]) = (fast.as_slice(), coded.blocks.as_slice()) else {
+                    panic!("one block")
                 };
-                let refinement = Refinement::parse(payload, at, sequence, &limits).unwrap();
-                let coded = CodedUnit { refinement: &refinement, payload_at: at };
-                let transforms = gop.transforms(frame, at).unwrap();
-                let known = before
-                    .as_ref()
-                    .map(|(layout, models): &(Layout, Vec<PlaneModel>)| (layout, models.as_slice()));
-                let prepared = PreparedUnit::new(coded, gop, transforms, known, &mut ()).unwrap();
-                let fast = prepared.coded_blocks(sequence).unwrap();
-                let title = format!("refinement {}", unit.header.refinement);
-                for (place, block) in prepared.blocks(sequence).into_iter().enumerate() {
-                    write!(text, "\n### Block {place} of {title}\n").unwrap();
-                    let slow = one(text, &prepared, block.0, block.2, refinement.header.lanes_log2);
-                    let expected = (fast[place].deltas.clone(), fast[place].coded[1..].to_vec());
-                    assert_eq!(slow, expected, "two readers of the same block");
-                }
-                before = Some((prepared.layout.clone(), prepared.models.clone()));
+                write!(text, "\n### The block of increment {}\n", unit.header.refinement).unwrap();
+                let slow = one(text, models, block, coded.count as usize, coded.lanes_log2);
+                assert_eq!(slow, (fast.deltas.clone(), fast.coded[1..].to_vec()), "two readers of a block");
             }
             _ => {}
         }
@@ -67,18 +52,12 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
 /// The deltas and the coded planes of a block.
 type Values = (Vec<u64>, Vec<Vec<i32>>);
 
-fn one(
-    text: &mut String,
-    unit: &PreparedUnit<'_, '_, '_>,
-    block: &[u8],
-    count: usize,
-    lanes_log2: u8,
-) -> Values {
+fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, lanes_log2: u8) -> Values {
     assert!(block[0] < 128, "a small block has a one-byte word_count");
     let lanes = 1 << lanes_log2;
     let mut bytes = block[1..].iter().copied();
     let mut number =
-        |size: usize| (0..size).fold(0, |sum, place| sum | u32::from(bytes.next().unwrap()) << (8 * place));
+        |size: usize| (0..size).fold(0, |sum, index| sum | u32::from(bytes.next().unwrap()) << (8 * index));
     let mut states: Vec<u32> = (0..lanes).map(|_| number(4)).collect();
     let words: Vec<u32> = (0..block[0]).map(|_| number(2)).collect();
     let mut raw = BitReader::new(&block[1 + 4 * lanes + 2 * words.len()..]);
@@ -89,7 +68,7 @@ fn one(
     );
     let (mut deltas, mut planes) = (Vec::new(), vec![Vec::new()]);
     let mut known = splatstream_decoder::block::CodedBlock::new(Vec::new());
-    for (plane, (&info, model)) in unit.layout.planes().iter().zip(&unit.models).enumerate() {
+    for (plane, (&info, model)) in section.layout.planes().iter().zip(&section.models).enumerate() {
         for i in 0..count {
             let context = context(model, plane, info.alphabet, &known, &deltas, &planes[plane]);
             let table = &model.tables[usize::from(model.table_of_context[context])];
@@ -110,7 +89,7 @@ fn one(
                 Alphabet::Attribute => i64::from(unzigzag(value as u32)),
                 _ => value as i64,
             };
-            let name = format!("{} {}", info.attribute.name(), info.place);
+            let name = format!("{} {}", info.attribute.name(), info.index);
             writeln!(
                 text,
                 "| {name} | {i} | {context} | {state:08x} | {slot} | {token} | {word} | {raw_bits} | {after:08x} | {coded} |"
@@ -149,8 +128,8 @@ fn context(
         with_next.push(0);
         plane_contexts(&model.axes, plane, known, &with_next)
     };
-    let place = if alphabet == Alphabet::Position { deltas.len() } else { values.len() };
-    contexts.get(place).copied().unwrap_or(0).into()
+    let next = if alphabet == Alphabet::Position { deltas.len() } else { values.len() };
+    contexts.get(next).copied().unwrap_or(0).into()
 }
 
 /// The token whose interval holds the slot, and the first slot of the interval.
@@ -165,21 +144,21 @@ fn token_of(frequencies: &[u16], slot: u32) -> (usize, u32) {
     panic!("a table has 4096 slots");
 }
 
-/// What later contexts need of a plane, clauses 7.4 and 7.5.
+/// What later contexts need of a plane, clause 7.6.2.
 fn remember(
     known: &mut splatstream_decoder::block::CodedBlock,
     info: splatstream_format::entropy::layout::PlaneInfo,
     values: Vec<i32>,
     bias: i32,
 ) {
-    let place = usize::from(info.place);
+    let index = usize::from(info.index);
     match info.attribute {
-        Attribute::LogScale if place == 0 => {
+        Attribute::LogScale if index == 0 => {
             known.log_scale[0] = values.iter().map(|value| value + bias).collect();
         }
         Attribute::LogScale => {
-            let larger = known.log_scale[place - 1].clone();
-            known.log_scale[place] =
+            let larger = known.log_scale[index - 1].clone();
+            known.log_scale[index] =
                 larger.iter().zip(&values).map(|(larger, value)| larger - value - bias).collect();
         }
         Attribute::Opacity => known.opacity = values.iter().map(|value| value + bias).collect(),

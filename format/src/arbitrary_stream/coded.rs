@@ -1,8 +1,9 @@
-//! Sections that decode: small values, coded with one flat table a plane.
+//! Sections that decode: small values, coded with one table per plane, explicit or parametric.
 
 use crate::entropy::frequencies::Frequencies;
 use crate::entropy::layout::{Attribute, Layout, PlaneInfo, Section};
 use crate::entropy::model::{ContextAxis, PlaneModel, Source, write_models};
+use crate::entropy::parametric::Parametric;
 use crate::entropy::token::{Alphabet, zigzag};
 use crate::entropy::writer::{BlockWriter, PlaneEncoder};
 use crate::payload::SectionBytes;
@@ -10,7 +11,7 @@ use crate::payload::SectionBytes;
 /// log2 of the values that have tokens of their own, which are all that occur.
 const DIRECT_LOG2: u8 = 4;
 /// The largest of these values.
-const MOST_DELTA: u64 = 15;
+const MAX_DELTA: u64 = 15;
 /// The code of a Gaussian that is removed.
 const REMOVED: i32 = 4;
 
@@ -26,8 +27,8 @@ impl Values {
         Self { state: seed, last_predictor: 2 }
     }
 
-    /// Values of a group that may have a network.
-    pub(super) fn of_group(seed: u64, has_network: bool) -> Self {
+    /// Values of a GOP that may have a network.
+    pub(super) fn of_gop(seed: u64, has_network: bool) -> Self {
         Self { last_predictor: if has_network { 3 } else { 2 }, ..Self::new(seed) }
     }
 
@@ -80,29 +81,29 @@ pub(super) fn coded(
     values: &mut Values,
 ) -> SectionBytes {
     let points = 1_u64.checked_shl(u32::from(axis_bits).saturating_mul(3)).unwrap_or(u64::MAX);
-    let room = points.saturating_sub(1).checked_div(count.into()).unwrap_or(0).min(MOST_DELTA);
+    let room = points.saturating_sub(1).checked_div(count.into()).unwrap_or(0).min(MAX_DELTA);
     let delta = i32::try_from(room).unwrap_or(0);
     let lanes_log2 = u8::try_from(values.below(6)).unwrap_or(0);
-    let model = flat();
-    let models = vec![model.clone(); layout.planes().len()];
-    let encoder = PlaneEncoder::new(&model);
+    let models: Vec<PlaneModel> =
+        layout.planes().iter().map(|plane| model(table(plane.alphabet, values))).collect();
+    let encoders: Vec<PlaneEncoder> = models.iter().map(PlaneEncoder::new).collect();
     let size = 1_u32.wrapping_shl(block_log2.into());
     let mut modes = modes.iter().copied();
     let mut block = |start: u32| {
         let mut writer = BlockWriter::new(lanes_log2);
-        for &plane in layout.planes() {
+        for (&plane, encoder) in layout.planes().iter().zip(&encoders) {
             let of_plane = |_| match (plane.section, modes.next()) {
                 (Section::Modes, Some(mode)) => mode,
                 _ => values.of_plane(plane, delta),
             };
             let length = usize::try_from(count.saturating_sub(start).min(size)).unwrap_or(0);
             let numbers: Vec<u64> = (0..length).map(of_plane).map(|value| unsigned(plane, value)).collect();
-            // Every value has a token of the flat table.
-            let _ = writer.plane(&encoder, &[], numbers.into_iter());
+            // Every value has a token of the table.
+            let _ = writer.plane(encoder, &[], numbers.into_iter());
         }
         writer.finish()
     };
-    let starts = (0..count.div_ceil(size)).map(|place| place.saturating_mul(size));
+    let starts = (0..count.div_ceil(size)).map(|block| block.saturating_mul(size));
     let blocks = starts.map(&mut block).collect();
     SectionBytes { lanes_log2, model: write_models(&models, &layout.alphabets(), None), blocks }
 }
@@ -114,14 +115,27 @@ fn unsigned(plane: PlaneInfo, value: i32) -> u64 {
     }
 }
 
-/// One table in which every small value is as likely as the others.
-fn flat() -> PlaneModel {
+/// A table of every small value: all as likely as the others, or by any distribution.
+fn table(alphabet: Alphabet, values: &mut Values) -> Frequencies {
+    if values.below(2) == 0 {
+        return Frequencies::from_counts(&[1; 1 << DIRECT_LOG2]);
+    }
+    let mut element = |bound: u64| u8::try_from(values.below(bound)).unwrap_or(0);
+    let last = element(20).saturating_add((1 << DIRECT_LOG2) - 1);
+    let [shape, zero_level, scale] = [4, 16, 64].map(&mut element);
+    let centre = if alphabet == Alphabet::Attribute { values.between(-40, 40) } else { 0 };
+    let parameters = Parametric { last, shape, zero_level, scale, centre };
+    Frequencies::parametric(parameters, alphabet, DIRECT_LOG2)
+}
+
+/// A model without contexts.
+fn model(table: Frequencies) -> PlaneModel {
     let axis = || ContextAxis { source: Source::None, thresholds: Vec::new() };
     PlaneModel {
         bias: 0,
         direct_log2: DIRECT_LOG2,
         axes: [axis(), axis()],
-        tables: vec![Frequencies::from_counts(&[1; 1 << DIRECT_LOG2])],
+        tables: vec![table],
         table_of_context: vec![0],
     }
 }

@@ -7,8 +7,8 @@ use arbitrary::{Error, Result, Unstructured};
 
 /// Any small network, or one that is registered.
 pub fn weights(u: &mut Unstructured<'_>) -> Result<Weights> {
-    let place: usize = u.int_in_range(0..=3)?;
-    match REGISTRY.get(place) {
+    let index: usize = u.int_in_range(0..=3)?;
+    match REGISTRY.get(index) {
         Some((digest, _)) => Ok(Weights::Registered(*digest)),
         None => network(u).map(Box::new).map(Weights::Carried),
     }

@@ -1,14 +1,27 @@
 //! Clause 8.3: a static frequency table and how it is carried.
 
 use super::FREQUENCY_SUM;
+use super::parametric::Parametric;
+use super::token::Alphabet;
 use crate::bits::BitWriter;
+
+/// How a table is carried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Carried {
+    /// Every frequency but that of this token, which the others imply.
+    Explicit {
+        /// The token.
+        mode: u8,
+    },
+    /// Numbers that all frequencies follow from.
+    Parametric(Parametric),
+}
 
 /// Frequencies of the tokens 0, 1, ...; they sum to [`FREQUENCY_SUM`], and the last is not zero.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Frequencies {
     of_token: Vec<u16>,
-    /// The token whose frequency is implied by the others.
-    mode: u8,
+    carried: Carried,
 }
 
 impl Frequencies {
@@ -16,7 +29,7 @@ impl Frequencies {
     pub fn single(token: u8) -> Self {
         let mut of_token = vec![0; usize::from(token)];
         of_token.push(4096);
-        Self { of_token, mode: token }
+        Self { of_token, carried: Carried::Explicit { mode: token } }
     }
 
     /// The frequency of each token.
@@ -55,7 +68,8 @@ impl Frequencies {
                     if let Some(frequency) = of_token.get_mut(mode) {
                         *frequency = rest;
                     }
-                    return Self { of_token, mode: u8::try_from(mode).unwrap_or(0) };
+                    let mode = u8::try_from(mode).unwrap_or(0);
+                    return Self { of_token, carried: Carried::Explicit { mode } };
                 }
                 // Rounding up small counts took it all: shrink the others a little and try again.
                 _ => scale = scale.saturating_sub(scale / 16),
@@ -63,15 +77,39 @@ impl Frequencies {
         }
     }
 
-    /// Writes the explicit form, clause 5.12: last token, mode, then length and mantissa of the others.
-    pub fn write(&self, bits: &mut BitWriter) {
-        let mode = usize::from(self.mode);
-        let last = self.of_token.len().saturating_sub(1);
-        bits.bits(u64::try_from(last).unwrap_or(0), 8);
-        bits.bits(u64::from(self.mode), 8);
+    /// The table of a distribution.
+    pub fn parametric(parameters: Parametric, alphabet: Alphabet, direct_log2: u8) -> Self {
+        let of_token = parameters.frequencies(alphabet, direct_log2);
+        Self { of_token, carried: Carried::Parametric(parameters) }
+    }
+
+    /// Writes what clause 5.12 has after `table_kind` 3.
+    pub fn write(&self, bits: &mut BitWriter, alphabet: Alphabet, largest_token: u8) {
+        let is_parametric = matches!(self.carried, Carried::Parametric(_));
+        bits.bits(u64::from(is_parametric), 1);
+        let last = u8::try_from(self.of_token.len().saturating_sub(1)).unwrap_or(0);
+        bits.bits(u64::from(last), token_bits(largest_token));
+        match self.carried {
+            Carried::Explicit { mode } => {
+                bits.bits(u64::from(mode), token_bits(last));
+                self.write_frequencies(bits, mode);
+            }
+            Carried::Parametric(Parametric { shape, zero_level, scale, centre, .. }) => {
+                bits.bits(u64::from(shape), 2);
+                bits.bits(u64::from(zero_level), 4);
+                bits.bits(u64::from(scale), 6);
+                if alphabet == Alphabet::Attribute {
+                    bits.signed_exp_golomb(centre);
+                }
+            }
+        }
+    }
+
+    /// Length and mantissa of every frequency but that of `mode`.
+    fn write_frequencies(&self, bits: &mut BitWriter, mode: u8) {
         let mut previous = 0_i32;
         for (token, &frequency) in self.of_token.iter().enumerate() {
-            if token == mode {
+            if token == usize::from(mode) {
                 continue;
             }
             let frequency = u32::from(frequency);
@@ -91,8 +129,13 @@ impl Frequencies {
         let others: u32 = of_token.iter().map(|&frequency| u32::from(frequency)).sum();
         let implied = FREQUENCY_SUM.checked_sub(others).filter(|&rest| rest > 0 && rest < FREQUENCY_SUM)?;
         *of_token.get_mut(usize::from(mode))? = u16::try_from(implied).ok()?;
-        (of_token.last() != Some(&0)).then_some(Self { of_token, mode })
+        (of_token.last() != Some(&0)).then_some(Self { of_token, carried: Carried::Explicit { mode } })
     }
+}
+
+/// Bits of an element that holds a token up to `largest`.
+pub(super) const fn token_bits(largest: u8) -> u32 {
+    u8::BITS.wrapping_sub(largest.leading_zeros())
 }
 
 /// The first of the largest entries.
@@ -150,11 +193,25 @@ mod tests {
                     prop_assert!(table.of_token()[token] > 0);
                 }
             }
-            let implied = Frequencies::with_implied(
-                table.of_token().iter().enumerate().map(|(token, &f)| if token == usize::from(table.mode) { 0 } else { f }).collect(),
-                table.mode,
-            );
+            let Carried::Explicit { mode } = table.carried else { panic!("counts give an explicit table") };
+            let others = |(token, &f)| if token == usize::from(mode) { 0 } else { f };
+            let implied =
+                Frequencies::with_implied(table.of_token().iter().enumerate().map(others).collect(), mode);
             prop_assert_eq!(implied, table.single_token().is_none().then_some(table));
+        }
+
+        #[test]
+        fn a_parametric_table_sums_to_4096_and_keeps_every_token(
+            alphabet in prop::sample::select(vec![Alphabet::Attribute, Alphabet::Position, Alphabet::Index]),
+            direct_log2 in 2_u8..=5, last in any::<u8>(), shape in 0_u8..4, zero_level in 0_u8..16,
+            scale in 0_u8..=Parametric::MAX_SCALE, centre in prop_oneof![-9..9_i32, -32768..32768_i32]
+        ) {
+            let last = last.min(alphabet.last_token(direct_log2).unwrap());
+            let parameters = Parametric { last, shape, zero_level, scale, centre };
+            let table = Frequencies::parametric(parameters, alphabet, direct_log2);
+            prop_assert_eq!(table.of_token().len(), usize::from(last) + 1);
+            prop_assert_eq!(table.of_token().iter().map(|&f| u32::from(f)).sum::<u32>(), FREQUENCY_SUM);
+            prop_assert!(table.of_token().iter().all(|&f| f > 0));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Clause 6.12: the plane models that `reuse` refers to in an increment.
+//! Clause 6.12: the plane models that `reuse` refers to in an increment and in the cells of a frame header.
 
 use super::layout::{Layout, Section};
 use super::model::PlaneModel;
@@ -13,7 +13,7 @@ pub struct SectionModels {
     pub models: Vec<PlaneModel>,
 }
 
-/// For each section of an increment, the models of the last unit that had it.
+/// For each section, the models of the last unit that had it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ModelsInForce {
     sections: [Option<Arc<SectionModels>>; 6],
@@ -28,12 +28,12 @@ impl ModelsInForce {
 
     /// The models of a section.
     pub fn get(&self, section: Section) -> Option<&SectionModels> {
-        self.sections.get(section.place()).and_then(Option::as_deref)
+        self.sections.get(section.index()).and_then(Option::as_deref)
     }
 
     /// Takes the models of a section that a unit has.
     pub fn replace(&mut self, section: Section, models: SectionModels) {
-        if let Some(slot) = self.sections.get_mut(section.place()) {
+        if let Some(slot) = self.sections.get_mut(section.index()) {
             *slot = Some(Arc::new(models));
         }
     }
@@ -42,8 +42,8 @@ impl ModelsInForce {
 /// The models in force for the next unit of a frame, by its refinement.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ModelsOfFrame {
-    /// For a unit of refinement 0: of the next spatial layer, or of a frame that refers to this one. A frame starts
-    /// with those of the frame it refers to.
+    /// For the cells of the frame header, and for a unit of refinement 0: of the next spatial layer, or of a frame that
+    /// refers to this one. A frame starts with those of the frame it refers to; the cells of its header replace theirs.
     pub first: ModelsInForce,
     /// For a unit of a higher refinement: those after the unit before it.
     current: ModelsInForce,

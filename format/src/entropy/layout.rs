@@ -26,8 +26,8 @@ pub enum Attribute {
     Stale,
     /// Translation of a cell: three planes.
     Translation,
-    /// Turn of a cell: three planes.
-    Turn,
+    /// Rotation of a cell: three planes.
+    CellRotation,
     /// What becomes of a parent, one plane.
     Mode,
     /// Position residual of a parent: three planes.
@@ -48,7 +48,7 @@ impl Attribute {
         Self::Cell,
         Self::Stale,
         Self::Translation,
-        Self::Turn,
+        Self::CellRotation,
         Self::Mode,
         Self::Move,
         Self::Predictor,
@@ -66,7 +66,7 @@ impl Attribute {
             Self::Cell => "cell",
             Self::Stale => "stale",
             Self::Translation => "translation",
-            Self::Turn => "turn",
+            Self::CellRotation => "cell_rotation",
             Self::Mode => "mode",
             Self::Move => "move",
             Self::Predictor => "predictor",
@@ -74,7 +74,7 @@ impl Attribute {
     }
 }
 
-/// The sections of an increment (5.14), in stream order. A refinement has one, which is [`Section::New`].
+/// The sections of a frame (5.15): that of a frame header, then those of an increment in stream order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Section {
     /// Motion of cells.
@@ -92,6 +92,10 @@ pub enum Section {
 }
 
 impl Section {
+    /// The sections of an increment, in stream order.
+    pub const OF_INCREMENT: [Self; 5] =
+        [Self::Modes, Self::Moves, Self::Updates, Self::Predictors, Self::New];
+
     /// Every section, in stream order.
     pub const ALL: [Self; 6] =
         [Self::Cells, Self::Modes, Self::Moves, Self::Updates, Self::Predictors, Self::New];
@@ -108,8 +112,8 @@ impl Section {
         }
     }
 
-    /// The place in stream order.
-    pub const fn place(self) -> usize {
+    /// The index in stream order.
+    pub const fn index(self) -> usize {
         match self {
             Self::Cells => 0,
             Self::Modes => 1,
@@ -168,8 +172,8 @@ pub struct PlaneInfo {
     pub section: Section,
     /// What the plane belongs to.
     pub attribute: Attribute,
-    /// Its place among the planes of the attribute.
-    pub place: u8,
+    /// Its index among the planes of the attribute.
+    pub index: u8,
     /// What its values may be.
     pub alphabet: Alphabet,
 }
@@ -181,15 +185,14 @@ impl PlaneInfo {
     }
 }
 
-/// The coded planes of a refinement or of a section, in order.
+/// The coded planes of a section, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
     planes: Vec<PlaneInfo>,
 }
 
 impl Layout {
-    /// The planes of new Gaussians for a dc transform of `dc_rank` components and the given SH coding: those of
-    /// a refinement, and of the section `new` of an increment.
+    /// The planes of the section `new` for a dc transform of `dc_rank` components and the given SH coding.
     pub fn new(dc_rank: u8, sh: ShCoding) -> Self {
         let mut layout = Self { planes: Vec::new() };
         layout.add(Section::New, Attribute::Position, 1, Alphabet::Position);
@@ -197,7 +200,7 @@ impl Layout {
         layout
     }
 
-    /// The planes of a section of an increment.
+    /// The planes of a section.
     pub fn of_section(section: Section, dc_rank: u8, sh: ShCoding) -> Self {
         let mut layout = Self { planes: Vec::new() };
         match section {
@@ -205,7 +208,7 @@ impl Layout {
                 layout.add(section, Attribute::Cell, 1, Alphabet::Position);
                 layout.add(section, Attribute::Stale, 1, Alphabet::Attribute);
                 layout.add(section, Attribute::Translation, 3, Alphabet::Attribute);
-                layout.add(section, Attribute::Turn, 3, Alphabet::Attribute);
+                layout.add(section, Attribute::CellRotation, 3, Alphabet::Attribute);
             }
             Section::Modes => layout.add(section, Attribute::Mode, 1, Alphabet::Attribute),
             Section::Moves => layout.add(section, Attribute::Move, 3, Alphabet::Attribute),
@@ -217,7 +220,7 @@ impl Layout {
     }
 
     fn add(&mut self, section: Section, attribute: Attribute, count: u8, alphabet: Alphabet) {
-        self.planes.extend((0..count).map(|place| PlaneInfo { section, attribute, place, alphabet }));
+        self.planes.extend((0..count).map(|index| PlaneInfo { section, attribute, index, alphabet }));
     }
 
     fn add_attributes(&mut self, section: Section, dc_rank: u8, sh: ShCoding) {
@@ -250,8 +253,8 @@ impl Layout {
     pub fn reusable<'m>(&self, before: Option<(&Self, &'m [PlaneModel])>) -> Vec<Option<&'m PlaneModel>> {
         let find = |plane: &PlaneInfo| {
             let (layout, models) = before?;
-            let place = layout.planes.iter().position(|known| known == plane)?;
-            models.get(place)
+            let index = layout.planes.iter().position(|known| known == plane)?;
+            models.get(index)
         };
         self.planes.iter().map(find).collect()
     }
@@ -276,26 +279,26 @@ impl Layout {
 /// The availability column of the table of clause 8.5.
 pub fn is_available(plane: PlaneInfo, source: Source) -> bool {
     use Attribute::{LogScale, Opacity, Rotation};
-    let PlaneInfo { section, attribute, place, alphabet } = plane;
+    let PlaneInfo { section, attribute, index, alphabet } = plane;
     if alphabet == Alphabet::Position {
         return matches!(source, Source::None | Source::NeighbourSum);
     }
     match source {
         Source::None => true,
         Source::NeighbourSum | Source::NeighbourMagnitude => alphabet == Alphabet::Attribute,
-        Source::PreviousPlane => place > 0 || follows_signed(plane),
-        Source::GroupMagnitude => place > 0,
+        Source::PreviousPlane => index > 0 || follows_signed(plane),
+        Source::GroupMagnitude => index > 0,
         // What is known of a whole Gaussian, which the other sections do not code.
         _ if section != Section::New => false,
         Source::PositionSpacing => true,
-        Source::LargestLogScale => attribute != LogScale || place > 0,
-        Source::MiddleLogScale => attribute != LogScale || place > 1,
+        Source::LargestLogScale => attribute != LogScale || index > 0,
+        Source::MiddleLogScale => attribute != LogScale || index > 1,
         Source::LogVolume | Source::Anisotropy => attribute >= Opacity,
         Source::Opacity => attribute >= Rotation,
     }
 }
 
-/// Whether the first plane of an attribute stands behind a plane of its section whose values can be a context.
+/// Whether the first plane of an attribute comes after a plane of its section whose values can be a context.
 fn follows_signed(plane: PlaneInfo) -> bool {
     let first = matches!(
         plane.attribute,

@@ -1,6 +1,7 @@
 //! Clauses 5.12 and 8.5: the model of a plane - bias, token split, contexts, frequency tables.
 
-use super::frequencies::{Frequencies, mantissa};
+use super::frequencies::{Frequencies, mantissa, token_bits};
+use super::parametric::Parametric;
 use super::token::Alphabet;
 use crate::bits::{BitReader, BitWriter};
 use crate::{Error, ErrorKind, Result};
@@ -147,7 +148,7 @@ impl AxisLookup {
     }
 }
 
-/// The model with which a plane of a refinement unit is coded.
+/// The model with which a plane is coded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlaneModel {
     /// Added to every coded value; 0 for positions and codebook indices.
@@ -199,6 +200,7 @@ fn write_model(bits: &mut BitWriter, model: &PlaneModel, alphabet: Alphabet) {
     if first.source != Source::None {
         write_axis(bits, second);
     }
+    let largest = alphabet.last_token(model.direct_log2).unwrap_or(u8::MAX);
     let mut defined = 0_u8;
     let mut previous = None;
     for &place in &model.table_of_context {
@@ -220,11 +222,11 @@ fn write_model(bits: &mut BitWriter, model: &PlaneModel, alphabet: Alphabet) {
             Some(token) => {
                 bits.bits(1, 2);
                 bits.bits(0, 1);
-                bits.bits(u64::from(token), 8);
+                bits.bits(u64::from(token), token_bits(largest));
             }
             None => {
                 bits.bits(3, 2);
-                table.write(bits);
+                table.write(bits, alphabet, largest);
             }
         }
     }
@@ -353,7 +355,7 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
         if contexts > MAX_CONTEXTS {
             return Err(self.broken("a plane has at most 64 contexts"));
         }
-        let (tables, table_of_context) = self.tables(contexts, last_token)?;
+        let (tables, table_of_context) = self.tables(contexts, alphabet, direct_log2, last_token)?;
         Ok(PlaneModel { bias, direct_log2, axes: [first, second], tables, table_of_context })
     }
 
@@ -378,7 +380,13 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
         Ok(ContextAxis { source, thresholds })
     }
 
-    fn tables(&mut self, contexts: usize, last_token: u8) -> Result<(Vec<Frequencies>, Vec<u8>)> {
+    fn tables(
+        &mut self,
+        contexts: usize,
+        alphabet: Alphabet,
+        direct_log2: u8,
+        last_token: u8,
+    ) -> Result<(Vec<Frequencies>, Vec<u8>)> {
         let mut tables: Vec<Frequencies> = Vec::new();
         let mut table_of_context: Vec<u8> = Vec::with_capacity(contexts);
         while table_of_context.len() < contexts {
@@ -389,7 +397,7 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
                     next
                 }
                 1 if self.element("is_reference", 1)? == 0 => {
-                    let token = self.element("token", 8)?;
+                    let token = self.element("token", token_bits(last_token))?;
                     if token > last_token {
                         return Err(self.broken("token beyond the largest value of the plane"));
                     }
@@ -397,15 +405,15 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
                     next
                 }
                 1 => {
-                    let place = self.element("table_place", 6)?;
+                    let place = self.element("table_index", 6)?;
                     if place >= next {
-                        return Err(self.broken("table_place names a table not yet defined"));
+                        return Err(self.broken("table_index names a table not yet defined"));
                     }
                     place
                 }
                 2 => *table_of_context.last().ok_or(self.broken("no context before the first"))?,
                 _ => {
-                    tables.push(self.explicit_table(last_token)?);
+                    tables.push(self.carried_table(alphabet, direct_log2, last_token)?);
                     next
                 }
             };
@@ -414,13 +422,30 @@ impl<T: ModelTrace> ModelReader<'_, '_, T> {
         Ok((tables, table_of_context))
     }
 
-    /// Clause 8.3, the explicit form.
-    fn explicit_table(&mut self, last_token: u8) -> Result<Frequencies> {
-        let last = self.element("last", 8)?;
+    /// Clause 8.3, `table_kind` 3.
+    fn carried_table(&mut self, alphabet: Alphabet, direct_log2: u8, last_token: u8) -> Result<Frequencies> {
+        let is_parametric = self.element("is_parametric", 1)? == 1;
+        let last = self.element("last", token_bits(last_token))?;
         if last > last_token {
             return Err(self.broken("token beyond the largest value of the plane"));
         }
-        let mode = self.element("mode", 8)?;
+        if !is_parametric {
+            return self.explicit_table(last);
+        }
+        let shape = self.element("shape", 2)?;
+        let zero_level = self.element("zero_level", 4)?;
+        let scale = self.element("scale", 6)?;
+        let centre = if alphabet == Alphabet::Attribute { self.signed("centre")? } else { 0 };
+        if i16::try_from(centre).is_err() {
+            return Err(self.broken("centre is a 16-bit value"));
+        }
+        let parameters = Parametric { last, shape, zero_level, scale, centre };
+        Ok(Frequencies::parametric(parameters, alphabet, direct_log2))
+    }
+
+    /// Clause 8.3, the explicit form.
+    fn explicit_table(&mut self, last: u8) -> Result<Frequencies> {
+        let mode = self.element("mode", token_bits(last))?;
         if mode > last {
             return Err(self.broken("mode is not above last"));
         }

@@ -20,7 +20,7 @@ pub struct PlaneDecoder {
     second_contexts: usize,
     /// First slot, in `token_of_slot`, of the table of each context.
     slots_of_context: [u32; 64],
-    /// The tables one behind the other.
+    /// The tables one after the other.
     token_of_slot: Vec<u8>,
     /// Frequency in the high half, first slot in the low half.
     interval_of_token: Vec<u32>,
@@ -32,8 +32,8 @@ impl PlaneDecoder {
     /// Expands the tables of a model.
     pub fn new(model: &PlaneModel) -> Self {
         let mut slots_of_context = [0; 64];
-        for (slots, &place) in slots_of_context.iter_mut().zip(&model.table_of_context) {
-            *slots = u32::from(place).wrapping_shl(FREQUENCY_BITS);
+        for (slots, &index) in slots_of_context.iter_mut().zip(&model.table_of_context) {
+            *slots = u32::from(index).wrapping_shl(FREQUENCY_BITS);
         }
         let mut value_of_token = Box::new([(0, 0); TOKENS]);
         for (token, value) in (0..=u8::MAX).zip(value_of_token.iter_mut()) {
@@ -110,11 +110,11 @@ pub struct BlockReader<'a> {
     raw_at: u64,
 }
 
-/// The words of a block. Past the end they are 0, and the place keeps counting.
+/// The words of a block. Past the end they are 0, and the offset keeps counting.
 #[derive(Debug, Clone, Copy)]
 struct Words<'a> {
     bytes: &'a [u8],
-    place: usize,
+    next: usize,
 }
 
 impl Words<'_> {
@@ -122,15 +122,15 @@ impl Words<'_> {
     /// no processor guesses it.
     #[inline(always)]
     fn refill(&mut self, state: u32) -> u32 {
-        let rest = self.bytes.get(self.place..).unwrap_or_default();
+        let rest = self.bytes.get(self.next..).unwrap_or_default();
         let word = rest.first_chunk::<2>().map_or(0, |bytes| u16::from_le_bytes(*bytes));
         let low = state < STATE_LOW;
-        self.place = self.place.wrapping_add(usize::from(low).wrapping_mul(2));
+        self.next = self.next.wrapping_add(usize::from(low).wrapping_mul(2));
         if low { state.wrapping_shl(16) | u32::from(word) } else { state }
     }
 
     fn are_spent(&self) -> bool {
-        self.place == self.bytes.len()
+        self.next == self.bytes.len()
     }
 }
 
@@ -155,7 +155,7 @@ impl<'a> BlockReader<'a> {
         }
         let raw_offset = block.len().wrapping_sub(raw.len());
         let raw_at = at.wrapping_add(u64::try_from(raw_offset).unwrap_or(0));
-        Ok(Self { states, lanes, words: Words { bytes, place: 0 }, raw: BitReader::new(raw), at, raw_at })
+        Ok(Self { states, lanes, words: Words { bytes, next: 0 }, raw: BitReader::new(raw), at, raw_at })
     }
 
     /// Reads one plane: the value of `out[i]` is coded in context `context(i, previous value)`.
@@ -174,10 +174,10 @@ impl<'a> BlockReader<'a> {
         let (mut states, mut words) = (self.states, self.words);
         let mask = self.lanes.wrapping_sub(1) & 31;
         let mut previous = start;
-        for (place, out) in out.iter_mut().enumerate() {
-            let context = usize::from(context(place, previous)) & 63;
+        for (index, out) in out.iter_mut().enumerate() {
+            let context = usize::from(context(index, previous)) & 63;
             let slots = decoder.slots_of_context.get(context).copied().unwrap_or(0);
-            let Some(state) = states.get_mut(place & mask) else { continue };
+            let Some(state) = states.get_mut(index & mask) else { continue };
             let (token, next) = Self::token(*state, decoder, slots);
             *state = words.refill(next);
             let (mut value, raw_bits) =
@@ -195,8 +195,8 @@ impl<'a> BlockReader<'a> {
     #[inline(always)]
     fn token(state: u32, decoder: &PlaneDecoder, slots: u32) -> (u8, u32) {
         let slot = state & 0xFFF;
-        let place = usize::try_from(slots | slot).unwrap_or(0);
-        let token = decoder.token_of_slot.get(place).copied().unwrap_or(0);
+        let index = usize::try_from(slots | slot).unwrap_or(0);
+        let token = decoder.token_of_slot.get(index).copied().unwrap_or(0);
         let interval_place = usize::try_from(slots >> 4 | u32::from(token)).unwrap_or(0);
         let interval = decoder.interval_of_token.get(interval_place).copied().unwrap_or(0);
         let [first, frequency] = [interval & 0xFFFF, interval >> 16];
@@ -210,11 +210,11 @@ impl<'a> BlockReader<'a> {
         if contexts.is_empty() {
             self.plane(decoder, out, 0, |_, _| 0, map);
         } else {
-            self.plane(decoder, out, 0, |place, _| contexts.get(place).copied().unwrap_or(0), map);
+            self.plane(decoder, out, 0, |index, _| contexts.get(index).copied().unwrap_or(0), map);
         }
     }
 
-    /// Reads signed values whose context also depends on the values just read: `context(place, previous)`.
+    /// Reads signed values whose context also depends on the values just read: `context(index, previous)`.
     pub fn signed_serial(
         &mut self,
         decoder: &PlaneDecoder,
@@ -227,7 +227,7 @@ impl<'a> BlockReader<'a> {
     /// Reads codebook indices.
     pub fn indices(&mut self, decoder: &PlaneDecoder, contexts: &[u8], out: &mut [i32]) {
         let map = |value: u64| low_half(value).cast_signed();
-        self.plane(decoder, out, 0, |place, _| contexts.get(place).copied().unwrap_or(0), map);
+        self.plane(decoder, out, 0, |index, _| contexts.get(index).copied().unwrap_or(0), map);
     }
 
     /// Reads Morton deltas; the context depends on the deltas just read.

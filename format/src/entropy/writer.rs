@@ -83,8 +83,8 @@ impl BlockWriter {
             "8.3",
             ErrorKind::Constraint { rule: "a coded token has a frequency of at least 1" },
         );
-        for (place, value) in values.enumerate() {
-            let context = contexts.get(place).copied().unwrap_or(0);
+        for (index, value) in values.enumerate() {
+            let context = contexts.get(index).copied().unwrap_or(0);
             let token = split(value, encoder.direct_log2);
             let (frequency, first) = encoder
                 .table_of_context
@@ -93,7 +93,7 @@ impl BlockWriter {
                 .and_then(|table| table.interval_of_token.get(usize::from(token.token)).copied())
                 .filter(|&(frequency, _)| frequency > 0)
                 .ok_or(uncodable)?;
-            let lane = u8::try_from(place & mask).unwrap_or(0);
+            let lane = u8::try_from(index & mask).unwrap_or(0);
             self.symbols.push(Symbol { lane, frequency, first });
             if token.raw_bits > 0 {
                 self.raw.bits(token.raw, token.raw_bits);

@@ -1,12 +1,12 @@
-//! Inside a refinement: the models bit by bit, the blocks section by section.
+//! Inside a section: the models bit by bit, the blocks part by part.
 
-use super::{Element, Inspector, variable_row};
-use crate::Result;
-use crate::entropy::in_force::{ModelsInForce, ModelsOfFrame};
+use super::{Element, Inspector};
+use crate::entropy::in_force::{ModelsInForce, ModelsOfFrame, SectionModels};
 use crate::entropy::layout::{Layout, PlaneInfo, ShCoding};
-use crate::entropy::model::{ModelTrace, PlaneModel, Source, read_models};
-use crate::payload::{Refinement, leb128};
-use crate::syntax::{FrameHeader, GopHeader, TransformHeader, TransformKind, after};
+use crate::entropy::model::{ModelTrace, Source, read_models};
+use crate::payload::{CodedSection, leb128};
+use crate::syntax::reader::Traced;
+use crate::syntax::{FrameHeader, GopHeader, ShHeader, TransformHeader, TransformKind, after};
 
 /// What the models of a unit depend on: the ranks of the transforms, and the models before.
 #[derive(Default)]
@@ -14,13 +14,12 @@ pub(super) struct Coding {
     gop: Option<(GopHeader, u32)>,
     dc_ranks: [u8; 16],
     sh_ranks: [u8; 16],
-    pub(super) frame_ranks: (u8, u8),
-    before: Option<(Layout, Vec<PlaneModel>)>,
+    frame_ranks: (u8, u8),
     /// Display index of the frame.
     frame: u32,
     /// The models in force for its next unit.
     pub(super) in_force: ModelsOfFrame,
-    /// Earlier frames of the group, and the models for those that refer to them.
+    /// Earlier frames of the GOP, and the models for those that refer to them.
     earlier: Vec<(u32, ModelsInForce)>,
 }
 
@@ -43,16 +42,14 @@ impl Coding {
         let rank = |ranks: &[u8; 16], id: u8| ranks.get(usize::from(id)).copied().unwrap_or(0);
         self.frame_ranks =
             (rank(&self.dc_ranks, header.dc_transform_id), rank(&self.sh_ranks, header.sh_transform_id));
-        self.before = None;
         let reference = self.gop.and_then(|(gop, first)| {
-            let place = gop.place(number.checked_sub(first)?);
-            first.checked_add(place.reference?)
+            let role = gop.role(number.checked_sub(first)?);
+            first.checked_add(role.reference?)
         });
         self.earlier.push((self.frame, core::mem::take(&mut self.in_force.first)));
         self.frame = number;
-        let mut frames = self.earlier.iter().rev();
-        let found = frames.find(|(number, _)| reference == Some(*number));
-        self.in_force.first = found.map(|(_, models)| models.clone()).unwrap_or_default();
+        let of = |reference| self.earlier.iter().rev().find(|(number, _)| reference == *number);
+        self.in_force.first = reference.and_then(of).map(|(_, models)| models.clone()).unwrap_or_default();
     }
 }
 
@@ -93,51 +90,61 @@ impl ModelTrace for Elements {
 }
 
 impl Inspector<'_> {
-    /// The elements of the models of a refinement.
-    pub(super) fn refinement_models(&mut self, refinement: &Result<Refinement<'_>>, model: &[u8], at: u64) {
-        let mut elements = Elements::default();
-        let read = match refinement {
-            Ok(refinement) => self.read(refinement, model, at, &mut elements),
-            Err(error) => Err(*error),
-        };
-        self.models("refinement", &elements, read.as_ref(), model, at);
-    }
-
-    /// The elements of a model section; one element for all of it where it cannot be read.
-    pub(super) fn models(
+    /// The elements of the sections of a unit, which could be divided: `trace` is what was read of them, `sections`
+    /// what it was. Without `refinement` the section is that of a frame header.
+    pub(super) fn sections(
         &mut self,
-        record: &str,
-        elements: &Elements,
-        read: core::result::Result<&Layout, &crate::Error>,
-        model: &[u8],
-        at: u64,
+        trace: &[Traced<'_>],
+        sections: &[CodedSection<'_>],
+        sh: &ShHeader,
+        refinement: Option<u8>,
     ) {
-        match read {
-            Ok(layout) if !model.is_empty() => self.show_models(&elements.list, layout.planes(), model, at),
-            Ok(_) => self.variable(record, "models", at, 0, "0 bytes".into()),
-            Err(error) => {
-                let value = format!("{} bytes, not readable: {}", model.len(), error.kind);
-                self.variable(record, "models", at, model.len(), value);
+        let mut models = self.coding.in_force.before(refinement.unwrap_or(0)).clone();
+        let mut sections = sections.iter();
+        let mut current = None;
+        for traced in trace {
+            if traced.element == "lanes_log2" {
+                current = sections.next();
+            }
+            let Some(coded) = current else { continue };
+            match (traced.element, traced.index) {
+                ("lanes_log2", _) => {
+                    self.traced(traced, format!("{} ({})", coded.lanes_log2, coded.section.name()));
+                }
+                ("models", _) => self.models(traced, coded, sh, &mut models),
+                ("blocks", Some(block)) => self.block(block, traced, coded.lanes_log2),
+                _ => self.plain(traced),
             }
         }
+        match refinement {
+            Some(refinement) => self.coding.in_force.follow(refinement, models),
+            None => self.coding.in_force.first = models,
+        }
     }
 
-    fn read(
+    /// The elements of the models of a section; one element for all of them where they cannot be read.
+    fn models(
         &mut self,
-        refinement: &Refinement<'_>,
-        model: &[u8],
-        at: u64,
-        trace: &mut Elements,
-    ) -> Result<Layout> {
-        let (dc, sh) = self.coding.frame_ranks;
-        let layout = Layout::new(dc, ShCoding::of(&refinement.header.sh(), sh));
-        if refinement.header.gaussian_count > 0 {
-            let before = self.coding.before.as_ref().map(|(layout, models)| (layout, models.as_slice()));
-            let reusable = layout.reusable(before);
-            let models = read_models(model, at, &layout.alphabets(), &reusable, trace)?;
-            self.coding.before = Some((layout.clone(), models));
+        traced: &Traced<'_>,
+        coded: &CodedSection<'_>,
+        sh: &ShHeader,
+        models: &mut ModelsInForce,
+    ) {
+        let (dc_rank, sh_rank) = self.coding.frame_ranks;
+        let layout = Layout::of_section(coded.section, dc_rank, ShCoding::of(sh, sh_rank));
+        let mut elements = Elements::default();
+        let reusable = models.reusable(coded.section, &layout);
+        let read = read_models(coded.model, coded.model_at, &layout.alphabets(), &reusable, &mut elements);
+        match read {
+            Ok(_) if coded.model.is_empty() => self.traced(traced, "0 bytes".into()),
+            Ok(read) => {
+                self.show_models(&elements.list, layout.planes(), coded.model, coded.model_at);
+                models.replace(coded.section, SectionModels { layout, models: read });
+            }
+            Err(error) => {
+                self.traced(traced, format!("{} bytes, not readable: {}", coded.model.len(), error.kind));
+            }
         }
-        Ok(layout)
     }
 
     fn show_models(&mut self, elements: &[ModelElement], planes: &[PlaneInfo], model: &[u8], at: u64) {
@@ -146,7 +153,7 @@ impl Inspector<'_> {
         for element in elements {
             let plane = planes.get(element.plane);
             let meaning =
-                plane.map_or(String::new(), |plane| format!("{} {}", plane.attribute.name(), plane.place));
+                plane.map_or(String::new(), |plane| format!("{} {}", plane.attribute.name(), plane.index));
             (self.visit)(Element {
                 at_bit: first_bit.saturating_add(element.bit),
                 bits: element.bits,
@@ -172,8 +179,9 @@ impl Inspector<'_> {
         }
     }
 
-    /// The sections of a block; one element for all of it where it cannot be divided.
-    pub(super) fn block(&mut self, record: &str, place: usize, block: &[u8], at: u64, lanes_log2: u8) {
+    /// The parts of a block; one element for all of it where it cannot be divided.
+    fn block(&mut self, index: usize, traced: &Traced<'_>, lanes_log2: u8) {
+        let (block, at) = (traced.bytes, traced.at);
         let states = 4_usize.wrapping_shl(u32::from(lanes_log2));
         let divided = leb128(block, at, "word_count", "5.13").ok().and_then(|(word_count, rest)| {
             let words = usize::try_from(word_count).ok()?.checked_mul(2)?;
@@ -181,11 +189,7 @@ impl Inspector<'_> {
             Some((word_count, block.len().saturating_sub(rest.len()), words, raw))
         });
         let Some((word_count, head, words, raw)) = divided else {
-            if let Some(row) = variable_row(record, "blocks") {
-                let (name, value) = (format!("blocks[{place}]"), format!("{} bytes", block.len()));
-                self.show(at, block.len(), name.into(), value, row.meaning, row.clause, row.record);
-            }
-            return;
+            return self.traced(traced, format!("{} bytes", block.len()));
         };
         let parts = [
             ("word_count", head, word_count.to_string(), "16-bit words of the block"),
@@ -196,7 +200,7 @@ impl Inspector<'_> {
         let mut offset = at;
         for (name, bytes, value, meaning) in parts {
             if bytes > 0 {
-                let name = format!("blocks[{place}].{name}");
+                let name = format!("blocks[{index}].{name}");
                 self.show(offset, bytes, name.into(), value, meaning, "5.13", "block");
             }
             offset = after(offset, bytes);

@@ -1,16 +1,15 @@
 //! 5.8 codebook: header, entries.
 
-use super::{element, length, whole};
+use super::{length, only};
 use crate::syntax::{CodebookHeader, after, encode};
 use crate::{Error, ErrorKind, Limits, Result};
-use nom::bytes::complete::take;
 
 /// The entries of one stage of vector quantisation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Codebook {
     /// The fixed part.
     pub header: CodebookHeader,
-    /// Place `x * component_count + k` is component k of entry x.
+    /// Index `x * component_count + k` is component k of entry x.
     pub entries: Vec<i16>,
 }
 
@@ -19,17 +18,15 @@ impl Codebook {
     pub fn parse(payload: &[u8], at: u64, limits: &Limits) -> Result<Self> {
         let (header, rest) = CodebookHeader::parse(payload, at)?;
         header.within(at, limits)?;
-        Self::parse_behind(header, rest, at)
+        Self::parse_rest(header, rest, at)
     }
 
-    /// Reads `rest`, the bytes behind a header that has been accepted. `at` is the offset of the payload, that
+    /// Reads `rest`, the bytes after a header that has been accepted. `at` is the offset of the payload, that
     /// is of the header.
-    pub fn parse_behind(header: CodebookHeader, rest: &[u8], at: u64) -> Result<Self> {
-        let table = &CodebookHeader::TABLE;
+    pub fn parse_rest(header: CodebookHeader, rest: &[u8], at: u64) -> Result<Self> {
         // Taken before anything is allocated: the bytes are there.
         let bytes = length(header.value_count()).saturating_mul(header.value_bytes.into());
-        let at = after(at, CodebookHeader::SIZE);
-        let raw: &[u8] = whole(table, rest, at, element("entries", take(bytes)))?;
+        let raw = only(&CodebookHeader::TABLE, rest, at, "entries", bytes)?;
         let entries = match header.value_bytes {
             1 => raw.iter().map(|value| i8::from_le_bytes([*value]).into()).collect(),
             _ => raw.as_chunks::<2>().0.iter().map(|value| i16::from_le_bytes(*value)).collect(),
@@ -42,7 +39,7 @@ impl Codebook {
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.header.validate(0)?;
         if self.entries.len() != length(self.header.value_count()) {
-            let rule = "entries have the places of the header";
+            let rule = "there are as many entries as the header says";
             return Err(Error::new(0, CodebookHeader::TABLE.semantics, ErrorKind::Constraint { rule }));
         }
         let mut bytes = encode(&CodebookHeader::TABLE, &self.header)?;
@@ -61,11 +58,11 @@ impl Codebook {
         self.entries.chunks_exact(usize::from(self.header.component_count).max(1))
     }
 
-    fn narrow(entry: i16, place: usize) -> Result<i8> {
+    fn narrow(entry: i16, offset: usize) -> Result<i8> {
         i8::try_from(entry).map_err(|_| {
             let (value, min, max) = (entry.into(), i8::MIN.into(), i8::MAX.into());
             let kind = ErrorKind::OutOfRange { element: "entries", value, min, max };
-            Error::new(after(0, place), CodebookHeader::TABLE.semantics, kind)
+            Error::new(after(0, offset), CodebookHeader::TABLE.semantics, kind)
         })
     }
 }

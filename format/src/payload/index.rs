@@ -1,29 +1,33 @@
 //! 5.10 index: header, entries.
 
-use super::{element, length, whole};
+use super::{length, only};
 use crate::syntax::{IndexEntry, IndexHeader, after};
 use crate::{Error, ErrorKind, Result};
-use nom::bytes::complete::take;
 
-/// Where the groups of pictures start.
+/// Where the GOPs start.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Index {
-    /// One entry for each group, in stream order.
+    /// One entry for each GOP, in stream order.
     pub entries: Vec<IndexEntry>,
 }
 
 impl Index {
     /// Reads and checks a payload that stands at offset `at`.
     pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
-        let table = &IndexHeader::TABLE;
         let (header, rest) = IndexHeader::parse(payload, at)?;
-        let at = after(at, IndexHeader::SIZE);
         // Taken before room is made: the bytes are there.
         let bytes = length(header.entry_count).saturating_mul(IndexEntry::SIZE);
-        let raw: &[u8] = whole(table, rest, at, element("entries", take(bytes)))?;
-        let places = (0_usize..).step_by(IndexEntry::SIZE);
-        let entry = |(raw, place)| Ok(IndexEntry::parse(raw, after(at, place))?.0);
-        let entries = raw.chunks(IndexEntry::SIZE).zip(places).map(entry).collect::<Result<_>>()?;
+        let raw = only(&IndexHeader::TABLE, rest, at, "entries", bytes)?;
+        let mut entries: Vec<IndexEntry> = Vec::with_capacity(length(header.entry_count));
+        let mut at = after(at, IndexHeader::SIZE);
+        for raw in raw.chunks(IndexEntry::SIZE) {
+            let (entry, _) = IndexEntry::parse(raw, at)?;
+            if let Some(before) = entries.last() {
+                entry.validate_after(at, before)?;
+            }
+            entries.push(entry);
+            at = after(at, IndexEntry::SIZE);
+        }
         Ok(Self { entries })
     }
 
@@ -37,6 +41,7 @@ impl Index {
         for entry in &self.entries {
             bytes.extend(entry.to_bytes()?);
         }
+        Self::parse(&bytes, 0)?;
         Ok(bytes)
     }
 }

@@ -1,9 +1,8 @@
 //! 5.16 operating_points: header, entries.
 
-use super::{element, length, whole};
+use super::{length, only};
 use crate::syntax::{OperatingPointEntry, OperatingPointsHeader, after};
 use crate::{Error, ErrorKind, Result};
-use nom::bytes::complete::take;
 
 /// What the operating points of a stream cost.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,20 +16,18 @@ impl OperatingPoints {
     pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
         let table = &OperatingPointsHeader::TABLE;
         let (header, rest) = OperatingPointsHeader::parse(payload, at)?;
-        let at = after(at, OperatingPointsHeader::SIZE);
         let bytes = length(header.point_count.into()).saturating_mul(OperatingPointEntry::SIZE);
-        let raw: &[u8] = whole(table, rest, at, element("entries", take(bytes)))?;
+        let raw = only(table, rest, at, "entries", bytes)?;
         let mut entries: Vec<OperatingPointEntry> = Vec::new();
-        for (raw, place) in
-            raw.chunks(OperatingPointEntry::SIZE).zip((0_usize..).step_by(OperatingPointEntry::SIZE))
-        {
-            let here = after(at, place);
+        let mut here = after(at, OperatingPointsHeader::SIZE);
+        for raw in raw.chunks(OperatingPointEntry::SIZE) {
             let entry = OperatingPointEntry::parse(raw, here)?.0;
             if entries.last().is_some_and(|before| before.key() >= entry.key()) {
                 let rule = "operating points rise by spatial layer, temporal layer and refinement";
                 return Err(Error::new(here, table.semantics, ErrorKind::Constraint { rule }));
             }
             entries.push(entry);
+            here = after(here, OperatingPointEntry::SIZE);
         }
         Ok(Self { entries })
     }

@@ -1,10 +1,8 @@
 //! 5.7 transform: header, mean, basis.
 
-use super::{element, whole};
+use super::after_fixed_part;
 use crate::syntax::{SequenceParameters, TransformHeader, after, encode};
 use crate::{Error, ErrorKind, Result};
-use nom::multi::count;
-use nom::number::complete::{le_i16, le_i32};
 
 /// The largest magnitude of a mean, in units of step/64.
 const MAX_MEAN: i32 = 1 << 30;
@@ -16,9 +14,9 @@ const MAX_BASIS: i16 = 1 << 12;
 pub struct Transform {
     /// The fixed part.
     pub header: TransformHeader,
-    /// The output for components 0, in units of step/64; `dimension` places.
+    /// The output for components 0, in units of step/64; `dimension` of them.
     pub mean: Vec<i32>,
-    /// Q12; place `k * dimension + j` is the weight of component k in output j.
+    /// Q12; index `k * dimension + j` is the weight of component k in output j.
     pub basis: Vec<i16>,
 }
 
@@ -26,17 +24,20 @@ impl Transform {
     /// Reads and checks a payload that stands at offset `at`.
     pub fn parse(payload: &[u8], at: u64, sequence: &SequenceParameters) -> Result<Self> {
         let (header, rest) = TransformHeader::parse(payload, at, sequence)?;
-        Self::parse_behind(header, rest, at)
+        Self::parse_rest(header, rest, at)
     }
 
-    /// Reads and checks `rest`, the bytes behind a header that has been accepted. `at` is the offset of the
+    /// Reads and checks `rest`, the bytes after a header that has been accepted. `at` is the offset of the
     /// payload, that is of the header.
-    pub fn parse_behind(header: TransformHeader, rest: &[u8], at: u64) -> Result<Self> {
-        let table = &TransformHeader::TABLE;
+    pub fn parse_rest(header: TransformHeader, rest: &[u8], at: u64) -> Result<Self> {
         // At most 45 and 45 * 45.
-        let (means, weights) = Self::places(&header);
-        let sections = (element("mean", count(le_i32, means)), element("basis", count(le_i16, weights)));
-        let (mean, basis) = whole(table, rest, after(at, TransformHeader::SIZE), sections)?;
+        let (means, weights) = Self::lengths(&header);
+        let mut reader = after_fixed_part(&TransformHeader::TABLE, rest, at);
+        let mean = reader.take("mean", means.saturating_mul(size_of::<i32>()))?;
+        let basis = reader.take("basis", weights.saturating_mul(size_of::<i16>()))?;
+        reader.end()?;
+        let mean = mean.as_chunks().0.iter().map(|value| i32::from_le_bytes(*value)).collect();
+        let basis = basis.as_chunks().0.iter().map(|value| i16::from_le_bytes(*value)).collect();
         let transform = Self { header, mean, basis };
         transform.validate_values(at)?;
         Ok(transform)
@@ -58,8 +59,8 @@ impl Transform {
         self.basis.chunks_exact(usize::from(self.header.dimension).max(1))
     }
 
-    /// Places of the mean and of the basis.
-    fn places(header: &TransformHeader) -> (usize, usize) {
+    /// Numbers of the mean and of the basis.
+    fn lengths(header: &TransformHeader) -> (usize, usize) {
         let dimension = usize::from(header.dimension);
         (dimension, dimension.saturating_mul(header.rank.into()))
     }
@@ -67,12 +68,12 @@ impl Transform {
     /// 6.7, the ranges of `mean` and `basis`.
     fn validate_values(&self, at: u64) -> Result<()> {
         let refuse = |at, kind| Err(Error::new(at, TransformHeader::TABLE.semantics, kind));
-        let (means, weights) = Self::places(&self.header);
+        let (means, weights) = Self::lengths(&self.header);
         if (self.mean.len(), self.basis.len()) != (means, weights) {
             // Only a transform made by hand: the parser counts.
             return refuse(
                 at,
-                ErrorKind::Constraint { rule: "mean and basis have the places of the header" },
+                ErrorKind::Constraint { rule: "mean and basis are as long as the header says" },
             );
         }
         let mut at = after(at, TransformHeader::SIZE);

@@ -1,20 +1,17 @@
 //! 5.17 weights: a network, or the name of one.
 
-use super::{element, whole};
+use super::{after_fixed_part, only};
 use crate::syntax::{NetworkHeader, WeightsHeader, after, encode};
 use crate::{Error, ErrorKind, Result};
-use nom::Parser;
-use nom::multi::count;
-use nom::number::complete::{i8, le_i16};
 
-/// The parts of a network in the order of 6.17.2, each an array of `i8` and one of `i16` behind it.
+/// The parts of a network in the order of 6.17.2, each an array of `i8` and one of `i16` after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// Relative positions to the hidden layer of the geometry network.
     Geometry,
     /// That layer to the embedding.
     GeometryEmbedding,
-    /// Tokens to the embedding; the rows of `rank` stand in the place of a bias.
+    /// Tokens to the embedding; the rows of `rank` take the part of a bias.
     Embedding,
     /// Added to the mean of the neighbours to make the row of the new Gaussian.
     Query,
@@ -101,7 +98,7 @@ impl Network {
         let fits =
             |(part, layer): (&Part, &Layer)| (layer.weights.len(), layer.bias.len()) == part.lengths(&header);
         if !Part::ALL.iter().zip(&layers).all(fits) {
-            let rule = "parameters have the places of the header";
+            let rule = "parameters are as many as the header says";
             return Err(Error::new(0, "6.17.2", ErrorKind::Constraint { rule }));
         }
         Ok(Self { header, layers })
@@ -110,19 +107,24 @@ impl Network {
     /// Reads and checks a network that stands at offset `at` and ends with `bytes`.
     pub fn parse(bytes: &[u8], at: u64) -> Result<Self> {
         let (header, rest) = NetworkHeader::parse(bytes, at)?;
-        let table = &NetworkHeader::TABLE;
-        let mut layers = [(); 11].map(|()| Layer::default());
+        let lengths = Part::ALL.map(|part| part.lengths(&header));
+        let bytes = |(weights, biases): (usize, usize)| weights.saturating_add(biases.saturating_mul(2));
         // At most 32,606 bytes.
-        let parts = |input| {
-            let mut rest = input;
-            for (part, layer) in Part::ALL.into_iter().zip(&mut layers) {
-                let (weights, biases) = part.lengths(&header);
-                (rest, (layer.weights, layer.bias)) =
-                    (count(i8, weights), count(le_i16, biases)).parse(rest)?;
+        let size = lengths.into_iter().map(bytes).fold(0, usize::saturating_add);
+        let mut parameters = only(&NetworkHeader::TABLE, rest, at, "parameters", size)?;
+        let layers = lengths.map(|(weights, biases)| {
+            let mut take = |length: usize| {
+                let (taken, rest) = parameters.split_at_checked(length).unwrap_or_default();
+                parameters = rest;
+                taken
+            };
+            let weights = take(weights).iter().map(|weight| weight.cast_signed()).collect();
+            let bias = take(biases.saturating_mul(2));
+            Layer {
+                weights,
+                bias: bias.as_chunks().0.iter().map(|value| i16::from_le_bytes(*value)).collect(),
             }
-            Ok((rest, ()))
-        };
-        whole(table, rest, after(at, NetworkHeader::SIZE), element("parameters", parts))?;
+        });
         Ok(Self { header, layers })
     }
 
@@ -158,18 +160,19 @@ impl Weights {
     /// Reads and checks a payload that stands at offset `at`.
     pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
         let (header, rest) = WeightsHeader::parse(payload, at)?;
-        Self::parse_behind(header, rest, at)
+        Self::parse_rest(header, rest, at)
     }
 
-    /// Reads `rest`, the bytes behind a header that has been accepted. `at` is the offset of the payload, that
+    /// Reads `rest`, the bytes after a header that has been accepted. `at` is the offset of the payload, that
     /// is of the header.
-    pub fn parse_behind(header: WeightsHeader, rest: &[u8], at: u64) -> Result<Self> {
-        let at = after(at, WeightsHeader::SIZE);
+    pub fn parse_rest(header: WeightsHeader, rest: &[u8], at: u64) -> Result<Self> {
         if header == WeightsHeader::CARRIED {
-            return Network::parse(rest, at).map(Box::new).map(Self::Carried);
+            return Network::parse(rest, after(at, WeightsHeader::SIZE)).map(Box::new).map(Self::Carried);
         }
-        let digest = nom::bytes::complete::take(32_usize).map_opt(|bytes: &[u8]| bytes.try_into().ok());
-        whole(&WeightsHeader::TABLE, rest, at, element("model", digest)).map(Self::Registered)
+        let mut reader = after_fixed_part(&WeightsHeader::TABLE, rest, at);
+        let digest = reader.array("model")?;
+        reader.end()?;
+        Ok(Self::Registered(digest))
     }
 
     /// The bytes of the payload.

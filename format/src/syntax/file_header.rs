@@ -6,8 +6,8 @@ use crate::{ErrorKind, Result};
 /// The first eight bytes: line ends and the eighth bit show a transfer that took the file for text.
 pub const SIGNATURE: [u8; 8] = [0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A];
 
-/// The version that this crate writes.
-const VERSION: (u8, u8) = (1, 0);
+/// The version that this crate reads and writes, 2.0 release candidate 1: 128 + 2, and the number of the candidate.
+const VERSION: (u8, u8) = (130, 1);
 /// Levels of annex A.
 const LEVELS: core::ops::RangeInclusive<u8> = 1..=4;
 /// `header_crc` itself, which it does not cover.
@@ -18,9 +18,9 @@ table! {
     "5.2" "6.2" file_header FileHeader {
         /// the eight bytes 89 47 53 53 0D 0A 1A 0A
         signature: u8[8],
-        /// 1; another major version cannot be read
+        /// 130: a release candidate of version 2.0
         version_major: u8,
-        /// 0; a greater minor version adds only units that can be skipped
+        /// number of the release candidate, 1
         version_minor: u8,
         /// 0 is Intra, 1 is Dynamic
         profile: u8,
@@ -34,7 +34,7 @@ table! {
 /// The tools that a stream uses, annex A.1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Profile {
-    /// 0: intra frames with refinements.
+    /// 0: I frames with refinements.
     Intra,
     /// 1: spatial layers, predicted frames, temporal layers.
     Dynamic,
@@ -109,12 +109,13 @@ impl FileHeader {
         encode(&Self::TABLE, self)
     }
 
-    /// 6.2: signature, check sum, version, profile, level, in this order.
+    /// 6.2: signature, checksum, version, profile, level, in this order.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.well_formed(self.signature == SIGNATURE, "signature", ErrorKind::Signature)?;
-        check.check_sum("header_crc", self.header_crc, self.covered_crc()?)?;
+        check.checksum("header_crc", self.header_crc, self.covered_crc()?)?;
         check.known(self.version_major == VERSION.0, "version_major", self.version_major)?;
+        check.known(self.version_minor == VERSION.1, "version_minor", self.version_minor)?;
         check.known(Profile::from_code(self.profile).is_some(), "profile", self.profile)?;
         check.known(LEVELS.contains(&self.level), "level", self.level)
     }

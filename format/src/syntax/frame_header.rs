@@ -1,6 +1,6 @@
 //! 5.6 frame_header: starts a frame.
 
-use super::{MAX_ID, PlaceInGop, Profile, record_io_in_profile, table};
+use super::{FrameRole, MAX_ID, SequenceParameters, record_io, table};
 use crate::{Limits, Result};
 
 /// `sh_transform_id` of a frame without spherical harmonics of degree 1 and above.
@@ -13,7 +13,7 @@ pub enum FrameType {
     Intra,
     /// P: refers to an earlier frame of the base temporal layer.
     Predicted,
-    /// B: temporal enhancement, refers to an earlier frame of a lower temporal layer.
+    /// B: temporal enhancement, refers to an earlier frame of a lower temporal layer; never bidirectional.
     Enhancement,
 }
 
@@ -48,7 +48,7 @@ impl FrameType {
 }
 
 table! {
-    /// 5.6 — how a frame is coded and how large it is.
+    /// 5.6 — the fixed part of a frame header; the digest of carried lists and the motion of cells may follow.
     "5.6" "6.6" frame_header FrameHeader {
         /// 0 is I, 1 is P, 2 is B
         frame_type: u8,
@@ -56,22 +56,27 @@ table! {
         dc_transform_id: u8,
         /// transform of the higher degrees, 0 to 15; 255 is none
         sh_transform_id: u8,
-        /// zero
-        reserved_zero: u8,
-        /// Gaussians of the whole frame
+        /// bit 0 has_carried_digest, bit 1 has_cells; zero in an I frame
+        frame_flags: u8,
+        /// Gaussians of the whole frame, all refinements
         gaussian_count: u32,
     }
 }
 
-record_io_in_profile!(FrameHeader);
+record_io!(FrameHeader);
 
 impl FrameHeader {
+    /// Bit 0 of `frame_flags`.
+    pub const HAS_CARRIED_DIGEST: u8 = 1;
+    /// Bit 1 of `frame_flags`.
+    pub const HAS_CELLS: u8 = 2;
+
     /// An intra frame; `sh_transform_id` is `None` without spherical harmonics.
     pub fn intra(dc_transform_id: u8, sh_transform_id: Option<u8>, gaussian_count: u32) -> Self {
         Self::new(FrameType::Intra, dc_transform_id, sh_transform_id, gaussian_count)
     }
 
-    /// A frame; `sh_transform_id` is `None` without spherical harmonics.
+    /// A frame without motion; `sh_transform_id` is `None` without spherical harmonics.
     pub fn new(
         frame_type: FrameType,
         dc_transform_id: u8,
@@ -82,7 +87,7 @@ impl FrameHeader {
             frame_type: frame_type.code(),
             dc_transform_id,
             sh_transform_id: sh_transform_id.unwrap_or(NO_TRANSFORM),
-            reserved_zero: 0,
+            frame_flags: 0,
             gaussian_count,
         }
     }
@@ -92,22 +97,14 @@ impl FrameHeader {
         FrameType::from_code(self.frame_type)
     }
 
-    /// 6.6: the type is the one that the structure of the group gives the frame.
-    pub fn validate_place(&self, at: u64, place: &PlaceInGop) -> Result<()> {
-        let (found, expected) = (self.frame_type.into(), place.frame_type.code().into());
-        Self::TABLE.check(at).equal("frame_type", found, expected)
+    /// Whether `carried_digest` follows.
+    pub const fn has_carried_digest(&self) -> bool {
+        self.frame_flags & Self::HAS_CARRIED_DIGEST != 0
     }
 
-    /// 6.6.
-    pub fn validate(&self, at: u64, profile: Profile) -> Result<()> {
-        let check = Self::TABLE.check(at);
-        let known = self.kind().is_some_and(|kind| profile == Profile::Dynamic || kind == FrameType::Intra);
-        check.known(known, "frame_type", self.frame_type)?;
-        check.range("dc_transform_id", self.dc_transform_id, 0, MAX_ID)?;
-        if self.sh_transform_id != NO_TRANSFORM {
-            check.range("sh_transform_id", self.sh_transform_id, 0, MAX_ID)?;
-        }
-        check.reserved_bits("reserved_zero", 0, self.reserved_zero)
+    /// Whether the motion of cells follows.
+    pub const fn has_cells(&self) -> bool {
+        self.frame_flags & Self::HAS_CELLS != 0
     }
 
     /// The transform of the higher degrees, where there is one.
@@ -115,9 +112,33 @@ impl FrameHeader {
         (self.sh_transform_id != NO_TRANSFORM).then_some(self.sh_transform_id)
     }
 
-    /// A.2: the frame is not larger than agreed.
-    pub fn within(&self, at: u64, limits: &Limits) -> Result<()> {
+    /// 6.6: the type is the one that the structure of the GOP gives the frame.
+    pub fn validate_role(&self, at: u64, role: &FrameRole) -> Result<()> {
+        let (found, expected) = (self.frame_type.into(), role.frame_type.code().into());
+        Self::TABLE.check(at).equal("frame_type", found, expected)
+    }
+
+    /// 6.6.
+    pub fn validate(&self, at: u64) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        check.known(self.kind().is_some(), "frame_type", self.frame_type)?;
+        check.range("dc_transform_id", self.dc_transform_id, 0, MAX_ID)?;
+        if self.sh_transform_id != NO_TRANSFORM {
+            check.range("sh_transform_id", self.sh_transform_id, 0, MAX_ID)?;
+        }
+        let reserved = self.frame_flags & !(Self::HAS_CARRIED_DIGEST | Self::HAS_CELLS);
+        check.reserved_bits("frame_flags", 0, reserved)?;
+        if self.kind() == Some(FrameType::Intra) {
+            check.equal("frame_flags", self.frame_flags.into(), 0)?;
+        }
+        Ok(())
+    }
+
+    /// A.2: the frame is not larger than agreed, nor are there more Gaussians in a second.
+    pub fn within(&self, at: u64, sequence: &SequenceParameters, limits: &Limits) -> Result<()> {
         let at = Self::TABLE.check(at).offset("gaussian_count", 0);
-        Limits::check(at, "max_gaussians", self.gaussian_count.into(), limits.max_gaussians.into())
+        Limits::check(at, "max_gaussians", self.gaussian_count.into(), limits.max_gaussians.into())?;
+        let rate = sequence.gaussian_rate(self.gaussian_count);
+        Limits::check(at, "max_gaussian_rate", rate, limits.max_gaussian_rate)
     }
 }

@@ -1,4 +1,4 @@
-//! 5.5 gop_header: a place where decoding can start.
+//! 5.5 gop_header: a point where decoding can start.
 
 use super::{FrameType, MAX_LAYERS, Profile, record_io_in_profile, table};
 use crate::Result;
@@ -10,15 +10,15 @@ const DISPLAY_INDICES: i64 = 1 << 32;
 const ALL_INTRA: u8 = 0;
 /// `gop_structure`: frames are predicted.
 const PREDICTED: u8 = 1;
-/// Frames of a predicted group, at most: each but the first depends on others.
+/// Frames of a predicted GOP, at most: each but the first depends on others.
 const MAX_PREDICTED: u32 = 1024;
 
 table! {
-    /// 5.5 — starts a group of pictures.
+    /// 5.5 — starts a GOP.
     "5.5" "6.5" gop_header GopHeader {
-        /// place of the group in the sequence
+        /// index of the GOP in the sequence
         gop_index: u32,
-        /// frames of the group, 1 or more
+        /// frames of the GOP, 1 or more
         gop_frame_count: u32,
         /// 0 is all intra, 1 is predicted
         gop_structure: u8,
@@ -31,19 +31,19 @@ table! {
 
 record_io_in_profile!(GopHeader);
 
-/// What the structure of a group says about one of its frames.
+/// What the structure of a GOP says about one of its frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PlaceInGop {
+pub struct FrameRole {
     /// Intra, predicted, or temporal enhancement.
     pub frame_type: FrameType,
     /// 0 is the base layer.
     pub temporal_layer: u8,
-    /// The frame it refers to, counted from the first of the group; none for an intra frame.
+    /// The frame it refers to, counted from the first of the GOP; none for an intra frame.
     pub reference: Option<u32>,
 }
 
 impl GopHeader {
-    /// A group of intra frames.
+    /// A GOP of intra frames.
     pub const fn intra(gop_index: u32, gop_frame_count: u32) -> Self {
         Self {
             gop_index,
@@ -54,7 +54,7 @@ impl GopHeader {
         }
     }
 
-    /// A group of an intra frame and predicted ones, with `temporal_depth` layers between anchors.
+    /// A GOP of an intra frame and predicted ones, with `temporal_depth` layers between anchors.
     pub const fn predicted(gop_index: u32, gop_frame_count: u32, temporal_depth: u8) -> Self {
         Self { gop_index, gop_frame_count, gop_structure: PREDICTED, temporal_depth, reserved_zero: [0; 2] }
     }
@@ -64,19 +64,19 @@ impl GopHeader {
         self.gop_structure == PREDICTED
     }
 
-    /// 6.5: type, layer and reference of the frame `place` of the group, counted from 0.
+    /// 6.5: type, layer and reference of frame `index` of the GOP, counted from 0.
     ///
     /// The reference is the nearest earlier frame of a lower temporal layer; in the base layer, of that layer.
-    pub fn place(&self, place: u32) -> PlaceInGop {
-        if !self.is_predicted() || place == 0 {
-            return PlaceInGop { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
+    pub fn role(&self, index: u32) -> FrameRole {
+        if !self.is_predicted() || index == 0 {
+            return FrameRole { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
         }
-        let step_log2 = place.trailing_zeros().min(self.temporal_depth.into());
+        let step_log2 = index.trailing_zeros().min(self.temporal_depth.into());
         let layer = u32::from(self.temporal_depth).saturating_sub(step_log2);
-        PlaceInGop {
+        FrameRole {
             frame_type: if layer == 0 { FrameType::Predicted } else { FrameType::Enhancement },
             temporal_layer: u8::try_from(layer).unwrap_or(u8::MAX),
-            reference: Some(place.saturating_sub(1_u32.wrapping_shl(step_log2))),
+            reference: Some(index.saturating_sub(1_u32.wrapping_shl(step_log2))),
         }
     }
 
@@ -86,13 +86,10 @@ impl GopHeader {
         check.range("gop_frame_count", self.gop_frame_count, 1, u32::MAX)?;
         let structures = if profile == Profile::Intra { ALL_INTRA } else { PREDICTED };
         check.known(self.gop_structure <= structures, "gop_structure", self.gop_structure)?;
-        if profile == Profile::Intra {
-            check.reserved_bits("temporal_depth", 0, self.temporal_depth)?;
-        }
         let deepest = if self.is_predicted() { MAX_LAYERS.saturating_sub(1) } else { 0 };
         check.range("temporal_depth", self.temporal_depth, 0, deepest)?;
-        for (place, value) in self.reserved_zero.into_iter().enumerate() {
-            check.reserved_bits("reserved_zero", place, value)?;
+        for (index, value) in self.reserved_zero.into_iter().enumerate() {
+            check.reserved_bits("reserved_zero", index, value)?;
         }
         let most = if self.is_predicted() { MAX_PREDICTED } else { u32::MAX };
         check.range("gop_frame_count", self.gop_frame_count, 1, most)
@@ -104,7 +101,7 @@ impl GopHeader {
         Self::TABLE.check(at).range("temporal_depth", self.temporal_depth, 0, deepest)
     }
 
-    /// 6.5: the last frame of a group that starts at display index `frame` has a display index too.
+    /// 6.5: the last frame of a GOP that starts at display index `frame` has a display index too.
     pub fn validate_from(&self, at: u64, frame: u32) -> Result<()> {
         let left = DISPLAY_INDICES.saturating_sub(frame.into());
         Self::TABLE.check(at).range("gop_frame_count", self.gop_frame_count, 1, left)

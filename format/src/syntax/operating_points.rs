@@ -26,9 +26,9 @@ table! {
         reserved_zero: u8,
         /// frames that are output
         frame_count: u32,
-        /// Gaussians of the homes that are decoded, over all frames
+        /// exact Gaussians that are output, over all frames
         gaussian_count: u64,
-        /// bytes of the units of its frames and groups
+        /// bytes of the units of its frames and GOPs
         byte_count: u64,
     }
 }

@@ -11,6 +11,7 @@ pub const MAX_LAYERS: u8 = 4;
 /// Bits of `sequence_flags`.
 const CANONICAL_AXES: u8 = 1;
 const ANTIALIASED: u8 = 2;
+const WHOLE_ANCHOR: u8 = 4;
 
 /// 2^-40, the smallest step.
 const MIN_STEP: f32 = f32::from_bits((127 - 40) << 23);
@@ -22,7 +23,7 @@ const MAX_OFFSET: f32 = f32::from_bits((127 + 40) << 23);
 const MIN_OFFSET: f32 = f32::from_bits(1 << 31 | (127 + 40) << 23);
 
 table! {
-    /// 5.4 — layers, refinements, and the lattices of the attributes.
+    /// 5.4 — layers, refinements, and the quantisation grids of the attributes.
     "5.4" "6.4" sequence_parameters SequenceParameters {
         /// degree of the spherical harmonics, 0 to 3
         sh_degree: u8,
@@ -38,7 +39,7 @@ table! {
         position_bits: u8,
         /// log2 of the Gaussians in an entropy block, 6 to 16
         block_log2: u8,
-        /// bit 0 canonical_axes, bit 1 antialiased; the others are zero
+        /// bit 0 canonical_axes, bit 1 antialiased, bit 2 whole_anchor; the others are zero
         sequence_flags: u8,
         /// anisotropy from which the rotation is finer, not increasing; 0 disables
         rotation_threshold: u8[3],
@@ -48,9 +49,9 @@ table! {
         ticks_per_second: u32,
         /// ticks from a frame to the next
         ticks_per_frame: u32,
-        /// position of lattice point 0, scene units
+        /// position of grid point 0, scene units
         position_offset: f32[3],
-        /// distance of lattice points, scene units
+        /// distance of grid points, scene units
         position_step: f32,
         /// natural log of the semi-axis at 0
         log_scale_offset: f32,
@@ -90,13 +91,15 @@ impl SequenceParameters {
         self.validate_percents(at)?;
         check.range("position_bits", self.position_bits, 1, 20)?;
         check.range("block_log2", self.block_log2, 6, 16)?;
-        check.reserved_bits("sequence_flags", 0, self.sequence_flags & !(CANONICAL_AXES | ANTIALIASED))?;
+        let dynamic = if profile == Profile::Intra { 0 } else { WHOLE_ANCHOR };
+        let known = CANONICAL_AXES | ANTIALIASED | dynamic;
+        check.reserved_bits("sequence_flags", 0, self.sequence_flags & !known)?;
         let thresholds = self.rotation_threshold;
-        for (place, (before, this)) in (1..).zip(thresholds.iter().zip(thresholds.iter().skip(1))) {
-            check.range_in("rotation_threshold", place, *this, 0, *before)?;
+        for (index, (before, this)) in (1..).zip(thresholds.iter().zip(thresholds.iter().skip(1))) {
+            check.range_in("rotation_threshold", index, *this, 0, *before)?;
         }
         check.range("ticks_per_second", self.ticks_per_second, 1, u32::MAX)?;
-        self.validate_lattices(at)
+        self.validate_grids(at)
     }
 
     /// Bit 0 of `sequence_flags`: axes are sorted by falling scale.
@@ -109,9 +112,27 @@ impl SequenceParameters {
         self.sequence_flags & ANTIALIASED != 0
     }
 
-    /// `sequence_flags` of these two properties.
-    pub const fn flags(canonical_axes: bool, antialiased: bool) -> u8 {
-        (if canonical_axes { CANONICAL_AXES } else { 0 }) | (if antialiased { ANTIALIASED } else { 0 })
+    /// Bit 2 of `sequence_flags`: predicted frames refer to all refinements of their I frame.
+    pub const fn whole_anchor(&self) -> bool {
+        self.sequence_flags & WHOLE_ANCHOR != 0
+    }
+
+    /// `sequence_flags` of these properties.
+    pub fn flags(canonical_axes: bool, antialiased: bool, whole_anchor: bool) -> u8 {
+        let bits =
+            [(canonical_axes, CANONICAL_AXES), (antialiased, ANTIALIASED), (whole_anchor, WHOLE_ANCHOR)];
+        bits.into_iter().filter(|(set, _)| *set).fold(0, |flags, (_, bit)| flags | bit)
+    }
+
+    /// Gaussians in a second, rounded up, of frames that have `gaussian_count` each; 0 where the rate of frames is
+    /// not stated.
+    pub fn gaussian_rate(&self, gaussian_count: u32) -> u64 {
+        // Below 2^64: no overflow.
+        let ticks = u64::from(gaussian_count).saturating_mul(self.ticks_per_second.into());
+        match u64::from(self.ticks_per_frame) {
+            0 => 0,
+            ticks_per_frame => ticks.div_ceil(ticks_per_frame),
+        }
     }
 
     /// Spherical-harmonics planes of a frame: 0, 9, 24 or 45.
@@ -146,32 +167,32 @@ impl SequenceParameters {
         let element = "refinement_percent";
         let used = usize::from(self.refinement_count);
         let mut min = 1_u8;
-        for (place, percent) in self.refinement_percent.into_iter().enumerate() {
-            if place >= used {
-                check.range_in(element, place, percent, 0, 0)?;
-            } else if place.saturating_add(1) == used {
-                check.range_in(element, place, percent, 100, 100)?;
+        for (index, percent) in self.refinement_percent.into_iter().enumerate() {
+            if index >= used {
+                check.range_in(element, index, percent, 0, 0)?;
+            } else if index.saturating_add(1) == used {
+                check.range_in(element, index, percent, 100, 100)?;
             } else {
                 // 99: the last one in use is 100 and greater than this one.
-                check.range_in(element, place, percent, min, 99)?;
+                check.range_in(element, index, percent, min, 99)?;
                 min = percent.saturating_add(1);
             }
         }
         Ok(())
     }
 
-    fn validate_lattices(&self, at: u64) -> Result<()> {
+    fn validate_grids(&self, at: u64) -> Result<()> {
         const OFFSET: &str = "an offset is finite and between -2^40 and 2^40";
         const STEP: &str = "a step is between 2^-40 and 2^20";
         const ROTATION_STEP: &str = "the rotation step is between 2^-40 and 1";
         let check = Self::TABLE.check(at);
         // A NaN is in no range.
-        let offset = |element, place, value: f32| {
-            check.rule((MIN_OFFSET..=MAX_OFFSET).contains(&value), element, place, OFFSET)
+        let offset = |element, index, value: f32| {
+            check.rule((MIN_OFFSET..=MAX_OFFSET).contains(&value), element, index, OFFSET)
         };
         let step = |element, value: f32| check.rule((MIN_STEP..=MAX_STEP).contains(&value), element, 0, STEP);
-        for (place, value) in self.position_offset().into_iter().enumerate() {
-            offset("position_offset", place, value)?;
+        for (index, value) in self.position_offset().into_iter().enumerate() {
+            offset("position_offset", index, value)?;
         }
         step("position_step", self.position_step())?;
         offset("log_scale_offset", 0, self.log_scale_offset())?;
@@ -183,12 +204,12 @@ impl SequenceParameters {
         step("sh_step", self.sh_step())
     }
 
-    /// The position of lattice point 0, scene units.
+    /// The position of grid point 0, scene units.
     pub fn position_offset(&self) -> [f32; 3] {
         self.position_offset.map(f32::from_bits)
     }
 
-    /// The distance of lattice points, scene units.
+    /// The distance of grid points, scene units.
     pub const fn position_step(&self) -> f32 {
         f32::from_bits(self.position_step)
     }

@@ -23,7 +23,7 @@ table! {
         reserved_zero: u8,
         /// low 16 bits of the CRC-32 of the other 18 bytes
         header_check: u16,
-        /// display index of the frame, or of the first frame of the group
+        /// display index of the frame, or of the first frame of the GOP
         frame: u32,
         /// bytes after this header
         payload_length: u32,
@@ -37,7 +37,7 @@ table! {
 pub enum UnitType {
     /// 1: what holds for the whole sequence.
     SequenceParameters,
-    /// 2: starts a group of pictures; forgets transforms and codebooks.
+    /// 2: starts a GOP; forgets transforms and codebooks.
     GopHeader,
     /// 3: starts a frame.
     FrameHeader,
@@ -45,16 +45,16 @@ pub enum UnitType {
     Transform,
     /// 5: entries of vector-quantised colour.
     Codebook,
-    /// 6: the Gaussians that one refinement adds.
-    Refinement,
-    /// 7: where the groups start.
+    /// 6: what one refinement of one layer changes and adds.
+    Increment,
+    /// 7: where the GOPs start.
     Index,
     /// 8: the last unit.
     End,
-    /// 9: the learned predictor of a group, profile Dynamic.
+    /// 9: the learned predictor of a GOP, profile Dynamic.
     Weights,
-    /// 10: what one refinement of one layer changes and adds, profile Dynamic.
-    Increment,
+    /// 10: what a viewer may want to know about the scene.
+    SceneDescription,
     /// 11: what the operating points cost.
     OperatingPoints,
     /// 0 (forbidden), 12 to 127: later versions.
@@ -72,11 +72,11 @@ impl UnitType {
             3 => Self::FrameHeader,
             4 => Self::Transform,
             5 => Self::Codebook,
-            6 => Self::Refinement,
+            6 => Self::Increment,
             7 => Self::Index,
             8 => Self::End,
             9 => Self::Weights,
-            10 => Self::Increment,
+            10 => Self::SceneDescription,
             11 => Self::OperatingPoints,
             128.. => Self::User(code),
             0 | 12..=127 => Self::Reserved(code),
@@ -91,11 +91,11 @@ impl UnitType {
             Self::FrameHeader => 3,
             Self::Transform => 4,
             Self::Codebook => 5,
-            Self::Refinement => 6,
+            Self::Increment => 6,
             Self::Index => 7,
             Self::End => 8,
             Self::Weights => 9,
-            Self::Increment => 10,
+            Self::SceneDescription => 10,
             Self::OperatingPoints => 11,
             Self::Reserved(code) | Self::User(code) => code,
         }
@@ -109,11 +109,11 @@ impl UnitType {
             Self::FrameHeader => "frame_header",
             Self::Transform => "transform",
             Self::Codebook => "codebook",
-            Self::Refinement => "refinement",
+            Self::Increment => "increment",
             Self::Index => "index",
             Self::End => "end",
             Self::Weights => "weights",
-            Self::Increment => "increment",
+            Self::SceneDescription => "scene_description",
             Self::OperatingPoints => "operating_points",
             Self::Reserved(0) => "forbidden",
             Self::Reserved(_) => "reserved",
@@ -126,39 +126,53 @@ impl UnitType {
         !matches!(self, Self::Reserved(_) | Self::User(_))
     }
 
-    /// Whether a decoder of streams of a profile knows the payload; to profile Intra increments and weights are
-    /// unknown.
-    pub fn is_known_in(self, profile: Profile) -> bool {
-        self.is_known() && !(profile == Profile::Intra && matches!(self, Self::Increment | Self::Weights))
-    }
-
     /// Whether a writer marks the unit critical.
     pub const fn is_critical(self) -> bool {
-        self.is_known() && !matches!(self, Self::Index | Self::OperatingPoints)
+        self.is_known() && !matches!(self, Self::Index | Self::SceneDescription | Self::OperatingPoints)
     }
 
-    /// Whether the unit belongs to one group, so that `frame` has a meaning.
+    /// Whether the unit belongs to one GOP, so that `frame` has a meaning.
     const fn has_frame(self) -> bool {
-        !matches!(self, Self::SequenceParameters | Self::Index | Self::End | Self::OperatingPoints)
+        self.is_critical() && !matches!(self, Self::SequenceParameters | Self::End)
     }
 
     /// Whether the unit carries a refinement.
     pub const fn has_refinement(self) -> bool {
-        matches!(self, Self::Refinement | Self::Increment)
+        matches!(self, Self::Increment)
     }
 
-    /// The highest spatial and temporal layer that a unit of this type may name in a profile.
-    const fn highest_layers(self, profile: Profile) -> (u8, u8) {
+    /// The highest spatial and temporal layer that a unit of this type may name.
+    const fn highest_layers(self) -> (u8, u8) {
         let highest = super::MAX_LAYERS - 1;
-        match (profile, self) {
-            (Profile::Dynamic, Self::FrameHeader | Self::Increment) => (highest, highest),
-            (Profile::Dynamic, Self::Codebook) => (0, highest),
+        match self {
+            Self::Increment => (highest, highest),
+            Self::FrameHeader | Self::Codebook => (0, highest),
             _ => (0, 0),
+        }
+    }
+
+    /// 9: what an error of such a unit costs, apart from errors of its header.
+    pub const fn error_scope(self) -> ErrorScope {
+        match self {
+            Self::Increment => ErrorScope::List,
+            _ if self.is_critical() || !self.is_known() => ErrorScope::Gop,
+            _ => ErrorScope::Unit,
         }
     }
 }
 
-/// A unit's kind and its place on the axes.
+/// What an error of a unit costs, clause 9.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ErrorScope {
+    /// The list that the increment belongs to, in this frame and in those that refer to it.
+    List,
+    /// The unit.
+    Unit,
+    /// The rest of the GOP.
+    Gop,
+}
+
+/// A unit's kind and its position on the axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct UnitId {
     /// The kind of unit.
@@ -169,7 +183,7 @@ pub struct UnitId {
     pub temporal_layer: u8,
     /// 0 is the smallest prefix of the frame.
     pub refinement: u8,
-    /// Display index of the frame, or of the first frame of the group; 0 for units of the whole stream.
+    /// Display index of the frame, or of the first frame of the GOP; 0 for units of the whole stream.
     pub frame: u32,
 }
 
@@ -179,14 +193,14 @@ impl UnitId {
         Self { unit_type, spatial_layer: 0, temporal_layer: 0, refinement: 0, frame: 0 }
     }
 
-    /// A unit of a frame, or of the group that starts with the frame.
+    /// A unit of a frame, or of the GOP that starts with the frame.
     pub const fn of_frame(unit_type: UnitType, frame: u32) -> Self {
         Self { frame, ..Self::stream(unit_type) }
     }
 
-    /// A refinement unit.
-    pub const fn of_refinement(frame: u32, refinement: u8) -> Self {
-        Self { refinement, ..Self::of_frame(UnitType::Refinement, frame) }
+    /// An increment on the base layers.
+    pub const fn of_increment(frame: u32, refinement: u8) -> Self {
+        Self { refinement, ..Self::of_frame(UnitType::Increment, frame) }
     }
 
     /// The same on other layers.
@@ -217,11 +231,11 @@ impl UnitHeader {
             "unit_type",
             header.unit_type,
         )?;
-        header.validate(0, Profile::Dynamic)?;
+        header.validate(0)?;
         Ok(header)
     }
 
-    /// This header before another payload: length and check sums are new, all else stays.
+    /// This header before another payload: length and checksums are new, all else stays.
     pub fn with_payload(&self, payload: &[u8]) -> Result<Self> {
         let payload_crc = crc32fast::hash(payload);
         let header = Self { payload_length: payload_length(payload)?, payload_crc, ..*self };
@@ -229,16 +243,23 @@ impl UnitHeader {
     }
 
     /// Reads and checks the header at the start of `bytes`; gives the bytes after it.
-    pub fn parse(bytes: &[u8], at: u64, profile: Profile) -> Result<(Self, &[u8])> {
+    pub fn parse(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
+        let (header, rest) = Self::delimit(bytes, at)?;
+        header.validate_elements(at)?;
+        Ok((header, rest))
+    }
+
+    /// The same without a check of the elements: the header is intact, so that the end of its unit is known.
+    pub fn delimit(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
         let (header, rest): (Self, _) =
             decode(&Self::TABLE, bytes, at).map_err(crate::unit::cut_is_truncated)?;
-        header.validate(at, profile)?;
+        header.validate_check(at)?;
         Ok((header, rest))
     }
 
     /// The bytes of the header; refused where [`Self::parse`] would refuse them.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        self.validate(0, Profile::Dynamic)?;
+        self.validate(0)?;
         encode(&Self::TABLE, self)
     }
 
@@ -252,7 +273,7 @@ impl UnitHeader {
         self.unit_flags & CRITICAL != 0
     }
 
-    /// The kind of unit and its place on the axes.
+    /// The kind of unit and its position on the axes.
     pub const fn id(&self) -> UnitId {
         UnitId {
             unit_type: self.unit_type(),
@@ -263,23 +284,46 @@ impl UnitHeader {
         }
     }
 
-    /// 6.3. The check sum comes first: behind a wrong one no element can be trusted.
-    pub fn validate(&self, at: u64, profile: Profile) -> Result<()> {
+    /// What an error of the unit costs: of a unit that is not marked as the text requires, the rest of the GOP.
+    pub const fn error_scope(&self) -> ErrorScope {
+        let reserved = self.unit_flags & !CRITICAL != 0 || self.reserved_zero != 0;
+        if reserved { ErrorScope::Gop } else { self.unit_type().error_scope() }
+    }
+
+    /// 6.3.
+    pub fn validate(&self, at: u64) -> Result<()> {
+        self.validate_check(at)?;
+        self.validate_elements(at)
+    }
+
+    /// 6.3: the header is the one that was written.
+    fn validate_check(&self, at: u64) -> Result<()> {
+        let (stored, computed) = (self.header_check.into(), self.covered_check()?.into());
+        Self::TABLE.check(at).checksum("header_check", stored, computed)
+    }
+
+    /// 6.3: the elements of an intact header.
+    pub fn validate_elements(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
-        check.check_sum("header_check", self.header_check.into(), self.covered_check()?.into())?;
         check.well_formed(self.unit_type != 0, "unit_type", ErrorKind::Number { element: "unit_type" })?;
         check.reserved_bits("unit_flags", 0, self.unit_flags & !CRITICAL)?;
         check.reserved_bits("reserved_zero", 0, self.reserved_zero)?;
         let unit_type = self.unit_type();
-        if !unit_type.is_known_in(profile) {
+        if !unit_type.is_known() {
             return check.known(!self.is_critical(), "unit_type", self.unit_type);
         }
         let refinements = if unit_type.has_refinement() { super::MAX_REFINEMENTS } else { 1 };
-        let (spatial, temporal) = unit_type.highest_layers(profile);
+        let (spatial, temporal) = unit_type.highest_layers();
         check.range("spatial_layer", self.spatial_layer, 0, spatial)?;
         check.range("temporal_layer", self.temporal_layer, 0, temporal)?;
         check.range("refinement", self.refinement, 0, refinements.saturating_sub(1))?;
         check.range("frame", self.frame, 0, if unit_type.has_frame() { u32::MAX } else { 0 })
+    }
+
+    /// 6.3: the unit is one of the profile.
+    pub fn validate_profile(&self, at: u64, profile: Profile) -> Result<()> {
+        let known = profile == Profile::Dynamic || self.unit_type() != UnitType::Weights;
+        Self::TABLE.check(at).known(known, "unit_type", self.unit_type)
     }
 
     /// 6.3: the layers are layers of the sequence.
@@ -296,12 +340,12 @@ impl UnitHeader {
         Limits::check(at, "max_payload", self.payload_length.into(), limits.max_payload.into())
     }
 
-    /// 6.3: a payload that is read has the check sum of the header; that of an unknown unit is not read.
-    pub(crate) fn check_payload(&self, at: u64, payload: &[u8], profile: Profile) -> Result<()> {
-        if !self.unit_type().is_known_in(profile) {
+    /// 6.3: a payload that is read has the checksum of the header; that of an unknown unit is not read.
+    pub(crate) fn check_payload(&self, at: u64, payload: &[u8]) -> Result<()> {
+        if !self.unit_type().is_known() {
             return Ok(());
         }
-        Self::TABLE.check(at).check_sum("payload_crc", self.payload_crc, crc32fast::hash(payload))
+        Self::TABLE.check(at).checksum("payload_crc", self.payload_crc, crc32fast::hash(payload))
     }
 
     /// What `header_check` shall be.

@@ -130,8 +130,8 @@ impl NetworkHeader {
         check.range("sh_count", self.sh_count, 0, 16)?;
         check.range("token_shift", self.token_shift, 0, 8)?;
         check.range("output_shift", self.output_shift, 0, 4)?;
-        for (place, shift) in self.layer_shift.into_iter().enumerate() {
-            check.range_in("layer_shift", place, shift, 1, 15)?;
+        for (index, shift) in self.layer_shift.into_iter().enumerate() {
+            check.range_in("layer_shift", index, shift, 1, 15)?;
         }
         // A network without outputs: dc_count is 0 here.
         check.range("sh_count", self.sh_count, u8::from(self.dc_count == 0), 16)

@@ -30,7 +30,7 @@ pub(crate) fn put(bytes: &mut [u8], at: usize, value: impl AsRef<[u8]>) {
 fn class_of(code: &str) -> &'static str {
     match code {
         "TRUNCATED" => "truncated",
-        "SIGNATURE" | "CHECK_SUM" | "SHORT_SECTION" | "TRAILING_BYTES" | "NUMBER" | "PADDING" => "malformed",
+        "SIGNATURE" | "CHECKSUM" | "SHORT_SECTION" | "TRAILING_BYTES" | "NUMBER" | "PADDING" => "malformed",
         "RESERVED_BITS" | "RESERVED" => "unsupported",
         "OVER_LIMIT" => "over-limit",
         _ => "invalid",

@@ -5,11 +5,12 @@
 pub(crate) mod case;
 
 use splatstream_format::payload::{
-    Codebook, Index, Layer, Network, Part, Transform, Weights, write_refinement,
+    CellsBytes, Codebook, Index, Layer, Network, Part, SceneDescription, SectionBytes, Transform, UpAxis,
+    Weights, write_frame, write_increment,
 };
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FrameHeader, GopHeader, IndexEntry, NO_CODEBOOK, NetworkHeader, Profile,
-    RefinementHeader, SequenceParameters, TransformHeader, UnitId, UnitType,
+    Camera, CodebookHeader, EndOfStream, FrameHeader, FrameType, GopHeader, IncrementHeader, IndexEntry,
+    NO_CODEBOOK, NetworkHeader, Profile, SequenceParameters, TransformHeader, UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_format::{Error, Limits, inspect::inspect};
@@ -18,19 +19,21 @@ use splatstream_format::{Error, Limits, inspect::inspect};
 pub(crate) const FILE_HEADER: usize = 16;
 pub(crate) const UNIT_HEADER: usize = 20;
 
-/// Places of the units in [`units`].
+/// Indices of the units in [`units`].
 pub(crate) const SEQUENCE: usize = 0;
-pub(crate) const GOP: usize = 1;
-pub(crate) const DC: usize = 2;
-pub(crate) const SH: usize = 3;
-pub(crate) const CODEBOOK: usize = 4;
-pub(crate) const FRAME: usize = 5;
-pub(crate) const REFINEMENT: usize = 6;
-pub(crate) const INDEX: usize = 7;
-pub(crate) const END: usize = 8;
+pub(crate) const SCENE: usize = 1;
+pub(crate) const GOP: usize = 2;
+pub(crate) const DC: usize = 3;
+pub(crate) const SH: usize = 4;
+pub(crate) const CODEBOOK: usize = 5;
+pub(crate) const FRAME: usize = 6;
+pub(crate) const INCREMENT: usize = 7;
+pub(crate) const INDEX: usize = 8;
+pub(crate) const END: usize = 9;
 
-/// The place of the weights in [`dynamic_units`].
+/// Indices of the units in [`dynamic_units`].
 pub(crate) const WEIGHTS: usize = 2;
+pub(crate) const P_FRAME: usize = 3;
 
 pub(crate) type Units = Vec<(UnitId, Vec<u8>)>;
 
@@ -43,7 +46,7 @@ pub(crate) fn sequence() -> SequenceParameters {
         refinement_percent: [20, 50, 100, 0, 0, 0, 0, 0, 0, 0],
         position_bits: 16,
         block_log2: 6,
-        sequence_flags: SequenceParameters::flags(true, false),
+        sequence_flags: SequenceParameters::flags(true, false, false),
         rotation_threshold: [30, 20, 10],
         frame_count: 1,
         ticks_per_second: 30,
@@ -60,22 +63,43 @@ pub(crate) fn sequence() -> SequenceParameters {
     }
 }
 
-pub(crate) fn refinement_header() -> RefinementHeader {
-    RefinementHeader {
+/// Every element of an increment of profile Intra.
+pub(crate) fn increment_header() -> IncrementHeader {
+    IncrementHeader {
         refinement_digest: 0x0123_4567_89AB_CDEF,
-        gaussian_count: 100,
+        new_count: 100,
         position_shift: 2,
-        lanes_log2: 3,
+        attribute_shift: [1, 2, 3, 4, 7],
         sh_mode: 2,
         vq_stage_count: 1,
         codebook_ids: [7, NO_CODEBOOK, NO_CODEBOOK, NO_CODEBOOK],
+        compensation_log_scale: -1,
+        compensation_opacity: 1,
+        ..IncrementHeader::PLAIN
+    }
+    .with_flags()
+}
+
+pub(crate) fn scene() -> SceneDescription {
+    SceneDescription {
+        up_axis: UpAxis::MinusY,
+        metres_per_unit: Some(0.5),
+        background: Some([0.0, 0.5, 1.0]),
+        bounds: Some([[-1.0, 0.0, 0.0], [1.0, 0.0, 2.0]]),
+        title: Some("Kö".into()),
+        cameras: vec![Camera {
+            position: [1.0, 2.0, 3.0],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            vertical_field_of_view: 1.0,
+        }],
+        ..SceneDescription::default()
     }
 }
 
 fn transform(transform_id: u8, transform_kind: u8, dimension: u8, rank: u8) -> Vec<u8> {
     let header = TransformHeader { transform_id, transform_kind, dimension, rank };
-    let mean = (0..i32::from(dimension)).map(|place| place * 1000 - 1).collect();
-    let basis = (0..i16::from(rank) * i16::from(dimension)).map(|place| place * 7 - 4096).collect();
+    let mean = (0..i32::from(dimension)).map(|index| index * 1000 - 1).collect();
+    let basis = (0..i16::from(rank) * i16::from(dimension)).map(|index| index * 7 - 4096).collect();
     Transform { header, mean, basis }.to_bytes(&sequence()).unwrap()
 }
 
@@ -85,23 +109,25 @@ pub(crate) fn units() -> Units {
         header: CodebookHeader { codebook_id: 7, component_count: 2, entry_count_minus1: 1, value_bytes: 1 },
         entries: vec![-128, 127, 0, 5],
     };
-    let blocks: [&[u8]; 2] = [&[1, 2, 3, 4], &[5, 6, 7, 8, 9]];
-    let refinement = write_refinement(&refinement_header(), &sequence(), &[10, 11, 12], &blocks).unwrap();
-    let sequence = sequence().to_bytes().unwrap();
-    // The GOP header stands behind the file header and the sequence parameters.
-    let offset = u64::try_from(FILE_HEADER + UNIT_HEADER + sequence.len()).unwrap();
-    let entries = vec![IndexEntry { frame: 0, reserved_zero: 0, offset }];
+    let section = SectionBytes {
+        lanes_log2: 3,
+        model: vec![10, 11, 12],
+        blocks: vec![vec![1, 2, 3, 4], vec![5, 6, 7, 8, 9]],
+    };
+    let increment = write_increment(&increment_header(), &sequence(), &[section]).unwrap();
     let mut units = vec![
-        (UnitId::stream(UnitType::SequenceParameters), sequence),
+        (UnitId::stream(UnitType::SequenceParameters), sequence().to_bytes().unwrap()),
+        (UnitId::stream(UnitType::SceneDescription), scene().to_bytes().unwrap()),
         (UnitId::of_frame(UnitType::GopHeader, 0), GopHeader::intra(0, 1).to_bytes().unwrap()),
         (UnitId::of_frame(UnitType::Transform, 0), transform(3, 0, 3, 3)),
         (UnitId::of_frame(UnitType::Transform, 0), transform(4, 1, 9, 2)),
         (UnitId::of_frame(UnitType::Codebook, 0), codebook.to_bytes().unwrap()),
         (UnitId::of_frame(UnitType::FrameHeader, 0), FrameHeader::intra(3, Some(4), 500).to_bytes().unwrap()),
-        (UnitId::of_refinement(0, 0), refinement),
-        (UnitId::stream(UnitType::Index), Index { entries }.to_bytes().unwrap()),
+        (UnitId::of_increment(0, 0), increment),
     ];
-    let end = EndOfStream { frame_count: 1, unit_count: 8, index_offset: unit_at(&units, INDEX) };
+    let entries = vec![IndexEntry { frame: 0, reserved_zero: 0, offset: unit_at(&units, GOP) }];
+    units.push((UnitId::stream(UnitType::Index), Index { entries }.to_bytes().unwrap()));
+    let end = EndOfStream { frame_count: 1, unit_count: 9, index_offset: unit_at(&units, INDEX) };
     units.push((UnitId::stream(UnitType::End), end.to_bytes().unwrap()));
     units
 }
@@ -131,25 +157,30 @@ pub(crate) fn network() -> Network {
     Network::new(header, layers).unwrap()
 }
 
-/// The units of a stream of profile Dynamic with a network and no frames.
+/// The units of a stream of profile Dynamic: a network, and a P frame of which cells move.
 pub(crate) fn dynamic_units() -> Units {
     let weights = Weights::Carried(Box::new(network())).to_bytes().unwrap();
-    let end = EndOfStream { frame_count: 0, unit_count: 3, index_offset: 0 };
+    let section = SectionBytes { lanes_log2: 0, model: vec![1, 2], blocks: vec![vec![9]] };
+    let cells = CellsBytes { cell_count: 5, cell_log2: 16, section };
+    let header = FrameHeader::new(FrameType::Predicted, 3, None, 7);
+    let frame = write_frame(&header, Some(0xFEDC), Some(&cells), &sequence()).unwrap();
+    let end = EndOfStream { frame_count: 1, unit_count: 4, index_offset: 0 };
     vec![
         (UnitId::stream(UnitType::SequenceParameters), sequence().to_bytes().unwrap()),
-        (UnitId::of_frame(UnitType::GopHeader, 0), GopHeader::intra(0, 1).to_bytes().unwrap()),
+        (UnitId::of_frame(UnitType::GopHeader, 0), GopHeader::predicted(0, 2, 0).to_bytes().unwrap()),
         (UnitId::of_frame(UnitType::Weights, 0), weights),
+        (UnitId::of_frame(UnitType::FrameHeader, 1), frame),
         (UnitId::stream(UnitType::End), end.to_bytes().unwrap()),
     ]
 }
 
 /// Offset of a unit in the stream of [`stream`].
-pub(crate) fn unit_at(units: &Units, place: usize) -> u64 {
-    let before = units.iter().take(place).map(|(_, payload)| UNIT_HEADER + payload.len());
+pub(crate) fn unit_at(units: &Units, index: usize) -> u64 {
+    let before = units.iter().take(index).map(|(_, payload)| UNIT_HEADER + payload.len());
     u64::try_from(FILE_HEADER + before.sum::<usize>()).unwrap()
 }
 
-/// The stream of profile Intra of these units, with check sums that fit.
+/// The stream of profile Intra of these units, with checksums that fit.
 pub(crate) fn stream(units: &Units) -> Vec<u8> {
     stream_of(Profile::Intra, units)
 }
@@ -163,7 +194,7 @@ pub(crate) fn stream_of(profile: Profile, units: &Units) -> Vec<u8> {
     bytes
 }
 
-/// Makes the check sum of the unit header at `at` fit again.
+/// Makes the checksum of the unit header at `at` fit again.
 pub(crate) fn seal_unit_header(bytes: &mut [u8], at: usize) {
     let mut crc = crc32fast::Hasher::new();
     crc.update(&bytes[at..at + 6]);
@@ -172,7 +203,7 @@ pub(crate) fn seal_unit_header(bytes: &mut [u8], at: usize) {
     bytes[at + 6..at + 8].copy_from_slice(&check[..2]);
 }
 
-/// Makes the check sum of the file header fit again.
+/// Makes the checksum of the file header fit again.
 pub(crate) fn seal_file_header(bytes: &mut [u8]) {
     let crc = crc32fast::hash(&bytes[..12]);
     bytes[12..16].copy_from_slice(&crc.to_le_bytes());

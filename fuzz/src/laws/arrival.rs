@@ -1,104 +1,60 @@
-//! A stream that arrives in pieces gives what the whole one gives, and each frame as soon as its units are there.
-//!
-//! A decoder takes units, not bytes: here is what a client does that reads from a network.
+//! A stream that arrives in pieces: each frame comes as soon as its units are there, and what is there has no error of
+//! its own.
 
-use super::Decoded;
-use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
-use splatstream_format::syntax::UnitType;
-use splatstream_format::unit::{Delivery, Stream};
-use splatstream_format::{Class, Error, Result};
+use super::{Decoded, PLAIN, STRICT};
+use splatstream_decoder::process::Decoder;
+use splatstream_format::syntax::{FileHeader, UnitHeader};
+use splatstream_format::unit::{Stream, Unit};
+use splatstream_format::{Class, Error};
 
-/// Decodes `bytes` as they arrive: up to each of `ends` in turn, then all.
-pub fn holds(bytes: &[u8], options: &Options, ends: &[usize]) {
-    let mut client = Client::new(options);
-    let whole = Decoded::of(bytes, options);
-    for &end in ends {
-        let arrived = &bytes[..end];
-        client.receive(arrived, false);
-        let prefix = Decoded::of(arrived, options);
-        let there = &client.decoded.frames;
-        assert!(prefix.frames.starts_with(there), "a client shows what is not there");
-        assert!(there.len() + 1 >= prefix.frames.len(), "a client keeps frames back");
-        let is_cut = prefix.end.is_some_and(|error| error.class() == Class::Truncated);
-        assert!(is_cut || client.has_ended || prefix.end == whole.end, "a part has an error of its own");
+/// More pieces add time, not depth.
+const MAX_PIECES: u32 = 3;
+
+/// `whole` is what the whole stream decodes to; `choice` chooses the pieces.
+pub fn holds(bytes: &[u8], whole: &Decoded, choice: u32) {
+    let frames_after = frames_after(bytes);
+    for piece in 0..=choice % MAX_PIECES {
+        // The fractional part of multiples of the golden ratio: spread over the stream, others for each choice.
+        let share = choice.wrapping_add(piece).wrapping_mul(0x9e37_79b9);
+        let end = ((u64::from(share) * (bytes.len() as u64 + 1)) >> 32) as usize;
+        let there = Decoded::of(&bytes[..end], &STRICT);
+        let is_cut = there.errors.first().is_some_and(is_truncation);
+        assert!(is_cut || there.errors.first() == whole.errors.first(), "a part has an error of its own");
+        let expected = frames_after.iter().take_while(|(unit_end, _)| *unit_end <= end).last();
+        let expected = expected.map_or(0, |(_, frames)| *frames);
+        assert!(there.frames == whole.frames[..expected], "{end} bytes give other frames");
     }
-    client.receive(bytes, true);
-    assert_eq!(client.decoded, whole, "pieces give something else");
 }
 
-/// What has arrived of a stream, and what it gave.
-struct Client<'a> {
-    options: &'a Options,
-    decoder: Option<Decoder<'a>>,
-    /// Offset of the next unit; of the end unit, once that is there.
-    at: u64,
-    has_ended: bool,
-    decoded: Decoded,
+/// Whether an error is that the stream ends too soon.
+pub(super) fn is_truncation(error: &Error) -> bool {
+    error.class() == Class::Truncated
 }
 
-impl<'a> Client<'a> {
-    fn new(options: &'a Options) -> Self {
-        let decoded = Decoded { sequence: None, frames: Vec::new(), end: None };
-        Self { options, decoder: None, at: 0, has_ended: false, decoded }
-    }
+/// The units from the first on whose ends are known.
+fn units(bytes: &[u8]) -> impl Iterator<Item = Unit<'_>> {
+    let units = Stream::open(bytes, &PLAIN.limits).map(|stream| stream.units());
+    units.into_iter().flat_map(|mut units| std::iter::from_fn(move || units.next_unit()?.ok()))
+}
 
-    /// Takes the units that have arrived; `is_all` says that nothing more will.
-    fn receive(&mut self, arrived: &'a [u8], is_all: bool) {
-        while self.decoded.end.is_none() && !self.has_ended {
-            match self.step(arrived) {
-                // Of a unit that is not all there nothing was taken: it is tried again with more bytes.
-                Err(error) if error.class() == Class::Truncated && !is_all => return,
-                Err(error) => self.give_up(error),
-                Ok(()) => {}
-            }
-        }
-        if self.has_ended && is_all && self.decoded.end.is_none() {
-            self.decoded.end = self.after_the_end(arrived).err();
-        }
-    }
+/// Where the file header and each of these units ends.
+pub(crate) fn ends(bytes: &[u8]) -> impl Iterator<Item = usize> {
+    let of_units = units(bytes).map(|unit| unit.at as usize + UnitHeader::SIZE + unit.payload.len());
+    core::iter::once(FileHeader::SIZE).chain(of_units)
+}
 
-    /// The next unit.
-    fn step(&mut self, arrived: &'a [u8]) -> Result<()> {
-        let stream = Stream::open(arrived, &self.options.limits)?;
-        if self.decoder.is_none() {
-            self.at = stream.units().position();
-        }
-        let decoder = self.decoder.get_or_insert_with(|| Decoder::new(stream.header(), *self.options));
-        let mut units = stream.units_from(self.at);
-        let Some(delivery) = units.next_unit() else { return Ok(()) };
-        let frame = match delivery? {
-            Delivery::Intact(unit) => {
-                self.has_ended = unit.header.unit_type() == UnitType::End;
-                decoder.unit(&unit)?
-            }
-            Delivery::Damaged(damaged) => decoder.damaged(&damaged).map(|()| None)?,
-        };
-        if !self.has_ended {
-            self.at = units.position();
-        }
-        self.show(frame);
-        Ok(())
-    }
-
-    /// The stream ends with this error, behind what was there of the frame that was arriving.
-    fn give_up(&mut self, error: Error) {
-        let cut = self.decoder.as_mut().map_or(Ok(None), Decoder::cut);
-        self.decoded.end = Some(cut.as_ref().err().copied().unwrap_or(error));
-        self.show(cut.ok().flatten());
-    }
-
-    fn show(&mut self, frame: Option<DecodedFrame>) {
-        let Some(decoder) = &self.decoder else { return };
-        if let (Some(sequence), Some(frame)) = (decoder.sequence(), frame) {
-            self.decoded.sequence = Some(*sequence);
-            self.decoded.frames.push(frame);
+/// The end of each unit up to the first error, and the frames that have come out then.
+fn frames_after(bytes: &[u8]) -> Vec<(usize, usize)> {
+    let Ok(stream) = Stream::open(bytes, &PLAIN.limits) else { return Vec::new() };
+    let mut decoder = Decoder::new(stream.header(), STRICT);
+    let mut frames = 0;
+    let mut after = Vec::new();
+    for (unit, end) in units(bytes).zip(ends(bytes).skip(1)) {
+        frames += usize::from(decoder.unit(&unit).is_some());
+        after.push((end, frames));
+        if decoder.has_stopped() {
+            break;
         }
     }
-
-    /// Nothing follows the end unit.
-    fn after_the_end(&self, arrived: &'a [u8]) -> Result<()> {
-        let mut units = Stream::open(arrived, &self.options.limits)?.units_from(self.at);
-        units.next_unit().transpose()?;
-        units.next_unit().transpose().map(|_| ())
-    }
+    after
 }

@@ -3,7 +3,6 @@
 use crate::laws::Decoded;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::operating_point::OperatingPoint;
-use splatstream_format::Error;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -22,6 +21,12 @@ pub(super) struct Request<'a> {
     pub(super) subset: bool,
 }
 
+impl core::fmt::Debug for Answer {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(&self.verdict)
+    }
+}
+
 impl core::fmt::Debug for Request<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "at {} in mode {}", self.point, self.mode())
@@ -36,26 +41,31 @@ impl Request<'_> {
 
 /// What it answers.
 pub(super) struct Answer {
-    /// Exit code and code of the error; 0 and nothing of a stream that is accepted.
-    pub(super) verdict: (i32, Option<String>),
+    /// Offset of the first error; none of a stream that is accepted.
+    pub(super) error_at: Option<u64>,
+    /// Its class and code, to be shown.
+    verdict: String,
+    /// Ranges of display indices of frames that never came out.
+    pub(super) lost: Vec<[u32; 2]>,
     /// The planes shown, by name of file.
     pub(super) planes: BTreeMap<String, Vec<u8>>,
 }
 
 impl Answer {
-    /// What the decoder answers that gave these frames, and found this error first.
-    pub(super) fn of(error: Option<Error>, decoded: Decoded) -> Self {
-        let verdict = error.map_or((0, None), |error| {
-            (error.class().exit_code().into(), Some(error.kind.code().to_owned()))
-        });
+    /// What the decoder answers that gave this.
+    pub(super) fn of(decoded: Decoded) -> Self {
+        let error = decoded.errors.first();
+        let error_at = error.map(|error| error.at);
+        let verdict = error.map_or_else(|| "accepted".to_owned(), ToString::to_string);
+        let lost = decoded.lost.iter().map(|range| [*range.start(), *range.end()]).collect();
         let has_sh = decoded.sequence.is_some_and(|sequence| sequence.sh_degree > 0);
         let files = decoded.frames.into_iter().flat_map(|frame| {
-            let number = frame.number;
+            let number = frame.index;
             let attributes = attributes(&frame.into_shown()).into_iter();
             let there = attributes.filter(move |(attribute, _)| *attribute != "sh" || has_sh);
             there.map(move |(attribute, bytes)| (format!("f{number:04}.{attribute}.i32"), bytes))
         });
-        Self { verdict, planes: files.collect() }
+        Self { error_at, verdict, lost, planes: files.collect() }
     }
 }
 
@@ -105,16 +115,24 @@ impl Oracle {
         writeln!(self.requests, "{}\t{op}\t{mode}\t{}", stream.display(), out.display()).expect("it listens");
         let mut line = String::new();
         self.answers.read_line(&mut line).expect("it answers in text");
-        Answer { verdict: verdict(&line), planes: planes(&out) }
+        Answer { planes: planes(&out), ..diagnosed(&line) }
     }
 }
 
 /// `exit-code`, or `exit-code TAB JSON`.
-fn verdict(line: &str) -> (i32, Option<String>) {
+fn diagnosed(line: &str) -> Answer {
     let (exit_code, diagnosis) = line.trim_end().split_once('\t').unwrap_or((line.trim_end(), "{}"));
-    let exit_code = exit_code.parse().unwrap_or_else(|_| panic!("the independent decoder gave up: '{line}'"));
+    assert!(exit_code.parse::<u8>().is_ok(), "the independent decoder gave up: '{line}'");
     let diagnosis: serde_json::Value = serde_json::from_str(diagnosis).expect("a diagnosis is JSON");
-    (exit_code, diagnosis["code"].as_str().map(str::to_owned))
+    let lost = diagnosis["lost"].as_array().into_iter().flatten();
+    let range = |range: &serde_json::Value| [0, 1].map(|end| range[end].as_u64().unwrap_or(0) as u32);
+    let error_at = diagnosis["byte"].as_u64();
+    Answer {
+        error_at,
+        verdict: diagnosis.to_string(),
+        lost: lost.map(range).collect(),
+        planes: BTreeMap::new(),
+    }
 }
 
 /// The planes in a folder, which is empty after.

@@ -1,9 +1,12 @@
 //! Streams of the encoder, as small as it makes them.
 
 use crate::{contexts, learned};
-use splatstream_encoder::{PredictorChoice, Preset, Quality, Settings, ShChoice, Steps, Structure, encode};
+use splatstream_encoder::{
+    Anchor, PredictorChoice, Preset, Quality, Settings, ShChoice, Steps, Structure, encode,
+};
 use splatstream_format::Limits;
-use splatstream_format::payload::{Refinement, Transform};
+use splatstream_format::entropy::layout::Section;
+use splatstream_format::payload::{Increment, Transform};
 use splatstream_format::syntax::{Profile, SequenceParameters, ShMode, UnitType};
 use splatstream_format::unit::Stream;
 use splatstream_scene::builtin::{BuiltinScene, Tracking};
@@ -43,15 +46,16 @@ fn intra() -> Vec<(String, Vec<u8>)> {
 fn dynamic() -> Vec<(String, Vec<u8>)> {
     let (structure, predictor_choice) = (Structure::Predicted { layers: 2 }, PredictorChoice::Difference);
     let predicted = Settings { refinements: vec![30, 100], structure, predictor_choice, ..fast() };
+    let layers = Settings { spatial_layers: 2, keep_invisible: true, ..predicted.clone() };
     let settings = [
-        ("predicted", 0, 5, Settings { gop: 4, ..predicted.clone() }),
-        ("layers", 1, 2, Settings { spatial_layers: 2, keep_invisible: true, ..predicted }),
+        ("predicted", 0, 5, Settings { gop: 4, ..predicted }),
+        ("layers", 1, 2, layers.clone()),
+        ("anchors", 0, 4, Settings { anchor: Anchor::Whole, gop: 2, ..layers }),
         ("residual-vectors", 2, 3, Settings { structure, ..with_sh(2, ShChoice::VectorQuantised) }),
     ];
-    let encoded =
-        settings.map(|(name, sh, frames, settings)| (name.to_owned(), stream(sh, frames, &settings)));
-    let made = [("learned".to_owned(), learned::stream())];
-    encoded.into_iter().chain(made).collect()
+    let encoded = settings.map(|(name, sh, frames, settings)| (name, stream(sh, frames, &settings)));
+    let made = [("learned", learned::stream())];
+    encoded.into_iter().chain(made).map(|(name, bytes)| (name.to_owned(), bytes)).collect()
 }
 
 fn stream(sh_degree: u8, frames: u32, settings: &Settings) -> Vec<u8> {
@@ -74,7 +78,7 @@ fn one_refinement() -> SequenceParameters {
         refinement_percent,
         position_bits: 10,
         block_log2: 6,
-        sequence_flags: SequenceParameters::flags(true, false),
+        sequence_flags: SequenceParameters::flags(true, false, false),
         rotation_threshold: [20, 10, 5],
         frame_count: 1,
         ticks_per_second: 30,
@@ -91,28 +95,28 @@ fn one_refinement() -> SequenceParameters {
     }
 }
 
-/// Model sections of the first units of streams of profile Intra, behind what says which planes they are for.
+/// Models of the first increments of streams of profile Intra, after what says which planes they are for.
 pub(crate) fn model_sections() -> Vec<Vec<u8>> {
     intra().iter().map(|(_, bytes)| model_section(bytes)).collect()
 }
 
 fn model_section(bytes: &[u8]) -> Vec<u8> {
-    let limits = Limits::default();
+    let (limits, profile) = (Limits::default(), Profile::Intra);
     let units: Vec<_> = Stream::open(bytes, &limits).unwrap().units().map(Result::unwrap).collect();
     let of_type = |unit_type| units.iter().filter(move |unit| unit.header.unit_type() == unit_type);
     let first = of_type(UnitType::SequenceParameters).next().unwrap();
-    let sequence =
-        SequenceParameters::parse_payload(first.payload, first.payload_at, Profile::Intra).unwrap();
+    let sequence = SequenceParameters::parse_payload(first.payload, first.payload_at, profile).unwrap();
     let ranks: Vec<u8> = of_type(UnitType::Transform)
         .map(|unit| Transform::parse(unit.payload, unit.payload_at, &sequence).unwrap().header.rank)
         .collect();
-    let unit = of_type(UnitType::Refinement).next().unwrap();
-    let refinement = Refinement::parse(unit.payload, unit.payload_at, &sequence, &limits).unwrap();
-    let header = &refinement.header;
-    // As `splatstream_fuzz::payload` takes them apart.
+    let unit = of_type(UnitType::Increment).next().unwrap();
+    let increment = Increment::parse(unit.payload, unit.payload_at, &sequence, profile, &limits).unwrap();
+    let header = &increment.header;
+    // As `splatstream_fuzz::records` takes them apart.
     let sh = match header.sh().mode() {
         Some(ShMode::VectorQuantised) => header.vq_stage_count + 2,
         _ => ranks.get(1).map_or(0, |rank| rank - 1),
     };
-    [&[ranks[0] - 1, header.sh_mode, sh], refinement.model].concat()
+    let model = increment.section(Section::New).unwrap().model;
+    [&[ranks[0] - 1, header.sh_mode, sh], model].concat()
 }

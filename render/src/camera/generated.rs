@@ -23,6 +23,10 @@ pub enum Up {
     MinusZ,
     /// Along z.
     PlusZ,
+    /// Against x.
+    MinusX,
+    /// Along x.
+    PlusX,
 }
 
 impl Up {
@@ -33,6 +37,8 @@ impl Up {
             Self::PlusY => [Vec3::X, Vec3::Y, Vec3::Z],
             Self::MinusZ => [Vec3::X, Vec3::NEG_Z, Vec3::Y],
             Self::PlusZ => [Vec3::X, Vec3::Z, Vec3::NEG_Y],
+            Self::MinusX => [Vec3::Y, Vec3::NEG_X, Vec3::Z],
+            Self::PlusX => [Vec3::Y, Vec3::X, Vec3::NEG_Z],
         }
     }
 }

@@ -6,18 +6,13 @@ use proptest::prelude::*;
 use splatstream_render::camera::{Up, forward, read_cameras, ring, spiral};
 use splatstream_render::{Camera, render};
 
-const UPS: [Up; 4] = [Up::MinusY, Up::PlusY, Up::MinusZ, Up::PlusZ];
+const UPS: [Up; 6] = [Up::MinusY, Up::PlusY, Up::MinusZ, Up::PlusZ, Up::MinusX, Up::PlusX];
 
 /// Where a camera sees a point, pixels, and how far ahead.
 fn seen(camera: &Camera, point: Vec3) -> [f32; 3] {
     let offset = point - Vec3::from(camera.position);
     let [x, y, z] = camera.rotation.map(|axis| Vec3::from(axis).dot(offset));
     [camera.focal[0] * x / z + camera.principal[0], camera.focal[1] * y / z + camera.principal[1], z]
-}
-
-/// Vertical angle of view, radians.
-fn field(camera: &Camera) -> f32 {
-    2.0 * (0.5 * camera.height as f32 / camera.focal[1]).atan()
 }
 
 fn point() -> impl Strategy<Value = Vec3> {
@@ -33,9 +28,21 @@ proptest! {
         let camera = Camera::look_at("c".to_owned(), position, target, down, angle, [64, 48]);
         let [x, y, z] = seen(&camera, target);
         prop_assert!((x - 32.0).abs() < 0.01 && (y - 24.0).abs() < 0.01 && z > 0.0, "{} {} {}", x, y, z);
-        prop_assert!((field(&camera) - angle).abs() < 1e-5);
+        prop_assert!((camera.vertical_field() - angle).abs() < 1e-5);
         let rows = camera.rotation.map(Vec3::from);
         prop_assert!((rows[0].cross(rows[1]) - rows[2]).length() < 1e-5, "not a rotation");
+    }
+
+    #[test]
+    fn a_pose_is_the_camera_again(position in point(), target in point(), down in point(), angle in 0.2_f32..2.0) {
+        prop_assume!((target - position).length() > 0.5);
+        let camera = Camera::look_at("c".to_owned(), position, target, down, angle, [64, 48]);
+        let rotation = camera.quaternion();
+        prop_assert!((rotation.iter().map(|part| part * part).sum::<f32>() - 1.0).abs() < 1e-5);
+        let again =
+            Camera::of_pose("c".to_owned(), camera.position, rotation, camera.vertical_field(), [64, 48]);
+        let [one, other] = [&camera, &again].map(|camera| seen(camera, target));
+        prop_assert!(one.iter().zip(other).all(|(one, other)| (one - other).abs() < 0.01), "{:?} {:?}", one, other);
     }
 
     #[test]
@@ -54,7 +61,7 @@ proptest! {
         let camera = Camera::look_at("c".to_owned(), Vec3::splat(20.0), Vec3::ZERO, Vec3::Y, 0.9, [960, 540]);
         let scaled = camera.scaled_to_height(height);
         prop_assert_eq!(scaled.height, height);
-        prop_assert!((field(&scaled) - 0.9).abs() < 1e-5);
+        prop_assert!((scaled.vertical_field() - 0.9).abs() < 1e-5);
         let ([x, y, _], [u, v, _]) = (seen(&camera, point), seen(&scaled, point));
         prop_assert!((x / 960.0 - u / scaled.width as f32).abs() < 1e-5);
         prop_assert!((y / 540.0 - v / height as f32).abs() < 1e-5);
@@ -79,7 +86,8 @@ fn cameras_that_are_made_see_the_middle_of_the_scene() {
 #[test]
 fn cameras_of_a_ring_stand_above_and_upright() {
     let frame = frame(&[BALL, Gaussian { position: [1.0, 1.0, 4.0], ..BALL }]);
-    for (up, axis) in UPS.into_iter().zip([Vec3::NEG_Y, Vec3::Y, Vec3::NEG_Z, Vec3::Z]) {
+    for (up, axis) in UPS.into_iter().zip([Vec3::NEG_Y, Vec3::Y, Vec3::NEG_Z, Vec3::Z, Vec3::NEG_X, Vec3::X])
+    {
         for camera in ring(&frame, up, 5, 90) {
             assert!(Vec3::from(camera.rotation[1]).dot(axis) < -0.8, "down in the picture is not up");
             assert!(Vec3::from(camera.rotation[0]).dot(axis).abs() < 1e-6, "the horizon is not level");

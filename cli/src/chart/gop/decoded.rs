@@ -28,7 +28,7 @@ pub(super) struct ShownFrame {
     pub(super) frame_type: FrameType,
     /// Bytes of its units, and of what the GOP defines for it.
     pub(super) bytes: u64,
-    /// Gaussians received, without those carried over.
+    /// Gaussians received, without those that are carried.
     pub(super) gaussians: u64,
     /// Figures of each camera.
     views: Vec<Comparison>,
@@ -52,7 +52,7 @@ impl Shown {
         self.frames.iter().map(|frame| frame.gaussians).sum()
     }
 
-    /// The intra frame: no operating point holds all its layers and nothing else, but a client may stop behind it.
+    /// The intra frame: no operating point holds all its layers and nothing else, but a client may stop after it.
     pub(super) fn intra_alone(self) -> Self {
         Self { frames: self.frames.into_iter().filter(ShownFrame::is_intra).collect() }
     }
@@ -98,24 +98,24 @@ pub(super) fn shown(stream: &[u8], point: OperatingPoint, judge: &mut Judge<'_>)
     let mut frames = Vec::new();
     let options = Options { operating_point: point, ..Options::default() };
     let summary = decode_stream(stream, &options, |sequence, frame| {
-        let (number, frame_type) = (frame.number, frame.frame_type);
-        let gaussians = (frame.planes.len() - frame.carried) as u64;
-        // What is carried over has a digest of its own, and the same Gaussians may be compensated or not.
+        let (number, frame_type) = (frame.index, frame.frame_type);
+        let (gaussians, carried) = ((frame.planes.len() - frame.carried) as u64, frame.carried);
         let mut key = sequence.to_bytes().unwrap_or_default();
-        key.extend(frame.carried_digest.unwrap_or_default().to_le_bytes());
-        key.push(u8::from(frame.compensation.applies.is_empty()));
+        key.extend(format!("{:?}", frame.compensation.exact).bytes());
         let key = (key, number, frame.digest.unwrap_or_default());
-        let views = judge.views_of(key, &to_gaussians(frame.into_shown(), sequence));
+        let shown = to_gaussians(frame.into_shown(), sequence);
+        // Digests know nothing of carried Gaussians.
+        let views = if carried > 0 { judge.views(number, &shown) } else { judge.views_of(key, &shown) };
         let bytes = sizes.get(&number).copied().unwrap_or_default();
         frames.push(ShownFrame { number, frame_type, bytes, gaussians, views });
         ControlFlow::Continue(())
     });
-    summary.end.map_or(Ok(()), |error| Err(fault(error)))?;
+    summary.verdict().map_or(Ok(()), |error| Err(fault(error)))?;
     frames.sort_by_key(|frame| frame.number);
     Ok(Shown { frames })
 }
 
-/// Bytes of each frame at an operating point, headers included. What the GOP defines counts to the frame behind it.
+/// Bytes of each frame at an operating point, headers included. What the GOP defines counts to the frame after it.
 fn sizes(stream: &[u8], point: OperatingPoint) -> Result<BTreeMap<u32, u64>, Failure> {
     let limits = Limits::default();
     let part = extract(stream, point, &limits).map_err(fault)?;

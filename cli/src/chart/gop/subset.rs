@@ -15,7 +15,7 @@ use splatstream_render::metrics::Comparison;
 use splatstream_scene::GaussianFrame;
 use std::ops::ControlFlow;
 
-/// The frames behind the first, each by itself.
+/// The frames after the first, each by itself.
 #[derive(Debug, Clone)]
 pub(crate) struct Subset {
     /// Bytes of these frames coded so, up to the level.
@@ -46,10 +46,10 @@ fn subset(stream: &[u8], info: OperatingPointInfo, judge: &Judge<'_>) -> Result<
     let options = Options { operating_point: info.point, ..Options::default() };
     let summary = decode_stream(stream, &options, |sequence, frame| {
         // The stream lacks the first frame of the sequence.
-        let number = frame.number + 1;
+        let number = frame.index + 1;
         views.extend(judge.views(number, &to_gaussians(frame.into_shown(), sequence)));
         ControlFlow::Continue(())
     });
-    summary.end.map_or(Ok(()), |error| Err(fault(error)))?;
+    summary.verdict().map_or(Ok(()), |error| Err(fault(error)))?;
     Ok(Subset { bytes: info.bytes, gaussians: info.gaussians, figures: mean(views.into_iter())? })
 }

@@ -24,7 +24,7 @@ pub(crate) struct ToolRow {
 }
 
 impl ToolRow {
-    /// Bytes a Gaussian of predicted frames.
+    /// Bytes per Gaussian of predicted frames.
     pub(crate) fn bytes_per_gaussian(&self) -> f64 {
         self.bytes as f64 / self.gaussians.max(1) as f64
     }

@@ -34,7 +34,7 @@ const TERMS: [(&str, &str); 18] = [
         "unit",
         "a piece of the stream that can be sent or left out by itself. I0 is the intra-coded first frame, r0 its first refinement.",
     ),
-    ("GOP", "group of pictures: frames that share tables; decoding can start at each group."),
+    ("GOP", "group of pictures: frames that share tables; decoding can start at each."),
     ("preset", "how much the encoder searches: fast, balanced, small."),
     ("baseline", "the variant that all others are compared with."),
     ("without …", "the baseline with one tool left out: what the tool is worth."),

@@ -1,4 +1,4 @@
-//! The first group of a sequence, with predicted frames: the two tables of the paper, and what tools are worth.
+//! The first GOP of a sequence, with predicted frames: the two tables of the paper, and what tools are worth.
 
 use super::tables::{METRIC_HEADINGS, metric_cells, mode_cells};
 use super::words::{Heading, figure, how_to_read, made_by, signed, size, table};
@@ -11,11 +11,11 @@ use maud::{Markup, html};
 /// All three tables.
 pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
     html! {
-        h3 { "Operating points of the first group" }
+        h3 { "Operating points of the first GOP" }
         (how_to_read(
             "each row is a way to play the stream: a client starts with the first spatial layer of the intra frame (I0), \
              completes that frame, then adds predicted frames (P, B), first at half the frame rate, then all of them \
-             at ever more refinements; the bandwidth is 8 × the size over the duration of the group."
+             at ever more refinements; the bandwidth is 8 × the size over the duration of the GOP."
         ))
         (modes(chart, gop))
         (made_by(command))
@@ -30,7 +30,7 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
         (made_by(command))
         h3 { "What the tools of predicted frames are worth" }
         (how_to_read(
-            "each row codes the same group with one tool left out or another choice of predictors; sizes and metrics \
+            "each row codes the same GOP with one tool left out or another choice of predictors; sizes and metrics \
              are of predicted frames, everything decoded."
         ))
         (tools(chart, gop))
@@ -38,8 +38,8 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
         @if !gop.ablation.is_empty() {
             h3 { "What predictors of new Gaussians are worth" }
             (how_to_read(
-                "each row codes the same group with another choice of predictors: one for every new Gaussian, or what \
-                 saves bits (auto); below, the network with one of its parts changed or left out, trained anew. Bits of \
+                "each row codes the same GOP with another choice of predictors: one for every new Gaussian, or what \
+                 saves bits (auto); below, the network with one of its parts changed or left out, trained again. Bits of \
                  dc and sh are per new Gaussian, the intra frame included; the network itself is counted apart."
             ))
             (ablation(chart, gop))

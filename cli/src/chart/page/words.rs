@@ -13,7 +13,7 @@ pub(super) fn how_to_read(sentence: &str) -> Markup {
     html! { p.read { strong { "How to read: " } (sentence) } }
 }
 
-/// The command behind a figure or a table.
+/// The command that makes a figure or a table.
 pub(super) fn made_by(command: &str) -> Markup {
     html! { p.made { "made by " code { @for word in command.split(' ') { span { (word) } " " } } } }
 }
@@ -76,7 +76,7 @@ pub(super) fn size(bytes: u64) -> String {
     }
 }
 
-/// Gaussians a second.
+/// Gaussians per second.
 pub(super) fn speed(speed: f64) -> String {
     match speed {
         0.0..1e6 => format!("{:.0} k/s", speed / 1e3),

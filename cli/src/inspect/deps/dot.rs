@@ -1,19 +1,19 @@
 //! Dependencies in the language of Graphviz: an arrow goes from a unit to one that it needs.
 
-use super::{Dependencies, FrameRow, GroupRow};
+use super::{Dependencies, FrameRow, GopRow};
 
-/// The graph; a group is a box with a box for each frame.
+/// The graph; a GOP is a box with a box for each frame.
 pub(super) fn graph(dependencies: &Dependencies) -> String {
     let mut text = String::from("digraph splatstream {\n  rankdir = RL;\n  node [shape = box];\n");
-    dependencies.groups.iter().for_each(|row| text += &group(row));
+    dependencies.gops.iter().for_each(|row| text += &gop(row));
     text += "}\n";
     text
 }
 
-fn group(row: &GroupRow) -> String {
-    let number = row.group;
+fn gop(row: &GopRow) -> String {
+    let number = row.gop;
     let mut text =
-        format!("  subgraph cluster_group_{number} {{\n    label = \"group {number}, unit {}\";\n", row.unit);
+        format!("  subgraph cluster_gop_{number} {{\n    label = \"GOP {number}, unit {}\";\n", row.unit);
     for tool in &row.tools {
         text += &format!(
             "    u{} [label = \"{}, t{}\\nunit {}\", shape = ellipse];\n",
@@ -46,9 +46,9 @@ fn frame(row: &FrameRow) -> String {
 fn edges(row: &FrameRow) -> String {
     let edge = |from: usize, to: usize| format!("  u{from} -> u{to};\n");
     let mut text: String = row.transforms.iter().map(|&unit| edge(row.unit, unit)).collect();
-    for (place, unit) in row.units.iter().enumerate() {
+    for (index, unit) in row.units.iter().enumerate() {
         // The header of the frame is needed by all of its units; the others need the first.
-        if place == 0 {
+        if index == 0 {
             text += &edge(unit.unit, row.unit);
         }
         text.extend(unit.needs.iter().filter_map(|need| Some(edge(unit.unit, need.unit?))));

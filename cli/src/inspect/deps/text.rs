@@ -1,32 +1,35 @@
 //! Dependencies as an indented list.
 
-use super::{Dependencies, FrameRow, GroupRow, Need, ToolRow, UnitRow};
+use super::{Dependencies, FrameRow, GopRow, Need, ToolRow, UnitRow};
 use crate::numbers::grouped;
 
-/// Every group with its frames and units.
+/// Every GOP with its frames and units.
 pub(super) fn list(dependencies: &Dependencies) -> String {
-    let mut text: String = dependencies.groups.iter().map(group).collect();
+    let mut text: String = dependencies.gops.iter().map(gop).collect();
     if let Some(error) = &dependencies.error {
         text += &format!("the first error is at {error}\n");
     }
     text
 }
 
-fn group(row: &GroupRow) -> String {
+fn gop(row: &GopRow) -> String {
     let structure = match (row.predicted, row.temporal_depth) {
         (false, _) => "every frame by itself".to_owned(),
         (true, depth) => format!("predicted, temporal depth {depth}"),
     };
     let last = row.first_frame.saturating_add(row.frame_count.saturating_sub(1));
     let mut text = format!(
-        "group {}  unit {} at {:#x}: frames {}..={last}, {structure}\n",
-        row.group, row.unit, row.at, row.first_frame
+        "GOP {}  unit {} at {:#x}: frames {}..={last}, {structure}\n",
+        row.gop, row.unit, row.at, row.first_frame
     );
-    for (place, of_place) in row.frames.iter().enumerate() {
-        row.tools.iter().filter(|tool| tool.frames_before == place).for_each(|it| text += &tool(it));
-        text += &frame(of_place);
+    let mut tools = row.tools.iter().peekable();
+    for (before, of_frame) in row.frames.iter().enumerate() {
+        while let Some(it) = tools.next_if(|tool| tool.frames_before == before) {
+            text += &tool(it);
+        }
+        text += &frame(of_frame);
     }
-    row.tools.iter().filter(|tool| tool.frames_before == row.frames.len()).for_each(|it| text += &tool(it));
+    tools.for_each(|it| text += &tool(it));
     text
 }
 
@@ -42,8 +45,9 @@ fn frame(row: &FrameRow) -> String {
         (Some(number), _) => format!("refers to frame {number}"),
         (None, _) => "refers to no frame".to_owned(),
     };
+    let damaged = if row.damaged { "  damaged" } else { "" };
     let mut text = format!(
-        "  frame {}  {}  t{}  unit {}  {reference}\n",
+        "  frame {}  {}  t{}  unit {}  {reference}{damaged}\n",
         row.frame, row.kind, row.temporal_layer, row.unit
     );
     row.units.iter().for_each(|it| text += &unit(row.frame, it));
@@ -63,10 +67,10 @@ fn unit(frame: u32, row: &UnitRow) -> String {
 /// A unit that is needed; the frame is named if it is another one.
 fn need(frame: u32, row: &Need) -> String {
     let (layer, refinement) = (row.spatial_layer, row.refinement);
-    let place = match row.unit {
+    let unit = match row.unit {
         Some(unit) => format!("unit {unit}"),
         None => "absent".to_owned(),
     };
     let other = if row.frame == frame { String::new() } else { format!("frame {} ", row.frame) };
-    format!("{other}s{layer},r{refinement} ({place})")
+    format!("{other}s{layer},r{refinement} ({unit})")
 }

@@ -1,4 +1,4 @@
-//! A report as JUnit XML: what continuous integration shows. A suite an area, a test a case.
+//! A report as JUnit XML for continuous integration: a test suite for each area, a test for each case.
 
 use super::Report;
 use super::summary::explanation;
@@ -46,7 +46,7 @@ fn test(case: &CaseResult) -> TestCase {
     test
 }
 
-/// A crash and a timeout are errors in the words of JUnit: the test could not be finished.
+/// A crash or a timeout is an error in terms of JUnit: the test could not be finished.
 fn failed(case: &CaseResult) -> TestCaseStatus {
     let broke_off = matches!(case.outcome, Outcome::Crash | Outcome::Timeout);
     let kind = if broke_off { NonSuccessKind::Error } else { NonSuccessKind::Failure };

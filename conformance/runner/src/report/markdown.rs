@@ -1,8 +1,9 @@
-//! A report as Markdown: what a project puts beside its decoder.
+//! A report as Markdown, to be published with a decoder.
 
+use super::causes::{Cause, causes};
 use super::summary::{contrast, counted, explanation};
 use super::{Report, Tally};
-use crate::result::{CaseResult, Outcome};
+use crate::result::Outcome;
 
 /// The page.
 pub fn page(report: &Report) -> String {
@@ -41,8 +42,8 @@ fn failures(report: &Report) -> String {
     if report.failures() > 0 {
         text += "\n## Failures\n\n";
     }
-    for case in report.cases.iter().filter(|case| case.outcome.is_failure()) {
-        text += &entry(case);
+    for cause in causes(report.cases.iter()) {
+        text += &entry(&cause);
     }
     if !report.stale.is_empty() {
         text += "\n## Stale expectations\n\n";
@@ -53,9 +54,10 @@ fn failures(report: &Report) -> String {
     text
 }
 
-fn entry(case: &CaseResult) -> String {
+fn entry(cause: &Cause<'_>) -> String {
+    let case = cause.first;
     let mut text = format!("- `{}`: {}{}\n", case.case_name(), case.label(), contrast(case));
-    for line in explanation(case) {
+    for line in explanation(case).into_iter().chain(cause.others()) {
         text += &format!("  - {line}\n");
     }
     text

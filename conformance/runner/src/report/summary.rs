@@ -1,22 +1,25 @@
-//! A report for people, as text.
+//! A report as text for people.
 
 use super::Report;
+use super::causes::{Cause, causes};
+use crate::SourceUnit;
 use crate::difference::Difference;
 use crate::result::{CaseResult, Outcome};
 use std::fmt::Write;
 
-/// Failures that are told in full; the report has all of them.
+/// Causes and warnings that are printed; the report has all of them.
 const SHOWN: usize = 20;
 
 /// The text.
 pub fn text(report: &Report) -> String {
     let mut text = String::new();
-    let failures: Vec<&CaseResult> = report.cases.iter().filter(|case| case.outcome.is_failure()).collect();
-    for case in failures.iter().take(SHOWN) {
-        text += &told(case);
+    let causes = causes(report.cases.iter());
+    for cause in causes.iter().take(SHOWN) {
+        text += &described(cause);
     }
-    if let Some(more @ 1..) = failures.len().checked_sub(SHOWN) {
-        text += &format!("... and {}; --report FILE has all of them\n", counted(more, "more failure"));
+    if let Some(more @ 1..) = causes.len().checked_sub(SHOWN) {
+        text +=
+            &format!("... and failures of {}; --report FILE has all of them\n", counted(more, "other cause"));
     }
     for entry in &report.stale {
         text += &format!("STALE expectation, {entry}\n");
@@ -29,7 +32,7 @@ pub fn text(report: &Report) -> String {
         .collect();
     text += &warnings.iter().take(SHOWN).map(String::as_str).collect::<String>();
     if let Some(more @ 1..) = warnings.len().checked_sub(SHOWN) {
-        text += &format!("... and {}; --strict makes failures of them\n", counted(more, "more warning"));
+        text += &format!("... and {}; with --strict they are failures\n", counted(more, "more warning"));
     }
     if !text.is_empty() {
         text.push('\n');
@@ -37,16 +40,17 @@ pub fn text(report: &Report) -> String {
     text + &last_line(report)
 }
 
-/// The lines about a failed case.
-fn told(case: &CaseResult) -> String {
+/// The lines about the failures of one cause.
+fn described(cause: &Cause<'_>) -> String {
+    let case = cause.first;
     let mut text = format!("FAIL {}: {}{}\n", case.case_name(), case.label(), contrast(case));
-    for line in explanation(case) {
+    for line in explanation(case).into_iter().chain(cause.others()) {
         text += &format!("  {line}\n");
     }
     text
 }
 
-/// What was expected and what was answered, where that is the fault.
+/// What was expected and what was found, if the verdict is wrong.
 pub(super) fn contrast(case: &CaseResult) -> String {
     match &case.answer {
         Some(answer) if *answer != case.expected => format!("; expected {}, found {answer}", case.expected),
@@ -54,7 +58,7 @@ pub(super) fn contrast(case: &CaseResult) -> String {
     }
 }
 
-/// What is wrong with a case, line by line.
+/// What is wrong with a case, in lines.
 pub(super) fn explanation(case: &CaseResult) -> Vec<String> {
     let difference = case.difference.as_ref().map(difference).unwrap_or_default();
     let symptom = case.symptom.map(|symptom| format!("looks like: {}", symptom.words()));
@@ -64,33 +68,28 @@ pub(super) fn explanation(case: &CaseResult) -> Vec<String> {
 fn difference(difference: &Difference) -> Vec<String> {
     let Difference { frame, frame_type, attribute, gaussians, .. } = difference;
     let kind = frame_type.as_ref().map_or_else(String::new, |kind| format!(" ({kind})"));
-    let mut place = format!("first in the order of coding: frame {frame}{kind}, {attribute}");
+    let mut first = format!("first in coding order: frame {frame}{kind}, {attribute}");
     if let Some(value) = difference.value {
         let _infallible = write!(
-            place,
+            first,
             ", Gaussian {} of {gaussians}, component {}: expected {}, found {} ({} wrong here)",
             value.gaussian, value.component, value.expected, value.found, value.differing
         );
     } else if let Some(bytes) = difference.bytes_found {
-        let _infallible = write!(place, ": {bytes} bytes are not those of {gaussians} Gaussians");
+        let _infallible = write!(first, ": {bytes} bytes is not the size of {gaussians} Gaussians");
     }
-    let carrier = difference.carrier.as_ref().map(|carrier| {
+    let unit = difference.unit.as_ref().map(|source| {
+        let SourceUnit { unit, unit_type, byte, bytes, frame, spatial_layer, refinement } = source;
         format!(
-            "carried by unit {} ({}, {} bytes at byte {}; frame {}, spatial layer {}, refinement {})",
-            carrier.unit,
-            carrier.unit_type,
-            carrier.bytes,
-            carrier.byte,
-            carrier.frame,
-            carrier.spatial_layer,
-            carrier.refinement
+            "decoded from unit {unit} ({unit_type}, {bytes} bytes at byte {byte}; frame {frame}, spatial layer \
+            {spatial_layer}, refinement {refinement})"
         )
     });
     let read = (!difference.read.is_empty()).then(|| format!("read {}", difference.read.join(", ")));
-    std::iter::once(place).chain(carrier).chain(read).collect()
+    std::iter::once(first).chain(unit).chain(read).collect()
 }
 
-/// How many, and the verdict.
+/// The verdict and the counts.
 fn last_line(report: &Report) -> String {
     let counts: Vec<String> = Outcome::ALL
         .into_iter()
@@ -101,7 +100,7 @@ fn last_line(report: &Report) -> String {
     let is_whole = report.all.run == report.all.claimed && report.suite.changed.is_none();
     let verdict = match (report.is_good(), report.count(Outcome::Pass)) {
         (true, _) if is_whole => "good",
-        (true, _) => "good as far as it was run",
+        (true, _) => "good, but only a part was run",
         (false, 0) => "NOT GOOD: no case passed",
         (false, _) => "NOT GOOD",
     };
@@ -109,7 +108,7 @@ fn last_line(report: &Report) -> String {
     format!("{}: {verdict}; {cases} of {vectors}: {}\n", report.decoder.name, counts.join(", "))
 }
 
-/// A number of things.
+/// A number with its noun.
 pub fn counted(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }

@@ -1,4 +1,4 @@
-//! How many cases there are of something in the whole suite, and what became of them.
+//! Counts of cases of the whole suite and of their results.
 
 use crate::capabilities::Capabilities;
 use crate::case::Case;
@@ -8,11 +8,11 @@ use crate::vector::Kind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Cases by what became of them.
+/// Counts of cases.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tally {
-    /// In the suite, whichever were selected.
+    /// In the suite, selected or not.
     pub cases: u64,
     /// Among these, claimed by the decoder.
     pub claimed: u64,
@@ -27,7 +27,7 @@ pub struct Tally {
 pub(super) struct Tallies {
     /// All cases.
     pub(super) all: Tally,
-    /// Those that are not of valid vectors.
+    /// Those of other vectors than valid ones.
     pub(super) broken: Tally,
     /// Those of valid vectors by the features of their streams, and under `profile N` by profile.
     pub(super) features: BTreeMap<String, Tally>,
@@ -57,7 +57,7 @@ impl Tallies {
 }
 
 impl Tally {
-    /// Counts a case; `outcome` is none of one that was not run.
+    /// Counts a case; `outcome` is none for one that was not run.
     fn add(&mut self, is_claimed: bool, outcome: Option<Outcome>) {
         self.cases += 1;
         self.claimed += u64::from(is_claimed);

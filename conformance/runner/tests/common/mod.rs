@@ -1,9 +1,10 @@
-//! A suite of made-up vectors, and decoders of one line of shell. The runner does not look into streams, so that these
-//! need not be any.
+//! A made-up suite, and decoders that are one line of shell. The streams need not be valid, since the runner does not parse
+//! them.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
+use splatstream_conformance::cancel::Cancel;
 use splatstream_conformance::capabilities::Capabilities;
 use splatstream_conformance::case::Case;
 use splatstream_conformance::command::Template;
@@ -11,14 +12,13 @@ use splatstream_conformance::limits::Limits;
 use splatstream_conformance::result::CaseResult;
 use splatstream_conformance::run::{Settings, run};
 use splatstream_conformance::session::Decoder;
-use splatstream_conformance::stop::Stop;
 use splatstream_conformance::suite::Suite;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// What a right decoder writes into each file of the one frame, in shell.
+/// Shell commands that write the right files of the one frame.
 pub(crate) const WRITE: &str =
     "for a in position log_scale opacity rotation dc; do printf abcd > $4/f0000.$a.i32; done";
 
@@ -26,7 +26,7 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A folder of vectors, in one of their own.
+/// A folder of vectors in a temporary folder.
 pub(crate) struct Vectors {
     around: TempDir,
     folder: PathBuf,
@@ -50,7 +50,7 @@ impl Vectors {
             record.as_object_mut().unwrap().remove("states");
         });
         vectors.add("either", "big", json!({"outcome": "accept"}), |record| {
-            record["acceptable"] = json!([{"outcome": "reject", "class": "over-limit", "code": "OVER_LIMIT", "why": "memory"}]);
+            record["acceptable"] = json!([{"class": "over-limit", "code": "OVER_LIMIT"}]);
         });
         vectors
     }
@@ -77,7 +77,7 @@ impl Vectors {
         &self.folder
     }
 
-    /// Makes these vectors a whole suite, version 9.
+    /// Adds VERSION and MANIFEST: version 9 of a suite.
     pub(crate) fn seal(&self) {
         let suite = self.suite();
         fs::write(self.around.path().join("VERSION"), "9\n1.0\n").unwrap();
@@ -99,7 +99,7 @@ pub(crate) fn settings(script: &str) -> Settings {
         limits: Limits { time: Duration::from_secs(10), ..Limits::default() },
         strict: false,
         jobs: 2,
-        stop: Stop::default(),
+        cancel: Cancel::default(),
     }
 }
 
@@ -108,7 +108,7 @@ pub(crate) fn results(suite: &Suite, settings: &Settings) -> Vec<CaseResult> {
     run(&Case::all(suite), settings, |_| {}).unwrap()
 }
 
-/// What the cases good, bad and big are called for a decoder.
+/// The verdicts of the cases good, bad and big for a decoder.
 pub(crate) fn labels(script: &str) -> [&'static str; 3] {
     let vectors = Vectors::new();
     let results = results(&vectors.suite(), &settings(script));

@@ -1,11 +1,11 @@
-//! Clause 7.17.6: from neighbours to what the network sees, and from its outputs to colour.
+//! Clause 7.7.6: from neighbours to what the network sees, and from its outputs to colour.
 
 use super::projection::{COLOURS_MAX, Colour, Components, Projection};
 use super::rows::Rows;
 use super::{Attributes, RUN, at, set_row};
 use crate::frame::QuantizedFrame;
-use crate::home::canonical;
 use crate::increment::residual::Stage;
+use crate::list::canonical;
 use crate::neighbours::Neighbour;
 use crate::predictor::{NEIGHBOURS_MAX, WeightedMean};
 use crate::transformer::batch::Seen;
@@ -24,22 +24,22 @@ pub struct Learned<'s> {
 /// A new Gaussian that the network predicts.
 #[derive(Debug, Clone, Copy)]
 pub struct Target<'n> {
-    /// Its place among the new Gaussians.
+    /// Its index among the new Gaussians.
     pub row: u32,
     /// Its position.
     pub(super) position: [u32; 3],
     /// Its neighbours in the reference set.
     pub(super) neighbours: &'n [Neighbour],
     /// Their rows.
-    pub(super) places: &'n [u32],
+    pub(super) indices: &'n [u32],
     /// What they weigh in the base.
     pub(super) weights: [i64; NEIGHBOURS_MAX],
-    /// What they weigh for dc, 7.17.4; 0 if the network is not gated.
+    /// What they weigh for dc, 7.7.4; 0 if the network is not gated.
     pub(super) affinities: [i64; NEIGHBOURS_MAX],
 }
 
 impl Learned<'_> {
-    /// Puts the colours that the network predicts in the place of what `attributes` holds for the targets. Their
+    /// Overwrites the colours of the targets in `attributes` with those that the network predicts. Their
     /// log-scales, opacities and rotations have been reconstructed.
     pub fn predict(&self, targets: &[Target<'_>], attributes: &mut Attributes) {
         let components = self.components(targets);
@@ -77,8 +77,8 @@ impl Learned<'_> {
     /// The components of every row that is a neighbour of a target; of the others 0.
     fn components(&self, targets: &[Target<'_>]) -> Vec<Components> {
         let mut used = vec![false; self.rows.len()];
-        for &place in targets.iter().flat_map(|target| target.places) {
-            if let Some(used) = used.get_mut(place as usize) {
+        for &index in targets.iter().flat_map(|target| target.indices) {
+            if let Some(used) = used.get_mut(index as usize) {
                 *used = true;
             }
         }
@@ -98,7 +98,7 @@ impl Learned<'_> {
         let weighted = WeightedMean::new(&target.weights);
         for (stage, out) in [(Stage::Dc, dc), (Stage::Sh, sh)] {
             let columns = self.rows.columns(stage);
-            let rows = target.places.iter().filter_map(|&place| self.rows.row(place).get(columns.clone()));
+            let rows = target.indices.iter().filter_map(|&index| self.rows.row(index).get(columns.clone()));
             weighted.of_rows(rows, out);
         }
         base
@@ -122,11 +122,11 @@ impl Learned<'_> {
             let own = self.projection.components(base);
             let farthest = target.neighbours.last().map_or(0, |neighbour| neighbour.distance);
             let geometry = geometry_of(attributes, target.row);
-            let neighbours = target.neighbours.iter().zip(target.places).zip(target.affinities);
-            for (rank, ((neighbour, &place), affinity)) in neighbours.enumerate() {
-                let mut apart = components.get(place as usize).copied().unwrap_or_default();
+            let neighbours = target.neighbours.iter().zip(target.indices).zip(target.affinities);
+            for (rank, ((neighbour, &index), affinity)) in neighbours.enumerate() {
+                let mut apart = components.get(index as usize).copied().unwrap_or_default();
                 apart.iter_mut().zip(&own).for_each(|(apart, own)| *apart = apart.wrapping_sub(*own));
-                let mut theirs = self.rows.row(place).iter();
+                let mut theirs = self.rows.row(index).iter();
                 let geometry = geometry.map(|own| theirs.next().map_or(0, |theirs| theirs.wrapping_sub(own)));
                 let seen = Seen { components: &apart, geometry, affinity, distance: neighbour.distance };
                 batch.set_token(header, (lane, rank), &seen, farthest);
@@ -137,7 +137,7 @@ impl Learned<'_> {
         batch
     }
 
-    /// Neighbours' positions less the target's, in lattice steps.
+    /// Neighbours' positions less the target's, in grid steps.
     fn offsets(&self, target: &Target<'_>) -> [[i32; 3]; NEIGHBOURS_MAX] {
         let mut offsets = [[0; 3]; NEIGHBOURS_MAX];
         for (offset, neighbour) in offsets.iter_mut().zip(target.neighbours) {

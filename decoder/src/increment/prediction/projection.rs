@@ -111,8 +111,8 @@ mod tests {
 
     fn transform(rank: u8, dimension: u8, mut weights: impl Iterator<Item = i16>) -> Transform {
         let header = TransformHeader { transform_id: 0, transform_kind: 0, dimension, rank };
-        let places = usize::from(rank) * usize::from(dimension);
-        let basis = (0..places).map(|_| weights.next().unwrap_or(0)).collect();
+        let weight_count = usize::from(rank) * usize::from(dimension);
+        let basis = (0..weight_count).map(|_| weights.next().unwrap_or(0)).collect();
         Transform { header, mean: vec![0; dimension.into()], basis }
     }
 

@@ -19,7 +19,7 @@ pub(super) struct Rows {
     width: usize,
     values: Vec<i32>,
     /// The row of each neighbour.
-    places: Vec<u32>,
+    indices: Vec<u32>,
 }
 
 impl Rows {
@@ -31,34 +31,35 @@ impl Rows {
                 *used = true;
             }
         }
-        let indices: Vec<u32> = (0..).zip(&used).filter(|(_, used)| **used).map(|(index, _)| index).collect();
+        let used_indices: Vec<u32> =
+            (0..).zip(&used).filter(|(_, used)| **used).map(|(index, _)| index).collect();
         let mut row_of = vec![0; set.len()];
-        for (row, &index) in (0..).zip(&indices) {
+        for (row, &index) in (0..).zip(&used_indices) {
             if let Some(slot) = row_of.get_mut(index as usize) {
                 *slot = row;
             }
         }
-        let places = neighbours.iter().map(|neighbour| at(&row_of, neighbour.index)).collect();
+        let indices = neighbours.iter().map(|neighbour| at(&row_of, neighbour.index)).collect();
         let width = BEFORE_SH.wrapping_add(set.sh.len());
-        let mut values = vec![0; indices.len().wrapping_mul(width)];
-        let runs = values.par_chunks_mut(width.wrapping_mul(RUN)).zip(indices.par_chunks(RUN));
+        let mut values = vec![0; used_indices.len().wrapping_mul(width)];
+        let runs = values.par_chunks_mut(width.wrapping_mul(RUN)).zip(used_indices.par_chunks(RUN));
         runs.for_each(|(values, indices)| {
             for (column, plane) in set.signed_planes().enumerate() {
                 let slots = values.iter_mut().skip(column).step_by(width);
                 slots.zip(indices).for_each(|(slot, &index)| *slot = at(plane, index));
             }
         });
-        Self { width, values, places }
+        Self { width, values, indices }
     }
 
     /// The attributes of all neighbours in `range`.
     pub(super) fn of(&self, range: Range<usize>) -> impl Iterator<Item = &[i32]> + Clone {
-        self.places.get(range).unwrap_or_default().iter().map(|&place| self.row(place))
+        self.indices.get(range).unwrap_or_default().iter().map(|&index| self.row(index))
     }
 
     /// The number of the row of each neighbour in `range`.
-    pub(super) fn places(&self, range: Range<usize>) -> &[u32] {
-        self.places.get(range).unwrap_or_default()
+    pub(super) fn indices(&self, range: Range<usize>) -> &[u32] {
+        self.indices.get(range).unwrap_or_default()
     }
 
     /// Rows.
@@ -67,8 +68,8 @@ impl Rows {
     }
 
     /// A row.
-    pub(super) fn row(&self, place: u32) -> &[i32] {
-        let start = (place as usize).wrapping_mul(self.width);
+    pub(super) fn row(&self, index: u32) -> &[i32] {
+        let start = (index as usize).wrapping_mul(self.width);
         self.values.get(start..start.wrapping_add(self.width)).unwrap_or_default()
     }
 

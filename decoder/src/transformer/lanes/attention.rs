@@ -44,15 +44,15 @@ impl<P: Products> OneBatch<'_, P> {
     /// The rows of `h`, each with its share, Q8.
     #[inline(always)]
     fn mix(&self, h: &[Lane], shares: &[Lane], out: &mut [Lane]) {
-        // Neighbours two by two: pairs of values of one row become pairs of values of one place.
+        // Neighbours two by two: pairs of values of one row become pairs of values of one index.
         let width = out.len().max(1);
         let mut both = [ZERO; RANKS / 2];
         pairs(shares, &mut both, |share| share);
-        for (place, out) in out.iter_mut().enumerate() {
+        for (index, out) in out.iter_mut().enumerate() {
             let (mut first, mut second) = (ZERO, ZERO);
             for (shares, rows) in both.iter().zip(h.chunks(width.wrapping_mul(2))) {
-                let a = rows.get(place).unwrap_or(&ZERO);
-                let b = rows.get(width.wrapping_add(place)).unwrap_or(&ZERO);
+                let a = rows.get(index).unwrap_or(&ZERO);
+                let b = rows.get(width.wrapping_add(index)).unwrap_or(&ZERO);
                 let (mut of_first, mut of_second) = (ZERO, ZERO);
                 for ((of_first, of_second), (&a, &b)) in
                     of_first.iter_mut().zip(&mut of_second).zip(a.iter().zip(b))
@@ -75,8 +75,8 @@ impl<P: Products> OneBatch<'_, P> {
         let from = from.iter().chain([&[0; LANES]; 3]);
         for ((table, near), from) in self.network.bias.iter().zip(self.batch.near(neighbour)).zip(from) {
             for ((sum, &near), &from) in sum.iter_mut().zip(near).zip(from) {
-                let place = i32::from(near).wrapping_sub(from.into()).wrapping_add(DIFFERENCE_MAX) & 511;
-                *sum = sum.wrapping_add(table.get(place as usize).copied().unwrap_or(0));
+                let index = i32::from(near).wrapping_sub(from.into()).wrapping_add(DIFFERENCE_MAX) & 511;
+                *sum = sum.wrapping_add(table.get(index as usize).copied().unwrap_or(0));
             }
         }
         sum

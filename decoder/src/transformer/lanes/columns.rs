@@ -98,7 +98,7 @@ mod tests {
             values in proptest::collection::vec(any::<i16>(), 50),
         ) {
             let matrix = Columns::new(rows, columns, |row, column| (column < columns).then(|| weights[row * 50 + column]));
-            let value = |place: usize| if place < columns { i32::from(values[place]) } else { 0 };
+            let value = |index: usize| if index < columns { i32::from(values[index]) } else { 0 };
             let pairs: Vec<i32> = (0..columns.div_ceil(2)).map(|p| packed(value(2 * p), value(2 * p + 1))).collect();
             let dot = |row: usize| (0..columns).map(|k| i32::from(weights[row * 50 + k]) * value(k)).sum::<i32>();
             for machine in Machine::all() {

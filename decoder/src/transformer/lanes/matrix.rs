@@ -22,15 +22,15 @@ impl Matrix {
     pub(super) fn new(weights: &[i8], bias: &[i16], columns: usize) -> Self {
         let rows: Vec<&[i8]> = weights.chunks_exact(columns.max(1)).collect();
         let pairs = columns.div_ceil(2);
-        let pair = |block: &[&[i8]], place: usize| {
+        let pair = |block: &[&[i8]], index: usize| {
             let mut out = [0; ROWS];
             for (slot, row) in out.iter_mut().zip(block) {
-                let mut both = row.iter().skip(place.wrapping_mul(2)).copied().map(i32::from);
+                let mut both = row.iter().skip(index.wrapping_mul(2)).copied().map(i32::from);
                 *slot = packed(both.next().unwrap_or(0), both.next().unwrap_or(0));
             }
             out
         };
-        let weights = rows.chunks(ROWS).flat_map(|block| (0..pairs).map(move |place| pair(block, place)));
+        let weights = rows.chunks(ROWS).flat_map(|block| (0..pairs).map(move |index| pair(block, index)));
         Self { pairs, weights: weights.collect(), bias: blocks(bias) }
     }
 

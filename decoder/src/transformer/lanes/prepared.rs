@@ -9,7 +9,7 @@ use splatstream_format::syntax::NetworkHeader;
 /// Differences of relative positions reach from -254 to 254.
 pub(super) const DIFFERENCE_MAX: i32 = 254;
 
-/// Relative-position bias of each difference, from -254 on; what is behind them is not in use.
+/// Relative-position bias of each difference, from -254 on; those after them are unused.
 pub(super) type Biases = [i32; 512];
 
 /// A network ready for batches.
@@ -17,7 +17,7 @@ pub(super) type Biases = [i32; 512];
 pub struct LaneNetwork {
     pub(super) header: NetworkHeader,
     pub(super) geometry: Matrix,
-    /// Tokens, and the hidden layer of the geometry network behind them, to embeddings; see `ranks`.
+    /// Tokens, and the hidden layer of the geometry network after them, to embeddings; see `ranks`.
     pub(super) embedding: Matrix,
     /// The biases of the embedding for each rank.
     pub(super) ranks: Vec<Vec<[i32; ROWS]>>,
@@ -70,16 +70,16 @@ impl LaneNetwork {
     }
 }
 
-/// The rows of the embedding, each with its row of the geometry embedding behind it. Both begin with a pair.
+/// The rows of the embedding, each with its row of the geometry embedding after it. Both begin with a pair.
 fn embedding(network: &Network) -> Matrix {
     let header = &network.header;
     let (inputs, geometry) = (header.inputs(), usize::from(header.geometry_width));
     let padding = inputs & 1;
     let tokens = network.layer(Part::Embedding).weights.chunks(inputs.max(1));
-    let mut behind = network.layer(Part::GeometryEmbedding).weights.chunks(geometry.max(1));
+    let mut after = network.layer(Part::GeometryEmbedding).weights.chunks(geometry.max(1));
     let row = |token: &[i8]| -> Vec<i8> {
-        let behind = behind.next().unwrap_or_default();
-        token.iter().copied().chain(core::iter::repeat_n(0, padding)).chain(behind.iter().copied()).collect()
+        let after = after.next().unwrap_or_default();
+        token.iter().copied().chain(core::iter::repeat_n(0, padding)).chain(after.iter().copied()).collect()
     };
     let weights: Vec<i8> = tokens.flat_map(row).collect();
     let columns = inputs.wrapping_add(padding).wrapping_add(geometry);
@@ -88,14 +88,14 @@ fn embedding(network: &Network) -> Matrix {
 
 fn position_bias(network: &Network, axis: usize) -> Biases {
     let fourier = &network.layer(Part::Fourier).weights;
-    let weight = |place: usize| fourier.get(place).copied().map_or(0, i32::from);
+    let weight = |index: usize| fourier.get(index).copied().map_or(0, i32::from);
     let term = |difference: i32, k: u32| {
-        let place = usize::try_from(k).unwrap_or(0).wrapping_mul(6).wrapping_add(axis.wrapping_mul(2));
+        let index = usize::try_from(k).unwrap_or(0).wrapping_mul(6).wrapping_add(axis.wrapping_mul(2));
         let phase = difference.wrapping_shl(k);
         let sines = [sine(phase), sine(phase.wrapping_add(128))];
-        weight(place)
+        weight(index)
             .wrapping_mul(sines[0])
-            .wrapping_add(weight(place.wrapping_add(1)).wrapping_mul(sines[1]))
+            .wrapping_add(weight(index.wrapping_add(1)).wrapping_mul(sines[1]))
     };
     let sum = |difference: i32| (0..4).map(|k| term(difference, k)).fold(0, i32::wrapping_add);
     let mut out = [0; 512];

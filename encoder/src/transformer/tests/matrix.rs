@@ -41,9 +41,9 @@ fn slopes_of_matrices_are_the_same_in_vectors_and_without() {
     for (rows, columns, times) in [(1, 1, 1), (8, 3, 5), (13, 8, 2), (19, 16, 1), (5, 0, 3), (0, 5, 3)] {
         let (slopes, x) = (any(rows * times, &mut random), any(columns * times, &mut random));
         let mut wanted = vec![ZERO; rows * columns];
-        for (place, sums) in wanted.iter_mut().enumerate() {
+        for (index, sums) in wanted.iter_mut().enumerate() {
             for time in 0..times {
-                let (row, column) = (place / columns, place % columns);
+                let (row, column) = (index / columns, index % columns);
                 let factors = slopes[time * rows + row].iter().zip(&x[time * columns + column]);
                 sums.iter_mut().zip(factors).for_each(|(sum, (slope, x))| *sum += slope * x);
             }

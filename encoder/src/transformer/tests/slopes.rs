@@ -43,15 +43,15 @@ fn slopes_are_those_of_every_part() {
                     continue;
                 }
                 let difference = |_| {
-                    let place = range.start + random.below(range.len());
-                    let apart = 0.05 * scales[place];
+                    let index = range.start + random.below(range.len());
+                    let apart = 0.05 * scales[index];
                     let moved = |by: f32| {
                         let mut moved = parameters.clone();
-                        moved[place] += by;
+                        moved[index] += by;
                         value(&layout, &moved, &batch, &slope)
                     };
                     let difference = (moved(apart) - moved(-apart)) / (2.0 * f64::from(apart));
-                    (f64::from(slopes[place]), difference)
+                    (f64::from(slopes[index]), difference)
                 };
                 let pairs: Vec<(f64, f64)> = (0..24).map(difference).collect();
                 let error = error(&pairs).unwrap_or_else(|| panic!("{name}: {part:?} does nothing"));

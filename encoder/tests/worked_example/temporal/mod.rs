@@ -7,74 +7,73 @@ mod steps;
 mod walk;
 mod writing;
 
-use crate::{elements, hexadecimal};
+use crate::elements;
 use core::fmt::Display;
 use splatstream_decoder::displacement::Cell;
-use splatstream_decoder::home::Home;
 use splatstream_decoder::layout::{Layout, Section, ShCoding};
+use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::position::collect;
 use std::fmt::Write as _;
 use walk::{Common, Step, Walked};
-pub(crate) use writing::stream;
+pub(crate) use writing::written;
 
 /// The text of the annex for the stream.
-pub(crate) fn annex(bytes: &[u8]) -> String {
-    let (common, frames) = writing::walked(bytes);
+pub(crate) fn annex(bytes: &[u8], common: &Common, frames: &[Walked]) -> String {
     let mut text = String::from(
-        "# Annex E Worked example of profile 1\n\n\
+        "# Annex E Worked temporal example\n\n\
          Informative. A stream of an I, a B and a P frame with two spatial layers, two temporal layers and two \
-         refinements: every byte with the element it belongs to, the values of its increments, and the arithmetic of \
-         one step of each kind. The stream is `data/worked-temporal-example.gss`; it was put together by hand, and \
-         its models and blocks follow the syntax of annex D, with one context and one table a plane. This annex is written by a test from what the \
-         reference decoder computes; the test fails when stream and annex part. Where a table here and clauses 2 to \
-         9 disagree, the clauses are right.\n\n",
+         refinements: the elements and values of its increments, and the arithmetic of one step of each kind. The \
+         stream is `data/worked-temporal-example.gss`; it was put together by hand, and its models and blocks follow \
+         the syntax of annex D, with one context and one table per plane. This annex is written by a test from what \
+         the reference decoder computes; the test fails when stream and annex part. Where a table here and clauses 2 \
+         to 9 disagree, the clauses are right.\n\n",
     );
-    overview(&mut text, &common, &frames);
-    text.push_str("\n## E.2 The file\n");
-    hexadecimal(&mut text, bytes, 0);
-    elements(&mut text, bytes, "E.3");
+    overview(&mut text, common, frames);
     text.push_str(
-        "\n## E.4 The increments\n\nThe values `v` of 8.1 of each section, entry by entry; then the home after the \
-         unit (7.14.4). Letters name Gaussians in the order in which units add them.\n",
+        "\n## E.2 Elements\n\nThe payloads of frame_headers and increments up to their models and blocks. The other \
+         units are like those of annex D.\n",
     );
-    let names = names(&frames);
+    elements(
+        &mut text,
+        bytes,
+        |unit_type| matches!(unit_type, 3 | 6),
+        |record| record.starts_with("frame_header") || record.starts_with("increment"),
+    );
+    text.push_str(
+        "\n## E.3 The increments\n\nThe values `v` of 8.1 of each section, entry by entry; then the list after the \
+         unit (7.4.4). Letters name Gaussians in the order in which units add them.\n",
+    );
+    let names = names(frames);
     for step in frames.iter().flat_map(|frame| &frame.steps) {
         unit(&mut text, step, &names);
     }
     cells(&mut text, &frames[1]);
-    steps::displacement(&mut text, &common, &frames[1], 1);
-    steps::residual(&mut text, &common, frames[2].step(1, 1), 1);
-    predicting::prediction(&mut text, &common, frames[1].step(1, 1), "E.8 New Gaussian predicted by KNN");
-    predicting::prediction(
-        &mut text,
-        &common,
-        frames[1].step(1, 0),
-        "E.9 New Gaussian predicted bilaterally",
-    );
-    frames::carried(&mut text, &frames, &names);
+    steps::displacement(&mut text, common, &frames[1], 1);
+    steps::residual(&mut text, common, frames[2].step(1, 1), 1);
+    predicting::prediction(&mut text, common, frames[1].step(1, 1), "E.7 New Gaussian predicted by KNN");
+    predicting::prediction(&mut text, common, frames[1].step(1, 0), "E.8 New Gaussian predicted bilaterally");
+    frames::carried(&mut text, bytes, common, frames, &names);
     frames::shown(&mut text, bytes);
-    frames::digests(&mut text, &frames);
-    frames::output(&mut text, bytes);
     text
 }
 
 fn overview(text: &mut String, common: &Common, frames: &[Walked]) {
     text.push_str(
-        "## E.1 The frames\n\nThe layers and references are those of 7.13.1 with `temporal_depth` 1. Each unit (s, r) \
+        "## E.1 The frames\n\nThe layers and references are those of 7.3.1 with `temporal_depth` 1. Each unit (s, r) \
          is listed with its parents, what becomes of them, and how many Gaussians it adds.\n\n\
          | Frame | Kind | Temporal layer | Refers to | Unit | position_shift | attribute_shift | Parents | Moves | \
-         Updates | Removed | New | Cells |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+         Updates | Removed | New |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for frame in frames {
-        let place = common.gop.place(frame.number);
-        let kind = ["I", "P", "B"][usize::from(place.frame_type.code())];
-        let reference = place.reference.map_or("none".to_owned(), |at| at.to_string());
+        let role = common.gop.role(frame.index);
+        let kind = ["I", "P", "B"][usize::from(role.frame_type.code())];
+        let reference = role.reference.map_or("none".to_owned(), |at| at.to_string());
         for Step { id, header, .. } in &frame.steps {
             writeln!(
                 text,
-                "| {} | {kind} | {} | {reference} | ({}, {}) | {} | {} | {} | {} | {} | {} | {} | {} |",
-                frame.number,
-                place.temporal_layer,
+                "| {} | {kind} | {} | {reference} | ({}, {}) | {} | {} | {} | {} | {} | {} | {} |",
+                frame.index,
+                role.temporal_layer,
                 id.spatial_layer,
                 id.refinement,
                 header.position_shift,
@@ -83,8 +82,7 @@ fn overview(text: &mut String, common: &Common, frames: &[Walked]) {
                 header.move_count,
                 header.update_count,
                 header.remove_count,
-                header.new_count,
-                header.cell_count
+                header.new_count
             )
             .unwrap();
         }
@@ -101,7 +99,7 @@ fn of<T: Copy>(planes: &[Vec<T>; 3], i: usize) -> [T; 3] {
     planes.each_ref().map(|plane| plane[i])
 }
 
-/// The names of the Gaussians of each home after each unit, in stream order.
+/// The names of the Gaussians of each list after each unit, in stream order.
 type Names = Vec<((u32, u8, u8), Vec<String>)>;
 
 /// Letters for Gaussians in the order in which units add them.
@@ -130,7 +128,7 @@ fn parent_names(step: &Step, names: &Names) -> Vec<String> {
 }
 
 fn name_list(names: &Names, at: (u32, u8, u8)) -> &[String] {
-    names.iter().find(|(place, _)| *place == at).map(|(_, names)| names.as_slice()).unwrap()
+    names.iter().find(|(unit, _)| *unit == at).map(|(_, names)| names.as_slice()).unwrap()
 }
 
 fn unit(text: &mut String, step: &Step, names: &Names) {
@@ -142,12 +140,12 @@ fn unit(text: &mut String, step: &Step, names: &Names) {
     } else {
         write!(text, "\nIts parents, in order: {}.\n", parents.join(", ")).unwrap();
     }
-    for section in Section::ALL.into_iter().filter(|&section| step.header.count(section) > 0) {
+    for section in Section::OF_INCREMENT.into_iter().filter(|&section| step.header.count(section) > 0) {
         section_table(text, step, section);
     }
-    write!(text, "\nHome {} after the unit:\n", id.refinement).unwrap();
+    write!(text, "\nList {} after the unit:\n", id.refinement).unwrap();
     let names = name_list(names, (id.frame, id.spatial_layer, id.refinement));
-    gaussians(text, &step.home, names);
+    gaussians(text, &step.list, names);
 }
 
 fn section_table(text: &mut String, step: &Step, section: Section) {
@@ -158,7 +156,7 @@ fn section_table(text: &mut String, step: &Step, section: Section) {
         .iter()
         .map(|plane| match plane.is_position() {
             true => "delta".to_owned(),
-            false => format!("{}[{}]", plane.attribute.name(), plane.place),
+            false => format!("{}[{}]", plane.attribute.name(), plane.index),
         })
         .collect();
     write!(text, "\n| {} | {} |\n|{}\n", section.name(), heads.join(" | "), "---|".repeat(heads.len() + 1))
@@ -171,24 +169,24 @@ fn section_table(text: &mut String, step: &Step, section: Section) {
     }
 }
 
-/// A home as a table.
-fn gaussians(text: &mut String, home: &Home, names: &[String]) {
-    assert_eq!(home.len(), names.len());
+/// A list as a table.
+fn gaussians(text: &mut String, of_list: &GaussianList, names: &[String]) {
+    assert_eq!(of_list.len(), names.len());
     text.push_str(
         "\n| Gaussian | position_fine | position | q | o | rotation_fine | rotation | dc | anchor |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
     for (i, name) in names.iter().enumerate() {
-        let planes = &home.planes;
+        let planes = &of_list.planes;
         let cells = [
-            list(of(&home.position_fine, i)),
+            list(of(&of_list.position_fine, i)),
             list(of(&planes.position, i)),
             list(of(&planes.log_scale, i)),
             planes.opacity[i].to_string(),
-            list(of(&home.rotation_fine, i)),
+            list(of(&of_list.rotation_fine, i)),
             list(of(&planes.rotation, i)),
             list(of(&planes.dc, i)),
-            u8::from(home.anchor[i]).to_string(),
+            u8::from(of_list.anchor[i]).to_string(),
         ];
         writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
     }
@@ -196,27 +194,26 @@ fn gaussians(text: &mut String, home: &Home, names: &[String]) {
 
 /// The cells of a frame, sums taken.
 fn cells(text: &mut String, frame: &Walked) {
-    let step = &frame.steps[0];
-    let cell_log2 = step.header.cell_log2;
+    let cell_log2 = frame.plan.cell_log2;
     write!(
         text,
-        "\n## E.5 The cells of frame {}\n\n`cell_log2` is {cell_log2}. Codes, translations and turns are sums over the \
-         entries of section cells (7.15.1).\n\n| Cell | delta | code | X | stale | translation | turn |\n\
+        "\n## E.4 The cells of frame {}\n\n`cell_log2` is {cell_log2}. Codes, translations and rotations are sums over the \
+         entries of section cells (7.5.1).\n\n| Cell | delta | code | X | stale | translation | cell_rotation |\n\
          |---|---|---|---|---|---|---|\n",
-        frame.number
+        frame.index
     )
     .unwrap();
     let mut code = 0;
-    for (i, delta) in step.values.section(Section::Cells).deltas.iter().enumerate() {
+    for (i, delta) in frame.plan.cells.deltas.iter().enumerate() {
         code += delta;
         let x = [collect(code), collect(code >> 1), collect(code >> 2)];
         let corner = x.map(|x| (x << (cell_log2 + 6)) as i32);
-        let &Cell { coordinates, stale, translation, turn } = frame.field.find(corner).unwrap();
+        let &Cell { coordinates, stale, translation, rotation } = frame.field.find(corner).unwrap();
         assert_eq!(coordinates, x);
-        let (translation, turn) = (list(translation), list(turn));
+        let (translation, rotation) = (list(translation), list(rotation));
         writeln!(
             text,
-            "| {i} | {delta} | {code} | {} | {} | {translation} | {turn} |",
+            "| {i} | {delta} | {code} | {} | {} | {translation} | {rotation} |",
             list(x),
             u8::from(stale)
         )

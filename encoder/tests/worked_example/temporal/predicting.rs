@@ -1,12 +1,12 @@
-//! Clause 7.17 for a unit with one new Gaussian: neighbours, weights, means.
+//! Clause 7.7 for a unit with one new Gaussian: neighbours, weights, means.
 
 use super::walk::{Common, Step};
 use super::{list, of};
 use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::home::{FINE, canonical};
 use splatstream_decoder::increment::prediction::{Predicting, Prediction};
 use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
 use splatstream_decoder::layout::Section;
+use splatstream_decoder::list::{FINE, canonical};
 use splatstream_decoder::neighbours::{Neighbour, NeighbourSearch};
 use splatstream_decoder::predictor::{Predictor, WeightedMean, bilateral_weights, knn_weights};
 use std::fmt::Write as _;
@@ -30,8 +30,8 @@ const NAMES: [(Stage, &str); 4] = [
 
 /// The only new Gaussian of a unit, predicted and reconstructed by the decoder.
 pub(crate) fn prediction(text: &mut String, common: &Common, step: &Step, title: &str) {
-    let planes = &step.home.planes;
-    let row = step.home.len() - 1;
+    let planes = &step.list.planes;
+    let row = step.list.len() - 1;
     let point = of(&planes.position, row);
     let predictor = Predictor::from_code(step.values.plane(Section::Predictors, 0)[0], 0).unwrap();
     let mut near = Vec::new();
@@ -44,7 +44,7 @@ pub(crate) fn prediction(text: &mut String, common: &Common, step: &Step, title:
     let mut case = Case { step, predictor, features: vec![0; near.len()], near };
     write!(
         text,
-        "\n## {title}\n\nThe new Gaussian of unit {} at {}, by 7.17. Its reference set (SS-PR-001), with K = {}:\n\n\
+        "\n## {title}\n\nThe new Gaussian of unit {} at {}, by 7.7. Its reference set (SS-PR-001), with K = {}:\n\n\
          | Index | position | D2 | Neighbour | q | o | rotation | dc |\n|---|---|---|---|---|---|---|---|\n",
         step.name(),
         list(point),
@@ -61,11 +61,11 @@ impl Case<'_> {
         for i in 0..set.len() {
             let at = of(&set.position, i);
             let squares = at.iter().zip(point).map(|(&a, b)| u64::from(a.abs_diff(b)).pow(2));
-            let place = self.near.iter().position(|neighbour| neighbour.index as usize == i);
+            let rank = self.near.iter().position(|neighbour| neighbour.index as usize == i);
             let cells = [
                 list(at),
                 squares.sum::<u64>().to_string(),
-                place.map_or_else(|| "none".to_owned(), |place| place.to_string()),
+                rank.map_or_else(|| "none".to_owned(), |rank| rank.to_string()),
                 list(of(&set.log_scale, i)),
                 set.opacity[i].to_string(),
                 list(of(&set.rotation, i)),
@@ -80,7 +80,7 @@ impl Case<'_> {
         let step = self.step;
         let coding = common.coding(&step.header);
         let at: [Vec<u32>; 3] =
-            step.home.planes.position.each_ref().map(|plane| vec![*plane.last().unwrap()]);
+            step.list.planes.position.each_ref().map(|plane| vec![*plane.last().unwrap()]);
         let position = at.each_ref().map(Vec::as_slice);
         let by = Predicting { header: &step.header, colour: coding.colour, network: None };
         let mut decoder = Prediction::new(&step.set, position, &[self.predictor], &by).unwrap();
@@ -107,13 +107,13 @@ impl Case<'_> {
             let (p, v, result) = (list(predicted), list(residual), list(planes(stage, &known)));
             writeln!(rows, "| {name} | {p} | {v} | {result} |").unwrap();
         }
-        write!(text, "\n| Attribute | p | v | Reconstructed |\n|---|---|---|---|\n{rows}").unwrap();
-        text.push_str("\nOf rotation, p and the reconstructed value are `rotation_fine`.\n");
+        write!(text, "\n| Attribute | pred | v | Reconstructed |\n|---|---|---|---|\n{rows}").unwrap();
+        text.push_str("\nOf rotation, pred and the reconstructed value are `rotation_fine`.\n");
         self.one_mean(text);
-        let row = step.home.len() - 1;
-        assert_eq!(planes(Stage::LogScale, &known), of(&step.home.planes.log_scale, row));
-        assert_eq!(planes(Stage::Rotation, &known), of(&step.home.rotation_fine, row));
-        assert_eq!(planes(Stage::Dc, &known), of(&step.home.planes.dc, row));
+        let row = step.list.len() - 1;
+        assert_eq!(planes(Stage::LogScale, &known), of(&step.list.planes.log_scale, row));
+        assert_eq!(planes(Stage::Rotation, &known), of(&step.list.rotation_fine, row));
+        assert_eq!(planes(Stage::Dc, &known), of(&step.list.planes.dc, row));
     }
 
     fn weights(&self) -> Vec<i64> {
@@ -169,7 +169,7 @@ impl Case<'_> {
         let (top, bottom) = (2 * sum + total, 2 * total);
         write!(
             text,
-            "\nThe mean that is `p.q[0]`:\n\n```text\nweight           = {}\nx                = {}\nW                = {total}\n\
+            "\nThe mean that is `pred.q[0]`:\n\n```text\nweight           = {}\nx                = {}\nW                = {total}\n\
              sum              = {sum}\n(2 * sum + W) / (2 * W) = {top} / {bottom} = {}\n```\n",
             list(&weights),
             list(&x),

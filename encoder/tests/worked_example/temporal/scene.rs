@@ -1,12 +1,10 @@
-//! The increments of annex E, in the values of their sections.
+//! The frames and increments of annex E, in the values of their sections.
 
 use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::layout::Section;
 use splatstream_decoder::position::morton;
 use splatstream_format::payload::Transform;
-use splatstream_format::syntax::{
-    GopHeader, IncrementHeader, NO_PREDICTOR, SequenceParameters, TransformHeader, UnitId, UnitType,
-};
+use splatstream_format::syntax::{GopHeader, IncrementHeader, SequenceParameters, TransformHeader, UnitId};
 
 /// log2 of the entries of a block: no section here has more than one.
 const BLOCK_LOG2: u8 = 6;
@@ -21,9 +19,6 @@ struct Plan {
     at: (u32, u8, u8),
     position_shift: u8,
     attribute_shift: [u8; 5],
-    cell_log2: u8,
-    /// Code, stale, translation, turn.
-    cells: Vec<(u64, [i32; 7])>,
     modes: Vec<i32>,
     moves: Vec<[i32; 3]>,
     updates: Vec<Values>,
@@ -49,7 +44,7 @@ pub(crate) fn sequence() -> SequenceParameters {
         refinement_percent: [50, 100, 0, 0, 0, 0, 0, 0, 0, 0],
         position_bits: 10,
         block_log2: BLOCK_LOG2,
-        sequence_flags: SequenceParameters::flags(true, false),
+        sequence_flags: SequenceParameters::flags(true, false, false),
         rotation_threshold: [4, 0, 0],
         frame_count: 3,
         ticks_per_second: 30,
@@ -77,8 +72,29 @@ pub(crate) fn transform() -> Transform {
     Transform { header, mean: vec![64, 48, 32], basis }
 }
 
-/// Gaussians of each frame: `gaussian_count`.
-pub(crate) const COUNTS: [u32; 3] = [5, 6, 5];
+/// A frame without its increments.
+pub(crate) struct FramePlan {
+    pub(crate) gaussian_count: u32,
+    pub(crate) cell_log2: u8,
+    pub(crate) cells: SectionValues,
+}
+
+/// All frames.
+pub(crate) fn frames() -> [FramePlan; 3] {
+    // Code; stale, translation, rotation.
+    let second = [(10, [0, 12, -20, 5, 0, 0, 1024]), (17, [1, 0, 0, 0, 0, 0, 0])];
+    let third = [(1, [0, 8, 0, -16, 0, 0, 0])];
+    let plan = |gaussian_count, cell_log2, cells: &[(u64, [i32; 7])]| {
+        let codes: Vec<u64> = cells.iter().map(|(code, _)| *code).collect();
+        let (deltas, planes) = (deltas(&codes), planes(&cell_differences(cells)));
+        FramePlan {
+            gaussian_count,
+            cell_log2,
+            cells: SectionValues { deltas, planes, block: 1 << BLOCK_LOG2 },
+        }
+    };
+    [plan(5, 0, &[]), plan(6, 8, &second), plan(5, 9, &third)]
+}
 
 /// All increments in stream order.
 pub(crate) fn increments() -> Vec<Planned> {
@@ -118,13 +134,11 @@ fn intra() -> [Plan; 4] {
     ]
 }
 
-/// Frame 1, a B frame: of home 0 the first Gaussian is removed, the second kept and displaced, the third moved.
+/// Frame 1, a B frame: of list 0 the first Gaussian is removed, the second kept and displaced, the third moved.
 fn enhancement() -> [Plan; 2] {
     [
         Plan {
             at: (1, 1, 0),
-            cell_log2: 8,
-            cells: vec![(10, [0, 12, -20, 5, 0, 0, 1024]), (17, [1, 0, 0, 0, 0, 0, 0])],
             modes: vec![4, 0, 1],
             moves: vec![[3, -2, 0]],
             predictor: Some(2),
@@ -150,8 +164,6 @@ fn predicted() -> [Plan; 2] {
             at: (2, 1, 0),
             position_shift: 1,
             attribute_shift: [1, 0, 0, 1, 0],
-            cell_log2: 9,
-            cells: vec![(1, [0, 8, 0, -16, 0, 0, 0])],
             modes: vec![3, 0, 1],
             moves: vec![[2, -1, 0], [-2, 3, 1]],
             updates: vec![[-1, 1, 0, 0, 1, 0, 0, 2, 0, -1]],
@@ -181,7 +193,7 @@ fn deltas(codes: &[u64]) -> Vec<u64> {
     codes.iter().scan(0, |before, &code| Some(code - core::mem::replace(before, code))).collect()
 }
 
-/// What 7.15.1 adds up again: `stale` as it is, motions as differences from the cell before.
+/// What 7.5.1 adds up again: `stale` as it is, motions as differences from the cell before.
 fn cell_differences(cells: &[(u64, [i32; 7])]) -> Vec<[i32; 7]> {
     let before = [[0; 7]].into_iter().chain(cells.iter().map(|(_, cell)| *cell));
     let row = |((_, cell), before): (&(u64, [i32; 7]), [i32; 7])| {
@@ -193,31 +205,33 @@ fn cell_differences(cells: &[(u64, [i32; 7])]) -> Vec<[i32; 7]> {
 impl Plan {
     fn into_unit(self) -> Planned {
         let (frame, spatial, refinement) = self.at;
-        let layer = gop().place(frame).temporal_layer;
-        let id = UnitId::of_frame(UnitType::Increment, frame).on_layers(spatial, layer);
-        Planned { id: UnitId { refinement, ..id }, header: self.header(), values: self.values() }
+        let layer = gop().role(frame).temporal_layer;
+        let id = UnitId::of_increment(frame, refinement).on_layers(spatial, layer);
+        Planned { id, header: self.header(), values: self.values() }
     }
 
     fn header(&self) -> IncrementHeader {
         let count = |holds: fn(i32) -> bool| self.modes.iter().filter(|&&mode| holds(mode)).count() as u32;
-        IncrementHeader {
+        let header = IncrementHeader {
             parent_count: self.modes.len() as u32,
-            cell_count: self.cells.len() as u32,
             move_count: count(|mode| mode & 1 != 0),
             update_count: count(|mode| mode & 2 != 0),
             remove_count: count(|mode| mode == 4),
             new_count: self.new.len() as u32,
             position_shift: self.position_shift,
             attribute_shift: self.attribute_shift,
-            cell_log2: self.cell_log2,
-            predictor_block_log2: if self.predictor.is_some() { 0 } else { NO_PREDICTOR },
-            neighbour_count: 3,
-            bilateral_spatial: 32,
-            bilateral_feature: 16,
             compensation_log_scale: self.compensation.0,
             compensation_opacity: self.compensation.1,
             ..IncrementHeader::PLAIN
-        }
+        };
+        let predicted = IncrementHeader {
+            predictor_block_log2: 0,
+            neighbour_count: 3,
+            bilateral_spatial: 32,
+            bilateral_feature: 16,
+            ..header
+        };
+        if self.predictor.is_some() { predicted.with_flags() } else { header.with_flags() }
     }
 
     fn values(&self) -> UnitValues {
@@ -227,8 +241,6 @@ impl Plan {
                 values.set(section, SectionValues { deltas, planes, block: 1 << BLOCK_LOG2 });
             }
         };
-        let codes: Vec<u64> = self.cells.iter().map(|(code, _)| *code).collect();
-        set(Section::Cells, deltas(&codes), planes(&cell_differences(&self.cells)));
         set(Section::Modes, Vec::new(), vec![self.modes.clone()]);
         set(Section::Moves, Vec::new(), planes(&self.moves));
         set(Section::Updates, Vec::new(), planes(&self.updates));

@@ -43,35 +43,35 @@ impl Lines<'_> {
     }
 }
 
-/// Clause 7.15.2 for a parent of unit 0 of a frame.
+/// Clause 7.5.2 for a parent of unit 0 of a frame.
 pub(crate) fn displacement(text: &mut String, common: &Common, frame: &Walked, row: usize) {
     let step = &frame.steps[0];
     let (fine, rotation) = (of(&step.parents.position_fine, row), of(&step.parents.rotation_fine, row));
     let cell = frame.field.find(fine).unwrap();
     write!(
         text,
-        "\n## E.6 One displacement\n\nParent {row} of unit {}, by 7.15.2. It has mode {}.\n\n```text\n",
+        "\n## E.5 One displacement\n\nParent {row} of unit {}, by 7.5.2. It has mode {}.\n\n```text\n",
         step.name(),
         step.values.plane(Section::Modes, 0)[row]
     )
     .unwrap();
     let mut lines = Lines(text);
     let fine = fine.map(i64::from);
-    let placed = position(&mut lines, common, cell, step.header.cell_log2, fine);
-    let turned = turn(&mut lines, common, cell, rotation.map(i64::from));
+    let placed = position(&mut lines, common, cell, frame.plan.cell_log2, fine);
+    let turned = rotation_of(&mut lines, common, cell, rotation.map(i64::from));
     text.push_str("```\n");
     assert_eq!(placed, of(&step.displaced.position_fine, row).map(i64::from));
     assert_eq!(turned, of(&step.displaced.rotation_fine, row).map(i64::from));
 }
 
 fn position(lines: &mut Lines<'_>, common: &Common, cell: &Cell, cell_log2: u8, fine: Three) -> Three {
-    let v = cell.turn.map(i64::from);
+    let v = cell.rotation.map(i64::from);
     let w = root((1 << 28) - dot(v, v));
     lines.three("position_fine", fine);
     lines.three("Round(position_fine, 6)", fine.map(|fine| round(fine, 6)));
     let x = cell.coordinates.map(i64::from);
     lines.three(&format!("X = Round(position_fine, 6) >> {cell_log2}"), x);
-    lines.three("v = turn", v);
+    lines.three("v = cell_rotation", v);
     lines.one(&format!("w = isqrt(2^28 - {})", dot(v, v)), w);
     let centre = x.map(|x| (x << (cell_log2 + 6)) + (1 << (cell_log2 + 5)));
     let d = three(|a| fine[a] - centre[a]);
@@ -94,8 +94,8 @@ fn position(lines: &mut Lines<'_>, common: &Common, cell: &Cell, cell_log2: u8, 
     placed
 }
 
-fn turn(lines: &mut Lines<'_>, common: &Common, cell: &Cell, r: Three) -> Three {
-    let v = cell.turn.map(i64::from);
+fn rotation_of(lines: &mut Lines<'_>, common: &Common, cell: &Cell, r: Three) -> Three {
+    let v = cell.rotation.map(i64::from);
     let w = root((1 << 28) - dot(v, v));
     let unit = rotation_unit(common.sequence.rotation_step);
     let one = 64 * unit;
@@ -116,7 +116,7 @@ fn turn(lines: &mut Lines<'_>, common: &Common, cell: &Cell, r: Three) -> Three 
     turned
 }
 
-/// Clause 7.16 for the update of a parent that stays.
+/// Clause 7.6 for the update of a parent that stays.
 pub(crate) fn residual(text: &mut String, common: &Common, step: &Step, row: usize) {
     let modes = step.values.plane(Section::Modes, 0);
     let entry = modes[..row].iter().filter(|mode| **mode & 2 != 0).count();
@@ -125,7 +125,7 @@ pub(crate) fn residual(text: &mut String, common: &Common, step: &Step, row: usi
         step.values.section(Section::Updates).planes.iter().map(|plane| plane[entry].into()).collect();
     write!(
         text,
-        "\n## E.7 One residual\n\nEntry {entry} of section updates of unit {}, about its parent {row}, by 7.16. \
+        "\n## E.6 One residual\n\nEntry {entry} of section updates of unit {}, about its parent {row}, by 7.6. \
          `attribute_shift` is {}.\n\n```text\n",
         step.name(),
         list(step.header.attribute_shift)
@@ -136,33 +136,33 @@ pub(crate) fn residual(text: &mut String, common: &Common, step: &Step, row: usi
     let planes = &step.displaced.planes;
     let q = log_scales(&mut lines, of(&planes.log_scale, row).map(i64::from), &v, shift[0]);
     let o = i64::from(planes.opacity[row]);
-    lines.one("p.o", o);
+    lines.one("pred.o", o);
     let o = o + (v[3] << shift[1]);
-    lines.one(&format!("o = p.o + ({} << {})", v[3], shift[1]), o);
+    lines.one(&format!("o = pred.o + ({} << {})", v[3], shift[1]), o);
     let before = of(&step.displaced.rotation_fine, row).map(i64::from);
     let c = rotation_shift((q[0] - q[2]) as i32, common.sequence.rotation_threshold);
     let bits = c + u32::from(shift[2]) + 6;
-    lines.three("p.rotation_fine", before);
+    lines.three("pred.rotation_fine", before);
     lines.one("c, with q[0] - q[2]", c.into());
     let rotation = three(|k| before[k] + (v[4 + k] << bits));
-    lines.three(&format!("rotation_fine = p.rotation_fine + (v << {bits})"), rotation);
+    lines.three(&format!("rotation_fine = pred.rotation_fine + (v << {bits})"), rotation);
     let dc = colour(&mut lines, common, of(&planes.dc, row).map(i64::from), &v[7..], shift[3]);
     text.push_str("```\n");
-    let planes = &step.home.planes;
+    let planes = &step.list.planes;
     assert_eq!(q, of(&planes.log_scale, kept).map(i64::from));
     assert_eq!(o, i64::from(planes.opacity[kept]));
-    assert_eq!(rotation, of(&step.home.rotation_fine, kept).map(i64::from));
+    assert_eq!(rotation, of(&step.list.rotation_fine, kept).map(i64::from));
     assert_eq!(dc, of(&planes.dc, kept).map(i64::from));
 }
 
 fn log_scales(lines: &mut Lines<'_>, p: Three, v: &[i64], shift: u8) -> Three {
     let x = three(|k| v[k] << shift);
-    lines.three("p.q", p);
+    lines.three("pred.q", p);
     lines.three("v_log_scale", three(|k| v[k]));
     lines.three(&format!("x = v_log_scale << {shift}"), x);
     let (d1, d2) = (p[0] - p[1] + x[1], p[1] - p[2] + x[2]);
-    lines.one("d1 = p.q[0] - p.q[1] + x[1]", d1);
-    lines.one("d2 = p.q[1] - p.q[2] + x[2]", d2);
+    lines.one("d1 = pred.q[0] - pred.q[1] + x[1]", d1);
+    lines.one("d2 = pred.q[1] - pred.q[2] + x[2]", d2);
     let q = [p[0] + x[0], p[0] + x[0] - d1, p[0] + x[0] - d1 - d2];
     lines.three("q", q);
     q
@@ -172,7 +172,7 @@ fn colour(lines: &mut Lines<'_>, common: &Common, p: Three, v: &[i64], shift: u8
     let component = three(|k| v[k] << shift);
     let basis = &common.transform.basis;
     let sum = three(|j| (0..3).map(|k| i64::from(basis[k * 3 + j]) * component[k]).sum());
-    lines.three("p.dc", p);
+    lines.three("pred.dc", p);
     lines.three(&format!("component = v_dc << {shift}"), component);
     lines.three("sum", sum);
     lines.three("Round(sum, 6)", sum.map(|sum| round(sum, 6)));

@@ -1,15 +1,16 @@
-//! Clauses 7.14 to 7.18 unit by unit, by the functions of the decoder, with all that stands between.
+//! Clauses 7.4 to 7.8 unit by unit, by the functions of the decoder, with all that stands between.
 
+use super::scene::FramePlan;
 use splatstream_decoder::colour::Colour;
-use splatstream_decoder::digest::{UnitDigest, frame_digest, unit_digest};
-use splatstream_decoder::displacement::{CellField, rotation_unit};
+use splatstream_decoder::digest::{ListDigest, lists_digest};
+use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::home::Home;
 use splatstream_decoder::increment::residual::AttributeCoding;
 use splatstream_decoder::increment::values::UnitValues;
 use splatstream_decoder::increment::{Situation, Unit, apply, field, reference_set};
 use splatstream_decoder::layout::ShCoding;
-use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_decoder::list::GaussianList;
+use splatstream_format::entropy::in_force::ModelsOfFrame;
 use splatstream_format::payload::Transform;
 use splatstream_format::syntax::{GopHeader, IncrementHeader, SequenceParameters, UnitId};
 
@@ -26,27 +27,22 @@ pub(crate) struct Step {
     pub(crate) header: IncrementHeader,
     pub(crate) values: UnitValues,
     /// The parents as the reference or the layer below has them, and displaced.
-    pub(crate) parents: Home,
-    pub(crate) displaced: Home,
+    pub(crate) parents: GaussianList,
+    pub(crate) displaced: GaussianList,
     pub(crate) set: QuantizedFrame,
-    pub(crate) home: Home,
-    /// The new Gaussians of the home.
+    pub(crate) list: GaussianList,
+    /// The new Gaussians of the list.
     pub(crate) added: QuantizedFrame,
-    /// refinement_digest and carried_digest as computed.
-    pub(crate) digests: [u64; 2],
 }
 
 /// A frame as far as it goes.
-#[derive(Default)]
 pub(crate) struct Walked {
-    pub(crate) number: u32,
+    pub(crate) index: u32,
     pub(crate) reference: Option<u32>,
+    pub(crate) plan: FramePlan,
     pub(crate) field: CellField,
     pub(crate) steps: Vec<Step>,
-    /// `carried(h)` of each home.
-    pub(crate) carried: Vec<Home>,
-    /// After the last unit of refinement 0, and after the last unit.
-    pub(crate) models: [ModelsInForce; 2],
+    pub(crate) models: ModelsOfFrame,
 }
 
 impl Common {
@@ -60,103 +56,88 @@ impl Common {
     }
 
     /// Begins a frame.
-    pub(crate) fn start(&self, frames: &[Walked], number: u32) -> Walked {
-        let reference = self.gop.place(number).reference;
-        let known = reference.map(|at| &frames[at as usize]);
-        let first = known.map(|known| known.models[0].clone()).unwrap_or_default();
-        Walked { number, reference, models: [first.clone(), first], ..Walked::default() }
+    pub(crate) fn start(&self, frames: &[Walked], index: u32, plan: FramePlan) -> Walked {
+        let reference = self.gop.role(index).reference;
+        let first = reference.map(|at| frames[at as usize].models.first.clone()).unwrap_or_default();
+        Walked {
+            index,
+            reference,
+            field: field(&plan.cells, plan.cell_log2, &self.sequence, 0).unwrap(),
+            plan,
+            steps: Vec::new(),
+            models: ModelsOfFrame::starting_with(first),
+        }
     }
 
-    /// Applies a unit to the frame in progress, behind the frames before it.
+    /// Applies a unit to the frame in progress, after the frames before it; the unit gets its digest.
     pub(crate) fn step(
         &self,
         frames: &[Walked],
         frame: &mut Walked,
         id: UnitId,
-        header: IncrementHeader,
+        mut header: IncrementHeader,
         values: UnitValues,
     ) {
-        let coding = self.coding(&header);
         let intra = frame.reference.is_none();
         let unit = Unit {
             header: &header,
             values: &values,
-            coding,
+            coding: self.coding(&header),
             sequence: &self.sequence,
             intra,
             network: None,
-            most_learned: 0,
+            max_learned: 0,
             at: 0,
         };
-        let r = usize::from(id.refinement);
-        let reference = frame.reference.map(|at| &frames[at as usize]);
-        if let (Some(reference), 0) = (reference, r) {
-            frame.field = field(&unit, rotation_unit(self.sequence.rotation_step)).unwrap();
-            let carried = |home: &Home| home.clone().carried(&frame.field);
-            frame.carried = reference.carried.iter().map(carried).collect();
-        }
         let parents = parents(frames, frame, &id);
         let mut displaced = parents.clone();
         displaced.displace(&frame.field);
-        let (lower, behind) = around(frames, frame, &id);
-        let (lower, behind): (Vec<_>, Vec<_>) = (lower.iter().collect(), behind.iter().collect());
-        let situation = Situation { around: [&lower, &behind], parents_follow: intra };
+        let [before, after] = around(frame, &id);
+        let situation = Situation { around: [&before, &after], parents_follow: intra };
         let applied = apply(&unit, displaced.clone(), &situation).unwrap();
-        let mut left = applied.home.planes.clone();
+        let mut left = applied.list.planes.clone();
         left.truncate(left.len() - applied.added.len());
         let set = reference_set(&situation, if intra { &left } else { &displaced.planes });
-        let (home, added) = (applied.home, applied.added);
-        let mut step = Step {
-            id,
-            header,
-            values,
-            parents,
-            displaced,
-            set,
-            home,
-            added,
-            digests: [0, frame_digest(&[])],
-        };
-        self.digests(frame, &mut step);
-        frame.steps.push(step);
+        let (list, added) = (applied.list, applied.added);
+        let lists = frame.layer(id.spatial_layer).map(|step| &step.list).chain([&list]);
+        header.refinement_digest =
+            lists_digest(&lists.map(GaussianList::digest).collect::<Vec<ListDigest>>());
+        frame.steps.push(Step { id, header, values, parents, displaced, set, list, added });
     }
 
-    /// Clause 7.18.4; an intra frame carries the homes of its highest layer.
-    fn digests(&self, frame: &mut Walked, step: &mut Step) {
-        let (spatial, r) = (step.id.spatial_layer, usize::from(step.id.refinement));
-        let homes = frame.layer(spatial).map(|step| &step.home).chain([&step.home]);
-        step.digests[0] = digest(homes);
-        if frame.reference.is_some() {
-            step.digests[1] = digest(frame.carried.iter().skip(r + 1));
-        } else if spatial + 1 == self.sequence.spatial_layer_count {
-            frame.carried.push(step.home.clone());
-        }
+    /// Clause 7.8.1: the lists of the I frame at a layer, moved into a frame that refers to it; without what lies in a
+    /// stale cell where units of the frame replace it.
+    pub(crate) fn carried(
+        &self,
+        frames: &[Walked],
+        frame: u32,
+        layer: u8,
+        drops_stale: bool,
+    ) -> Vec<GaussianList> {
+        let lists = frames[0].layer(layer).map(|step| step.list.clone());
+        lists.map(|list| list.carried(&frames[frame as usize].field, drops_stale)).collect()
     }
 }
 
 /// SS-PA-001: the parents of a unit, not displaced.
-fn parents(frames: &[Walked], frame: &Walked, id: &UnitId) -> Home {
-    let home = match frame.reference {
-        Some(reference) => frames[reference as usize].home(id.spatial_layer, id.refinement.into()),
-        None => id.spatial_layer.checked_sub(1).and_then(|below| frame.home(below, id.refinement.into())),
+fn parents(frames: &[Walked], frame: &Walked, id: &UnitId) -> GaussianList {
+    let r = id.refinement.into();
+    let list = match frame.reference {
+        Some(reference) => frames[reference as usize].layer(id.spatial_layer).nth(r),
+        None => id.spatial_layer.checked_sub(1).and_then(|below| frame.layer(below).nth(r)),
     };
-    home.cloned().unwrap_or_else(|| Home::empty(0))
+    list.map_or_else(|| GaussianList::empty(0), |step| step.list.clone())
 }
 
-/// SS-PR-001: what stands before and behind the parents of a unit in its reference set.
-fn around(frames: &[Walked], frame: &Walked, id: &UnitId) -> (Vec<QuantizedFrame>, Vec<QuantizedFrame>) {
-    if frame.reference.is_none() {
-        return (frame.layer(id.spatial_layer).map(|step| step.home.planes.clone()).collect(), Vec::new());
+/// SS-PR-001: what stands before and after the parents of a unit in its reference set.
+fn around<'f>(frame: &'f Walked, id: &UnitId) -> [Vec<&'f QuantizedFrame>; 2] {
+    let steps = || frame.layer(id.spatial_layer);
+    match frame.reference {
+        None => [steps().map(|step| &step.list.planes).collect(), Vec::new()],
+        Some(_) => {
+            [steps().map(|step| &step.displaced.planes).collect(), steps().map(|step| &step.added).collect()]
+        }
     }
-    let lower = frame.steps.iter().map(|step| step.displaced.planes.clone()).collect();
-    let anchor = frames[0].layer(id.spatial_layer).skip(usize::from(id.refinement) + 1);
-    let added = frame.steps.iter().map(|step| step.added.clone());
-    (lower, anchor.map(|step| step.home.planes.clone()).chain(added).collect())
-}
-
-fn digest<'h>(homes: impl Iterator<Item = &'h Home>) -> u64 {
-    let digests: Vec<UnitDigest> = homes.map(|home| unit_digest(&home.planes, 0..home.len())).collect();
-    frame_digest(&digests)
 }
 
 impl Step {
@@ -166,15 +147,11 @@ impl Step {
 }
 
 impl Walked {
-    fn layer(&self, spatial: u8) -> impl Iterator<Item = &Step> {
+    pub(crate) fn layer(&self, spatial: u8) -> impl Iterator<Item = &Step> {
         self.steps.iter().filter(move |step| step.id.spatial_layer == spatial)
     }
 
     pub(crate) fn step(&self, spatial: u8, refinement: usize) -> &Step {
         self.layer(spatial).nth(refinement).unwrap()
-    }
-
-    fn home(&self, spatial: u8, refinement: usize) -> Option<&Home> {
-        self.layer(spatial).nth(refinement).map(|step| &step.home)
     }
 }

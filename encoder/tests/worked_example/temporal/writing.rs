@@ -1,49 +1,46 @@
-//! The stream of annex E: sections to bytes, units to a file, and back.
+//! The stream of annex E: sections to bytes, units to a file.
 
-use super::scene::{COUNTS, Planned, gop, increments, sequence, transform};
+use super::scene::{Planned, frames, gop, increments, sequence, transform};
 use super::walk::{Common, Walked};
-use splatstream_decoder::increment::values::{PreparedIncrement, SectionValues, UnitValues};
+use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Layout, Section, ShCoding};
-use splatstream_format::Limits;
 use splatstream_format::entropy::frequencies::Frequencies;
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
 use splatstream_format::entropy::model::{ContextAxis, PlaneModel, write_models};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
-use splatstream_format::payload::{Increment, Index, SectionBytes, Transform, write_increment};
-use splatstream_format::syntax::{
-    EndOfStream, FrameHeader, GopHeader, IncrementHeader, IndexEntry, Profile, SequenceParameters, UnitId,
-    UnitType,
-};
-use splatstream_format::unit::{Stream, write_file_header, write_unit};
+use splatstream_format::payload::{CellsBytes, Index, SectionBytes, write_frame, write_increment};
+use splatstream_format::syntax::{EndOfStream, FrameHeader, IndexEntry, Profile, UnitId, UnitType};
+use splatstream_format::unit::{write_file_header, write_unit};
 
 /// Components of the dc transform.
 const RANK: u8 = 3;
 
-/// The stream, its digests computed by the decoder.
-pub(crate) fn stream() -> Vec<u8> {
+/// The stream, and what stands between its units and its frames.
+pub(crate) fn written() -> (Vec<u8>, Common, Vec<Walked>) {
     let common = Common { sequence: sequence(), gop: gop(), transform: transform() };
     let mut file = File { bytes: write_file_header(Profile::Dynamic, 1).unwrap(), units: 0 };
-    let stream = |unit_type| UnitId::of_frame(unit_type, 0);
-    file.unit(stream(UnitType::SequenceParameters), &common.sequence.to_bytes().unwrap());
+    file.unit(UnitId::stream(UnitType::SequenceParameters), &common.sequence.to_bytes().unwrap());
     let gop_at = file.bytes.len() as u64;
-    file.unit(stream(UnitType::GopHeader), &common.gop.to_bytes().unwrap());
-    file.unit(stream(UnitType::Transform), &common.transform.to_bytes(&common.sequence).unwrap());
-    let mut frames: Vec<Walked> = Vec::new();
-    for unit in increments() {
-        let number = unit.id.frame;
-        if frames.len() <= number as usize {
-            file.frame_header(&common, number);
-            frames.push(common.start(&frames, number));
+    file.unit(UnitId::of_frame(UnitType::GopHeader, 0), &common.gop.to_bytes().unwrap());
+    let transform = common.transform.to_bytes(&common.sequence).unwrap();
+    file.unit(UnitId::of_frame(UnitType::Transform, 0), &transform);
+    let mut walked: Vec<Walked> = Vec::new();
+    let mut units = increments().into_iter().peekable();
+    for (index, plan) in (0..).zip(frames()) {
+        let mut frame = common.start(&walked, index, plan);
+        file.frame_header(&common, &mut frame);
+        while let Some(unit) = units.next_if(|unit| unit.id.frame == index) {
+            file.increment(&common, &walked, &mut frame, unit);
         }
-        file.increment(&common, &mut frames, unit);
+        walked.push(frame);
     }
     let index_offset = file.bytes.len() as u64;
     let entries = vec![IndexEntry { frame: 0, reserved_zero: 0, offset: gop_at }];
-    file.unit(stream(UnitType::Index), &Index { entries }.to_bytes().unwrap());
-    let end = EndOfStream { frame_count: COUNTS.len() as u32, unit_count: file.units, index_offset };
-    file.unit(stream(UnitType::End), &end.to_bytes().unwrap());
-    file.bytes
+    file.unit(UnitId::stream(UnitType::Index), &Index { entries }.to_bytes().unwrap());
+    let end = EndOfStream { frame_count: walked.len() as u32, unit_count: file.units, index_offset };
+    file.unit(UnitId::stream(UnitType::End), &end.to_bytes().unwrap());
+    (file.bytes, common, walked)
 }
 
 struct File {
@@ -57,42 +54,34 @@ impl File {
         self.units += 1;
     }
 
-    fn frame_header(&mut self, common: &Common, number: u32) {
-        let place = common.gop.place(number);
-        let header = FrameHeader::new(place.frame_type, 0, None, COUNTS[number as usize]);
-        let spatial = u8::from(place.reference.is_some());
-        let id = UnitId::of_frame(UnitType::FrameHeader, number).on_layers(spatial, place.temporal_layer);
-        self.unit(id, &header.to_bytes().unwrap());
+    fn frame_header(&mut self, common: &Common, frame: &mut Walked) {
+        let role = common.gop.role(frame.index);
+        let header = FrameHeader::new(role.frame_type, 0, None, frame.plan.gaussian_count);
+        let cell_count = frame.plan.cells.deltas.len() as u32;
+        let cells = (cell_count > 0).then(|| CellsBytes {
+            cell_count,
+            cell_log2: frame.plan.cell_log2,
+            section: coded(Section::Cells, &frame.plan.cells, &mut frame.models.first),
+        });
+        let payload = write_frame(&header, None, cells.as_ref(), &common.sequence).unwrap();
+        let id = UnitId::of_frame(UnitType::FrameHeader, frame.index).on_layers(0, role.temporal_layer);
+        self.unit(id, &payload);
     }
 
-    fn increment(&mut self, common: &Common, frames: &mut Vec<Walked>, unit: Planned) {
-        let mut frame = frames.pop().unwrap();
+    fn increment(&mut self, common: &Common, walked: &[Walked], frame: &mut Walked, unit: Planned) {
         let Planned { id, header, values } = unit;
-        common.step(frames, &mut frame, id, header, values);
+        common.step(walked, frame, id, header, values);
         let step = frame.steps.last().unwrap();
-        let [refinement_digest, carried_digest] = step.digests;
-        let header = IncrementHeader { refinement_digest, carried_digest, ..header };
-        let mut models = frame.models[usize::from(id.refinement > 0)].clone();
-        let present = Section::ALL.into_iter().filter(|&section| header.count(section) > 0);
+        let mut models = frame.models.before(id.refinement).clone();
+        let present = Section::OF_INCREMENT.into_iter().filter(|&section| step.header.count(section) > 0);
         let sections: Vec<SectionBytes> =
             present.map(|section| coded(section, step.values.section(section), &mut models)).collect();
-        frame.follow(id.refinement, models);
-        self.unit(id, &write_increment(&header, &common.sequence, &sections).unwrap());
-        frames.push(frame);
+        self.unit(id, &write_increment(&step.header, &common.sequence, &sections).unwrap());
+        frame.models.follow(id.refinement, models);
     }
 }
 
-impl Walked {
-    /// Which models are in force, by clause 6.12.
-    fn follow(&mut self, refinement: u8, models: ModelsInForce) {
-        if refinement == 0 {
-            self.models[0] = models.clone();
-        }
-        self.models[1] = models;
-    }
-}
-
-/// One block and one table a plane; models in force are used again where they have a frequency for every token.
+/// One block and one table per plane; models in force are used again where they have a frequency for every token.
 fn coded(section: Section, values: &SectionValues, in_force: &mut ModelsInForce) -> SectionBytes {
     let layout = Layout::of_section(section, RANK, ShCoding::None);
     let first = usize::from(layout.planes()[0].is_position());
@@ -136,48 +125,4 @@ fn own(values: &[u64]) -> PlaneModel {
         tables: vec![Frequencies::from_counts(&counts)],
         table_of_context: vec![0],
     }
-}
-
-/// The bytes of a stream taken apart again.
-pub(crate) fn walked(bytes: &[u8]) -> (Common, Vec<Walked>) {
-    let limits = Limits::default();
-    let (mut sequence, mut gop, mut common) = (None, None, None);
-    let mut frames: Vec<Walked> = Vec::new();
-    for unit in Stream::open(bytes, &limits).unwrap().units() {
-        let unit = unit.unwrap();
-        let (payload, at) = (unit.payload, unit.payload_at);
-        match unit.header.unit_type() {
-            UnitType::SequenceParameters => {
-                sequence = SequenceParameters::parse_payload(payload, at, Profile::Dynamic).ok();
-            }
-            UnitType::GopHeader => gop = GopHeader::parse_payload(payload, at, Profile::Dynamic).ok(),
-            UnitType::Transform => {
-                let (sequence, gop) = (sequence.unwrap(), gop.unwrap());
-                let transform = Transform::parse(payload, at, &sequence).unwrap();
-                common = Some(Common { sequence, gop, transform });
-            }
-            UnitType::FrameHeader => {
-                frames.push(common.as_ref().unwrap().start(&frames, unit.header.frame));
-            }
-            UnitType::Increment => {
-                let mut frame = frames.pop().unwrap();
-                one(common.as_ref().unwrap(), &frames, &mut frame, unit.header.id(), (payload, at));
-                frames.push(frame);
-            }
-            _ => {}
-        }
-    }
-    (common.unwrap(), frames)
-}
-
-fn one(common: &Common, frames: &[Walked], frame: &mut Walked, id: UnitId, (payload, at): (&[u8], u64)) {
-    let increment = Increment::parse(payload, at, &common.sequence, &Limits::default()).unwrap();
-    let mut models = frame.models[usize::from(id.refinement > 0)].clone();
-    let prepared = PreparedIncrement::new(&increment, RANK, ShCoding::None, &mut models, &mut ()).unwrap();
-    let values: UnitValues = prepared.decode(&common.sequence).unwrap();
-    common.step(frames, frame, id, increment.header, values);
-    frame.follow(id.refinement, models);
-    let header = increment.header;
-    let computed = frame.steps.last().unwrap().digests;
-    assert_eq!(computed, [header.refinement_digest, header.carried_digest], "the digests of unit {id:?}");
 }

@@ -1,0 +1,1 @@
+"""The generator of the vectors; make.py is the command."""

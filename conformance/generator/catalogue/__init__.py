@@ -1,0 +1,19 @@
+"""All vectors by name, those of each area from a module of its own."""
+
+from . import (blocks, entropy, headers, increments, learned, limits, losses, mixed, narrow, nested, order, parameters, records,
+               scene, stream, structure, tools, values, weights)
+
+MODULES = (stream, values, entropy, structure, nested, tools, learned, weights, mixed, headers, parameters, records, order,
+           losses, increments, blocks, limits, scene, narrow)
+
+
+def collected():
+    result = {}
+    for module in MODULES:
+        for row in module.rows():
+            assert row.name not in result, row.name
+            result[row.name] = row
+    return result
+
+
+VECTORS = collected()

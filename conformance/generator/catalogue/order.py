@@ -1,0 +1,256 @@
+"""Invalid vectors of the order of units, of several faults in one unit, and of digests (7.1, 7.13, 7.9, 7.18)."""
+
+from oracle import constants as c
+from ..faults import (changed, copy_of, element, flipped, inserted, invalid, kind, lost, lost_all, moved, payload, repeated,
+                      together, where)
+
+INTRA, FALLING, DYNAMIC = "stream-several-gops", "refinement-ceiling", "temporal-gops-mixed"
+DEEP, LAYERS, BOOKS = "temporal-depth-2", "spatial-with-predicted-frames", "codebook-defined-again"
+SEVERAL, ABOVE = "refinement-frames-stop-early", "temporal-units-above-reference-in-layers"
+INCREMENT, GOP, FRAME, END = kind(c.UT_INCREMENT), kind(c.UT_GOP), kind(c.UT_FRAME), kind(c.UT_END)
+PARAMETERS, POINTS, INDEX = kind(c.UT_SEQUENCE), kind(c.UT_POINTS), kind(c.UT_INDEX)
+
+
+def increment(frame, r=0, s=None):
+    """The increment of a frame by display index."""
+    return where(lambda u: u.kind == c.UT_INCREMENT and u.frame == frame and u.r == r and s in (None, u.s))
+
+
+def header_of(frame):
+    return where(lambda u: u.kind == c.UT_FRAME and u.frame == frame)
+
+
+def damaged(select, **values):
+    """A unit with another header whose payload is damaged besides."""
+    return together(flipped(select), changed(select, **values))
+
+
+def whole_frame(number):
+    """frame_header and increments of a frame."""
+    return lost_all(lambda u: u.kind in (c.UT_FRAME, c.UT_INCREMENT) and u.frame == number)
+
+
+ORDER = [
+    ("order-without-parameters", INTRA, "UNEXPECTED_UNIT", "SS-BS-001", "the stream starts with a gop_header",
+     lost(PARAMETERS)),
+    ("order-parameters-late", INTRA, "UNEXPECTED_UNIT", "SS-BS-001",
+     "sequence_parameters comes after the first gop_header", moved(PARAMETERS, kind(c.UT_TRANSFORM))),
+    ("order-only-end", INTRA, "UNEXPECTED_UNIT", "SS-BS-001", "the end unit is the only unit",
+     lost_all(lambda u: u.kind != c.UT_END)),
+    ("order-frame-before-gop", INTRA, "UNEXPECTED_UNIT", "SS-BS-001",
+     "a frame_header stands before the first gop_header", inserted(copy_of(FRAME), GOP)),
+    ("order-transform-before-gop", INTRA, "UNEXPECTED_UNIT", "SS-BS-001",
+     "a transform stands before the first gop_header", inserted(copy_of(kind(c.UT_TRANSFORM)), GOP)),
+    ("order-refinement-before-frame", INTRA, "UNEXPECTED_UNIT", "SS-BS-001",
+     "a increment stands before the first frame_header", inserted(copy_of(INCREMENT), FRAME)),
+    ("order-transform-between-frames", INTRA, "UNEXPECTED_UNIT", "SS-BS-001",
+     "a transform stands between the frames of a GOP",
+     inserted(copy_of(kind(c.UT_TRANSFORM), payload=b""), kind(c.UT_FRAME, nth=2))),
+    ("order-points-twice", DYNAMIC, "UNEXPECTED_UNIT", "SS-BS-001", "there are two operating_points units",
+     repeated(POINTS)),
+    ("order-index-twice", INTRA, "UNEXPECTED_UNIT", "SS-BS-001", "there are two index units", repeated(INDEX)),
+    ("order-points-after-index", INTRA, "UNEXPECTED_UNIT", "SS-BS-001", "operating_points comes after the index",
+     moved(POINTS, END)),
+    ("order-gop-after-points", INTRA, "UNEXPECTED_UNIT", "SS-BS-001", "a gop_header comes after operating_points",
+     inserted(copy_of(GOP), INDEX)),
+    ("order-gop-after-index", INTRA, "UNEXPECTED_UNIT", "SS-BS-001", "a gop_header comes after the index",
+     inserted(copy_of(GOP), END)),
+    ("order-frame-too-many", INTRA, "UNEXPECTED_UNIT", "SS-BS-006", "a GOP has a frame more than gop_frame_count",
+     inserted(lambda units: units[kind(c.UT_FRAME, nth=-1)(units)].copy(frame=6), POINTS)),
+    ("order-frame-too-few", INTRA, "MISMATCH", "SS-BS-006", "a GOP ends before it has gop_frame_count frames",
+     lost_all(lambda u: u.kind in (c.UT_FRAME, c.UT_INCREMENT) and u.frame == 3)),
+    ("order-last-frame-missing", INTRA, "MISMATCH", "SS-BS-006", "operating_points comes before the last frame",
+     lost_all(lambda u: u.kind in (c.UT_FRAME, c.UT_INCREMENT) and u.frame == 5)),
+    ("order-frame-of-gop-header", INTRA, "MISMATCH", "SS-GH-001", "frame of the second gop_header is wrong",
+     changed(kind(c.UT_GOP, nth=1), frame=2)),
+    ("order-frame-of-transform", INTRA, "MISMATCH", "SS-BS-002", "frame of a transform unit is not that of its GOP",
+     changed(kind(c.UT_TRANSFORM, nth=1), frame=2)),
+    ("order-frame-of-codebook", BOOKS, "MISMATCH", "SS-BS-002", "frame of a codebook unit is not that of its GOP",
+     changed(kind(c.UT_CODEBOOK), frame=1)),
+    ("order-frame-number-skipped", INTRA, "MISMATCH", "SS-BS-002", "frame of a frame_header leaves out an index",
+     changed(kind(c.UT_FRAME, nth=2), frame=3)),
+    ("order-frame-number-again", INTRA, "MISMATCH", "SS-BS-002", "frame of a frame_header is that of the frame before",
+     changed(kind(c.UT_FRAME, nth=2), frame=1)),
+    ("order-frame-of-refinement", INTRA, "MISMATCH", "SS-BS-002 SS-ER-008",
+     "frame of a increment is that of the next frame", changed(kind(c.UT_INCREMENT, nth=1), frame=2)),
+    ("order-frame-of-increment", DYNAMIC, "MISMATCH", "SS-BS-002", "frame of an increment is far ahead",
+     changed(increment(1), frame=6)),
+    ("order-frame-of-later-refinement", SEVERAL, "MISMATCH", "SS-BS-002 SS-OP-002",
+     "frame of refinement 2 is that of the next frame, which is not looked at where refinement 2 is discarded",
+     changed(increment(1, 2), frame=2)),
+    ("order-refinement-1-first", FALLING, "UNEXPECTED_UNIT", "SS-BS-004 SS-LO-002 SS-ER-006",
+     "refinement 0 is missing: the frame is lost", lost(INCREMENT)),
+    ("order-refinement-left-out", FALLING, "UNEXPECTED_UNIT", "SS-BS-004 SS-LO-002",
+     "refinement 2 is missing: the frame stays at refinement 1", lost(kind(c.UT_INCREMENT, nth=2))),
+    ("order-refinement-twice", FALLING, "UNEXPECTED_UNIT", "SS-BS-004 SS-LO-002", "refinement 1 stands twice",
+     repeated(kind(c.UT_INCREMENT, nth=1))),
+    ("order-refinements-exchanged", FALLING, "UNEXPECTED_UNIT", "SS-BS-004", "refinements 2 and 3 are exchanged",
+     moved(kind(c.UT_INCREMENT, nth=3), kind(c.UT_INCREMENT, nth=2))),
+    ("order-refinement-above-count", INTRA, "OUT_OF_RANGE", "SS-BS-004",
+     "refinement 1 in a sequence of one refinement", inserted(copy_of(INCREMENT, r=1), kind(c.UT_GOP, nth=1))),
+    ("order-frame-without-units", INTRA, "CONSTRAINT", "SS-BS-005", "a frame has no increments",
+     lost(kind(c.UT_INCREMENT, nth=2))),
+    ("order-increment-before-frame", DYNAMIC, "UNEXPECTED_UNIT", "SS-BS-001", "an increment in phase GOP",
+     inserted(copy_of(kind(c.UT_INCREMENT)), FRAME)),
+    ("order-transform-in-predicted-gop", DYNAMIC, "UNEXPECTED_UNIT", "SS-BS-010",
+     "a transform stands between frames of a predicted GOP",
+     inserted(copy_of(kind(c.UT_TRANSFORM)), header_of(1))),
+    ("order-increment-after-codebook", BOOKS, "UNEXPECTED_UNIT", "SS-BS-010 SS-BS-001",
+     "an increment comes after the codebook that ended its frame",
+     inserted(lambda units: units[increment(0, 1)(units)].copy(), header_of(1))),
+    ("order-codebook-of-other-layer", BOOKS, "CONSTRAINT", "SS-CB-001",
+     "a codebook is defined again with another temporal_layer",
+     changed(kind(c.UT_CODEBOOK, nth=-1), t=lambda u: 1 - min(u.t, 1))),
+    ("order-first-frame-missing", DYNAMIC, "MISMATCH", "SS-BS-010", "a predicted GOP has no frames",
+     lost_all(lambda u: u.kind in (c.UT_FRAME,
+                                   c.UT_INCREMENT) and u.frame == 7 or u.frame == 8 and u.kind in (c.UT_FRAME,
+                                                                                                   c.UT_INCREMENT))),
+    ("order-i-frame-missing", DEEP, "UNDEFINED", "SS-BS-010", "the first frame of a predicted GOP is missing",
+     whole_frame(0)),
+    ("order-frame-beyond-gop", DEEP, "UNEXPECTED_UNIT", "SS-BS-010 SS-BS-001",
+     "a frame_header comes after the last display index of a predicted GOP",
+     inserted(lambda units: units[header_of(8)(units)].copy(frame=9), POINTS)),
+    ("order-frame-number-beyond-gop", DEEP, "MISMATCH", "SS-BS-010",
+     "frame of a frame_header is beyond the frames of its predicted GOP", changed(header_of(4), frame=9)),
+    ("order-frame-after-points-in-profile-1", DEEP, "UNEXPECTED_UNIT", "SS-BS-001 SS-OP-002",
+     "a frame_header, which not every operating point has, comes after operating_points",
+     inserted(copy_of(header_of(7)), INDEX)),
+    ("order-increment-after-index", DEEP, "UNEXPECTED_UNIT", "SS-BS-001 SS-OP-002",
+     "an increment, which not every operating point has, comes after the index",
+     inserted(copy_of(increment(7, 1)), END)),
+    ("order-increment-before-gop", DEEP, "UNEXPECTED_UNIT", "SS-BS-001 SS-OP-002",
+     "an increment, which not every operating point has, stands before the first gop_header",
+     inserted(copy_of(increment(0, 1)), GOP)),
+    ("order-codebook-after-points", BOOKS, "UNEXPECTED_UNIT", "SS-BS-001", "a codebook comes after operating_points",
+     inserted(copy_of(kind(c.UT_CODEBOOK)), INDEX)),
+    ("order-transform-after-codebook", BOOKS, "UNEXPECTED_UNIT", "SS-BS-010 SS-BS-001",
+     "a transform comes after the codebook that ended a frame of a predicted GOP",
+     inserted(copy_of(kind(c.UT_TRANSFORM)), header_of(1))),
+    ("order-temporal-layer", DEEP, "MISMATCH", "SS-BS-009",
+     "temporal_layer of a frame_header is not that of its frame", changed(header_of(2), t=2)),
+    ("order-temporal-layer-of-increment", DEEP, "MISMATCH", "SS-BS-009",
+     "temporal_layer of an increment is not that of its frame", changed(increment(2), t=0)),
+    ("order-spatial-layer-of-increment", LAYERS, "UNEXPECTED_UNIT", "SS-BS-009",
+     "spatial_layer of an increment of a P frame is not top", changed(increment(2), s=0)),
+    ("order-layer-left-out", LAYERS, "UNEXPECTED_UNIT", "SS-BS-004 SS-CA-003", "layer 1 of an I frame is missing",
+     lost_all(lambda u: u.kind == c.UT_INCREMENT and u.frame == 0 and u.s == 1)),
+    ("order-layer-without-refinement-0", LAYERS, "UNEXPECTED_UNIT", "SS-BS-004",
+     "layer 1 of an I frame starts with refinement 1", lost(increment(0, 0, 1))),
+    ("order-layer-above-base", "spatial-frame-stops-at-layer-0", "UNEXPECTED_UNIT", "SS-BS-004",
+     "layer 1 has a refinement that layer 0 does not have",
+     lost(increment(2, 1, 0))),
+    ("order-increment-twice", DEEP, "UNEXPECTED_UNIT", "SS-BS-004", "an increment stands twice",
+     repeated(increment(4, 0))),
+    ("order-increments-exchanged", DEEP, "UNEXPECTED_UNIT", "SS-BS-004", "two increments of a frame are exchanged",
+     moved(increment(4, 1), increment(4, 0))),
+    ("order-increment-above-count", DEEP, "OUT_OF_RANGE", "SS-BS-004",
+     "refinement of an increment is 2 in a sequence of two refinements",
+     inserted(lambda units: units[increment(8, 1)(units)].copy(r=2), POINTS)),
+]
+SUMS = [
+    ("constraint-increment-sum", "temporal-b-from-part-of-p", "MISMATCH", "SS-PA-006",
+     "the only increment of a P frame that stops early gives more Gaussians than gaussian_count",
+     element(header_of(4), "gaussian_count", 1)),
+    ("constraint-increment-sum-below-top", "spatial-frame-stops-at-layer-0", "MISMATCH", "SS-PA-006",
+     "layer 0 of an I frame without higher layers has more Gaussians than gaussian_count",
+     element(header_of(0), "gaussian_count", 1)),
+]
+OF_ABOVE = "of an increment above the level of the reference frame "
+ABOVE_REFERENCE = [
+    ("order-above-reference-frame", ABOVE, "MISMATCH", "SS-BS-002 SS-LO-001 SS-ER-008",
+     "frame " + OF_ABOVE + "is that of the next frame", changed(increment(3, 2), frame=4)),
+    ("order-above-reference-frame-of-i-frame", ABOVE, "MISMATCH", "SS-BS-002 SS-LO-001 SS-ER-008 SS-OP-002",
+     "frame " + OF_ABOVE + "is that of the I frame, so that it belongs to lower refinements too",
+     changed(increment(3, 2), frame=0)),
+]
+IN_ONE_UNIT = [
+    ("order-frame-and-checksum", SEVERAL, ("MISMATCH", "CHECKSUM"), "SS-ER-009 SS-BS-002",
+     "frame of an increment is that of the next frame, and its payload is damaged",
+     damaged(increment(1, 1), frame=2)),
+    ("order-frame-of-increment-and-checksum", DEEP, ("MISMATCH", "CHECKSUM"), "SS-ER-009 SS-BS-002",
+     "frame of an increment is that of the next frame, and its payload is damaged",
+     damaged(increment(4, 0), frame=5)),
+    ("order-temporal-layer-and-checksum", DEEP, ("MISMATCH", "CHECKSUM"), "SS-ER-009 SS-BS-009",
+     "temporal_layer of an increment is not that of its frame, and its payload is damaged",
+     damaged(increment(4, 0), t=1)),
+    ("order-spatial-layer-and-checksum", LAYERS, ("UNEXPECTED_UNIT", "CHECKSUM"), "SS-ER-009 SS-BS-004",
+     "spatial_layer of an increment of a P frame is not top, and its payload is damaged",
+     damaged(increment(2, 0), s=1)),
+    ("order-layer-beyond-and-checksum", LAYERS, ("OUT_OF_RANGE", "UNEXPECTED_UNIT", "CHECKSUM"), "SS-ER-009 SS-UH-008",
+     "spatial_layer of an increment is spatial_layer_count, and its payload is damaged",
+     damaged(increment(2, 0), s=3)),
+    ("order-layer-beyond-and-frame", DEEP, ("OUT_OF_RANGE", "MISMATCH"), "SS-ER-009 SS-UH-008",
+     "temporal_layer of an increment is temporal_layer_count, and its frame is that of the next frame",
+     changed(increment(4, 0), t=3, frame=5)),
+]
+WRONG_CARRIED = element(header_of(4), "carried_digest", lambda x: x ^ 1)
+CARRIED = "nested-frames-of-fewer-units"
+DIGESTS = [
+    ("digest-of-frame", INTRA, "DIGEST", "SS-IN-012 SS-DG-004 SS-DG-001 SS-DG-002",
+     "a bit of refinement_digest is wrong", element(INCREMENT, "refinement_digest", lambda x: x ^ 1)),
+    ("digest-of-later-refinement", FALLING, "DIGEST", "SS-IN-012 SS-DG-004 SS-ER-008",
+     "refinement_digest of refinement 3 is that of another frame",
+     element(kind(c.UT_INCREMENT, nth=3), "refinement_digest", 0)),
+    ("digest-of-empty-frame", "stream-empty-frame", "DIGEST", "SS-IN-012 SS-DG-004",
+     "refinement_digest of a frame without Gaussians is xxh64 of no bytes",
+     element(INCREMENT, "refinement_digest", 0xEF46DB3751D8E999)),
+    ("digest-of-increment", DEEP, "DIGEST", "SS-IN-012 SS-DG-004 SS-DG-003",
+     "refinement_digest of an increment of a P frame is wrong",
+     element(increment(4, 0), "refinement_digest", lambda x: x ^ 2 ** 63)),
+    ("digest-of-i-frame", DEEP, "DIGEST", "SS-IN-012 SS-DG-004", "refinement_digest of the first increment is wrong",
+     element(increment(0, 0), "refinement_digest", lambda x: x + 1)),
+    ("digest-carried", CARRIED, "DIGEST", "SS-DG-005 SS-CA-001 SS-CA-003 SS-DG-003",
+     "carried_digest of a frame with carried lists is wrong; the frame is output as it is", WRONG_CARRIED),
+    ("digest-carried-at-the-end-of-the-data", CARRIED, "TRUNCATED", "SS-DG-005 SS-BS-005",
+     "carried_digest of the last frame is wrong, which is not looked at where the data end",
+     together(WRONG_CARRIED, lambda head, units: (head, units[:increment(4, 1)(units) + 1]))),
+    ("digest-carried-before-a-fatal-error", CARRIED, "OUT_OF_RANGE", "SS-DG-005 SS-BS-005",
+     "carried_digest of the last frame is wrong, which is not looked at where a wrong header ends the frame",
+     together(WRONG_CARRIED, changed(lambda units: increment(4, 1)(units) + 1, r=1))),
+    ("digest-carried-and-unit", CARRIED, "CHECKSUM", "SS-DG-005 SS-LO-002",
+     "an increment of a frame is damaged, so that its wrong carried_digest is not looked at",
+     together(WRONG_CARRIED, flipped(increment(4, 1)))),
+    ("digest-carried-after-loss", CARRIED, "CHECKSUM", "SS-DG-005 SS-LO-002 SS-CA-001",
+     "the first increment of frame 2 is damaged: what later frames carry is not what carried_digest is of",
+     flipped(increment(2, 0))),
+    ("digest-transform-other", INTRA, "DIGEST", "SS-AT-002 SS-IN-012",
+     "a coefficient of a transform is another one than when the digest was made",
+     payload(kind(c.UT_TRANSFORM), lambda data: data[:16] + b"\x00\x08" + data[18:])),
+    ("digest-codebook-other", "codebook-two-stages", "DIGEST", "SS-SH-001 SS-IN-012",
+     "values of a codebook are others than when the digest was made",
+     payload(kind(c.UT_CODEBOOK), lambda data: data[:5] + bytes(255 - x for x in data[5:]))),
+    ("digest-thresholds-other", "attribute-rotation-thresholds", "DIGEST", "SS-AT-001 SS-IN-012",
+     "a rotation_threshold is another one than when the digest was made",
+     element(PARAMETERS, "rotation_threshold", 6, 2)),
+    ("digest-position-shift-other", "geometry-shift-5", "DIGEST", "SS-PO-003 SS-PO-002 SS-DG-004",
+     "position_shift is one less than when the digest was made",
+     element(INCREMENT, "position_shift", 4)),
+    ("digest-sh-transform-other", "colour-sh-degree-1", "DIGEST", "SS-RC-004 SS-DG-001",
+     "a mean of the sh transform is another one than when the digest was made",
+     payload(kind(c.UT_TRANSFORM, nth=1), lambda data: data[:4] + b"\x07" + data[5:])),
+    ("digest-bilateral-spatial-other", "prediction-bilateral", "DIGEST", "SS-PR-007 SS-PR-008",
+     "bilateral_spatial is another one than when the digest was made",
+     element(where(lambda u: u.kind == c.UT_INCREMENT and u.get("new_count") > 2 and u.r > 0), "bilateral_spatial",
+             200)),
+    ("digest-bilateral-feature-other", "prediction-features", "DIGEST", "SS-PR-007",
+     "bilateral_feature is another one than when the digest was made",
+     element(where(lambda u: u.kind == c.UT_INCREMENT and u.get("new_count") > 2 and u.r > 0, nth=-1), "bilateral_feature",
+             255)),
+    ("digest-rotation-step-other", "cells-unity-half", "DIGEST", "SS-MO-003 SS-MO-004",
+     "rotation_step is another one than when cells were displaced", element(PARAMETERS, "rotation_step", 0.02)),
+    ("digest-cell-size-other", "cells-stale-in-part", "DIGEST", "SS-MO-004 SS-PA-001",
+     "cell_log2 is another one than when the digest was made", element(header_of(1), "cell_log2", 5)),
+    ("digest-attribute-shift-other", "survivors-all-update", "DIGEST", "SS-PA-004 SS-RC-001",
+     "attribute_shift of opacity is another one than when the digest was made",
+     element(increment(1, 0), "attribute_shift", lambda x: x ^ 1, 1)),
+    ("digest-neighbour-count-other", "refinement-compensation", "DIGEST", "SS-PR-005 SS-PR-006 SS-IN-012",
+     "neighbour_count is another one than when the digest was made",
+     element(where(lambda u: u.kind == c.UT_INCREMENT and u.get("new_count") > 2, nth=-1), "neighbour_count",
+             lambda x: 17 - x)),
+]
+
+
+def rows():
+    yield from invalid("order", "order", ORDER + ABOVE_REFERENCE + IN_ONE_UNIT)
+    yield from invalid("constraint", "order", SUMS)
+    yield from invalid("digest", "digest", DIGESTS)

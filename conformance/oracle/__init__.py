@@ -1,0 +1,1 @@
+"""The independent decoder of SplatStream streams: slow, and written from the text alone."""

@@ -1,0 +1,106 @@
+//! New Gaussians without predictors: blocks are decoded straight into the planes of the frame, those of all units at once.
+//!
+//! The blocks of a unit depend on nothing but its models, and these are read beforehand. So every core takes the next
+//! block, whichever unit it is of, and writes to the part of the planes that belongs to it. This is how frames decode
+//! whose units only add Gaussians: all frames of static content, and I frames of one spatial layer.
+
+use crate::block::{UnitParameters, decode_block};
+use crate::frame::{FrameSlice, QuantizedFrame};
+use crate::increment::residual::AttributeCoding;
+use crate::increment::values::{PreparedSections, blocks_of};
+use rayon::prelude::*;
+use splatstream_format::Result;
+use splatstream_format::entropy::in_force::SectionModels;
+use splatstream_format::entropy::layout::Section;
+use splatstream_format::entropy::reader::PlaneDecoder;
+use splatstream_format::payload::{CodedSection, Increment};
+use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
+
+/// A unit whose blocks can be decoded straight into planes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DirectUnit<'r, 'a> {
+    pub(crate) header: &'r IncrementHeader,
+    pub(crate) prepared: &'r PreparedSections<'r, 'a>,
+    pub(crate) coding: AttributeCoding<'r>,
+}
+
+/// Whether a unit does nothing but add Gaussians without predictors.
+pub(crate) fn is_direct(increment: &Increment<'_>) -> bool {
+    let header = &increment.header;
+    let only_new = increment.sections.iter().all(|coded| coded.section == Section::New);
+    header.parent_count == 0 && only_new
+}
+
+/// A block, where it goes, and the unit that it is of.
+struct Task<'t, 'f, 'a> {
+    unit: usize,
+    parameters: UnitParameters<'t>,
+    decoders: &'t [PlaneDecoder],
+    bytes: &'a [u8],
+    at: u64,
+    out: FrameSlice<'f>,
+}
+
+/// Decodes units one after the other. Gives the planes, and for each unit its Gaussians or its first error; the Gaussians
+/// of a unit with an error mean nothing.
+pub(crate) fn decode(
+    units: &[DirectUnit<'_, '_>],
+    sequence: &SequenceParameters,
+) -> (QuantizedFrame, Vec<Result<usize>>) {
+    let sections: Vec<Option<(&CodedSection<'_>, &SectionModels)>> =
+        units.iter().map(|unit| unit.prepared.sections().next()).collect();
+    let decoders: Vec<Vec<PlaneDecoder>> = sections
+        .par_iter()
+        .map(|section| section.iter().flat_map(|(_, models)| &models.models).map(PlaneDecoder::new).collect())
+        .collect();
+    let blocks: Vec<(usize, &[u8], u64, usize)> = sections
+        .iter()
+        .enumerate()
+        .filter_map(|(unit, section)| section.map(|(coded, _)| (unit, coded)))
+        .flat_map(|(unit, coded)| {
+            blocks_of(coded, sequence).into_iter().map(move |(bytes, at, count)| (unit, bytes, at, count))
+        })
+        .collect();
+    let lengths: Vec<usize> = blocks.iter().map(|&(.., count)| count).collect();
+    let total = lengths.iter().copied().fold(0, usize::wrapping_add);
+    let mut planes = QuantizedFrame::zeroed(total, usize::from(sequence.sh_dimension()));
+    let task = |((unit, bytes, at, _), out)| {
+        let (coded, models) = sections.get(unit).copied().flatten()?;
+        let parameters = parameters(units.get(unit)?, coded, models, sequence);
+        Some(Task { unit, parameters, decoders: decoders.get(unit)?, bytes, at, out })
+    };
+    let tasks: Vec<Task<'_, '_, '_>> =
+        blocks.into_iter().zip(planes.slices(&lengths)).filter_map(task).collect();
+    let decoded: Vec<(usize, Result<usize>)> = tasks.into_par_iter().map(run).collect();
+    let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
+    for (unit, block) in decoded {
+        let Some(slot) = results.get_mut(unit) else { continue };
+        *slot = slot.and_then(|gaussians| block.map(|count| gaussians.wrapping_add(count)));
+    }
+    (planes, results)
+}
+
+fn run(task: Task<'_, '_, '_>) -> (usize, Result<usize>) {
+    let Task { unit, parameters, decoders, bytes, at, mut out } = task;
+    let count = out.planes.first().map_or(0, |plane| plane.len());
+    (unit, decode_block(bytes, at, &parameters, decoders, &mut out).map(|()| count))
+}
+
+/// What the sequence and a unit say about a block.
+fn parameters<'t>(
+    unit: &DirectUnit<'t, '_>,
+    coded: &CodedSection<'_>,
+    models: &'t SectionModels,
+    sequence: &SequenceParameters,
+) -> UnitParameters<'t> {
+    UnitParameters {
+        position_bits: sequence.position_bits,
+        position_shift: unit.header.position_shift,
+        attribute_shift: unit.header.attribute_shift,
+        canonical_axes: sequence.canonical_axes(),
+        rotation_thresholds: sequence.rotation_threshold,
+        lanes_log2: coded.lanes_log2,
+        layout: &models.layout,
+        colour: unit.coding.colour,
+    }
+}

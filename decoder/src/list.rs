@@ -1,0 +1,154 @@
+//! Clause 7.4: a list of Gaussians, with the fractions that prediction keeps.
+//!
+//! List h holds the Gaussians that the units of refinement h brought. Inside the prediction loop positions and rotations
+//! have six more bits than the canonical planes; [`GaussianList::settle`] derives the canonical planes from them.
+
+use crate::digest::{ListDigest, list_digest};
+use crate::displacement::CellField;
+use crate::frame::QuantizedFrame;
+use rayon::prelude::*;
+
+/// Fraction bits of positions and rotations inside the prediction loop.
+pub const FRACTION_BITS: u32 = 6;
+/// One step of the position grid in fine units.
+pub const FINE: i32 = 1 << FRACTION_BITS;
+
+/// The canonical integer of a fine one: `Round(fine, 6)`.
+#[inline]
+pub fn canonical(fine: i32) -> i32 {
+    fine.wrapping_add(FINE / 2) >> FRACTION_BITS
+}
+
+/// A list of Gaussians, in coded order. All planes have the same length.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct GaussianList {
+    /// The canonical planes (7.9).
+    pub planes: QuantizedFrame,
+    /// Position in 64ths of a grid step: x, y, z.
+    pub position_fine: [Vec<i32>; 3],
+    /// Quaternion x, y, z in 64ths of rotation_step.
+    pub rotation_fine: [Vec<i32>; 3],
+    /// True for Gaussians of the intra frame of the GOP.
+    pub anchor: Vec<bool>,
+}
+
+impl GaussianList {
+    /// A list without Gaussians, for frames with `sh_planes` SH planes.
+    pub fn empty(sh_planes: usize) -> Self {
+        Self::of_planes(QuantizedFrame::zeroed(0, sh_planes), false)
+    }
+
+    /// Gaussians whose positions and rotations have no fraction yet.
+    pub fn of_planes(planes: QuantizedFrame, anchor: bool) -> Self {
+        let fine = |value: i32| value.wrapping_mul(FINE);
+        let position_fine =
+            planes.position.each_ref().map(|plane| plane.iter().map(|&q| fine(q.cast_signed())).collect());
+        let rotation_fine = planes.rotation.each_ref().map(|plane| plane.iter().map(|&r| fine(r)).collect());
+        let anchor = vec![anchor; planes.len()];
+        Self { planes, position_fine, rotation_fine, anchor }
+    }
+
+    /// Gaussians in the list.
+    pub fn len(&self) -> usize {
+        self.planes.len()
+    }
+
+    /// True if there is no Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.planes.is_empty()
+    }
+
+    /// Derives the canonical positions and rotations from the fine ones.
+    pub fn settle(&mut self) {
+        let Self { planes, position_fine, rotation_fine, .. } = self;
+        for (plane, fine) in planes.position.iter_mut().zip(position_fine) {
+            for (slot, &value) in plane.iter_mut().zip(fine.iter()) {
+                *slot = canonical(value).cast_unsigned();
+            }
+        }
+        for (plane, fine) in planes.rotation.iter_mut().zip(rotation_fine) {
+            for (slot, &value) in plane.iter_mut().zip(fine.iter()) {
+                *slot = canonical(value);
+            }
+        }
+    }
+
+    /// Clause 7.5: displaces every Gaussian by its cell and returns the stale flag of each; no flags if nothing moves.
+    pub fn displace(&mut self, field: &CellField) -> Vec<bool> {
+        if field.is_empty() {
+            return Vec::new();
+        }
+        let stale = field.displace_planes(&mut self.position_fine, &mut self.rotation_fine);
+        self.settle();
+        stale
+    }
+
+    /// Keeps the Gaussians whose flag is set; an empty list keeps all.
+    pub fn retain(&mut self, keep: &[bool]) {
+        if keep.iter().all(|&keep| keep) {
+            return;
+        }
+        let Self { planes, position_fine, rotation_fine, anchor } = self;
+        planes.retain(keep);
+        position_fine.iter_mut().chain(rotation_fine).for_each(|plane| retain(plane, keep));
+        retain(anchor, keep);
+    }
+
+    /// Appends the Gaussians of another list.
+    pub fn append(&mut self, other: &Self) {
+        self.planes.append(&other.planes);
+        let ours = self.position_fine.iter_mut().chain(&mut self.rotation_fine);
+        for (plane, more) in ours.zip(other.position_fine.iter().chain(&other.rotation_fine)) {
+            plane.extend_from_slice(more);
+        }
+        self.anchor.extend_from_slice(&other.anchor);
+    }
+
+    /// Clause 7.8.1: the list as it is carried into a frame whose cells are `field`. Gaussians of stale cells are dropped if
+    /// `drops_stale` is set, that is if the frame has units that replace them.
+    #[must_use]
+    pub fn carried(mut self, field: &CellField, drops_stale: bool) -> Self {
+        let stale = self.displace(field);
+        if drops_stale {
+            let keep: Vec<bool> = stale.par_iter().map(|&stale| !stale).collect();
+            self.retain(&keep);
+        }
+        self
+    }
+
+    /// The digest of the list (7.9.2).
+    pub fn digest(&self) -> ListDigest {
+        list_digest(&self.planes, 0..self.len())
+    }
+}
+
+/// Keeps the values whose flag is set; values without a flag stay.
+pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut flags = keep.iter();
+    values.retain(|_| flags.next().copied().unwrap_or(true));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_round_up_as_round_of_clause_4_says() {
+        let rounded = [-97, -96, -33, -32, -31, 0, 31, 32, 95, 96].map(canonical);
+        assert_eq!(rounded, [-2, -1, -1, 0, 0, 0, 0, 1, 1, 2]);
+    }
+
+    #[test]
+    fn what_is_kept_stays_in_order() {
+        let mut planes = QuantizedFrame::zeroed(4, 0);
+        planes.opacity = vec![1, 2, 3, 4];
+        let mut list = GaussianList::of_planes(planes, true);
+        list.retain(&[true, false, false, true]);
+        assert_eq!(list.planes.opacity, [1, 4]);
+        assert_eq!(list.len(), 2);
+        let twice = list.clone();
+        list.append(&twice);
+        assert_eq!(list.planes.opacity, [1, 4, 1, 4]);
+        assert_eq!(list.anchor.len(), 4);
+    }
+}

@@ -1,0 +1,160 @@
+//! The end of a frame: what is shown, with which compensation, and what later frames refer to. Clauses 7.3.3 and 7.8.
+
+use super::decoded::{Compensation, DecodedFrame, Shift};
+use super::decoding::Lists;
+use super::frame::{Context, FrameInProgress};
+use crate::carried::Carried;
+use crate::digest::lists_digest;
+use crate::frame::QuantizedFrame;
+use crate::frame_state::FrameState;
+use crate::list::GaussianList;
+use splatstream_format::{Error, ErrorKind};
+use std::sync::Arc;
+
+/// A frame that has ended.
+pub(super) struct Closed {
+    pub(super) decoded: DecodedFrame,
+    /// For frames that refer to it.
+    pub(super) state: FrameState,
+    /// The carried lists are not those of their digest.
+    pub(super) fault: Option<Error>,
+}
+
+impl FrameInProgress<'_> {
+    /// Ends the frame, all units of which have been decoded. The digest of carried lists is compared if a unit ends the
+    /// frame, not if an error does.
+    pub(super) fn close(
+        mut self,
+        context: &Context<'_>,
+        reference: Option<&mut FrameState>,
+        ends_by_unit: bool,
+    ) -> Closed {
+        self.carried_digest = self.carried_digest.filter(|_| ends_by_unit);
+        let mut decoded = DecodedFrame::empty(self.index, self.role.frame_type);
+        decoded.level = u8::try_from(self.lists.heads.len()).unwrap_or(u8::MAX);
+        decoded.spatial_layer = self.lists.heads.last().map_or(0, |head| head.spatial_layer);
+        decoded.bytes = self.bytes;
+        decoded.entropy = core::mem::take(&mut self.entropy);
+        decoded.error = self.error;
+        let has_digest = context.options.verify && decoded.level > 0;
+        decoded.digest = has_digest.then(|| lists_digest(&self.lists.digests));
+        match self.is_intra() {
+            true => self.close_intra(context, decoded),
+            false => self.close_predicted(context, decoded, reference),
+        }
+    }
+
+    fn close_intra(mut self, context: &Context<'_>, mut decoded: DecodedFrame) -> Closed {
+        let sequence = context.sequence;
+        let sh_planes = usize::from(sequence.sh_dimension());
+        let refinements = sequence.refinement_count;
+        let top = sequence.spatial_layer_count.saturating_sub(1);
+        let layers = (0..sequence.spatial_layer_count).map(|layer| self.decoded.count(layer));
+        let is_complete = layers.into_iter().all(|count| count == refinements);
+        let level = match sequence.whole_anchor() {
+            true if is_complete => refinements,
+            true => 0,
+            false => self.decoded.count(top),
+        };
+        let is_short = decoded.level < refinements;
+        let shift = self.lists.last_shift().filter(|_| is_short).unwrap_or_default();
+        decoded.compensation = Compensation { exact: shift, ..Compensation::default() };
+        decoded.is_lost = decoded.level == 0;
+        let mut state =
+            FrameState { index: self.index, level, carried_shift: shift, ..FrameState::default() };
+        if context.gop.header.is_predicted() {
+            self.lists.divide();
+            state.carried = (decoded.level > 0).then(|| Carried::new(self.lists.lists.iter().cloned()));
+            state.anchor = sequence.whole_anchor().then(|| self.lists.lists.as_slice().into());
+            state.is_exact = level == refinements;
+        }
+        decoded.planes = self.lists.planes(sh_planes);
+        state.lists = self.lists.lists;
+        state.models = self.lists.models.first;
+        Closed { decoded, state, fault: None }
+    }
+
+    fn close_predicted(
+        mut self,
+        context: &Context<'_>,
+        mut decoded: DecodedFrame,
+        reference: Option<&mut FrameState>,
+    ) -> Closed {
+        let mut state = FrameState { index: self.index, level: decoded.level, ..FrameState::default() };
+        let level = usize::from(decoded.level);
+        let shows_subset = context.options.subset && level > 0;
+        let mut fault = None;
+        decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()));
+        if let Some(reference) = reference {
+            state.anchor = reference.anchor.clone();
+            state.is_exact = reference.is_exact && level > 0;
+            state.carried_shift = reference.carried_shift;
+            let digest = self.carried_digest.filter(|_| context.options.verify && !context.options.subset);
+            let count = reference.carried.as_ref().map_or(0, Carried::len);
+            let digest = digest.filter(|_| state.is_exact && level < count && self.error.is_none());
+            let from = if digest.is_some() { 0 } else { level };
+            let from = if shows_subset { count } else { from };
+            state.carried =
+                reference.carried.as_mut().map(|carried| carried.moved(&self.field, level > 0, from));
+            if let (Some((stored, at)), Some(carried)) = (digest, &mut state.carried) {
+                let computed = carried.digest();
+                decoded.carried_digest = Some(computed);
+                let kind = ErrorKind::Digest { stored, computed };
+                fault = (computed != stored).then_some(Error::new(at, "7.9.3", kind));
+            }
+            if let (Some(carried), false) = (&mut state.carried, shows_subset) {
+                show_carried(&mut decoded, carried);
+            }
+        }
+        decoded.error = decoded.error.or(fault);
+        decoded.is_lost = level == 0 && decoded.carried_lists == 0;
+        let refinements = context.sequence.refinement_count;
+        decoded.compensation = self.lists.compensation(&decoded, refinements, state.carried_shift);
+        state.lists = self.lists.lists;
+        state.models = self.lists.models.first;
+        Closed { decoded, state, fault }
+    }
+}
+
+/// Shows the carried lists from the level of the frame on.
+fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried) {
+    let exact = decoded.planes.len();
+    for h in usize::from(decoded.level)..carried.len() {
+        decoded.planes.append(&carried.list(h).planes);
+        decoded.carried_lists = decoded.carried_lists.saturating_add(1);
+    }
+    decoded.carried = decoded.planes.len().saturating_sub(exact);
+}
+
+impl Lists {
+    /// The exact Gaussians, list by list.
+    fn planes(&mut self, sh_planes: usize) -> QuantizedFrame {
+        if self.lists.is_empty() && !self.planes.is_empty() {
+            return core::mem::take(&mut self.planes);
+        }
+        let mut planes = QuantizedFrame::zeroed(0, sh_planes);
+        self.lists.iter().for_each(|list| planes.append(&list.planes));
+        planes
+    }
+
+    /// What the last unit says of a frame that ends with it.
+    fn last_shift(&self) -> Option<Shift> {
+        self.heads.last().map(|head| head.shift)
+    }
+
+    /// Clause 7.8.3, of a P or B frame. Where carried lists fill the frame, only Gaussians that are not of the I frame
+    /// are compensated.
+    fn compensation(&self, decoded: &DecodedFrame, refinements: u8, carried: Shift) -> Compensation {
+        let is_short = decoded.level < refinements;
+        let exact = self.last_shift().filter(|_| is_short).unwrap_or_default();
+        if decoded.carried_lists == 0 {
+            return Compensation { exact, ..Compensation::default() };
+        }
+        let is_new = |list: &Arc<GaussianList>| list.anchor.iter().map(|anchor| !anchor).collect::<Vec<_>>();
+        let only = match exact.is_zero() {
+            true => Vec::new(),
+            false => self.lists.iter().flat_map(is_new).collect(),
+        };
+        Compensation { exact, only, carried }
+    }
+}

@@ -1,0 +1,371 @@
+//! The units of a frame, decoded: clauses 7.4 to 7.9.
+//!
+//! 1. The models of all pending units are read, one unit after the other, since they may repeat each other.
+//! 2. The blocks of all units are decoded on all cores, as many units at a time as have few enough tables.
+//! 3. The units are applied one after the other: parents, displaced in a P or B frame, become the list of the unit.
+//!
+//! Where units only add Gaussians without predictors, steps 2 and 3 are one: see [`crate::direct`].
+
+use super::decoded::Shift;
+use super::frame::{Context, FrameInProgress, PendingUnit, Refused};
+use crate::digest::{ListDigest, list_digest, lists_digest};
+use crate::direct::{self, DirectUnit};
+use crate::entropy_state::{UnitEntropy, of_sections};
+use crate::frame::QuantizedFrame;
+use crate::frame_state::FrameState;
+use crate::increment::residual::AttributeCoding;
+use crate::increment::values::{PreparedSections, UnitValues};
+use crate::increment::{Applied, Situation, Unit, apply};
+use crate::layout::ShCoding;
+use crate::list::GaussianList;
+use rayon::prelude::*;
+use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
+use splatstream_format::syntax::IncrementHeader;
+use splatstream_format::{Error, ErrorKind, Result};
+use std::sync::Arc;
+
+/// Tables that are expanded at the same time: all of those of an honest frame. A stream made to take memory gets one unit
+/// at a time.
+const MAX_TABLES: usize = 1 << 12;
+/// Values of units that are held at the same time, if there is more than one unit: 64 MiB. Units of spatial layers, each
+/// of which changes all Gaussians, would take several times the memory of their frame otherwise.
+const MAX_VALUES: u64 = 1 << 24;
+
+/// The lists of a frame so far: list h at the highest spatial layer that has it.
+#[derive(Debug, Default)]
+pub(super) struct Lists {
+    /// The lists one after the other, as long as all were decoded straight into planes; `lists` is empty then.
+    pub(super) planes: QuantizedFrame,
+    pub(super) lists: Vec<Arc<GaussianList>>,
+    /// The unit of each list.
+    pub(super) heads: Vec<Head>,
+    pub(super) digests: Vec<ListDigest>,
+    pub(super) models: ModelsOfFrame,
+    /// In a P or B frame: the first lists of the reference frame displaced, as far as units predicted from them.
+    displaced: Vec<QuantizedFrame>,
+}
+
+/// The last unit of a list.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Head {
+    pub(super) spatial_layer: u8,
+    pub(super) shift: Shift,
+    /// Gaussians of the list, and how many of them, the last ones, the unit added.
+    size: usize,
+    added: usize,
+}
+
+/// A pending unit with its models read.
+struct Prepared<'r, 'a> {
+    unit: &'r PendingUnit<'a>,
+    sections: PreparedSections<'r, 'a>,
+    coding: AttributeCoding<'r>,
+    /// The models in force after the unit.
+    models: ModelsInForce,
+}
+
+impl Lists {
+    /// Of a frame with these models in force before its first unit.
+    pub(super) fn new(models: ModelsInForce) -> Self {
+        Self { models: ModelsOfFrame::starting_with(models), ..Self::default() }
+    }
+
+    /// Makes lists of the planes.
+    pub(super) fn divide(&mut self) {
+        if !self.lists.is_empty() {
+            return;
+        }
+        let mut start = 0_usize;
+        for head in &self.heads {
+            let end = start.saturating_add(head.size);
+            self.lists.push(Arc::new(GaussianList::of_planes(self.planes.part(start..end), true)));
+            start = end;
+        }
+        self.planes = QuantizedFrame::default();
+    }
+
+    /// Compares the digest of lists 0 to r, of which the last is new.
+    fn check_digest(&mut self, refinement: u8, digest: ListDigest, stored: u64, at: u64) -> Result<()> {
+        let r = usize::from(refinement);
+        let mut digests = self.digests.get(..r).unwrap_or_default().to_vec();
+        digests.push(digest.clone());
+        let computed = lists_digest(&digests);
+        if computed != stored {
+            return Err(Error::new(at, "7.9.2", ErrorKind::Digest { stored, computed }));
+        }
+        put(&mut self.digests, r, digest);
+        Ok(())
+    }
+
+    /// Takes the list that a unit leaves.
+    fn take(&mut self, refinement: u8, list: GaussianList, head: Head) {
+        put(&mut self.lists, refinement.into(), Arc::new(list));
+        put(&mut self.heads, refinement.into(), head);
+    }
+}
+
+/// Sets the value at an index, which is at most the length.
+fn put<T>(values: &mut Vec<T>, index: usize, value: T) {
+    match values.get_mut(index) {
+        Some(slot) => *slot = value,
+        None => values.push(value),
+    }
+}
+
+impl<'a> FrameInProgress<'a> {
+    /// Decodes the pending units; gives their errors in stream order.
+    pub(super) fn decode(&mut self, context: &Context<'_>) -> Vec<Error> {
+        let pending = core::mem::take(&mut self.pending);
+        let mut errors = Vec::new();
+        let prepared = self.prepare(&pending, context);
+        let is_direct = self.is_direct(&pending, context);
+        if !is_direct {
+            self.lists.divide();
+        }
+        let mut rest = prepared.as_slice();
+        while !rest.is_empty() {
+            let (group, later) = rest.split_at_checked(group_length(rest, is_direct)).unwrap_or((rest, &[]));
+            match is_direct {
+                true => self.decode_direct(group, context, &mut errors),
+                false => self.decode_group(group, context, &mut errors),
+            }
+            rest = later;
+        }
+        self.expected = self.decoded.clone();
+        errors
+    }
+
+    /// Reads the models of the units. A unit whose models are wrong is the last: those after it are of no use, or they are
+    /// judged again once the error has been reported.
+    fn prepare<'r>(
+        &self,
+        units: &'r [PendingUnit<'a>],
+        context: &Context<'r>,
+    ) -> Vec<(&'r PendingUnit<'a>, Result<Prepared<'r, 'a>>)> {
+        let mut in_force = self.lists.models.clone();
+        let prepare = |unit: &'r PendingUnit<'a>| {
+            let prepared = self.prepared(unit, context, &mut in_force);
+            (unit, prepared)
+        };
+        units.iter().map(prepare).collect()
+    }
+
+    fn prepared<'r>(
+        &self,
+        unit: &'r PendingUnit<'a>,
+        context: &Context<'r>,
+        in_force: &mut ModelsOfFrame,
+    ) -> Result<Prepared<'r, 'a>> {
+        let header = &unit.increment.header;
+        let transforms = context.gop.transforms(&self.header, self.payload_at)?;
+        let colour = context.gop.colour(transforms, header, self.role.temporal_layer, unit.payload_at)?;
+        let sh = ShCoding::of(&header.sh(), transforms.sh.map_or(0, |sh| sh.header.rank));
+        let mut models = in_force.before(unit.refinement).clone();
+        let sections = &unit.increment.sections;
+        let sections = PreparedSections::new(sections, transforms.dc.header.rank, sh, &mut models, &mut ())?;
+        in_force.follow(unit.refinement, models.clone());
+        let coding = AttributeCoding {
+            shift: header.attribute_shift,
+            canonical_axes: context.sequence.canonical_axes(),
+            rotation_thresholds: context.sequence.rotation_threshold,
+            colour,
+        };
+        Ok(Prepared { unit, sections, coding, models })
+    }
+
+    /// Whether the units can be decoded straight into planes. Entropy states need the values by themselves.
+    fn is_direct(&self, units: &[PendingUnit<'a>], context: &Context<'_>) -> bool {
+        let of_lowest_layer = |unit: &PendingUnit<'_>| self.is_intra() && unit.spatial_layer == 0;
+        let is_direct = |unit: &PendingUnit<'_>| of_lowest_layer(unit) && direct::is_direct(&unit.increment);
+        self.lists.lists.is_empty() && !context.options.entropy && units.iter().all(is_direct)
+    }
+
+    /// Decodes units whose blocks go straight into planes. They are of one layer: after one that fails none is accepted.
+    fn decode_direct(
+        &mut self,
+        group: &[(&PendingUnit<'a>, Result<Prepared<'_, 'a>>)],
+        context: &Context<'_>,
+        errors: &mut Vec<Error>,
+    ) {
+        let units: Vec<DirectUnit<'_, '_>> = group
+            .iter()
+            .filter_map(|(unit, prepared)| Some((unit, prepared.as_ref().ok()?)))
+            .map(|(unit, Prepared { sections, coding, .. })| DirectUnit {
+                header: &unit.increment.header,
+                prepared: sections,
+                coding: *coding,
+            })
+            .collect();
+        let (mut planes, results) = direct::decode(&units, context.sequence);
+        let mut results = results.into_iter();
+        let mut kept = 0_usize;
+        for (unit, prepared) in group {
+            if unit.refinement >= self.decoded.limit {
+                break;
+            }
+            let taken = known(prepared).and_then(|prepared| {
+                let added = results.next().unwrap_or(Ok(0))?;
+                let end = kept.wrapping_add(added);
+                self.check_list(unit, context, || list_digest(&planes, kept..end))?;
+                put(&mut self.lists.heads, unit.refinement.into(), Head::new(unit, added, added));
+                self.finish_unit(unit, added, prepared);
+                Ok(end)
+            });
+            match taken {
+                Ok(end) => kept = end,
+                Err(error) => self.refuse(unit, error, errors),
+            }
+        }
+        planes.truncate(kept);
+        match self.lists.planes.is_empty() {
+            true => self.lists.planes = planes,
+            false => self.lists.planes.append(&planes),
+        }
+    }
+
+    /// Decodes units whose lists depend on others.
+    fn decode_group(
+        &mut self,
+        group: &[(&PendingUnit<'a>, Result<Prepared<'_, 'a>>)],
+        context: &Context<'_>,
+        errors: &mut Vec<Error>,
+    ) {
+        let values: Vec<Result<UnitValues>> = group
+            .par_iter()
+            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence))
+            .collect();
+        for ((unit, prepared), values) in group.iter().zip(values) {
+            if unit.refinement >= self.decoded.limit {
+                continue;
+            }
+            let prepared = known(prepared);
+            let taken = prepared.and_then(|prepared| self.unit(prepared, &values?, context));
+            if let Err(error) = taken {
+                self.refuse(unit, error, errors);
+            }
+        }
+    }
+
+    /// Applies a unit and checks its digest.
+    fn unit(
+        &mut self,
+        prepared: &Prepared<'_, 'a>,
+        values: &UnitValues,
+        context: &Context<'_>,
+    ) -> Result<()> {
+        let pending = prepared.unit;
+        let header = &pending.increment.header;
+        let unit = Unit {
+            header,
+            values,
+            coding: prepared.coding,
+            sequence: context.sequence,
+            intra: self.is_intra(),
+            network: context.gop.network(),
+            max_learned: context.options.limits.max_learned,
+            at: pending.payload_at,
+        };
+        let Applied { list, added } = self.applied(&unit, pending.refinement, context)?;
+        self.check_list(pending, context, || list.digest())?;
+        if context.options.entropy {
+            let state = of_sections(&pending.increment.sections, values);
+            let payload_at = pending.payload_at;
+            self.entropy.extend(state.map(|state| UnitEntropy { payload_at, state }));
+        }
+        let (size, head) = (list.len(), Head::new(pending, list.len(), added.len()));
+        self.lists.take(pending.refinement, list, head);
+        self.finish_unit(pending, size, prepared);
+        Ok(())
+    }
+
+    fn applied(&mut self, unit: &Unit<'_>, refinement: u8, context: &Context<'_>) -> Result<Applied> {
+        let r = usize::from(refinement);
+        let sh_planes = usize::from(context.sequence.sh_dimension());
+        let empty = || GaussianList::empty(sh_planes);
+        let Some(reference) = context.reference else {
+            let parents = self.lists.lists.get(r).map_or_else(empty, |list| list.as_ref().clone());
+            let lower: Vec<&QuantizedFrame> =
+                self.lists.lists.iter().take(r).map(|list| &list.planes).collect();
+            return apply(unit, parents, &Situation { around: [&lower, &[]], parents_follow: true });
+        };
+        let mut parents = reference.lists.get(r).map_or_else(empty, |list| list.as_ref().clone());
+        parents.displace(&self.field);
+        if unit.header.predictor_count() == 0 {
+            return apply(unit, parents, &Situation { around: [&[], &[]], parents_follow: false });
+        }
+        self.displace_before(r, reference);
+        let added = self.added_before(r);
+        let lower: Vec<&QuantizedFrame> = self.lists.displaced.iter().take(r).collect();
+        let anchor = reference.anchor.iter().flat_map(|lists| lists.iter().skip(r.wrapping_add(1)));
+        let after: Vec<&QuantizedFrame> = anchor.map(|list| &list.planes).chain(&added).collect();
+        apply(unit, parents, &Situation { around: [&lower, &after], parents_follow: false })
+    }
+
+    /// Displaces the lists before list r of the reference frame, unless units before have asked for them.
+    fn displace_before(&mut self, r: usize, reference: &FrameState) {
+        for list in reference.lists.iter().take(r).skip(self.lists.displaced.len()) {
+            let mut list = list.as_ref().clone();
+            list.displace(&self.field);
+            self.lists.displaced.push(list.planes);
+        }
+    }
+
+    /// The Gaussians that the units before unit r added.
+    fn added_before(&self, r: usize) -> Vec<QuantizedFrame> {
+        let added = |(list, head): (&Arc<GaussianList>, &Head)| {
+            list.planes.part(head.size.saturating_sub(head.added)..head.size)
+        };
+        self.lists.lists.iter().zip(&self.lists.heads).take(r).map(added).collect()
+    }
+
+    fn check_list(
+        &mut self,
+        unit: &PendingUnit<'_>,
+        context: &Context<'_>,
+        digest: impl FnOnce() -> ListDigest,
+    ) -> Result<()> {
+        if !context.options.verify {
+            return Ok(());
+        }
+        let stored = unit.increment.header.refinement_digest;
+        let at = unit.increment.header.at(unit.payload_at, "refinement_digest");
+        self.lists.check_digest(unit.refinement, digest(), stored, at)
+    }
+
+    /// Takes note of a unit that was decoded.
+    fn finish_unit(&mut self, unit: &PendingUnit<'_>, size: usize, prepared: &Prepared<'_, '_>) {
+        self.bytes = self.bytes.saturating_add(unit.bytes);
+        self.lists.models.follow(unit.refinement, prepared.models.clone());
+        self.decoded.take(unit.spatial_layer, unit.refinement, u32::try_from(size).unwrap_or(u32::MAX));
+    }
+
+    fn refuse(&mut self, unit: &PendingUnit<'_>, error: Error, errors: &mut Vec<Error>) {
+        self.fail(&Refused { error, limit: unit.refinement });
+        errors.push(error);
+    }
+}
+
+impl Head {
+    fn new(unit: &PendingUnit<'_>, size: usize, added: usize) -> Self {
+        let IncrementHeader { compensation_log_scale, compensation_opacity, .. } = unit.increment.header;
+        let shift = Shift { log_scale: compensation_log_scale, opacity: compensation_opacity };
+        Self { spatial_layer: unit.spatial_layer, shift, size, added }
+    }
+}
+
+/// A unit with its models, unless they are wrong.
+fn known<'p, 'r, 'a>(prepared: &'p Result<Prepared<'r, 'a>>) -> Result<&'p Prepared<'r, 'a>> {
+    prepared.as_ref().map_err(|error| *error)
+}
+
+/// How many of the units, at least one, have their tables expanded and their values held at the same time.
+fn group_length(units: &[(&PendingUnit<'_>, Result<Prepared<'_, '_>>)], is_direct: bool) -> usize {
+    let (mut tables, mut values) = (0_usize, 0_u64);
+    let fits = |(_, prepared): &&(&PendingUnit<'_>, Result<Prepared<'_, '_>>)| {
+        let more = prepared.as_ref().map_or(0, |prepared| prepared.sections.tables());
+        tables = tables.saturating_add(more);
+        values = values.saturating_add(prepared.as_ref().map_or(0, |prepared| prepared.sections.values()));
+        tables <= MAX_TABLES && (is_direct || values <= MAX_VALUES)
+    };
+    units.iter().take_while(fits).count().max(1)
+}

@@ -1,0 +1,242 @@
+//! A frame in progress: which increments are accepted (clause 7.1.4).
+//!
+//! The payload of an increment is divided when it comes; its blocks are decoded later, together with those of the units
+//! after it, so that all cores have work ([`super::decoding`]). Until then the unit counts as good. That changes nothing:
+//! an error in a unit of refinement r makes the decoder discard units of refinements from r on, and no other unit depends
+//! on it. Before an error is reported, the units before it are decoded, so that errors come in stream order.
+
+use super::Options;
+use super::decoding::Lists;
+use super::phase::{same, unexpected};
+use crate::displacement::CellField;
+use crate::entropy_state::UnitEntropy;
+use crate::frame_state::FrameState;
+use crate::gop::{Gop, element_at};
+use splatstream_format::payload::Increment;
+use splatstream_format::syntax::{
+    FrameHeader, FrameRole, IncrementHeader, ListSizes, Profile, SequenceParameters, UnitHeader,
+};
+use splatstream_format::unit::Unit;
+use splatstream_format::{Error, ErrorKind, Result};
+use std::sync::Arc;
+
+/// What stands around a frame.
+#[derive(Clone, Copy)]
+pub(super) struct Context<'d> {
+    pub(super) options: &'d Options,
+    pub(super) profile: Profile,
+    pub(super) sequence: &'d SequenceParameters,
+    pub(super) gop: &'d Gop,
+    /// The reference frame of a P or B frame, if its header was decoded.
+    pub(super) reference: Option<&'d FrameState>,
+}
+
+/// A frame whose units are arriving.
+pub(super) struct FrameInProgress<'a> {
+    /// Display index.
+    pub(super) index: u32,
+    /// Absolute offset of the payload of its header.
+    pub(super) payload_at: u64,
+    pub(super) header: FrameHeader,
+    pub(super) role: FrameRole,
+    /// The digest of its carried lists, and its absolute offset.
+    pub(super) carried_digest: Option<(u64, u64)>,
+    /// Where the reference frame is kept, if it is.
+    pub(super) reference: Option<usize>,
+    /// The cells that move.
+    pub(super) field: Arc<CellField>,
+    /// Whether an increment of the frame came, decoded or not.
+    pub(super) seen: bool,
+    /// Units that were accepted and are not yet decoded.
+    pub(super) pending: Vec<PendingUnit<'a>>,
+    /// The state if all pending units are good.
+    pub(super) expected: Progress,
+    /// The state after the units that were decoded.
+    pub(super) decoded: Progress,
+    pub(super) lists: Lists,
+    /// Bytes of its units, and their entropy states if they are asked for.
+    pub(super) bytes: u64,
+    pub(super) entropy: Vec<UnitEntropy>,
+    /// The first error of the frame.
+    pub(super) error: Option<Error>,
+}
+
+/// Which units of a frame there are.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Progress {
+    /// Units of refinements from this one on are discarded.
+    pub(super) limit: u8,
+    /// The spatial layer of the last unit.
+    layer: u8,
+    /// Units of each spatial layer.
+    pub(super) counts: [u8; 4],
+    /// Gaussians of each list, at the highest spatial layer that has it.
+    sizes: Vec<u32>,
+}
+
+/// An increment that has been divided.
+pub(super) struct PendingUnit<'a> {
+    pub(super) spatial_layer: u8,
+    pub(super) refinement: u8,
+    pub(super) increment: Increment<'a>,
+    pub(super) payload_at: u64,
+    pub(super) bytes: u64,
+}
+
+/// An error of an increment, and the refinements that are still accepted after it.
+pub(super) struct Refused {
+    pub(super) error: Error,
+    pub(super) limit: u8,
+}
+
+impl Progress {
+    /// Of a frame without units that takes lists below `limit`.
+    pub(super) fn new(limit: u8) -> Self {
+        Self { limit, ..Self::default() }
+    }
+
+    /// Units of a spatial layer.
+    pub(super) fn count(&self, layer: u8) -> u8 {
+        self.counts.get(usize::from(layer)).copied().unwrap_or(0)
+    }
+
+    /// Gaussians of list h.
+    fn size(&self, h: u8) -> u32 {
+        self.sizes.get(usize::from(h)).copied().unwrap_or(0)
+    }
+
+    /// Gaussians of the lists before list h.
+    fn size_before(&self, h: u8) -> u32 {
+        self.sizes.iter().take(h.into()).copied().fold(0, u32::saturating_add)
+    }
+
+    /// Whether unit (s, r) is the next: the units of an I frame come layer by layer, and a layer has no list that the layer
+    /// below lacks.
+    fn expects(&self, layer: u8, refinement: u8, intra: bool) -> bool {
+        let has_parents = match layer.checked_sub(1) {
+            Some(below) if intra => self.count(below) > refinement,
+            _ => true,
+        };
+        layer >= self.layer && refinement == self.count(layer) && has_parents
+    }
+
+    /// Takes a unit that leaves its list with `size` Gaussians.
+    pub(super) fn take(&mut self, layer: u8, refinement: u8, size: u32) {
+        self.layer = layer;
+        if let Some(count) = self.counts.get_mut(usize::from(layer)) {
+            *count = count.saturating_add(1);
+        }
+        match self.sizes.get_mut(usize::from(refinement)) {
+            Some(slot) => *slot = size,
+            None => self.sizes.push(size),
+        }
+    }
+}
+
+impl<'a> FrameInProgress<'a> {
+    pub(super) const fn is_intra(&self) -> bool {
+        self.role.reference.is_none()
+    }
+
+    /// Accepts an increment that belongs to the operating point. `None` if it is discarded.
+    pub(super) fn accept(
+        &self,
+        unit: &Unit<'a>,
+        context: &Context<'_>,
+    ) -> core::result::Result<Option<PendingUnit<'a>>, Refused> {
+        let header = &unit.header;
+        let limit = self.expected.limit;
+        let costs_nothing = |error| Refused { error, limit };
+        let frame_at = element_at(&UnitHeader::TABLE, unit.at, "frame");
+        same(frame_at, "7.1.2", "frame", header.frame, self.index).map_err(costs_nothing)?;
+        let refinements = context.sequence.refinement_count;
+        if header.refinement >= refinements {
+            let at = element_at(&UnitHeader::TABLE, unit.at, "refinement");
+            let (value, max) = (header.refinement.into(), refinements.saturating_sub(1).into());
+            let kind = ErrorKind::OutOfRange { element: "refinement", value, min: 0, max };
+            return Err(costs_nothing(Error::new(at, "7.1.4", kind)));
+        }
+        if header.refinement >= limit {
+            return Ok(None);
+        }
+        let costs_list = |error| Refused { error, limit: header.refinement };
+        self.check_layers(unit, context).map_err(costs_list)?;
+        let top = context.sequence.spatial_layer_count.saturating_sub(1);
+        let layer = if self.is_intra() { header.spatial_layer } else { top };
+        if header.spatial_layer != layer || !self.expected.expects(layer, header.refinement, self.is_intra())
+        {
+            let limit = limit.min(self.expected.count(layer));
+            return Err(Refused { error: unexpected(unit), limit });
+        }
+        unit.check_payload().map_err(costs_list)?;
+        let increment = self.divided(unit, context).map_err(costs_list)?;
+        Ok(Some(PendingUnit {
+            spatial_layer: header.spatial_layer,
+            refinement: header.refinement,
+            increment,
+            payload_at: unit.payload_at,
+            bytes: unit_bytes(unit),
+        }))
+    }
+
+    /// The layers of a unit are layers of the sequence and of the frame.
+    fn check_layers(&self, unit: &Unit<'a>, context: &Context<'_>) -> Result<()> {
+        unit.header.validate_layers(unit.at, context.sequence)?;
+        let at = element_at(&UnitHeader::TABLE, unit.at, "temporal_layer");
+        same(at, "7.3.1", "temporal_layer", unit.header.temporal_layer, self.role.temporal_layer)
+    }
+
+    /// Checks the elements of the payload, those that relate to the frame included, and divides it into sections.
+    fn divided(&self, unit: &Unit<'a>, context: &Context<'_>) -> Result<Increment<'a>> {
+        let Context { sequence, gop, options, .. } = context;
+        let at = unit.payload_at;
+        let (header, _) = IncrementHeader::parse(unit.payload, at, sequence, context.profile)?;
+        header.within(at, unit.payload.len(), &options.limits)?;
+        header.validate_counts(at, &self.sizes(unit, context))?;
+        let transforms = gop.transforms(&self.header, self.payload_at)?;
+        gop.colour(transforms, &header, unit.header.temporal_layer, at)?;
+        Increment::parse(unit.payload, at, sequence, context.profile, &options.limits)
+    }
+
+    /// What the frame says about the list of a unit.
+    fn sizes(&self, unit: &Unit<'a>, context: &Context<'_>) -> ListSizes {
+        let (sequence, refinement) = (context.sequence, unit.header.refinement);
+        let all = self.header.gaussian_count;
+        let before = self.expected.size_before(refinement);
+        let max_size = all.saturating_sub(before);
+        let is_top = unit.header.spatial_layer.saturating_add(1) == sequence.spatial_layer_count;
+        let is_last = refinement.saturating_add(1) == sequence.refinement_count;
+        let size = match self.is_intra() {
+            true => is_top.then(|| sequence.refinement_length(refinement, all)),
+            false => is_last.then_some(max_size),
+        };
+        let parents = match (context.reference, unit.header.spatial_layer) {
+            (Some(reference), _) => {
+                let list = reference.lists.get(usize::from(refinement));
+                list.map_or(0, |list| u32::try_from(list.len()).unwrap_or(u32::MAX))
+            }
+            (None, 0) => 0,
+            (None, _) => self.expected.size(refinement),
+        };
+        ListSizes { parents, intra: self.is_intra(), size, max_size }
+    }
+
+    /// Puts an accepted unit to those that wait.
+    pub(super) fn push(&mut self, unit: PendingUnit<'a>) {
+        self.expected.take(unit.spatial_layer, unit.refinement, unit.increment.header.list_size());
+        self.pending.push(unit);
+    }
+
+    /// Takes note of an error; units of refinements from `limit` on are discarded.
+    pub(super) fn fail(&mut self, Refused { error, limit }: &Refused) {
+        self.error.get_or_insert(*error);
+        self.decoded.limit = self.decoded.limit.min(*limit);
+        self.expected.limit = self.decoded.limit;
+    }
+}
+
+/// Bytes of a unit, its header included.
+pub(super) fn unit_bytes(unit: &Unit<'_>) -> u64 {
+    let length = UnitHeader::SIZE.saturating_add(unit.payload.len());
+    u64::try_from(length).unwrap_or(u64::MAX)
+}

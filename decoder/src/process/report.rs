@@ -1,0 +1,45 @@
+//! What a decoder has found wrong with a stream, clause 9.
+
+use core::ops::RangeInclusive;
+use splatstream_format::Error;
+
+/// Errors in stream order, and frames that were never output.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Report {
+    pub(super) errors: Vec<Error>,
+    /// Display indices, increasing; ranges that touch are joined.
+    pub(super) lost: Vec<RangeInclusive<u32>>,
+}
+
+impl Report {
+    /// The frames with display indices from `first` up to, but without, `end` will not be output.
+    pub(super) fn lose(&mut self, first: u64, end: u64) {
+        let (Ok(start), Some(Ok(last))) = (u32::try_from(first), end.checked_sub(1).map(u32::try_from))
+        else {
+            return;
+        };
+        if first >= end {
+            return;
+        }
+        match self.lost.last_mut() {
+            Some(range) if u64::from(*range.end()).saturating_add(1) >= first => {
+                *range = *range.start()..=last
+            }
+            _ => self.lost.push(start..=last),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_lost_frames_are_joined_and_reach_the_last_index() {
+        let mut report = Report::default();
+        for (first, end) in [(3, 3), (3, 5), (5, 6), (8, 9), ((1 << 32) - 1, 1 << 32), (1 << 32, 1 << 32)] {
+            report.lose(first, end);
+        }
+        assert_eq!(report.lost, [3..=5, 8..=8, u32::MAX..=u32::MAX]);
+    }
+}

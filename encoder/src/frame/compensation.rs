@@ -1,0 +1,69 @@
+//! What fills the holes of a prefix: log-scales and opacities raised where later refinements are missing (7.8.3).
+
+use splatstream_decoder::list::GaussianList;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_render::camera::{Up, spiral};
+use splatstream_render::{Camera, Image, metrics, render};
+use splatstream_scene::GaussianFrame;
+
+/// Views that a prefix is judged in, and their lines: holes are large. Fuzzing wants streams, not pictures.
+const VIEWS: u32 = 2;
+const LINES: u32 = if cfg!(fuzzing) { 12 } else { 120 };
+/// Largest offset that is tried, steps.
+const MOST: i8 = 6;
+const BACKGROUND: [f32; 3] = [0.0; 3];
+
+/// Judges prefixes of one frame.
+pub(crate) struct Compensator {
+    views: Vec<(Camera, Image)>,
+}
+
+impl Compensator {
+    /// For prefixes of a frame that all of its Gaussians make.
+    pub(crate) fn new(frame: &GaussianFrame) -> Self {
+        let view = |camera: Camera| {
+            let colour = render(frame, &camera, BACKGROUND).colour;
+            (camera, colour)
+        };
+        Self { views: spiral(frame, Up::default(), VIEWS, LINES).into_iter().map(view).collect() }
+    }
+
+    /// Offsets of log-scale and opacity for the Gaussians of some lists: as far as each step up brings the pictures
+    /// nearer to those of the whole frame, first of the scale, then of the opacity.
+    pub(crate) fn offsets(&self, lists: &[GaussianList], sequence: &SequenceParameters) -> (i8, i8) {
+        let mut best = (self.error(lists, (0, 0), sequence), (0, 0));
+        for grow in
+            [|(scale, opacity): (i8, i8)| (scale + 1, opacity), |(scale, opacity)| (scale, opacity + 1)]
+        {
+            loop {
+                let tried = grow(best.1);
+                let error = self.error(lists, tried, sequence);
+                if tried.0 > MOST || tried.1 > MOST || error >= best.0 {
+                    break;
+                }
+                best = (error, tried);
+            }
+        }
+        best.1
+    }
+
+    /// Decibels below the whole frame, so that less is better.
+    fn error(
+        &self,
+        lists: &[GaussianList],
+        (scale, opacity): (i8, i8),
+        sequence: &SequenceParameters,
+    ) -> f64 {
+        let mut planes =
+            splatstream_decoder::frame::QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
+        lists.iter().for_each(|list| planes.append(&list.planes));
+        planes.log_scale.iter_mut().flatten().for_each(|value| *value += i32::from(scale));
+        planes.opacity.iter_mut().for_each(|value| *value += i32::from(opacity));
+        let shown = to_gaussians(planes, sequence);
+        let psnr = |(camera, whole): &(Camera, Image)| {
+            metrics::psnr(&render(&shown, camera, BACKGROUND).colour, whole)
+        };
+        -self.views.iter().map(psnr).sum::<f64>()
+    }
+}

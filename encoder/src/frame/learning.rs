@@ -1,0 +1,208 @@
+//! The network of a sequence: where it comes from, and what it is trained with.
+
+use super::wanted::Wanted;
+use crate::error::Error;
+use crate::gop::SequenceCoder;
+use crate::importance::Ranking;
+use crate::report::Report;
+use crate::sequence::{Analysis, analyse};
+use crate::settings::{NetworkSource, Preset, Settings};
+use crate::source::FrameSource;
+use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, TrainingReport, train};
+use crate::writer::UnitWriter;
+use core::cell::RefCell;
+use core::ops::ControlFlow;
+use splatstream_decoder::increment::prediction::Prediction;
+use splatstream_decoder::increment::residual::Attributes;
+use splatstream_decoder::predictor::Predictor;
+use splatstream_decoder::transformer::{Batch, LANES};
+use splatstream_format::Limits;
+use splatstream_format::payload::{Layer, Network, Part, REGISTRY, Weights};
+use splatstream_format::syntax::{Profile, SequenceParameters};
+
+/// Batches that a unit gives, at most: a network is trained on many frames.
+const OF_A_UNIT: usize = 1 << 9;
+
+/// Batches that a network is trained with, at most.
+const MOST: usize = 1 << 13;
+
+/// Batches below which there is nothing to train with.
+const LEAST: usize = 1 << 6;
+
+/// One batch of so many is kept to judge the network by.
+const HELD_OUT: usize = 8;
+
+/// Collects what a network is trained with, while a sequence is encoded.
+#[derive(Default)]
+pub(crate) struct Recorder {
+    samples: RefCell<Vec<Sample>>,
+}
+
+impl Recorder {
+    /// Takes some of the Gaussians that a unit predicts.
+    pub(crate) fn take(&self, prediction: &Prediction<'_>, now: &Attributes, wanted: &Wanted) {
+        let Some(learned) = prediction.learned() else { return };
+        let targets = prediction.targets();
+        let stride = targets.len().div_ceil(LANES).div_ceil(OF_A_UNIT).max(1);
+        let some: Vec<_> = targets.chunks_exact(LANES).step_by(stride).flatten().copied().collect();
+        let batches = learned.batches(&some, now);
+        let outputs = learned.wanted(&some, &wanted.dc, &wanted.sh);
+        let mut samples = self.samples.borrow_mut();
+        samples
+            .extend(batches.into_iter().zip(outputs.chunks(LANES)).map(|(batch, rows)| sample(batch, rows)));
+    }
+
+    /// Whether that is enough.
+    pub(crate) fn is_full(&self) -> bool {
+        self.samples.borrow().len() >= MOST
+    }
+}
+
+/// The payload of the weights unit of a network: its name, if it is registered.
+///
+/// # Errors
+/// A network that a decoder would refuse.
+pub(crate) fn weights(network: &Network) -> Result<Weights, Error> {
+    let bytes = network.to_bytes()?;
+    let registered = REGISTRY.iter().find(|(_, known)| **known == bytes[..]);
+    Ok(registered
+        .map_or_else(|| Weights::Carried(Box::new(network.clone())), |(name, _)| Weights::Registered(*name)))
+}
+
+/// The network that the GOPs of a sequence may use.
+///
+/// # Errors
+/// As [`encode`](crate::encode).
+pub(crate) fn network(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    analysis: &Analysis,
+) -> Result<Option<Network>, Error> {
+    let sequence = &analysis.parameters;
+    if settings.profile() == Profile::Intra || !settings.predictors.allows(Predictor::Transformer) {
+        return Ok(None);
+    }
+    // Among other predictors it seldom saves what it takes.
+    let sought = settings.preset == Preset::Small || !settings.predictors.allows(Predictor::Bilateral);
+    match settings.network.clone().or(sought.then_some(NetworkSource::Fitted)) {
+        None => Ok(None),
+        Some(NetworkSource::Given(network)) => Ok(Some(*network)),
+        Some(NetworkSource::Registered) => registered(),
+        Some(NetworkSource::Fitted) => trained(source, settings, sequence, &Architecture::BASES),
+        Some(NetworkSource::Trained(architecture)) => trained(source, settings, sequence, &[architecture]),
+    }
+}
+
+/// A network trained on the sequence, of the architecture whose base is nearer.
+fn trained(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    sequence: &SequenceParameters,
+    architectures: &[Architecture],
+) -> Result<Option<Network>, Error> {
+    let mut found = Vec::new();
+    for architecture in architectures {
+        found.push((*architecture, recorded(source, settings, sequence, architecture)?));
+    }
+    let (architecture, samples) = nearer(found);
+    Ok(train_network(&architecture, samples, &mut |_| {})?.map(|(network, _)| network))
+}
+
+/// The registered network, if there is one.
+fn registered() -> Result<Option<Network>, Error> {
+    let first = REGISTRY.first().map(|(_, bytes)| Network::parse(bytes, 0));
+    Ok(first.transpose()?)
+}
+
+/// Encodes a sequence for what its new Gaussians are predicted from.
+///
+/// # Errors
+/// As [`encode`](crate::encode).
+fn recorded(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    sequence: &SequenceParameters,
+    architecture: &Architecture,
+) -> Result<Vec<Sample>, Error> {
+    let recorder = Recorder::default();
+    let (mut report, mut nowhere) = (Report::default(), std::io::sink());
+    let mut writer = UnitWriter::new(&mut nowhere, settings.profile(), sequence);
+    let coder = SequenceCoder {
+        source,
+        settings,
+        sequence: *sequence,
+        ranking: &mut Ranking::new(settings),
+        writer: &mut writer,
+        report: &mut report,
+        network: Some(zero(architecture)?),
+        limits: Limits::default(),
+        recorder: Some(&recorder),
+    };
+    coder.run(&mut |_, _| {})?;
+    Ok(recorder.samples.into_inner())
+}
+
+/// What the new Gaussians of a sequence can be predicted from: a network is trained with it.
+///
+/// # Errors
+/// As [`encode`](crate::encode).
+pub fn samples(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    architecture: &Architecture,
+) -> Result<Vec<Sample>, Error> {
+    let analysis = analyse(source, settings)?;
+    recorded(source, settings, &analysis.parameters, architecture)
+}
+
+/// The architecture whose base leaves least, and its samples; of equal ones the first.
+pub fn nearer(found: Vec<(Architecture, Vec<Sample>)>) -> (Architecture, Vec<Sample>) {
+    let left = |(architecture, samples): &(Architecture, Vec<Sample>)| -> u64 {
+        let outputs = usize::from(architecture.dc_count) + usize::from(architecture.sh_count);
+        Loss::of_base(samples, outputs).sums.iter().sum()
+    };
+    found.into_iter().min_by_key(left).unwrap_or_default()
+}
+
+/// A network trained with samples; none where they are too few. `progress` is called after each epoch.
+///
+/// # Errors
+/// As [`train`].
+pub fn train_network(
+    architecture: &Architecture,
+    samples: Vec<Sample>,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Option<(Network, TrainingReport)>, Error> {
+    if samples.len() < LEAST {
+        return Ok(None);
+    }
+    let (mut training, mut held_out) = (Vec::new(), Vec::new());
+    for (index, sample) in samples.into_iter().enumerate() {
+        if index % HELD_OUT == 0 { held_out.push(sample) } else { training.push(sample) }
+    }
+    let mut progress = |epoch: &Progress| {
+        progress(epoch);
+        ControlFlow::Continue(())
+    };
+    train(architecture, &training, &held_out, &Schedule::default(), &mut progress).map(Some)
+}
+
+/// A network of an architecture that gives 0: it predicts what its base does.
+fn zero(architecture: &Architecture) -> Result<Network, Error> {
+    let header = architecture.header()?;
+    let layers = Part::ALL.map(|part| {
+        let (weights, biases) = part.lengths(&header);
+        Layer { weights: vec![0; weights], bias: vec![0; biases] }
+    });
+    Ok(Network::new(header, layers)?)
+}
+
+/// A batch, and for each of its Gaussians the outputs that would leave nothing to code.
+fn sample(batch: Batch, rows: &[Vec<i32>]) -> Sample {
+    let outputs = rows.first().map_or(0, Vec::len);
+    let mut wanted = vec![[0; LANES]; outputs];
+    for (lane, row) in rows.iter().enumerate() {
+        wanted.iter_mut().zip(row).for_each(|(wanted, &value)| wanted[lane] = value);
+    }
+    Sample { batch, wanted, used: rows.len() }
+}

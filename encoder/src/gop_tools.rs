@@ -1,0 +1,124 @@
+//! What the frames of a GOP share: colour transforms and codebooks.
+
+use crate::colour::{self, ShPlan};
+use crate::error::Error;
+use crate::grid::Spacing;
+use crate::pca::Components;
+use crate::report::Report;
+use crate::settings::Settings;
+use splatstream_decoder::layout::ShCoding;
+use splatstream_format::payload::{Codebook, Transform};
+use splatstream_format::syntax::{Profile, SequenceParameters, TransformKind, UnitId, UnitType};
+use splatstream_scene::GaussianFrame;
+
+/// Transforms and codebooks, made for the first frame of a GOP.
+pub(crate) struct GopTools {
+    pub(crate) dc: Transform,
+    pub(crate) sh: Option<(Transform, ShPlan)>,
+    /// SH components of the first frame, which were needed to find the rank.
+    first_components: Option<Vec<Vec<i32>>>,
+}
+
+/// The SH planes that the sequence carries; a frame of a lower degree has fewer.
+pub(crate) fn sh_planes<'a>(
+    frame: &'a GaussianFrame,
+    sequence: &SequenceParameters,
+    zeros: &'a [f32],
+) -> Vec<&'a [f32]> {
+    (0..usize::from(sequence.sh_dimension()))
+        .map(|plane| frame.sh().get(plane).map_or(zeros, Vec::as_slice))
+        .collect()
+}
+
+pub(crate) fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
+    frame.dc().iter().map(Vec::as_slice).collect()
+}
+
+impl GopTools {
+    /// For a GOP of at most so many frames that starts with `frame`.
+    pub(crate) fn new(
+        frame: &GaussianFrame,
+        spacing: &Spacing,
+        sequence: &SequenceParameters,
+        settings: &Settings,
+        frames: u32,
+    ) -> Self {
+        let dc = Components::of(&dc_planes(frame));
+        let dc = colour::transform(TransformKind::Dc, &dc, sequence.dc_step());
+        let zeros = vec![0.0; frame.len()];
+        let mut first_components = None;
+        let sh = (sequence.sh_degree > 0).then(|| {
+            let planes = sh_planes(frame, sequence, &zeros);
+            let step = sequence.sh_step();
+            let basis = match settings.tools.sh_transform {
+                true => Components::of(&planes),
+                false => Components::identity(planes.len()),
+            };
+            let mut transform = colour::transform(TransformKind::Sh, &basis, step);
+            let mut components = colour::components(&transform, &planes, step, spacing);
+            // What the first frame does not need, another may.
+            if frames == 1 {
+                colour::drop_unused(&mut transform, &mut components);
+            }
+            let gaussians = frame.len() * frames as usize;
+            let mut plan =
+                colour::plan_sh(&transform, &planes, step, gaussians, settings.sh, settings.preset);
+            if settings.profile() == Profile::Dynamic {
+                keep_zero(&mut plan.codebooks, usize::from(transform.header.rank));
+            }
+            first_components = plan.codebooks.is_empty().then_some(components);
+            (transform, plan)
+        });
+        Self { dc, sh, first_components }
+    }
+
+    /// The units that define them, for the GOP that starts with a frame.
+    ///
+    /// # Errors
+    /// A transform or codebook that a decoder would refuse.
+    pub(crate) fn units(
+        &self,
+        sequence: &SequenceParameters,
+        frame: u32,
+    ) -> Result<Vec<(UnitId, Vec<u8>)>, Error> {
+        let transform_id = UnitId::of_frame(UnitType::Transform, frame);
+        let mut units = vec![(transform_id, self.dc.to_bytes(sequence)?)];
+        let Some((transform, plan)) = &self.sh else { return Ok(units) };
+        units.push((transform_id, transform.to_bytes(sequence)?));
+        for codebook in &plan.codebooks {
+            units.push((UnitId::of_frame(UnitType::Codebook, frame), codebook.to_bytes()?));
+        }
+        Ok(units)
+    }
+
+    /// Reports how SH is coded.
+    pub(crate) fn report(&self, report: &mut Report) {
+        if let Some((transform, plan)) = &self.sh {
+            report.sh_rank = transform.header.rank;
+            report.sh_trial = plan.trial;
+            report.sh_codebook_entries =
+                plan.codebooks.first().map_or(0, |book| u32::from(book.header.entry_count_minus1) + 1);
+        }
+    }
+
+    /// How the SH of I frames is coded.
+    pub(crate) fn sh_coding(&self) -> ShCoding {
+        match &self.sh {
+            None => ShCoding::None,
+            Some((transform, plan)) if plan.codebooks.is_empty() => {
+                ShCoding::Coefficients { rank: transform.header.rank }
+            }
+            Some((_, plan)) => ShCoding::VectorQuantised { stages: plan.codebooks.len() as u8 },
+        }
+    }
+
+    /// The SH components of the first frame, once, if they are known.
+    pub(crate) fn take_components(&mut self) -> Option<Vec<Vec<i32>>> {
+        self.first_components.take()
+    }
+}
+
+/// Makes entry 0 of every codebook zero, so that it can stand for "as before".
+fn keep_zero(books: &mut [Codebook], rank: usize) {
+    books.iter_mut().for_each(|book| book.entries[..rank].fill(0));
+}

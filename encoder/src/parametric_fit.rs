@@ -1,0 +1,238 @@
+//! Finds the distribution of clause 8.3 that codes counted tokens in the fewest bits.
+//!
+//! The search works with real numbers, which rank distributions nearly as the integers of the clause do; what is
+//! taken in the end is compared by the integers.
+
+use splatstream_format::entropy::parametric::Parametric;
+use splatstream_format::entropy::token::{Alphabet, join, unzigzag};
+
+/// A token that occurs.
+struct Counted {
+    /// Codes of its values: from the first to before the second.
+    codes: [u64; 2],
+    count: f64,
+}
+
+/// What a distribution is fitted to.
+struct Sample {
+    tokens: Vec<Counted>,
+    alphabet: Alphabet,
+    last: u8,
+    /// The first code after those of the last token.
+    end: u64,
+}
+
+/// The best distribution for `counts` of tokens, of which there is at least one.
+pub(crate) fn fitted(counts: &[u64], alphabet: Alphabet, direct_log2: u8) -> Option<Parametric> {
+    let first_code = |token: usize| join(u8::try_from(token).unwrap_or(u8::MAX), direct_log2).0;
+    let occurring = counts.iter().enumerate().filter(|&(_, &count)| count > 0);
+    let tokens: Vec<Counted> = occurring
+        .map(|(token, &count)| Counted {
+            codes: [first_code(token), first_code(token + 1)],
+            count: count as f64,
+        })
+        .collect();
+    let last = u8::try_from(counts.iter().rposition(|&count| count > 0)?).ok()?;
+    let sample = Sample { tokens, alphabet, last, end: first_code(usize::from(last) + 1) };
+    Some(sample.best())
+}
+
+/// Values that stand for a token, each half of its count: codes of many values have both signs.
+fn values_of(token: &Counted, alphabet: Alphabet) -> [f64; 2] {
+    let [first, end] = token.codes;
+    let middle = first + (end - first) / 2;
+    if alphabet != Alphabet::Attribute {
+        return [middle as f64; 2];
+    }
+    let other = if end - first == 1 { middle } else { middle + 1 };
+    [middle, other].map(|code| f64::from(unzigzag(code as u32)))
+}
+
+impl Sample {
+    /// The best of the distributions around the mean, the median, the most frequent value and 0.
+    fn best(&self) -> Parametric {
+        let mut best: Option<(f64, Parametric)> = None;
+        for centre in self.centres() {
+            let mut from = self.start(centre);
+            for shape in [2, 3, 1, 0] {
+                from = Parametric { shape, ..from };
+                let (bits, found) = self.descended(from);
+                from = found;
+                let bits = bits + 2.0 * libm::log2(1.0 + 2.0 * f64::from(centre.unsigned_abs()));
+                if best.is_none_or(|(fewest, _)| bits < fewest) {
+                    best = Some((bits, found));
+                }
+            }
+        }
+        best.map_or_else(|| self.start(0), |(_, found)| found)
+    }
+
+    fn centres(&self) -> Vec<i32> {
+        if self.alphabet != Alphabet::Attribute {
+            return vec![0];
+        }
+        let halves =
+            |token: &Counted| values_of(token, self.alphabet).map(|value| (value, token.count / 2.0));
+        let mut values: Vec<(f64, f64)> = self.tokens.iter().flat_map(halves).collect();
+        values.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let total: f64 = values.iter().map(|(_, count)| count).sum();
+        let mean = values.iter().map(|(value, count)| value * count).sum::<f64>() / total;
+        let mut below = 0.0;
+        let median = values.iter().find(|(_, count)| {
+            below += count;
+            2.0 * below >= total
+        });
+        let density = |token: &&Counted| token.count / (token.codes[1] - token.codes[0]) as f64;
+        let densest = self.tokens.iter().max_by(|a, b| density(a).total_cmp(&density(b)));
+        let mode = densest.map(|token| (values_of(token, self.alphabet)[0], 0.0));
+        let mut centres: Vec<i32> = [Some(&(mean, 0.0)), median, mode.as_ref(), Some(&(0.0, 0.0))]
+            .into_iter()
+            .flatten()
+            .map(|(value, _)| value.round().clamp(-32768.0, 32767.0) as i32)
+            .collect();
+        centres.sort_unstable();
+        centres.dedup();
+        centres
+    }
+
+    /// A distribution whose width is the mean distance from the centre.
+    fn start(&self, centre: i32) -> Parametric {
+        let total: f64 = self.tokens.iter().map(|token| token.count).sum();
+        let distance = |token: &Counted| {
+            let [one, other] = values_of(token, self.alphabet).map(|value| (value - f64::from(centre)).abs());
+            (one + other) * token.count / 2.0
+        };
+        let mean = (self.tokens.iter().map(distance).sum::<f64>() / total).max(0.125);
+        let scale = (2.0 * libm::log2(8.0 * mean)).round().clamp(0.0, f64::from(Parametric::MAX_SCALE)) as u8;
+        Parametric { last: self.last, shape: 0, zero_level: 0, scale, centre }
+    }
+
+    /// Changes scale and zero level by steps that save bits, until none does.
+    fn descended(&self, from: Parametric) -> (f64, Parametric) {
+        let natural = self.descended_at(Parametric { zero_level: 0, ..from });
+        let observed = Parametric { zero_level: self.observed_level(from.centre), ..from };
+        let given = self.descended_at(observed);
+        if given.0 < natural.0 { given } else { natural }
+    }
+
+    /// As [`Self::descended`], a zero level of 0 staying 0.
+    fn descended_at(&self, from: Parametric) -> (f64, Parametric) {
+        let mut best = (self.bits(&from), from);
+        loop {
+            let before = best.0;
+            for (scale, level) in [(2, 0), (-2, 0), (1, 0), (-1, 0), (0, 1), (0, -1)] {
+                let here = best.1;
+                let zero_level = match here.zero_level {
+                    0 => 0,
+                    old => old.saturating_add_signed(level).clamp(1, 15),
+                };
+                let scale = here.scale.saturating_add_signed(scale).min(Parametric::MAX_SCALE);
+                let next = Parametric { scale, zero_level, ..here };
+                let bits = if next == here { best.0 } else { self.bits(&next) };
+                if bits < best.0 {
+                    best = (bits, next);
+                }
+            }
+            if best.0 >= before {
+                return best;
+            }
+        }
+    }
+
+    /// The zero level of the share that the centre has.
+    fn observed_level(&self, centre: i32) -> u8 {
+        let total: f64 = self.tokens.iter().map(|token| token.count).sum();
+        let at = |token: &&Counted| {
+            let [first, end] = token.codes;
+            end - first == 1 && values_of(token, self.alphabet).contains(&f64::from(centre))
+        };
+        let share = self.tokens.iter().find(at).map_or(0.0, |token| token.count) / total;
+        (8.0 + libm::log2((share + 1e-3) / (1.0 - share + 1e-3))).round().clamp(1.0, 15.0) as u8
+    }
+
+    /// Bits of all symbols, without raw bits.
+    fn bits(&self, parameters: &Parametric) -> f64 {
+        let real = Real::new(parameters, self.alphabet);
+        let shared = 4095.0 - f64::from(self.last);
+        let scale = shared / real.mass_below(self.end).max(1e-9);
+        let mut below = (0, 0.0);
+        let bits = |token: &Counted| {
+            let [first, end] = token.codes;
+            let start = if below.0 == first { below.1 } else { real.mass_below(first) };
+            below = (end, real.mass_below(end));
+            token.count * (12.0 - libm::log2(1.0 + scale * (below.1 - start).max(0.0)))
+        };
+        self.tokens.iter().map(bits).sum()
+    }
+}
+
+/// The distribution in real numbers; the mass of one side without the centre is `weight`.
+struct Real {
+    alphabet: Alphabet,
+    centre: f64,
+    width: f64,
+    squarings: u8,
+    weight: f64,
+}
+
+impl Real {
+    fn new(parameters: &Parametric, alphabet: Alphabet) -> Self {
+        let &Parametric { shape, zero_level, scale, centre, .. } = parameters;
+        let squarings = 2 * shape;
+        let width = f64::from(2 | (scale & 1)) * libm::exp2(f64::from((scale >> 1) + squarings));
+        let mut real = Self { alphabet, centre: f64::from(centre), width, squarings, weight: 1.0 };
+        real.weight = match zero_level {
+            0 => real.survival(8.0),
+            level => 1.0 / (1.0 + libm::exp2(f64::from(level) - 8.0)),
+        };
+        real
+    }
+
+    fn survival(&self, distance: f64) -> f64 {
+        (0..self.squarings).fold(self.width / (self.width + distance), |part, _| part * part)
+    }
+
+    fn tail(&self, distance: f64) -> f64 {
+        self.weight * self.survival(16.0 * (distance - 1.0))
+    }
+
+    fn signed_mass_below(&self, value: f64) -> f64 {
+        let beyond = value - self.centre;
+        if beyond > 0.0 { 2.0 - self.tail(beyond) } else { self.tail(1.0 - beyond) }
+    }
+
+    fn mass_below(&self, code: u64) -> f64 {
+        if self.alphabet == Alphabet::Attribute {
+            let half = (code >> 1) as f64;
+            self.signed_mass_below(half + (code & 1) as f64) - self.signed_mass_below(-half)
+        } else if code == 0 {
+            0.0
+        } else {
+            1.0 - self.tail(code as f64)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splatstream_format::entropy::token::{split, zigzag};
+
+    #[test]
+    fn a_distribution_is_found_again() {
+        let drawn = Parametric { last: 40, shape: 2, zero_level: 0, scale: 12, centre: -3 };
+        let frequencies = drawn.frequencies(Alphabet::Attribute, 4);
+        let counts: Vec<u64> = frequencies.iter().map(|&frequency| u64::from(frequency)).collect();
+        let found = fitted(&counts, Alphabet::Attribute, 4).unwrap();
+        assert_eq!((found.centre, found.last), (-3, 40));
+        assert!(found.scale.abs_diff(12) <= 2, "{found:?}");
+    }
+
+    #[test]
+    fn one_value_alone_is_in_the_middle() {
+        let mut counts = vec![0_u64; 64];
+        counts[usize::from(split(u64::from(zigzag(-5)), 4).token)] = 100;
+        assert_eq!(fitted(&counts, Alphabet::Attribute, 4).unwrap().centre, -5);
+        assert_eq!(fitted(&[0; 64], Alphabet::Attribute, 4), None);
+    }
+}

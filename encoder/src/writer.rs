@@ -1,0 +1,92 @@
+//! Units on their way out.
+
+use crate::error::Error;
+use crate::sequence::Analysis;
+use splatstream_decoder::operating_point::Tally;
+use splatstream_format::payload::{Index, SceneDescription};
+use splatstream_format::syntax::{
+    EndOfStream, GopHeader, IndexEntry, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
+};
+use splatstream_format::unit::{Unit, write_file_header};
+use std::io::Write;
+
+/// Writes units, and keeps what the end of the stream says about them.
+pub(crate) struct UnitWriter<'a> {
+    sink: &'a mut dyn Write,
+    profile: Profile,
+    sequence: SequenceParameters,
+    /// Bytes written.
+    pub(crate) offset: u64,
+    units: u32,
+    /// Where GOPs start.
+    index: Vec<IndexEntry>,
+    /// What the units add to the operating points.
+    tally: Tally,
+}
+
+impl<'a> UnitWriter<'a> {
+    pub(crate) fn new(sink: &'a mut dyn Write, profile: Profile, sequence: &SequenceParameters) -> Self {
+        Self {
+            sink,
+            profile,
+            sequence: *sequence,
+            offset: 0,
+            units: 0,
+            index: Vec::new(),
+            tally: Tally::new(profile),
+        }
+    }
+
+    /// What stands before the first GOP.
+    pub(crate) fn start(&mut self, analysis: &Analysis, description: &SceneDescription) -> Result<(), Error> {
+        self.bytes(&write_file_header(self.profile, analysis.level)?)?;
+        self.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
+        let description = SceneDescription { bounds: analysis.bounds, ..description.clone() };
+        self.unit(UnitId::stream(UnitType::SceneDescription), &description.to_bytes()?)
+    }
+
+    /// GOPs that have been started.
+    pub(crate) fn gops(&self) -> u32 {
+        self.index.len() as u32
+    }
+
+    /// Starts a GOP. The sequence parameters are repeated before each but the first: a stream of which the beginning is
+    /// lost or damaged can still be decoded.
+    pub(crate) fn gop(&mut self, header: &GopHeader, frame: u32) -> Result<(), Error> {
+        if !self.index.is_empty() {
+            self.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
+        }
+        self.index.push(IndexEntry { frame, reserved_zero: 0, offset: self.offset });
+        self.unit(UnitId::of_frame(UnitType::GopHeader, frame), &header.to_bytes()?)
+    }
+
+    /// What stands after the last GOP.
+    pub(crate) fn finish(mut self) -> Result<u64, Error> {
+        if self.profile == Profile::Dynamic {
+            let points = self.tally.list().to_bytes()?;
+            self.unit(UnitId::stream(UnitType::OperatingPoints), &points)?;
+        }
+        let index_offset = self.offset;
+        let index = Index { entries: core::mem::take(&mut self.index) };
+        self.unit(UnitId::stream(UnitType::Index), &index.to_bytes()?)?;
+        let end =
+            EndOfStream { frame_count: self.sequence.frame_count, unit_count: self.units, index_offset };
+        self.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)?;
+        Ok(self.offset)
+    }
+
+    /// Writes a unit.
+    pub(crate) fn unit(&mut self, id: UnitId, payload: &[u8]) -> Result<(), Error> {
+        let header = UnitHeader::new(id, payload)?;
+        self.units += 1;
+        self.tally.unit(&Unit { at: 0, header, payload, payload_at: 0 });
+        self.bytes(&header.to_bytes()?)?;
+        self.bytes(payload)
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.sink.write_all(bytes)?;
+        self.offset += bytes.len() as u64;
+        Ok(())
+    }
+}

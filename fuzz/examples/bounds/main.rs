@@ -1,0 +1,106 @@
+//! The worst streams of each level: what they cost a decoder, beside what annex A.3 says that they may.
+//!
+//! `cargo run --release -p splatstream-fuzz --example bounds -- [LEVEL]... [CASE]...` makes every case, or those named, at
+//! the levels named (1), decodes each in a process of its own, and prints a table. Processor time is that of decoding with
+//! all digests compared, of all threads together.
+
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_format::Limits;
+use std::ops::ControlFlow;
+use std::process::{Command, Stdio};
+
+mod cases;
+mod healing;
+mod stream;
+
+/// Ticks of processor time in a second, as /proc gives them.
+const TICKS: f64 = 100.0;
+/// What the process that decodes a stream is told, before its file and its level.
+const DECODE: &str = "--decode";
+
+type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> Result<()> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if let [decode, path, level] = words.as_slice()
+        && decode == DECODE
+    {
+        return measured(path, level.parse()?);
+    }
+    let (levels, names): (Vec<String>, Vec<String>) =
+        words.into_iter().partition(|word| word.parse::<u8>().is_ok());
+    let levels = if levels.is_empty() { vec!["1".to_owned()] } else { levels };
+    println!(
+        "| Case | Level | Bytes | Frames | CPU s | CPU ms a frame | A.3 counts in a frame | ns each | Peak MB | A.3 MB |"
+    );
+    println!("|---|--:|--:|--:|--:|--:|---|--:|--:|--:|");
+    for level in &levels {
+        for (name, make) in cases::ALL {
+            if names.is_empty() || names.iter().any(|wanted| wanted == name) {
+                let level = level.parse()?;
+                print(name, level, &make(level, &Limits::of_level(level)))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Has a case decoded by a process of its own, and prints its line.
+fn print(name: &str, level: u8, case: &cases::Case) -> Result<()> {
+    let path = std::env::temp_dir().join(format!("bounds-{}.gss", std::process::id()));
+    std::fs::write(&path, &case.bytes)?;
+    let mut decoder = Command::new(std::env::current_exe()?);
+    let output = decoder.arg(DECODE).arg(&path).arg(level.to_string()).stderr(Stdio::inherit()).output()?;
+    std::fs::remove_file(&path)?;
+    let line = String::from_utf8(output.stdout)?;
+    let [frames, seconds, peak, errors] = line.split_whitespace().collect::<Vec<_>>()[..] else {
+        return Err(format!("{name}: {}", output.status).into());
+    };
+    let (seconds, peak, errors) = (seconds.parse::<f64>()?, peak.parse::<f64>()?, errors.parse::<u32>()?);
+    if errors > 0 && !case.is_damaged {
+        return Err(format!("{name}: {errors} errors").into());
+    }
+    let per_frame = seconds / f64::from(case.frames.max(1));
+    println!(
+        "| {name} | {level} | {} | {frames} | {seconds:.2} | {:.2} | {:.3e} {} | {:.1} | {:.0} | {:.0} |",
+        case.bytes.len(),
+        per_frame * 1e3,
+        case.work as f64,
+        case.unit,
+        per_frame * 1e9 / case.work as f64,
+        peak / 1e6,
+        case.memory as f64 / 1e6,
+    );
+    Ok(())
+}
+
+/// Decodes a file, and prints frames, processor seconds, peak bytes and errors.
+fn measured(path: &str, level: u8) -> Result<()> {
+    let bytes = std::fs::read(path)?;
+    let before = processor_seconds()?;
+    let options = Options { limits: Limits::of_level(level), ..Options::default() };
+    let summary = decode_stream(&bytes, &options, |_, _| ControlFlow::Continue(()));
+    let seconds = processor_seconds()? - before;
+    println!("{} {seconds} {} {}", summary.frames, peak_bytes()?, summary.errors.len());
+    if let Some(error) = summary.verdict() {
+        eprintln!("{error}");
+    }
+    Ok(())
+}
+
+/// Processor time of this process so far.
+fn processor_seconds() -> Result<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat")?;
+    // After the name, which is in brackets, the 12th and 13th fields are user and system time.
+    let (_, fields) = stat.rsplit_once(") ").ok_or("no process")?;
+    let ticks: f64 = fields.split(' ').skip(11).take(2).filter_map(|field| field.parse::<f64>().ok()).sum();
+    Ok(ticks / TICKS)
+}
+
+/// The largest memory in use so far.
+fn peak_bytes() -> Result<u64> {
+    let status = std::fs::read_to_string("/proc/self/status")?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).ok_or("no peak")?;
+    Ok(line.trim().trim_end_matches(" kB").parse::<u64>()? * 1024)
+}
