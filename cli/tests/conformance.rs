@@ -123,7 +123,10 @@ fn a_claim_of_nothing_and_expectations_of_what_is_not_there_are_refused() {
     let wrong = claim("\"features\": [\"bframes\"]");
     assert!(run(&["--capabilities", text(&wrong)]).contains("did you mean b-frames"));
     let list = file("list.txt", "no-such-vector crash # to be done\n");
-    assert!(run(&["--area", "geometry", "--expectations", text(&list)]).contains("there is no case no-such-vector"));
+    assert!(
+        run(&["--area", "geometry", "--expectations", text(&list)])
+            .contains("there is no case no-such-vector")
+    );
 }
 
 #[cfg(unix)]

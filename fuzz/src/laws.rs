@@ -116,7 +116,8 @@ fn verified(bytes: &[u8], plain: &Decoded) {
 fn is_of_first_faulty_unit(bytes: &[u8], error: &Error) {
     let mut start = 0;
     for end in arrival::ends(bytes) {
-        if end as u64 > error.at {
+        // An error of what is missing stands at the end of its unit.
+        if end as u64 >= error.at {
             break;
         }
         start = end;

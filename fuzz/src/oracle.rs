@@ -13,6 +13,7 @@ use client::{Answer, Oracle, Request};
 use healed::healed;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::Options;
+use splatstream_format::syntax::UnitHeader;
 use splatstream_format::{Class, Limits};
 use std::sync::{LazyLock, Mutex, PoisonError};
 
@@ -28,19 +29,33 @@ static ORACLE: LazyLock<Mutex<Oracle>> = LazyLock::new(|| Mutex::new(Oracle::sta
 pub fn run(data: &[u8]) {
     let choice = choice(data);
     let stream = healed(stream_of(data).into_owned());
+    if cfg!(fuzzing) && !is_sealed(&stream) {
+        return;
+    }
     let request = Request { stream: &stream, point: point(choice), subset: choice >> 28 & 1 == 1 };
     let Some(mine) = mine(&request) else { return };
     let theirs = ORACLE.lock().unwrap_or_else(PoisonError::into_inner).ask(&request);
-    // Within one unit, a decoder may report any fault that is there.
-    let unit_of =
-        |answer: &Answer| answer.error_at.map(|at| ends(&stream).take_while(|end| *end as u64 <= at).count());
-    assert_eq!(unit_of(&mine), unit_of(&theirs), "{request:?}: {mine:?}, {theirs:?}");
+    // Within one unit, a decoder may report any fault that is there, also of what is missing at its end.
+    let before = |at: u64| ends(&stream).take_while(|end| (*end as u64) < at).count();
+    let units = |answer: &Answer| answer.error_at.map(|at| [before(at), before(at.saturating_add(1))]);
+    let agree = match (units(&mine), units(&theirs)) {
+        (Some([first, last]), Some([low, high])) => first <= high && low <= last,
+        (mine, theirs) => mine == theirs,
+    };
+    assert!(agree, "{request:?}: {mine:?}, {theirs:?}");
     assert_eq!(mine.lost, theirs.lost, "{request:?}");
     let names = |answer: &Answer| answer.planes.keys().cloned().collect::<Vec<_>>();
     assert_eq!(names(&mine), names(&theirs), "{request:?}");
     for (name, planes) in &mine.planes {
         assert!(theirs.planes.get(name) == Some(planes), "{name} differs, {request:?}");
     }
+}
+
+/// Whether units follow each other to the end, so that all of them have checksums that fit. What a scan finds inside a unit
+/// that is cut short has not, and a decoder that is built for fuzzing does not mind.
+fn is_sealed(stream: &[u8]) -> bool {
+    let end = ends(stream).last().unwrap_or(0);
+    stream.len().saturating_sub(end) < UnitHeader::SIZE
 }
 
 /// Often everything.
