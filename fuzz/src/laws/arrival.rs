@@ -21,7 +21,9 @@ pub fn holds(bytes: &[u8], whole: &Decoded, choice: u32) {
         let is_cut = there.errors.first().is_some_and(is_truncation);
         // Which fault of a unit is reported may depend on what comes after it.
         let unit_of = |error: &Error| ends(bytes).take_while(|end| (*end as u64) < error.at).count();
-        let [part, all] = [&there, whole].map(|decoded| decoded.errors.first().map(unit_of));
+        // Bytes after the end unit are an error only where some have come.
+        let is_there = |error: &&Error| error.at < end as u64;
+        let [part, all] = [&there, whole].map(|decoded| decoded.errors.first().filter(is_there).map(unit_of));
         assert!(is_cut || part == all, "a part has an error of its own");
         let expected = frames_after.iter().take_while(|(unit_end, _)| *unit_end <= end).last();
         let expected = expected.map_or(0, |(_, frames)| *frames);
