@@ -49,9 +49,10 @@ impl Conformance {
 /// Where the vectors are, and which of them are meant.
 #[derive(Args)]
 struct SuiteArgs {
-    /// The folder of the vectors, or the one above it.
-    #[arg(long, value_name = "DIR", default_value = "conformance/vectors")]
-    suite: PathBuf,
+    /// The folder of the vectors, or the one above it [default: conformance/vectors of the repository around the
+    /// current folder or around this program].
+    #[arg(long, value_name = "DIR")]
+    suite: Option<PathBuf>,
     /// Only vectors whose names match a pattern, such as 'temporal-*', or cases, vector@op or vector@op/mode. Several add up.
     #[arg(long, value_name = "GLOB")]
     filter: Vec<String>,
@@ -71,10 +72,11 @@ struct SuiteArgs {
 
 impl SuiteArgs {
     fn read(&self) -> Result<Suite, Failure> {
-        let folder =
-            std::path::absolute(&self.suite).map_err(|error| Failure::file("find", &self.suite, &error))?;
+        let named = self.suite.clone().or_else(Suite::locate);
+        let named = named.unwrap_or_else(|| Path::new("conformance/vectors").into());
+        let folder = std::path::absolute(&named).map_err(|error| Failure::file("find", &named, &error))?;
         if !folder.is_dir() {
-            let path = self.suite.display();
+            let path = named.display();
             let what = if folder.exists() { "this is a file" } else { "there is no such directory" };
             let advice = "give the folder of the vectors with --suite DIR; they are in conformance/vectors of the repository";
             return Err(Failure::other(format!("{path}: {what}\n  {advice}")));

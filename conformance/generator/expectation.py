@@ -16,7 +16,7 @@ from oracle.semantics import parse_unit_header
 
 PLANE_GROUPS = (("position", 0, 3), ("log_scale", 3, 6), ("opacity", 6, 7), ("rotation", 7, 10), ("dc", 10, 13),
                 ("sh", 13, None))
-MOST_POINTS = 24                                    # of more operating points a selection is recorded
+MAX_POINTS = 24                                    # of more operating points a selection is recorded
 
 UNIT_NAMES = {c.UT_SEQUENCE: "sequence_parameters", c.UT_GOP: "gop_header", c.UT_FRAME: "frame_header",
               c.UT_TRANSFORM: "transform", c.UT_CODEBOOK: "codebook", c.UT_INCREMENT: "increment",
@@ -76,7 +76,7 @@ def operating_points(sequence):
     """All points of a sequence, the highest first; of many the corners of the three axes and what lies on the axes."""
     counts = (sequence.spatial_layer_count, sequence.temporal_layer_count, sequence.refinement_count)
     every = [(s, t, r) for s in range(counts[0]) for t in range(counts[1]) for r in range(counts[2])]
-    if len(every) > MOST_POINTS:
+    if len(every) > MAX_POINTS:
         top = tuple(n - 1 for n in counts)
         ends = [{0, n} for n in top]
         every = [p for p in every if all(x in end for x, end in zip(p, ends))

@@ -16,7 +16,7 @@ pub(crate) struct Ranking {
     cameras: Vec<Camera>,
     preset: Preset,
     /// The order of the first frame, if it was needed early.
-    foreseen: Option<Vec<u32>>,
+    known_order: Option<Vec<u32>>,
 }
 
 impl Ranking {
@@ -35,7 +35,7 @@ impl Ranking {
             rounds: rounds(&settings.refinements, settings.preset),
             cameras: settings.cameras.clone(),
             preset: settings.preset,
-            foreseen: None,
+            known_order: None,
         }
     }
 
@@ -58,15 +58,15 @@ impl Ranking {
     }
 
     /// The order of the first frame, which [`Ranking::order`] will not compute again.
-    pub(crate) fn foresee(&mut self, frame: &GaussianFrame) -> Vec<u32> {
+    pub(crate) fn order_first(&mut self, frame: &GaussianFrame) -> Vec<u32> {
         let order = self.order(frame);
-        self.foreseen = Some(order.clone());
+        self.known_order = Some(order.clone());
         order
     }
 
     /// The Gaussians of a frame, most important first.
     pub(crate) fn order(&mut self, frame: &GaussianFrame) -> Vec<u32> {
-        if let Some(order) = self.foreseen.take() {
+        if let Some(order) = self.known_order.take() {
             return order;
         }
         let volume = importance::opacity_volume(frame);

@@ -63,7 +63,7 @@ fn fitted(
         let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
         let shown = visible(&first, settings.keep_invisible);
         let frame = canonicalise(&first, &shown, true);
-        let order = ranking.foresee(&frame);
+        let order = ranking.order_first(&frame);
         let spacing = ranking.spacing(&order, &settings);
         settings.steps = allocation::fit(frame, spacing, &settings, decibels);
     }

@@ -8,9 +8,9 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Most bytes of one request.
-pub const MOST: usize = 64 << 20;
+pub const MAX_REQUEST: usize = 64 << 20;
 /// Most bytes of all requests together.
-pub const MOST_IN_USE: usize = 2 * MOST;
+pub const MAX_IN_USE: usize = 2 * MAX_REQUEST;
 
 struct Ceiling {
     in_use: AtomicUsize,
@@ -22,10 +22,10 @@ static CEILING: Ceiling = Ceiling { in_use: AtomicUsize::new(0) };
 impl Ceiling {
     /// Whether there is room for `size` more bytes, which then are in use.
     fn claim(&self, size: usize) -> bool {
-        if size > MOST {
+        if size > MAX_REQUEST {
             return false;
         }
-        let has_room = self.in_use.fetch_add(size, Relaxed) <= MOST_IN_USE - size;
+        let has_room = self.in_use.fetch_add(size, Relaxed) <= MAX_IN_USE - size;
         if !has_room {
             self.release(size);
         }

@@ -9,14 +9,14 @@ use splatstream_format::unit::Stream;
 /// Bytes of an edit: what, in which unit, where (16 bits), and with which value.
 const EDIT: usize = 5;
 /// More add time, not depth.
-const MOST_EDITS: usize = 32;
+const MAX_EDITS: usize = 32;
 
 /// One of the valid streams with edits.
 pub fn edited(data: &[u8]) -> Vec<u8> {
     let (choice, edits) = data.split_first().unwrap_or((&0, &[]));
     let stream = streams::ALL[usize::from(*choice) % streams::ALL.len()];
     let mut units = units(stream);
-    for &[what, unit, low, high, value] in edits.as_chunks::<EDIT>().0.iter().take(MOST_EDITS) {
+    for &[what, unit, low, high, value] in edits.as_chunks::<EDIT>().0.iter().take(MAX_EDITS) {
         apply(&mut units, what, unit.into(), u16::from_le_bytes([low, high]).into(), value);
     }
     let mut out = stream[..FileHeader::SIZE].to_vec();

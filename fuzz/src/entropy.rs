@@ -8,9 +8,9 @@ use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 
 /// More add time, not depth.
-const MOST_VALUES: usize = 300;
-const MOST_PLANES: usize = 4;
-const MOST_CHANGES: usize = 4;
+const MAX_VALUES: usize = 300;
+const MAX_PLANES: usize = 4;
+const MAX_CHANGES: usize = 4;
 
 /// The input is what the planes and changes of a block are made of.
 pub fn run(data: &[u8]) {
@@ -28,14 +28,14 @@ struct Plane {
 
 fn coded(u: &mut Unstructured<'_>) -> Result<()> {
     let lanes_log2 = u.int_in_range(0..=5)?;
-    let (plane_count, count) = (u.int_in_range(1..=MOST_PLANES)?, u.int_in_range(0..=MOST_VALUES)?);
+    let (plane_count, count) = (u.int_in_range(1..=MAX_PLANES)?, u.int_in_range(0..=MAX_VALUES)?);
     let planes = (0..plane_count).map(|_| plane(u, count)).collect::<Result<Vec<_>>>()?;
     models_come_back(&planes);
     let values: Vec<Vec<u64>> = planes.iter().map(|plane| plane.values.clone()).collect();
     let mut block = encoded(&planes, &values, lanes_log2);
     assert_eq!(decoded(&planes, &block, lanes_log2).as_ref(), Some(&values), "symbols come back");
     // Changed, it is mostly refused.
-    for _ in 0..u.int_in_range(0..=MOST_CHANGES)? {
+    for _ in 0..u.int_in_range(0..=MAX_CHANGES)? {
         let (index, value) = (u.choose_index(block.len())?, u.arbitrary::<u8>()?);
         block[index] ^= value;
     }

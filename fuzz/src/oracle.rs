@@ -20,7 +20,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 /// What takes the independent decoder no more than a second.
 const LIMITS: Limits = Limits { max_gaussians: 300, max_learned: 4, max_payload: 1 << 13, ..crate::LIMITS };
 /// Gaussians of all frames.
-const MOST_GAUSSIANS: usize = 600;
+const MAX_GAUSSIANS: usize = 600;
 
 /// One process for all inputs.
 static ORACLE: LazyLock<Mutex<Oracle>> = LazyLock::new(|| Mutex::new(Oracle::start()));
@@ -74,5 +74,5 @@ fn mine(request: &Request<'_>) -> Option<Answer> {
     let decoded = Decoded::of(request.stream, &options);
     let gaussians: usize = decoded.frames.iter().map(|frame| frame.planes.len()).sum();
     let is_large = decoded.errors.iter().any(|error| error.class() == Class::OverLimit);
-    (gaussians <= MOST_GAUSSIANS && !is_large).then(|| Answer::of(decoded))
+    (gaussians <= MAX_GAUSSIANS && !is_large).then(|| Answer::of(decoded))
 }

@@ -4,10 +4,10 @@ use arbitrary::{Arbitrary, Result, Unstructured};
 use splatstream_scene::{GaussianFrame, MAX_SH_DEGREE, Planes, sh_coefficients};
 
 /// More add time, not depth.
-const MOST_GAUSSIANS: usize = 24;
-const MOST_FRAMES: usize = 4;
+const MAX_GAUSSIANS: usize = 24;
+const MAX_FRAMES: usize = 4;
 /// Changes from one frame to the next.
-const MOST_CHANGES: usize = 6;
+const MAX_CHANGES: usize = 6;
 
 /// A Gaussian: the values of a row of a PLY file.
 #[derive(Debug, Clone)]
@@ -24,10 +24,10 @@ struct Row {
 pub(crate) fn scene(u: &mut Unstructured<'_>) -> Result<Vec<GaussianFrame>> {
     let sh_degree = u.int_in_range(0..=MAX_SH_DEGREE)?;
     let mut rows =
-        (0..u.int_in_range(0..=MOST_GAUSSIANS)?).map(|_| row(u, sh_degree)).collect::<Result<Vec<_>>>()?;
+        (0..u.int_in_range(0..=MAX_GAUSSIANS)?).map(|_| row(u, sh_degree)).collect::<Result<Vec<_>>>()?;
     let mut frames = vec![frame(&rows, sh_degree)];
-    for _ in 1..u.int_in_range(1..=MOST_FRAMES)? {
-        for _ in 0..u.int_in_range(0..=MOST_CHANGES)? {
+    for _ in 1..u.int_in_range(1..=MAX_FRAMES)? {
+        for _ in 0..u.int_in_range(0..=MAX_CHANGES)? {
             change(u, &mut rows, sh_degree)?;
         }
         frames.push(frame(&rows, sh_degree));

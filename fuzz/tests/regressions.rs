@@ -112,8 +112,8 @@ fn every_target_is_replayed_and_has_seeds() {
 #[test]
 fn the_heap_refuses_what_a_count_on_trust_would_ask_for() {
     let mut bytes: Vec<u8> = Vec::new();
-    assert!(bytes.try_reserve_exact(ceiling::MOST).is_ok());
-    assert!(bytes.try_reserve_exact(ceiling::MOST + 1).is_err());
+    assert!(bytes.try_reserve_exact(ceiling::MAX_REQUEST).is_ok());
+    assert!(bytes.try_reserve_exact(ceiling::MAX_REQUEST + 1).is_err());
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn a_count_on_trust_ends_the_program_that_the_targets_are_in() {
         let program = env!("CARGO_BIN_EXE_splatstream-fuzz");
         Command::new(program).arg(&input).env("FUZZ_TARGET", "planted").output().unwrap().status
     };
-    let (granted, refused) = (outcome(ceiling::MOST as u32), outcome(ceiling::MOST as u32 + 1));
+    let (granted, refused) = (outcome(ceiling::MAX_REQUEST as u32), outcome(ceiling::MAX_REQUEST as u32 + 1));
     std::fs::remove_file(&input).unwrap();
     assert!(granted.success(), "{granted}");
     assert!(!refused.success(), "{refused}");

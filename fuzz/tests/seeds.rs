@@ -26,7 +26,7 @@ mod scenes;
 mod valid_streams;
 
 /// The seeds of a target: they are part of every clone.
-const MOST_BYTES: usize = 50_000;
+const MAX_BYTES: usize = 50_000;
 
 fn folder(target: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds").join(target)
@@ -48,7 +48,7 @@ fn saved(target: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let files = std::fs::read_dir(folder(target)).unwrap().map(|entry| entry.unwrap().path());
     let files: Vec<_> = files.map(|path| (path.clone(), std::fs::read(path).unwrap())).collect();
     let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-    assert!(bytes <= MOST_BYTES, "the seeds of {target} take {bytes} bytes");
+    assert!(bytes <= MAX_BYTES, "the seeds of {target} take {bytes} bytes");
     files
 }
 

@@ -4,7 +4,7 @@
 //! points to the border brings them closer together, never apart, so that a search by cells misses nothing.
 
 /// Cells an axis, at most: 16 MB of cells.
-const MOST_CELLS: f32 = 160.0;
+const MAX_CELLS: f32 = 160.0;
 
 /// Points that a cell holds on average. Scenes are surfaces: most cells are empty, and the others hold some.
 const POINTS_A_CELL: f32 = 0.125;
@@ -35,7 +35,7 @@ impl<'a> Grid<'a> {
         let [low, high] = inner_box(points);
         let sides = [0, 1, 2].map(|axis: usize| high[axis] - low[axis]);
         let longest = sides.iter().fold(f32::MIN_POSITIVE, |longest, &side| longest.max(side));
-        let wanted = (points[0].len() as f32 / POINTS_A_CELL).cbrt().clamp(1.0, MOST_CELLS);
+        let wanted = (points[0].len() as f32 / POINTS_A_CELL).cbrt().clamp(1.0, MAX_CELLS);
         let cell = longest / wanted;
         let cells = sides.map(|side| (side / cell).floor() as usize + 1);
         let mut grid = Self { points, low, cell, cells, starts: Vec::new(), members: Vec::new() };

@@ -10,7 +10,7 @@ import tempfile
 
 CONFORMANCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 ORACLE = os.path.join(CONFORMANCE, "oracle")
-MOST_SECONDS, MOST_BYTES = 120, 4 << 30             # of one vector, and of memory
+MAX_SECONDS, MAX_BYTES = 120, 4 << 30             # of one vector, and of memory
 
 
 def mutated(text, snippet, replacement):
@@ -66,7 +66,7 @@ def first_failure(job):
     number, mutation, folders = job
     with tempfile.TemporaryDirectory() as root:
         sys.path.insert(0, copy_of_oracle(root, mutation))
-        resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_BYTES, MAX_BYTES))
         signal.signal(signal.SIGALRM, stop)
         try:
             from oracle import run_vectors
@@ -79,7 +79,7 @@ def first_failure(job):
 
 
 def fails(run_vectors, folder):
-    signal.alarm(MOST_SECONDS)
+    signal.alarm(MAX_SECONDS)
     try:
         return bool(run_vectors.run(folder)[1])
     except Exception:                               # pylint: disable=broad-except

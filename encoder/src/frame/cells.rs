@@ -18,7 +18,7 @@ use splatstream_format::payload::CellsBytes;
 use splatstream_format::syntax::SequenceParameters;
 
 /// The largest translation of a cell, steps / 8: the difference of two is below 2^16.
-const MOST_TRANSLATION: i32 = (1 << 15) - 1;
+const MAX_TRANSLATION: i32 = (1 << 15) - 1;
 
 /// The Gaussians of a reference as matching sees them.
 pub(crate) struct ReferenceCloud {
@@ -139,7 +139,7 @@ pub(crate) fn code_cells(
     let cloud = ReferenceCloud::new(from.reference, sequence);
     let mut motion = cloud.motion(from.target, matching, plan, sequence.position_bits);
     // What differs more from cell to cell, no token codes.
-    motion.cells.retain(|cell| cell.translation.iter().all(|part| part.abs() <= MOST_TRANSLATION));
+    motion.cells.retain(|cell| cell.translation.iter().all(|part| part.abs() <= MAX_TRANSLATION));
     motion.cells.truncate(plan.max_cells as usize);
     if motion.cells.is_empty() {
         return Ok((CellField::default(), None));

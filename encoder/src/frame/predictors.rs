@@ -36,7 +36,7 @@ const FEW: usize = 64;
 const SEARCHED_FOR_A_BIT: usize = 16;
 
 /// Bits that prediction may save a new Gaussian, at most; where even that is too little it is not tried.
-const MOST_SAVED: usize = 10;
+const MAX_SAVED: usize = 10;
 
 /// Values from which on a histogram counts powers of two.
 const DIRECT: u32 = 32;
@@ -118,7 +118,7 @@ impl Chooser<'_> {
                 reference_set(situation, &changed.list.planes)
             }
         };
-        let too_large = self.is_frugal() && set.len() / SEARCHED_FOR_A_BIT > count * MOST_SAVED;
+        let too_large = self.is_frugal() && set.len() / SEARCHED_FOR_A_BIT > count * MAX_SAVED;
         Ok(Some(set).filter(|set| !set.is_empty() && !too_large))
     }
 
