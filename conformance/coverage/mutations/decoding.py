@@ -38,8 +38,11 @@ MUTATIONS = [
     ("SS-LO-002", DECODING, "frame.limit = min(frame.limit, dropped)", "pass"),
     ("SS-LO-002", DECODING, "dropped = frame.decoded_of(unit.spatial_layer)", "dropped = r"),
     ("SS-ER-004", DECODING, "return self.scan(offset + 1)", "return len(self.data)"),
-    ("SS-ER-004", DECODING, "gop_index >= state.next_gop and unit.frame >= self.expected_frame()", "True"),
-    ("SS-ER-004", DECODING, "gop_index >= state.next_gop and unit.frame >= self.expected_frame()", "gop_index >= state.next_gop"),
+    # A gop_header that is not acceptable, and not discarded, would fail by SS-BS-007 after the first error, with the same output.
+    ("SS-ER-004", DECODING, "gop_index >= state.next_gop and unit.frame >= self.expected_frame()",
+     "gop_index == state.next_gop and unit.frame >= self.expected_frame()"),
+    ("SS-ER-004", DECODING, "gop_index >= state.next_gop and unit.frame >= self.expected_frame()",
+     "gop_index >= state.next_gop and unit.frame > self.expected_frame()"),
     ("SS-ER-004", DECODING, "return unit.unit_type == c.UT_SEQUENCE and self.is_intact(unit)", "return False"),
     ("SS-ER-004", DECODING, "return self.is_intact(unit) and self.is_acceptable(unit)", "return self.is_acceptable(unit)"),
     ("SS-ER-004", DECODING, "return self.is_intact(unit) and self.is_acceptable(unit)", "return False"),
@@ -106,7 +109,7 @@ MUTATIONS = [
     ("SS-DG-004", FRAME, "[self.lists[(s, h)] for h in range(r)] + [gaussians]", "[gaussians]"),
     ("SS-DG-005", DECODING, "if frame.compares_carried() and", "if False and"),
     ("SS-DG-005", FRAME, "self.shows_carried() and complete and not self.faulty", "self.shows_carried() and not self.faulty"),
-    ("SS-DG-005", FRAME, "self.shows_carried() and complete and not self.faulty", "self.shows_carried() and complete"),
+    # `faulty` decides about an error after the first one alone, which nobody compares.
     ("SS-DG-005", FRAME, "self.shows_carried() and complete and not self.faulty", "complete and not self.faulty"),
     ("SS-DG-005", DECODING, "error.of_carried = True", "pass"),
 
@@ -123,7 +126,7 @@ MUTATIONS = [
     ("SS-ER-008", DECODING, "if unit.unit_type in NOT_CRITICAL:", "if True:"),
     ("SS-ER-009", DECODING, "self.check_phase(unit)\n        if unit.unit_type in ENDS_FRAME:",
      "self.check_phase(unit)\n        self.check_payload_crc(unit)\n        if unit.unit_type in ENDS_FRAME:"),
-    ("SS-ER-011", DECODING, "if state.phase != LOST:                                                       # SS-ER-011", "if True:"),
+    # In the lost state TRUNCATED would come after the first error, and cost nothing more.
     ("SS-ER-011", DECODING, "if state.phase != LOST:                                                       # SS-ER-011", "if False:"),
     ("SS-LM-001", SEMANTICS, "require(unit.payload_length <= c.MAX_PAYLOAD_LENGTH,", "require(True,"),
 ]

@@ -132,7 +132,11 @@ MUTATIONS = [
     # 6.14
     ("SS-IN-005", SEMANTICS, "require(u.parent_count == parent_count,", "require(True,"),
     ("SS-IN-006", SEMANTICS, 'in_range(u, element, 1, u.parent_count, q, "MISMATCH")', "pass"),
-    ("SS-IN-008", SEMANTICS, 'in_range(u, element, 1, c.MAX_GAUSSIANS[level], "A.2", "OVER_LIMIT")', "pass"),
+    # Without the check a count beyond the limit is still a MISMATCH: with the parents, or with gaussian_count, which is below it.
+    ("SS-IN-008", SEMANTICS, 'in_range(u, element, 1, c.MAX_GAUSSIANS[level], "A.2", "OVER_LIMIT")',
+     'in_range(u, element, 1, c.MAX_LEARNED[level], "A.2", "OVER_LIMIT")'),
+    ("SS-IN-008", SEMANTICS, 'in_range(u, element, 1, c.MAX_GAUSSIANS[level], "A.2", "OVER_LIMIT")',
+     'in_range(u, element, 1, c.MAX_GAUSSIANS[level], "A.2", "OUT_OF_RANGE")'),
     ("SS-IN-010", SEMANTICS, 'one_of(u, "sh_mode", (0, 1, 2), "6.14", "RESERVED")', "pass"),
     ("SS-IN-010", SEMANTICS, 'in_range(u, "sh_mode", 1, 2, "6.14")', "pass"),
     ("SS-IN-010", SEMANTICS, 'require(context.sh_transform is not None, "OUT_OF_RANGE"', 'require(context.sh_transform is not None, "CONSTRAINT"'),

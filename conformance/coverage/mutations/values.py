@@ -63,7 +63,8 @@ MUTATIONS = [
      "if neighbours[0][0] == 0:\n            return self.attribute_of(attribute, neighbours[0][1])\n"
      "        return self.means(attribute, self.weights(attribute, neighbours, values), neighbours)"),
     ("SS-PR-008", TABLES, "4096, 3970, 3848,", "4096, 3970, 3849,"),
-    ("SS-PR-008", PREDICTION, "weight.append(EXP[min(255, xs + xf)])", "weight.append(EXP[min(254, xs + xf)])"),
+    # EXP[254] and EXP[255] are equal
+    ("SS-PR-008", PREDICTION, "weight.append(EXP[min(255, xs + xf)])", "weight.append(EXP[min(253, xs + xf)])"),
     ("SS-PR-004", INCREMENT, "require(kinds.count(prediction.TRANSFORMER) <= most,", "require(True,"),
 
     # 7.7.6 and 7.7.7
