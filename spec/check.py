@@ -10,7 +10,7 @@ from pathlib import Path
 
 TYPES = {"i32": 2**31 - 1, "u32": 2**32 - 1, "i64": 2**63 - 1, "u64": 2**64 - 1}
 HERE = Path(__file__).parent
-TEXTS = {path.name: path.read_text() for glob in ("0*.md", "[abf]-*.md") for path in sorted(HERE.glob(glob))}
+TEXTS = {path.name: path.read_text() for glob in ("0*.md", "[abfg]-*.md") for path in sorted(HERE.glob(glob))}
 # Numbers with a point that are not clauses: versions, rounded numbers of A.3, code.
 NUMBERS = re.compile(r"(?:[Vv]ersion|SplatStream) \d+\.\d+|\d+\.\d+ (?:k|M|G|MB)\b|`[^`]*`")
 CLAUSE = re.compile(r"(?<![\w.-])([1-9A-F](?:\.\d+)+)(?![\w-]|\.\d)")
@@ -18,7 +18,7 @@ BOUND = re.compile(r"[0-9^*+() -]+")
 # The limits of A.2 that the bounds of A.3 are computed from, by the first word of their rows.
 LIMITS = {"N": "Gaussians of a frame", "M": "cells of a frame", "T": "new Gaussians of an increment with", "V": "codebook values"}
 SUFFIXES = {"k": 10**3, "M": 10**6, "G": 10**9}
-SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "i8": 1, "f32": 4}
+SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "i8": 1, "i32": 4, "f32": 4}
 
 
 def cells(line):

@@ -12,6 +12,7 @@ mod peers;
 mod pictures;
 mod scene_chart;
 mod scenes;
+mod stability;
 mod standing;
 mod summary;
 mod svg;
@@ -43,15 +44,19 @@ use sweep::{Sweep, SweepArgs};
 /// Every scene is encoded with every variant at every quality, decoded, rendered and compared with its source.
 /// A directory of frames is one sequence: of its first GOP with predicted frames, every operating point is measured
 /// too, and what the tools of predicted frames are worth. The page holds everything and needs no network.
+///
+/// With --stability the page shows instead where codecs fail: scenes and sequences made to break them, of the built-in
+/// scene or of yours, with PSNR, bits, what was detected and what the encoder fell back to.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream chart --builtin --quick -o look/\n  \
     splatstream chart garden.ply frames/ -o report/ --height 720\n  \
     splatstream chart frames/ -o report/ --presets balanced --qualities high --without contexts\n  \
     splatstream chart frames/ -o report/ --quick --ablation --gop 8\n  \
-    splatstream chart frames/ -o report/ --frames 8 --peers peers.json --st-lpips weights.npz")]
+    splatstream chart frames/ -o report/ --frames 8 --peers peers.json --st-lpips weights.npz\n  \
+    splatstream chart --stability -o stability/")]
 pub(crate) struct Chart {
     /// Scene files, and directories of frames.
-    #[arg(value_name = "SCENE_OR_SEQUENCE", required_unless_present = "builtin")]
+    #[arg(value_name = "SCENE_OR_SEQUENCE", required_unless_present_any = ["builtin", "stability"])]
     scenes: Vec<PathBuf>,
     /// A directory for the page, index.html, and the files beside it.
     #[arg(short, long = "out", value_name = "DIR")]
@@ -76,6 +81,12 @@ pub(crate) struct Chart {
     /// parts; trains it for every row.
     #[arg(long)]
     ablation: bool,
+    /// Instead, show where codecs fail: cases made to break them, stronger and stronger.
+    #[arg(long, conflicts_with_all = ["cameras", "ablation", "peers", "st_lpips"])]
+    stability: bool,
+    /// All strengths of the cases, on larger scenes.
+    #[arg(long, requires = "stability", conflicts_with = "quick")]
+    full: bool,
     #[command(flatten)]
     sweep: SweepArgs,
     /// Results of other codecs on the same scenes.
@@ -104,6 +115,9 @@ struct Charting<'a> {
 impl Chart {
     /// Measures every scene, then writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        if self.stability {
+            return stability::run(self, console);
+        }
         make_directory(&self.out)?;
         let mut scenes = self.scenes()?;
         let sweep = self.sweep.sweep(self.fps);

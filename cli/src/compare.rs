@@ -107,6 +107,7 @@ impl Compare {
         report.attributes = sums.errors();
         report.pictures = pictures.errors();
         (report.errors_a, report.errors_b) = (frames_a.faults(), frames_b.faults());
+        report.pictures.warning().into_iter().for_each(|warning| console.complain(&warning));
         console.report(&report, || report.text())?;
         frames_a.verdict().and_then(|()| frames_b.verdict())
     }

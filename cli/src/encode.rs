@@ -1,6 +1,8 @@
 //! `splatstream encode`: frames in files to a stream.
 
 mod choices;
+mod pictures;
+pub(crate) mod warnings;
 
 use crate::cameras::{BackgroundArg, CameraArgs, Views, to_stream};
 use crate::console::Console;
@@ -14,24 +16,29 @@ use crate::setting_names::{
 };
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
+use pictures::{Goal, Pictures};
 use serde::Serialize;
 use splatstream_encoder::{
-    FrameSource, Importance, NetworkSource, Quality, Report, Settings, Structure, encode,
+    FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
 };
 use splatstream_format::payload::{Network, SceneDescription};
 use splatstream_render::Camera;
+use splatstream_scene::Defect;
 use std::convert::Infallible;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Instant;
+use warnings::{Warning, warnings};
 
 /// Encode frames of Gaussians to a stream.
 ///
 /// Frames are .ply, .compressed.ply, .spz, .sog or .splat files, or SOG directories (those with a meta.json).
-/// They are taken in the natural order of their names: frame_9 before frame_10.
+/// They are taken in the natural order of their names: frame_9 before frame_10. The finished stream is decoded, and
+/// pictures of a few frames are compared with those of the source; a quality or a size that was missed is a warning.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream encode frames/ -o talk.gss --fps 30\n  \
-    splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small")]
+    splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small\n  \
+    splatstream encode garden.ply -o garden.gss --target-mb 8")]
 pub(crate) struct Encode {
     /// Files, or one directory of frames.
     #[arg(required = true, value_name = "INPUT")]
@@ -42,13 +49,19 @@ pub(crate) struct Encode {
     /// How much to search: smaller files take longer.
     #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
     preset: PresetName,
-    /// How close the decoded scene is to the source.
+    /// How close pictures of the decoded scene are to those of the source: PSNR at 540 lines. The quantisers are fitted
+    /// to the first frame for it.
     #[arg(long, value_enum, default_value_t = QualityName::High)]
     quality: QualityName,
-    /// Fit the quantisers to the first frame instead, for pictures with this PSNR, decibels; takes a few seconds
-    /// more.
+    /// Any other PSNR, decibels, 20 to 90.
     #[arg(long, value_name = "DB", conflicts_with = "quality", value_parser = parse_psnr)]
     psnr: Option<f32>,
+    /// The size of the stream instead, bits per Gaussian with everything counted, to 3 %: it is encoded a few times.
+    #[arg(long, value_name = "BITS", conflicts_with_all = ["quality", "psnr"], value_parser = parse_positive)]
+    target_bpg: Option<f64>,
+    /// The size of the stream in megabytes (of 1,000,000 bytes) instead, to 3 %.
+    #[arg(long, value_name = "MB", conflicts_with_all = ["quality", "psnr", "target_bpg"], value_parser = parse_positive)]
+    target_mb: Option<f64>,
     /// Frames in a GOP; decoding can start at each.
     #[arg(long, value_name = "N", default_value_t = Settings::default().gop)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
@@ -96,6 +109,10 @@ pub(crate) struct Encode {
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     #[arg(long)]
     keep_invisible: bool,
+    /// Leave out Gaussians with values that are NaN or infinite, or a rotation of length 0, and count them; without
+    /// this option they are an error.
+    #[arg(long)]
+    drop_invalid: bool,
     /// What puts Gaussians into the first refinements; default is removal, and volume for the fast preset.
     #[arg(long, value_enum)]
     importance: Option<ImportanceName>,
@@ -142,6 +159,11 @@ enum ImportanceName {
 fn parse_psnr(text: &str) -> Result<f32, String> {
     let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
     decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (1e-6..=1e9).contains(number));
+    number.ok_or_else(|| format!("'{text}' is not a number above 0"))
 }
 
 fn parse_tolerance(text: &str) -> Result<f32, String> {
@@ -206,14 +228,19 @@ struct Encoded {
     bpg: f64,
     seconds: f64,
     invisible: u64,
+    /// Gaussians left out because of values that are not finite.
+    dropped: u64,
     chosen: Vec<Choice>,
+    #[serde(flatten)]
+    pictures: Pictures,
+    warnings: Vec<Warning>,
     digests: Vec<String>,
 }
 
 impl Encode {
     /// Encodes to a file that appears when it is whole.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
-        let mut source = FrameFiles::find(&self.inputs)?;
+        let mut source = FrameFiles::find(&self.inputs)?.unchecked();
         let settings = self.settings(&mut source)?;
         self.check_out(&source)?;
         let mut file = OutputFile::create(&self.out)?;
@@ -223,7 +250,8 @@ impl Encode {
             .map_err(|error| self.failed(&source, &error))?;
         drop(progress);
         file.finish()?;
-        let encoded = self.encoded(&report, &settings, start.elapsed().as_secs_f64());
+        let encoded = self.encoded(&report, &settings, &source, start.elapsed().as_secs_f64());
+        encoded.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         console.report(&encoded, || encoded.text())
     }
 
@@ -269,7 +297,13 @@ impl Encode {
             network: self.network.as_ref().map(NetworkName::source).transpose()?,
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
-            psnr: self.psnr,
+            psnr: match self.size() {
+                Some(_) => None,
+                None => Some(self.psnr.unwrap_or_else(|| Quality::from(self.quality).decibels())),
+            },
+            size: self.size(),
+            verify: true,
+            drop_invalid: self.drop_invalid,
             gop: self.gop,
             refinements: self.refinements.clone(),
             sh_degree: self.sh_degree,
@@ -285,6 +319,12 @@ impl Encode {
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
         Ok(settings)
+    }
+
+    /// The size that was asked for.
+    fn size(&self) -> Option<Size> {
+        let bytes = self.target_mb.map(|megabytes| Size::Bytes((megabytes * 1e6) as u64));
+        self.target_bpg.map(Size::BitsPerGaussian).or(bytes)
     }
 
     /// What the stream says about its scene. Cameras that were made are made again by whoever needs some.
@@ -309,6 +349,21 @@ impl Encode {
         match error {
             // Errors of reading name the file.
             Error::Source { source, .. } => Failure::other(source.to_string()),
+            Error::Invalid { frame, count, first } => {
+                let Defect { row, property, value, kind } = first;
+                let path = source.paths().get(*frame as usize).unwrap_or(&self.out).display();
+                let more = match count - 1 {
+                    0 => String::new(),
+                    more => format!(
+                        ", and {} more Gaussians of this frame have such values",
+                        grouped(more as u64)
+                    ),
+                };
+                Failure::other(format!(
+                    "{path}: frame {frame}, Gaussian {row}: {property} is {value}: {kind}{more}\n  \
+                     repair the file, or leave such Gaussians out with --drop-invalid"
+                ))
+            }
             Error::TooManyGaussians { frame, .. }
             | Error::TooManyPerSecond { frame, .. }
             | Error::OutOfGrid { frame, .. } => {
@@ -320,7 +375,11 @@ impl Encode {
         }
     }
 
-    fn encoded(&self, report: &Report, settings: &Settings, seconds: f64) -> Encoded {
+    fn encoded(&self, report: &Report, settings: &Settings, source: &FrameFiles, seconds: f64) -> Encoded {
+        let path = |frame: u32| source.paths().get(frame as usize);
+        let name = |frame: u32| {
+            path(frame).map_or_else(|| format!("frame {frame}"), |path| path.display().to_string())
+        };
         Encoded {
             output: self.out.clone(),
             bytes: report.bytes,
@@ -329,7 +388,10 @@ impl Encode {
             bpg: bits_per_gaussian(report.bytes, report.gaussians),
             seconds,
             invisible: report.invisible,
+            dropped: report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum(),
             chosen: choices(report, settings),
+            pictures: Pictures::of(report, settings, Goal::of(settings)),
+            warnings: warnings(report, settings, &name),
             digests: report.digests.iter().copied().map(hex_digest).collect(),
         }
     }
@@ -340,13 +402,14 @@ impl Encoded {
         let chosen: String = self.chosen.iter().map(Choice::text).collect();
         format!(
             "{}\n  frames             {}\n  Gaussians          {}\n  bytes              {}\n  \
-             bits per Gaussian  {:.2}\n  seconds            {:.2}\nchosen\n{chosen}",
+             bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}chosen\n{chosen}",
             self.output.display(),
             grouped(self.frames.into()),
             grouped(self.gaussians),
             grouped(self.bytes),
             self.bpg,
             self.seconds,
+            self.pictures.text(),
         )
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use splatstream_encoder::FrameSource;
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
+use splatstream_scene::{GaussianFrame, ReadLimits, read_scene, read_scene_as_is};
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,6 +18,8 @@ pub(crate) struct FrameFiles {
     paths: Vec<PathBuf>,
     /// The frame read last: of a single frame, the encoder's second pass needs no second reading.
     last: Option<(u32, GaussianFrame)>,
+    /// Whether values that no frame may hold are left to whoever asks for the frames.
+    as_is: bool,
 }
 
 impl FrameFiles {
@@ -31,7 +33,12 @@ impl FrameFiles {
             }
         };
         paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-        Ok(Self { paths, last: None })
+        Ok(Self { paths, last: None, as_is: false })
+    }
+
+    /// Values are not checked.
+    pub(crate) fn unchecked(self) -> Self {
+        Self { as_is: true, ..self }
     }
 
     /// The files, in the order of the frames.
@@ -52,7 +59,8 @@ impl FrameSource for FrameFiles {
             return Ok(frame.clone());
         }
         let path = self.paths.get(number as usize).ok_or_else(|| format!("there is no frame {number}"))?;
-        let frame = read_scene(path, &ReadLimits::default())?;
+        let read = if self.as_is { read_scene_as_is } else { read_scene };
+        let frame = read(path, &ReadLimits::default())?;
         self.last = Some((number, frame.clone()));
         Ok(frame)
     }

@@ -17,16 +17,16 @@ pub(crate) enum PresetName {
     Small,
 }
 
-/// How close to the source.
+/// How close pictures are to those of the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum QualityName {
-    /// Visible loss.
+    /// 40 dB: visible loss.
     Low,
-    /// Loss visible side by side.
+    /// 45 dB: loss visible side by side.
     Medium,
-    /// Loss hard to see.
+    /// 50 dB: loss hard to see.
     High,
-    /// No visible loss.
+    /// 57 dB: no visible loss.
     VisuallyLossless,
 }
 
@@ -115,8 +115,8 @@ pub(crate) enum ToolName {
     ShTransform,
     /// Tables taken over from the refinement before.
     TableReuse,
-    /// Coarser scale, rotation and colour in the last refinement.
-    CoarseTail,
+    /// Steps that follow from size, opacity, shape and importance.
+    AdaptiveSteps,
     /// Cells that move what is in them, in predicted frames.
     CellMotion,
     /// Gaussians that continue those of the reference, in predicted frames.
@@ -135,7 +135,7 @@ impl ToolName {
             Self::AxisSort => settings.tools.axis_sort = false,
             Self::ShTransform => settings.tools.sh_transform = false,
             Self::TableReuse => settings.tools.table_reuse = false,
-            Self::CoarseTail => settings.tools.coarse_tail = false,
+            Self::AdaptiveSteps => settings.tools.adaptive_steps = false,
             Self::CellMotion => settings.tools.cell_motion = false,
             Self::Survivors => settings.tools.survivors = false,
             Self::Prune => settings.keep_invisible = true,

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{directory, json, succeed, text, write_frames};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 fn read(path: &Path) -> String {
@@ -98,12 +98,10 @@ fn the_numbers_of_a_sequence_and_of_a_peer_are_beside_the_page() {
     assert_eq!(read(&out.join("bandwidth.csv")).lines().count(), 1 + 4);
 }
 
-/// The lines of a CSV file, each as its cells by name. No cell of these files holds a comma.
+/// The lines of a CSV file, each as its cells by name.
 fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
-    let text = read(path);
-    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    let names = lines.next().expect("headings");
-    lines.map(|cells| names.iter().cloned().zip(cells).collect()).collect()
+    let mut reader = csv::Reader::from_path(path).expect("a file");
+    reader.deserialize().map(|row| row.expect("cells under headings")).collect()
 }
 
 /// A whole number in a cell.
@@ -146,4 +144,32 @@ fn the_operating_points_of_a_sequence_add_up() {
     let everything = levels[1]["added_bytes"].parse::<u64>().unwrap();
     assert_eq!(count(&tools[0], "inter_bytes"), everything);
     assert!(["Low-frame-rate temporal", "without survivors"].iter().all(|words| report.contains(words)));
+}
+
+#[test]
+fn a_look_at_stability_has_every_case_and_says_what_is_silent() {
+    let directory = directory();
+    let out = directory.path().join("report");
+    let report = json(&["chart", "--stability", "--quick", "--height", "60", "-o", text(&out)]);
+    let table = rows(&out.join("stability.csv"));
+    let cases: BTreeSet<&str> = table.iter().map(|row| row["case"].as_str()).collect();
+    let tools: BTreeSet<&str> = table.iter().map(|row| row["tool"].as_str()).collect();
+    assert_eq!(cases.len(), 21, "{cases:?}");
+    assert_eq!(tools.into_iter().collect::<Vec<_>>(), [".splat", "SOG", "SPZ", "SplatStream", "all intra"]);
+    // Ten scenes for four tools, eleven sequences for two, one strength each.
+    assert_eq!(table.len(), 10 * 4 + 11 * 2);
+    let silent = table.iter().filter(|row| row["verdict"] == "silent failure");
+    let ours = silent.filter(|row| ["SplatStream", "all intra"].contains(&row["tool"].as_str()));
+    assert_eq!(report["silent_failures"].as_u64(), Some(ours.count() as u64));
+    let one = |case: &str, tool: &str| {
+        table.iter().find(|row| row["case"] == case && row["tool"] == tool).expect("a row")
+    };
+    assert_eq!(one("floater-visible", "SPZ")["verdict"], "warned");
+    assert!(one("loss", "SplatStream")["detected"].starts_with("decoder: "));
+    assert!(one("transparent", "SplatStream")["fallback"].contains("invisible"));
+    let page = read(&out.join("index.html"));
+    for file in report["files"].as_array().unwrap().iter().filter_map(|file| file.as_str()) {
+        assert!(out.join(file).is_file() && page.contains(file), "{file}");
+    }
+    assert!(!page.contains("NaN") && !page.contains("http://") && !page.contains("https://"));
 }

@@ -297,7 +297,7 @@ fn dependencies_are_those_of_the_structure() {
     assert_eq!(frames[3]["units"][1]["needs"][1]["unit"], frames[2]["units"][1]["unit"]);
     assert_eq!(frames[0]["transforms"].as_array().unwrap().len(), 2);
     let list = succeed(&["inspect", text(&dynamic()), "--deps"]);
-    assert!(list.starts_with("GOP 0  unit 2 at 0xa2: frames 0..=4, predicted, temporal depth 2\n"), "{list}");
+    assert!(list.starts_with("GOP 0  unit 2 at 0xc0: frames 0..=4, predicted, temporal depth 2\n"), "{list}");
     assert!(list.contains("\n  frame 3  B  t2  unit 20  refers to frame 2\n"), "{list}");
     let intra = succeed(&["inspect", text(&fixture()), "--deps"]);
     assert!(intra.contains("every frame by itself") && intra.contains("needs codebook unit"), "{intra}");

@@ -72,7 +72,7 @@ fn the_dump_of_a_unit_holds_its_bytes() {
 #[test]
 fn operating_points_are_the_streams_that_extraction_makes() {
     // What a stream has whatever the operating point: file header, twice the sequence parameters, description, index, end.
-    let always = 16 + 2 * (20 + 76) + (20 + 30) + (20 + 4 + 2 * 16) + (20 + 16);
+    let always = 16 + 2 * (20 + 106) + (20 + 30) + (20 + 4 + 2 * 16) + (20 + 16);
     let directory = directory();
     let part = directory.path().join("part.gss");
     let points = json(&["inspect", text(&fixture()), "--ops"]);

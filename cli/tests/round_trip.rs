@@ -15,7 +15,7 @@ fn files(directory: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn what_is_decoded_is_within_a_step_of_what_was_encoded() {
+fn what_is_decoded_is_close_to_what_was_encoded() {
     let directory = directory();
     let frames = write_frames(directory.path());
     let stream = directory.path().join("small.gss");
@@ -28,13 +28,14 @@ fn what_is_decoded_is_within_a_step_of_what_was_encoded() {
     assert_eq!(report["gaussians"], encoded["gaussians"]);
     assert_eq!(files(&decoded).len(), 3);
     for other in [&stream, &decoded] {
-        let compared = json(&["compare", text(&frames), text(other)]);
-        let largest = |attribute: &str| compared["attributes"][attribute]["max"].as_f64().unwrap();
+        let views = ["--cameras", "ring:3", "--height", "270"];
+        let compared = json(&[&["compare", text(&frames), text(other)][..], &views].concat());
         assert_eq!(compared["frames"], 3);
-        assert!(largest("log_scale") <= 0.0501, "a step of 0.05: {}", largest("log_scale"));
-        assert!(largest("opacity_logit") <= 0.0551, "a step of 0.055: {}", largest("opacity_logit"));
-        assert!(largest("rotation") <= 0.02, "{}", largest("rotation"));
-        assert!(largest("position") <= 0.001, "{}", largest("position"));
+        let mean = |attribute: &str| compared["attributes"][attribute]["rmse"].as_f64().unwrap();
+        // Steps follow what pictures show: a Gaussian that hardly shows may be farther off than the mean.
+        assert!(mean("position") <= 0.02, "{}", mean("position"));
+        let psnr = compared["psnr_db"].as_f64().unwrap();
+        assert!(psnr >= 55.0, "{psnr}");
     }
 }
 
@@ -58,10 +59,13 @@ fn frames_come_in_the_order_that_people_count_in() {
     let directory = directory();
     let stream = write_stream(directory.path());
     // f8, f9, f10: by order of names, frame 0 of the stream would be f10.
-    let first = directory.path().join("frames/f8.ply");
-    let compared = json(&["compare", text(&first), text(&stream), "--match", "nearest"]);
-    assert_eq!((&compared["frames"], &compared["frames_b"]), (&1.into(), &3.into()));
-    assert!(compared["attributes"]["position"]["max"].as_f64().unwrap() < 0.001);
+    let apart = |name: &str| {
+        let first = directory.path().join("frames").join(name);
+        let compared = json(&["compare", text(&first), text(&stream), "--match", "nearest"]);
+        assert_eq!((&compared["frames"], &compared["frames_b"]), (&1.into(), &3.into()));
+        compared["attributes"]["position"]["rmse"].as_f64().unwrap()
+    };
+    assert!(apart("f8.ply") < apart("f10.ply"), "{} {}", apart("f8.ply"), apart("f10.ply"));
 }
 
 #[test]
@@ -107,7 +111,7 @@ fn any_number_of_threads_gives_the_same_bytes_and_digests() {
         let encoded = json(&["encode", text(&frames), "-o", text(&stream), "--threads", threads]);
         let decoded = json(&["--threads", threads, "decode", text(&stream), "--dry-run"]);
         assert_eq!(encoded["digests"], decoded["digests"]);
-        (fs::read(stream).unwrap(), decoded["digests"].clone())
+        (fs::read(stream).unwrap(), decoded["digests"].clone(), encoded["verified"].clone())
     };
     assert_eq!(of("1"), of("2"));
 }

@@ -108,6 +108,7 @@ def on_increment(_, args):
     for bit, part in enumerate(syntax.INCREMENT_PARTS):
         SEEN.condition("increment: %s is present" % part[0][0], u.increment_flags >> bit & 1)
     SEEN.condition("increment: sh_mode == 2", u.sh_mode == 2)
+    SEEN.condition("increment: extrapolates_opacity == 1", u.extrapolates_opacity)
 
 
 def on_frame_header(frame, _):

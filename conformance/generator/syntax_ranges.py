@@ -17,7 +17,7 @@ def free(high):
     return 0, high, (), True
 
 
-FILE_HEADER = {"signature": some(0x0A, 0x89), "version_major": some(130, 130), "version_minor": some(1, 1),
+FILE_HEADER = {"signature": some(0x0A, 0x89), "version_major": some(130, 130), "version_minor": some(2, 2),
                "profile": some(0, 1),
                "level": some(1, 4), "header_crc": free(U32)}
 UNIT_HEADER = {"unit_type": some(1, U8), "unit_flags": some(0, 1), "spatial_layer": some(0, 3),
@@ -29,7 +29,10 @@ SEQUENCE_PARAMETERS = {
     "refinement_count": some(1, 10),
     "refinement_percent": some(0, 100), "position_bits": some(1, 20), "block_log2": some(6, 16),
     "sequence_flags": some(0, 7),
-    "rotation_threshold": some(0, U8), "frame_count": some(0, U32), "ticks_per_second": some(1, U32),
+    "linear_log2": some(0, 20), "segment_log2": some(0, 20), "feature_shift": some(0, 7), "size_weight": some(0, 8191),
+    "opacity_weight": some(0, 8191), "anisotropy_weight": some(0, 8191), "size_reference": some(-65536, 65535),
+    "opacity_reference": some(-32768, 32767), "anisotropy_reference": some(0, 65535), "frame_count": some(0, U32),
+         "ticks_per_second": some(1, U32),
     "ticks_per_frame": some(0, U32),
     "position_offset": some(-FAR, FAR), "position_step": STEP, "log_scale_offset": some(-FAR, FAR),
     "log_scale_step": STEP,
@@ -48,15 +51,15 @@ CODEBOOK = {"codebook_id": some(0, 15), "component_count": some(1, 45), "entry_c
             "value_bytes": some(1, 2),
             "entries as i8": some(-128, 127), "entries as i16": some(-2 ** 15, 2 ** 15 - 1)}
 INDEX = {"entry_count": some(0, U32)}
-INDEX_ENTRY = {"frame": some(0, U32), "reserved_zero": some(0, 0), "offset": some(112, U64)}
+INDEX_ENTRY = {"frame": some(0, U32), "reserved_zero": some(0, 0), "offset": some(142, U64)}
 END = {"frame_count": some(0, U32), "unit_count": some(1, U32), "index_offset": some(0, U64)}
 COUNT = some(1, 2 ** 24)
-INCREMENT = {"increment_flags": some(0, 1023), "refinement_digest": free(U64), "parent_count": COUNT, "move_count": COUNT,
+INCREMENT = {"increment_flags": some(0, 4095), "refinement_digest": free(U64), "parent_count": COUNT, "move_count": COUNT,
              "update_count": COUNT, "remove_count": COUNT, "new_count": COUNT, "position_shift": some(0, 19),
-             "attribute_shift": some(0, 7), "predictor_block_log2": some(0, 16), "neighbour_count": some(1, 16),
+             "attribute_step": some(0, 24), "predictor_block_log2": some(0, 16), "neighbour_count": some(1, 16),
              "bilateral_spatial": some(0, U8), "bilateral_feature": some(0, U8), "sh_mode": some(1, 2),
              "vq_stage_count": some(1, 4), "codebook_ids": some(0, 15), "compensation_log_scale": some(-128, 127),
-             "compensation_opacity": some(-128, 127)}
+             "compensation_opacity": some(-128, 127), "move_block_log2": some(0, 16)}
 SCENE = {"up_axis": some(0, 6), "kernel": some(0, 0), "colour_space": some(0, 1), "projection": some(0, 0),
          "sorting": some(0, 1), "description_flags": some(0, 31), "metres_per_unit": some(2.0 ** -149, FAR),
          "background": some(0.0, 1.0), "bounds_min": some(-FAR, FAR), "bounds_max": some(-FAR, FAR),
@@ -78,7 +81,7 @@ BLOCK = {"word_count": some(0, U32), "state": some(65536, U32), "word": some(0, 
 PLANE_MODEL = {
     "reuse": some(0, 1), "bias": some(-32768, 32767), "direct_log2_minus2": some(0, 5),
     "direct_log2_minus2 of position": some(0, 3),
-    "source_a": some(0, 10), "source_b": some(0, 10), "threshold_a_count_minus1": some(0, 15),
+    "source_a": some(0, 11), "source_b": some(0, 11), "threshold_a_count_minus1": some(0, 15),
     "threshold_b_count_minus1": some(0, 15),
     "threshold_a_first": some(-2 ** 31 + 1, 2 ** 31 - 1), "threshold_b_first": some(-2 ** 31 + 1, 2 ** 31 - 1),
     "threshold_a_step_minus1": some(0, 2 ** 32 - 3), "threshold_b_step_minus1": some(0, 2 ** 32 - 3),
@@ -110,11 +113,13 @@ CONDITIONS = ["transform: transform_kind == 1", "weights: model_source == 1",
               "plane_model: threshold_a_count_minus1 == 0", "plane_model: threshold_b_count_minus1 == 0",
               "plane_model: is_reference == 1", "plane_model: is_parametric == 1",
               "plane_model: mode == last"]
-CONDITIONS += ["increment: section %s is present" % name for name in ("modes", "moves", "updates", "predictors", "new")]
+CONDITIONS += ["increment: section %s is present" % name for name in ("modes", "move_predictors", "moves", "updates",
+                                                                   "predictors", "new")]
 CONDITIONS += ["increment: %s is present" % name for name in (
-    "parent_count", "move_count", "update_count", "remove_count", "new_count", "position_shift", "attribute_shift",
-    "predictor_block_log2", "sh_mode", "compensation_log_scale")]
-CONDITIONS += ["increment: sh_mode == 2", "frame_header: carried_digest is present", "frame_header: cell_count is present"]
+    "parent_count", "move_count", "update_count", "remove_count", "new_count", "position_shift", "attribute_step",
+    "predictor_block_log2", "sh_mode", "compensation_log_scale", "move_block_log2")]
+CONDITIONS += ["increment: sh_mode == 2", "increment: extrapolates_opacity == 1", "frame_header: carried_digest is present",
+     "frame_header: cell_count is present"]
 CONDITIONS += ["scene_description: %s is present" % name for name in ("metres_per_unit", "background", "bounds_min",
                                                                       "title_length", "camera_count")]
 CONDITIONS += ["network: array %s is present" % name for name in ARRAYS]

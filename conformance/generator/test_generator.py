@@ -68,11 +68,11 @@ class Writers(unittest.TestCase):
 
     def test_elements(self):
         """What is written is read again, in every combination of parts."""
-        values = {"new_count": 300, "attribute_shift": [1, 2, 3, 4, 5], "predictor_block_log2": 4, "sh_mode": 2,
+        values = {"new_count": 300, "attribute_step": [1, 2, 3, 4, 5], "predictor_block_log2": 4, "sh_mode": 2,
                   "vq_stage_count": 2, "codebook_ids": [3, 9], "compensation_opacity": -7}
-        for flags in range(1 << 10):
+        for flags in range(1 << 12):
             u = Elements(INCREMENT, increment_flags=flags, **values)
-            u.predictor_block_log2 = 4
+            u.predictor_block_log2, u.move_block_log2 = 4, 3
             again = Elements.parse(INCREMENT, u.bytes() + b"rest")
             self.assertEqual((again.bytes(), again.rest), (u.bytes() + b"rest", b"rest"))
         self.assertEqual(Elements(INCREMENT, **values).needed(), 0b1111010000)

@@ -1,7 +1,7 @@
 """Clause 3: symbols and constants, and the limits of annex A."""
 
 SIGNATURE = bytes([0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A])
-VERSION = (130, 1)                                  # SS-FH-003: version_major, version_minor
+VERSION = (130, 2)                                  # SS-FH-003: version_major, version_minor
 PROFILE_INTRA = 0
 PROFILE_DYNAMIC = 1
 FILE_HEADER_BYTES = 16
@@ -11,7 +11,12 @@ MAX_LAYERS = 4
 MAX_PREDICTED_FRAMES = 1024
 MAX_NEIGHBOURS = 16
 NEIGHBOUR_WINDOW = 16
-MAX_ATTRIBUTE_SHIFT = 7
+MOVE_WINDOW = 16
+MOVE_NEIGHBOURS = 4
+MAX_SEGMENTS = 24
+MAX_ATTRIBUTE_STEP = 24
+MAX_WEIGHT = 8191
+MAX_FEATURE_SHIFT = 7
 FINE_BITS = 6
 TRANSLATION_MAX = 2 ** 20
 CELL_ROTATION_MAX = 8192

@@ -8,7 +8,7 @@ from .errors import StreamError
 
 
 def Round(x, s):
-    return (x + (1 << (s - 1))) >> s
+    return x if s == 0 else (x + (1 << (s - 1))) >> s
 
 
 def ceil_div(a, b):

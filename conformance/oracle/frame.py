@@ -60,6 +60,7 @@ class Frame:
         self.cell_models = {}                       # models in force for cells after the frame_header
         self.lists = {}                             # (s, h) -> Gaussians
         self.new = {}                               # r -> new Gaussians of unit (top, r) of a P or B frame
+        self.moved = {}                             # r -> moves.Parents of unit (top, r) of a P or B frame
         self.records = {}                           # (s, r) -> elements of the unit
         self.models = {}                            # (s, r) -> models after the unit
         self.counts = [0] * seq.spatial_layer_count  # count(s)
@@ -91,6 +92,7 @@ class Frame:
         s, r = increment.s, increment.r
         self.lists[(s, r)] = increment.list
         self.new[r] = increment.new
+        self.moved[r] = increment.parents
         self.models[(s, r)] = increment.models
         self.records[(s, r)] = increment.header
         self.counts[s] += 1
@@ -103,11 +105,24 @@ class Frame:
             return {} if s == 0 else self.models[(s - 1, 0)]
         return self.reference.models[(self.seq.top, 0)]
 
-    def parents(self, s, r):
-        """SS-PA-001"""
+    def origins(self, s, r):
+        """The parents of a unit as they are before the cells displace them"""
         if self.intra:
             return self.lists[(s - 1, r)] if s > 0 else []
-        return [self.cells.displaced(g) for g in self.reference.lists[(self.seq.top, r)]]
+        return self.reference.lists[(self.seq.top, r)]
+
+    def parents(self, s, r):
+        """SS-PA-001"""
+        origins = self.origins(s, r)
+        return origins if self.intra else [self.cells.displaced(g) for g in origins]
+
+    def span(self):
+        """7.4.6, of a P or B frame"""
+        return self.index_in_gop - self.reference.index_in_gop
+
+    def gap(self):
+        """SS-PA-008, of a P or B frame: 0 where the reference frame is an I frame, of which nothing is scaled"""
+        return 0 if self.reference.intra else tz(self.reference.span() // self.span())
 
     def reference_set(self, s, r, parents):
         """SS-PR-001; `parents` are those of the unit after moves and updates."""

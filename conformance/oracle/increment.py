@@ -4,11 +4,13 @@ from . import models as plane_models, prediction
 from .cells import coordinates
 from .constants import MAX_LEARNED
 from .errors import require
-from .lists import MOVE_AND_UPDATE, UPDATE, Gaussian, check_modes, moved, survivors
+from .lists import MOVE_AND_UPDATE, REMOVE, UPDATE, Gaussian, check_modes, survivors
+from .moves import MovePrediction, changed_by_frame, check_move_predictors, extrapolated, moved, parents_of
 from .parsing import BlockDecoder
 from .reconstruction import prefix_count
 from .residuals import Residuals
 from .semantics import divide_increment, parse_increment
+from .steps import StepRule
 
 
 class Context:
@@ -23,11 +25,14 @@ class Context:
 
 
 class Section:
-    """A section of a frame_header or an increment: its planes, models and the values of all its blocks."""
+    """A section of a frame_header or an increment: its planes, models and the values of all its blocks.
 
-    def __init__(self, division, planes, seq):
+    rule: the StepRule of the increment.
+    """
+
+    def __init__(self, division, planes, seq, rule=None):
         self.name, self.count = division.name, division.count
-        self.division, self.planes = division, planes
+        self.division, self.planes, self.rule = division, planes, rule
         self.block_size = 2 ** seq.block_log2
 
     def parse_models(self, in_force):
@@ -43,7 +48,7 @@ class Section:
         for block in self.division.block_sections:
             n = min(left, self.block_size)
             left -= n
-            self.blocks.append(BlockDecoder(block, self.planes, self.models, self.division.lanes, n))
+            self.blocks.append(BlockDecoder(block, self.planes, self.models, self.division.lanes, n, self.rule))
             for whole, part in zip(self.e, self.blocks[-1].decode()):
                 whole.extend(part)
 
@@ -77,7 +82,8 @@ def parse_sections(sections, in_force):
 class Increment:
     """Decodes unit (s, r) of a frame.
 
-    Afterwards: `list`, `new` (its new Gaussians), `models` after the unit, `header` (its elements), `coded` (planes,
+    Afterwards: `list`, `new` (its new Gaussians), `parents` (moves.Parents, in a P or B frame), `models` after the unit,
+         `header` (its elements), `coded` (planes,
     models and blocks of each section).
     """
 
@@ -90,7 +96,8 @@ class Increment:
         self.header = parse_increment(reader, self.unit, self.frame, self.context, len(parents))
         self.check_sizes()
         divide_increment(self.header, reader, self.context.seq.block_log2)
-        sections = [Section(division, self.planes(division.name), self.context.seq)
+        rule = StepRule(self.context.seq, self.header.attribute_step)
+        sections = [Section(division, self.planes(division.name), self.context.seq, rule)
                     for division in self.header.sections]
         self.models = parse_sections(sections, self.frame.models_in_force(self.s, self.r))
         self.coded = [section.coded() for section in sections]
@@ -122,13 +129,17 @@ class Increment:
         if "modes" in sections:
             modes = sections["modes"].values("mode")[0]
             check_modes(modes, u, frame.intra, sections["modes"].at())
-        changed = parents
+        self.find_parents(parents)
+        changed = self.extrapolated(parents)
         if "moves" in sections:
-            changed = moved(changed, modes, sections["moves"].values("move"), u.position_shift, seq,
-                            sections["moves"].at())
+            planes = sections["moves"].values("move")
+            changed = moved(changed, modes, lambda move, _: [plane[move] for plane in planes],
+                            self.move_prediction(sections, modes), u, seq, sections["moves"].at())
         if "updates" in sections:
             section = sections["updates"]
-            changed = self.updated(changed, modes, lambda attribute, _: section.values(attribute), section.at())
+            changed = self.updated(changed, modes, lambda attribute, *_: section.values(attribute), section.at())
+        if not frame.intra:
+            changed = self.with_changes(changed, modes)
         predictors = []
         if "predictors" in sections:
             prediction.check_predictors(sections["predictors"], self.context.network)
@@ -138,8 +149,36 @@ class Increment:
         if "new" in sections:
             section = sections["new"]
             self.new = self.new_gaussians(self.positions(section), predictors, changed,
-                                          lambda attribute, _: section.values(attribute), section.at())
+                                          lambda attribute, *_: section.values(attribute), section.at())
         self.list = (survivors(changed, modes) if modes else changed) + self.new
+
+    def move_prediction(self, sections, modes):
+        """The MovePrediction of the unit and its move predictors; None if it has none."""
+        if "move_predictors" not in sections:
+            return None
+        check_move_predictors(sections["move_predictors"])
+        return self.move_space(modes), sections["move_predictors"].values("move_predictor")[0]
+
+    def find_parents(self, parents):
+        """The moves.Parents of the unit; `parents` are displaced."""
+        origins = self.frame.origins(self.s, self.r)
+        self.parents = [] if self.frame.intra else parents_of(self.r, origins, parents, self.frame.gap())
+
+    def extrapolated(self, parents):
+        """SS-PA-012; those that are removed do not matter."""
+        if not self.header.extrapolates_opacity:
+            return parents
+        return [extrapolated(g, self.frame.gap()) for g in parents]
+
+    def move_space(self, modes):
+        return MovePrediction([self.frame.moved[h] for h in range(self.r)] + [self.parents], modes)
+
+    def with_changes(self, changed, modes):
+        """SS-PA-007, for the parents of a P or B frame"""
+        result = [changed_by_frame(g, origin) for g, origin in zip(changed, self.frame.origins(self.s, self.r))]
+        for i, parent in enumerate(self.parents):
+            parent.motion = None if modes and modes[i] == REMOVE else result[i].motion
+        return result
 
     def updated(self, parents, modes, take, at):
         """SS-PA-004: the parents after their updates."""

@@ -8,8 +8,9 @@ from .conventions import Round, xxh64
 from .errors import require
 from .reconstruction import i32le
 
-# 7.4.1; dc and sh are the integers of 7.7 and 7.8, anchor is 1 if the Gaussian was in the I frame of its GOP
-Gaussian = namedtuple("Gaussian", "position_fine q o rotation_fine dc sh anchor")
+# 7.4.1; dc and sh are the integers of 7.7 and 7.8, anchor is 1 if the Gaussian was in the I frame of its GOP;
+# motion and fade are 0 in I frames and of new Gaussians (SS-PA-007)
+Gaussian = namedtuple("Gaussian", "position_fine q o rotation_fine dc sh anchor motion fade", defaults=((0, 0, 0), 0))
 
 # 7.4.3
 SKIP, MOVE, UPDATE, MOVE_AND_UPDATE, REMOVE = range(5)
@@ -56,21 +57,6 @@ def check_modes(modes, increment, intra_frame, at):
         count = sum(mode in of_it for mode in modes)                                  # SS-PA-003
         element_at = increment.at(element if increment.has(element) else "increment_flags")
         require(getattr(increment, element) == count, "MISMATCH", "7.4.3", element_at)
-
-
-def moved(parents, modes, v_move, position_shift, seq, at):
-    """SS-PA-004: the parents after their moves; v_move are three planes."""
-    movers = [i for i, mode in enumerate(modes) if mode in (MOVE, MOVE_AND_UPDATE)]
-    result = list(parents)
-    limit = position_limit(seq)
-    fine = [list(parents[i].position_fine) for i in movers]
-    for a in range(3):
-        for j in range(len(movers)):
-            fine[j][a] += v_move[a][j] << (position_shift + FINE_BITS)
-            require(0 <= fine[j][a] <= limit, "CONSTRAINT", "7.4.3", at)                # SS-PA-005
-    for j, i in enumerate(movers):
-        result[i] = parents[i]._replace(position_fine=tuple(fine[j]))
-    return result
 
 
 def survivors(parents, modes):

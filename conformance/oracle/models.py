@@ -35,6 +35,7 @@ def section_planes(name, dc_rank=0, sh_mode=0, sh_rank=0, vq_stage_count=0):
         "cells": [("cell", 1, "position"), ("stale", 1, "signed"),
                   ("translation", 3, "signed"), ("cell_rotation", 3, "signed")],
         "modes": [("mode", 1, "signed")],
+        "move_predictors": [("move_predictor", 1, "signed")],
         "moves": [("move", 3, "signed")],
         "updates": attributes,
         "predictors": [("predictor", 1, "signed")],
@@ -84,7 +85,9 @@ def source_available(source, plane):
         return after_log_scale and plane.attribute != "opacity"
     if source == 10:
         return in_new
-    raise AssertionError("sources of 11 and more do not get here")
+    if source == 11:
+        return after_log_scale
+    raise AssertionError("sources of 12 and more do not get here")
 
 
 # ---- 5.12 plane_model ----
@@ -155,7 +158,7 @@ def parse_plane_model(bits, plane):
 
 def parse_source(bits):
     source = bits.u(4)
-    require(source <= 10, "RESERVED", "6.12", bits.byte())                            # SS-PM-003
+    require(source <= 11, "RESERVED", "6.12", bits.byte())                            # SS-PM-003
     return source
 
 

@@ -1,4 +1,4 @@
-"""Clause 7.10: the f32 attributes, and files of planes.
+"""Clause 7.10: the f32 attributes with the expansion of positions, and files of planes.
 
 Python's float is binary64. The product of two binary32 numbers is exact in binary64, and for sums and
 square roots of binary32 numbers rounding first to 53 and then to 24 bits equals rounding once, since
@@ -27,7 +27,8 @@ def float_planes(seq, planes):
         out[name] = [fl(factor * fl(value)) for value in integers]
 
     for a in range(3):
-        affine("position%d" % a, seq.position_offset[a], seq.position_step, planes[a])
+        expanded = [expand(code, seq) for code in planes[a]]
+        affine("position%d" % a, seq.position_offset[a], seq.position_step, expanded)
     for a in range(3):
         affine("log_scale%d" % a, seq.log_scale_offset, seq.log_scale_step, planes[3 + a])
     affine("opacity", seq.opacity_offset, seq.opacity_step, planes[6])
@@ -38,6 +39,18 @@ def float_planes(seq, planes):
     for j in range(seq.sh_planes):
         scaled("sh%d" % j, fl(seq.sh_step * 0.015625), planes[13 + j])
     return out
+
+
+def expand(code, seq):
+    """SS-OUT-005"""
+    middle = 2 ** (seq.position_bits - 1)
+    distance, linear = abs(code - middle), 2 ** seq.linear_log2
+    length = distance
+    if distance > linear:
+        segment, rest = divmod(distance - linear, 2 ** seq.segment_log2)
+        segment += 1
+        length = linear + (2 ** segment - 2) * 2 ** seq.segment_log2 + rest * 2 ** segment
+    return middle + length if code >= middle else middle - length
 
 
 def rotations(step, planes):

@@ -3,18 +3,20 @@
 from bisect import bisect_right
 
 from .constants import STATE_LOW
-from .conventions import BitReader, bl, unzigzag
+from .conventions import BitReader, bl, ceil_div, unzigzag
 from .errors import require
+from .steps import ATTRIBUTES, LOG_SCALE, OPACITY
 
 
 class BlockDecoder:
     """decode_block of 8.4 for one block of n entries."""
 
-    def __init__(self, section, planes, models, lanes, n):
+    def __init__(self, section, planes, models, lanes, n, rule):
         self.planes = planes
         self.models = models
         self.lanes = lanes
         self.n = n
+        self.rule = rule                            # the StepRule of an increment
         self.start = section.pos
         self.size = section.end - section.start
         self.e = []                                 # e[p][i], coded values
@@ -37,21 +39,31 @@ class BlockDecoder:
         self.raw.check_end()                                                          # SS-BL-003
         return self.e
 
+    @property
+    def strip(self):
+        """Entries of a lane"""
+        return ceil_div(self.n, self.lanes)
+
+    def order(self):
+        """SS-LN-001: (lane, entry) of the symbols of a plane"""
+        places = ((lane, lane * self.strip + place) for place in range(self.strip) for lane in range(self.lanes))
+        return [(lane, i) for lane, i in places if i < self.n]
+
     def decode_plane(self, plane, model):
-        values = []
+        values = [None] * self.n
         self.e.append(values)
         source_a = self.source(model.source_a, plane)
         source_b = self.source(model.source_b, plane)
         nb = len(model.thresholds_b)
         signed = plane.alphabet == "signed"
-        for i in range(self.n):
+        for lane, i in self.order():
             # context(p, i) of 8.5
             ca = bisect_right(model.thresholds_a, source_a(i)) if source_a else 0
             cb = bisect_right(model.thresholds_b, source_b(i)) if source_b else 0
             table = model.tables[ca * (nb + 1) + cb]
-            token = self.symbol(i % self.lanes, table)
+            token = self.symbol(lane, table)
             u = self.value(token, model.direct_log2)
-            values.append(unzigzag(u) if signed else u)
+            values[i] = unzigzag(u) if signed else u
 
     def symbol(self, lane, table):
         if len(table.tokens) == 1:                  # SS-EC-004: the state stays as it is
@@ -78,48 +90,65 @@ class BlockDecoder:
 
     # ---- 8.5 ----
 
-    def log_scale_q(self, k):
-        """q[k] of 7.4 for every Gaussian of the block, from e and the biases as they are."""
-        v = [[value + self.models[1 + j].bias for value in self.e[1 + j]] for j in range(k + 1)]
-        q = v[0]
-        for j in range(1, k + 1):
-            q = [a - b for a, b in zip(q, v[j])]
-        return q
+    def v(self, p):
+        """The values of a plane with their bias."""
+        return [value + self.models[p].bias for value in self.e[p]]
+
+    def cq(self, count):
+        """SS-CX-001: the first `count` of cq[0..2], each of all entries"""
+        first = self.rule.first()
+        rows = [[value * first for value in self.v(1)]]
+        factors = [self.rule.factor(LOG_SCALE, [q]) for q in rows[0]]
+        for k in range(1, count):
+            rows.append([q - value * factor for q, value, factor in zip(rows[-1], self.v(1 + k), factors)])
+        return rows
+
+    def co(self):
+        """SS-CX-001"""
+        return [value * self.rule.factor(OPACITY, q) for value, q in zip(self.v(4), zip(*self.cq(3)))]
+
+    def exponents(self, attribute):
+        """Source 11 for the planes of an attribute"""
+        opacities = [None] * self.n if attribute == OPACITY else self.co()
+        return [self.rule.exponent(attribute, q, o) for q, o in zip(zip(*self.cq(3)), opacities)]
 
     def source(self, code, plane):
-        """The value of a source as a function of i; None for source 0. e[p][j] with j < 0 counts as 0."""
+        """The value of a source as a function of i; None for source 0. Sources 1 and 2 stay in the strip (SS-LN-002)."""
         p = plane.number
         own = self.e[p]                             # grows while the plane is decoded
+        before = lambda i, count: own[max(i - count, i // self.strip * self.strip):i]
 
         if code == 0:
             return None
         if code == 1 and plane.alphabet == "position":
             def neighbour_sum_of_position(i):
-                return 2 * (bl(own[i - 1]) if i >= 1 else 0) + (bl(own[i - 2]) if i >= 2 else 0)
+                lengths = [0, 0] + [bl(delta) for delta in before(i, 2)]
+                return 2 * lengths[-1] + lengths[-2]
             return neighbour_sum_of_position
         if code == 1:
-            return lambda i: sum(own[max(i - 4, 0):i])
+            return lambda i: sum(before(i, 4))
         if code == 2:
-            return lambda i: sum(map(abs, own[max(i - 4, 0):i]))
+            return lambda i: sum(map(abs, before(i, 4)))
         if code == 3:
             values = self.e[p - 1]
         elif code == 4:
             group = self.e[p - plane.index:p]
             values = [sum(abs(e[i]) for e in group) for i in range(self.n)]
         elif code == 5:
-            values = self.log_scale_q(0)
+            values = self.cq(1)[0]
         elif code == 6:
-            values = self.log_scale_q(1)
+            values = self.cq(2)[1]
         elif code == 7:
-            q = [self.log_scale_q(k) for k in range(3)]
-            values = [a + b + c for a, b, c in zip(*q)]
+            values = [sum(q) for q in zip(*self.cq(3))]
         elif code == 8:
-            values = [a - b for a, b in zip(self.log_scale_q(0), self.log_scale_q(2))]
+            values = [q[0] - q[2] for q in zip(*self.cq(3))]
         elif code == 9:
-            values = [value + self.models[4].bias for value in self.e[4]]
+            values = self.co()
         elif code == 10:
             lengths = [bl(delta) for delta in self.e[0]] + [0]
             values = [lengths[i] + lengths[i + 1] for i in range(self.n)]
+        elif code == 11:
+            values = self.exponents(ATTRIBUTES.index(plane.attribute))
         else:
             raise AssertionError("reserved source")
         return values.__getitem__

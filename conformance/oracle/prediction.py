@@ -77,7 +77,8 @@ class NewPredictions:
         self.neighbours = [None] * len(kinds)
         self.learned = {}                           # entry -> its prediction of dc and sh
         if TRANSFORMER in kinds:
-            self.transformer = Transformer(context.network, context.dc_transform, context.sh_transform)
+            self.transformer = Transformer(context.network, context.dc_transform, context.sh_transform,
+                                           context.seq.feature_shift)
         search = Neighbours(references) if any(kinds) else None
         for i, kind in enumerate(kinds):
             if kind != NONE:
@@ -136,7 +137,7 @@ class NewPredictions:
         farthest = neighbours[-1][0]
         weight = []
         for d2, index in neighbours:
-            f = feature_distance(attribute, values, self.references[index])
+            f = feature_distance(attribute, values, self.references[index], self.context.seq.feature_shift)
             xs = (d2 * self.increment.bilateral_spatial) // (farthest + 1)
             xf = min(255, (f * self.increment.bilateral_feature) >> 6)
             weight.append(EXP[min(255, xs + xf)])
@@ -164,19 +165,19 @@ def mean(weight, x):
     return (2 * total + W) // (2 * W)
 
 
-def feature_distance(attribute, values, neighbour):
-    """f of 7.7.4; `values` are those of the new Gaussian so far."""
+def feature_distance(attribute, values, neighbour, shift):
+    """`feature` of 7.7.4; `values` are those of the new Gaussian so far."""
     f = 0
     if attribute in ("opacity", "rotation", "dc", "sh"):
-        f += squares(values.q, neighbour.q)
+        f += squares(values.q, neighbour.q, shift)
     if attribute in ("rotation", "dc", "sh"):
-        f += (values.o - neighbour.o) * (values.o - neighbour.o)
+        f += squares([values.o], [neighbour.o], shift)
     if attribute in ("dc", "sh"):
-        f += squares(canonical(values.rotation_fine), neighbour.rotation)
+        f += squares(canonical(values.rotation_fine), neighbour.rotation, shift)
     if attribute == "sh":
-        f += squares([Round(x, 6) for x in values.dc], [Round(x, 6) for x in neighbour.dc])
+        f += squares(values.dc, neighbour.dc, 6 + shift)
     return f
 
 
-def squares(a, b):
-    return sum((x - y) * (x - y) for x, y in zip(a, b))
+def squares(a, b, shift):
+    return sum(Round(x - y, shift) ** 2 for x, y in zip(a, b))

@@ -3,6 +3,7 @@
 from .constants import COLOUR_SHIFT, COMPONENT_MAX, FINE_BITS, OUTPUT_MAX, VALUE_MAX, VALUE_MIN
 from .conventions import Round, clamp
 from .errors import require
+from .steps import ATTRIBUTES, LOG_SCALE, StepRule
 
 
 class Values:
@@ -14,13 +15,15 @@ class Values:
 class Residuals:
     """Reconstructs `count` entries.
 
-    predict(attribute, i, values) gives the prediction of an attribute of entry i, whose attributes before
-    it are in `values`. take(attribute, predictions) gives the planes of the attribute.
+    predict(attribute, i, values) gives the prediction of an attribute of entry i, whose attributes before it are in
+    `values`. take(attribute, predictions, factors) gives the planes of the attribute; the factors, one for each entry, are
+    those of 7.6.6, of log_scale that of its first plane.
     """
 
     def __init__(self, count, predict, take, increment, context, at):
         self.count, self.predict, self.take = count, predict, take
         self.increment, self.context, self.at = increment, context, at
+        self.rule = StepRule(context.seq, increment.attribute_step)
         self.values = [Values() for _ in range(count)]
 
     def check(self, condition, code):
@@ -32,22 +35,25 @@ class Residuals:
                 self.check(low <= value <= high, "OUT_OF_RANGE")
 
     def run(self):
-        for attribute in ("log_scale", "opacity", "rotation", "dc", "sh"):
+        for number, attribute in enumerate(ATTRIBUTES):
             p = [self.predict(attribute, i, values) for i, values in enumerate(self.values)]
-            v = self.take(attribute, p)
-            getattr(self, attribute)(p, v)
+            factors = [self.rule.factor(number, values.q, values.o) if number else self.rule.first()
+                       for values in self.values]
+            getattr(self, attribute)(p, self.take(attribute, p, factors), factors)
         return self.values
 
     # ---- 7.6.2 ----
 
-    def log_scale(self, p, v):
-        shift = self.increment.attribute_shift[0]
-        x = [[value << shift for value in plane] for plane in v]
+    def log_scale(self, p, v, factors):
+        x = [[value * factor for value, factor in zip(v[0], factors)], [], []]
         q, steps = [[], [], []], []
         for i in range(self.count):
+            q[0].append(p[i][0] + x[0][i])
+            factor = self.rule.factor(LOG_SCALE, [q[0][i]])
+            for k in (1, 2):
+                x[k].append(v[k][i] * factor)
             d1 = p[i][0] - p[i][1] + x[1][i]
             d2 = p[i][1] - p[i][2] + x[2][i]
-            q[0].append(p[i][0] + x[0][i])
             q[1].append(q[0][i] - d1)
             q[2].append(q[1][i] - d2)
             steps += [d1, d2]
@@ -59,22 +65,19 @@ class Residuals:
         for i, values in enumerate(self.values):
             values.q = (q[0][i], q[1][i], q[2][i])
 
-    def opacity(self, p, v):
-        shift = self.increment.attribute_shift[1]
-        o = [p[i] + (v[0][i] << shift) for i in range(self.count)]
+    def opacity(self, p, v, factors):
+        o = [prediction + value * factor for prediction, value, factor in zip(p, v[0], factors)]
         self.check_planes([o], VALUE_MIN, VALUE_MAX)                                  # SS-RC-001
         for values, value in zip(self.values, o):
             values.o = value
 
     # ---- 7.6.3 ----
 
-    def rotation(self, p, v):
-        shift = self.increment.attribute_shift[2]
-        coarser = [rotation_coarseness(self.context.seq, values.q) for values in self.values]
+    def rotation(self, p, v, factors):
         fine = []
         for k in range(3):
             self.check_planes([v[k]], VALUE_MIN, VALUE_MAX)                           # SS-RC-003
-            plane = [p[i][k] + (v[k][i] << (coarser[i] + shift + FINE_BITS)) for i in range(self.count)]
+            plane = [p[i][k] + (v[k][i] * factors[i] << FINE_BITS) for i in range(self.count)]
             self.check_planes([plane], -32767 * 64, 32767 * 64)
             fine.append(plane)
         for i, values in enumerate(self.values):
@@ -82,22 +85,24 @@ class Residuals:
 
     # ---- 7.6.5 ----
 
-    def dc(self, p, v):
-        shift = self.increment.attribute_shift[3]
-        component = [[value << shift for value in plane] for plane in v]
-        self.check_planes(component, -COMPONENT_MAX, COMPONENT_MAX)                   # SS-RC-005
+    def components(self, planes, factors):
+        """SS-RC-005: components after their steps"""
+        result = [[value * factor for value, factor in zip(plane, factors)] for plane in planes]
+        self.check_planes(result, -COMPONENT_MAX, COMPONENT_MAX)
+        return result
+
+    def dc(self, p, v, factors):
+        component = self.components(v, factors)
         for values, out in zip(self.values, self.transformed(p, component, self.context.dc_transform)):
             values.dc = out
 
-    def sh(self, p, v):
+    def sh(self, p, v, factors):
         """SS-RC-004"""
-        mode, shift = self.increment.sh_mode, self.increment.attribute_shift[4]
+        mode = self.increment.sh_mode
         if mode == 0:
             out = [tuple(one) for one in p]
         else:
-            component = v if mode == 1 else self.looked_up(v)
-            component = [[value << shift for value in plane] for plane in component]
-            self.check_planes(component, -COMPONENT_MAX, COMPONENT_MAX)
+            component = self.components(v if mode == 1 else self.looked_up(v), factors)
             out = self.transformed(p, component, self.context.sh_transform)
         for values, one in zip(self.values, out):
             values.sh = one
@@ -126,10 +131,3 @@ class Residuals:
                       for i in range(self.count)]
             component.append([clamp(total, -COMPONENT_MAX, COMPONENT_MAX) for total in totals])
         return component
-
-
-def rotation_coarseness(seq, q):
-    """`shift` of 7.6.3"""
-    d = q[0] - q[2]
-    # SS-AT-001: a threshold of 0 never counts
-    return sum(1 for threshold in seq.rotation_threshold if threshold > 0 and d < threshold)

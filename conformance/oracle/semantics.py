@@ -131,9 +131,15 @@ def parse_sequence_parameters(reader, profile=c.PROFILE_DYNAMIC):
     in_range(seq, "position_bits", 1, 20, q)
     in_range(seq, "block_log2", 6, 16, q)
     reserved_zero(seq, "sequence_flags", q, 0xF8 if dynamic else 0xFC)                # SS-SP-004
-    threshold = seq.rotation_threshold
-    good = threshold[0] >= threshold[1] >= threshold[2]
-    require(good, "OUT_OF_RANGE", q, seq.at("rotation_threshold"))                    # SS-SP-002
+    in_range(seq, "linear_log2", 0, 20, q)
+    in_range(seq, "segment_log2", 0, seq.linear_log2, q)
+    check_segments(seq)
+    in_range(seq, "feature_shift", 0, c.MAX_FEATURE_SHIFT, q)
+    for element in ("size_weight", "opacity_weight", "anisotropy_weight"):
+        in_range(seq, element, 0, c.MAX_WEIGHT, q)
+    in_range(seq, "size_reference", -65536, 65535, q)
+    in_range(seq, "opacity_reference", -32768, 32767, q)
+    in_range(seq, "anisotropy_reference", 0, 65535, q)
     in_range(seq, "ticks_per_second", 1, 2 ** 32 - 1, q)
     for element in ("position_offset", "position_step", "log_scale_offset", "log_scale_step", "rotation_step",
                     "opacity_offset", "opacity_step", "dc_step", "sh_step"):
@@ -159,6 +165,13 @@ def check_percent(seq):
     for r in range(count, 10):
         good = good and percent[r] == 0
     require(good, "OUT_OF_RANGE", "6.4", seq.at("refinement_percent"))
+
+
+def check_segments(seq):
+    """SS-SP-008"""
+    companded = 2 ** (seq.position_bits - 1) - 2 ** seq.linear_log2
+    good = companded <= 0 or ceil_div(companded, 2 ** seq.segment_log2) <= c.MAX_SEGMENTS
+    require(good, "CONSTRAINT", "6.4", seq.at("segment_log2"))
 
 
 # ---- 6.5 gop_header ----
@@ -304,14 +317,14 @@ def check_end(end, seq, frame_count, unit_count, index_offset, gop_frames):
 # ---- 6.14 increment ----
 
 # The bits of increment_flags
-PARENTS, MOVES, UPDATES, REMOVALS, NEW, POSITION_SHIFT, ATTRIBUTE_SHIFT, PREDICTORS, SH, COMPENSATION = (
-    1 << bit for bit in range(10))
+PARENTS, MOVES, UPDATES, REMOVALS, NEW, POSITION_SHIFT, ATTRIBUTE_STEP, PREDICTORS, SH, COMPENSATION, \
+    MOVE_PREDICTORS, EXTRAPOLATES_OPACITY = (1 << bit for bit in range(12))
 ABSENT = {"parent_count": 0, "move_count": 0, "update_count": 0, "remove_count": 0, "new_count": 0,
-          "position_shift": 0, "attribute_shift": (0, 0, 0, 0, 0), "sh_mode": 0, "vq_stage_count": 0,
+          "position_shift": 0, "attribute_step": (0, 0, 0, 0, 0), "sh_mode": 0, "vq_stage_count": 0,
           "codebook_ids": (), "compensation_log_scale": 0, "compensation_opacity": 0}
 
 # SS-IN-011
-SECTIONS = ("modes", "moves", "updates", "predictors", "new")
+SECTIONS = ("modes", "move_predictors", "moves", "updates", "predictors", "new")
 
 
 def parse_increment(reader, unit, frame, context, parent_count):
@@ -321,12 +334,15 @@ def parse_increment(reader, unit, frame, context, parent_count):
     """
     u = Record(syntax.INCREMENT_FIXED, reader)
     q, flags = "6.14", u.increment_flags
-    reserved_zero(u, "increment_flags", q, 0xFC00)                                    # SS-IN-002
+    reserved_zero(u, "increment_flags", q, 0xF000)                                    # SS-IN-002
     flags_at = u.at("increment_flags")
     dynamic = context.profile == c.PROFILE_DYNAMIC
     require(not flags & PREDICTORS or dynamic, "RESERVED", q, flags_at)               # SS-IN-004
     require(not flags & PREDICTORS or flags & NEW, "CONSTRAINT", q, flags_at)         # SS-IN-003
+    check_prediction_flags(flags, dynamic, frame, flags_at)
     u.predictors = bool(flags & PREDICTORS)
+    u.predicts_moves = bool(flags & MOVE_PREDICTORS)
+    u.extrapolates_opacity = bool(flags & EXTRAPOLATES_OPACITY)
     for element, value in ABSENT.items():                                             # SS-IN-001
         setattr(u, element, value)
     for bit, part in enumerate(syntax.INCREMENT_PARTS):
@@ -337,13 +353,26 @@ def parse_increment(reader, unit, frame, context, parent_count):
     check_counts(u, unit, frame, context.level, parent_count)
     if u.has("position_shift"):
         in_range(u, "position_shift", 0, context.seq.position_bits - 1, q)
-    if u.has("attribute_shift"):
-        in_range(u, "attribute_shift", 0, c.MAX_ATTRIBUTE_SHIFT, q)
+    if u.has("attribute_step"):
+        in_range(u, "attribute_step", 0, c.MAX_ATTRIBUTE_STEP, q)
     if u.predictors:
         in_range(u, "predictor_block_log2", 0, 16, q)
         in_range(u, "neighbour_count", 1, c.MAX_NEIGHBOURS, q)
     check_sh(u, unit, context)
+    if u.predicts_moves:
+        in_range(u, "move_block_log2", 0, 16, q)
     return u
+
+
+def check_prediction_flags(flags, dynamic, frame, at):
+    """The flags of move predictors and extrapolation"""
+    either = flags & (MOVE_PREDICTORS | EXTRAPOLATES_OPACITY)
+    require(not either or dynamic, "RESERVED", "6.14", at)                            # SS-IN-014
+    require(not either or not frame.intra, "MISMATCH", "6.14", at)                    # SS-IN-015
+    good = flags & MOVES or not flags & MOVE_PREDICTORS                               # SS-IN-013
+    require(good, "CONSTRAINT", "6.14", at)
+    good = flags & PARENTS or not flags & EXTRAPOLATES_OPACITY
+    require(good, "CONSTRAINT", "6.14", at)
 
 
 def divide_increment(u, reader, block_log2):
@@ -401,7 +430,8 @@ def section_counts(u):
     """The table of SS-IN-011: (section, count) in order."""
     changed = u.increment_flags & (MOVES | UPDATES | REMOVALS)
     predictor_count = ceil_div(u.new_count, 2 ** u.predictor_block_log2) if u.predictors else 0
-    return list(zip(SECTIONS, (u.parent_count if changed else 0, u.move_count, u.update_count,
+    move_predictor_count = ceil_div(u.move_count, 2 ** u.move_block_log2) if u.predicts_moves else 0
+    return list(zip(SECTIONS, (u.parent_count if changed else 0, move_predictor_count, u.move_count, u.update_count,
                                predictor_count, u.new_count)))
 
 

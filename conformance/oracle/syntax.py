@@ -35,7 +35,15 @@ SEQUENCE_PARAMETERS = [
     ("position_bits", "u8", 1, "6.4"),
     ("block_log2", "u8", 1, "6.4"),
     ("sequence_flags", "u8", 1, "6.4"),
-    ("rotation_threshold", "u8", 3, "6.4"),
+    ("linear_log2", "u8", 1, "6.4"),
+    ("segment_log2", "u8", 1, "6.4"),
+    ("feature_shift", "u8", 1, "6.4"),
+    ("size_weight", "u16", 5, "6.4"),
+    ("opacity_weight", "u16", 3, "6.4"),
+    ("anisotropy_weight", "u16", 1, "6.4"),
+    ("size_reference", "i32", 1, "6.4"),
+    ("opacity_reference", "i32", 1, "6.4"),
+    ("anisotropy_reference", "i32", 1, "6.4"),
     ("frame_count", "u32", 1, "6.4"),
     ("ticks_per_second", "u32", 1, "6.4"),
     ("ticks_per_frame", "u32", 1, "6.4"),
@@ -128,7 +136,7 @@ INCREMENT_UPDATES = [("update_count", "leb128", 1, "6.14")]
 INCREMENT_REMOVALS = [("remove_count", "leb128", 1, "6.14")]
 INCREMENT_NEW = [("new_count", "leb128", 1, "6.14")]
 INCREMENT_POSITION_SHIFT = [("position_shift", "u8", 1, "6.14")]
-INCREMENT_ATTRIBUTE_SHIFT = [("attribute_shift", "u8", 5, "6.14")]
+INCREMENT_ATTRIBUTE_STEP = [("attribute_step", "u8", 5, "6.14")]
 INCREMENT_PREDICTORS = [
     ("predictor_block_log2", "u8", 1, "6.14"),
     ("neighbour_count", "u8", 1, "6.14"),
@@ -141,9 +149,11 @@ INCREMENT_COMPENSATION = [
     ("compensation_log_scale", "i8", 1, "6.14"),
     ("compensation_opacity", "i8", 1, "6.14"),
 ]
+INCREMENT_MOVE_PREDICTORS = [("move_block_log2", "u8", 1, "6.14")]
 INCREMENT_PARTS = [                                 # in the order of the bits
     INCREMENT_PARENTS, INCREMENT_MOVES, INCREMENT_UPDATES, INCREMENT_REMOVALS, INCREMENT_NEW,
-    INCREMENT_POSITION_SHIFT, INCREMENT_ATTRIBUTE_SHIFT, INCREMENT_PREDICTORS, INCREMENT_SH, INCREMENT_COMPENSATION,
+    INCREMENT_POSITION_SHIFT, INCREMENT_ATTRIBUTE_STEP, INCREMENT_PREDICTORS, INCREMENT_SH, INCREMENT_COMPENSATION,
+    INCREMENT_MOVE_PREDICTORS,
 ]
 
 POINTS_FIXED = [

@@ -1,4 +1,10 @@
-"""Clauses 7.7.5 and 7.7.7: the tables EXP and SINE."""
+"""Clauses 7.6.6, 7.7.5 and 7.7.7: the tables STEP, EXP and SINE."""
+
+# SS-AT-003
+STEP = [
+    1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96,
+    128, 192, 256, 384, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144,
+]
 
 # SS-PR-008
 EXP = [

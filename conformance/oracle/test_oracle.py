@@ -74,7 +74,7 @@ class Conventions(unittest.TestCase):
 
 class Parsing(unittest.TestCase):
     def test_headers_of_annex_b(self):
-        data = bytes.fromhex("89475353 0d0a1a0a 82010002 e2d9201f 020100000000 e4a2 00000000 0c000000 f1c67fb7"
+        data = bytes.fromhex("89475353 0d0a1a0a 82020002 bb67661d 020100000000 e4a2 00000000 0c000000 f1c67fb7"
                              "0000000001000000 00000000")
         self.assertEqual(parse_file_header(data).level, 2)
         unit = parse_unit_header(data, 16)
@@ -205,20 +205,20 @@ class Frames(unittest.TestCase):
     def test_sources(self):
         """The second table of 8.5"""
         def sources(section, *shape):
-            return [[s for s in range(11) if pm.source_available(s, plane)]
+            return [[s for s in range(12) if pm.source_available(s, plane)]
                     for plane in pm.section_planes(section, *shape)]
-        up_to = [list(range(k + 1)) for k in range(11)]
+        up_to = [list(range(k + 1)) for k in range(12)]
         self.assertEqual(sources("cells"), [up_to[1], up_to[2]] + [up_to[3], up_to[4], up_to[4]] * 2)
-        self.assertEqual(sources("modes") + sources("predictors"), [up_to[2]] * 2)
+        self.assertEqual(sources("modes") + sources("move_predictors") + sources("predictors"), [up_to[2]] * 3)
         self.assertEqual(sources("moves"), [up_to[2], up_to[4], up_to[4]])
         expected = [up_to[2], up_to[4], up_to[4], up_to[3], up_to[3], up_to[4], up_to[4], up_to[3], up_to[4]]
         self.assertEqual(sources("updates", 2, 1, 2), expected + [up_to[3], up_to[4]])
         self.assertEqual(sources("updates", 2, 2, 2, 2), expected + [[0], [0, 3, 4]])
-        first = up_to[3] + [5, 6, 7, 8, 9, 10]
-        expected = [up_to[1], up_to[2] + [10], up_to[5] + [10], up_to[6] + [10], up_to[3] + [5, 6, 7, 8, 10],
-                    first, up_to[10], up_to[10], first, up_to[10]]
-        self.assertEqual(sources("new", 2, 1, 2), expected + [first, up_to[10]])
-        self.assertEqual(sources("new", 2, 2, 2, 2), expected + [[0, 5, 6, 7, 8, 9, 10], [0] + up_to[10][3:]])
+        first = up_to[3] + [5, 6, 7, 8, 9, 10, 11]
+        expected = [up_to[1], up_to[2] + [10], up_to[5] + [10], up_to[6] + [10], up_to[3] + [5, 6, 7, 8, 10, 11],
+                    first, up_to[11], up_to[11], first, up_to[11]]
+        self.assertEqual(sources("new", 2, 1, 2), expected + [first, up_to[11]])
+        self.assertEqual(sources("new", 2, 2, 2, 2), expected + [[0, 5, 6, 7, 8, 9, 10, 11], [0] + up_to[11][3:]])
 
 
 def small_network(**asked):

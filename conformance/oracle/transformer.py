@@ -36,8 +36,8 @@ def sine(x):
 class Transformer:
     """A network with the transforms of a frame; sh_transform is None where sh_transform_id is 255."""
 
-    def __init__(self, network, dc_transform, sh_transform):
-        self.network = network
+    def __init__(self, network, dc_transform, sh_transform, feature_shift=0):
+        self.network, self.feature_shift = network, feature_shift
         self.dc_transform, self.sh_transform = dc_transform, sh_transform
 
     def predict(self, own, neighbours, affinity, base):
@@ -63,13 +63,14 @@ class Transformer:
 
     def tokens(self, own, neighbours, affinity, base):
         _, q, o, rotation = own
+        apart = lambda a, b: Round(a - b, self.feature_shift)
         farthest = neighbours[-1][1]
         result = []
         for (neighbour, d2), w in zip(neighbours, affinity):
             token = [self.projected(column, neighbour, base) for column in self.columns()]
-            token += [saturated(4 * (a - b)) for a, b in zip(neighbour.q, q)]
-            token.append(saturated(2 * (neighbour.o - o)))
-            token += [saturated(a - b) for a, b in zip(neighbour.rotation, rotation)]
+            token += [saturated(4 * apart(a, b)) for a, b in zip(neighbour.q, q)]
+            token.append(saturated(2 * apart(neighbour.o, o)))
+            token += [saturated(apart(a, b)) for a, b in zip(neighbour.rotation, rotation)]
             token.append((127 * d2) // (farthest + 1))
             if self.network.gated:
                 token = [act(w * value, 12) for value in token]
@@ -82,7 +83,7 @@ class Transformer:
             return 0
         basis = transform.basis[component * transform.dimension:(component + 1) * transform.dimension]
         difference = [a - b for a, b in zip(getattr(neighbour, attribute), base[attribute])]
-        return act(product(basis, difference), 12 + self.network.token_shift)
+        return act(product(basis, difference), 12 + self.network.token_shift + self.feature_shift)
 
     # ---- SS-TR-002 ----
 

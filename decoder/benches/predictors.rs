@@ -75,7 +75,7 @@ fn predicted(bencher: Bencher, predictor: Predictor) {
         bilateral_feature: 32,
         ..IncrementHeader::PLAIN
     };
-    let by = Predicting { header: &header, colour, network: Some(&network) };
+    let by = Predicting { header: &header, colour, network: Some(&network), feature_shift: 0 };
     let predictors = vec![predictor; GAUSSIANS.div_ceil(64)];
     bencher
         .counter(ItemsCount::new(GAUSSIANS))

@@ -84,7 +84,13 @@ fn batch(header: &NetworkHeader, state: &mut u64) -> Batch {
             let components: Vec<i64> =
                 (0..header.outputs()).map(|_| i64::from(random(state)) - (1 << 23)).collect();
             let geometry = [(); 7].map(|()| random(state) % 60 - 30);
-            let seen = Seen { components: &components, geometry, affinity: 3000, distance: rank as u64 };
+            let seen = Seen {
+                components: &components,
+                geometry,
+                affinity: 3000,
+                distance: rank as u64,
+                ..Seen::default()
+            };
             batch.set_token(header, (lane, rank), &seen, NEIGHBOURS as u64);
             offsets.push([(); 3].map(|()| random(state) % 200 - 100));
         }

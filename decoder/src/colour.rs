@@ -1,7 +1,9 @@
 //! Clause 7.6.5: colour components to colour, by an integer transform.
 
-use crate::attribute::{self, in_range};
+use crate::attribute::in_range;
 use crate::layout::ShCoding;
+use crate::steps::Exponents;
+use crate::vector::{Task, vectorized};
 use core::ops::RangeInclusive;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::{Error, ErrorKind, Result};
@@ -29,8 +31,8 @@ pub struct Colour<'a> {
 }
 
 impl Colour<'_> {
-    /// Writes red, green, blue and the SH planes of a block to `out`. The components have been
-    /// shifted; `entry_shift` is the shift of sums of codebook entries.
+    /// Writes red, green, blue and the SH planes of a block to `out`. The components have been multiplied by their
+    /// steps; `of_entries` are those of sums of codebook entries.
     ///
     /// # Errors
     /// Invalid if a component or a colour is out of range or an index names no entry.
@@ -38,7 +40,7 @@ impl Colour<'_> {
         &self,
         dc: &[Vec<i32>],
         sh: &[Vec<i32>],
-        entry_shift: u8,
+        of_entries: &Exponents,
         out: &mut [&mut [i32]],
         at: u64,
     ) -> Result<()> {
@@ -48,9 +50,8 @@ impl Colour<'_> {
             (ShCoding::Coefficients { .. }, Some(transform)) => inverse(transform, sh, sh_out, at),
             (ShCoding::VectorQuantised { .. }, Some(transform)) => {
                 let entries = self.entries(sh, usize::from(transform.header.rank), at)?;
-                let shifted: Vec<_> =
-                    entries.iter().map(|plane| attribute::shifted(plane, entry_shift)).collect();
-                inverse(transform, &shifted, sh_out, at)
+                let components: Vec<_> = entries.iter().map(|plane| of_entries.scaled(plane)).collect();
+                inverse(transform, &components, sh_out, at)
             }
             _ => {
                 sh_out.iter_mut().for_each(|plane| plane.fill(0));
@@ -136,34 +137,81 @@ fn transformed(
     for plane in components {
         in_range(plane, &COMPONENT_RANGE, "component", "7.6.5", at)?;
     }
-    let count = out.first().map_or(0, |plane| plane.len());
-    let mut tile = vec![[0_i16; TILE]; components.len()];
-    let mut start = 0_usize;
-    while start < count {
-        for (tile, plane) in tile.iter_mut().zip(components) {
-            for (value, &component) in tile.iter_mut().zip(plane.get(start..).unwrap_or_default()) {
-                *value = component as i16;
-            }
-        }
-        for (axis, (plane, &mean)) in out.iter_mut().zip(&transform.mean).enumerate() {
-            let sums = tile_sums(transform, axis, dimension, &tile);
-            for (slot, sum) in plane.get_mut(start..).unwrap_or_default().iter_mut().zip(sums) {
-                *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
-            }
-        }
-        start = start.wrapping_add(TILE);
-    }
+    let weights = weights(transform, dimension);
+    vectorized(Tiles { weights: &weights, means: &transform.mean, components, out, join });
     Ok(())
 }
 
+/// A pair of weights, or of components, in the halves of an `i32`: machines multiply both pairs and add the products in
+/// one instruction.
+fn packed(low: i16, high: i16) -> i32 {
+    i32::from(low) & 0xFFFF | i32::from(high).wrapping_shl(16)
+}
+
+/// For each plane of the output the weights of the components, in pairs.
+fn weights(transform: &Transform, dimension: usize) -> Vec<Vec<i32>> {
+    let rows: Vec<&[i16]> = transform.basis.chunks_exact(dimension.max(1)).collect();
+    let weight = |row: &&[i16], axis: usize| row.get(axis).copied().unwrap_or(0);
+    let of_axis = |axis: usize| {
+        let pair = |rows: &[&[i16]]| match rows {
+            [first, second] => packed(weight(first, axis), weight(second, axis)),
+            rows => packed(rows.first().map_or(0, |row| weight(row, axis)), 0),
+        };
+        rows.chunks(2).map(pair).collect()
+    };
+    (0..dimension).map(of_axis).collect()
+}
+
+/// Colours, tile by tile: the sums of products of a tile stay in registers.
+struct Tiles<'t, 'o, F> {
+    weights: &'t [Vec<i32>],
+    means: &'t [i32],
+    components: &'t [Vec<i32>],
+    out: &'t mut [&'o mut [i32]],
+    join: F,
+}
+
+impl<F: Fn(i32, i32, i32) -> i32> Task for Tiles<'_, '_, F> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { weights, means, components, out, join } = self;
+        let count = out.first().map_or(0, |plane| plane.len());
+        let mut tile = vec![[0_i32; TILE]; components.len().div_ceil(2)];
+        for start in (0..count).step_by(TILE) {
+            for (tile, pair) in tile.iter_mut().zip(components.chunks(2)) {
+                let [first, second] = [0, 1].map(|index: usize| {
+                    pair.get(index).and_then(|plane| plane.get(start..)).unwrap_or_default()
+                });
+                // Components have 15 bits.
+                tile.iter_mut().zip(first).for_each(|(slot, &low)| *slot = low & 0xFFFF);
+                tile.iter_mut().zip(second).for_each(|(slot, &high)| *slot |= high.wrapping_shl(16));
+            }
+            for ((plane, &mean), weights) in out.iter_mut().zip(means).zip(weights) {
+                let sums = tile_sums(weights, &tile);
+                for (slot, sum) in plane.get_mut(start..).unwrap_or_default().iter_mut().zip(sums) {
+                    *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
+                }
+            }
+        }
+    }
+}
+
+/// The sums of the products of weights and components. With |weights| at most 4096 and at most 45 components they stay
+/// below 2^31.
 #[inline(always)]
-fn tile_sums(transform: &Transform, axis: usize, dimension: usize, tile: &[[i16; TILE]]) -> [i32; TILE] {
+fn tile_sums(weights: &[i32], tile: &[[i32; TILE]]) -> [i32; TILE] {
     let mut sums = [0_i32; TILE];
-    for (row, components) in transform.basis.chunks_exact(dimension.max(1)).zip(tile) {
-        let weight = i32::from(row.get(axis).copied().unwrap_or(0));
-        for (sum, &component) in sums.iter_mut().zip(components) {
-            *sum = sum.wrapping_add(weight.wrapping_mul(i32::from(component)));
+    for (&weights, components) in weights.iter().zip(tile) {
+        for (sum, &pair) in sums.iter_mut().zip(components) {
+            let low = low(pair).wrapping_mul(low(weights));
+            *sum = sum.wrapping_add(low.wrapping_add((pair >> 16).wrapping_mul(weights >> 16)));
         }
     }
     sums
+}
+
+/// The low half of a pair.
+#[inline(always)]
+fn low(pair: i32) -> i32 {
+    pair.wrapping_shl(16) >> 16
 }

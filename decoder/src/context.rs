@@ -1,34 +1,14 @@
 //! Clause 8.5: the values that choose the context of a symbol.
 
 use crate::block::CodedBlock;
+use crate::increment::residual::Stage;
+use crate::steps::Exponents;
+use splatstream_format::entropy::lanes::Segments;
+use splatstream_format::entropy::layout::PlaneInfo;
 use splatstream_format::entropy::model::{AxisLookup, ContextAxis, Source};
 use std::borrow::Cow;
 
-/// The last four coded values of a plane, and what the two serial sources make of them.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Neighbours {
-    last: [i32; 4],
-}
-
-impl Neighbours {
-    /// Remembers a coded value.
-    #[inline(always)]
-    pub fn push(&mut self, value: i32) {
-        let [a, b, c, _] = self.last;
-        self.last = [value, a, b, c];
-    }
-
-    /// The value of a serial source; 0 for any other.
-    #[inline(always)]
-    pub fn value(&self, source: Source) -> i32 {
-        let sum = |values: [i32; 4]| values.iter().fold(0_i32, |sum, &value| sum.wrapping_add(value));
-        match source {
-            Source::NeighbourSum => sum(self.last),
-            Source::NeighbourMagnitude => sum(self.last.map(i32::wrapping_abs)),
-            _ => 0,
-        }
-    }
-}
+pub(crate) mod lanes;
 
 /// The context value of a Morton delta: the bit lengths of the two deltas before it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -63,89 +43,186 @@ pub fn is_serial(source: Source) -> bool {
     matches!(source, Source::NeighbourSum | Source::NeighbourMagnitude)
 }
 
-/// The values of a source that is not serial for every Gaussian of a block, known before `plane` is read.
-pub fn values(source: Source, plane: usize, block: &CodedBlock) -> Cow<'_, [i32]> {
-    let coded = |plane: usize| block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-    let [largest, middle, smallest] = &block.log_scale;
-    match source {
-        Source::None | Source::NeighbourSum | Source::NeighbourMagnitude => Cow::default(),
-        Source::PreviousPlane => coded(plane.wrapping_sub(1)).into(),
-        Source::GroupMagnitude => block.magnitudes_before(plane).into(),
-        Source::LargestLogScale => largest.into(),
-        Source::MiddleLogScale => middle.into(),
-        Source::LogVolume => largest
-            .iter()
-            .zip(middle)
-            .zip(smallest)
-            .map(|((&a, &b), &c)| a.wrapping_add(b).wrapping_add(c))
-            .collect(),
-        Source::Anisotropy => largest.iter().zip(smallest).map(|(&a, &b)| a.wrapping_sub(b)).collect(),
-        Source::Opacity => (&block.opacity).into(),
-        Source::PositionSpacing => spacing(&block.deltas).into(),
+/// The values of a source that is not serial, of which all entries are known before the plane is read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum SourceValues<'b> {
+    /// The same for all entries.
+    Same(i32),
+    /// Those of a plane.
+    Plane(&'b [i32]),
+    /// The sum of three planes.
+    Sum([&'b [i32]; 3]),
+    /// One plane less another.
+    Difference([&'b [i32]; 2]),
+    /// Exponents of steps.
+    Exponents(&'b [u8]),
+    /// How far the deltas before and after each entry are.
+    Spacing(&'b [u64]),
+}
+
+impl<'b> SourceValues<'b> {
+    /// The values of a source for plane number `plane` of a block.
+    pub(crate) fn of(source: Source, plane: usize, info: PlaneInfo, block: &'b CodedBlock) -> Self {
+        let [largest, middle, smallest] = block.log_scale.each_ref().map(Vec::as_slice);
+        match source {
+            Source::None | Source::NeighbourSum | Source::NeighbourMagnitude => Self::Same(0),
+            Source::PreviousPlane => {
+                let before = block.coded.get(plane.wrapping_sub(1));
+                Self::Plane(before.map(Vec::as_slice).unwrap_or_default())
+            }
+            Source::GroupMagnitude => Self::Plane(block.magnitudes_before(plane)),
+            Source::LargestLogScale => Self::Plane(largest),
+            Source::MiddleLogScale => Self::Plane(middle),
+            Source::LogVolume => Self::Sum([largest, middle, smallest]),
+            Source::Anisotropy => Self::Difference([largest, smallest]),
+            Source::Opacity => Self::Plane(&block.opacity),
+            Source::PositionSpacing => Self::Spacing(&block.deltas),
+            Source::StepExponent => match Stage::of(info.attribute).map(|stage| block.exponents(stage)) {
+                None => Self::Same(0),
+                Some(Exponents::Same(exponent)) => Self::Same((*exponent).into()),
+                Some(Exponents::Each(exponents)) => Self::Exponents(exponents),
+            },
+        }
+    }
+
+    /// Writes the values of the entries from `first` on to `out`, as many as it holds.
+    #[inline(always)]
+    pub(crate) fn write(&self, first: usize, out: &mut [i32]) {
+        let range = first..first.wrapping_add(out.len());
+        let of = |plane: &'b [i32]| plane.get(range.clone()).unwrap_or_default().iter().copied();
+        let wide = |plane: &'b [i32]| of(plane).map(i64::from);
+        match *self {
+            Self::Same(value) => out.fill(value),
+            Self::Plane(plane) => out.iter_mut().zip(of(plane)).for_each(|(slot, value)| *slot = value),
+            Self::Sum([a, b, c]) => {
+                for (slot, ((a, b), c)) in out.iter_mut().zip(wide(a).zip(wide(b)).zip(wide(c))) {
+                    *slot = limited(a.wrapping_add(b).wrapping_add(c));
+                }
+            }
+            Self::Difference([a, c]) => {
+                for (slot, (a, c)) in out.iter_mut().zip(wide(a).zip(wide(c))) {
+                    *slot = limited(a.wrapping_sub(c));
+                }
+            }
+            Self::Exponents(exponents) => {
+                let exponents = exponents.get(range).unwrap_or_default();
+                out.iter_mut().zip(exponents).for_each(|(slot, &exponent)| *slot = exponent.into());
+            }
+            Self::Spacing(deltas) => {
+                let deltas = deltas.get(first..).unwrap_or_default();
+                let mut lengths = deltas.iter().map(|&delta| bit_length(delta));
+                let mut here = lengths.next().unwrap_or(0);
+                for (slot, next) in out.iter_mut().zip(lengths.chain([0])) {
+                    *slot = here.wrapping_add(next).cast_signed();
+                    here = next;
+                }
+            }
+        }
     }
 }
 
-fn spacing(deltas: &[u64]) -> Vec<i32> {
-    let lengths = deltas.iter().map(|&delta| bit_length(delta));
-    let next = deltas.iter().skip(1).map(|&delta| bit_length(delta)).chain([0]);
-    lengths.zip(next).map(|(here, next)| here.wrapping_add(next).cast_signed()).collect()
+/// The values of a source that is not serial for every entry of a block, known before `plane` is read.
+pub fn values(source: Source, plane: usize, info: PlaneInfo, block: &CodedBlock) -> Cow<'_, [i32]> {
+    match SourceValues::of(source, plane, info, block) {
+        SourceValues::Plane(plane) => plane.into(),
+        _ if source == Source::None || is_serial(source) => Cow::default(),
+        source => {
+            let mut values = vec![0; block.len()];
+            source.write(0, &mut values);
+            values.into()
+        }
+    }
 }
 
-/// The contexts of one axis for every Gaussian; empty if the axis has no or a serial source.
-pub fn axis_contexts(axis: &ContextAxis, plane: usize, block: &CodedBlock) -> Vec<u8> {
+/// A value as thresholds see it: these have 32 bits.
+#[inline(always)]
+fn limited(value: i64) -> i32 {
+    value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+}
+
+/// The contexts of one axis for every entry; empty if the axis has no or a serial source.
+fn axis_contexts(axis: &ContextAxis, plane: usize, info: PlaneInfo, block: &CodedBlock) -> Vec<u8> {
     if axis.source == Source::None || is_serial(axis.source) {
         return Vec::new();
     }
-    let values = values(axis.source, plane, block);
-    let mut contexts = vec![0_u8; values.len()];
-    for &threshold in &axis.thresholds {
-        for (context, &value) in contexts.iter_mut().zip(values.iter()) {
-            *context = context.wrapping_add(u8::from(threshold <= value));
-        }
-    }
+    let mut contexts = vec![0; block.len()];
+    AxisLookup::new(axis, 1).add_contexts(&values(axis.source, plane, info, block), &mut contexts);
     contexts
 }
 
 /// The contexts of a plane whose values are known: what the encoder codes with.
 ///
 /// `values` are the plane's coded values; the position plane goes through [`delta_contexts`].
-pub fn plane_contexts(axes: &[ContextAxis; 2], plane: usize, block: &CodedBlock, values: &[i32]) -> Vec<u8> {
+pub fn plane_contexts(
+    axes: &[ContextAxis; 2],
+    plane: usize,
+    info: PlaneInfo,
+    block: &CodedBlock,
+    values: &[i32],
+) -> Vec<u8> {
     let [first, second] = axes;
     if first.source == Source::None {
         return Vec::new();
     }
-    let on_axis = |axis: &ContextAxis| {
-        if is_serial(axis.source) { serial_contexts(axis, values) } else { axis_contexts(axis, plane, block) }
+    let on_axis = |axis: &ContextAxis| match is_serial(axis.source) {
+        true => serial_contexts(axis, values, block.segments()),
+        false => axis_contexts(axis, plane, info, block),
     };
     combine(&on_axis(first), &on_axis(second), second.contexts())
 }
 
 /// The contexts of the deltas of a block.
-pub fn delta_contexts(axes: &[ContextAxis; 2], deltas: &[u64]) -> Vec<u8> {
+pub fn delta_contexts(axes: &[ContextAxis; 2], deltas: &[u64], segments: Segments) -> Vec<u8> {
     let [first, second] = axes;
     if first.source == Source::None {
         return Vec::new();
     }
-    let mut neighbours = DeltaNeighbours::default();
-    let context = |&delta: &u64| {
-        let [a, b] = [first, second].map(|axis| usize::from(axis.context(neighbours.value())));
-        neighbours.push(delta);
+    let before = delta_values(deltas, segments);
+    let context = |&value: &i32| {
+        let [a, b] = [first, second].map(|axis| usize::from(axis.context(value)));
         u8::try_from(a.wrapping_mul(second.contexts()).wrapping_add(b)).unwrap_or(0)
     };
-    deltas.iter().map(context).collect()
+    before.iter().map(context).collect()
 }
 
-fn serial_contexts(axis: &ContextAxis, values: &[i32]) -> Vec<u8> {
-    let lookup = AxisLookup::new(axis);
-    let mut neighbours = Neighbours::default();
-    values
-        .iter()
-        .map(|&value| {
-            let context = lookup.context(neighbours.value(axis.source));
-            neighbours.push(value);
-            context
-        })
-        .collect()
+/// The context values of the deltas of a block, which start again in each segment.
+pub fn delta_values(deltas: &[u64], segments: Segments) -> Vec<i32> {
+    let of_segment = |deltas: &[u64]| {
+        let mut neighbours = DeltaNeighbours::default();
+        let before = |&delta: &u64| {
+            let value = neighbours.value();
+            neighbours.push(delta);
+            value
+        };
+        deltas.iter().map(before).collect::<Vec<_>>()
+    };
+    deltas.chunks(segments.length()).flat_map(of_segment).collect()
+}
+
+/// The values of a serial source for a plane whose values are known; they start again in each segment.
+pub fn serial_values(source: Source, values: &[i32], segments: Segments) -> Vec<i32> {
+    let of_segment = |values: &[i32]| {
+        let mut last = [0; 4];
+        let before = |&value: &i32| {
+            let sum = last.iter().fold(0_i32, |sum, &value| sum.wrapping_add(value));
+            let [a, b, c, _] = last;
+            last = [term(source, value), a, b, c];
+            sum
+        };
+        values.iter().map(before).collect::<Vec<_>>()
+    };
+    values.chunks(segments.length()).flat_map(of_segment).collect()
+}
+
+/// What a value adds to a serial source of the four entries after it.
+#[inline(always)]
+pub(crate) fn term(source: Source, value: i32) -> i32 {
+    if source == Source::NeighbourMagnitude { value.wrapping_abs() } else { value }
+}
+
+fn serial_contexts(axis: &ContextAxis, values: &[i32], segments: Segments) -> Vec<u8> {
+    let lookup = AxisLookup::new(axis, 1);
+    serial_values(axis.source, values, segments).into_iter().map(|value| lookup.context(value)).collect()
 }
 
 /// `first * second_contexts + second`; an empty second axis is all 0.

@@ -4,7 +4,7 @@
 //! block, whichever unit it is of, and writes to the part of the planes that belongs to it. This is how frames decode
 //! whose units only add Gaussians: all frames of static content, and I frames of one spatial layer.
 
-use crate::block::{UnitParameters, decode_block};
+use crate::block::{Buffers, UnitParameters, decode_block};
 use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, blocks_of};
@@ -71,7 +71,8 @@ pub(crate) fn decode(
     };
     let tasks: Vec<Task<'_, '_, '_>> =
         blocks.into_iter().zip(planes.slices(&lengths)).filter_map(task).collect();
-    let decoded: Vec<(usize, Result<usize>)> = tasks.into_par_iter().map(run).collect();
+    let decoded: Vec<(usize, Result<usize>)> =
+        tasks.into_par_iter().map_init(Buffers::default, run).collect();
     let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (unit, block) in decoded {
         let Some(slot) = results.get_mut(unit) else { continue };
@@ -80,10 +81,10 @@ pub(crate) fn decode(
     (planes, results)
 }
 
-fn run(task: Task<'_, '_, '_>) -> (usize, Result<usize>) {
+fn run(buffers: &mut Buffers, task: Task<'_, '_, '_>) -> (usize, Result<usize>) {
     let Task { unit, parameters, decoders, bytes, at, mut out } = task;
     let count = out.planes.first().map_or(0, |plane| plane.len());
-    (unit, decode_block(bytes, at, &parameters, decoders, &mut out).map(|()| count))
+    (unit, decode_block(bytes, at, &parameters, decoders, buffers, &mut out).map(|()| count))
 }
 
 /// What the sequence and a unit say about a block.
@@ -96,9 +97,8 @@ fn parameters<'t>(
     UnitParameters {
         position_bits: sequence.position_bits,
         position_shift: unit.header.position_shift,
-        attribute_shift: unit.header.attribute_shift,
+        steps: unit.coding.steps,
         canonical_axes: sequence.canonical_axes(),
-        rotation_thresholds: sequence.rotation_threshold,
         lanes_log2: coded.lanes_log2,
         layout: &models.layout,
         colour: unit.coding.colour,

@@ -11,6 +11,8 @@ use std::sync::Arc;
 pub(crate) struct FrameState {
     /// Its display index.
     pub(crate) index: u32,
+    /// log2 of how many frames it is later than its reference frame.
+    pub(crate) span_log2: u8,
     /// How many exact lists frames that refer to this one can have (clause 7.3.3).
     pub(crate) level: u8,
     /// The exact lists; of an I frame those that it shows.
@@ -25,4 +27,10 @@ pub(crate) struct FrameState {
     pub(crate) carried_shift: Shift,
     /// The plane models in force in a frame that refers to this one: for its cells, and for its unit of refinement 0.
     pub(crate) models: ModelsInForce,
+}
+
+/// log2 of how many frames a frame is later than the one it refers to: a power of two (7.3.1).
+pub(crate) fn span_log2(index: u32, reference: &FrameState) -> u8 {
+    let span = index.saturating_sub(reference.index);
+    span.checked_ilog2().and_then(|log2| u8::try_from(log2).ok()).unwrap_or(0)
 }

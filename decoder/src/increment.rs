@@ -9,4 +9,4 @@ pub mod values;
 
 mod apply;
 
-pub use apply::{Applied, Situation, Unit, apply, field, reference_set};
+pub use apply::{Applied, Situation, Temporal, Unit, apply, field, reference_set};

@@ -7,11 +7,12 @@
 //! | 7.3 frames of a GOP | [`process`] |
 //! | 7.4 lists, parents and modes | [`list`], [`increment`] |
 //! | 7.5 cells | [`displacement`] |
-//! | 7.6 values | [`attribute`], [`position`], [`colour`], [`increment::residual`] |
+//! | 7.4.3 moves | [`moves`] |
+//! | 7.6 values | [`steps`], [`attribute`], [`position`], [`colour`], [`increment::residual`] |
 //! | 7.7 prediction | [`neighbours`], [`predictor`], [`transformer`], [`increment::prediction`] |
 //! | 7.8 what is shown | [`process::DecodedFrame`] |
 //! | 7.9 canonical planes and digests | [`frame`], [`digest`] |
-//! | 7.10 output | [`output`] |
+//! | 7.10 output | [`companding`], [`output`] |
 //! | 8.5 contexts | [`context`] |
 //!
 //! The encoder calls the same functions: what it reconstructs is what a decoder reconstructs.
@@ -44,7 +45,9 @@ pub mod attribute;
 pub mod block;
 mod carried;
 pub mod colour;
+pub mod companding;
 pub mod context;
+mod curve;
 pub mod digest;
 mod direct;
 pub mod displacement;
@@ -55,11 +58,14 @@ pub mod gop;
 pub mod increment;
 pub mod list;
 mod motion;
+pub mod moves;
 pub mod neighbours;
 pub mod operating_point;
 pub mod output;
 pub mod position;
 pub mod predictor;
 pub mod process;
+pub mod steps;
 pub mod stream;
 pub mod transformer;
+mod vector;

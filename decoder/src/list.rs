@@ -30,6 +30,47 @@ pub struct GaussianList {
     pub rotation_fine: [Vec<i32>; 3],
     /// True for Gaussians of the intra frame of the GOP.
     pub anchor: Vec<bool>,
+    /// What the Gaussians have become since the reference frame. Carried lists have none.
+    pub change: Change,
+}
+
+/// How the Gaussians of a list differ from what they were in the reference frame. Without planes nothing has changed, as
+/// in an I frame.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Change {
+    /// Of the fine positions.
+    pub motion: [Vec<i32>; 3],
+    /// Of the opacities.
+    pub fade: Vec<i32>,
+}
+
+impl Change {
+    /// From one state of some Gaussians to another.
+    pub fn between(before: &GaussianList, after: &GaussianList) -> Self {
+        let difference = |before: &Vec<i32>, after: &Vec<i32>| -> Vec<i32> {
+            after.iter().zip(before).map(|(after, before)| after.wrapping_sub(*before)).collect()
+        };
+        let mut motion = before
+            .position_fine
+            .iter()
+            .zip(&after.position_fine)
+            .map(|(before, after)| difference(before, after));
+        Self {
+            motion: [(); 3].map(|()| motion.next().unwrap_or_default()),
+            fade: difference(&before.planes.opacity, &after.planes.opacity),
+        }
+    }
+
+    fn planes_mut(&mut self) -> impl Iterator<Item = &mut Vec<i32>> {
+        self.motion.iter_mut().chain([&mut self.fade])
+    }
+
+    /// Appends Gaussians that have not changed to those there are.
+    fn extend(&mut self, count: usize) {
+        if !self.fade.is_empty() {
+            self.planes_mut().for_each(|plane| plane.extend(core::iter::repeat_n(0, count)));
+        }
+    }
 }
 
 impl GaussianList {
@@ -45,7 +86,20 @@ impl GaussianList {
             planes.position.each_ref().map(|plane| plane.iter().map(|&q| fine(q.cast_signed())).collect());
         let rotation_fine = planes.rotation.each_ref().map(|plane| plane.iter().map(|&r| fine(r)).collect());
         let anchor = vec![anchor; planes.len()];
-        Self { planes, position_fine, rotation_fine, anchor }
+        Self { planes, position_fine, rotation_fine, anchor, change: Change::default() }
+    }
+
+    /// A copy that later frames start from: what has changed before is not of it.
+    #[must_use]
+    pub fn unchanged(&self) -> Self {
+        let Self { planes, position_fine, rotation_fine, anchor, change: _ } = self;
+        Self {
+            planes: planes.clone(),
+            position_fine: position_fine.clone(),
+            rotation_fine: rotation_fine.clone(),
+            anchor: anchor.clone(),
+            change: Change::default(),
+        }
     }
 
     /// Gaussians in the list.
@@ -88,13 +142,14 @@ impl GaussianList {
         if keep.iter().all(|&keep| keep) {
             return;
         }
-        let Self { planes, position_fine, rotation_fine, anchor } = self;
+        let Self { planes, position_fine, rotation_fine, anchor, change } = self;
         planes.retain(keep);
         position_fine.iter_mut().chain(rotation_fine).for_each(|plane| retain(plane, keep));
         retain(anchor, keep);
+        change.planes_mut().for_each(|plane| retain(plane, keep));
     }
 
-    /// Appends the Gaussians of another list.
+    /// Appends new Gaussians.
     pub fn append(&mut self, other: &Self) {
         self.planes.append(&other.planes);
         let ours = self.position_fine.iter_mut().chain(&mut self.rotation_fine);
@@ -102,6 +157,7 @@ impl GaussianList {
             plane.extend_from_slice(more);
         }
         self.anchor.extend_from_slice(&other.anchor);
+        self.change.extend(other.len());
     }
 
     /// Clause 7.8.1: the list as it is carried into a frame whose cells are `field`. Gaussians of stale cells are dropped if

@@ -1,10 +1,11 @@
 //! The neighbours of a new Gaussian: the nearest among those next to it on the Morton curve.
 //!
 //! An exact search can be made to look at every point (a sphere of points around the one that seeks), so the
-//! definition itself is bounded: the points are sorted along the Morton curve, and only [`WINDOW`] points on either
+//! definition itself is bounded: the points are [sorted](curve) along the Morton curve, and only [`WINDOW`] points on either
 //! side of the index at which the seeking point would stand are candidates. The nearest candidates, ties to the lower
-//! index, are the neighbours. Sorting costs n log n once, a search 2 * `WINDOW` distances.
+//! index, are the neighbours. Sorting takes a time that grows with n, a search 2 * `WINDOW` distances.
 
+use crate::curve;
 use crate::position::morton;
 use rayon::prelude::*;
 
@@ -30,8 +31,8 @@ pub struct NeighbourSearch {
     points: Vec<Point>,
 }
 
-/// A point with its Morton code. The order is that of the curve, then the index.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// A point with its Morton code.
+#[derive(Debug, Clone, Copy)]
 struct Point {
     code: u64,
     index: u32,
@@ -42,12 +43,11 @@ impl NeighbourSearch {
     /// A search among points, given by their planes x, y, z of one length. Coordinates are below 2^21.
     pub fn new(points: [&[u32]; 3]) -> Self {
         let [xs, ys, zs] = points;
-        let planes = xs.iter().zip(ys).zip(zs).zip(0_u32..);
-        let mut points: Vec<Point> = planes
-            .map(|(((&x, &y), &z), index)| Point { code: morton(x, y, z), index, at: [x, y, z] })
-            .collect();
-        points.par_sort_unstable();
-        Self { points }
+        let codes: Vec<u64> = (xs, ys, zs).into_par_iter().map(|(&x, &y, &z)| morton(x, y, z)).collect();
+        let coordinate = |plane: &[u32], index: u32| plane.get(index as usize).copied().unwrap_or(0);
+        let point =
+            |(code, index)| Point { code, index, at: [xs, ys, zs].map(|plane| coordinate(plane, index)) };
+        Self { points: curve::order(codes.into_iter()).into_par_iter().map(point).collect() }
     }
 
     /// Points searched.

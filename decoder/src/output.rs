@@ -4,6 +4,7 @@
 //! multiply-add, no reassociation. So the output is the same bits everywhere.
 #![expect(clippy::float_arithmetic, reason = "clause 7.10: attributes leave the integer domain here")]
 
+use crate::companding::Companding;
 use crate::frame::QuantizedFrame;
 use rayon::prelude::*;
 use splatstream_format::syntax::SequenceParameters;
@@ -36,11 +37,14 @@ pub fn to_gaussians(frame: QuantizedFrame, sequence: &SequenceParameters) -> Gau
 }
 
 fn scene_positions(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {
-    let step = sequence.position_step();
+    let (step, companding) = (sequence.position_step(), Companding::new(sequence));
     let mut offsets = sequence.position_offset().into_iter();
     position.map(|plane| {
         let offset = offsets.next().unwrap_or_default();
-        plane.into_iter().map(|q| offset + step * q as f32).collect()
+        match companding.is_linear() {
+            true => plane.into_iter().map(|q| offset + step * q as f32).collect(),
+            false => plane.into_iter().map(|q| offset + step * companding.expand(q) as f32).collect(),
+        }
     })
 }
 

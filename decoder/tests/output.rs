@@ -8,30 +8,7 @@ use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::GaussianFrame;
 
 fn sequence() -> SequenceParameters {
-    let one = 1.0_f32.to_bits();
-    SequenceParameters {
-        sh_degree: 0,
-        spatial_layer_count: 1,
-        temporal_layer_count: 1,
-        refinement_count: 1,
-        refinement_percent: [100, 0, 0, 0, 0, 0, 0, 0, 0, 0],
-        position_bits: 20,
-        block_log2: 6,
-        sequence_flags: 0,
-        rotation_threshold: [0; 3],
-        frame_count: 1,
-        ticks_per_second: 30,
-        ticks_per_frame: 1,
-        position_offset: [0; 3],
-        position_step: one,
-        log_scale_offset: 0,
-        log_scale_step: one,
-        rotation_step: one,
-        opacity_offset: 0,
-        opacity_step: one,
-        dc_step: one,
-        sh_step: one,
-    }
+    SequenceParameters { block_log2: 6, frame_count: 1, ..SequenceParameters::PLAIN }
 }
 
 /// The output of one Gaussian.

@@ -6,21 +6,37 @@
 
 use crate::colour;
 use crate::entropy_cost::entropy_of;
-use crate::grid::{Spacing, inner_side, nearest_integer};
+use crate::frame::unit::Grains;
+use crate::grid::{Geometry, geometry, nearest_integer};
+use crate::importance::Ranked;
+use crate::laws::Laws;
 use crate::pca::Components;
-use crate::settings::{Settings, Steps};
-use splatstream_format::syntax::TransformKind;
-use splatstream_render::camera::{Up, ring};
+use crate::sequence::Scene;
+use crate::settings::{Preset, Settings, Steps};
+use crate::shape::{Shape, nearest_multiple};
+use rayon::prelude::*;
+use splatstream_decoder::companding::Companding;
+use splatstream_decoder::increment::residual::Stage;
+use splatstream_decoder::position::refine;
+use splatstream_decoder::steps::{StepRule, step};
+use splatstream_format::syntax::{SequenceParameters, TransformKind};
+use splatstream_render::camera::{Up, spiral};
 use splatstream_render::metrics::psnr;
 use splatstream_render::{Camera, Rendering, render};
-use splatstream_scene::GaussianFrame;
+use splatstream_scene::{GaussianFrame, Planes};
 
 /// Views made for the scene, and their height, where none are given.
-const VIEWS: (u32, u32) = (4, 540);
+const VIEWS: (u32, u32) = (3, 540);
+/// Attributes are measured alone in so many of them; for the fast preset in smaller pictures, and once.
+const ALONE: usize = 2;
+const FAST_HEIGHT: u32 = 360;
 /// Gaussians whose symbols are counted.
-const SAMPLE: usize = 1 << 14;
-/// How often every attribute is measured; a last look at all together follows.
+const SAMPLE: usize = 1 << 13;
+/// How often every attribute is measured alone.
 const ROUNDS: usize = 2;
+/// How often all are measured together, at most, and how near is near enough, dB.
+const CORRECTIONS: usize = 4;
+const NEAR: f64 = 0.05;
 /// Steps change by no more than this factor at once: the model is local.
 const LARGEST_CHANGE: f64 = 8.0;
 
@@ -44,29 +60,6 @@ const ATTRIBUTES: [Attribute; 6] = [
     Attribute::Sh,
 ];
 
-/// The steps with which renderings of a canonical frame have a PSNR of about `decibels`.
-pub(crate) fn fit(frame: GaussianFrame, spacing: Spacing, settings: &Settings, decibels: f32) -> Steps {
-    let scene = Scene::new(frame, spacing, settings);
-    let allowed = libm::pow(10.0, -0.1 * f64::from(decibels));
-    let mut steps = settings.steps;
-    for _ in 0..ROUNDS {
-        let measured = ATTRIBUTES.map(|attribute| {
-            let slope = scene.bits_an_octave(attribute, &steps);
-            (scene.error(&[attribute], &steps), if slope > 0.0 { slope } else { 0.0 })
-        });
-        let all: f64 = measured.iter().map(|(_, slope)| slope).sum();
-        for (attribute, (error, slope)) in ATTRIBUTES.into_iter().zip(measured) {
-            // What costs nothing or cannot be seen keeps its step.
-            if error > 0.0 && slope > 0.0 {
-                attribute.scale(&mut steps, (allowed * slope / all / error).sqrt());
-            }
-        }
-    }
-    let change = (allowed / scene.error(&ATTRIBUTES, &steps).max(f64::MIN_POSITIVE)).sqrt();
-    ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, change));
-    steps
-}
-
 impl Attribute {
     /// Makes a step coarser by `factor`, within what is sensible.
     fn scale(self, steps: &mut Steps, factor: f64) {
@@ -86,83 +79,134 @@ impl Attribute {
     }
 }
 
-/// A frame with its pictures.
-struct Scene {
+/// What is measured of a frame to fit steps to a quality.
+pub(crate) struct Fit {
     frame: GaussianFrame,
-    spacing: Spacing,
-    views: Vec<(Camera, Rendering)>,
-    inner_side: f32,
+    scene: Scene,
+    settings: Settings,
+    /// The refinement of each Gaussian.
+    refinement: Vec<u8>,
+    /// Principal components of dc and of sh.
+    bases: [Components; 2],
+    /// Pictures in which all attributes are measured together.
+    together: Vec<View>,
+    /// Pictures in which each is measured alone.
+    alone: Vec<View>,
+    /// Steps at which attributes were measured alone, the squared error of each in pictures, and the bits of an octave.
+    measured: (Steps, [(f64, f64); 6]),
 }
 
-impl Scene {
-    fn new(frame: GaussianFrame, spacing: Spacing, settings: &Settings) -> Self {
-        let (count, height) = VIEWS;
+impl Fit {
+    /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it.
+    pub(crate) fn new(frame: GaussianFrame, ranked: &Ranked, settings: &Settings) -> Self {
+        let laws = Laws::of(&frame, &ranked.order, &ranked.energy, settings);
+        let decibels = settings.psnr.unwrap_or(50.0);
+        let steps = Steps::about(decibels);
         let cameras = match settings.cameras.as_slice() {
-            [] => ring(&frame, Up::default(), count, height),
+            [] => spiral(&frame, Up::default(), VIEWS.0, VIEWS.1),
             given => given.to_vec(),
         };
-        let views = cameras.into_iter().map(|camera| {
-            let picture = render(&frame, &camera, [0.0; 3]);
-            (camera, picture)
-        });
-        let inner_side = inner_side(&frame);
-        Self { views: views.collect(), inner_side, spacing, frame }
+        let (count, height) = (ALONE, if settings.preset == Preset::Fast { FAST_HEIGHT } else { u32::MAX });
+        let stride = cameras.len().div_ceil(count).max(1);
+        let smaller = |camera: &Camera| camera.scaled_to_height(camera.height.min(height));
+        let alone = cameras.iter().step_by(stride).map(|camera| view(&frame, smaller(camera))).collect();
+        let together = cameras.into_iter().map(|camera| view(&frame, camera)).collect();
+        let all: Vec<u32> = (0..frame.len() as u32).collect();
+        let mut scene = Scene::new();
+        scene.add(&frame, &all);
+        let mut refinement = vec![0; frame.len()];
+        let mut start = 0;
+        for (number, &percent) in (0..).zip(&settings.refinements) {
+            let length = splatstream_format::syntax::prefix_length(percent, frame.len() as u32) as usize;
+            ranked.order[start..length.max(start)].iter().for_each(|&row| refinement[row as usize] = number);
+            start = length.max(start);
+        }
+        let slices =
+            |planes: &[Vec<f32>]| Components::of(&planes.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let bases = [slices(frame.dc()), slices(frame.sh())];
+        let rounds = if settings.preset == Preset::Fast { 1 } else { ROUNDS };
+        let settings = Settings { laws, ..settings.clone() };
+        let measured = (steps, [(0.0, 0.0); 6]);
+        let mut fit = Self { frame, scene, settings, refinement, bases, together, alone, measured };
+        for round in 0..rounds {
+            let steps = if round == 0 { steps } else { fit.allocated(decibels) };
+            let sample = fit.sample();
+            let of = |attribute| {
+                let slope = fit.bits_an_octave(&sample, attribute, &steps);
+                (fit.error(&[attribute], &steps, &fit.alone), slope.max(0.0))
+            };
+            fit.measured = (steps, ATTRIBUTES.map(of));
+        }
+        fit
     }
 
-    /// Mean squared error of the pictures with these attributes on their grids, by the mean of decibels.
-    fn error(&self, attributes: &[Attribute], steps: &Steps) -> f64 {
-        let mut frame = self.frame.clone();
-        for &attribute in attributes {
-            frame = self.quantised(frame, attribute, steps);
+    /// How steps follow from what is known of a Gaussian.
+    pub(crate) fn laws(&self) -> Laws {
+        self.settings.laws
+    }
+
+    /// The steps with which renderings have a PSNR of about `decibels`.
+    pub(crate) fn at(&self, decibels: f32) -> Steps {
+        let mut steps = self.allocated(decibels);
+        // log2 of the last factor of all steps, and the PSNR before it.
+        let mut before: Option<(f64, f64)> = None;
+        for _ in 0..CORRECTIONS {
+            let now =
+                -10.0 * libm::log10(self.error(&ATTRIBUTES, &steps, &self.together).max(f64::MIN_POSITIVE));
+            let missing = f64::from(decibels) - now;
+            if missing.abs() < NEAR {
+                break;
+            }
+            // An octave is 6 dB where quantisers are fine, and less where they are coarse.
+            let slope = match before {
+                Some((log, was)) if log != 0.0 => ((was - now) / log).clamp(2.0, 7.0),
+                _ => 6.02,
+            };
+            let log = -missing / slope;
+            before = Some((log, now));
+            ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, libm::exp2(log)));
         }
-        let decibels = |(camera, picture): &(Camera, Rendering)| {
+        steps
+    }
+
+    /// Steps that share the error that is allowed.
+    fn allocated(&self, decibels: f32) -> Steps {
+        let allowed = libm::pow(10.0, -0.1 * f64::from(decibels));
+        let (mut steps, measured) = self.measured;
+        let all: f64 = measured.iter().map(|(_, slope)| slope).sum();
+        for (attribute, (error, slope)) in ATTRIBUTES.into_iter().zip(measured) {
+            // What costs nothing or cannot be seen keeps its step.
+            if error > 0.0 && slope > 0.0 {
+                attribute.scale(&mut steps, (allowed * slope / all / error).sqrt());
+            }
+        }
+        steps
+    }
+
+    /// Mean squared error of pictures with these attributes on their grids, by the mean of decibels.
+    fn error(&self, attributes: &[Attribute], steps: &Steps, views: &[View]) -> f64 {
+        let frame = Trial::new(self, &self.frame, None, steps).decoded(attributes);
+        let decibels = |(camera, picture): &View| {
             psnr(&picture.colour, &render(&frame, camera, [0.0; 3]).colour).min(120.0)
         };
-        let mean = self.views.iter().map(decibels).sum::<f64>() / self.views.len().max(1) as f64;
-        libm::pow(10.0, -0.1 * mean)
+        let sum: f64 = views.iter().map(decibels).sum();
+        libm::pow(10.0, -0.1 * sum / views.len().max(1) as f64)
     }
 
-    /// The frame with one attribute as a decoder would have it.
-    fn quantised(&self, frame: GaussianFrame, attribute: Attribute, steps: &Steps) -> GaussianFrame {
-        let (degree, antialiased) = (frame.sh_degree(), frame.antialiased());
-        let mut planes = frame.into_planes();
-        let rounded = |planes: &mut [Vec<f32>], step: f32| {
-            for plane in planes {
-                for (row, value) in plane.iter_mut().enumerate() {
-                    *value = self.spacing.nearest(row, (*value / step).clamp(-1e6, 1e6)) as f32 * step;
-                }
-            }
-        };
-        let evenly = |planes: &mut [Vec<f32>], step: f32| {
-            for value in planes.iter_mut().flatten() {
-                *value = libm::rintf(*value / step) * step;
-            }
-        };
-        match attribute {
-            Attribute::Position => evenly(&mut planes.position, self.position_step(steps)),
-            Attribute::LogScale => rounded(&mut planes.log_scale, steps.log_scale),
-            Attribute::Opacity => evenly(std::slice::from_mut(&mut planes.opacity_logit), steps.opacity),
-            Attribute::Dc => rounded(&mut planes.dc, steps.dc),
-            Attribute::Sh => planes.sh = rounded_components(&planes.sh, steps.sh, &self.spacing),
-            Attribute::Rotation => {
-                let [w, parts @ ..] = &mut planes.rotation;
-                rounded(parts, steps.rotation);
-                for (row, w) in w.iter_mut().enumerate() {
-                    let squares: f32 = parts.iter().map(|plane| plane[row] * plane[row]).sum();
-                    *w = (1.0 - squares).max(0.0).sqrt();
-                }
-            }
-        }
-        let frame = GaussianFrame::from_planes(degree, planes).unwrap_or_default();
-        frame.with_antialiased(antialiased)
-    }
-
-    fn position_step(&self, steps: &Steps) -> f32 {
-        (self.inner_side / libm::exp2f(steps.position_bits)).max(f32::MIN_POSITIVE)
+    /// Some of the Gaussians.
+    fn sample(&self) -> (GaussianFrame, Vec<u32>) {
+        let stride = self.frame.len().div_ceil(SAMPLE).max(1);
+        let rows: Vec<u32> = (0..self.frame.len() as u32).step_by(stride).collect();
+        (self.frame.select(&rows), rows)
     }
 
     /// Bits per Gaussian that halving the step costs.
-    fn bits_an_octave(&self, attribute: Attribute, steps: &Steps) -> f64 {
+    fn bits_an_octave(
+        &self,
+        (sample, rows): &(GaussianFrame, Vec<u32>),
+        attribute: Attribute,
+        steps: &Steps,
+    ) -> f64 {
         // Every bit of a sorted position costs one bit an axis.
         if attribute == Attribute::Position {
             return 3.0;
@@ -170,61 +214,175 @@ impl Scene {
         let [finer, coarser] = [-0.25, 0.25].map(|octaves| {
             let mut steps = *steps;
             attribute.scale(&mut steps, libm::exp2(octaves));
-            self.bits(attribute, &steps)
+            Trial::new(self, sample, Some(rows), &steps).bits(attribute)
         });
-        (finer - coarser) / 0.5
-    }
-
-    /// Zero-order bits per Gaussian of an attribute, on a sample.
-    fn bits(&self, attribute: Attribute, steps: &Steps) -> f64 {
-        let stride = self.frame.len().div_ceil(SAMPLE).max(1);
-        let rows: Vec<u32> = (0..self.frame.len() as u32).step_by(stride).collect();
-        let sample = self.frame.select(&rows);
-        let bits = |planes: &[Vec<f32>], step: f32| -> f64 {
-            let plane = |plane: &Vec<f32>| -> Vec<i32> {
-                plane.iter().map(|&value| nearest_integer((value / step).clamp(-1e6, 1e6))).collect()
-            };
-            planes.iter().map(|values| entropy_of(&plane(values))).sum()
-        };
-        let total = match attribute {
-            Attribute::Position => 0.0,
-            Attribute::LogScale => {
-                let [a, b, c] = sample.log_scale();
-                let less = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a - b).collect();
-                bits(&[a.clone(), less(a, b), less(b, c)], steps.log_scale)
-            }
-            Attribute::Rotation => bits(&sample.rotation()[1..], steps.rotation),
-            Attribute::Opacity => bits(&[sample.opacity_logit().to_vec()], steps.opacity),
-            Attribute::Dc => bits(sample.dc(), steps.dc),
-            Attribute::Sh => {
-                let planes: Vec<&[f32]> = sample.sh().iter().map(Vec::as_slice).collect();
-                let basis = Components::of(&planes);
-                let transform = colour::transform(TransformKind::Sh, &basis, steps.sh);
-                colour::components(&transform, &planes, steps.sh, &Spacing::default())
-                    .iter()
-                    .map(|plane| entropy_of(plane))
-                    .sum()
-            }
-        };
-        total / rows.len().max(1) as f64
+        (finer - coarser) / 0.5 / rows.len().max(1) as f64
     }
 }
 
-/// SH planes whose principal components are on a grid.
-fn rounded_components(planes: &[Vec<f32>], step: f32, spacing: &Spacing) -> Vec<Vec<f32>> {
-    let slices: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
-    let basis = Components::of(&slices);
-    let transform = colour::transform(TransformKind::Sh, &basis, step);
-    let components = colour::components(&transform, &slices, step, spacing);
-    let plane = |index: usize| {
-        let mut plane = vec![basis.mean[index] as f32; slices[index].len()];
-        for (row, component) in basis.rows.iter().zip(&components) {
-            let weight = row[index] as f32 * step;
-            for (value, &component) in plane.iter_mut().zip(component) {
-                *value += weight * component as f32;
+/// A camera and what it sees of the source.
+type View = (Camera, Rendering);
+
+fn view(frame: &GaussianFrame, camera: Camera) -> View {
+    let picture = render(frame, &camera, [0.0; 3]);
+    (camera, picture)
+}
+
+/// A frame with some steps.
+struct Trial<'a> {
+    frame: &'a GaussianFrame,
+    bases: &'a [Components; 2],
+    sequence: SequenceParameters,
+    geometry: Geometry,
+    /// How each Gaussian is coded.
+    coded: Vec<Coded>,
+}
+
+/// What the values of a Gaussian depend on.
+struct Coded {
+    shape: Shape,
+    position_shift: u8,
+    /// Of rotation, dc and sh.
+    exponents: [u8; 3],
+}
+
+impl<'a> Trial<'a> {
+    /// `rows`: which Gaussians of the fit these are; none: all.
+    fn new(fit: &'a Fit, frame: &'a GaussianFrame, rows: Option<&[u32]>, steps: &Steps) -> Self {
+        let settings = Settings { steps: *steps, spatial_layers: 1, ..fit.settings.clone() };
+        let flags = SequenceParameters::flags(true, frame.antialiased(), false);
+        let sequence = fit.scene.parameters(&settings, 1, frame.sh_degree(), flags);
+        let grains = Grains::new(&settings, &sequence);
+        let geometry = geometry(frame, &sequence);
+        let rules: Vec<StepRule> = (0..sequence.refinement_count)
+            .map(|refinement| StepRule::new(&sequence, grains.of(refinement).attribute_step))
+            .collect();
+        let code = |row: usize| {
+            let refinement = fit.refinement[rows.map_or(row, |rows| rows[row] as usize)];
+            let rule = &rules[usize::from(refinement)];
+            let wanted = geometry.log_scale.each_ref().map(|plane| plane[row]);
+            let shape = Shape::new(wanted, geometry.opacity[row], rule, true);
+            let exponents = [Stage::Rotation, Stage::Dc, Stage::Sh].map(|stage| shape.exponent(stage, rule));
+            Coded { shape, position_shift: grains.of(refinement).position_shift, exponents }
+        };
+        let coded = (0..frame.len()).into_par_iter().map(code).collect();
+        Self { frame, bases: &fit.bases, sequence, geometry, coded }
+    }
+
+    /// The frame with some attributes as a decoder would have them.
+    fn decoded(&self, attributes: &[Attribute]) -> GaussianFrame {
+        let mut planes = self.frame.planes().clone();
+        for attribute in attributes {
+            match attribute {
+                Attribute::Position => self.positions(&mut planes),
+                Attribute::LogScale => {
+                    let (offset, step) = (self.sequence.log_scale_offset(), self.sequence.log_scale_step());
+                    for (axis, plane) in planes.log_scale.iter_mut().enumerate() {
+                        let value = |coded: &Coded| offset + step * coded.shape.log_scale[axis] as f32;
+                        *plane = self.coded.iter().map(value).collect();
+                    }
+                }
+                Attribute::Opacity => {
+                    let (offset, step) = (self.sequence.opacity_offset(), self.sequence.opacity_step());
+                    let value = |coded: &Coded| offset + step * coded.shape.opacity as f32;
+                    planes.opacity_logit = self.coded.iter().map(value).collect();
+                }
+                Attribute::Rotation => self.rotations(&mut planes),
+                Attribute::Dc => {
+                    for (slot, plane) in planes.dc.iter_mut().zip(self.colours(0)) {
+                        *slot = plane;
+                    }
+                }
+                Attribute::Sh => planes.sh = self.colours(1),
             }
         }
-        plane
-    };
-    (0..planes.len()).map(plane).collect()
+        let frame = GaussianFrame::from_planes(self.frame.sh_degree(), planes).unwrap_or_default();
+        frame.with_antialiased(self.frame.antialiased())
+    }
+
+    fn positions(&self, planes: &mut Planes) {
+        let companding = Companding::new(&self.sequence);
+        let (offset, step) = (self.sequence.position_offset(), self.sequence.position_step());
+        for (axis, plane) in planes.position.iter_mut().enumerate() {
+            let value = |(coded, &code): (&Coded, &u32)| {
+                let code = refine(code >> coded.position_shift, coded.position_shift);
+                offset[axis] + step * companding.expand(code) as f32
+            };
+            *plane = self.coded.iter().zip(&self.geometry.position[axis]).map(value).collect();
+        }
+    }
+
+    fn rotations(&self, planes: &mut Planes) {
+        let finest = self.sequence.rotation_step();
+        let [w, parts @ ..] = &mut planes.rotation;
+        for (part, values) in parts.iter_mut().zip(self.turns()) {
+            let value = |(value, coded): (&i32, &Coded)| finest * (value * step(coded.exponents[0])) as f32;
+            *part = values.iter().zip(&self.coded).map(value).collect();
+        }
+        for (row, w) in w.iter_mut().enumerate() {
+            let squares: f32 = parts.iter().map(|plane| plane[row] * plane[row]).sum();
+            *w = (1.0 - squares).max(0.0).sqrt();
+        }
+    }
+
+    /// Coded values of the rotation.
+    fn turns(&self) -> [Vec<i32>; 3] {
+        self.geometry.rotation.each_ref().map(|plane| {
+            let value = |(&parts, coded): (&i32, &Coded)| nearest_multiple(parts, coded.exponents[0]);
+            plane.iter().zip(&self.coded).map(value).collect()
+        })
+    }
+
+    fn colour_step(&self, which: usize) -> f32 {
+        if which == 0 { self.sequence.dc_step() } else { self.sequence.sh_step() }
+    }
+
+    /// Coded values of dc, 0, or sh, 1.
+    fn components(&self, which: usize) -> Vec<Vec<i32>> {
+        let step_of = self.colour_step(which);
+        let kind = [TransformKind::Dc, TransformKind::Sh][which];
+        let transform = colour::transform(kind, &self.bases[which], step_of);
+        let planes: Vec<&[f32]> = match which {
+            0 => self.frame.dc().iter().map(Vec::as_slice).collect(),
+            _ => self.frame.sh().iter().map(Vec::as_slice).collect(),
+        };
+        let value = |(&component, coded): (&f32, &Coded)| {
+            let steps = component / step(coded.exponents[1 + which]) as f32;
+            nearest_integer(steps.clamp(-1e6, 1e6))
+        };
+        let components = colour::components(&transform, &planes, step_of);
+        components.par_iter().map(|plane| plane.iter().zip(&self.coded).map(value).collect()).collect()
+    }
+
+    /// Planes of dc, 0, or sh, 1, from their coded values.
+    fn colours(&self, which: usize) -> Vec<Vec<f32>> {
+        let (basis, finest) = (&self.bases[which], self.colour_step(which));
+        let components = self.components(which);
+        let plane = |index: usize| {
+            let mut plane = vec![basis.mean[index] as f32; self.coded.len()];
+            for (row, component) in basis.rows.iter().zip(&components) {
+                let weight = row[index] as f32 * finest;
+                for ((value, &component), coded) in plane.iter_mut().zip(component).zip(&self.coded) {
+                    *value += weight * (component * step(coded.exponents[1 + which])) as f32;
+                }
+            }
+            plane
+        };
+        (0..components.len()).into_par_iter().map(plane).collect()
+    }
+
+    /// Zero-order bits of an attribute.
+    fn bits(&self, attribute: Attribute) -> f64 {
+        let shapes =
+            |part: usize| -> Vec<i32> { self.coded.iter().map(|coded| coded.shape.values[part]).collect() };
+        let of_all = |planes: &[Vec<i32>]| planes.iter().map(|plane| entropy_of(plane)).sum();
+        match attribute {
+            Attribute::Position => 0.0,
+            Attribute::LogScale => of_all(&[0, 1, 2].map(shapes)),
+            Attribute::Opacity => of_all(&[shapes(3)]),
+            Attribute::Rotation => of_all(&self.turns()),
+            Attribute::Dc => of_all(&self.components(0)),
+            Attribute::Sh => of_all(&self.components(1)),
+        }
+    }
 }

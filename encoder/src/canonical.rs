@@ -9,13 +9,11 @@ use splatstream_scene::{GaussianFrame, Planes};
 /// The logit below which opacity stays under 1/255: ln(1/254).
 pub const INVISIBLE_LOGIT: f32 = -5.537_334;
 
-/// The Gaussians that can be seen, in their order. All of them if `keep_invisible`.
+/// The Gaussians that can be seen, in their order; with `keep_invisible` also those that cannot, if they have any
+/// opacity at all.
 pub fn visible(frame: &GaussianFrame, keep_invisible: bool) -> Vec<u32> {
-    (0..)
-        .zip(frame.opacity_logit())
-        .filter(|&(_, &logit)| keep_invisible || logit >= INVISIBLE_LOGIT)
-        .map(|(index, _)| index)
-        .collect()
+    let least = if keep_invisible { f32::MIN } else { INVISIBLE_LOGIT };
+    (0..).zip(frame.opacity_logit()).filter(|&(_, &logit)| logit >= least).map(|(index, _)| index).collect()
 }
 
 /// The quaternion that turns the axes 0, 1, 2 into `order`, up to the signs of axes.

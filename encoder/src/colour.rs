@@ -1,12 +1,12 @@
 //! Colour on its way in: transforms, components, and the choice between coefficients and codebooks.
 
 use crate::entropy_cost::entropy_of;
-use crate::grid::{Spacing, nearest_integer};
+use crate::grid::nearest_integer;
 use crate::pca::Components;
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
 use rayon::prelude::*;
-use splatstream_decoder::colour::COMPONENT_RANGE;
+use splatstream_decoder::steps::step;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{TransformHeader, TransformKind};
 
@@ -42,19 +42,14 @@ pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32)
 /// Gaussians projected at a time: their planes stay in the second-level cache.
 const TILE: usize = 1 << 12;
 
-/// Components in units of the step, turned into `V` by `map`, which is given the row as well; one plane per component.
-fn project<V: Send + Sync + Copy>(
-    transform: &Transform,
-    planes: &[&[f32]],
-    step: f32,
-    map: impl Fn(usize, f32) -> V + Sync,
-) -> Vec<Vec<V>> {
+/// Components in units of the step; one plane per component.
+pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<f32>> {
     let means: Vec<f32> =
         transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
     let scale = 1.0 / (step * UNIT as f32);
     let count = planes.first().map_or(0, |plane| plane.len());
     let starts: Vec<usize> = (0..count).step_by(TILE).collect();
-    let tile = |&start: &usize| -> Vec<Vec<V>> {
+    let tile = |&start: &usize| -> Vec<Vec<f32>> {
         let end = count.min(start + TILE);
         let row = |weights: &[i16]| {
             let mut sums = vec![0.0_f32; end - start];
@@ -64,32 +59,21 @@ fn project<V: Send + Sync + Copy>(
                     *sum += weight * (value - mean);
                 }
             }
-            (start..).zip(sums).map(|(row, sum)| map(row, sum)).collect()
+            sums
         };
         transform.rows().map(row).collect()
     };
-    let tiles: Vec<Vec<Vec<V>>> = starts.par_iter().map(tile).collect();
+    let tiles: Vec<Vec<Vec<f32>>> = starts.par_iter().map(tile).collect();
     let component = |index: usize| tiles.iter().flat_map(|tile| tile[index].iter().copied()).collect();
     (0..transform.rows().len()).into_par_iter().map(component).collect()
 }
 
-/// Components rounded to the step, or to multiples of it.
-pub(crate) fn components(
-    transform: &Transform,
-    planes: &[&[f32]],
-    step: f32,
-    spacing: &Spacing,
-) -> Vec<Vec<i32>> {
-    let (first, last) = COMPONENT_RANGE.into_inner();
-    let nearest = |row, value: f32| spacing.nearest(row, value.clamp(first as f32, last as f32));
-    // The nearest multiple of two steps may lie beyond.
-    project(transform, planes, step, |row, value| nearest(row, value).clamp(first, last))
-}
-
-/// Drops the last components that are 0 for every Gaussian; at least one stays.
-pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<i32>>) {
-    let used =
-        planes.iter().rposition(|plane| plane.iter().any(|&value| value != 0)).map_or(1, |last| last + 1);
+/// Drops the last components that round to 0 for every Gaussian, with these steps; at least one stays.
+pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<f32>>, exponents: &[u8]) {
+    let is_used = |plane: &Vec<f32>| {
+        plane.iter().zip(exponents).any(|(value, &exponent)| value.abs() >= 0.5 * step(exponent) as f32)
+    };
+    let used = planes.iter().rposition(is_used).map_or(1, |last| last + 1);
     planes.truncate(used);
     transform.basis.truncate(used * usize::from(transform.header.dimension));
     transform.header.rank = used as u8;
@@ -110,28 +94,27 @@ pub(crate) struct ShPlan {
 /// The multiplier is that of a uniform quantiser at high rate: one bit more a component divides its error
 /// of step^2/12 by four, so a bit is worth 2 ln 2 / 12 squared steps.
 pub(crate) fn plan_sh(
-    transform: &Transform,
-    planes: &[&[f32]],
-    step: f32,
+    components: &[Vec<f32>],
+    exponents: &[u8],
     gaussians_of_gop: usize,
     choice: ShChoice,
     preset: Preset,
 ) -> ShPlan {
-    let count = planes.first().map_or(0, |plane| plane.len());
+    let count = exponents.len();
     let coefficients = ShPlan { codebooks: Vec::new(), trial: None };
     let try_it = choice == ShChoice::VectorQuantised || choice == ShChoice::Auto && preset != Preset::Fast;
     if !try_it || count < 2 {
         return coefficients;
     }
-    let rank = usize::from(transform.header.rank);
-    let rows = sampled_rows(transform, planes, step, (count / (2 * TRIAL)).max(1));
+    let rank = components.len();
+    let rows = sampled_rows(components, exponents, (count / (2 * TRIAL)).max(1));
     let entries = vq::entry_count(gaussians_of_gop, choice == ShChoice::VectorQuantised);
     let (trial, pays) = compare(&rows, rank, gaussians_of_gop, entries);
     let trial = Some(trial);
     if choice == ShChoice::Auto && !pays {
         return ShPlan { trial, ..coefficients };
     }
-    let all = sampled_rows(transform, planes, step, (count / (vq::TRAINING_PER_ENTRY * entries)).max(1));
+    let all = sampled_rows(components, exponents, (count / (vq::TRAINING_PER_ENTRY * entries)).max(1));
     ShPlan { codebooks: vec![vq::train(&all, rank, entries.min(count))], trial }
 }
 
@@ -155,12 +138,13 @@ pub(crate) fn compare(
     ([by_coefficients, by_vq], cost(by_vq) < cost(by_coefficients))
 }
 
-/// The components of every `stride`-th Gaussian, one after the other.
-pub(crate) fn sampled_rows(transform: &Transform, planes: &[&[f32]], step: f32, stride: usize) -> Vec<f32> {
-    let sampled: Vec<Vec<f32>> =
-        planes.iter().map(|plane| plane.iter().step_by(stride).copied().collect()).collect();
-    let sampled: Vec<&[f32]> = sampled.iter().map(Vec::as_slice).collect();
-    vq::rows(&project(transform, &sampled, step, |_, value| value))
+/// The components of every `stride`-th Gaussian in its own steps, one after the other.
+fn sampled_rows(components: &[Vec<f32>], exponents: &[u8], stride: usize) -> Vec<f32> {
+    let of_row = |row: usize| {
+        let step = step(exponents[row]) as f32;
+        components.iter().map(move |plane| plane[row] / step)
+    };
+    (0..exponents.len()).step_by(stride).flat_map(of_row).collect()
 }
 
 /// Bits and squared error per Gaussian of rounding every component.
@@ -178,25 +162,4 @@ fn coefficient_cost(rows: &[f32], rank: usize) -> (f64, f64) {
             .sum::<f64>();
     }
     (bits / gaussians, error / gaussians)
-}
-
-/// The codebook indices of every Gaussian, one plane per stage: the nearest entry of the first codebook, then of each
-/// other that of what is left.
-pub(crate) fn stages(
-    transform: &Transform,
-    planes: &[&[f32]],
-    step: f32,
-    codebooks: &[&Codebook],
-) -> Vec<Vec<i32>> {
-    let rank = usize::from(transform.header.rank);
-    let mut rows = sampled_rows(transform, planes, step, 1);
-    let mut stage = |book: &&Codebook| {
-        let (indices, _) = vq::assign(book, &rows, rank);
-        for (row, &index) in rows.chunks_exact_mut(rank.max(1)).zip(&indices) {
-            let entry = &book.entries[index as usize * rank..];
-            row.iter_mut().zip(entry).for_each(|(part, &value)| *part -= f32::from(value));
-        }
-        indices
-    };
-    codebooks.iter().map(&mut stage).collect()
 }

@@ -1,5 +1,7 @@
 //! What an encoder can be given that it cannot encode.
 
+use splatstream_scene::Defect;
+
 /// Errors of encoding. Those of reading a frame are the source's own.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -42,6 +44,16 @@ pub enum Error {
         /// The most that one second holds.
         max: u64,
     },
+    /// A frame has values that no frame may hold.
+    #[error("frame {frame}: {count} invalid Gaussians, for example {first}")]
+    Invalid {
+        /// The frame.
+        frame: u32,
+        /// Gaussians with such values.
+        count: usize,
+        /// One of the values.
+        first: Defect,
+    },
     /// An attribute cannot be put on its quantisation grid.
     #[error("frame {frame}: {attribute} of Gaussian {row} is {value}, too far out for a step of {step}")]
     OutOfGrid {
@@ -67,6 +79,11 @@ pub enum Error {
     /// The stream could not be written.
     #[error("the stream cannot be written: {0}")]
     Output(#[from] std::io::Error),
+    /// The stream that was written does not decode to what it should: the encoder is at fault.
+    #[error(
+        "the stream was written and then decoded for a check, which failed: {0}; please report this, with the scene"
+    )]
+    Verification(splatstream_format::Error),
     /// The syntax refuses what the encoder wants to write.
     #[error("the bitstream cannot carry this: {0}")]
     Syntax(#[from] splatstream_format::Error),

@@ -10,10 +10,12 @@ pub(crate) mod compensation;
 pub(crate) mod intra;
 mod judge;
 pub(crate) mod learning;
+mod moves;
 mod new_list;
 pub(crate) mod predicted;
 pub(crate) mod predictors;
 pub(crate) mod price;
+pub(crate) mod steadiness;
 pub(crate) mod survivors;
 pub(crate) mod unit;
 pub(crate) mod wanted;
@@ -40,7 +42,7 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    fn cloud(&self) -> Cloud<'_> {
+    pub(crate) fn cloud(&self) -> Cloud<'_> {
         Cloud {
             position: self.position.each_ref().map(Vec::as_slice),
             log_scale: self.frame.log_scale().each_ref().map(Vec::as_slice),
@@ -55,6 +57,8 @@ impl Target {
 /// A coded frame that others refer to.
 pub(crate) struct Reference {
     pub(crate) lists: Vec<GaussianList>,
+    /// log2 of how many frames it is later than the one it refers to.
+    pub(crate) span_log2: u8,
     /// What is carried of each list; none where anchors are nested, as only who has all of the I frame compares it.
     carried: Vec<GaussianList>,
     /// The models in force for a frame that refers to this one.
@@ -85,6 +89,15 @@ pub(crate) struct CodedFrame {
 }
 
 impl CodedFrame {
+    /// Bytes of its units, without their headers.
+    pub(crate) fn bytes(&self) -> f64 {
+        let units: usize = self.units.iter().map(|unit| unit.payload.len()).sum();
+        let cells = self.cells.as_ref().map_or(0, |cells| {
+            cells.section.model.len() + cells.section.blocks.iter().map(Vec::len).sum::<usize>()
+        });
+        (units + cells) as f64
+    }
+
     /// Gaussians of the frame.
     pub(crate) fn gaussians(&self) -> u32 {
         self.reference.lists.iter().map(GaussianList::len).sum::<usize>() as u32

@@ -1,35 +1,31 @@
 //! GOPs, frame by frame: I frames, and frames that refer to others.
 
+mod means;
+
 use crate::canonical::{canonicalise, visible};
-use crate::colour;
 use crate::error::Error;
-use crate::frame::cells::{CellPlan, ReferenceCloud};
+use crate::frame::cells::CellPlan;
 use crate::frame::compensation::Compensator;
 use crate::frame::intra::{IntraTarget, code_intra};
 use crate::frame::learning::{self, Recorder};
 use crate::frame::predicted::{Predicted, PredictedTarget};
-use crate::frame::predictors::Chooser;
-use crate::frame::price::{Goal, Pictures};
-use crate::frame::survivors::Survivors;
-use crate::frame::unit::UnitCoder;
+use crate::frame::steadiness::Steadiness;
 use crate::frame::wanted::Wanted;
-use crate::frame::{CodedFrame, Namings, Reference, Target};
+use crate::frame::{CodedFrame, Reference, Target};
 use crate::gop_tools::GopTools;
-use crate::grid::Spacing;
+use crate::grid::PositionGrid;
 use crate::importance::Ranking;
-use crate::matching::{Kind, Matching, Measure, shares_little, shares_much};
+use crate::isolated::{self, Isolated};
+use crate::matching::{shares_little, shares_much};
+use crate::motion::follow::follow;
 use crate::report::{FrameReport, Report};
-use crate::section::SectionPlan;
-use crate::settings::{Fidelity, Importance, Predictors, Preset, Settings, ShChoice};
+use crate::settings::{Preset, Settings};
 use crate::source::FrameSource;
 use crate::stream::Progress;
-use crate::vq;
 use crate::writer::UnitWriter;
-use splatstream_decoder::colour::Colour;
-use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::Limits;
-use splatstream_format::payload::{Codebook, Network, write_frame};
+use splatstream_format::payload::{Network, write_frame};
 use splatstream_format::syntax::{
     FrameHeader, FrameRole, FrameType, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
 };
@@ -37,14 +33,9 @@ use splatstream_format::syntax::{
 /// Frames of a predicted GOP, at most (6.5).
 const MAX_FRAMES: u32 = 1024;
 
-/// Pairs on which coefficients and a codebook of SH residuals are compared, and on which the codebook is trained.
-const TRIAL: usize = 1 << 13;
-
-/// Entries of a codebook of SH residuals, at most: it is carried with each frame.
-const RESIDUAL_ENTRIES: usize = 256;
-
-/// Rows of the same Gaussian may differ by this many steps in attributes that motion leaves alone.
-const SAME: f32 = 1.5;
+/// A predicted frame that takes more than this part of what an I frame would is not worth it: it is no easier to decode,
+/// and an I frame is where decoding can start.
+const DEAR: f64 = 0.97;
 
 /// Codes the frames of a sequence one after the other.
 pub(crate) struct SequenceCoder<'a, 'w> {
@@ -60,14 +51,26 @@ pub(crate) struct SequenceCoder<'a, 'w> {
     pub(crate) limits: Limits,
     /// What a network is trained with, while that is being collected.
     pub(crate) recorder: Option<&'a Recorder>,
+    /// Frames from the first on that have been looked at.
+    pub(crate) looked_at: u32,
 }
 
 /// An I frame to be coded.
 struct Intra {
     target: Target,
-    /// Its Gaussians, most important first, and which of them may be coarser.
+    /// Its Gaussians, most important first.
     order: Vec<u32>,
-    spacing: Spacing,
+}
+
+/// Whether a frame has been predicted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    /// It has.
+    Predicted,
+    /// It shares too little with the frame that it would refer to.
+    Unlike,
+    /// It takes as many bits as an I frame.
+    Dear,
 }
 
 /// A GOP while its frames are being coded.
@@ -84,6 +87,10 @@ struct Gop {
     compensation: Vec<(i8, i8)>,
     /// The level of the price of a bit in pictures, of the last frame that had one.
     price_level: i32,
+    /// What the I frame takes: bytes of a Gaussian.
+    intra_bytes: f64,
+    /// How good its frames are, where these are true to attributes.
+    steadiness: Option<Steadiness>,
     /// Units that are not written yet.
     units: Vec<(UnitId, Vec<u8>)>,
     /// Whether the header has been written.
@@ -111,11 +118,13 @@ impl SequenceCoder<'_, '_> {
     /// Codes a GOP of the frames from `first` up to `last` at most, and gives the frame after it: it ends where a
     /// frame shares little with the one it would refer to.
     fn gop(&mut self, first: u32, last: u32, progress: Progress<'_>) -> Result<u32, Error> {
+        self.ranking.start_gop();
         let intra = self.intra_target(first)?;
         let mut gop = self.start(first, last - first, &intra)?;
         self.intra(&mut gop, first, intra)?;
         let mut end = first + 1;
         progress(end, self.source.len());
+        let mut verdict = Verdict::Predicted;
         while end < last {
             let role = gop.header.role(end - first);
             match role.reference {
@@ -125,7 +134,8 @@ impl SequenceCoder<'_, '_> {
                 }
                 Some(reference) => {
                     let target = self.target(end)?;
-                    if !self.predicted(&mut gop, end, &role, first + reference, &target)? {
+                    verdict = self.predicted(&mut gop, end, &role, first + reference, &target)?;
+                    if verdict != Verdict::Predicted {
                         break;
                     }
                 }
@@ -134,14 +144,57 @@ impl SequenceCoder<'_, '_> {
             progress(end, self.source.len());
         }
         gop.header = self.header(end - first);
+        if end == first + 1 && verdict != Verdict::Predicted {
+            end = self.intra_run(&mut gop, (end, last), verdict, progress)?;
+        }
         self.write(&mut gop)?;
         Ok(end)
+    }
+
+    /// Goes on with I frames in a GOP of which the first frame alone has been coded, and gives the frame after it.
+    ///
+    /// Frames that share little are I frames until two share much again, which begins a GOP; those of which the
+    /// differences are dear are I frames as far as the GOP goes.
+    fn intra_run(
+        &mut self,
+        gop: &mut Gop,
+        (second, last): (u32, u32),
+        verdict: Verdict,
+        progress: Progress<'_>,
+    ) -> Result<u32, Error> {
+        gop.header = GopHeader::intra(self.writer.gops(), last - gop.first);
+        gop.references.fill_with(|| None);
+        let mut end = second;
+        let mut next = (verdict == Verdict::Unlike).then(|| self.target(second)).transpose()?;
+        while end < last {
+            if let Some(target) = next.take()
+                && end + 1 < last
+            {
+                let after = self.target(end + 1)?;
+                if !self.is_unlike(&target, &after) {
+                    break;
+                }
+                next = Some(after);
+            }
+            let intra = self.intra_target(end)?;
+            self.intra(gop, end, intra)?;
+            end += 1;
+            progress(end, self.source.len());
+        }
+        gop.header = GopHeader::intra(self.writer.gops(), end - gop.first);
+        Ok(end)
+    }
+
+    /// Whether a frame shares too little with the one before it to be predicted from it.
+    fn is_unlike(&self, before: &Target, after: &Target) -> bool {
+        let matching = follow(&before.cloud(), &after.cloud(), &self.measure(), self.sequence.position_bits);
+        shares_little(&matching) && !(self.by_pictures() && shares_much(&matching))
     }
 
     /// A GOP of at most so many frames that starts with an I frame.
     fn start(&mut self, first: u32, frames: u32, intra: &Intra) -> Result<Gop, Error> {
         let frame = &intra.target.frame;
-        let tools = GopTools::new(frame, &intra.spacing, &self.sequence, self.settings, frames);
+        let tools = GopTools::new(frame, &intra.order, &self.sequence, self.settings, frames);
         if first == 0 {
             tools.report(self.report);
         }
@@ -154,6 +207,8 @@ impl SequenceCoder<'_, '_> {
             anchor: Vec::new(),
             compensation: Vec::new(),
             price_level: 0,
+            intra_bytes: f64::INFINITY,
+            steadiness: None,
             is_open: false,
             has_learned: false,
         })
@@ -189,27 +244,31 @@ impl SequenceCoder<'_, '_> {
         // Where frames are predicted axes are named as in the reference, and what a frame starts with is sorted.
         let sorts = self.sequence.canonical_axes() || self.settings.profile() == Profile::Dynamic;
         let frame = canonicalise(&frame, &rows, sorts);
-        let step = self.sequence.position_step();
-        let offset = self.sequence.position_offset();
-        let position = [0, 1, 2].map(|axis: usize| {
-            frame.position()[axis].iter().map(|&value| (value - offset[axis]) / step).collect()
-        });
+        let (frame, found) = isolated::colours(frame, &rows, number);
+        let grid = PositionGrid::of(&self.sequence);
+        // A frame is looked at again where it is tried in one way and coded in another.
+        if number >= self.looked_at {
+            self.looked_at = number + 1;
+            Isolated::add(found, &mut self.report.isolated);
+            Isolated::add(isolated::positions(&frame, &rows, &grid, number), &mut self.report.isolated);
+        }
+        let position = [0, 1, 2]
+            .map(|axis: usize| frame.position()[axis].iter().map(|&value| grid.steps(axis, value)).collect());
         Ok(Target { frame, position, rows, row_count })
     }
 
     fn intra_target(&mut self, number: u32) -> Result<Intra, Error> {
         let target = self.target(number)?;
         let order = self.ranking.order(&target.frame);
-        let spacing = self.ranking.spacing(&order, self.settings);
-        Ok(Intra { target, order, spacing })
+        Ok(Intra { target, order })
     }
 
     /// Codes an I frame.
     fn intra(&mut self, gop: &mut Gop, number: u32, intra: Intra) -> Result<(), Error> {
-        let Intra { target, order, spacing } = &intra;
+        let Intra { target, order } = &intra;
         let known = gop.tools.take_components();
         let coder = self.coder(gop, None);
-        let wanted = Wanted::new(&target.frame, spacing, known, &coder)?;
+        let wanted = Wanted::new(&target.frame, known, &coder);
         let compensator = self.compensator(target);
         let is_predicted = gop.header.is_predicted();
         let coded = code_intra(
@@ -226,6 +285,11 @@ impl SequenceCoder<'_, '_> {
         )?;
         let role = FrameRole { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
         self.add(gop, number, &role, target, &coded)?;
+        gop.intra_bytes = coded.bytes() / f64::from(coded.gaussians().max(1));
+        if is_predicted && self.recorder.is_none() && !target.frame.is_empty() {
+            let cameras = self.ranking.cameras(&target.frame);
+            gop.steadiness = Some(Steadiness::new(cameras, target, &coded, &self.sequence));
+        }
         if is_predicted {
             gop.start_with(number, coded, self.sequence.whole_anchor());
         } else if self.network.is_none() {
@@ -234,7 +298,7 @@ impl SequenceCoder<'_, '_> {
         Ok(())
     }
 
-    /// Codes a frame that refers to another; false, and nothing done, if it shares too little with it.
+    /// Codes a frame that refers to another, if that is worth it.
     fn predicted(
         &mut self,
         gop: &mut Gop,
@@ -242,11 +306,12 @@ impl SequenceCoder<'_, '_> {
         role: &FrameRole,
         reference: u32,
         target: &Target,
-    ) -> Result<bool, Error> {
+    ) -> Result<Verdict, Error> {
         let found = gop.references.iter().flatten().find(|(number, _)| *number == reference);
-        let Some((_, reference)) = found else { return Ok(false) };
+        let Some((earlier, reference)) = found else { return Ok(Verdict::Unlike) };
+        let span_log2 = (number - earlier).ilog2() as u8;
         let measure = self.measure();
-        let Some(matching) = self.matching(reference, target, &measure) else { return Ok(false) };
+        let Some(matching) = self.matching(reference, target, &measure) else { return Ok(Verdict::Unlike) };
         let mut goal = self.goal(gop, &matching, target);
         let mut survivors = self.survivors(gop, target);
         let book = self.residual_book(gop, &survivors, reference, &matching, role.temporal_layer);
@@ -260,92 +325,38 @@ impl SequenceCoder<'_, '_> {
             coder: self.coder(gop, Some(book.as_ref())),
             chooser: self.chooser(),
             reference,
+            span_log2,
             anchor: &gop.anchor,
             target,
             survivors,
-            coarse_tail: self.settings.tools.coarse_tail && self.ranking.importance() != Importance::Volume,
             compensation: &gop.compensation,
         };
         let cells = Some(&cells).filter(|_| self.settings.tools.cell_motion);
         let coded = Predicted::new(from, cells, matching)?.code(goal.as_mut())?;
         if !self.is_within_limits(&coded) {
-            return Ok(false);
+            return Ok(Verdict::Unlike);
+        }
+        if self.settings.tools.survivors
+            && coded.bytes() > DEAR * gop.intra_bytes * f64::from(coded.gaussians())
+        {
+            return Ok(Verdict::Dear);
         }
         if let Some(book) = &book {
             let id = UnitId::of_frame(UnitType::Codebook, gop.first).on_layers(0, role.temporal_layer);
             gop.units.push((id, book.to_bytes()?));
         }
         self.add(gop, number, role, target, &coded)?;
-        if let (Some(goal), Some(frame)) = (goal, self.report.coded.last_mut()) {
-            gop.price_level = goal.level;
-            frame.by_pictures = true;
+        match goal {
+            Some(goal) => {
+                gop.price_level = goal.level;
+                self.report.coded.last_mut().into_iter().for_each(|frame| frame.by_pictures = true);
+            }
+            None => gop.steadiness.iter_mut().for_each(|s| s.follow(target, &coded, &self.sequence)),
         }
         if role.temporal_layer + 1 < self.settings.temporal_layers().max(2) {
             gop.keep(role.temporal_layer, number, coded.reference);
         }
-        Ok(true)
-    }
-
-    /// Which Gaussian of a frame continues each of a reference; none if they share too little.
-    fn matching(&self, reference: &Reference, target: &Target, measure: &Measure) -> Option<Matching> {
-        let cloud = ReferenceCloud::new(reference, &self.sequence);
-        let mut matching = cloud.matching(target, measure, self.sequence.position_bits);
-        // Who goes by pictures has a use for partners that differ a lot.
-        let useful = self.by_pictures() && shares_much(&matching);
-        if shares_little(&matching) && !useful && !target.frame.is_empty() {
-            return None;
-        }
-        if !self.settings.tools.survivors {
-            matching.target_of.iter_mut().for_each(|partner| *partner = None);
-        }
-        Some(matching)
-    }
-
-    /// Whether the level of the stream allows a frame: what stays although nothing continues it may make it larger than
-    /// any of the source.
-    fn is_within_limits(&self, coded: &CodedFrame) -> bool {
-        let gaussians = coded.gaussians();
-        let rate = self.sequence.gaussian_rate(gaussians);
-        gaussians <= self.limits.max_gaussians && rate <= self.limits.max_gaussian_rate
-    }
-
-    /// What becomes of the Gaussians of a reference is found with this.
-    fn survivors<'s>(&'s self, gop: &'s Gop, target: &'s Target) -> Survivors<'s> {
-        Survivors {
-            target,
-            sequence: &self.sequence,
-            steps: &self.settings.steps,
-            dc: &gop.tools.dc,
-            sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
-            namings: Namings::new(),
-            judge: None,
-            book: None,
-        }
-    }
-
-    fn measure(&self) -> Measure {
-        Measure { position_step: self.sequence.position_step(), steps: self.settings.steps, same: SAME }
-    }
-
-    /// Whether frames of which no row keeps its meaning are true to their pictures. What a network is trained with is
-    /// the same either way, and sooner found without them.
-    fn by_pictures(&self) -> bool {
-        let may = self.settings.tools.survivors && self.recorder.is_none();
-        may && self.settings.fidelity() == Fidelity::Pictures
-    }
-
-    /// How good the pictures of a frame must be, if it is them that the frame is true to.
-    fn goal(&mut self, gop: &Gop, matching: &Matching, target: &Target) -> Option<Goal> {
-        if !self.by_pictures() || matching.kind != Kind::Untracked || target.frame.is_empty() {
-            return None;
-        }
-        let cameras = self.ranking.cameras(&target.frame).to_vec();
-        Some(Goal {
-            pictures: Pictures::new(&target.frame, cameras),
-            tolerance: f64::from(self.settings.tolerance),
-            least: Vec::new(),
-            level: gop.price_level,
-        })
+        Ok(Verdict::Predicted)
     }
 
     /// Prefixes of I frames are compensated where time is no matter: not in streams of one frame, or of frames that
@@ -354,82 +365,6 @@ impl SequenceCoder<'_, '_> {
         let takes_time = self.settings.preset != Preset::Fast && self.settings.profile() == Profile::Dynamic;
         let has_prefixes = self.sequence.refinement_count > 1 && !target.frame.is_empty();
         (takes_time && has_prefixes).then(|| Compensator::new(&target.frame))
-    }
-
-    /// The codebook of the SH residuals of a frame, where a codebook serves them better than coefficients. Only a
-    /// GOP whose I frame has a codebook has them: a new Gaussian takes an entry of each.
-    fn residual_book(
-        &self,
-        gop: &Gop,
-        survivors: &Survivors<'_>,
-        reference: &Reference,
-        matching: &Matching,
-        temporal_layer: u8,
-    ) -> Option<Codebook> {
-        let (transform, plan) = gop.tools.sh.as_ref()?;
-        plan.codebooks.first()?;
-        let rank = usize::from(transform.header.rank);
-        let pairs = matching.target_of.iter().flatten().count();
-        let rows = survivors.sh_rows(&reference.lists, &matching.target_of, pairs / TRIAL);
-        let forced = self.settings.sh == ShChoice::VectorQuantised;
-        let entries = vq::entry_count(pairs, false).min(RESIDUAL_ENTRIES);
-        if rows.len() < 4 * rank || !forced && !colour::compare(&rows, rank, pairs, entries).1 {
-            return None;
-        }
-        let mut book = vq::train(&rows, rank, entries.min(rows.len() / rank));
-        book.entries[..rank].fill(0);
-        // Each temporal layer has a codebook of its own, which only its frames replace.
-        book.header.codebook_id = 1 + temporal_layer;
-        Some(book)
-    }
-
-    /// How new Gaussians are predicted.
-    fn chooser(&self) -> Chooser<'_> {
-        Chooser {
-            predictors: match self.settings.profile() {
-                Profile::Intra => Predictors::NONE,
-                Profile::Dynamic => self.settings.predictors,
-            },
-            choice: self.settings.predictor_choice,
-            neighbours: self.settings.neighbours,
-            recorder: self.recorder,
-        }
-    }
-
-    /// How the units of a frame are coded: an I frame, or one with or without a codebook of SH residuals.
-    fn coder<'g>(&'g self, gop: &'g Gop, predicted: Option<Option<&'g Codebook>>) -> UnitCoder<'g> {
-        let sh = gop.tools.sh.as_ref();
-        let whole = sh.and_then(|(_, plan)| plan.codebooks.first());
-        let residual = predicted.flatten();
-        let coding = match (sh, predicted) {
-            (Some((transform, _)), Some(None)) => ShCoding::Coefficients { rank: transform.header.rank },
-            (Some(_), Some(Some(_))) => ShCoding::VectorQuantised { stages: 2 },
-            _ => gop.tools.sh_coding(),
-        };
-        let books = match coding {
-            ShCoding::VectorQuantised { .. } => [whole, residual, None, None],
-            _ => [None; 4],
-        };
-        UnitCoder {
-            sequence: &self.sequence,
-            colour: Colour {
-                dc: &gop.tools.dc,
-                sh: sh.map(|(transform, _)| transform),
-                mode: coding,
-                codebooks: books,
-            },
-            sh: coding.header(books.iter().flatten().map(|book| book.header.codebook_id)),
-            plan: SectionPlan {
-                block_log2: self.sequence.block_log2,
-                preset: self.settings.preset,
-                tools: self.settings.tools,
-            },
-            intra: predicted.is_none(),
-            has_differences: self.chooser().predictors != Predictors::NONE
-                || self.sequence.spatial_layer_count > 1,
-            network: self.network.as_ref(),
-            max_learned: self.limits.max_learned,
-        }
     }
 
     /// Adds the units of a coded frame to its GOP, and what they are to the report.

@@ -2,11 +2,14 @@
 
 use crate::colour::{self, ShPlan};
 use crate::error::Error;
-use crate::grid::Spacing;
+use crate::grid::{Geometry, geometry};
 use crate::pca::Components;
 use crate::report::Report;
 use crate::settings::Settings;
+use crate::shape::Shape;
+use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::layout::ShCoding;
+use splatstream_decoder::steps::StepRule;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{Profile, SequenceParameters, TransformKind, UnitId, UnitType};
 use splatstream_scene::GaussianFrame;
@@ -15,8 +18,8 @@ use splatstream_scene::GaussianFrame;
 pub(crate) struct GopTools {
     pub(crate) dc: Transform,
     pub(crate) sh: Option<(Transform, ShPlan)>,
-    /// SH components of the first frame, which were needed to find the rank.
-    first_components: Option<Vec<Vec<i32>>>,
+    /// SH components of the first frame, steps, which were needed to find the rank.
+    first_components: Option<Vec<Vec<f32>>>,
 }
 
 /// The SH planes that the sequence carries; a frame of a lower degree has fewer.
@@ -35,10 +38,10 @@ pub(crate) fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
 }
 
 impl GopTools {
-    /// For a GOP of at most so many frames that starts with `frame`.
+    /// For a GOP of at most so many frames that starts with `frame`, whose Gaussians have the order of importance `order`.
     pub(crate) fn new(
         frame: &GaussianFrame,
-        spacing: &Spacing,
+        order: &[u32],
         sequence: &SequenceParameters,
         settings: &Settings,
         frames: u32,
@@ -55,18 +58,18 @@ impl GopTools {
                 false => Components::identity(planes.len()),
             };
             let mut transform = colour::transform(TransformKind::Sh, &basis, step);
-            let mut components = colour::components(&transform, &planes, step, spacing);
+            let mut components = colour::components(&transform, &planes, step);
+            let exponents = sh_exponents(frame, order, sequence, settings);
             // What the first frame does not need, another may.
             if frames == 1 {
-                colour::drop_unused(&mut transform, &mut components);
+                colour::drop_unused(&mut transform, &mut components, &exponents);
             }
             let gaussians = frame.len() * frames as usize;
-            let mut plan =
-                colour::plan_sh(&transform, &planes, step, gaussians, settings.sh, settings.preset);
+            let mut plan = colour::plan_sh(&components, &exponents, gaussians, settings.sh, settings.preset);
             if settings.profile() == Profile::Dynamic {
                 keep_zero(&mut plan.codebooks, usize::from(transform.header.rank));
             }
-            first_components = plan.codebooks.is_empty().then_some(components);
+            first_components = Some(components);
             (transform, plan)
         });
         Self { dc, sh, first_components }
@@ -113,9 +116,34 @@ impl GopTools {
     }
 
     /// The SH components of the first frame, once, if they are known.
-    pub(crate) fn take_components(&mut self) -> Option<Vec<Vec<i32>>> {
+    pub(crate) fn take_components(&mut self) -> Option<Vec<Vec<f32>>> {
         self.first_components.take()
     }
+}
+
+/// The exponents of the steps of SH of an I frame.
+fn sh_exponents(
+    frame: &GaussianFrame,
+    order: &[u32],
+    sequence: &SequenceParameters,
+    settings: &Settings,
+) -> Vec<u8> {
+    let Geometry { log_scale, opacity, .. } = geometry(frame, sequence);
+    let mut exponents = vec![0; frame.len()];
+    let mut start = 0;
+    for refinement in 0..sequence.refinement_count {
+        let end = (sequence.prefix_length(refinement, order.len() as u32) as usize).max(start);
+        let announced = settings.laws.attribute_step(&settings.steps, sequence, refinement);
+        let rule = StepRule::new(sequence, announced);
+        for &row in &order[start..end] {
+            let row = row as usize;
+            let wanted = log_scale.each_ref().map(|plane| plane[row]);
+            let shape = Shape::new(wanted, opacity[row], &rule, sequence.canonical_axes());
+            exponents[row] = shape.exponent(Stage::Sh, &rule);
+        }
+        start = end;
+    }
+    exponents
 }
 
 /// Makes entry 0 of every codebook zero, so that it can stand for "as before".

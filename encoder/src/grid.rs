@@ -1,97 +1,98 @@
 //! Floats onto the grids of the sequence.
 
 use crate::error::Error;
-use crate::settings::Steps;
 use rayon::prelude::*;
-use splatstream_decoder::attribute::rotation_shift;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::GaussianFrame;
 
-/// The most bits of an axis that the syntax carries.
-const MAX_POSITION_BITS: u32 = 20;
-/// The largest magnitude of a log-scale, steps: the difference of two fits 16 bits on the coarsest layer's grid too.
-const MAX_LOG_SCALE: f32 = 16_000.0;
+/// Parts of a step in which attributes are kept before they are coded, so that they are rounded once.
+pub(crate) const PARTS: f32 = 64.0;
+
+/// The largest magnitude of a log-scale, finest steps: the difference of two fits 16 bits.
+pub(crate) const MAX_LOG_SCALE: f32 = 16_000.0;
 /// The same of an opacity.
-const MAX_OPACITY: f32 = 32_000.0;
-/// The largest magnitude of a position, scene units: with the largest step, 20 bits hold twice as much.
+pub(crate) const MAX_OPACITY: f32 = 32_000.0;
+/// The largest magnitude of a position, scene units: sums of two of them are finite, and so are the squares of what
+/// they become in steps.
 const MAX_POSITION: f32 = (1_u64 << 38) as f32;
+/// The largest magnitude of a coefficient of colour: more than a screen shows several times over. What is beyond is
+/// taken for this.
+pub(crate) const MAX_COLOUR: f32 = 16.0;
 
 /// The integers of a frame that are coded as they are: all but colour. In the order of the source.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Geometry {
-    /// Grid position.
+    /// Codes of positions.
     pub(crate) position: [Vec<u32>; 3],
-    /// Log-scales.
+    /// Log-scales, [`PARTS`] of a step.
     pub(crate) log_scale: [Vec<i32>; 3],
-    /// Opacity logit.
+    /// Opacity logit, parts of a step.
     pub(crate) opacity: Vec<i32>,
-    /// Quaternion x, y, z as coded: nearly round Gaussians on a coarser grid.
+    /// Quaternion x, y, z, parts of a step; none of a sphere.
     pub(crate) rotation: [Vec<i32>; 3],
 }
 
-/// Smallest and largest position on each axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Extent {
-    /// Smallest.
-    pub(crate) low: [f32; 3],
-    /// Largest.
-    pub(crate) high: [f32; 3],
+/// The codes of positions: points of a grid that is coarser far from its middle (clause 7.10).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PositionGrid {
+    offset: [f64; 3],
+    step: f64,
+    /// The code in the middle.
+    middle: f64,
+    last: f64,
+    /// Half the length of the linear part, and codes of a segment outside.
+    linear: f64,
+    segment: f64,
 }
 
-impl Extent {
-    /// Of no Gaussian at all.
-    pub(crate) const NONE: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
-
-    /// Grown to hold some Gaussians of a frame.
-    pub(crate) fn with(mut self, frame: &GaussianFrame, rows: &[u32]) -> Self {
-        for (axis, plane) in frame.position().iter().enumerate() {
-            for value in rows.iter().map(|&row| plane[row as usize]) {
-                self.low[axis] = self.low[axis].min(value);
-                self.high[axis] = self.high[axis].max(value);
-            }
+impl PositionGrid {
+    /// That of a sequence.
+    pub(crate) fn of(sequence: &SequenceParameters) -> Self {
+        let power = |exponent: u8| (1_u64 << exponent) as f64;
+        Self {
+            offset: sequence.position_offset().map(f64::from),
+            step: sequence.position_step().into(),
+            middle: power(sequence.position_bits - 1),
+            last: power(sequence.position_bits) - 1.0,
+            linear: power(sequence.linear_log2),
+            segment: power(sequence.segment_log2),
         }
-        self
     }
 
-    /// The two corners, if there is a Gaussian.
-    pub(crate) fn bounds(&self) -> Option<[[f32; 3]; 2]> {
-        (self.low[0] <= self.high[0]).then_some([self.low, self.high])
+    /// A coordinate as a code and the fraction to the next one.
+    pub(crate) fn steps(&self, axis: usize, value: f32) -> f32 {
+        self.exact(axis, value) as f32
     }
 
-    fn largest_side(&self) -> f32 {
-        let side = |axis: usize| (self.high[axis] - self.low[axis]).max(0.0);
-        side(0).max(side(1)).max(side(2))
+    fn exact(&self, axis: usize, value: f32) -> f64 {
+        let apart = (f64::from(value) - self.offset[axis]) / self.step - self.middle;
+        self.middle + compressed(apart.abs(), self.linear, self.segment).copysign(apart)
+    }
+
+    /// The code whose point is nearest to a coordinate.
+    pub(crate) fn code(&self, axis: usize, value: f32) -> u32 {
+        // The map is linear between two codes, so that the nearest code is that of the nearest point.
+        libm::rint(self.exact(axis, value)).clamp(0.0, self.last) as u32
+    }
+
+    /// Whether a coordinate is farther out than the last code, by more than half of the step there.
+    pub(crate) fn is_beyond(&self, axis: usize, value: f32) -> bool {
+        let code = self.exact(axis, value);
+        !(-0.5..=self.last + 0.5).contains(&code)
     }
 }
 
-/// The largest side of the box that holds the inner 98 % on each axis.
-pub(crate) fn inner_side(frame: &GaussianFrame) -> f32 {
-    let side = |plane: &Vec<f32>| {
-        let mut sorted = plane.clone();
-        sorted.sort_unstable_by(f32::total_cmp);
-        let at =
-            |percent: usize| sorted.get((sorted.len().max(1) - 1) * percent / 100).copied().unwrap_or(0.0);
-        at(99) - at(1)
-    };
-    frame.position().iter().map(side).fold(0.0, f32::max)
-}
-
-/// Offset, step and bits of the position grid.
-///
-/// The step is what was asked for unless the extent then needs more than 20 bits an axis.
-pub(crate) fn position_grid(extent: Extent, inner_side: f32, steps: &Steps) -> ([f32; 3], f32, u8) {
-    if extent.bounds().is_none() {
-        return ([0.0; 3], 1.0, 1);
+/// A distance from the middle of the grid, steps, in codes: as it is in the linear part, outside with steps that double
+/// from segment to segment.
+pub(crate) fn compressed(apart: f64, linear: f64, segment: f64) -> f64 {
+    if apart <= linear {
+        return apart;
     }
-    let side = extent.largest_side();
-    let cells = ((1_u32 << MAX_POSITION_BITS) - 1) as f32;
-    let asked = inner_side / libm::exp2f(steps.position_bits);
-    let least = (side / cells).max(f32::from_bits(88 << 23));
-    let step = asked.max(least).min(f32::from_bits(146 << 23));
-    let last = libm::rintf(side / step);
-    let bits =
-        (1..=MAX_POSITION_BITS).find(|&bits| last < (1_u32 << bits) as f32).unwrap_or(MAX_POSITION_BITS);
-    (extent.low, step, bits as u8)
+    // Segment k, from 1, begins at linear + segment (2^k - 2) and has steps of 2^k.
+    let scaled = (apart - linear) / segment + 2.0;
+    let k = libm::floor(libm::log2(scaled)).max(1.0);
+    let step = libm::exp2(k);
+    linear + segment * (k - 1.0) + (scaled - step) * segment / step
 }
 
 /// The nearest integer, ties to even, of a value below 2^22 in magnitude.
@@ -103,67 +104,47 @@ pub(crate) fn nearest_integer(value: f32) -> i32 {
     ((value + SHIFTER) - SHIFTER) as i32
 }
 
-/// Which Gaussians take only every second point of a grid.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Spacing(Option<Vec<bool>>);
-
-impl Spacing {
-    /// Every second point for the last `coarse` of `order`.
-    pub(crate) fn of_last(order: &[u32], coarse: usize) -> Self {
-        let mut doubled = vec![false; order.len()];
-        for &row in order.iter().rev().take(coarse) {
-            doubled[row as usize] = true;
-        }
-        Self(Some(doubled))
-    }
-
-    /// Whether a Gaussian takes every second point only.
-    pub(crate) fn is_coarse(&self, row: usize) -> bool {
-        self.0.as_ref().is_some_and(|doubled| doubled[row])
-    }
-
-    /// The nearest point that a Gaussian may take, in steps.
-    #[inline]
-    pub(crate) fn nearest(&self, row: usize, steps: f32) -> i32 {
-        match &self.0 {
-            Some(doubled) if doubled[row] => 2 * nearest_integer(0.5 * steps),
-            _ => nearest_integer(steps),
-        }
-    }
-}
-
 /// Rounds a canonical frame whose reach has been checked onto the grids.
-pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters, spacing: &Spacing) -> Geometry {
-    let last = ((1_u32 << sequence.position_bits) - 1) as f32;
-    let step = sequence.position_step();
+pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters) -> Geometry {
+    let grid = PositionGrid::of(sequence);
     let mut position = [const { Vec::new() }; 3];
     for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
-        let offset = sequence.position_offset()[axis];
-        *plane = values
-            .par_iter()
-            .map(|&value| nearest_integer(((value - offset) / step).clamp(0.0, last)) as u32)
-            .collect();
+        *plane = values.par_iter().map(|&value| grid.code(axis, value)).collect();
     }
-    let mut log_scale = [const { Vec::new() }; 3];
-    for (plane, values) in log_scale.iter_mut().zip(frame.log_scale()) {
-        *plane = rounded(values, sequence.log_scale_offset(), sequence.log_scale_step(), spacing);
-    }
+    let (offset, step) = (sequence.log_scale_offset(), sequence.log_scale_step());
+    let log_scale = frame.log_scale().each_ref().map(|plane| parts(plane, offset, step));
     let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
-    let opacity = rounded(frame.opacity_logit(), offset, step, &Spacing::default());
+    let opacity = parts(frame.opacity_logit(), offset, step);
     let [_, x, y, z] = frame.rotation();
-    let shifts = rotation_shifts(&log_scale, sequence);
-    let rotation = [x, y, z].map(|plane| rotation_plane(plane, &shifts, sequence.rotation_step(), spacing));
+    let rotation = [x, y, z].map(|plane| {
+        let mut turned = parts(plane, 0.0, sequence.rotation_step());
+        let [a, b, c] = frame.log_scale();
+        for (turned, ((a, b), c)) in turned.iter_mut().zip(a.iter().zip(b).zip(c)) {
+            // A sphere needs no rotation.
+            if a == b && b == c {
+                *turned = 0;
+            }
+        }
+        turned
+    });
     Geometry { position, log_scale, opacity, rotation }
 }
 
-/// Whether the values of some Gaussians of a source frame are such that every layer can carry them.
+/// Values in parts of a step. In reach they are below 2^21.
+fn parts(values: &[f32], offset: f32, step: f32) -> Vec<i32> {
+    let most = (1_u32 << 21) as f32;
+    let scale = PARTS / step;
+    values.par_iter().map(|&value| nearest_integer(((value - offset) * scale).clamp(-most, most))).collect()
+}
+
+/// Whether the values of some Gaussians of a source frame are such that a decoder can have them.
 ///
 /// # Errors
 /// The first value of an attribute that is too far out.
 pub(crate) fn check_reach(
     frame: &GaussianFrame,
     rows: &[u32],
-    steps: &Steps,
+    (log_scale_step, opacity_step): (f32, f32),
     number: u32,
 ) -> Result<(), Error> {
     let check = |attribute: &'static str, values: &[f32], step: f32, most: f32| {
@@ -180,67 +161,49 @@ pub(crate) fn check_reach(
         check("position", plane, 1.0, MAX_POSITION)?;
     }
     for plane in frame.log_scale() {
-        check("log_scale", plane, steps.log_scale, MAX_LOG_SCALE)?;
+        check("log_scale", plane, log_scale_step, MAX_LOG_SCALE)?;
     }
-    check("opacity", frame.opacity_logit(), steps.opacity, MAX_OPACITY)
-}
-
-fn rounded(values: &[f32], offset: f32, step: f32, spacing: &Spacing) -> Vec<i32> {
-    let nearest = |(row, &value): (usize, &f32)| spacing.nearest(row, (value - offset) / step);
-    values.par_iter().enumerate().map(nearest).collect()
-}
-
-/// For each Gaussian the bits left out of its rotation; none for a sphere, which needs no rotation.
-fn rotation_shifts(log_scale: &[Vec<i32>; 3], sequence: &SequenceParameters) -> Vec<Option<u32>> {
-    let [largest, middle, smallest] = log_scale;
-    largest
-        .iter()
-        .zip(middle)
-        .zip(smallest)
-        .map(|((&a, &b), &c)| {
-            let round = a == b && b == c;
-            (!round).then(|| rotation_shift(a - c, sequence.rotation_threshold))
-        })
-        .collect()
-}
-
-fn rotation_plane(values: &[f32], shifts: &[Option<u32>], step: f32, spacing: &Spacing) -> Vec<i32> {
-    values
-        .iter()
-        .zip(shifts)
-        .enumerate()
-        .map(|(row, (&value, shift))| match shift {
-            Some(shift) => spacing.nearest(row, value / (step * (1_u32 << shift) as f32)),
-            None => 0,
-        })
-        .collect()
+    check("opacity", frame.opacity_logit(), opacity_step, MAX_OPACITY)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Quality;
+    use proptest::prelude::*;
+    use splatstream_decoder::companding::Companding;
 
-    #[test]
-    fn the_grid_holds_the_extent_with_the_step_asked_for() {
-        let extent = Extent { low: [-1.0, 0.0, 2.0], high: [3.0, 1.0, 2.5] };
-        let (offset, step, bits) = position_grid(extent, 2.0, &Quality::High.steps());
-        // The sides of the box have 4 * 2^13.4 / 2 = 21,618 cells.
-        assert_eq!((offset, step, bits), ([-1.0, 0.0, 2.0], 2.0 / libm::exp2f(13.4), 15));
+    fn grid(position_bits: u8, linear_log2: u8, segment_log2: u8) -> (PositionGrid, Companding) {
+        let sequence = SequenceParameters {
+            position_bits,
+            linear_log2,
+            segment_log2,
+            position_step: 0.25_f32.to_bits(),
+            position_offset: [(-0.25 * (1_u32 << (position_bits - 1)) as f32).to_bits(); 3],
+            ..SequenceParameters::PLAIN
+        };
+        (PositionGrid::of(&sequence), Companding::new(&sequence))
     }
 
     #[test]
-    fn a_far_outlier_makes_the_step_coarser_and_no_more_bits() {
-        let extent = Extent { low: [0.0; 3], high: [1.0e6, 1.0, 1.0] };
-        let (_, step, bits) = position_grid(extent, 1.0, &Quality::High.steps());
-        assert_eq!(bits, 20);
-        assert!(step > 0.9 && 1.0e6 / step < (1 << 20) as f32);
+    fn every_code_comes_back_from_its_point() {
+        for (bits, linear, segment) in [(8, 7, 7), (8, 4, 4), (8, 4, 3), (6, 2, 1), (20, 15, 15), (1, 0, 0)] {
+            let (grid, companding) = grid(bits, linear, segment);
+            let middle = 1_i64 << (bits - 1);
+            for code in (0..1_u32 << bits).step_by(if bits > 8 { 997 } else { 1 }) {
+                let point = (companding.expand(code) - middle) as f32 * 0.25;
+                assert_eq!(grid.code(0, point), code, "{bits} {linear} {segment}");
+                assert!(!grid.is_beyond(0, point));
+            }
+        }
     }
 
-    #[test]
-    fn one_point_and_no_point_have_a_grid() {
-        let point = Extent { low: [5.0; 3], high: [5.0; 3] };
-        assert_eq!(position_grid(point, 0.0, &Quality::High.steps()).2, 1);
-        assert_eq!(position_grid(Extent::NONE, 0.0, &Quality::High.steps()).2, 1);
+    proptest! {
+        #[test]
+        fn the_nearest_point_is_taken(value in -3_000.0_f32..3_000.0) {
+            let (grid, companding) = grid(8, 4, 3);
+            let point = |code: u32| (companding.expand(code) - 128) as f32 * 0.25;
+            let nearest = (0..256).map(|code| (point(code) - value).abs()).fold(f32::INFINITY, f32::min);
+            prop_assert!((point(grid.code(0, value)) - value).abs() <= nearest * 1.0001);
+        }
     }
 }

@@ -1,19 +1,29 @@
 //! Which Gaussians come first.
 
-use crate::grid::Spacing;
 use crate::settings::{Importance, Preset, Settings};
 use splatstream_format::syntax::prefix_length;
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
-use splatstream_render::contribution::{contribution, worth};
+use splatstream_render::contribution::{Worth, worth};
 use splatstream_scene::{GaussianFrame, importance};
 
+/// The Gaussians of a frame, most important first, and what pictures show of them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ranked {
+    pub(crate) order: Vec<u32>,
+    /// [Energy](Worth::energy) by Gaussian; empty where no views were needed.
+    pub(crate) energy: Vec<f64>,
+}
+
 /// Orders the frames of a sequence, most important Gaussian first.
+#[derive(Clone)]
 pub(crate) struct Ranking {
     importance: Importance,
     /// Shares of the Gaussians at which what is kept is weighed again, percent; falling.
     rounds: Vec<u8>,
     cameras: Vec<Camera>,
+    /// Whether the settings say which these are.
+    are_given: bool,
     preset: Preset,
     /// The order of the first frame, if it was needed early.
     known_order: Option<Vec<u32>>,
@@ -23,7 +33,7 @@ impl Ranking {
     /// What the settings ask for. With one refinement there is nothing to rank.
     pub(crate) fn new(settings: &Settings) -> Self {
         let by_preset = match settings.preset {
-            Preset::Fast => Importance::Volume,
+            Preset::Fast => Importance::Contribution,
             Preset::Balanced | Preset::Small => Importance::Removal,
         };
         let importance = match settings.refinements.len() {
@@ -34,6 +44,7 @@ impl Ranking {
             importance,
             rounds: rounds(&settings.refinements, settings.preset),
             cameras: settings.cameras.clone(),
+            are_given: !settings.cameras.is_empty(),
             preset: settings.preset,
             known_order: None,
         }
@@ -44,46 +55,58 @@ impl Ranking {
         self.importance
     }
 
-    /// Which Gaussians may be coarser: those of the last refinement, if they come last because pictures hardly show
-    /// them.
-    pub(crate) fn spacing(&self, order: &[u32], settings: &Settings) -> Spacing {
-        let last_but_one = settings.refinements.iter().rev().nth(1);
-        match last_but_one {
-            Some(&percent) if settings.tools.coarse_tail && self.importance != Importance::Volume => {
-                let kept = prefix_length(percent, order.len() as u32) as usize;
-                Spacing::of_last(order, order.len() - kept)
-            }
-            _ => Spacing::default(),
+    /// The first frame, whose order [`Ranking::order`] will not find again.
+    pub(crate) fn rank_first(&mut self, frame: &GaussianFrame) -> Ranked {
+        let mut ranked = self.ranked(frame);
+        if ranked.energy.is_empty() && !self.rounds.is_empty() {
+            self.cameras(frame);
+            ranked.energy = energies(&worth(frame, &self.cameras));
         }
-    }
-
-    /// The order of the first frame, which [`Ranking::order`] will not compute again.
-    pub(crate) fn order_first(&mut self, frame: &GaussianFrame) -> Vec<u32> {
-        let order = self.order(frame);
-        self.known_order = Some(order.clone());
-        order
+        self.known_order = Some(ranked.order.clone());
+        ranked
     }
 
     /// The Gaussians of a frame, most important first.
     pub(crate) fn order(&mut self, frame: &GaussianFrame) -> Vec<u32> {
-        if let Some(order) = self.known_order.take() {
-            return order;
-        }
-        let volume = importance::opacity_volume(frame);
-        if self.importance == Importance::Volume {
-            return importance::order(&volume);
-        }
-        self.cameras(frame);
-        match self.importance {
-            Importance::Removal => self.eliminate(frame, &volume),
-            _ => ranked(&contribution(frame, &self.cameras), &volume, &all(frame)),
+        match self.known_order.take() {
+            Some(order) => order,
+            None => self.ranked(frame).order,
         }
     }
 
-    /// The cameras in use: those of the settings, or made for the first frame that they are asked for.
+    fn ranked(&mut self, frame: &GaussianFrame) -> Ranked {
+        let volume = importance::opacity_volume(frame);
+        if self.importance == Importance::Volume {
+            return Ranked { order: importance::order(&volume), energy: Vec::new() };
+        }
+        self.cameras(frame);
+        let shown = worth(frame, &self.cameras);
+        let order = match self.importance {
+            Importance::Removal => self.eliminate(frame, &volume, &shown),
+            _ => {
+                let given: Vec<f64> = shown.iter().map(|worth| worth.contribution).collect();
+                ranked(&given, &volume, &all(frame))
+            }
+        };
+        Ranked { order, energy: energies(&shown) }
+    }
+
+    /// A GOP begins: after a cut there is something else to see, from elsewhere. Views for which an order is known already
+    /// stay.
+    pub(crate) fn start_gop(&mut self) {
+        if !self.are_given && self.known_order.is_none() {
+            self.cameras.clear();
+        }
+    }
+
+    /// The cameras in use: those of the settings, or made for the first frame of a GOP that they are asked for.
     pub(crate) fn cameras(&mut self, frame: &GaussianFrame) -> &[Camera] {
         if self.cameras.is_empty() {
-            let (count, height) = if self.preset == Preset::Small { (24, 360) } else { (10, 270) };
+            let (count, height) = match self.preset {
+                Preset::Fast => (6, 180),
+                Preset::Balanced => (10, 270),
+                Preset::Small => (24, 360),
+            };
             self.cameras = spiral(frame, Up::default(), count, height);
         }
         &self.cameras
@@ -94,12 +117,15 @@ impl Ranking {
     /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
     /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what
     /// goes at the same time, the contribution alone none of how alike things look.
-    fn eliminate(&self, frame: &GaussianFrame, volume: &[f64]) -> Vec<u32> {
+    fn eliminate(&self, frame: &GaussianFrame, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
         let mut kept = all(frame);
         let mut gone: Vec<u32> = Vec::new();
         for &percent in &self.rounds {
-            let worth = worth(&frame.select(&kept), &self.cameras);
-            let scores: Vec<f64> = worth.iter().map(|w| (w.contribution * w.loss).sqrt()).collect();
+            let of_kept = match kept.len() == frame.len() {
+                true => whole.to_vec(),
+                false => worth(&frame.select(&kept), &self.cameras),
+            };
+            let scores: Vec<f64> = of_kept.iter().map(|w| (w.contribution * w.loss).sqrt()).collect();
             kept = ranked(&scores, volume, &kept);
             let going = kept.split_off(prefix_length(percent, frame.len() as u32) as usize);
             gone = going.into_iter().chain(gone).collect();
@@ -107,6 +133,10 @@ impl Ranking {
         kept.extend(gone);
         kept
     }
+}
+
+fn energies(shown: &[Worth]) -> Vec<f64> {
+    shown.iter().map(|worth| worth.energy).collect()
 }
 
 fn all(frame: &GaussianFrame) -> Vec<u32> {

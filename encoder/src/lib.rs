@@ -1,16 +1,17 @@
 //! The SplatStream encoder (informative: any stream that the specification accepts is a stream).
 //!
-//! Read it from the top: [`encode`](fn@encode) in [stream](mod@stream) looks at every frame once
-//! ([sequence](mod@sequence)), writes the beginning of the stream, its GOPs and its end ([writer](mod@writer)).
+//! Read it from the top: [`encode`](fn@encode) in [stream](mod@stream) finds steps for the quality or the size that is
+//! asked for ([target](mod@target)), looks at every frame once ([sequence](mod@sequence)), writes the beginning of the stream, its GOPs and its end ([writer](mod@writer)).
 //! [gop](mod@gop) goes from frame to frame: each GOP gets its colour transforms and codebooks
 //! ([gop_tools](mod@gop_tools)), each [frame](mod@frame) its units, and each unit its sections
 //! ([section](mod@section), [models](mod@models), [blocks](mod@blocks)). An I frame of one layer and a predicted frame
-//! take the same way. Prediction, contexts and reconstruction are the decoder's own functions. Same frames and
+//! take the same way. The result is decoded and looked at ([verification](mod@verification)). Prediction, contexts and reconstruction are the decoder's own functions. Same frames and
 //! settings, same bytes, on every machine and with any number of threads.
 
 mod allocation;
 mod blocks;
 pub mod canonical;
+mod checked;
 mod clusters;
 mod colour;
 mod entropy_cost;
@@ -20,27 +21,36 @@ mod gop;
 mod gop_tools;
 mod grid;
 mod importance;
+mod isolated;
+mod laws;
 mod matching;
 mod models;
 mod motion;
 mod parametric_fit;
 mod pca;
+mod reach;
 mod report;
+mod secant;
 mod section;
 mod sequence;
 mod settings;
+mod shape;
 mod source;
 mod stream;
+mod target;
 pub mod transformer;
+mod verification;
 mod vq;
 mod writer;
 
 pub use error::Error;
 pub use frame::learning::{nearer, samples, train_network};
-pub use report::{FrameReport, Report};
+pub use isolated::Isolated;
+pub use laws::Laws;
+pub use report::{Dropped, FrameReport, GopReport, PictureReport, Report, TargetReport, VerifiedFrame};
 pub use settings::{
     Anchor, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings,
-    ShChoice, Steps, Structure, Tools,
+    ShChoice, Size, Steps, Structure, Tools,
 };
 pub use source::FrameSource;
 pub use stream::{Progress, encode};

@@ -7,7 +7,7 @@ use crate::settings::{Preset, Tools};
 use core::slice;
 use rayon::prelude::*;
 use splatstream_decoder::block::CodedBlock;
-use splatstream_decoder::context::{self, DeltaNeighbours, Neighbours, is_serial};
+use splatstream_decoder::context::{self, is_serial};
 use splatstream_decoder::layout::{Attribute, PlaneInfo, Section, is_available};
 use splatstream_format::bits::BitWriter;
 use splatstream_format::entropy::frequencies::Frequencies;
@@ -37,17 +37,17 @@ pub(crate) fn unsigned_values<'a>(
 /// The contexts of a plane of one block under a model.
 pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u8> {
     if info.is_position() {
-        return context::delta_contexts(&model.axes, &block.deltas);
+        return context::delta_contexts(&model.axes, &block.deltas, block.segments());
     }
     let values = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-    context::plane_contexts(&model.axes, plane, block, values)
+    context::plane_contexts(&model.axes, plane, info, block, values)
 }
 
 /// The sources worth trying for a plane, the most promising first.
 fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
     use Source::{
         Anisotropy, GroupMagnitude, LargestLogScale, LogVolume, MiddleLogScale, NeighbourMagnitude,
-        NeighbourSum, Opacity, PositionSpacing, PreviousPlane,
+        NeighbourSum, Opacity, PositionSpacing, PreviousPlane, StepExponent,
     };
     if !tools.contexts {
         return Vec::new();
@@ -59,13 +59,15 @@ fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
         (_, Attribute::LogScale, 0) => &[NeighbourSum, PositionSpacing],
         (_, Attribute::LogScale, 1) => &[LargestLogScale, NeighbourSum],
         (_, Attribute::LogScale, _) => &[MiddleLogScale, NeighbourSum, PreviousPlane],
-        (_, Attribute::Opacity, _) => &[LogVolume, NeighbourSum, LargestLogScale],
-        (_, Attribute::Rotation, _) => &[NeighbourSum, GroupMagnitude, PreviousPlane, Anisotropy],
-        (_, Attribute::Dc, _) => &[NeighbourSum, GroupMagnitude, Opacity],
-        (_, Attribute::Sh, 0) => &[NeighbourMagnitude, Opacity, LargestLogScale],
-        (_, Attribute::Sh, _) => &[GroupMagnitude, Opacity, LargestLogScale],
+        (_, Attribute::Opacity, _) => &[StepExponent, LogVolume, NeighbourSum, LargestLogScale],
+        (_, Attribute::Rotation, _) => {
+            &[StepExponent, NeighbourSum, GroupMagnitude, PreviousPlane, Anisotropy]
+        }
+        (_, Attribute::Dc, _) => &[StepExponent, NeighbourSum, GroupMagnitude, Opacity],
+        (_, Attribute::Sh, 0) => &[StepExponent, NeighbourMagnitude, Opacity, LargestLogScale],
+        (_, Attribute::Sh, _) => &[GroupMagnitude, StepExponent, Opacity, LargestLogScale],
         (_, Attribute::Cell | Attribute::Mode, _) => &[NeighbourSum],
-        (_, Attribute::Stale | Attribute::Predictor, _) => &[NeighbourSum],
+        (_, Attribute::Stale | Attribute::Predictor | Attribute::MovePredictor, _) => &[NeighbourSum],
         (_, Attribute::Translation | Attribute::CellRotation, _) => &[NeighbourMagnitude, GroupMagnitude],
         (_, Attribute::Move, _) => &[NeighbourMagnitude, GroupMagnitude, NeighbourSum],
     };
@@ -76,25 +78,13 @@ fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {
 /// The values of a source for one block, serial or not.
 fn source_values(source: Source, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<i32> {
     if info.is_position() {
-        let mut neighbours = DeltaNeighbours::default();
-        let step = |&delta: &u64| {
-            let value = neighbours.value();
-            neighbours.push(delta);
-            value
-        };
-        return block.deltas.iter().map(step).collect();
+        return context::delta_values(&block.deltas, block.segments());
     }
     if is_serial(source) {
         let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-        let mut neighbours = Neighbours::default();
-        let step = |&value: &i32| {
-            let before = neighbours.value(source);
-            neighbours.push(value);
-            before
-        };
-        return coded.iter().map(step).collect();
+        return context::serial_values(source, coded, block.segments());
     }
-    context::values(source, plane, block).into_owned()
+    context::values(source, plane, info, block).into_owned()
 }
 
 /// Thresholds that cut the values in parts of about equal size.
@@ -154,7 +144,7 @@ impl PlaneView<'_> {
             thresholds: quantile_thresholds(values, parts),
         };
         let on_axis = |axis: &ContextAxis, values: &[i32]| -> Vec<u8> {
-            let lookup = AxisLookup::new(axis);
+            let lookup = AxisLookup::new(axis, 1);
             values.iter().map(|&value| lookup.context(value)).collect()
         };
         let values: Vec<Vec<i32>> = sources.iter().map(|&source| self.values(source)).collect();

@@ -7,6 +7,7 @@
 
 pub(crate) mod follow;
 mod listing;
+mod registration;
 mod rigid;
 pub(crate) mod stale;
 mod tree;

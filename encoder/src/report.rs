@@ -1,8 +1,10 @@
 //! What was written, what was chosen, and why.
 
+use crate::isolated::Isolated;
 use crate::sequence::Analysis;
 use crate::settings::{Importance, Settings, Steps};
 use splatstream_format::syntax::{FrameType, IncrementHeader};
+use splatstream_scene::Defect;
 
 /// What was written, what was chosen, and why.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,6 +17,8 @@ pub struct Report {
     pub gaussians: u64,
     /// Gaussians left out because they can never be seen.
     pub invisible: u64,
+    /// Values that were too far out, by attribute.
+    pub isolated: Vec<Isolated>,
     /// Level of the stream.
     pub level: u8,
     /// SH degree of the source and of the stream.
@@ -39,6 +43,14 @@ pub struct Report {
     pub digests: Vec<u64>,
     /// What each frame is made of.
     pub coded: Vec<FrameReport>,
+    /// The GOPs.
+    pub gops: Vec<GopReport>,
+    /// What pictures of the stream are worth; none if it was not verified.
+    pub pictures: Option<PictureReport>,
+    /// How the size or the quality that was asked for was found; none if none was.
+    pub target: Option<TargetReport>,
+    /// Gaussians left out because a value of theirs is not finite, by frame.
+    pub dropped: Vec<Dropped>,
 }
 
 impl Report {
@@ -57,6 +69,79 @@ impl Report {
             ..Self::default()
         }
     }
+}
+
+/// A GOP.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GopReport {
+    /// Display index of its first frame.
+    pub first: u32,
+    /// Its frames.
+    pub frames: u32,
+}
+
+/// Pictures of the finished stream beside those of the source, in views that nothing was chosen by.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PictureReport {
+    /// The frames that were looked at.
+    pub frames: Vec<VerifiedFrame>,
+    /// Views of each.
+    pub views: u32,
+    /// Rows of each picture.
+    pub height: u32,
+}
+
+/// A frame that was looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VerifiedFrame {
+    /// Display index.
+    pub number: u32,
+    /// How it is coded.
+    pub frame_type: FrameType,
+    /// Mean of the PSNR of its views, decibels; none if nothing can be seen in any of them.
+    pub psnr: Option<f64>,
+}
+
+impl PictureReport {
+    /// Mean PSNR of all frames that were looked at, decibels.
+    pub fn psnr(&self) -> Option<f64> {
+        self.mean(|_| true)
+    }
+
+    /// The same of frames of a type.
+    pub fn psnr_of(&self, frame_type: FrameType) -> Option<f64> {
+        self.mean(|frame| frame.frame_type == frame_type)
+    }
+
+    fn mean(&self, counts: impl Fn(&VerifiedFrame) -> bool) -> Option<f64> {
+        let values = self.frames.iter().filter(|frame| counts(frame)).filter_map(|frame| frame.psnr);
+        let (sum, count) = values.fold((0.0, 0), |(sum, count), decibels| (sum + decibels, count + 1));
+        (count > 0).then(|| sum / f64::from(count))
+    }
+}
+
+/// How a size or a quality that was asked for was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TargetReport {
+    /// The PSNR that the steps were fitted for at last, decibels.
+    pub fitted: f32,
+    /// Times that the sequence was encoded for it.
+    pub encodings: u32,
+    /// Times that a part of it was encoded.
+    pub trials: u32,
+}
+
+/// Gaussians of a frame that were left out because of values that no frame may hold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dropped {
+    /// The frame.
+    pub frame: u32,
+    /// Gaussians left out.
+    pub gaussians: u32,
+    /// The properties at fault by their PLY names, and the number of bad values of each.
+    pub properties: Vec<(String, u32)>,
+    /// One of the values.
+    pub first: Defect,
 }
 
 /// What a frame is made of.

@@ -1,13 +1,14 @@
 //! Codes a section: values to models and blocks.
 
-use crate::blocks::code_blocks;
+use crate::blocks::{code_blocks, lanes_log2};
 use crate::error::Error;
 use crate::models;
 use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
 use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::increment::values::SectionValues;
-use splatstream_decoder::layout::{Attribute, Layout, PlaneInfo, Section};
+use splatstream_decoder::layout::{Layout, PlaneInfo, Section};
+use splatstream_decoder::steps::StepRule;
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
 use splatstream_format::entropy::model::{PlaneModel, write_models};
 use splatstream_format::entropy::token::Alphabet;
@@ -31,19 +32,29 @@ pub(crate) struct SectionPlan {
 /// chosen at once.
 pub(crate) struct SectionDraft {
     layout: Layout,
+    lanes_log2: u8,
     blocks: Vec<CodedBlock>,
     own: Vec<PlaneModel>,
 }
 
 impl SectionDraft {
-    /// Divides values into blocks and chooses models for them.
-    pub(crate) fn new(layout: Layout, values: &SectionValues, biases: &[i32], plan: &SectionPlan) -> Self {
-        let blocks = blocks(&layout, values, biases, 1 << plan.block_log2);
+    /// Divides values into blocks and chooses models for them. `steps` are those of the unit.
+    pub(crate) fn new(
+        layout: Layout,
+        values: &SectionValues,
+        biases: &[i32],
+        steps: StepRule,
+        plan: &SectionPlan,
+    ) -> Self {
+        let size = 1 << plan.block_log2;
+        let lanes_log2 = lanes_log2(count(&layout, values).min(size));
+        let blocks =
+            blocks(&layout, values, biases, size, |deltas| CodedBlock::new(deltas, lanes_log2, steps));
         let own = match blocks.is_empty() {
             true => Vec::new(),
             false => models::choose_all(layout.planes(), &blocks, biases, plan.preset, plan.tools),
         };
-        Self { layout, blocks, own }
+        Self { layout, lanes_log2, blocks, own }
     }
 
     /// Codes the section, each plane with its own model or with the one in force, and puts its models in force.
@@ -86,9 +97,9 @@ impl SectionDraft {
         model: Vec<u8>,
         in_force: &mut ModelsInForce,
     ) -> Result<SectionBytes, Error> {
-        let (lanes_log2, blocks) = code_blocks(self.layout.planes(), &models, &self.blocks)?;
+        let blocks = code_blocks(self.layout.planes(), &models, &self.blocks, self.lanes_log2)?;
         in_force.replace(section, SectionModels { layout: self.layout.clone(), models });
-        Ok(SectionBytes { lanes_log2, model, blocks })
+        Ok(SectionBytes { lanes_log2: self.lanes_log2, model, blocks })
     }
 }
 
@@ -134,38 +145,36 @@ fn value_plane(layout: &Layout) -> usize {
     usize::from(layout.planes().first().is_some_and(PlaneInfo::is_position))
 }
 
-fn blocks(layout: &Layout, values: &SectionValues, biases: &[i32], size: usize) -> Vec<CodedBlock> {
-    let first = value_plane(layout);
-    let count = if first == 1 { values.deltas.len() } else { values.planes.first().map_or(0, Vec::len) };
+/// Values of a plane.
+fn count(layout: &Layout, values: &SectionValues) -> usize {
+    match value_plane(layout) {
+        0 => values.planes.first().map_or(0, Vec::len),
+        _ => values.deltas.len(),
+    }
+}
+
+/// Blocks of `size` values a plane; `empty` makes one without planes from its deltas.
+fn blocks(
+    layout: &Layout,
+    values: &SectionValues,
+    biases: &[i32],
+    size: usize,
+    empty: impl Fn(Vec<u64>) -> CodedBlock + Sync,
+) -> Vec<CodedBlock> {
+    let (first, count) = (value_plane(layout), count(layout, values));
     let starts: Vec<usize> = (0..count).step_by(size).collect();
     let of_start = |&start: &usize| {
         let end = count.min(start + size);
         let deltas = if first == 1 { values.deltas[start..end].to_vec() } else { vec![0; end - start] };
-        let mut block = CodedBlock::new(deltas);
+        let mut block = empty(deltas);
         for (plane, (&info, &bias)) in layout.planes().iter().zip(biases).enumerate() {
             let coded = match plane.checked_sub(first) {
                 Some(plane) => values.planes[plane][start..end].iter().map(|value| value - bias).collect(),
                 None => Vec::new(),
             };
-            keep_for_contexts(&mut block, info, &coded, bias);
-            block.push(info, coded);
+            block.push(info, coded, bias);
         }
         block
     };
     starts.par_iter().map(of_start).collect()
-}
-
-/// Clause 8.5: log-scales and opacity as contexts see them, without prediction or shift.
-fn keep_for_contexts(block: &mut CodedBlock, info: PlaneInfo, coded: &[i32], bias: i32) {
-    let index = usize::from(info.index);
-    let values = coded.iter().map(|value| value + bias);
-    match info.attribute {
-        Attribute::LogScale if index == 0 => block.log_scale[0] = values.collect(),
-        Attribute::LogScale => {
-            block.log_scale[index] =
-                block.log_scale[index - 1].iter().zip(values).map(|(a, v)| a - v).collect();
-        }
-        Attribute::Opacity => block.opacity = values.collect(),
-        _ => {}
-    }
 }

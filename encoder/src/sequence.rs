@@ -3,9 +3,13 @@
 use crate::canonical::{canonicalise, visible};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
-use crate::grid::{Extent, check_reach, inner_side, nearest_integer, position_grid};
+use crate::grid::{MAX_COLOUR, MAX_LOG_SCALE, MAX_OPACITY, check_reach, nearest_integer};
+use crate::laws::{FEATURE_SHIFT, finest};
+use crate::reach::{Core, Extent, Reach};
 use crate::settings::{Settings, Structure};
 use crate::source::FrameSource;
+use splatstream_decoder::attribute::ROTATION_RANGE;
+use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_format::Limits;
 use splatstream_format::syntax::{Profile, SequenceParameters};
 use splatstream_scene::{GaussianFrame, sh_coefficients};
@@ -37,8 +41,7 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
     if frames == 0 {
         return Err(Error::NoFrames);
     }
-    let mut extent = Extent::NONE;
-    let mut inner = 0.0_f32;
+    let mut scene = Scene::new();
     let mut largest = (0, 0);
     let mut degree = 0;
     let mut antialiased = false;
@@ -47,29 +50,33 @@ pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Resu
     for number in 0..frames {
         let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
         let shown = visible(&frame, settings.keep_invisible);
-        check_reach(&frame, &shown, &settings.steps, number)?;
+        check_reach(&frame, &shown, (settings.steps.log_scale, settings.steps.opacity), number)?;
         if shown.len() > largest.1 {
             largest = (number, shown.len());
         }
-        extent = extent.with(&frame, &shown);
+        scene.add(&frame, &shown);
         source_degree = source_degree.max(frame.sh_degree());
         degree = degree.max(needed_degree(&frame, settings.steps.sh));
         antialiased |= frame.antialiased();
         if number == 0 {
-            inner = inner_side(&frame);
             axes_trial = try_axes(&frame, &shown, settings);
         }
     }
     let degree = settings.sh_degree.unwrap_or(degree).min(source_degree);
-    let (offset, step, bits) = position_grid(extent, inner, &settings.steps);
     let [sorted, unsorted] = axes_trial;
     // A Gaussian that changes keeps the names of its axes, so that predicted frames are not sorted.
     let sorts = settings.tools.axis_sort && settings.profile() == Profile::Intra;
     let canonical_axes = sorts && sorted <= unsorted;
     let flags = SequenceParameters::flags(canonical_axes, antialiased, settings.whole_anchor());
-    let parameters = parameters(settings, frames, degree, flags, (offset, step, bits));
+    let parameters = scene.parameters(settings, frames, degree, flags);
     let level = level(&parameters, largest)?;
-    Ok(Analysis { parameters, level, source_sh_degree: source_degree, axes_trial, bounds: extent.bounds() })
+    Ok(Analysis {
+        parameters,
+        level,
+        source_sh_degree: source_degree,
+        axes_trial,
+        bounds: scene.extent.bounds(),
+    })
 }
 
 /// The lowest level for frames of which the largest has so many Gaussians.
@@ -122,12 +129,12 @@ fn check(settings: &Settings) -> Result<(), Error> {
     Ok(())
 }
 
-/// The highest band of which some coefficient does not round to 0.
+/// The highest band of which some coefficient may not round to 0; steps of large Gaussians are finer than the usual one.
 fn needed_degree(frame: &GaussianFrame, step: f32) -> u8 {
     let needed = |degree: &u8| {
         let planes = 3 * sh_coefficients(degree - 1)..3 * sh_coefficients(*degree);
         let bands = frame.sh().get(planes).unwrap_or_default();
-        bands.iter().flatten().any(|value| value.abs() > 0.5 * step)
+        bands.iter().flatten().any(|value| value.abs() > 0.25 * step)
     };
     (1..=frame.sh_degree()).rev().find(needed).unwrap_or(0)
 }
@@ -152,40 +159,107 @@ fn try_axes(frame: &GaussianFrame, shown: &[u32], settings: &Settings) -> [f64; 
     })
 }
 
-fn parameters(
-    settings: &Settings,
-    frames: u32,
-    sh_degree: u8,
-    sequence_flags: u8,
-    (offset, step, position_bits): ([f32; 3], f32, u8),
-) -> SequenceParameters {
-    let mut refinement_percent = [0; 10];
-    refinement_percent[..settings.refinements.len()].copy_from_slice(&settings.refinements);
-    let steps = &settings.steps;
-    SequenceParameters {
-        sh_degree,
-        spatial_layer_count: settings.spatial_layers,
-        temporal_layer_count: match settings.structure {
-            Structure::Intra => 1,
-            Structure::Predicted { layers } => layers,
-        },
-        refinement_count: settings.refinements.len() as u8,
-        refinement_percent,
-        position_bits,
-        block_log2: settings.block_log2,
-        sequence_flags,
-        rotation_threshold: [0; 3],
-        frame_count: frames,
-        ticks_per_second: settings.ticks.0,
-        ticks_per_frame: settings.ticks.1,
-        position_offset: offset.map(f32::to_bits),
-        position_step: step.to_bits(),
-        log_scale_offset: 0.0_f32.to_bits(),
-        log_scale_step: steps.log_scale.to_bits(),
-        rotation_step: steps.rotation.to_bits(),
-        opacity_offset: 0.0_f32.to_bits(),
-        opacity_step: steps.opacity.to_bits(),
-        dc_step: steps.dc.to_bits(),
-        sh_step: steps.sh.to_bits(),
+/// What the parameters of a sequence follow from.
+pub(crate) struct Scene {
+    extent: Extent,
+    cores: Vec<Core>,
+    /// Positions and squared opacities of some Gaussians of the first frame that has any.
+    sample: Vec<([f32; 3], f32)>,
+    /// Means of the largest log-scale and of the opacity in that frame.
+    means: [f32; 2],
+    /// Farthest values from them, and the largest colours: log-scale, opacity, dc, sh.
+    reach: [f32; 4],
+}
+
+impl Scene {
+    /// Of no frame.
+    pub(crate) fn new() -> Self {
+        Self { extent: Extent::NONE, cores: Vec::new(), sample: Vec::new(), means: [0.0; 2], reach: [0.0; 4] }
     }
+
+    /// Adds the Gaussians of a frame that can be seen.
+    pub(crate) fn add(&mut self, frame: &GaussianFrame, shown: &[u32]) {
+        if shown.is_empty() {
+            return;
+        }
+        if self.cores.is_empty() {
+            self.sample = Reach::sample(frame, shown);
+            self.means = means(frame, shown);
+        }
+        self.extent = self.extent.with(frame, shown);
+        self.cores.push(Core::of(frame, shown));
+        let farthest = |planes: &[&[f32]], from: f32| {
+            let values = planes.iter().flat_map(|plane| shown.iter().map(|&row| plane[row as usize]));
+            values.map(|value| (value - from).abs()).fold(0.0, f32::max)
+        };
+        let norm = |planes: &[&[f32]]| {
+            let square = |plane: &&[f32], row: u32| {
+                let value = plane[row as usize].clamp(-MAX_COLOUR, MAX_COLOUR);
+                value * value
+            };
+            let norms = shown.iter().map(|&row| planes.iter().map(|plane| square(plane, row)).sum::<f32>());
+            norms.fold(0.0, f32::max).sqrt()
+        };
+        let [scale, opacity] = self.means;
+        let reach = [
+            farthest(&frame.log_scale().each_ref().map(Vec::as_slice), scale),
+            farthest(&[frame.opacity_logit()], opacity),
+            norm(&frame.dc().each_ref().map(Vec::as_slice)),
+            norm(&frame.sh().iter().map(Vec::as_slice).collect::<Vec<_>>()),
+        ];
+        self.reach = [0, 1, 2, 3].map(|at: usize| self.reach[at].max(reach[at]));
+    }
+
+    /// The parameters of a sequence of so many frames.
+    pub(crate) fn parameters(
+        &self,
+        settings: &Settings,
+        frames: u32,
+        sh_degree: u8,
+        sequence_flags: u8,
+    ) -> SequenceParameters {
+        let mut refinement_percent = [0; 10];
+        refinement_percent[..settings.refinements.len()].copy_from_slice(&settings.refinements);
+        let steps = &settings.steps;
+        let [scale, opacity, dc, sh] = self.reach;
+        // What lies beside the mean of colours adds a little.
+        let colour = |step: f32, norm: f32| finest(step, 1.25 * norm, *COMPONENT_RANGE.end() as f32);
+        let mut parameters = SequenceParameters {
+            sh_degree,
+            spatial_layer_count: settings.spatial_layers,
+            temporal_layer_count: settings.temporal_layers().max(1),
+            refinement_count: settings.refinements.len() as u8,
+            refinement_percent,
+            block_log2: settings.block_log2,
+            sequence_flags,
+            feature_shift: FEATURE_SHIFT,
+            frame_count: frames,
+            ticks_per_second: settings.ticks.0,
+            ticks_per_frame: settings.ticks.1,
+            log_scale_offset: self.means[0].to_bits(),
+            log_scale_step: finest(steps.log_scale, scale, MAX_LOG_SCALE).to_bits(),
+            rotation_step: finest(steps.rotation, 1.0, *ROTATION_RANGE.end() as f32).to_bits(),
+            opacity_offset: self.means[1].to_bits(),
+            opacity_step: finest(steps.opacity, opacity, MAX_OPACITY).to_bits(),
+            dc_step: colour(steps.dc, dc).to_bits(),
+            sh_step: colour(steps.sh, sh).to_bits(),
+            ..SequenceParameters::PLAIN
+        };
+        let core = Core::of_all(&self.cores);
+        let side = self.cores.first().map_or(0.0, |core| 2.0 * core.half);
+        let reach = Reach { extent: self.extent, core, side, sample: self.sample.clone() };
+        reach.put_into(&mut parameters, steps);
+        settings.laws.put_into(&mut parameters);
+        parameters
+    }
+}
+
+/// Means of the largest log-scale and of the opacity, so that what is coded is near 0.
+fn means(frame: &GaussianFrame, shown: &[u32]) -> [f32; 2] {
+    let mean = |value: &dyn Fn(usize) -> f32| {
+        let sum: f64 = shown.iter().map(|&row| f64::from(value(row as usize))).sum();
+        (sum / shown.len().max(1) as f64) as f32
+    };
+    let [a, b, c] = frame.log_scale();
+    [mean(&|row| a[row].max(b[row]).max(c[row])), mean(&|row| frame.opacity_logit()[row])]
 }

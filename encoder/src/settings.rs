@@ -1,5 +1,6 @@
 //! What a user asks for: quality, effort, layers.
 
+use crate::laws::Laws;
 use crate::transformer::Architecture;
 use splatstream_decoder::predictor::Predictor;
 use splatstream_format::payload::{Network, SceneDescription};
@@ -18,24 +19,24 @@ pub enum Preset {
     Small,
 }
 
-/// How close the decoded scene is to the source.
+/// How close the pictures of the decoded scene are to those of the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quality {
-    /// Visible loss in still comparison.
+    /// Visible loss in still comparison: 40 dB.
     Low,
-    /// Loss visible side by side.
+    /// Loss visible side by side: 45 dB.
     Medium,
-    /// Loss hard to see.
+    /// Loss hard to see: 50 dB.
     #[default]
     High,
-    /// No visible loss.
+    /// No visible loss: 57 dB.
     VisuallyLossless,
 }
 
 /// Quantiser steps. Attributes in PLY's domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Steps {
-    /// The position step is the largest side of the box of the inner 98 % divided by 2 to this, 1 to 20.
+    /// The position step is the side of the box that most of the scene is in divided by 2 to this, 1 to 20.
     pub position_bits: f32,
     /// Step of the natural log of the semi-axes.
     pub log_scale: f32,
@@ -50,21 +51,34 @@ pub struct Steps {
 }
 
 impl Quality {
-    /// The steps of a quality: between those that fit real scenes best at 45, 50, 56 and 62 dB, see [`Settings::psnr`].
-    pub fn steps(self) -> Steps {
-        let steps = |position_bits, log_scale, rotation, opacity, dc, sh| Steps {
-            position_bits,
-            log_scale,
-            rotation,
-            opacity,
-            dc,
-            sh,
-        };
+    /// The PSNR of pictures that a quality stands for, decibels.
+    pub const fn decibels(self) -> f32 {
         match self {
-            Self::Low => steps(11.1, 0.31, 0.055, 0.46, 0.185, 0.22),
-            Self::Medium => steps(12.1, 0.2, 0.033, 0.26, 0.13, 0.125),
-            Self::High => steps(13.4, 0.12, 0.02, 0.14, 0.074, 0.08),
-            Self::VisuallyLossless => steps(15.1, 0.05, 0.009, 0.055, 0.032, 0.027),
+            Self::Low => 40.0,
+            Self::Medium => 45.0,
+            Self::High => 50.0,
+            Self::VisuallyLossless => 57.0,
+        }
+    }
+
+    /// Steps that give about this quality on an average scene: those from which a [fit](Settings::psnr) starts.
+    pub fn steps(self) -> Steps {
+        Steps::about(self.decibels())
+    }
+}
+
+impl Steps {
+    /// Steps that give about a PSNR on an average scene.
+    pub(crate) fn about(decibels: f32) -> Self {
+        // At 50 dB, between those that fit real scenes best.
+        let times = libm::exp2f((50.0 - decibels) / 6.02);
+        Self {
+            position_bits: (12.0 - libm::log2f(times)).clamp(1.0, 20.0),
+            log_scale: 0.2 * times,
+            rotation: 0.033 * times,
+            opacity: 0.26 * times,
+            dc: 0.13 * times,
+            sh: 0.125 * times,
         }
     }
 }
@@ -189,6 +203,15 @@ pub enum PredictorChoice {
     Difference,
 }
 
+/// How large a stream shall be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Size {
+    /// So many bits for each Gaussian that is coded, everything counted; above 0.
+    BitsPerGaussian(f64),
+    /// A stream of so many bytes.
+    Bytes(u64),
+}
+
 /// Tools that can be left out, to see what each is worth. Streams are valid with any of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tools {
@@ -200,9 +223,9 @@ pub struct Tools {
     pub sh_transform: bool,
     /// Plane models taken over from the refinement before; without it each refinement carries its own.
     pub table_reuse: bool,
-    /// Every second point of the grids only, for the scale, rotation and colour of the last refinement, where the
-    /// order goes by what pictures show.
-    pub coarse_tail: bool,
+    /// Steps that follow from the size, the opacity, the shape and the importance of a Gaussian, where they are fitted to
+    /// a PSNR; without it all Gaussians have the same.
+    pub adaptive_steps: bool,
     /// Predicted frames: cells that move what is in them; without it only residuals move Gaussians.
     pub cell_motion: bool,
     /// Predicted frames: Gaussians continue those of the reference; without it every Gaussian is new.
@@ -216,7 +239,7 @@ impl Default for Tools {
             axis_sort: true,
             sh_transform: true,
             table_reuse: true,
-            coarse_tail: true,
+            adaptive_steps: true,
             cell_motion: true,
             survivors: true,
         }
@@ -230,8 +253,18 @@ pub struct Settings {
     pub preset: Preset,
     /// Quantiser steps.
     pub steps: Steps,
-    /// Fit the steps to the first frame, so that renderings of it have this PSNR, decibels; 20 to 90.
+    /// How steps follow from what is known of a Gaussian.
+    pub laws: Laws,
+    /// Fit steps and laws to the first frame, so that pictures have this PSNR in views that nothing is chosen by,
+    /// decibels; 20 to 90.
     pub psnr: Option<f32>,
+    /// Fit the steps so that the stream has this size, to 3 %; `psnr` is not looked at then.
+    pub size: Option<Size>,
+    /// Decode some of the stream and compare its pictures with those of the source. Where `psnr` or `size` is given that
+    /// is done in any case.
+    pub verify: bool,
+    /// Leave out Gaussians with values that are not finite; otherwise they are an error.
+    pub drop_invalid: bool,
     /// Frames in a GOP.
     pub gop: u32,
     /// What the frames of a GOP refer to.
@@ -312,7 +345,11 @@ impl Default for Settings {
         Self {
             preset: Preset::default(),
             steps: Quality::default().steps(),
+            laws: Laws::default(),
             psnr: None,
+            size: None,
+            verify: false,
+            drop_invalid: false,
             gop: 16,
             structure: Structure::default(),
             anchor: Anchor::default(),

@@ -2,7 +2,7 @@
 
 use splatstream_scene::GaussianFrame;
 
-/// A sequence of frames, each read when it is needed. The encoder asks for every frame twice.
+/// A sequence of frames, each read when it is needed. The encoder asks for every frame twice, and for a few more often.
 pub trait FrameSource {
     /// Frames in the sequence.
     fn len(&self) -> u32;

@@ -20,10 +20,18 @@ pub(crate) fn entry_count(gaussians: usize, forced: bool) -> usize {
     (gaussians / 64).clamp(1, most)
 }
 
-/// Component planes as rows.
-pub(crate) fn rows(planes: &[Vec<f32>]) -> Vec<f32> {
-    let count = planes.first().map_or(0, Vec::len);
-    (0..count).flat_map(|index| planes.iter().map(move |plane| plane[index])).collect()
+/// The codebook indices of every row, one plane per stage: the nearest entry of the first codebook, then of each other
+/// that of what is left.
+pub(crate) fn stages(mut rows: Vec<f32>, rank: usize, codebooks: &[&Codebook]) -> Vec<Vec<i32>> {
+    let mut stage = |book: &&Codebook| {
+        let (indices, _) = assign(book, &rows, rank);
+        for (row, &index) in rows.chunks_exact_mut(rank.max(1)).zip(&indices) {
+            let entry = &book.entries[index as usize * rank..];
+            row.iter_mut().zip(entry).for_each(|(part, &value)| *part -= f32::from(value));
+        }
+        indices
+    };
+    codebooks.iter().map(&mut stage).collect()
 }
 
 /// Rows of even and of odd index.

@@ -1,13 +1,15 @@
 //! Units on their way out.
 
 use crate::error::Error;
+use crate::report::GopReport;
 use crate::sequence::Analysis;
+use crate::verification::Verifier;
 use splatstream_decoder::operating_point::Tally;
 use splatstream_format::payload::{Index, SceneDescription};
 use splatstream_format::syntax::{
     EndOfStream, GopHeader, IndexEntry, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
 };
-use splatstream_format::unit::{Unit, write_file_header};
+use splatstream_format::unit::{Unit, write_file_header, write_unit};
 use std::io::Write;
 
 /// Writes units, and keeps what the end of the stream says about them.
@@ -20,8 +22,21 @@ pub(crate) struct UnitWriter<'a> {
     units: u32,
     /// Where GOPs start.
     index: Vec<IndexEntry>,
+    /// The GOPs that have been started.
+    gops: Vec<GopReport>,
     /// What the units add to the operating points.
     tally: Tally,
+    verifier: Option<Verifier>,
+}
+
+/// What has been written.
+pub(crate) struct Written {
+    /// Bytes of the stream.
+    pub(crate) bytes: u64,
+    /// Its GOPs.
+    pub(crate) gops: Vec<GopReport>,
+    /// What was kept of it to be looked at.
+    pub(crate) verifier: Option<Verifier>,
 }
 
 impl<'a> UnitWriter<'a> {
@@ -33,14 +48,27 @@ impl<'a> UnitWriter<'a> {
             offset: 0,
             units: 0,
             index: Vec::new(),
+            gops: Vec::new(),
             tally: Tally::new(profile),
+            verifier: None,
         }
+    }
+
+    /// Shows everything that is written to a verifier too.
+    pub(crate) fn with(self, verifier: Option<Verifier>) -> Self {
+        Self { verifier, ..self }
     }
 
     /// What stands before the first GOP.
     pub(crate) fn start(&mut self, analysis: &Analysis, description: &SceneDescription) -> Result<(), Error> {
-        self.bytes(&write_file_header(self.profile, analysis.level)?)?;
-        self.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
+        let mut head = write_file_header(self.profile, analysis.level)?;
+        self.bytes(&head)?;
+        let (id, sequence) = (UnitId::stream(UnitType::SequenceParameters), self.sequence.to_bytes()?);
+        self.unit(id, &sequence)?;
+        if let Some(verifier) = &mut self.verifier {
+            write_unit(&mut head, id, &sequence)?;
+            verifier.head(&head);
+        }
         let description = SceneDescription { bounds: analysis.bounds, ..description.clone() };
         self.unit(UnitId::stream(UnitType::SceneDescription), &description.to_bytes()?)
     }
@@ -57,11 +85,18 @@ impl<'a> UnitWriter<'a> {
             self.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
         }
         self.index.push(IndexEntry { frame, reserved_zero: 0, offset: self.offset });
+        self.gops.push(GopReport { first: frame, frames: header.gop_frame_count });
+        if let Some(verifier) = &mut self.verifier {
+            verifier.start_gop(header, frame)?;
+        }
         self.unit(UnitId::of_frame(UnitType::GopHeader, frame), &header.to_bytes()?)
     }
 
     /// What stands after the last GOP.
-    pub(crate) fn finish(mut self) -> Result<u64, Error> {
+    pub(crate) fn finish(mut self) -> Result<Written, Error> {
+        if let Some(verifier) = &mut self.verifier {
+            verifier.end_gop()?;
+        }
         if self.profile == Profile::Dynamic {
             let points = self.tally.list().to_bytes()?;
             self.unit(UnitId::stream(UnitType::OperatingPoints), &points)?;
@@ -72,7 +107,7 @@ impl<'a> UnitWriter<'a> {
         let end =
             EndOfStream { frame_count: self.sequence.frame_count, unit_count: self.units, index_offset };
         self.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)?;
-        Ok(self.offset)
+        Ok(Written { bytes: self.offset, gops: self.gops, verifier: self.verifier })
     }
 
     /// Writes a unit.
@@ -80,6 +115,9 @@ impl<'a> UnitWriter<'a> {
         let header = UnitHeader::new(id, payload)?;
         self.units += 1;
         self.tally.unit(&Unit { at: 0, header, payload, payload_at: 0 });
+        if let Some(verifier) = &mut self.verifier {
+            verifier.unit(&header, payload)?;
+        }
         self.bytes(&header.to_bytes()?)?;
         self.bytes(payload)
     }

@@ -9,8 +9,8 @@ use crate::payload::{
 };
 use crate::syntax::{
     Camera, CodebookHeader, EndOfStream, FrameHeader, GopHeader, IncrementHeader, IndexEntry, MAX_ID,
-    MAX_LAYERS, OperatingPointEntry, Profile, SequenceParameters, TransformHeader, TransformKind, UnitId,
-    UnitType, after,
+    MAX_LAYERS, MAX_LINEAR_LOG2, OperatingPointEntry, Profile, SequenceParameters, TransformHeader,
+    TransformKind, UnitId, UnitType, after,
 };
 use crate::unit::{write_file_header, write_unit};
 use arbitrary::{Arbitrary, Result, Unstructured};
@@ -220,8 +220,12 @@ impl ArbitraryFrame {
 pub fn sequence_parameters(u: &mut Unstructured<'_>, profile: Profile) -> Result<SequenceParameters> {
     let refinement_count = u.int_in_range(1..=crate::syntax::MAX_REFINEMENTS)?;
     let layers = if profile == Profile::Intra { 1 } else { MAX_LAYERS };
-    let mut rotation_threshold: [u8; 3] = u.arbitrary()?;
-    rotation_threshold.sort_unstable_by(|a, b| b.cmp(a));
+    let position_bits = u.int_in_range(1..=20)?;
+    let (linear_log2, segment_log2) = companding(u, position_bits)?;
+    let mut weight = || Ok(if u.ratio(1_u8, 4_u8)? { u.int_in_range(0..=8191)? } else { 0 });
+    let size_weight = [weight()?, weight()?, weight()?, weight()?, weight()?];
+    let opacity_weight = [weight()?, weight()?, weight()?];
+    let anisotropy_weight = weight()?;
     let ticks_per_second: u32 = u.int_in_range(1..=u32::MAX)?;
     // Up to 100,000 frames in a second: the small frames made here stay within the rate of every level.
     let least_ticks = ticks_per_second.div_ceil(100_000);
@@ -233,10 +237,18 @@ pub fn sequence_parameters(u: &mut Unstructured<'_>, profile: Profile) -> Result
         temporal_layer_count: u.int_in_range(1..=layers)?,
         refinement_count,
         refinement_percent: percents(u, refinement_count)?,
-        position_bits: u.int_in_range(1..=20)?,
+        position_bits,
         block_log2: u.int_in_range(6..=16)?,
         sequence_flags: SequenceParameters::flags(u.arbitrary()?, u.arbitrary()?, whole_anchor),
-        rotation_threshold,
+        linear_log2,
+        segment_log2,
+        feature_shift: u.int_in_range(0..=7)?,
+        size_weight,
+        opacity_weight,
+        anisotropy_weight,
+        size_reference: u.int_in_range(-65_536..=65_535)?,
+        opacity_reference: u.int_in_range(-32_768..=32_767)?,
+        anisotropy_reference: u.int_in_range(0..=65_535)?,
         frame_count: 0,
         ticks_per_second,
         ticks_per_frame,
@@ -250,6 +262,19 @@ pub fn sequence_parameters(u: &mut Unstructured<'_>, profile: Profile) -> Result
         dc_step: step(u, MAX_STEP)?,
         sh_step: step(u, MAX_STEP)?,
     })
+}
+
+/// Any `linear_log2` and `segment_log2` that are accepted.
+fn companding(u: &mut Unstructured<'_>, position_bits: u8) -> Result<(u8, u8)> {
+    let half = 1_u32.wrapping_shl(u32::from(position_bits).saturating_sub(1));
+    let fits = |linear: u8, segment: u8| {
+        let outside = half.saturating_sub(1_u32.wrapping_shl(linear.into()));
+        outside.div_ceil(1_u32.wrapping_shl(segment.into())) <= 24
+    };
+    let linear: Vec<u8> = (0..=MAX_LINEAR_LOG2).filter(|&linear| fits(linear, linear)).collect();
+    let linear = *u.choose(&linear)?;
+    let segments: Vec<u8> = (0..=linear).filter(|&segment| fits(linear, segment)).collect();
+    Ok((linear, *u.choose(&segments)?))
 }
 
 /// Any transform of a kind that is accepted. A sequence of degree 0 has none of kind sh.

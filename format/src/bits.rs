@@ -6,13 +6,13 @@ use crate::{Error, ErrorKind, Result};
 ///
 /// Reading past the end gives zeros and is remembered: [`BitReader::finish`] reports it. So an inner loop
 /// needs no branch an error would take.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub struct BitReader<'a> {
-    rest: &'a [u8],
-    pending: u64,
-    pending_bits: u32,
-    consumed_bits: u64,
-    available_bits: u64,
+    bytes: &'a [u8],
+    /// The last eight bytes, or as many as there are, and where they start: what is read where fewer are left.
+    tail: (u64, usize),
+    /// Bits read so far.
+    position: u64,
 }
 
 impl<'a> BitReader<'a> {
@@ -21,46 +21,43 @@ impl<'a> BitReader<'a> {
 
     /// Starts at bit 0 of `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
-        let available_bits = u64::try_from(bytes.len()).unwrap_or(u64::MAX).saturating_mul(8);
-        Self { rest: bytes, pending: 0, pending_bits: 0, consumed_bits: 0, available_bits }
+        let start = bytes.len().saturating_sub(8);
+        let last = bytes.get(start..).unwrap_or_default();
+        let word = last.iter().rev().fold(0, |word: u64, &byte| word.wrapping_shl(8) | u64::from(byte));
+        Self { bytes, tail: (word, start), position: 0 }
     }
 
     /// Bits read so far, those past the end included.
-    pub fn position(&self) -> u64 {
-        self.consumed_bits
+    pub const fn position(&self) -> u64 {
+        self.position
     }
 
     /// Bits there are in all.
     pub fn available(&self) -> u64 {
-        self.available_bits
+        u64::try_from(self.bytes.len()).unwrap_or(u64::MAX).saturating_mul(8)
     }
 
     /// Descriptor u(n), n at most [`BitReader::MAX_BITS`].
     #[inline(always)]
     pub fn bits(&mut self, count: u32) -> u64 {
-        if self.pending_bits < count {
-            self.refill();
-        }
-        let value = self.pending & 1_u64.wrapping_shl(count).wrapping_sub(1);
-        self.pending = self.pending.wrapping_shr(count);
-        self.pending_bits = self.pending_bits.wrapping_sub(count);
-        self.consumed_bits = self.consumed_bits.wrapping_add(u64::from(count));
-        value
+        // Eight bytes from the one in which the bits start: they hold 57 bits or more of what is to come.
+        let start = usize::try_from(self.position >> 3).unwrap_or(usize::MAX);
+        let rest = self.bytes.get(start..).unwrap_or_default();
+        let word = match rest.first_chunk::<8>() {
+            Some(bytes) => u64::from_le_bytes(*bytes),
+            None => self.last_bytes(start),
+        };
+        let bit = u32::try_from(self.position & 7).unwrap_or(0);
+        let value = word.wrapping_shr(bit);
+        self.position = self.position.wrapping_add(count.into());
+        value & 1_u64.wrapping_shl(count).wrapping_sub(1)
     }
 
-    /// Tops the pending bits up to at least [`BitReader::MAX_BITS`]; past the end with zeros.
-    fn refill(&mut self) {
-        while self.pending_bits < Self::MAX_BITS {
-            let byte = match self.rest.split_first() {
-                Some((&first, rest)) => {
-                    self.rest = rest;
-                    first
-                }
-                None => 0,
-            };
-            self.pending |= u64::from(byte).wrapping_shl(self.pending_bits);
-            self.pending_bits = self.pending_bits.wrapping_add(8);
-        }
+    /// What is left from a byte on, fewer than eight bytes, followed by zeros.
+    fn last_bytes(&self, start: usize) -> u64 {
+        let (word, first) = self.tail;
+        let bits = u32::try_from(start.saturating_sub(first).saturating_mul(8)).unwrap_or(u32::MAX);
+        word.checked_shr(bits).unwrap_or(0)
     }
 
     /// A small u(n) as a `u8`, n at most 8.
@@ -91,7 +88,7 @@ impl<'a> BitReader<'a> {
 
     /// True once more bits were asked for than there are.
     pub fn overran(&self) -> bool {
-        self.consumed_bits > self.available_bits
+        self.position > self.available()
     }
 
     /// Checks that what is left is padding: fewer than eight bits, all zero.
@@ -100,11 +97,11 @@ impl<'a> BitReader<'a> {
     /// Malformed: the bits ran out, whole bytes are left, or the padding is not zero. `at` is the absolute
     /// offset of the section's first byte.
     pub fn finish(mut self, at: u64, element: &'static str, clause: &'static str) -> Result<()> {
-        let end = at.wrapping_add(self.consumed_bits.min(self.available_bits) / 8);
+        let end = at.wrapping_add(self.position.min(self.available()) / 8);
         if self.overran() {
             return Err(Error::new(end, clause, ErrorKind::ShortSection { element }));
         }
-        let left = self.available_bits.wrapping_sub(self.consumed_bits);
+        let left = self.available().wrapping_sub(self.position);
         if left >= 8 {
             return Err(Error::new(end, clause, ErrorKind::TrailingBytes { element, bytes: left / 8 }));
         }

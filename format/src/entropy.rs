@@ -6,6 +6,7 @@
 
 pub mod frequencies;
 pub mod in_force;
+pub mod lanes;
 pub mod layout;
 pub mod model;
 pub mod parametric;

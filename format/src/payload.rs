@@ -54,7 +54,7 @@ const fn row(
 }
 
 /// The rows after the fixed part of the records, in the order of clause 5.
-pub const VARIABLE_ROWS: [VariableRow; 41] = [
+pub const VARIABLE_ROWS: [VariableRow; 42] = [
     row("5.6", "frame_header", "carried_digest", "u64", "digest of the carried lists"),
     row("5.6", "frame_header", "cell_count", "leb128", "cells that move or are stale"),
     row("5.6", "frame_header", "cell_log2", "u8", "log2 of the side of a cell in grid steps"),
@@ -83,7 +83,7 @@ pub const VARIABLE_ROWS: [VariableRow; 41] = [
     row("5.14", "increment", "remove_count", "leb128", "parents that are removed"),
     row("5.14", "increment", "new_count", "leb128", "Gaussians that the unit adds"),
     row("5.14", "increment", "position_shift", "u8", "low bits of positions that are not coded"),
-    row("5.14", "increment", "attribute_shift", "u8[5]", "low bits not coded of the other attributes"),
+    row("5.14", "increment", "attribute_step", "u8[5]", "exponents of the steps of the other attributes"),
     row(
         "5.14",
         "increment",
@@ -111,6 +111,7 @@ pub const VARIABLE_ROWS: [VariableRow; 41] = [
         "i8",
         "added to opacities of an incomplete frame, steps",
     ),
+    row("5.14", "increment", "move_block_log2", "u8", "log2 of the moves that share a predictor"),
     row("5.14", "increment", "sections", "section[...]", "sections with a count above 0"),
     row("5.15", "section", "lanes_log2", "u8", "log2 of the entropy states of a block, 0 to 5"),
     row("5.15", "section", "model_length", "leb128", "bytes of models"),

@@ -28,12 +28,14 @@ pub use end::EndOfStream;
 pub use file_header::{FileHeader, Profile, SIGNATURE};
 pub use frame_header::{FrameHeader, FrameType, NO_TRANSFORM};
 pub use gop_header::{FrameRole, GopHeader};
-pub use increment::{IncrementHeader, ListSizes, MAX_NEIGHBOURS, NO_PREDICTOR};
+pub use increment::{IncrementHeader, ListSizes, MAX_ATTRIBUTE_STEP, MAX_NEIGHBOURS, NO_PREDICTOR};
 pub use index::{IndexEntry, IndexHeader};
 pub use operating_points::{OperatingPointEntry, OperatingPointsHeader};
 pub(crate) use scene_description::in_range;
 pub use scene_description::{Camera, SceneDescriptionHeader};
-pub use sequence_parameters::{MAX_LAYERS, MAX_REFINEMENTS, SequenceParameters, prefix_length};
+pub use sequence_parameters::{
+    MAX_LAYERS, MAX_LINEAR_LOG2, MAX_REFINEMENTS, SequenceParameters, prefix_length,
+};
 pub use sh_header::{NO_CODEBOOK, ShHeader, ShMode};
 pub use transform::{TransformHeader, TransformKind};
 pub use unit_header::{ErrorScope, UnitHeader, UnitId, UnitType};

@@ -41,7 +41,7 @@ fn a_broken_file_header_is_refused() {
         (true, case(0, |b| b[8] = 2, "RESERVED", "6.2", 8)),
         (true, case(0, |b| b[8] = 1, "RESERVED", "6.2", 8)),
         (true, case(0, |b| put(b, 8, [129, 0, 1, 9]), "RESERVED", "6.2", 8)),
-        (true, case(0, |b| b[9] = 2, "RESERVED", "6.2", 9)),
+        (true, case(0, |b| b[9] = 1, "RESERVED", "6.2", 9)),
         (true, case(0, |b| put(b, 10, [2, 9]), "RESERVED", "6.2", 10)),
         // Profile 1 is known, so that the level is looked at.
         (true, case(0, |b| put(b, 10, [1, 9]), "RESERVED", "6.2", 11)),

@@ -24,7 +24,7 @@ fn assert_refused_of(profile: Profile, units: &Units, cases: &[Case]) {
     }
 }
 
-// covers: SS-ER-001, SS-SP-001, SS-SP-002, SS-SP-003, SS-SP-004
+// covers: SS-ER-001, SS-SP-001, SS-SP-003, SS-SP-004
 #[test]
 fn broken_sequence_parameters_are_refused() {
     const NAN: [u8; 4] = f32::NAN.to_le_bytes();
@@ -50,20 +50,29 @@ fn broken_sequence_parameters_are_refused() {
         // whole_anchor, in profile Intra.
         case(SEQUENCE, |p| p[16] = 4, "RESERVED_BITS", "6.4", 16),
         case(SEQUENCE, |p| p[16] = 8, "RESERVED_BITS", "6.4", 16),
-        case(SEQUENCE, |p| p[18] = 31, "OUT_OF_RANGE", "6.4", 18),
-        case(SEQUENCE, |p| p[19] = 21, "OUT_OF_RANGE", "6.4", 19),
-        case(SEQUENCE, |p| put(p, 24, [0; 4]), "OUT_OF_RANGE", "6.4", 24),
-        case(SEQUENCE, |p| put(p, 32, NAN), "CONSTRAINT", "6.4", 32),
-        case(SEQUENCE, |p| put(p, 36, INFINITE), "CONSTRAINT", "6.4", 36),
-        case(SEQUENCE, |p| put(p, 40, (-1.1e12_f32).to_le_bytes()), "CONSTRAINT", "6.4", 40),
-        case(SEQUENCE, |p| put(p, 44, [0; 4]), "CONSTRAINT", "6.4", 44),
-        case(SEQUENCE, |p| put(p, 48, NAN), "CONSTRAINT", "6.4", 48),
-        case(SEQUENCE, |p| put(p, 52, (-0.5_f32).to_le_bytes()), "CONSTRAINT", "6.4", 52),
-        case(SEQUENCE, |p| put(p, 56, 1.01_f32.to_le_bytes()), "CONSTRAINT", "6.4", 56),
-        case(SEQUENCE, |p| put(p, 60, INFINITE), "CONSTRAINT", "6.4", 60),
-        case(SEQUENCE, |p| put(p, 64, 1.1e6_f32.to_le_bytes()), "CONSTRAINT", "6.4", 64),
-        case(SEQUENCE, |p| put(p, 68, 9e-13_f32.to_le_bytes()), "CONSTRAINT", "6.4", 68),
-        case(SEQUENCE, |p| put(p, 72, NAN), "CONSTRAINT", "6.4", 72),
+        case(SEQUENCE, |p| p[17] = 21, "OUT_OF_RANGE", "6.4", 17),
+        case(SEQUENCE, |p| p[18] = 15, "OUT_OF_RANGE", "6.4", 18),
+        // 32 segments on a side.
+        case(SEQUENCE, |p| p[18] = 9, "CONSTRAINT", "6.4", 18),
+        case(SEQUENCE, |p| p[19] = 8, "OUT_OF_RANGE", "6.4", 19),
+        case(SEQUENCE, |p| put(p, 28, [0, 32]), "OUT_OF_RANGE", "6.4", 28),
+        case(SEQUENCE, |p| put(p, 34, [0, 32]), "OUT_OF_RANGE", "6.4", 34),
+        case(SEQUENCE, |p| put(p, 36, [0, 32]), "OUT_OF_RANGE", "6.4", 36),
+        case(SEQUENCE, |p| put(p, 38, 65_536_i32.to_le_bytes()), "OUT_OF_RANGE", "6.4", 38),
+        case(SEQUENCE, |p| put(p, 42, 32_768_i32.to_le_bytes()), "OUT_OF_RANGE", "6.4", 42),
+        case(SEQUENCE, |p| put(p, 46, (-1_i32).to_le_bytes()), "OUT_OF_RANGE", "6.4", 46),
+        case(SEQUENCE, |p| put(p, 54, [0; 4]), "OUT_OF_RANGE", "6.4", 54),
+        case(SEQUENCE, |p| put(p, 62, NAN), "CONSTRAINT", "6.4", 62),
+        case(SEQUENCE, |p| put(p, 66, INFINITE), "CONSTRAINT", "6.4", 66),
+        case(SEQUENCE, |p| put(p, 70, (-1.1e12_f32).to_le_bytes()), "CONSTRAINT", "6.4", 70),
+        case(SEQUENCE, |p| put(p, 74, [0; 4]), "CONSTRAINT", "6.4", 74),
+        case(SEQUENCE, |p| put(p, 78, NAN), "CONSTRAINT", "6.4", 78),
+        case(SEQUENCE, |p| put(p, 82, (-0.5_f32).to_le_bytes()), "CONSTRAINT", "6.4", 82),
+        case(SEQUENCE, |p| put(p, 86, 1.01_f32.to_le_bytes()), "CONSTRAINT", "6.4", 86),
+        case(SEQUENCE, |p| put(p, 90, INFINITE), "CONSTRAINT", "6.4", 90),
+        case(SEQUENCE, |p| put(p, 94, 1.1e6_f32.to_le_bytes()), "CONSTRAINT", "6.4", 94),
+        case(SEQUENCE, |p| put(p, 98, 9e-13_f32.to_le_bytes()), "CONSTRAINT", "6.4", 98),
+        case(SEQUENCE, |p| put(p, 102, NAN), "CONSTRAINT", "6.4", 102),
         // The first broken element in the order of the table counts.
         case(SEQUENCE, |p| put(p, 14, [0, 0]), "OUT_OF_RANGE", "6.4", 14),
     ]);
@@ -75,12 +84,12 @@ fn the_ends_of_the_ranges_are_accepted() {
     let mut units = sample::units();
     let payload = &mut units[SEQUENCE].1;
     let (smallest, largest) = (2_f32.powi(-40).to_le_bytes(), 2_f32.powi(20).to_le_bytes());
-    put(payload, 32, 2_f32.powi(40).to_le_bytes());
-    put(payload, 36, (-2_f32.powi(40)).to_le_bytes());
-    put(payload, 40, (-0.0_f32).to_le_bytes());
-    put(payload, 44, smallest);
-    put(payload, 52, largest);
-    put(payload, 56, 1_f32.to_le_bytes());
+    put(payload, 62, 2_f32.powi(40).to_le_bytes());
+    put(payload, 66, (-2_f32.powi(40)).to_le_bytes());
+    put(payload, 70, (-0.0_f32).to_le_bytes());
+    put(payload, 74, smallest);
+    put(payload, 82, largest);
+    put(payload, 86, 1_f32.to_le_bytes());
     assert_eq!(sample::verdict(&sample::stream(&units)), None);
 }
 
@@ -172,16 +181,18 @@ fn double(index: &mut Vec<u8>, change: fn(&mut [u8])) {
 // covers: SS-IN-008, SS-IN-010, SS-IN-002, SS-IN-001, SS-IN-003, SS-IN-004, SS-IN-009
 #[test]
 fn broken_increments_are_refused() {
-    // Flags, digest, new_count at 10, shifts at 11 and 12, sh at 17 to 19, compensation at 20, the section at 22.
+    // Flags, digest, new_count at 10, position_shift at 11, steps at 12, sh at 17 to 19, compensation at 20, the section at 22.
     assert_payloads_refused(&[
-        case(INCREMENT, |p| p[1] |= 4, "RESERVED_BITS", "6.14", 0),
+        case(INCREMENT, |p| p[1] |= 16, "RESERVED_BITS", "6.14", 0),
+        case(INCREMENT, |p| p[1] |= 4, "RESERVED", "6.14", 0),
+        case(INCREMENT, |p| p[1] |= 8, "RESERVED", "6.14", 0),
         case(INCREMENT, |p| p[1] |= 128, "RESERVED_BITS", "6.14", 0),
         case(INCREMENT, |p| p[0] |= 128, "RESERVED", "6.14", 0),
         case(INCREMENT, |p| p[10] = 0, "OUT_OF_RANGE", "6.14", 10),
         case(INCREMENT, |p| drop(p.splice(10..11, [0xE4, 0])), "NUMBER", "5.14", 10),
         case(INCREMENT, |p| drop(p.splice(10..11, [0x80, 0x80, 0x80, 0x80, 16])), "NUMBER", "5.14", 10),
         case(INCREMENT, |p| p[11] = 16, "OUT_OF_RANGE", "6.14", 11),
-        case(INCREMENT, |p| p[16] = 8, "OUT_OF_RANGE", "6.14", 16),
+        case(INCREMENT, |p| p[16] = 25, "OUT_OF_RANGE", "6.14", 16),
         case(INCREMENT, |p| p[17] = 0, "OUT_OF_RANGE", "6.14", 17),
         case(INCREMENT, |p| p[17] = 3, "RESERVED", "6.14", 17),
         case(INCREMENT, |p| p[18] = 0, "OUT_OF_RANGE", "6.14", 18),
@@ -199,7 +210,9 @@ fn broken_increments_are_refused() {
     ]);
     let units = sample::units();
     let predicted = case(INCREMENT, |p| put(p, 0, [128, 0]), "CONSTRAINT", "6.14", 0);
-    assert_refused_of(Profile::Dynamic, &units, &[predicted]);
+    let moved = case(INCREMENT, |p| put(p, 0, [0, 4]), "CONSTRAINT", "6.14", 0);
+    let extrapolated = case(INCREMENT, |p| put(p, 0, [0, 8]), "CONSTRAINT", "6.14", 0);
+    assert_refused_of(Profile::Dynamic, &units, &[predicted, moved, extrapolated]);
 }
 
 // covers: SS-FR-007
@@ -333,7 +346,7 @@ fn broken_weights_are_refused() {
 fn a_payload_that_is_too_long_or_too_short_is_refused() {
     // The last element of each payload: its name is in the error, its first byte is the offset.
     let last = [
-        (SEQUENCE, "5.4", 72),
+        (SEQUENCE, "5.4", 102),
         (SCENE, "5.9", 51),
         (GOP, "5.5", 10),
         (DC, "5.7", 16),

@@ -36,11 +36,11 @@ fn codes_are_shown_with_what_they_stand_for() {
     assert_eq!(one("transform", "mean"), "3 values, -1 to 1999; 9 values, -1 to 7999");
     assert_eq!(one("codebook", "entries"), "4 values, -128 to 127");
     assert_eq!(one("frame_header", "frame_type"), "0 (I)");
-    let present = "880 (has_new, has_position_shift, has_attribute_shift, has_sh, has_compensation)";
+    let present = "880 (has_new, has_position_shift, has_attribute_step, has_sh, has_compensation)";
     assert_eq!(one("increment", "increment_flags"), present);
     assert_eq!(one("increment", "refinement_digest"), "0x0123456789abcdef");
     assert_eq!(one("increment", "new_count"), "100");
-    assert_eq!(one("increment", "attribute_shift"), "[1, 2, 3, 4, 7]");
+    assert_eq!(one("increment", "attribute_step"), "[1, 2, 3, 4, 24]");
     assert_eq!(one("increment", "sh_mode"), "2 (vector quantised)");
     assert_eq!(one("increment", "codebook_ids"), "[7]");
     assert_eq!(one("increment", "compensation_log_scale"), "-1");

@@ -81,7 +81,7 @@ fn rows_and_sizes_agree() {
     let expected: [(&str, usize); 17] = [
         ("file_header", 16),
         ("unit_header", 20),
-        ("sequence_parameters", 76),
+        ("sequence_parameters", 106),
         ("gop_header", 12),
         ("frame_header", 8),
         ("transform", 4),

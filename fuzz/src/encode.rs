@@ -96,7 +96,7 @@ fn tools(u: &mut Unstructured<'_>) -> Result<Tools> {
         axis_sort: u.arbitrary()?,
         sh_transform: u.arbitrary()?,
         table_reuse: u.arbitrary()?,
-        coarse_tail: u.arbitrary()?,
+        adaptive_steps: u.arbitrary()?,
         cell_motion: u.arbitrary()?,
         survivors: u.arbitrary()?,
     })

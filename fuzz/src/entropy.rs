@@ -3,7 +3,7 @@
 use arbitrary::{Result, Unstructured};
 use splatstream_format::entropy::frequencies::Frequencies;
 use splatstream_format::entropy::model::{ContextAxis, PlaneModel, Source, read_models, write_models};
-use splatstream_format::entropy::reader::{BlockReader, PlaneDecoder};
+use splatstream_format::entropy::reader::{BlockReader, KnownContexts, PlaneDecoder};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 
@@ -135,19 +135,20 @@ fn decoded(planes: &[Plane], block: &[u8], lanes_log2: u8) -> Option<Vec<Vec<u64
 
 fn read(reader: &mut BlockReader<'_>, plane: &Plane) -> Vec<u64> {
     let decoder = PlaneDecoder::new(&plane.model);
+    let mut contexts = KnownContexts(&plane.contexts);
     let mut values = vec![0_i32; plane.contexts.len()];
     match plane.alphabet {
         Alphabet::Attribute => {
-            reader.signed(&decoder, &plane.contexts, &mut values);
+            reader.signed(&decoder, &mut contexts, &mut values);
             values.into_iter().map(|value| zigzag(value).into()).collect()
         }
         Alphabet::Index => {
-            reader.indices(&decoder, &plane.contexts, &mut values);
+            reader.indices(&decoder, &mut contexts, &mut values);
             values.into_iter().map(|value| u64::from(value.cast_unsigned())).collect()
         }
         Alphabet::Position => {
             let mut deltas = vec![0; plane.contexts.len()];
-            reader.deltas(&decoder, |index, _| plane.contexts[index], &mut deltas);
+            reader.deltas(&decoder, &mut contexts, &mut deltas);
             deltas
         }
     }

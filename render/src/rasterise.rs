@@ -34,7 +34,8 @@ pub struct Rendering {
 /// Draws a frame over one colour, with the compensation of the low-pass filter if the frame was made for it. The
 /// picture is the same with any number of threads and on every machine.
 ///
-/// Gaussians nearer than 0.01 in front of the camera, or with a projection that is not finite, are left out.
+/// Gaussians nearer to the camera than 1/256 of the mean depth of the scene in front of it, or with a projection that is
+/// not finite, are left out.
 /// Gaussians at one depth are drawn in the order of the frame.
 pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> Rendering {
     draw(frame, camera, background, pulp::Arch::new())

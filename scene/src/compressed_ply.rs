@@ -50,6 +50,11 @@ const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", 
 /// A header that is not understood, missing elements or properties (all are named), fewer chunks than the
 /// vertices need, more than `limits` allow, or a value that no frame may hold.
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    read_as_is(bytes, limits)?.checked()
+}
+
+/// As [`read`], with values as they are: none is checked.
+pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     limits.bytes(bytes.len() as u64)?;
     let header = parse_header(bytes)?;
     let layout = Layout::of(&header, limits)?;
@@ -69,7 +74,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
     let mut planes = unpack(&ranges, &words);
     planes.sh = planes_of_rest(layout.sh_degree, rest);
     planes.sh.iter_mut().flatten().for_each(|value| *value = sh_of_byte(*value));
-    GaussianFrame::from_read(layout.sh_degree, planes)
+    GaussianFrame::from_file(layout.sh_degree, planes)
 }
 
 /// Which properties a file has, of those that may be absent.

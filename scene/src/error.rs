@@ -4,7 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::frame::{Defect, FrameError};
+use crate::defect::Defect;
+use crate::frame::FrameError;
 
 /// Why a scene could not be read or written: which file where known, where in it, what, and what to do.
 #[derive(Debug, thiserror::Error)]

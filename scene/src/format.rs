@@ -48,17 +48,27 @@ pub fn detect(path: &Path) -> Result<SceneFormat, SceneError> {
 /// # Errors
 /// Those of [`detect`] and of the format's reader, with the path.
 pub fn read_scene(path: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    let checked = read_scene_as_is(path, limits)?.checked();
+    checked.map_err(|error| error.in_file(path))
+}
+
+/// As [`read_scene`], but with all values as they are, even those that no frame may hold: see
+/// [`GaussianFrame::defects`].
+///
+/// # Errors
+/// As [`read_scene`], without those of values.
+pub fn read_scene_as_is(path: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     if let Some(directory) = sog_directory(path) {
-        return sog::read_dir(&directory, limits);
+        return sog::read_dir_as_is(&directory, limits);
     }
     let read = || {
         let bytes = read_file(path, limits)?;
         match format_of(&bytes, path)? {
-            SceneFormat::Ply => ply::read(&bytes, limits),
-            SceneFormat::CompressedPly => compressed_ply::read(&bytes, limits),
-            SceneFormat::Splat => splat::read(&bytes, limits),
-            SceneFormat::Spz => spz::read(&bytes, limits),
-            SceneFormat::Sog => sog::read_zip(&bytes, limits),
+            SceneFormat::Ply => ply::read_as_is(&bytes, limits),
+            SceneFormat::CompressedPly => compressed_ply::read_as_is(&bytes, limits),
+            SceneFormat::Splat => splat::read_as_is(&bytes, limits),
+            SceneFormat::Spz => spz::read_as_is(&bytes, limits),
+            SceneFormat::Sog => sog::read_zip_as_is(&bytes, limits),
         }
     };
     read().map_err(|error| error.in_file(path))

@@ -61,31 +61,6 @@ pub enum FrameError {
     },
 }
 
-/// A value that no frame may hold.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("Gaussian {row}: {property} is {value}: {kind}; remove or repair that Gaussian")]
-pub struct Defect {
-    /// Index of the Gaussian, from 0.
-    pub row: usize,
-    /// PLY name of the property.
-    pub property: String,
-    /// Why the value is refused.
-    pub kind: DefectKind,
-    /// The value; 0 for a quaternion without direction.
-    pub value: f32,
-}
-
-/// Why a value is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DefectKind {
-    /// NaN or infinite.
-    #[error("every value must be finite")]
-    NotFinite,
-    /// All four components of the quaternion are zero.
-    #[error("a rotation must have a length")]
-    ZeroRotation,
-}
-
 impl Planes {
     /// Empty planes with as many SH planes as `sh_degree` has, and room for `rows`.
     pub(crate) fn with_room(sh_degree: u8, rows: usize) -> Self {
@@ -101,7 +76,7 @@ impl Planes {
     }
 
     /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.
-    fn named(&self, sh_degree: u8) -> impl Iterator<Item = (String, &Vec<f32>)> {
+    pub(crate) fn named(&self, sh_degree: u8) -> impl Iterator<Item = (String, &Vec<f32>)> {
         let numbered =
             |prefix: &'static str| move |(at, plane)| (format!("{prefix}{at}"), plane) as (String, &Vec<f32>);
         let rest = move |(plane, values)| (format!("f_rest_{}", rest_index(plane, sh_degree)), values);
@@ -149,12 +124,17 @@ impl GaussianFrame {
         Ok(Self { sh_degree, antialiased: false, planes })
     }
 
-    /// A frame as a reader hands it out: checked, and its rotations at unit length.
-    pub(crate) fn from_read(sh_degree: u8, planes: Planes) -> Result<Self, SceneError> {
+    /// A frame as it is in a file, its rotations at unit length. Values are not checked.
+    pub(crate) fn from_file(sh_degree: u8, planes: Planes) -> Result<Self, SceneError> {
         let mut frame = Self::from_planes(sh_degree, planes)?;
-        frame.validate()?;
-        normalise_rows(&mut frame.planes.rotation)?;
+        normalise_rows(&mut frame.planes.rotation);
         Ok(frame)
+    }
+
+    /// The frame, if it holds no value that it may not hold.
+    pub(crate) fn checked(self) -> Result<Self, SceneError> {
+        self.validate()?;
+        Ok(self)
     }
 
     /// How many Gaussians.
@@ -231,27 +211,6 @@ impl GaussianFrame {
     pub fn select(&self, indices: &[u32]) -> Self {
         Self { planes: self.planes.gather(indices), ..*self }
     }
-
-    /// Checks that every value is finite and every rotation has a direction.
-    ///
-    /// # Errors
-    /// The first bad value of the first bad plane: position, DC, SH, opacity, scale, rotation.
-    pub fn validate(&self) -> Result<(), Defect> {
-        for (property, plane) in self.planes.named(self.sh_degree) {
-            if let Some(row) = plane.iter().position(|value| !value.is_finite()) {
-                return Err(Defect { row, property, kind: DefectKind::NotFinite, value: plane[row] });
-            }
-        }
-        let [w, x, y, z] = self.rotation();
-        let zero = |row: &usize| [w, x, y, z].iter().all(|plane| plane[*row] == 0.0);
-        match (0..self.len()).find(zero) {
-            Some(row) => {
-                let property = "rot_0..rot_3".to_owned();
-                Err(Defect { row, property, kind: DefectKind::ZeroRotation, value: 0.0 })
-            }
-            None => Ok(()),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -266,16 +225,6 @@ mod tests {
         }
         planes.opacity_logit.push(0.5);
         planes
-    }
-
-    #[test]
-    fn the_defect_names_the_row_and_the_property() {
-        let mut planes = one(1);
-        planes.sh[4][0] = f32::NAN;
-        let defect = GaussianFrame::from_planes(1, planes).unwrap().validate().unwrap_err();
-        // Plane 4 is the second coefficient of green; green starts at f_rest_3.
-        assert_eq!((defect.row, defect.property.as_str()), (0, "f_rest_4"));
-        assert!(defect.to_string().starts_with("Gaussian 0: f_rest_4 is NaN"));
     }
 
     #[test]

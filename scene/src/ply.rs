@@ -21,6 +21,11 @@ use crate::sh::{degree_of_values, rest_index, sh_coefficients};
 /// A header that is not understood, missing properties (all of them are named), fewer bytes than the header
 /// promises, more than `limits` allow, or a value that no frame may hold (row and property are named).
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    read_as_is(bytes, limits)?.checked()
+}
+
+/// As [`read`], with values as they are: none is checked.
+pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     limits.bytes(bytes.len() as u64)?;
     let header = parse_header(bytes)?;
     let vertex = header.element("vertex").ok_or_else(|| {
@@ -39,7 +44,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
         body.skip(element)?;
     }
     let columns = body.columns(vertex, &names)?;
-    GaussianFrame::from_read(sh_degree, planes_of_columns(sh_degree, columns))
+    GaussianFrame::from_file(sh_degree, planes_of_columns(sh_degree, columns))
 }
 
 /// Writes a frame: every value exactly, whatever it is.

@@ -1,28 +1,18 @@
 //! Rotations: unit quaternions, and the "smallest three" way of storing them.
 
-use crate::frame::{Defect, DefectKind};
-
 /// A norm² this close to 1 counts as unit. Rounding four components to `f32` moves it by less than 3e-7, so
 /// that reading what was written changes no bit.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
-/// Scales every quaternion `w x y z` of the four planes to unit length; one that is already is not touched.
-///
-/// # Errors
-/// The first row whose quaternion has no direction.
-pub(crate) fn normalise_rows(rotation: &mut [Vec<f32>; 4]) -> Result<(), Defect> {
+/// Scales every quaternion `w x y z` of the four planes to unit length; one that is already, or that has no direction,
+/// is not touched.
+pub(crate) fn normalise_rows(rotation: &mut [Vec<f32>; 4]) {
     let [w, x, y, z] = rotation;
-    let rows = w.iter_mut().zip(x).zip(y).zip(z);
-    for (row, (((w, x), y), z)) in rows.enumerate() {
-        let [nw, nx, ny, nz] = normalised([*w, *x, *y, *z]).ok_or_else(|| Defect {
-            row,
-            property: "rot_0..rot_3".to_owned(),
-            kind: DefectKind::ZeroRotation,
-            value: 0.0,
-        })?;
-        (*w, *x, *y, *z) = (nw, nx, ny, nz);
+    for (((w, x), y), z) in w.iter_mut().zip(x).zip(y).zip(z) {
+        if let Some(unit) = normalised([*w, *x, *y, *z]) {
+            [*w, *x, *y, *z] = unit;
+        }
     }
-    Ok(())
 }
 
 /// `quaternion` at unit length, or nothing where its norm is zero. Infinite or NaN components pass through:

@@ -35,6 +35,12 @@ pub(crate) const META: &str = "meta.json";
 /// Files that are missing or not what `meta.json` says, more than `limits` allow, or a value that no frame
 /// may hold. The error carries the path of the file at fault.
 pub fn read_dir(directory: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    let checked = read_dir_as_is(directory, limits)?.checked();
+    checked.map_err(|error| error.in_file(directory))
+}
+
+/// As [`read_dir`], with values as they are: none is checked.
+pub(crate) fn read_dir_as_is(directory: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     let fetch = |name: &str| {
         // A name that leads elsewhere would let a scene read any file.
         if Path::new(name).file_name().is_none_or(|file| file != name) {
@@ -51,6 +57,11 @@ pub fn read_dir(directory: &Path, limits: &ReadLimits) -> Result<GaussianFrame, 
 /// # Errors
 /// Those of [`read_dir`]; the message names the member at fault.
 pub fn read_zip(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    read_zip_as_is(bytes, limits)?.checked()
+}
+
+/// As [`read_zip`], with values as they are: none is checked.
+pub(crate) fn read_zip_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     limits.bytes(bytes.len() as u64)?;
     let refuse = |what: String| SceneError::inconsistent(what, "this is no SOG archive, or it is damaged");
     let mut archive =

@@ -25,6 +25,11 @@ const SMALLEST_SCALE: f32 = 1e-10;
 /// A length that is no multiple of 32 (there is no other way to tell a `.splat` file from any other bytes),
 /// more than `limits` allow, or a value that no frame may hold (row and property are named).
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    read_as_is(bytes, limits)?.checked()
+}
+
+/// As [`read`], with values as they are: none is checked.
+pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     limits.bytes(bytes.len() as u64)?;
     let over = bytes.len() % RECORD;
     if over != 0 {
@@ -40,7 +45,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
     for record in bytes.as_chunks::<RECORD>().0 {
         push(&mut planes, record);
     }
-    GaussianFrame::from_read(0, planes)
+    GaussianFrame::from_file(0, planes)
 }
 
 fn push(planes: &mut Planes, record: &[u8; RECORD]) {

@@ -49,9 +49,14 @@ impl Default for WriteOptions {
 /// Bytes that are no SPZ or end early, SH degree 4, axes that are more than flipped, more than `limits`
 /// allow, or a value that no frame may hold.
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    read_as_is(bytes, limits)?.checked()
+}
+
+/// As [`read`], with values as they are: none is checked.
+pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     limits.bytes(bytes.len() as u64)?;
     let (shape, streams) = container::read(bytes, limits)?;
-    let frame = GaussianFrame::from_read(shape.sh_degree, attributes::unpack(&shape, &streams))?;
+    let frame = GaussianFrame::from_file(shape.sh_degree, attributes::unpack(&shape, &streams))?;
     Ok(frame.with_antialiased(shape.antialiased))
 }
 

@@ -165,7 +165,7 @@ def layout(rows):
 
 def clause_of(title):
     """The number of a heading: `7.1` of `7.1 State`, `F` of `Annex F Numeric widths`; none of a heading without."""
-    number = re.match(r"(?:Annex )?((?:\d+|[A-F]\b)(?:\.\d+)*) ", title)
+    number = re.match(r"(?:Annex )?((?:\d+|[A-G]\b)(?:\.\d+)*) ", title)
     return number[1] if number else ""
 
 

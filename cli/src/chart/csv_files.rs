@@ -45,7 +45,8 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-fn csv(rows: &[Vec<String>]) -> Result<Vec<u8>, Failure> {
+/// Rows as a file.
+pub(super) fn csv(rows: &[Vec<String>]) -> Result<Vec<u8>, Failure> {
     let failed = |error: String| Failure::other(format!("a table cannot be written as CSV: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {

@@ -6,7 +6,7 @@ mod peers;
 mod pictures;
 mod scene;
 mod tables;
-mod words;
+pub(super) mod words;
 
 use super::csv_files;
 use super::scene_chart::{METRICS, SceneChart};
@@ -36,6 +36,24 @@ impl SceneFigures {
     }
 }
 
+/// A page with nothing from outside, as text.
+pub(super) fn document(title: &str, body: &Markup) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(STYLE)) (PreEscaped(FIGURE_STYLE)) }
+            }
+            body { (body) }
+        }
+    };
+    page.into_string() + "\n"
+}
+
 /// What the page is made of.
 pub(super) struct Page<'a> {
     /// The scenes.
@@ -52,30 +70,18 @@ impl Page<'_> {
     /// The page as text.
     pub(super) fn html(&self) -> String {
         let names: Vec<&str> = self.charts.iter().map(|chart| chart.name.as_str()).collect();
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    title { "SplatStream: " (names.join(", ")) }
-                    style { (PreEscaped(STYLE)) (PreEscaped(FIGURE_STYLE)) }
+        let body = html! {
+            (self.top())
+            main {
+                (self.summary())
+                (self.conditions())
+                @for (chart, figures) in self.charts.iter().zip(self.figures) {
+                    (scene::section(chart, figures, self.command))
                 }
-                body {
-                    (self.top())
-                    main {
-                        (self.summary())
-                        (self.conditions())
-                        @for (chart, figures) in self.charts.iter().zip(self.figures) {
-                            (scene::section(chart, figures, self.command))
-                        }
-                        (glossary::section())
-                    }
-                }
+                (glossary::section())
             }
         };
-        page.into_string() + "\n"
+        document(&format!("SplatStream: {}", names.join(", ")), &body)
     }
 
     fn top(&self) -> Markup {

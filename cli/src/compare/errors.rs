@@ -161,6 +161,7 @@ impl AttributeErrors {
             table.row([name.to_owned(), format!("{:.6}", error.rmse), format!("{:.6}", error.max)]);
         }
         table.text()
+            + "rotation: components of a quaternion; that of a round Gaussian may be anything without being seen\n"
     }
 }
 

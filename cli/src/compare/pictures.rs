@@ -44,6 +44,8 @@ pub(super) struct PictureErrors {
     flicker: Flicker,
     /// Pictures compared.
     pictures: usize,
+    /// Pictures that show nothing of A and nothing of B: they are no part of the means.
+    blank_pictures: usize,
 }
 
 /// The figures of a comparison, all of them null where there is none.
@@ -69,6 +71,7 @@ pub(super) struct Pictures<'a> {
     /// The renderings of the frame before, A and B of each camera.
     before: Vec<[Rendering; 2]>,
     flicker: FlickerSums,
+    blank: usize,
 }
 
 impl PictureArgs {
@@ -85,6 +88,7 @@ impl PictureArgs {
             photos,
             before: Vec::new(),
             flicker: FlickerSums::default(),
+            blank: 0,
         })
     }
 }
@@ -109,7 +113,13 @@ impl Pictures<'_> {
             if let Some(before) = before.next() {
                 self.flicker.add(before, [&a, &b]);
             }
-            self.rendered.push(compare(&a.colour, &a.alpha, &b.colour, self.learned.as_ref()));
+            // Two pictures of nothing are equal, and say nothing.
+            match [&a, &b].iter().all(|drawn| drawn.alpha.iter().all(|&alpha| alpha <= 0.0)) {
+                true => self.blank += 1,
+                false => {
+                    self.rendered.push(compare(&a.colour, &a.alpha, &b.colour, self.learned.as_ref()));
+                }
+            }
             if let Some(directory) = &self.args.photos {
                 let photo = read_photo(directory, camera)?;
                 let against =
@@ -130,6 +140,7 @@ impl Pictures<'_> {
             photos: self.args.photos.as_ref().map(|_| self.photos.each_ref().map(|list| Figures::of(list))),
             flicker: self.flicker.means(),
             pictures: self.rendered.len(),
+            blank_pictures: self.blank,
         }
     }
 }
@@ -183,7 +194,19 @@ impl Figures {
 }
 
 impl PictureErrors {
-    /// A table for people; nothing if no picture was drawn.
+    /// What to say where pictures show nothing; none if all show something.
+    pub(super) fn warning(&self) -> Option<String> {
+        let all = self.pictures + self.blank_pictures;
+        (self.blank_pictures > 0).then(|| {
+            format!(
+                "warning: {} of {all} pictures are blank on both sides and count for nothing: the cameras do not see the \
+                 scene; check --cameras, or let --cameras ring:8 make some",
+                self.blank_pictures
+            )
+        })
+    }
+
+    /// A table for people; nothing if no picture shows anything.
     pub(super) fn text(&self) -> String {
         if self.pictures == 0 {
             return String::new();

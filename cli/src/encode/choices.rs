@@ -47,8 +47,9 @@ fn positions(report: &Report, settings: &Settings) -> Choice {
     let bits = report.position_bits;
     let choice = format!("{bits} bits per axis, grid step {}", report.position_step);
     let inner = report.steps.unwrap_or(settings.steps).position_bits;
-    let why =
-        format!("the inner 98 % span 2^{inner:.2} cells at this quality; the rest is for what lies outside");
+    let why = format!(
+        "the core of the scene spans 2^{inner:.2} cells at this quality; the rest is for what lies outside"
+    );
     Choice::new("position", choice, why)
 }
 
@@ -204,14 +205,14 @@ fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
 }
 
 fn left_out(settings: &Settings) -> Option<Choice> {
-    let Tools { contexts, axis_sort, sh_transform, table_reuse, coarse_tail, cell_motion, survivors } =
+    let Tools { contexts, axis_sort, sh_transform, table_reuse, adaptive_steps, cell_motion, survivors } =
         settings.tools;
     let tools = [
         (contexts, "contexts"),
         (axis_sort, "axis-sort"),
         (sh_transform, "sh-transform"),
         (table_reuse, "table-reuse"),
-        (coarse_tail, "coarse-tail"),
+        (adaptive_steps, "adaptive-steps"),
         (cell_motion, "cell-motion"),
         (survivors, "survivors"),
     ];

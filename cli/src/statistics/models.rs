@@ -3,7 +3,8 @@
 use super::symbols::BitsOfPlanes;
 use super::{Planes, Statistics};
 use splatstream_decoder::gop::{Gop, Transforms};
-use splatstream_decoder::increment::values::PreparedSections;
+use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
+use splatstream_decoder::steps::StepRule;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::entropy::layout::ShCoding;
@@ -43,7 +44,9 @@ impl Models {
         statistics: &mut Statistics,
     ) -> Result<()> {
         let sections = core::slice::from_ref(&cells.coded);
-        add(sections, (0, ShCoding::None), &mut self.in_force.first, sequence, statistics)
+        let steps = StepRule::new(sequence, [0; 5]);
+        let coding = SectionCoding { dc_rank: 0, sh: ShCoding::None, steps };
+        add(sections, &coding, &mut self.in_force.first, sequence, statistics)
     }
 
     /// Adds the costs of an increment.
@@ -57,8 +60,9 @@ impl Models {
     ) -> Result<()> {
         let mut models = self.in_force.before(refinement).clone();
         let sh = ShCoding::of(&increment.header.sh(), tools.sh.map_or(0, |sh| sh.header.rank));
-        let coding = (tools.dc.header.rank, sh);
-        add(&increment.sections, coding, &mut models, sequence, statistics)?;
+        let steps = StepRule::new(sequence, increment.header.attribute_step);
+        let coding = SectionCoding { dc_rank: tools.dc.header.rank, sh, steps };
+        add(&increment.sections, &coding, &mut models, sequence, statistics)?;
         self.in_force.follow(refinement, models);
         Ok(())
     }
@@ -67,13 +71,13 @@ impl Models {
 /// Adds the costs of sections; `models` are those in force before them, and then after them.
 fn add(
     sections: &[CodedSection<'_>],
-    (dc_rank, sh): (u8, ShCoding),
+    coding: &SectionCoding,
     models: &mut ModelsInForce,
     sequence: &SequenceParameters,
     statistics: &mut Statistics,
 ) -> Result<()> {
     let mut trace = BitsOfPlanes::default();
-    let prepared = PreparedSections::new(sections, dc_rank, sh, models, &mut trace)?;
+    let prepared = PreparedSections::new(sections, coding, models, &mut trace)?;
     // The bits of models come plane by plane through all sections.
     let mut bits = trace.bits.as_slice();
     for (coded, models) in prepared.sections() {

@@ -27,13 +27,15 @@ impl ModelTrace for BitsOfPlanes {
 pub(super) fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> f64 {
     let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
     let (contexts, values): (Vec<u8>, Vec<u64>) = match info.alphabet {
-        Alphabet::Position => (delta_contexts(&model.axes, &block.deltas), block.deltas.clone()),
+        Alphabet::Position => {
+            (delta_contexts(&model.axes, &block.deltas, block.segments()), block.deltas.clone())
+        }
         Alphabet::Attribute | Alphabet::Index => {
             let unsigned = |&value: &i32| match info.alphabet {
                 Alphabet::Index => u64::from(value.cast_unsigned()),
                 _ => u64::from(zigzag(value)),
             };
-            (plane_contexts(&model.axes, plane, block, coded), coded.iter().map(unsigned).collect())
+            (plane_contexts(&model.axes, plane, info, block, coded), coded.iter().map(unsigned).collect())
         }
     };
     let cost = |(index, &value): (usize, &u64)| {

@@ -1,9 +1,9 @@
 """Mutations of the independent decoder: for each requirement one change that breaks it, so that some vector has to fail."""
 
-from . import decoding, records, values
+from . import decoding, records, tools, values
 
 # (requirement, file of the oracle, snippet, replacement); white space of a snippet stands for any white space
-MUTATIONS = records.MUTATIONS + decoding.MUTATIONS + values.MUTATIONS
+MUTATIONS = records.MUTATIONS + decoding.MUTATIONS + values.MUTATIONS + tools.MUTATIONS
 
 # Requirements of which no mutation of the oracle can break the rule alone
 NOT_MUTABLE = {

@@ -1,7 +1,7 @@
 """Mutations of clauses 7.1 to 7.4, 7.8 to 7.11, 9 and annexes A and B. A row is as in records.py."""
 
 SEMANTICS, DECODING, FRAME, LISTS, POINTS = "semantics.py", "decoding.py", "frame.py", "lists.py", "points.py"
-INCREMENT, OUTPUT, EXTRACTION = "increment.py", "output.py", "extraction.py"
+INCREMENT, OUTPUT, EXTRACTION, MOVES = "increment.py", "output.py", "extraction.py", "moves.py"
 
 MUTATIONS = [
     # 7.1: phases, increments, ends of frames and GOPs
@@ -70,17 +70,16 @@ MUTATIONS = [
     ("SS-LO-004", FRAME, "if self.intra and self.seq.whole_anchor:", "if self.intra:"),
     ("SS-LO-003", DECODING, "if not frame.intra and frame.reference is None:", "if False:"),
     ("SS-PA-001", FRAME, "self.lists[(s - 1, r)] if s > 0 else []", "self.lists[(s - 1, 0)] if s > 0 else []"),
-    ("SS-PA-001", FRAME, "return [self.cells.displaced(g) for g in self.reference.lists[(self.seq.top, r)]]",
-     "return self.reference.lists[(self.seq.top, r)]"),
+    ("SS-PA-001", FRAME, "return origins if self.intra else [self.cells.displaced(g) for g in origins]", "return origins"),
     ("SS-PA-002", LISTS, "require(SKIP <= mode <= REMOVE,", "require(SKIP <= mode,"),
     ("SS-PA-002", LISTS, "require(mode != REMOVE or not intra_frame,", "require(True,"),
     ("SS-PA-003", LISTS, "require(getattr(increment, element) == count,", 'require(element == "move_count" or getattr(increment, element) == count,'),
     ("SS-PA-003", LISTS, "require(getattr(increment, element) == count,", 'require(element == "update_count" or getattr(increment, element) == count,'),
     ("SS-PA-003", LISTS, "require(getattr(increment, element) == count,", 'require(element == "remove_count" or getattr(increment, element) == count,'),
-    ("SS-PA-004", LISTS, "<< (position_shift + FINE_BITS)", "<< FINE_BITS"),
+    ("SS-PA-004", MOVES, "<< (u.position_shift + FINE_BITS)", "<< FINE_BITS"),
     ("SS-PA-004", INCREMENT, "for i, v in zip(updaters, values):", "for i, v in zip(updaters[::-1], values):"),
-    ("SS-PA-005", LISTS, "<= limit, \"CONSTRAINT\", \"7.4.3\", at)", "<= limit + 1, \"CONSTRAINT\", \"7.4.3\", at)"),
-    ("SS-PA-005", LISTS, "require(0 <= fine[j]", "require(-1000 <= fine[j]"),
+    ("SS-PA-005", MOVES, "require(all(0 <= x <= limit for x in fine)", "require(all(0 <= x <= limit + 1 for x in fine)"),
+    ("SS-PA-005", MOVES, "require(all(0 <= x <= limit for x in fine)", "require(all(-1000 <= x <= limit for x in fine)"),
     ("SS-PA-006", INCREMENT, "good = total <= n_total", "good = True"),
     ("SS-PA-006", INCREMENT, "if frame.intra and self.s == seq.top:", "if False:"),
     ("SS-PA-006", INCREMENT, "if not frame.intra and self.r == seq.refinement_count - 1:", "if False:"),

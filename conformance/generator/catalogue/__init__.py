@@ -1,10 +1,11 @@
 """All vectors by name, those of each area from a module of its own."""
 
-from . import (blocks, entropy, headers, increments, learned, limits, losses, mixed, narrow, nested, noticed, order, parameters,
-               records, scene, stream, structure, tools, values, weights)
+from . import (blocks, entropy, grid, headers, increments, lanes, learned, limits, losses, mixed, motion, narrow, nested,
+               noticed, order, parameters, records, scene, steps, stream, structure, tools, values, weights)
 
-MODULES = (stream, values, entropy, structure, nested, tools, learned, weights, mixed, headers, parameters, records, order,
-           losses, increments, blocks, limits, scene, narrow, noticed)
+MODULES = (stream, values, grid, steps, entropy, lanes, structure, nested, tools, motion, learned, weights, mixed, headers,
+           parameters, records, order, losses, increments, blocks, limits, scene, narrow,
+           noticed)
 
 
 def collected():

@@ -27,7 +27,7 @@ def sources(tamper=None):
 
 def plain(tamper=None):
     return one_frame(66, plans={"position": fitted(direct_log2=4), "opacity": fitted(direct_log2=4)}, tamper=tamper,
-                     sequence_flags=1, rotation_threshold=[90, 9, 0], **SH)
+                     sequence_flags=1, anisotropy_weight=1000, anisotropy_reference=90, **SH)
 
 
 def quantised(tamper=None):
@@ -56,7 +56,7 @@ def repeated(tamper=None):
 SH = {"sh": {}, "sh_degree": 1}
 TOKEN = "u7"                                        # of signed planes with direct_log2 4, whose largest token is 67
 PARENTS = {"entropy-parent-of-faults": ("Models with both sources and every kind of table", sources),
-           "attribute-parent-of-faults": ("Two blocks of Gaussians with canonical_axes, thresholds and sh", plain),
+           "attribute-parent-of-faults": ("Two blocks of Gaussians with canonical_axes, steps of rotations and sh", plain),
            "codebook-parent-of-faults": ("Two VQ stages", quantised),
            "entropy-reuse-parent-of-faults": ("Two units, of which the second reuses a model", repeated)}
 SOURCES, PLAIN, QUANTISED, REPEATED = PARENTS
@@ -159,7 +159,7 @@ MODELS = [
      model("opacity", "direct_log2_minus2", 6)),
     ("models-direct-log2-6-of-position", PLAIN, "CONSTRAINT", "SS-PM-002",
      "direct_log2_minus2 of the position plane is 4", model("position", "direct_log2_minus2", 4)),
-    ("models-source-11", PLAIN, "RESERVED", "SS-PM-003", "source_a is 11", source("opacity", 11)),
+    ("models-source-12", PLAIN, "RESERVED", "SS-PM-003", "source_a is 12", source("opacity", 12)),
     ("models-source-15", SOURCES, "RESERVED", "SS-PM-003", "source_b is 15", stop_after("opacity", "source_b", 15)),
     ("models-source-of-position", PLAIN, "CONSTRAINT", "SS-PM-003 SS-EC-005", "the position plane uses source 10",
      source("position", 10)),
@@ -300,8 +300,8 @@ VALUES = [
     ("opacity-high-twice", PLAIN, "OUT_OF_RANGE", "SS-RC-001", "two opacities are 32768", twice(4, 32768)),
     ("opacity-low-twice", PLAIN, "OUT_OF_RANGE", "SS-RC-001", "two opacities are -32769", twice(4, -32769)),
     ("rotation-value-low", PLAIN, "OUT_OF_RANGE", "SS-RC-003", "v_rotation[0] is -32769", value(5, 0, -32769)),
-    ("rotation-shifted", PLAIN, "OUT_OF_RANGE", "SS-RC-003 SS-AT-001",
-     "rotation[1] is beyond 32767 after its shift by the thresholds", value(6, 0, 30000)),
+    ("rotation-multiplied", PLAIN, "OUT_OF_RANGE", "SS-RC-003 SS-AT-004",
+     "rotation[1] is beyond 32767 after v_rotation[1] was multiplied by its step", value(6, 0, 30000)),
     ("dc-component-high", PLAIN, "OUT_OF_RANGE", "SS-RC-005", "v_dc[0] is 8192", value(8, 0, 8192)),
     ("dc-component-low", PLAIN, "OUT_OF_RANGE", "SS-RC-005", "v_dc[2] is -8192", value(10, 65, -8192)),
     ("sh-component-high", PLAIN, "OUT_OF_RANGE", "SS-RC-004", "v_sh[8] is 8192", value(19, 0, 8192)),

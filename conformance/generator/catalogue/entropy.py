@@ -15,10 +15,10 @@ def everywhere(plan):
     return {name: plan for name in ATTRIBUTES}
 
 
-def two_sources(first, second):
+def two_sources(first, second, first_thresholds=(0, 3, 9, 30)):
     """A plan with the sources where they are available to the plane, and thresholds that split the values."""
     def plan(coder, plane):
-        thresholds = [0, 3, 9, 30] if plane.attribute != "position" else [10, 40, 80]
+        thresholds = list(first_thresholds) if plane.attribute != "position" else [10, 40, 80]
         a = (first, thresholds) if pm.source_available(first, plane) else None
         b = (second, [1, 5]) if a and second and pm.source_available(second, plane) else None
         return fitted(a=a, b=b, direct_log2=3)(coder, plane)

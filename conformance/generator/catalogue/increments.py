@@ -11,6 +11,7 @@ from oracle import models as pm
 from oracle.decoding import Decoder
 from oracle.constants import MAX_CELLS
 from oracle.lists import REMOVE
+from oracle.tables import STEP
 from ..synth.cells import CellsWriter
 from ..synth.scripts import Script
 from ..synth.stream import Made
@@ -92,7 +93,7 @@ def first_move_out(v, w):
 
 def log_scales_rise(v, w):
     """d1 becomes -1 or less (SS-RC-002) while all ranges hold."""
-    v[2][0] -= 30000 >> w.u.attribute_shift[0]
+    v[2][0] -= 30000 // STEP[w.u.attribute_step[0]]
     return v
 
 
@@ -149,7 +150,7 @@ def small_grid(v, w):
 def full_dc(v, w):
     """Component 0 as large as it may be, the others 0."""
     for k in range(w.context.dc_transform.rank):
-        v[8 + k][0] = 8191 >> w.u.attribute_shift[3] if k == 0 else 0
+        v[8 + k][0] = 8191 // STEP[w.u.attribute_step[3]] if k == 0 else 0
     return v
 
 
@@ -172,6 +173,9 @@ FAULTS = [
     ("entropy", "entropy-increment-source-not-in-section", "CONSTRAINT", "SS-EC-005 SS-PM-003",
      "the plane of modes uses source 10, which section new alone has",
      "available", lambda value, w: w.section_name == "modes", lambda value, w: lambda source, plane: source == 10),
+    ("entropy", "entropy-increment-source-11-of-updates", "CONSTRAINT", "SS-EC-005 SS-PM-003 SS-CX-001",
+     "a plane of updates uses source 11, which section new alone has", "available", lambda value, w: w.section_name == "updates",
+     lambda value, w: lambda source, plane: source == 11 and plane.attribute in ("rotation", "dc")),
 ] + [
     ("entropy", "entropy-increment-source-3-of-" + plane, "CONSTRAINT", "SS-EC-005 SS-PM-003",
      "the first plane of section %s uses source 3, and there is no plane before it" % name,
@@ -211,9 +215,9 @@ FAULTS = [
      "position_shift equals position_bits",
      "elements", always,
      element("position_shift", lambda u, w: w.seq.position_bits)),
-    ("constraint", "constraint-increment-attribute-shift", "OUT_OF_RANGE", "SS-ER-001", "attribute_shift of sh is 8",
+    ("constraint", "constraint-increment-attribute-step", "OUT_OF_RANGE", "SS-ER-001", "attribute_step of sh is 25",
      "elements", always,
-     element("attribute_shift", 8, 4)),
+     element("attribute_step", 25, 4)),
     ("constraint", "constraint-increment-predictor-block", "OUT_OF_RANGE", "SS-ER-001", "predictor_block_log2 is 17",
      "elements", has_predictors,
      element("predictor_block_log2", 17)),
@@ -319,10 +323,10 @@ FAULTS = [
     ("constraint", "constraint-increment-dc-output", "OUT_OF_RANGE", "SS-RC-006", "dc of a new Gaussian is above 2^30",
      "new", dc_at_limit,
      full_dc),
-    ("constraint", "constraint-increment-dc-component-shifted", "OUT_OF_RANGE", "SS-RC-005",
-     "a dc component is below -8191 after its shift",
-     "updates", lambda v, w: w.u.attribute_shift[3] > 0,
-     lambda v, w: entry(7, -(8191 >> w.u.attribute_shift[3]) - 2)(v, w)),
+    ("constraint", "constraint-increment-dc-component-multiplied", "OUT_OF_RANGE", "SS-RC-005",
+     "a dc component is below -8191 after it was multiplied",
+     "updates", lambda v, w: w.u.attribute_step[3] > 0,
+     lambda v, w: entry(7, -(8191 // STEP[w.u.attribute_step[3]]) - 2)(v, w)),
     ("constraint", "constraint-increment-sh-index", "OUT_OF_RANGE", "SS-RC-005",
      "an index is not below the number of entries of its codebook",
      "new", lambda v, w: w.u.sh_mode == 2,
@@ -375,8 +379,8 @@ FAULTS = [
     ("constraint", "constraint-increment-remove-in-i-frame", ("MISMATCH", "CONSTRAINT"), "SS-IN-007 SS-PA-002",
      "remove_count is present in an I frame", "elements", lambda u, w: w.frame.intra and w.s > 0 and w.v["modes"],
      element("remove_count", 1)),
-    ("constraint", "constraint-increment-shifted-value", "OUT_OF_RANGE", "SS-RC-001",
-     "the product of a v_log_scale with its shift is -40000, and the log-scale that it gives is within its range",
+    ("constraint", "constraint-increment-multiplied-value", "OUT_OF_RANGE", "SS-RC-001",
+     "the product of a v_log_scale with its factor is -40000, and the log-scale that it gives is within its range",
      "updates", always,
      entry(0, -20000)),
     ("constraint", "constraint-increment-update-rotation", "OUT_OF_RANGE", "SS-RC-003",
@@ -387,7 +391,7 @@ FAULTS = [
 
 
 PARENTS = {"constraint-increment-sh-mode-without-transform": ALL_TOOLS[1][:2],
-           "constraint-increment-dc-output": COLOURS, "constraint-increment-shifted-value": LARGE,
+           "constraint-increment-dc-output": COLOURS, "constraint-increment-multiplied-value": LARGE,
            "constraint-increment-update-rotation": LARGE}
 
 

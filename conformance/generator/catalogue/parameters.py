@@ -61,8 +61,6 @@ SEQUENCE = [
      element(PARAMETERS, "sequence_flags", 4)),
     ("stream-flags-8", DYNAMIC, "RESERVED_BITS", "SS-ER-002", "bit 3 of sequence_flags is set",
      element(PARAMETERS, "sequence_flags", 8)),
-    ("stream-thresholds-rise", INTRA, "OUT_OF_RANGE", "SS-SP-002", "rotation_threshold increases",
-     element(PARAMETERS, "rotation_threshold", 1, 2)),
     ("stream-no-ticks", INTRA, "OUT_OF_RANGE", "SS-ER-001", "ticks_per_second is 0",
      element(PARAMETERS, "ticks_per_second", 0)),
     ("stream-step-0", INTRA, "CONSTRAINT", "SS-SP-003", "position_step is 0", f32("position_step", 0.0)),

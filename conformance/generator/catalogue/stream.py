@@ -9,7 +9,7 @@ from ..vector import Vector
 
 
 def one_frame(total=9, values=None, plans=None, seed=1, codes=None, tamper=None, level=1, sh=None, lanes_log2=0,
-              **asked):
+              attribute_step=(0,) * 5, **asked):
     """A stream of one frame with one increment; sh: None or the arguments of its sh transform."""
     s = GivenStream(seed, level, tamper=tamper, **asked)
     s.gop()
@@ -17,7 +17,7 @@ def one_frame(total=9, values=None, plans=None, seed=1, codes=None, tamper=None,
     if sh is not None:
         s.transform(kind=1, **sh)
     s.frame(total, sh=c.NONE_ID if sh is None else 0)
-    s.unit(values, plans, codes, lanes_log2, sh_mode=0 if sh is None else 1)
+    s.unit(values, plans, codes, lanes_log2, sh_mode=0 if sh is None else 1, attribute_step=attribute_step)
     return s.close()
 
 

@@ -88,15 +88,15 @@ TEMPORAL = [
 REFINEMENT = [
     ("refinement-position-shift-19", "SS-PO-003", "position_shift 19 of a grid of 20 bits in increments",
      dict(position_bits=20, fixed={"position_shift": 19}, modes=(1, 0, 1, 0))),
-    ("refinement-attribute-shifts", "SS-RC-001 SS-RC-003 SS-RC-005", "attribute_shift 7 of every attribute",
-     dict(fixed={"attribute_shift": [7] * 5, "sh_mode": lambda w: int(w.context.sh_transform is not None)},
-          sh_degree=1, values={"log_scale": lambda w, p, shift: [3, 0, 0], "opacity": lambda w, p, shift: [1]})),
+    ("refinement-attribute-steps", "SS-RC-001 SS-RC-003 SS-RC-005", "attribute_step 13 of every attribute",
+     dict(fixed={"attribute_step": [13] * 5, "sh_mode": lambda w: int(w.context.sh_transform is not None)},
+          sh_degree=1, values={"log_scale": lambda w, p, factor: [3, 0, 0], "opacity": lambda w, p, factor: [1]})),
     ("refinement-position-shift", "SS-PO-003 SS-PA-005", "Moves and new positions with position_shift 3",
      dict(fixed={"position_shift": 3}, modes=(0, 1, 0, 0))),
     ("refinement-compensation", "SS-CA-004 SS-OP-003",
      "Log-scales and opacities are compensated at lower refinements, to the ends of their ranges",
      dict(fixed={"compensation_log_scale": 127, "compensation_opacity": -128}, percent=QUARTERS,
-          values={"log_scale": lambda w, p, shift: [(32760 - p[0]) >> shift, 0, 0] if p == (0, 0, 0) else [0, 0, 0]})),
+          values={"log_scale": lambda w, p, factor: [(32760 - p[0]) // factor, 0, 0] if p == (0, 0, 0) else [0, 0, 0]})),
     ("refinement-compensation-down", "SS-CA-004", "Compensation downwards in I, P and B frames of two spatial layers",
      dict(fixed={"compensation_log_scale": -128, "compensation_opacity": 127}, percent=QUARTERS, spatial_layer_count=2,
           gops=[(1, 1, 3), (0, 0, 1)])),
@@ -150,8 +150,6 @@ STABILITY = [
     ("stability-block-log2-16", "SS-SE-001", "Blocks of 65536 entries", dict(block_log2=16, most=80, gops=[(1, 0, 2)])),
     ("stability-canonical-axes", "SS-RC-002 SS-RC-002", "canonical_axes in predicted frames",
      dict(sequence_flags=1, modes=(0, 0, 1, 0))),
-    ("stability-rotation-thresholds", "SS-AT-001 SS-RC-003", "rotation_threshold in predicted frames",
-     dict(rotation_threshold=[255, 40, 5], modes=(0, 0, 1, 0))),
 ]
 
 

@@ -79,7 +79,7 @@ def eight_cells(w, occupied):
 
 NO_ROTATION, NO_SHIFT = [0, 0, 0], [0, 0, 0]
 STEP_OF_HALF = step_of_half()
-NO_ROTATIONS = {"rotation": lambda w, p, shift: [0, 0, 0]}
+NO_ROTATIONS = {"rotation": lambda w, p, factor: [0, 0, 0]}
 CELLS = [
     ("cells-translation", "SS-MO-001 SS-MO-002 SS-MO-004", "Cells that are translated without rotating",
      dict(cells=every(([8, -16, 3], NO_ROTATION, 0)))),
@@ -119,14 +119,14 @@ CELLS = [
      "1 / rotation_step + 1/2 is just below an integer, which single precision takes for that integer",
      dict(cells=every((NO_SHIFT, [0, 0, 8192], 0)), rotation_step=STEP_OF_HALF, values=NO_ROTATIONS, modes=(1, 0, 0, 0))),
     ("cells-rotation-clamped", "SS-MO-004", "Rotations whose integers are beyond 32767 after a displacement",
-     dict(cells=every((NO_SHIFT, [0, 0, 8192], 0)), modes=(1, 0, 0, 0), rotation_threshold=[0, 0, 0],
-          values={"rotation": lambda w, p, shift: [(32767 - (x >> 6)) * (k < 2) for k, x in enumerate(p)]},
-          fixed={"attribute_shift": [0] * 5, "predictor_block_log2": None})),
+     dict(cells=every((NO_SHIFT, [0, 0, 8192], 0)), modes=(1, 0, 0, 0),
+          values={"rotation": lambda w, p, factor: [(32767 - (x >> 6)) * (k < 2) for k, x in enumerate(p)]},
+          fixed={"attribute_step": [0] * 5, "predictor_block_log2": None})),
     ("cells-rotation-double-cover", "SS-MO-004",
      "Rotations of nearly half a revolution displaced further: the scalar part changes its sign",
      dict(cells=every((NO_SHIFT, [0, 0, 8000], 0)), rotation_step=0.001,
-          values={"rotation": lambda w, p, shift: [0, 0, (63500 - p[2]) >> 6]},
-          fixed={"attribute_shift": [0] * 5, "predictor_block_log2": None})),
+          values={"rotation": lambda w, p, factor: [0, 0, (63500 - p[2]) >> 6]},
+          fixed={"attribute_step": [0] * 5, "predictor_block_log2": None})),
 ]
 NEAR = {"percent": [50, 100], "most": 24, "gops": [(1, 0, 2)], "sizes": more, "sh_degree": 1}
 
@@ -261,8 +261,8 @@ COLOURS = ("prediction-colour-ends", lambda tamper=None: DirectedSynth(COLOUR_SE
 # Updates at which a value may be out of range while what it gives is not
 LARGE = ("survivors-large-updates", lambda tamper=None: DirectedSynth(
     3, tamper, percent=[100], gops=[(1, 0, 2)], modes=(0, 0, 1, 0), sizes=same, removed=lambda n: 0, cells=lambda w, occupied: {},
-    values={"log_scale": lambda w, p, shift: [0 if any(p) else 10000, 0, 0], "rotation": lambda w, p, shift: [
-        0 if any(p) else 1000] * 3}, fixed={"attribute_shift": [1, 0, 0, 0, 0], "predictor_block_log2": None}))
+    values={"log_scale": lambda w, p, factor: [0 if any(p) else 10000, 0, 0], "rotation": lambda w, p, factor: [
+        0 if any(p) else 1000] * 3}, fixed={"attribute_step": [1, 0, 0, 0, 0], "predictor_block_log2": None}))
 TABLES = (("survivors", SURVIVORS), ("cells", CELLS), ("prediction", PREDICTION))
 
 

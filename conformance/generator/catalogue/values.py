@@ -80,15 +80,6 @@ ATTRIBUTE = [
                        rotation_step=0.003)),
     ("attribute-rotation-steps-denormal", "SS-OUT-002", "Squares of components that are subnormal numbers",
      lambda: one_frame(4, attribute("rotation", [1, -1, 2, 3], [1, 1, 1, 1], [0, 0, 1, -1]), rotation_step=2.0 ** -40)),
-    ("attribute-rotation-thresholds", "SS-AT-001 SS-SP-002",
-     "Anisotropies below, at and above three thresholds: one to eight times coarser",
-     lambda: one_frame(8, {**attribute("log_scale", [0] * 8, [0, 4, 5, 6, 19, 20, 99, 100], [0] * 8),
-                           **attribute("rotation", [10] * 8, [-10] * 8, [4095] * 6 + [9, 9])},
-                           rotation_threshold=[100, 20, 5])),
-    ("attribute-rotation-threshold-0", "SS-AT-001", "Thresholds 0 do not count for a negative anisotropy either",
-     lambda: one_frame(4, attribute("log_scale", [0] * 4, [-50, -1, 0, 1], [0] * 4), rotation_threshold=[3, 0, 0])),
-    ("attribute-rotation-thresholds-equal", "SS-SP-002", "All thresholds are 255",
-     lambda: one_frame(4, attribute("rotation", [4095, -4095, 1, 0], [0] * 4, [0] * 4), rotation_threshold=[255] * 3)),
 ]
 
 

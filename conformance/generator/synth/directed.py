@@ -7,12 +7,14 @@ present     index of a frame in its GOP -> whether it is there
 units       frame number -> units of the frame; of an I frame a list with one number for each layer
 sizes       (frame number, sizes of the lists of its reference) -> sizes of its lists
 fixed       element of 5.14 -> value, or a function of the writer; predictor_block_log2 None: no predictors
-modes       weights of modes 0 to 3             removed    parents of a unit -> how many go
+modes       weights of modes 0 to 3, or a function of the writer
+                       removed    parents of a unit -> how many go
 cells       a function of the CellsWriter and the occupied cells in order that gives {X: (translation, rotation, stale)}
 cell_log2   of all frames                       predictors weights of predictors 0 to 2
 position    (writer, positions near, bits) -> grid position of a new Gaussian
 move        (writer, axis) -> position residual
-values      attribute -> function (writer, prediction, shift) -> values
+move_predictors weights of move predictors 0 to 3
+values      attribute -> function (writer, prediction, factor) -> values
 layer_sizes (share, s) -> size of a list in spatial layers below the top
 disturbed   whether skipped units and copies of sequence_parameters stand between others
 transforms  whether there is an sh transform    ranks, mean     of all transforms
@@ -25,10 +27,11 @@ from oracle import constants as c
 from .cells import CellsWriter
 from .increment import IncrementWriter
 from .mixed import MixedSynth
-from .stream import WHOLE_ANCHOR, sequence_payload
+from .stream import WHOLE_ANCHOR
 
 USUAL = {"most": 12, "gops": [(1, 1, 3)], "present": lambda k: True, "units": lambda number: None, "sizes": None,
          "fixed": {}, "modes": None, "removed": None, "cells": None, "cell_log2": None, "predictors": None,
+         "move_predictors": None,
          "position": None, "move": None, "values": {}, "layer_sizes": None, "disturbed": False, "transforms": True,
          "listed": True, "indexed": True, "described": False, "copies": False, "digests": True, "whole": False, "level": 1,
          "ranks": None, "mean": None, "lanes": None, "profile": c.PROFILE_DYNAMIC}
@@ -56,7 +59,8 @@ class DirectedWriter(IncrementWriter):
         return super().choose_lanes(count) if self.asked["lanes"] is None else self.asked["lanes"]
 
     def mode_weights(self):
-        return self.asked["modes"] or super().mode_weights()
+        asked = self.asked["modes"]
+        return asked(self) if callable(asked) else asked or super().mode_weights()
 
     def predictor_weights(self):
         return self.asked["predictors"] or super().predictor_weights()
@@ -68,9 +72,12 @@ class DirectedWriter(IncrementWriter):
         asked = self.asked["position"]
         return super().position(near, bits, shift) if asked is None else asked(self, near, bits)
 
-    def choose(self, attribute, prediction, shift):
+    def move_predictor_weights(self):
+        return self.asked["move_predictors"] or super().move_predictor_weights()
+
+    def choose(self, attribute, prediction, factor):
         asked = self.asked["values"].get(attribute)
-        return asked(self, prediction, shift) if asked else super().choose(attribute, prediction, shift)
+        return asked(self, prediction, factor) if asked else super().choose(attribute, prediction, factor)
 
 
 class DirectedSynth(MixedSynth):
@@ -90,7 +97,7 @@ class DirectedSynth(MixedSynth):
         self.temporal_layers = self.elements.get("temporal_layer_count", 1 + max(depth for _, depth, _ in self.gops))
 
     def chosen_sequence(self):
-        return sequence_payload({**self.elements, "temporal_layer_count": self.temporal_layers})
+        return {**self.elements, "temporal_layer_count": self.temporal_layers}
 
     def disturb(self):
         if self.asked["disturbed"]:

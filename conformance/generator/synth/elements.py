@@ -23,11 +23,13 @@ INCREMENT = Layout("increment_flags", (("increment_flags", "u16"), ("refinement_
     3: (("remove_count", "leb", 0),),
     4: (("new_count", "leb", 0),),
     5: (("position_shift", "u8", 0),),
-    6: (("attribute_shift", "shifts", (0,) * 5),),
+    6: (("attribute_step", "steps", (0,) * 5),),
     7: (("predictor_block_log2", "u8", None), ("neighbour_count", "u8", 1), ("bilateral_spatial", "u8", 0),
         ("bilateral_feature", "u8", 0)),
     8: (("sh_mode", "u8", 0), ("vq_stage_count", "stages", 0), ("codebook_ids", "books", ())),
-    9: (("compensation_log_scale", "i8", 0), ("compensation_opacity", "i8", 0))})
+    9: (("compensation_log_scale", "i8", 0), ("compensation_opacity", "i8", 0)),
+    10: (("move_block_log2", "u8", None),),
+    11: (("extrapolates_opacity", "flag", 0),)})
 FRAME = Layout("frame_flags", (("frame_type", "u8"), ("dc_transform_id", "u8"), ("sh_transform_id", "u8"), ("frame_flags", "u8"),
                                ("gaussian_count", "u32")), {
     0: (("carried_digest", "u64", 0),),
@@ -52,6 +54,11 @@ class Elements:
         """Whether an increment has them; as in the record of the oracle."""
         return self.predictor_block_log2 is not None
 
+    @property
+    def predicts_moves(self):
+        """Whether an increment has move predictors; as in the record of the oracle."""
+        return self.move_block_log2 is not None
+
     @classmethod
     def parse(cls, layout, payload):
         u, reader = cls(layout), ByteReader(payload, 0, len(payload))
@@ -70,18 +77,20 @@ class Elements:
     def read(self, reader, kind):
         if kind in ("stages", "books") and self.sh_mode != 2:
             return 0 if kind == "stages" else []
+        if kind == "flag":                          # the bit itself is the element
+            return 1
         if kind == "leb":
             return reader.leb128("5.14")
-        if kind in ("shifts", "books"):
-            return list(reader.values("u8", 5 if kind == "shifts" else self.vq_stage_count, "5.14"))
+        if kind in ("steps", "books"):
+            return list(reader.values("u8", 5 if kind == "steps" else self.vq_stage_count, "5.14"))
         return reader.value("u8" if kind == "stages" else kind, "5.14")
 
     def written(self, kind, value):
-        if kind in ("stages", "books") and self.sh_mode != 2:
+        if kind == "flag" or kind in ("stages", "books") and self.sh_mode != 2:
             return b""
         if kind == "leb":
             return leb(value)
-        if kind in ("shifts", "books"):
+        if kind in ("steps", "books"):
             return bytes(value)
         return struct.pack("<" + CODES.get(kind, "B"), value)
 

@@ -55,7 +55,7 @@ def unit(kind, payload, frame=0, refinement=0, flags=None, spatial=0, temporal=0
     return head + struct.pack("<H", crc32(head + tail) & 0xFFFF) + tail + payload
 
 
-def file_header(profile, level, minor=1, major=130):
+def file_header(profile, level, minor=2, major=130):
     head = c.SIGNATURE + bytes([major, minor, profile, level])
     return head + struct.pack("<I", crc32(head))
 
@@ -77,10 +77,10 @@ class SectionEncoder:
     """Chooses random models that can code given values, and codes them in blocks.
 
     planes: those of 8.1; v: the values of each plane over all entries (deltas and indices as they are);
-    in_force: identity -> PlaneModel that may be reused, or None.
+    in_force: identity -> PlaneModel that may be reused, or None; rule: the StepRule of an increment.
     """
 
-    def __init__(self, rng, planes, v, block_size, lanes, in_force, available):
+    def __init__(self, rng, planes, v, block_size, lanes, in_force, available, rule=None):
         self.rng, self.planes, self.v, self.lanes = rng, planes, v, lanes
         self.in_force, self.available = in_force or {}, available
         self.count = len(v[0])
@@ -91,6 +91,7 @@ class SectionEncoder:
         for start in self.starts:
             block = BlockDecoder.__new__(BlockDecoder)
             block.planes, block.models, block.e = planes, self.models, []
+            block.lanes, block.rule = lanes, rule
             block.n = min(block_size, self.count - start)
             self.blocks.append(block)
         self.coded = [[] for _ in self.blocks]      # per block: (plane's model, [(context, u)])
@@ -168,7 +169,7 @@ class SectionEncoder:
             bits.se(model.bias)
         model.direct_log2 = rng.choice([2, 2, 3, 3, 4, 5, 5 if plane.alphabet == "position" else 7])
         bits.u(model.direct_log2 - 2, 3)
-        sources = [s for s in range(1, 11) if self.available(s, plane)]
+        sources = [s for s in range(1, 12) if self.available(s, plane)]
         model.source_a = rng.choice(sources) if sources and rng.random() < 0.45 else 0
         model.source_b = rng.choice(sources) if model.source_a and rng.random() < 0.4 else 0
         model.thresholds_a, model.thresholds_b = [], []
@@ -279,12 +280,13 @@ class SectionEncoder:
         """8.4 backwards"""
         raw, symbols = Bits(), []
         for model, coded in self.coded[k]:
-            for i, (context, u) in enumerate(coded):
+            for lane, i in self.blocks[k].order():
+                context, u = coded[i]
                 token, low, count = token_of(u, model.direct_log2)
                 raw.u(low, count)
                 table = model.tables[context]
                 row = table.tokens.index(token)
-                symbols.append((i % self.lanes, table.freq[row], table.cum[row]))
+                symbols.append((lane, table.freq[row], table.cum[row]))
         return rans(symbols, self.lanes) + raw.bytes()
 
 

@@ -22,6 +22,7 @@ class GivenWriter(IncrementWriter):
     def choose_elements(self, parent_count):
         u, given = self.u, self.given
         u.position_shift, u.sh_mode = given["position_shift"], given["sh_mode"]
+        u.attribute_step = list(given["attribute_step"])
         u.codebook_ids, u.vq_stage_count = list(given["stages"]), len(given["stages"])
         u.new_count = self.size
 
@@ -42,7 +43,7 @@ class GivenWriter(IncrementWriter):
         return self.in_blocks(codes)
 
     def taker(self, name):
-        def take(attribute, predictions):
+        def take(attribute, predictions, factors):
             planes = [self.given["values"].get((attribute, plane.index)) or self.usual(plane, len(predictions))
                       for plane in self.planes(name) if plane.attribute == attribute]
             self.v[name] = self.v[name] + planes
@@ -60,7 +61,8 @@ class GivenWriter(IncrementWriter):
 
     def coder(self, planes, v, lanes_log2, in_force):
         change = lambda plane, elements: self.tamper("plane", (plane, elements), self)[1]
-        return ScriptCoder(planes, v, self.block_size(), 2 ** lanes_log2, in_force, self.given["plans"], change)
+        return ScriptCoder(planes, v, self.block_size(), 2 ** lanes_log2, in_force, self.rule, self.given["plans"],
+                           change)
 
 
 class FirstIncrement:
@@ -95,13 +97,15 @@ class GivenStream(StreamWriter):
         self.total, self.units = total, 0
         self.frame_header(self.state.next_frame, dc, sh, total)
 
-    def unit(self, values=None, plans=None, codes=None, lanes_log2=0, position_shift=0, sh_mode=0, stages=()):
+    def unit(self, values=None, plans=None, codes=None, lanes_log2=0, position_shift=0, sh_mode=0, stages=(),
+             attribute_step=(0,) * 5):
         """The next increment. values: (attribute, index) -> values of a plane, others are random; plans: those of scripts.py;
         codes: Morton codes of the positions."""
         r = self.units
         size = prefix_count(self.seq, self.total, r) - prefix_count(self.seq, self.total, r - 1)
         writer = GivenWriter(self.rng, self.state.frame, self.live.context(self.state.frame), 0, r, size, self.tamper)
         writer.given = {"values": values or {}, "plans": plans or {}, "codes": codes, "lanes_log2": lanes_log2,
-                        "position_shift": position_shift, "sh_mode": sh_mode, "stages": stages}
+                        "position_shift": position_shift, "sh_mode": sh_mode, "stages": stages,
+                        "attribute_step": attribute_step}
         self.increment(writer)
         self.units += 1

@@ -5,15 +5,17 @@ after it has predicted it, and they are chosen within the ranges of clause 7.
 """
 
 from oracle import models as pm
-from oracle.constants import OUTPUT_MAX
+from oracle.constants import COMPONENT_MAX, OUTPUT_MAX
 from oracle.conventions import Round, ceil_div
 from oracle.increment import Increment
-from oracle.lists import MOVE, MOVE_AND_UPDATE, REMOVE, SKIP, UPDATE, canonical, moved, position_limit, survivors
+from oracle.lists import MOVE, MOVE_AND_UPDATE, REMOVE, SKIP, UPDATE, canonical, position_limit, survivors
+from oracle.moves import moved
+from oracle.steps import LOG_SCALE, StepRule
 from .cells import morton
 from .elements import INCREMENT, Elements
 from .encoding import SectionEncoder, section
 
-SECTIONS = ("modes", "moves", "updates", "predictors", "new")
+SECTIONS = ("modes", "move_predictors", "moves", "updates", "predictors", "new")
 PREDICTORS = INCREMENT.bits["predictor_block_log2"]
 
 
@@ -34,7 +36,7 @@ class IncrementWriter:
         self.seq = context.seq
         self.s, self.r, self.size = s, r, size
         self.tamper = tamper or (lambda stage, value, writer: value)
-        self.v = {}                                 # section -> planes of values
+        self.v = dict.fromkeys(SECTIONS, ())        # section -> planes of values
         self.u = Elements(INCREMENT)
 
     def payload(self):
@@ -45,10 +47,13 @@ class IncrementWriter:
         self.choose_elements(len(parents))
         increment = Increment(UnitOf(self.s, self.r, frame.layer), frame, self.context)
         increment.header = u
+        self.rule = StepRule(self.seq, u.attribute_step)
         modes = self.modes(parents)
-        parents = self.moves(parents, modes)
+        increment.find_parents(parents)
+        parents = self.moves(increment, increment.extrapolated(parents), modes)
         self.v["updates"] = []
         parents = increment.updated(parents, modes, self.taker("updates"), 0) if u.update_count else parents
+        parents = parents if frame.intra else increment.with_changes(parents, modes)
         kinds = self.predictors()
         self.v["new"] = []
         new = []
@@ -66,7 +71,7 @@ class IncrementWriter:
     def choose_elements(self, parent_count):
         rng, u, seq = self.rng, self.u, self.seq
         u.position_shift = rng.choice([0, 0, 0, min(1, seq.position_bits - 1), rng.randint(0, seq.position_bits - 1)])
-        u.attribute_shift = rng.choice([[0] * 5, [rng.choice([0, 0, 1, 2, rng.randint(0, 7)]) for _ in range(5)]])
+        u.attribute_step = rng.choice([[0] * 5, [rng.choice([0, 1, 2, 5, rng.randint(0, 24)]) for _ in range(5)]])
         u.compensation_log_scale = rng.choice([0, 0, 1, -3, 127, -128])
         u.compensation_opacity = rng.choice([0, 0, 2, -5, 127, -128])
         self.choose_sh_mode()
@@ -75,6 +80,9 @@ class IncrementWriter:
         u.remove_count = rng.choice([least, least, rng.randint(least, max(least, removable // 3))])
         u.new_count = self.size - (parent_count - u.remove_count)
         self.choose_predictors()
+        if self.predicting and not self.frame.intra:
+            u.move_block_log2 = rng.choice([None, 0, 0, 1, 2, 3, 16])
+            u.extrapolates_opacity = int(rng.random() < 0.5)
 
     def choose_sh_mode(self):
         rng, u = self.rng, self.u
@@ -89,9 +97,6 @@ class IncrementWriter:
             else:
                 u.sh_mode = 1
         u.vq_stage_count = len(u.codebook_ids)
-        largest = sum(max(abs(x) for x in self.context.codebooks[b].values) for b in u.codebook_ids)
-        while u.sh_mode == 2 and u.attribute_shift[4] and min(largest, 8191) << u.attribute_shift[4] > 8191:
-            u.attribute_shift[4] -= 1
 
     def choose_predictors(self):
         rng, u = self.rng, self.u
@@ -103,7 +108,7 @@ class IncrementWriter:
 
     def choose_flags(self):
         """The parts that are needed, and some whose elements are what they would be if absent."""
-        free = sum(1 << INCREMENT.bits[name] for name in ("position_shift", "attribute_shift", "compensation_opacity")
+        free = sum(1 << INCREMENT.bits[name] for name in ("position_shift", "attribute_step", "compensation_opacity")
                    if self.rng.random() < 0.1)
         self.u.increment_flags = self.u.needed() | free
 
@@ -120,19 +125,36 @@ class IncrementWriter:
         u.move_count = sum(m in (MOVE, MOVE_AND_UPDATE) for m in modes)
         u.update_count = sum(m in (UPDATE, MOVE_AND_UPDATE) for m in modes)
         self.v["modes"] = [modes] if u.move_count + u.update_count + u.remove_count else []
+        if u.move_count == 0 or self.frame.intra:
+            u.move_block_log2 = None
+        u.extrapolates_opacity *= int(len(parents) > 0 and not self.frame.intra)
         return modes
 
-    def moves(self, parents, modes):
+    def moves(self, increment, parents, modes):
+        """The parents after moves that are chosen one after the other, since each may predict those after it."""
         u, limit = self.u, position_limit(self.seq)
         step = u.position_shift + 6
-        planes = [[], [], []]
-        for g, mode in zip(parents, modes):
-            if mode in (MOVE, MOVE_AND_UPDATE):
-                for a in range(3):
-                    low, high = -(g.position_fine[a] >> step), (limit - g.position_fine[a]) >> step
-                    planes[a].append(max(low, min(high, self.move(a))))
-        self.v["moves"] = planes
-        return moved(parents, modes, planes, u.position_shift, self.seq, 0) if u.move_count else parents
+        self.v["moves"], self.starts = [[], [], []], []
+        planes = self.v["moves"]
+        prediction = (increment.move_space(modes), self.move_predictors()) if u.predicts_moves else None
+
+        def take(_, start):
+            self.starts.append(start)               # where the moves start
+            for a in range(3):
+                low, high = -(start[a] >> step), (limit - start[a]) >> step
+                planes[a].append(max(low, min(high, self.move(a))))
+            return [plane[-1] for plane in planes]
+
+        return moved(parents, modes, take, prediction, u, self.seq, 0)
+
+    def move_predictors(self):
+        count = ceil_div(self.u.move_count, 2 ** self.u.move_block_log2)
+        values = self.rng.choices(range(4), self.move_predictor_weights(), k=count)
+        self.v["move_predictors"] = [values]
+        return values
+
+    def move_predictor_weights(self):
+        return self.rng.choice([(1, 1, 1, 1), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)])
 
     def move(self, axis):
         reach = self.rng.choice([0, 1, 5, 300])
@@ -142,74 +164,77 @@ class IncrementWriter:
 
     def taker(self, name):
         """A `take` of residuals.Residuals that chooses values and keeps them."""
-        self.shifts = dict(zip(("log_scale", "opacity", "rotation", "dc", "sh"), self.u.attribute_shift))
-
-        def take(attribute, predictions):
-            rows = [self.choose(attribute, one, self.shifts[attribute]) for one in predictions]
+        def take(attribute, predictions, factors):
+            rows = [self.choose(attribute, *one) for one in zip(predictions, factors)]
             planes = [list(plane) for plane in zip(*rows)] if rows and rows[0] else []
             self.v[name] = self.v[name] + planes
             return planes
 
         return take
 
-    def choose(self, attribute, prediction, shift):
-        """Values of one entry."""
-        return getattr(self, "choose_" + attribute)(prediction, shift)
+    def choose(self, attribute, prediction, factor):
+        """Values of one entry, which are multiplied by the factor (7.6.6)."""
+        return getattr(self, "choose_" + attribute)(prediction, factor)
 
-    def choose_log_scale(self, p, shift):
+    def choose_log_scale(self, p, factor):
         rng = self.rng
         fresh = tuple(p) == (0, 0, 0)
-        reach = rng.choice([0, 1, 4, 4, 40 if not fresh else 400])
+        reach = min(rng.choice([0, 1, 4, 4, 40 if not fresh else 400]), 8000 // factor)
         v = [rng.randint(-reach, reach) for _ in range(3)]
         if rng.random() < 0.005:
             v = [rng.choice([30000, -30000, 9000]), rng.choice([0, 2000]), rng.choice([0, 2000])]
-        x = [value << shift for value in v]
-        d1, d2 = p[0] - p[1] + x[1], p[1] - p[2] + x[2]
+        q0 = p[0] + v[0] * factor
+        factor = self.rule.factor(LOG_SCALE, [q0])
+        d = [p[0] - p[1] + v[1] * factor, p[1] - p[2] + v[2] * factor]
         if self.seq.canonical_axes:                 # what would be negative becomes at least 0
-            v[1] += ceil_div(max(0, -d1), 1 << shift)
-            v[2] += ceil_div(max(0, -d2), 1 << shift)
-        x = [value << shift for value in v]
-        q0 = p[0] + x[0]
-        q1 = q0 - (p[0] - p[1] + x[1])
-        q2 = q1 - (p[1] - p[2] + x[2])
-        good = all(-32768 <= value <= 32767 for value in x + [q0, q1, q2])
-        return v if good else [0, 0, 0]
+            for k in (0, 1):
+                more = ceil_div(max(0, -d[k]), factor)
+                v[1 + k] += more
+                d[k] += more * factor
+        q = [q0, q0 - d[0], q0 - d[0] - d[1]]
+        x = [q0 - p[0], v[1] * factor, v[2] * factor]
+        return v if all(-32768 <= value <= 32767 for value in x + q) else [0, 0, 0]
 
-    def choose_opacity(self, p, shift):
-        reach = self.rng.choice([0, 1, 6, 60])
+    def choose_opacity(self, p, factor):
+        reach = min(self.rng.choice([0, 1, 6, 60]), max(1, 3000 // factor))
         v = self.rng.randint(-reach, reach)
         if self.rng.random() < 0.01:
-            v = (self.rng.choice([-32767, 32767]) - p) >> shift
-        return [v if abs(p + (v << shift)) <= 32767 else 0]
+            v = (self.rng.choice([-32767, 32767]) - p) // factor
+        return [v if abs(p + v * factor) <= 32767 else 0]
 
-    def choose_rotation(self, p, shift):
+    def choose_rotation(self, p, factor):
         result = []
         wild = self.rng.random() < 0.01
         for k in range(3):
             reach = 30000 if wild else self.rng.choice([0, 1, 3, 30])
-            v = self.rng.randint(-reach, reach)     # at most three coarser by 7.6
-            result.append(v if abs(p[k] + (v << (3 + shift + 6))) <= 32767 * 64 else 0)
+            v = self.rng.randint(-reach, reach)
+            result.append(v if abs(p[k] + (v * factor << 6)) <= 32767 * 64 else 0)
         return result
 
-    def choose_components(self, rank, shift):
-        reach = min(self.rng.choice([0, 1, 2, 2, 9, 200]), 8191 >> shift)
+    def choose_components(self, rank, factor):
+        reach = min(self.rng.choice([0, 1, 2, 2, 9, 200]), COMPONENT_MAX // factor)
         return [self.rng.randint(-reach, reach) for _ in range(rank)]
 
-    def choose_dc(self, p, shift):
+    def choose_dc(self, p, factor):
         transform = self.context.dc_transform
-        v = self.choose_components(transform.rank, shift)
+        v = self.choose_components(transform.rank, factor)
         for j in range(3):                          # SS-RC-006
-            total = sum(transform.basis[k * 3 + j] * (v[k] << shift) for k in range(transform.rank))
+            total = sum(transform.basis[k * 3 + j] * (v[k] * factor) for k in range(transform.rank))
             if abs(p[j] + Round(total, 6)) > OUTPUT_MAX:
                 return [0] * transform.rank
         return v
 
-    def choose_sh(self, p, shift):
+    def choose_sh(self, p, factor):
         if self.u.sh_mode == 0:
             return []
         if self.u.sh_mode == 1:
-            return self.choose_components(self.context.sh_transform.rank, shift)
-        return [self.rng.randrange(self.context.codebooks[b].entry_count) for b in self.u.codebook_ids]
+            return self.choose_components(self.context.sh_transform.rank, factor)
+        books = [self.context.codebooks[b] for b in self.u.codebook_ids]
+        for _ in range(4):
+            v = [self.rng.randrange(book.entry_count) for book in books]
+            if all(abs(x) * factor <= COMPONENT_MAX for x in looked_up(books, v)):
+                return v
+        return [0] * len(books)                     # entries of zeros
 
     # ---- 7.17.2, 7.16.4 ----
 
@@ -276,7 +301,7 @@ class IncrementWriter:
 
     def coder(self, planes, v, lanes_log2, in_force):
         available = self.tamper("available", pm.source_available, self)
-        return SectionEncoder(self.rng, planes, v, self.block_size(), 2 ** lanes_log2, in_force, available)
+        return SectionEncoder(self.rng, planes, v, self.block_size(), 2 ** lanes_log2, in_force, available, self.rule)
 
     def section(self, name, v, in_force):
         self.section_name = name
@@ -286,3 +311,10 @@ class IncrementWriter:
         coded = self.coder(self.planes(name), v, lanes_log2, in_force).run()
         models, blocks = self.tamper("coded", coded, self)
         return section(self.tamper("lanes", lanes_log2, self), models, blocks)
+
+
+def looked_up(books, indices):
+    """The sums of entries of codebooks (SS-SH-001), clamped."""
+    columns = zip(*(book.values[index * book.component_count:(index + 1) * book.component_count]
+                    for book, index in zip(books, indices)))
+    return [max(-COMPONENT_MAX, min(COMPONENT_MAX, sum(column))) for column in columns]

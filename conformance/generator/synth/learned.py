@@ -22,6 +22,7 @@ USUAL = {
     "without": (),                                  # GOPs without a weights unit
     "source": 0,
     "complete": False,                              # whether every frame has all its units
+    "feature_shift": 0,
     "least": 12, "above": 0,
     # Gaussians predicted by the network in spatial layers from `above` on
 }
@@ -74,12 +75,10 @@ class LearnedSynth(MixedSynth):
         self.temporal_layers = 1 + max(depth for _, depth, _ in self.gops)
 
     def chosen_sequence(self):
-        asked, parameters = self.asked, bytearray(super().chosen_sequence())
-        percent = asked["percent"]
-        parameters[:4] = [asked["degree"], asked["spatial"], self.temporal_layers, len(percent)]
-        parameters[4:14] = percent + [0] * (10 - len(percent))
-        parameters[14], parameters[15] = asked["bits"], asked["block_log2"]
-        return bytes(parameters)
+        asked = self.asked
+        return {**super().chosen_sequence(), "sh_degree": asked["degree"], "spatial_layer_count": asked["spatial"],
+                "percent": asked["percent"], **self.chosen_grid(asked["bits"]), "block_log2": asked["block_log2"],
+                "feature_shift": asked["feature_shift"]}
 
     def transform_count(self, kind, dimension):
         if kind == 1 and not self.asked["sh_transforms"]:
@@ -256,6 +255,15 @@ VALID = [
     ("gate-open", {"bilateral": (0, 0), "network_flags": 2},
      "Weights of the bilateral predictor are all largest: the gate does nothing",
      "SS-TR-001"),
+    ("feature-shift-1", {"feature_shift": 1, "network_flags": 2, "dc_count": 3, "sh_count": 3},
+     "feature_shift 1 halves the differences of tokens",
+     "SS-TR-001 SS-PR-007"),
+    ("feature-shift-3", {"feature_shift": 3, "network_flags": 10, "token_shift": 1, "dc_count": 2, "sh_count": 4},
+     "feature_shift 3 beside token_shift 1",
+     "SS-TR-001 SS-PR-007"),
+    ("feature-shift-7", {"feature_shift": 7, "token_shift": 8, "network_flags": 1},
+     "feature_shift and token_shift are as large as they may be",
+     "SS-TR-001 SS-PR-007"),
     ("layers", {"spatial": 3, "gops": [(0, 0, 2), (1, 0, 2)], "percent": [40, 100], "network_flags": 0, "most": 40,
                 "above": 1, "least": 40},
      "The network predicts in units of higher spatial layers",

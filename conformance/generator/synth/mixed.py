@@ -1,6 +1,8 @@
 """Random conforming streams of both profiles (A.1) that use every tool."""
 
 from oracle import constants as c
+from oracle.constants import MAX_SEGMENTS
+from oracle.conventions import ceil_div
 from oracle.reconstruction import prefix_count
 from .cells import CellsWriter
 from .increment import IncrementWriter
@@ -32,7 +34,7 @@ class MixedSynth(StreamWriter):
     def stream(self):
         self.plan_gops()
         self.disturb()
-        self.sequence(self.chosen_sequence())
+        self.sequence(sequence_payload(self.chosen_sequence()))
         if self.wants("described", 0.3):
             self.put(c.UT_SCENE, random_scene(self.rng))
         for number, (structure, depth, count) in enumerate(self.gops):
@@ -74,23 +76,41 @@ class MixedSynth(StreamWriter):
                 self.gops.append((1, depth, rng.choice([1, 2, 3, 2 ** depth + 1, 2 ** depth + 2, 9 if depth else 4])))
 
     def chosen_sequence(self):
+        """Elements of sequence_parameters"""
         rng = self.rng
         count = rng.choice([1, 2, 2, 3, 3, 4, 5]) if rng.random() < 0.95 else 10
         spatial, sh_degree = rng.choice([1, 1, 2, 2, 3, 4]), rng.choice([0, 0, 1, 1, 1, 2, 3])
         if self.deep:
             count, spatial, sh_degree = rng.randint(2, 4), rng.choice([1, 1, 2]), rng.choice([0, 0, 1])
         dynamic = self.profile == c.PROFILE_DYNAMIC
-        return sequence_payload({
+        return {
             "sh_degree": sh_degree, "spatial_layer_count": spatial if dynamic else 1,
             "temporal_layer_count": self.temporal_layers,
             "percent": sorted(rng.sample(range(1, 100), count - 1)) + [100],
-            "position_bits": rng.choice([1, 3, 6, 10, 12, 14, 16, 20]), "block_log2": rng.choice([6, 6, 6, 7, 16]),
+            **self.chosen_grid(), **self.chosen_steps(), "block_log2": rng.choice([6, 6, 6, 7, 16]),
             "sequence_flags": rng.randint(0, 3) + WHOLE_ANCHOR * (dynamic and rng.random() < 0.3),
-            "rotation_threshold": sorted([rng.choice([0, 0, 2, 5, 40, 100, 255]) for _ in range(3)], reverse=True),
             "frame_count": rng.choice([0, sum(gop[2] for gop in self.gops)]),
             "ticks_per_second": rng.choice([1, 30, 60]), "ticks_per_frame": rng.choice([0, 1, 3003]),
             "position_offset": [1.5, -0.0, 2.25], "opacity_offset": 1.0, "sh_step": 0.03,
-            "rotation_step": rng.choice([1.0, 0.02, 0.003, 0.0005, 0.0001, 1e-6, 0.7])})
+            "rotation_step": rng.choice([1.0, 0.02, 0.003, 0.0005, 0.0001, 1e-6, 0.7])}
+
+    def chosen_grid(self, bits=None):
+        """A grid that is linear or companded."""
+        rng = self.rng
+        bits = bits or rng.choice([1, 3, 6, 10, 12, 14, 16, 20])
+        linear = rng.choice([20, bits, max(0, bits - 2), max(0, bits - 4)])
+        far = max(0, 2 ** (bits - 1) - 2 ** linear)
+        least = next(k for k in range(21) if ceil_div(far, 2 ** k) <= MAX_SEGMENTS)
+        return {"position_bits": bits, "linear_log2": linear, "segment_log2": min(linear, least + rng.choice([0, 0, 1]))}
+
+    def chosen_steps(self):
+        """Elements of the rule of steps, idle in half of the streams."""
+        rng = self.rng
+        weight = lambda: rng.choice([0, 0, 30, 300, 2000])
+        rule = {"size_weight": [weight() for _ in range(5)], "opacity_weight": [weight() for _ in range(3)],
+                "anisotropy_weight": weight(), "size_reference": rng.choice([-300, 0, 100, 400]),
+                "opacity_reference": rng.choice([-20, 0, 50]), "anisotropy_reference": rng.choice([0, 10, 200])}
+        return {**(rule if rng.random() < 0.5 else {}), "feature_shift": rng.choice([0, 0, 0, 1, 3, 7])}
 
     def present(self, structure, depth, count):
         """Indices of the frames that are there: a frame that is absent takes those that refer to it along."""
@@ -143,7 +163,8 @@ class MixedSynth(StreamWriter):
             layer = old.temporal_layer if old else 0
         size, entries = rng.choice([(1, 5), (1, 17), (2, 3), (2, 40)])
         reach = {1: 60, 2: rng.choice([100, 32767])}[size]
-        self.codebook(identifier, rank, [rng.randint(-reach, reach) for _ in range(entries * rank)], size, layer)
+        values = [0] * rank + [rng.randint(-reach, reach) for _ in range((entries - 1) * rank)]
+        self.codebook(identifier, rank, values, size, layer)
 
     # ---- frames ----
 

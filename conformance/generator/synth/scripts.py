@@ -144,8 +144,8 @@ REUSE = "reuse"                                     # the plan of a plane whose 
 class ScriptCoder(SectionEncoder):
     """A SectionEncoder with plans: (attribute, index) or attribute -> plan; `change` may alter the elements of a plane."""
 
-    def __init__(self, planes, v, block_size, lanes, in_force, plans, change=None):
-        super().__init__(None, planes, v, block_size, lanes, in_force, None)
+    def __init__(self, planes, v, block_size, lanes, in_force, rule, plans, change=None):
+        super().__init__(None, planes, v, block_size, lanes, in_force, None, rule)
         self.plans, self.change = plans, change or (lambda plane, elements: elements)
 
     def plane(self, plane):

@@ -12,7 +12,9 @@ from .encoding import file_header, unit
 from .units import offset_of, stream_of, units_of
 
 SEQUENCE = {"sh_degree": 0, "spatial_layer_count": 1, "temporal_layer_count": 1, "percent": [100], "position_bits": 10,
-            "block_log2": 6, "sequence_flags": 0, "rotation_threshold": [0, 0, 0], "frame_count": 0,
+            "block_log2": 6, "sequence_flags": 0, "linear_log2": 20, "segment_log2": 0, "feature_shift": 0,
+            "size_weight": [0] * 5, "opacity_weight": [0] * 3, "anisotropy_weight": 0, "size_reference": 0,
+            "opacity_reference": 0, "anisotropy_reference": 0, "frame_count": 0,
             "ticks_per_second": 30, "ticks_per_frame": 1, "position_offset": [0.0, 0.0, 0.0], "position_step": 0.001,
             "log_scale_offset": -5.0, "log_scale_step": 0.01, "rotation_step": 0.003, "opacity_offset": 0.0,
             "opacity_step": 0.1, "dc_step": 0.02, "sh_step": 0.02}
@@ -25,8 +27,10 @@ def sequence_payload(asked):
     percent = e["percent"]
     head = [e["sh_degree"], e["spatial_layer_count"], e["temporal_layer_count"], len(percent), *percent,
             *[0] * (10 - len(percent)), e["position_bits"], e["block_log2"], e["sequence_flags"],
-            *e["rotation_threshold"]]
-    return bytes(head) + struct.pack(
+            e["linear_log2"], e["segment_log2"], e["feature_shift"]]
+    rule = [*e["size_weight"], *e["opacity_weight"], e["anisotropy_weight"], e["size_reference"], e["opacity_reference"],
+            e["anisotropy_reference"]]
+    return bytes(head) + struct.pack("<9H3i", *rule) + struct.pack(
         "<III11f", e["frame_count"], e["ticks_per_second"], e["ticks_per_frame"], *e["position_offset"],
         e["position_step"], e["log_scale_offset"], e["log_scale_step"], e["rotation_step"], e["opacity_offset"],
         e["opacity_step"], e["dc_step"], e["sh_step"])

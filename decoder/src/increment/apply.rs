@@ -7,10 +7,11 @@
 use super::prediction::{Predicting, Prediction};
 use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
 use super::values::{SectionValues, UnitValues};
-use crate::attribute::in_range;
+use crate::attribute::{ATTRIBUTE_RANGE, in_range};
 use crate::displacement::{Cell, CellField, rotation_unit};
 use crate::frame::QuantizedFrame;
-use crate::list::{FINE, GaussianList};
+use crate::list::{Change, FINE, GaussianList};
+use crate::moves::{MovePredictor, MoveSpace, Moves, SpanRatio};
 use crate::position::{collect, positions};
 use crate::predictor::Predictor;
 use core::ops::RangeInclusive;
@@ -43,8 +44,6 @@ pub struct Unit<'a> {
     pub coding: AttributeCoding<'a>,
     /// The sequence.
     pub sequence: &'a SequenceParameters,
-    /// Whether the frame is an intra frame.
-    pub intra: bool,
     /// The learned predictor of the GOP.
     pub network: Option<&'a Network>,
     /// How many new Gaussians the network may predict (A.2).
@@ -58,8 +57,20 @@ pub struct Unit<'a> {
 pub struct Situation<'a> {
     /// What the reference set holds besides the parents: before them and after them.
     pub around: [&'a [&'a QuantizedFrame]; 2],
-    /// Intra frames: the parents take part as the unit leaves them. Others: as they come.
-    pub parents_follow: bool,
+    /// What the parents come from in a P or B frame, where they take part as they come; none in an I frame, where they
+    /// take part as the unit leaves them.
+    pub temporal: Option<Temporal<'a>>,
+}
+
+/// What the parents of a unit of a P or B frame come from.
+#[derive(Debug, Clone, Copy)]
+pub struct Temporal<'a> {
+    /// The parents in the reference frame, before displacement.
+    pub reference: &'a GaussianList,
+    /// How changes over the span of the reference frame are scaled.
+    pub ratio: SpanRatio,
+    /// The parents of the units up to this one, which come last; needed if the unit has move predictors.
+    pub moves: Option<&'a MoveSpace>,
 }
 
 /// The result of a unit.
@@ -69,6 +80,8 @@ pub struct Applied {
     pub list: GaussianList,
     /// The new Gaussians by themselves: other units predict from them.
     pub added: QuantizedFrame,
+    /// Which parents stay; empty: all.
+    pub keep: Vec<bool>,
 }
 
 /// Clause 7.5: the cells of a frame, from the values of the section of its header; `at` goes into errors.
@@ -131,9 +144,15 @@ fn cell(code: u64, stale: i32, motion: [i64; 6], at: u64) -> Result<Cell> {
 pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) -> Result<Applied> {
     let mut list = parents;
     let before =
-        (!situation.parents_follow && unit.header.predictor_count() > 0).then(|| list.planes.clone());
-    let keep = change_parents(unit, &mut list)?;
+        (situation.temporal.is_some() && unit.header.predictor_count() > 0).then(|| list.planes.clone());
+    if let Some(temporal) = situation.temporal.as_ref().filter(|_| unit.header.extrapolates_opacity) {
+        extrapolate(&mut list, temporal);
+    }
+    let keep = change_parents(unit, &mut list, situation.temporal.as_ref())?;
     let predictors = predictors(unit)?;
+    if let Some(temporal) = &situation.temporal {
+        list.change = Change::between(temporal.reference, &list);
+    }
     list.retain(&keep);
     let set = match predictors.iter().any(|&predictor| predictor != Predictor::None) {
         true => reference_set(situation, before.as_ref().unwrap_or(&list.planes)),
@@ -143,9 +162,9 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
         check_learned(unit, &predictors)?;
     }
     let position = new_positions(unit)?;
-    let added = new_gaussians(unit, position, &predictors, &set)?;
+    let added = new_gaussians(unit, situation.temporal.is_none(), position, &predictors, &set)?;
     list.append(&added);
-    Ok(Applied { list, added: added.planes })
+    Ok(Applied { list, added: added.planes, keep })
 }
 
 /// Clause 7.7: everything that new Gaussians may be predicted from, in order.
@@ -159,17 +178,24 @@ pub fn reference_set(situation: &Situation<'_>, parents: &QuantizedFrame) -> Qua
 }
 
 /// Applies moves and updates; returns which parents stay.
-fn change_parents(unit: &Unit<'_>, list: &mut GaussianList) -> Result<Vec<bool>> {
+fn change_parents(
+    unit: &Unit<'_>,
+    list: &mut GaussianList,
+    temporal: Option<&Temporal<'_>>,
+) -> Result<Vec<bool>> {
     if !unit.header.has_modes() {
         return Ok(Vec::new());
     }
     let modes = unit.values.plane(Section::Modes, 0);
-    check_modes(unit, modes)?;
+    check_modes(unit, modes, temporal.is_none())?;
     let rows = |bit: i32| -> Vec<u32> {
         (0_u32..).zip(modes).filter(|(_, mode)| *mode & bit != 0).map(|(row, _)| row).collect()
     };
     let (moved, updated) = (rows(HAS_MOVE), rows(HAS_UPDATE));
-    move_parents(unit, list, &moved)?;
+    match temporal.and_then(|temporal| temporal.moves).filter(|_| unit.header.move_predictor_count() > 0) {
+        Some(space) => move_predicted(unit, list, space, modes)?,
+        None => move_parents(unit, list, &moved)?,
+    }
     if !updated.is_empty() {
         let mut attributes = Attributes::of_list(list, &updated);
         let values = AttributeValues(&unit.values.section(Section::Updates).planes);
@@ -183,13 +209,13 @@ fn change_parents(unit: &Unit<'_>, list: &mut GaussianList) -> Result<Vec<bool>>
 }
 
 /// Clause 6.14: the modes are what the counts of the header say.
-fn check_modes(unit: &Unit<'_>, modes: &[i32]) -> Result<()> {
+fn check_modes(unit: &Unit<'_>, modes: &[i32], intra: bool) -> Result<()> {
     if let Some(&mode) = modes.iter().find(|mode| !(0..=REMOVED).contains(*mode)) {
         let (value, min, max) = (mode.into(), 0, REMOVED.into());
         let kind = ErrorKind::OutOfRange { element: "mode", value, min, max };
         return Err(Error::new(unit.at, "7.4", kind));
     }
-    if unit.intra && modes.contains(&REMOVED) {
+    if intra && modes.contains(&REMOVED) {
         let rule = "an intra frame removes no Gaussian";
         return Err(Error::new(unit.at, "7.4", ErrorKind::Constraint { rule }));
     }
@@ -213,22 +239,62 @@ fn check_modes(unit: &Unit<'_>, modes: &[i32]) -> Result<()> {
     Ok(())
 }
 
+/// Moves without predictors: residuals on top of displaced positions.
 fn move_parents(unit: &Unit<'_>, list: &mut GaussianList, moved: &[u32]) -> Result<()> {
-    let last =
-        1_i64.wrapping_shl(unit.sequence.position_bits.into()).wrapping_sub(1).wrapping_mul(FINE.into());
-    let unit_step = i64::from(FINE).wrapping_shl(unit.header.position_shift.into());
     for (axis, plane) in list.position_fine.iter_mut().enumerate() {
         for (&row, &value) in moved.iter().zip(unit.values.plane(Section::Moves, axis)) {
             let Some(slot) = usize::try_from(row).ok().and_then(|row| plane.get_mut(row)) else { continue };
-            let sum = i64::from(*slot).wrapping_add(i64::from(value).wrapping_mul(unit_step));
-            if !(0..=last).contains(&sum) {
-                let rule = "a position lies outside the grid";
-                return Err(Error::new(unit.at, "7.4", ErrorKind::Constraint { rule }));
-            }
-            *slot = i32::try_from(sum).unwrap_or(0);
+            *slot = moved_by(unit, *slot, value)?;
         }
     }
     Ok(())
+}
+
+/// A fine coordinate after a move by so many steps.
+fn moved_by(unit: &Unit<'_>, from: i32, value: i32) -> Result<i32> {
+    let last =
+        1_i64.wrapping_shl(unit.sequence.position_bits.into()).wrapping_sub(1).wrapping_mul(FINE.into());
+    let step = i64::from(FINE).wrapping_shl(unit.header.position_shift.into());
+    let sum = i64::from(from).wrapping_add(i64::from(value).wrapping_mul(step));
+    if !(0..=last).contains(&sum) {
+        let rule = "a position lies outside the grid";
+        return Err(Error::new(unit.at, "7.4", ErrorKind::Constraint { rule }));
+    }
+    Ok(i32::try_from(sum).unwrap_or(0))
+}
+
+/// Moves with predictors: residuals on top of predictions, one parent after the other.
+fn move_predicted(unit: &Unit<'_>, list: &mut GaussianList, space: &MoveSpace, modes: &[i32]) -> Result<()> {
+    let codes = unit.values.plane(Section::MovePredictors, 0);
+    let predictors: Vec<MovePredictor> =
+        codes.iter().map(|&code| MovePredictor::from_code(code, unit.at)).collect::<Result<_>>()?;
+    let run = 1_usize.wrapping_shl(unit.header.move_block_log2.into());
+    let predictor_of = |number: usize| {
+        let run = number.checked_div(run).unwrap_or(0);
+        predictors.get(run).copied().unwrap_or_default()
+    };
+    let mut moves: Moves<'_> = space.moves(modes, |number| predictor_of(number).has_neighbours());
+    for number in 0..moves.rows().len() {
+        let mut position = moves.predicted(number, predictor_of(number));
+        for (axis, coordinate) in position.iter_mut().enumerate() {
+            let value = unit.values.plane(Section::Moves, axis).get(number).copied().unwrap_or(0);
+            *coordinate = moved_by(unit, *coordinate, value)?;
+        }
+        moves.set(number, position);
+        let row = moves.rows().get(number).map_or(usize::MAX, |&row| row as usize);
+        for (plane, coordinate) in list.position_fine.iter_mut().zip(position) {
+            plane.get_mut(row).into_iter().for_each(|slot| *slot = coordinate);
+        }
+    }
+    Ok(())
+}
+
+/// Opacities of parents go on changing as they did to the reference frame, before anything is said of them.
+fn extrapolate(list: &mut GaussianList, temporal: &Temporal<'_>) {
+    for (opacity, &fade) in list.planes.opacity.iter_mut().zip(&temporal.reference.change.fade) {
+        let gone_on = opacity.wrapping_add(temporal.ratio.scaled(fade));
+        *opacity = gone_on.clamp(*ATTRIBUTE_RANGE.start(), *ATTRIBUTE_RANGE.end());
+    }
 }
 
 /// Clause 7.6.4, block by block.
@@ -275,6 +341,7 @@ fn check_learned(unit: &Unit<'_>, predictors: &[Predictor]) -> Result<()> {
 
 fn new_gaussians(
     unit: &Unit<'_>,
+    anchor: bool,
     position: [Vec<u32>; 3],
     predictors: &[Predictor],
     set: &QuantizedFrame,
@@ -282,7 +349,12 @@ fn new_gaussians(
     let count = position.first().map_or(0, Vec::len);
     let sh_planes = usize::from(unit.sequence.sh_dimension());
     let values = &unit.values.section(Section::New).planes;
-    let by = Predicting { header: unit.header, colour: unit.coding.colour, network: unit.network };
+    let by = Predicting {
+        header: unit.header,
+        colour: unit.coding.colour,
+        network: unit.network,
+        feature_shift: unit.sequence.feature_shift,
+    };
     let prediction = Prediction::new(set, position.each_ref().map(Vec::as_slice), predictors, &by);
     let attributes = match prediction {
         Some(prediction) => {
@@ -294,10 +366,8 @@ fn new_gaussians(
     };
     let Attributes { log_scale, opacity, rotation_fine, dc, sh } = attributes;
     let rotation = [(); 3].map(|()| vec![0; count]);
-    let mut list = GaussianList::of_planes(
-        QuantizedFrame { position, log_scale, opacity, rotation, dc, sh },
-        unit.intra,
-    );
+    let mut list =
+        GaussianList::of_planes(QuantizedFrame { position, log_scale, opacity, rotation, dc, sh }, anchor);
     list.rotation_fine = rotation_fine;
     list.settle();
     Ok(list)

@@ -32,6 +32,8 @@ pub struct Predicting<'a> {
     pub colour: Colour<'a>,
     /// The network of the GOP.
     pub network: Option<&'a Network>,
+    /// `feature_shift` of the sequence.
+    pub feature_shift: u8,
 }
 
 /// Items, at least, that are worth another thread.
@@ -59,6 +61,8 @@ pub struct Prediction<'s> {
     /// Squared differences of the attributes known so far, for each of `neighbours`.
     features: Vec<u64>,
     falloff: [u8; 2],
+    /// Low bits of differences that are ignored.
+    feature_shift: u8,
     /// The network, if a Gaussian takes it.
     network: Option<LaneNetwork>,
 }
@@ -93,8 +97,20 @@ impl<'s> Prediction<'s> {
         let falloff = [header.bilateral_spatial, header.bilateral_feature];
         let network = by.network.filter(|_| predictors.contains(&Predictor::Transformer));
         let network = network.map(LaneNetwork::new);
-        let (rows, colour) = (Rows::new(set, &neighbours), by.colour);
-        Some(Self { set, colour, items, position, neighbours, count, rows, features, falloff, network })
+        let (rows, colour, feature_shift) = (Rows::new(set, &neighbours), by.colour, by.feature_shift);
+        Some(Self {
+            set,
+            colour,
+            items,
+            position,
+            neighbours,
+            count,
+            rows,
+            features,
+            falloff,
+            feature_shift,
+            network,
+        })
     }
 
     /// Predicts and adds residuals, attribute by attribute.
@@ -130,22 +146,22 @@ impl<'s> Prediction<'s> {
     /// Updates the attribute differences with one attribute as it is reconstructed.
     pub fn learn(&mut self, stage: Stage, attributes: &Attributes) {
         let same: fn(i32) -> i32 = |value| value;
-        let grid: [fn(i32) -> i32; 2] = match stage {
-            Stage::LogScale | Stage::Opacity => [same; 2],
-            Stage::Rotation => [canonical, same],
-            Stage::Dc => [canonical; 2],
+        let (grid, shift) = match stage {
+            Stage::LogScale | Stage::Opacity => (same, self.feature_shift),
+            Stage::Rotation => (canonical as fn(i32) -> i32, self.feature_shift),
+            Stage::Dc => (same, self.feature_shift.wrapping_add(6)),
             // Nothing is predicted after it.
             Stage::Sh => return,
         };
-        self.compare(stage, attributes.stage(stage), grid);
+        self.compare(stage, attributes.stage(stage), grid, shift.into());
     }
 
     /// The network, if a Gaussian takes it.
     pub fn learned(&self) -> Option<Learned<'_>> {
-        let Self { network, set, rows, colour, .. } = self;
+        let Self { network, set, rows, colour, feature_shift, .. } = self;
         network.as_ref().map(|network| {
             let projection = Projection::new(network.header(), colour.dc, colour.sh);
-            Learned { network, projection, set, rows }
+            Learned { network, projection, set, rows, feature_shift: *feature_shift }
         })
     }
 
@@ -218,25 +234,32 @@ impl<'s> Prediction<'s> {
         }
     }
 
-    /// Adds the squared differences between the items and their neighbours in an attribute, both brought to one grid.
-    fn compare(&mut self, stage: Stage, own: &[Vec<i32>], grid: [fn(i32) -> i32; 2]) {
+    /// Adds the squares of the differences between the items and their neighbours in an attribute, rounded to steps of
+    /// 2^shift. `grid` brings values of the items to the grid of the neighbours.
+    fn compare(&mut self, stage: Stage, own: &[Vec<i32>], grid: fn(i32) -> i32, shift: u32) {
         let columns = self.rows.columns(stage);
         let mut mine = [0; 3];
         for (index, item) in self.items.iter().enumerate() {
             if !self.is_compared(item) {
                 continue;
             }
-            mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = grid[0](at(plane, item.row)));
+            mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = grid(at(plane, item.row)));
             let range = self.range(index);
             let rows = self.rows.of(range.clone()).filter_map(|row| row.get(columns.clone()));
             for (feature, row) in self.features.get_mut(range).unwrap_or_default().iter_mut().zip(rows) {
                 for (theirs, mine) in row.iter().zip(mine) {
-                    let difference = u64::from(mine.abs_diff(grid[1](*theirs)));
+                    let difference =
+                        rounded(i64::from(mine).wrapping_sub((*theirs).into()), shift).unsigned_abs();
                     *feature = feature.saturating_add(difference.wrapping_mul(difference));
                 }
             }
         }
     }
+}
+
+/// `Round(value, bits)` of clause 4.
+fn rounded(value: i64, bits: u32) -> i64 {
+    value.wrapping_add(1_i64.wrapping_shl(bits) >> 1).wrapping_shr(bits)
 }
 
 /// Writes a value to a row of each plane.

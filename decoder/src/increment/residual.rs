@@ -1,9 +1,10 @@
 //! Clause 7.6: residuals on top of a prediction, attribute by attribute.
 
-use crate::attribute::{self, ATTRIBUTE_RANGE, in_range, rotation_shift};
+use crate::attribute::{ATTRIBUTE_RANGE, in_range};
 use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
-use crate::layout::ShCoding;
+use crate::layout::{Attribute, ShCoding};
 use crate::list::{FINE, FRACTION_BITS, GaussianList};
+use crate::steps::{Exponents, StepRule, step};
 use core::ops::RangeInclusive;
 use splatstream_format::payload::Transform;
 use splatstream_format::{Error, ErrorKind, Result};
@@ -14,12 +15,10 @@ const ROTATION_FINE_RANGE: RangeInclusive<i32> = -32_767 * FINE..=32_767 * FINE;
 /// How a unit codes attributes.
 #[derive(Debug, Clone, Copy)]
 pub struct AttributeCoding<'a> {
-    /// attribute_shift: low bits not coded of log_scale, opacity, rotation, dc, sh.
-    pub shift: [u8; 5],
+    /// The steps of the values.
+    pub steps: StepRule,
     /// Whether the axes are sorted.
     pub canonical_axes: bool,
-    /// rotation_threshold of the sequence.
-    pub rotation_thresholds: [u8; 3],
     /// How components become colour.
     pub colour: Colour<'a>,
 }
@@ -42,6 +41,18 @@ pub enum Stage {
 impl Stage {
     /// Every attribute, in order.
     pub const ALL: [Self; 5] = [Self::LogScale, Self::Opacity, Self::Rotation, Self::Dc, Self::Sh];
+
+    /// That of the planes of an attribute, if it is one of those.
+    pub const fn of(attribute: Attribute) -> Option<Self> {
+        match attribute {
+            Attribute::LogScale => Some(Self::LogScale),
+            Attribute::Opacity => Some(Self::Opacity),
+            Attribute::Rotation => Some(Self::Rotation),
+            Attribute::Dc => Some(Self::Dc),
+            Attribute::Sh => Some(Self::Sh),
+            _ => None,
+        }
+    }
 }
 
 /// The attributes of a run of Gaussians: predictions at first, then what the residuals make of them.
@@ -196,26 +207,29 @@ impl Attributes {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        let residuals = shifted(values.of_stage(Stage::LogScale, &coding.colour), coding.shift[0]);
-        for plane in &residuals {
-            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
-        }
-        let [first, second, third] = residuals.as_slice() else { return Ok(()) };
+        let [first, second, third] = values.of_stage(Stage::LogScale, &coding.colour) else { return Ok(()) };
+        let of_largest = step(coding.steps.of_largest());
         let [largest, middle, smallest] = &mut self.log_scale;
-        let mut least = 0;
+        let (mut least, mut reach) = (0, 0..=0);
         for (((a, b), c), ((&u, &v), &w)) in largest
             .iter_mut()
             .zip(middle.iter_mut())
             .zip(smallest.iter_mut())
             .zip(first.iter().zip(second).zip(third))
         {
-            let differences = [a.wrapping_sub(*b).wrapping_add(v), b.wrapping_sub(*c).wrapping_add(w)];
-            let [to_middle, to_smallest] = differences;
+            let u = u.wrapping_mul(of_largest);
+            let start = *a;
             *a = a.wrapping_add(u);
+            let step = step(coding.steps.of_log_scale(*a));
+            let [v, w] = [v.wrapping_mul(step), w.wrapping_mul(step)];
+            reach = u.min(v).min(w).min(*reach.start())..=u.max(v).max(w).max(*reach.end());
+            let differences = [start.wrapping_sub(*b).wrapping_add(v), b.wrapping_sub(*c).wrapping_add(w)];
+            let [to_middle, to_smallest] = differences;
             *b = a.wrapping_sub(to_middle);
             *c = b.wrapping_sub(to_smallest);
             least = least.min(to_middle).min(to_smallest);
         }
+        in_range(&[*reach.start(), *reach.end()], &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
         for plane in &self.log_scale {
             in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
         }
@@ -236,13 +250,19 @@ impl Attributes {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        for residual in shifted(values.of_stage(Stage::Opacity, &coding.colour), coding.shift[1]) {
+        let exponents = self.exponents(Stage::Opacity, coding);
+        for residual in scaled(values.of_stage(Stage::Opacity, &coding.colour), &exponents) {
             add(&mut self.opacity, &residual);
         }
         in_range(&self.opacity, &ATTRIBUTE_RANGE, "opacity", "7.6", at)
     }
 
-    /// Residuals of the rotation, coarser where the log-scales say so.
+    /// The exponents of the steps of an attribute; those before it have been reconstructed.
+    fn exponents(&self, stage: Stage, coding: &AttributeCoding<'_>) -> Exponents {
+        coding.steps.exponents(stage, self.log_scale.each_ref().map(Vec::as_slice), &self.opacity)
+    }
+
+    /// Residuals of the rotation.
     ///
     /// # Errors
     /// Invalid if a value leaves its range.
@@ -252,17 +272,15 @@ impl Attributes {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        let [largest, _, smallest] = &self.log_scale;
+        let exponents = self.exponents(Stage::Rotation, coding);
         for (plane, residual) in
             self.rotation_fine.iter_mut().zip(values.of_stage(Stage::Rotation, &coding.colour))
         {
             in_range(residual, &ATTRIBUTE_RANGE, "rotation", "7.6", at)?;
-            for ((slot, &value), (&a, &c)) in plane.iter_mut().zip(residual).zip(largest.iter().zip(smallest))
-            {
-                let coarser = rotation_shift(a.wrapping_sub(c), coding.rotation_thresholds);
-                let bits = coarser.wrapping_add(u32::from(coding.shift[2])).wrapping_add(FRACTION_BITS);
-                // At most 2^15 * 2^(3 + 7 + 6): the sum with a fine rotation stays below 2^31 only after a clamp.
-                let change = i64::from(value).wrapping_shl(bits);
+            for (row, (slot, &value)) in plane.iter_mut().zip(residual).enumerate() {
+                // At most 2^15 * 6144 * 2^6: the sum with a fine rotation stays below 2^31 only after a clamp.
+                let fine = i64::from(step(exponents.at(row))).wrapping_shl(FRACTION_BITS);
+                let change = i64::from(value).wrapping_mul(fine);
                 let sum = i64::from(*slot).wrapping_add(change);
                 *slot = i32::try_from(sum).unwrap_or(i32::MAX);
             }
@@ -276,7 +294,8 @@ impl Attributes {
     /// # Errors
     /// Invalid if a value leaves its range.
     fn add_dc(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
-        let components = shifted(values.of_stage(Stage::Dc, &coding.colour), coding.shift[3]);
+        let exponents = self.exponents(Stage::Dc, coding);
+        let components = scaled(values.of_stage(Stage::Dc, &coding.colour), &exponents);
         let mut out: Vec<&mut [i32]> = self.dc.iter_mut().map(Vec::as_mut_slice).collect();
         add_inverse(coding.colour.dc, &components, &mut out, at)?;
         self.dc.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "dc", "7.6", at))
@@ -289,12 +308,13 @@ impl Attributes {
     fn add_sh(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
         let planes = values.of_stage(Stage::Sh, &coding.colour);
         let Some(transform) = coding.colour.sh else { return Ok(()) };
+        let exponents = self.exponents(Stage::Sh, coding);
         let components = match coding.colour.mode {
             ShCoding::None => return Ok(()),
-            ShCoding::Coefficients { .. } => shifted(planes, coding.shift[4]),
+            ShCoding::Coefficients { .. } => scaled(planes, &exponents),
             ShCoding::VectorQuantised { .. } => {
                 let entries = coding.colour.entries(planes, usize::from(transform.header.rank), at)?;
-                shifted(&entries, coding.shift[4])
+                scaled(&entries, &exponents)
             }
         };
         let mut out: Vec<&mut [i32]> = self.sh.iter_mut().map(Vec::as_mut_slice).collect();
@@ -308,9 +328,9 @@ fn first_sh(colour: &Colour<'_>) -> usize {
     DC.saturating_add(usize::from(colour.dc.header.rank))
 }
 
-/// Planes times 2^shift.
-fn shifted(planes: &[Vec<i32>], shift: u8) -> Vec<Vec<i32>> {
-    planes.iter().map(|plane| attribute::shifted(plane, shift)).collect()
+/// Planes times the steps of their attribute.
+fn scaled(planes: &[Vec<i32>], exponents: &Exponents) -> Vec<Vec<i32>> {
+    planes.iter().map(|plane| exponents.scaled(plane)).collect()
 }
 
 fn add(plane: &mut [i32], residual: &[i32]) {

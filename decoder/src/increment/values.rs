@@ -1,7 +1,8 @@
 //! Clauses 8.1 to 8.6 for increments: the sections of a unit to the values of its planes.
 
 use crate::attribute;
-use crate::block::{CodedBlock, decode_coded};
+use crate::block::{Buffers, CodedBlock, CodedPlanes, decode_coded};
+use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
@@ -25,13 +26,13 @@ pub struct SectionValues {
 /// The values of an increment.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct UnitValues {
-    sections: [SectionValues; 6],
+    sections: [SectionValues; Section::COUNT],
 }
 
 impl UnitValues {
     /// The values of a section; none of a section that is absent.
     pub fn section(&self, section: Section) -> &SectionValues {
-        // Every section has an index below 6.
+        // Every section has an index below COUNT.
         const ABSENT: &SectionValues = &SectionValues { deltas: Vec::new(), planes: Vec::new(), block: 0 };
         self.sections.get(section.index()).unwrap_or(ABSENT)
     }
@@ -54,6 +55,18 @@ impl UnitValues {
 pub struct PreparedSections<'r, 'a> {
     sections: &'r [CodedSection<'a>],
     models: Vec<SectionModels>,
+    steps: StepRule,
+}
+
+/// What the planes of the sections of a unit depend on besides their models.
+#[derive(Debug, Clone, Copy)]
+pub struct SectionCoding {
+    /// Components of the dc transform.
+    pub dc_rank: u8,
+    /// How the spherical harmonics are coded.
+    pub sh: ShCoding,
+    /// The steps of the attributes.
+    pub steps: StepRule,
 }
 
 impl<'r, 'a> PreparedSections<'r, 'a> {
@@ -63,14 +76,13 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
     /// Malformed or invalid by clauses 5.12 and 6.12.
     pub fn new(
         sections: &'r [CodedSection<'a>],
-        dc_rank: u8,
-        sh: ShCoding,
+        coding: &SectionCoding,
         in_force: &mut ModelsInForce,
         trace: &mut impl ModelTrace,
     ) -> Result<Self> {
         let mut models = Vec::with_capacity(sections.len());
         for coded in sections {
-            let layout = Layout::of_section(coded.section, dc_rank, sh);
+            let layout = Layout::of_section(coded.section, coding.dc_rank, coding.sh);
             let reusable = in_force.reusable(coded.section, &layout);
             let read = read_models(coded.model, coded.model_at, &layout.alphabets(), &reusable, trace)?;
             layout.check(&read, coded.model_at)?;
@@ -79,7 +91,7 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
         for (coded, models) in sections.iter().zip(&models) {
             in_force.replace(coded.section, models.clone());
         }
-        Ok(Self { sections, models })
+        Ok(Self { sections, models, steps: coding.steps })
     }
 
     /// The sections with their planes and models.
@@ -109,7 +121,7 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
     pub fn decode(&self, sequence: &SequenceParameters) -> Result<UnitValues> {
         let mut values = UnitValues::default();
         for (coded, models) in self.sections() {
-            values.set(coded.section, joined(&self.blocks(coded, models, sequence)?, models, sequence));
+            values.set(coded.section, joined(self.blocks(coded, models, sequence)?, models, sequence));
         }
         Ok(values)
     }
@@ -125,10 +137,11 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
         sequence: &SequenceParameters,
     ) -> Result<Vec<CodedBlock>> {
         let decoders: Vec<PlaneDecoder> = models.models.iter().map(PlaneDecoder::new).collect();
+        let planes = CodedPlanes { lanes_log2: coded.lanes_log2, layout: &models.layout, steps: self.steps };
         let decoded: Vec<Result<CodedBlock>> = blocks_of(coded, sequence)
             .into_par_iter()
             .map(|(bytes, at, count)| {
-                decode_coded(bytes, at, count, &models.layout, coded.lanes_log2, &decoders)
+                decode_coded(bytes, at, count, &planes, &decoders, &mut Buffers::default())
             })
             .collect();
         decoded.into_iter().collect()
@@ -155,20 +168,26 @@ fn block_size(sequence: &SequenceParameters) -> usize {
     1_usize.wrapping_shl(u32::from(sequence.block_log2))
 }
 
-/// The blocks of a section one after the other, biases added.
-fn joined(blocks: &[CodedBlock], models: &SectionModels, sequence: &SequenceParameters) -> SectionValues {
+/// The blocks of a section one after the other, biases added. The memory of the first block is used again.
+fn joined(blocks: Vec<CodedBlock>, models: &SectionModels, sequence: &SequenceParameters) -> SectionValues {
     let has_deltas = models.layout.planes().first().is_some_and(|plane| plane.is_position());
-    let first = usize::from(has_deltas);
-    let deltas = match has_deltas {
-        true => blocks.iter().flat_map(|block| block.deltas.iter().copied()).collect(),
-        false => Vec::new(),
-    };
-    let planes = models.models.iter().enumerate().skip(first).map(|(plane, model)| {
-        let of_block = |block: &CodedBlock| {
-            let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-            attribute::unbias(coded, model.bias)
-        };
-        blocks.iter().flat_map(of_block).collect()
-    });
-    SectionValues { deltas, planes: planes.collect(), block: block_size(sequence) }
+    let mut blocks = blocks.into_iter();
+    let mut values = SectionValues { block: block_size(sequence), ..SectionValues::default() };
+    if let Some(first) = blocks.next() {
+        (values.deltas, values.planes) = (first.deltas, first.coded);
+    }
+    for block in blocks {
+        values.deltas.extend_from_slice(&block.deltas);
+        for (plane, more) in values.planes.iter_mut().zip(&block.coded) {
+            plane.extend_from_slice(more);
+        }
+    }
+    for (plane, model) in values.planes.iter_mut().zip(&models.models) {
+        attribute::unbias(plane, model.bias);
+    }
+    match has_deltas {
+        true => drop(values.planes.drain(..1)),
+        false => values.deltas = Vec::new(),
+    }
+    values
 }

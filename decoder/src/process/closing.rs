@@ -6,7 +6,7 @@ use super::frame::{Context, FrameInProgress};
 use crate::carried::Carried;
 use crate::digest::lists_digest;
 use crate::frame::QuantizedFrame;
-use crate::frame_state::FrameState;
+use crate::frame_state::{FrameState, span_log2};
 use crate::list::GaussianList;
 use splatstream_format::{Error, ErrorKind};
 use std::sync::Arc;
@@ -86,6 +86,7 @@ impl FrameInProgress<'_> {
         let mut fault = None;
         decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()));
         if let Some(reference) = reference {
+            state.span_log2 = span_log2(self.index, reference);
             state.anchor = reference.anchor.clone();
             state.is_exact = reference.is_exact && level > 0;
             state.carried_shift = reference.carried_shift;

@@ -12,12 +12,14 @@ use crate::digest::{ListDigest, list_digest, lists_digest};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::frame::QuantizedFrame;
-use crate::frame_state::FrameState;
+use crate::frame_state::{FrameState, span_log2};
 use crate::increment::residual::AttributeCoding;
-use crate::increment::values::{PreparedSections, UnitValues};
-use crate::increment::{Applied, Situation, Unit, apply};
+use crate::increment::values::{PreparedSections, SectionCoding, UnitValues};
+use crate::increment::{Applied, Situation, Temporal, Unit, apply};
 use crate::layout::ShCoding;
 use crate::list::GaussianList;
+use crate::moves::{MoveSpace, SpanRatio};
+use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::syntax::IncrementHeader;
@@ -42,7 +44,11 @@ pub(super) struct Lists {
     pub(super) digests: Vec<ListDigest>,
     pub(super) models: ModelsOfFrame,
     /// In a P or B frame: the first lists of the reference frame displaced, as far as units predicted from them.
-    displaced: Vec<QuantizedFrame>,
+    displaced: Vec<GaussianList>,
+    /// Which parents the unit of each list has kept; empty: all.
+    kept: Vec<Vec<bool>>,
+    /// In a P or B frame: the parents of the first units, as far as moves were predicted from them.
+    moves: Option<MoveSpace>,
 }
 
 /// The last unit of a list.
@@ -162,14 +168,11 @@ impl<'a> FrameInProgress<'a> {
         let sh = ShCoding::of(&header.sh(), transforms.sh.map_or(0, |sh| sh.header.rank));
         let mut models = in_force.before(unit.refinement).clone();
         let sections = &unit.increment.sections;
-        let sections = PreparedSections::new(sections, transforms.dc.header.rank, sh, &mut models, &mut ())?;
+        let steps = StepRule::new(context.sequence, header.attribute_step);
+        let coding = SectionCoding { dc_rank: transforms.dc.header.rank, sh, steps };
+        let sections = PreparedSections::new(sections, &coding, &mut models, &mut ())?;
         in_force.follow(unit.refinement, models.clone());
-        let coding = AttributeCoding {
-            shift: header.attribute_shift,
-            canonical_axes: context.sequence.canonical_axes(),
-            rotation_thresholds: context.sequence.rotation_threshold,
-            colour,
-        };
+        let coding = AttributeCoding { steps, canonical_axes: context.sequence.canonical_axes(), colour };
         Ok(Prepared { unit, sections, coding, models })
     }
 
@@ -260,12 +263,11 @@ impl<'a> FrameInProgress<'a> {
             values,
             coding: prepared.coding,
             sequence: context.sequence,
-            intra: self.is_intra(),
             network: context.gop.network(),
             max_learned: context.options.limits.max_learned,
             at: pending.payload_at,
         };
-        let Applied { list, added } = self.applied(&unit, pending.refinement, context)?;
+        let Applied { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
         self.check_list(pending, context, || list.digest())?;
         if context.options.entropy {
             let state = of_sections(&pending.increment.sections, values);
@@ -274,6 +276,7 @@ impl<'a> FrameInProgress<'a> {
         }
         let (size, head) = (list.len(), Head::new(pending, list.len(), added.len()));
         self.lists.take(pending.refinement, list, head);
+        put(&mut self.lists.kept, pending.refinement.into(), keep);
         self.finish_unit(pending, size, prepared);
         Ok(())
     }
@@ -286,28 +289,64 @@ impl<'a> FrameInProgress<'a> {
             let parents = self.lists.lists.get(r).map_or_else(empty, |list| list.as_ref().clone());
             let lower: Vec<&QuantizedFrame> =
                 self.lists.lists.iter().take(r).map(|list| &list.planes).collect();
-            return apply(unit, parents, &Situation { around: [&lower, &[]], parents_follow: true });
+            return apply(unit, parents, &Situation { around: [&lower, &[]], temporal: None });
         };
-        let mut parents = reference.lists.get(r).map_or_else(empty, |list| list.as_ref().clone());
+        let before = reference.lists.get(r).map_or_else(|| Arc::new(empty()), Arc::clone);
+        let mut parents = before.unchanged();
         parents.displace(&self.field);
-        if unit.header.predictor_count() == 0 {
-            return apply(unit, parents, &Situation { around: [&[], &[]], parents_follow: false });
+        let ratio = SpanRatio::new(span_log2(self.index, reference), reference.span_log2);
+        let predicts_moves = unit.header.move_predictor_count() > 0;
+        let predicts_new = unit.header.predictor_count() > 0;
+        if predicts_moves || predicts_new {
+            self.displace_before(r, reference);
         }
-        self.displace_before(r, reference);
-        let added = self.added_before(r);
-        let lower: Vec<&QuantizedFrame> = self.lists.displaced.iter().take(r).collect();
+        let mut moves = None;
+        if predicts_moves {
+            let mut space = self.moves_before(r, reference, ratio, unit.sequence.position_bits);
+            space.push(&before, &parents);
+            moves = Some(space);
+        }
+        let temporal = Temporal { reference: &before, ratio, moves: moves.as_ref() };
+        let added = if predicts_new { self.added_before(r) } else { Vec::new() };
+        let lower: Vec<&QuantizedFrame> =
+            self.lists.displaced.iter().take(r).map(|list| &list.planes).collect();
         let anchor = reference.anchor.iter().flat_map(|lists| lists.iter().skip(r.wrapping_add(1)));
         let after: Vec<&QuantizedFrame> = anchor.map(|list| &list.planes).chain(&added).collect();
-        apply(unit, parents, &Situation { around: [&lower, &after], parents_follow: false })
+        let applied =
+            apply(unit, parents, &Situation { around: [&lower, &after], temporal: Some(temporal) })?;
+        if let Some(mut space) = moves {
+            space.settle(&applied.list, &applied.keep);
+            self.lists.moves = Some(space);
+        }
+        Ok(applied)
     }
 
     /// Displaces the lists before list r of the reference frame, unless units before have asked for them.
     fn displace_before(&mut self, r: usize, reference: &FrameState) {
         for list in reference.lists.iter().take(r).skip(self.lists.displaced.len()) {
-            let mut list = list.as_ref().clone();
+            let mut list = list.unchanged();
             list.displace(&self.field);
-            self.lists.displaced.push(list.planes);
+            self.lists.displaced.push(list);
         }
+    }
+
+    /// The parents of the units before unit r, with their motions; their lists have been displaced.
+    fn moves_before(
+        &mut self,
+        r: usize,
+        reference: &FrameState,
+        ratio: SpanRatio,
+        position_bits: u8,
+    ) -> MoveSpace {
+        let new = || MoveSpace::new(ratio, position_bits);
+        let mut space = self.lists.moves.take().unwrap_or_else(new);
+        let units = reference.lists.iter().zip(&self.lists.displaced).zip(&self.lists.lists);
+        let units = units.zip(&self.lists.kept).take(r).skip(space.len());
+        for (((before, displaced), list), keep) in units {
+            space.push(before, displaced);
+            space.settle(list, keep);
+        }
+        space
     }
 
     /// The Gaussians that the units before unit r added.

@@ -9,8 +9,9 @@ use crate::displacement::CellField;
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::gop::{Gop, element_at};
 use crate::increment::field;
-use crate::increment::values::PreparedSections;
+use crate::increment::values::{PreparedSections, SectionCoding};
 use crate::layout::{Section, ShCoding};
+use crate::steps::StepRule;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{Cells, FramePayload};
 use splatstream_format::syntax::{FrameRole, GopHeader, SequenceParameters, UnitHeader};
@@ -190,7 +191,9 @@ impl Context<'_> {
         let is_available = self.reference.is_some_and(|reference| reference.carried.is_some());
         let Some(cells) = cells.filter(|_| is_available) else { return Ok(moved) };
         let sections = core::slice::from_ref(&cells.coded);
-        let prepared = PreparedSections::new(sections, 0, ShCoding::None, &mut moved.models, &mut ())?;
+        let steps = StepRule::new(self.sequence, [0; 5]);
+        let coding = SectionCoding { dc_rank: 0, sh: ShCoding::None, steps };
+        let prepared = PreparedSections::new(sections, &coding, &mut moved.models, &mut ())?;
         let values = prepared.decode(self.sequence)?;
         moved.field = field(values.section(Section::Cells), cells.cell_log2, self.sequence, at)?;
         if self.options.entropy {

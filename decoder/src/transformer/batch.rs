@@ -26,6 +26,8 @@ pub struct Seen<'t> {
     pub components: &'t [i64],
     /// log_scale, opacity and rotation less those of the new Gaussian.
     pub geometry: [i32; 7],
+    /// Low bits of both that are ignored, 0 to 7.
+    pub feature_shift: u8,
     /// Weight of 7.7.4 for dc.
     pub affinity: i64,
     /// Squared distance.
@@ -71,7 +73,8 @@ impl Batch {
     ) {
         let start = neighbour.wrapping_mul(self.inputs);
         let Some(rows) = self.tokens.get_mut(start..start.wrapping_add(self.inputs)) else { return };
-        let shift = u32::from(header.token_shift).wrapping_add(12);
+        let ignored = u32::from(seen.feature_shift);
+        let shift = u32::from(header.token_shift).wrapping_add(12).wrapping_add(ignored);
         let half = 1_i64.wrapping_shl(shift.wrapping_sub(1));
         let mut token = [0; INPUTS_MAX];
         let (components, rest) = token.split_at_mut_checked(header.outputs()).unwrap_or_default();
@@ -80,7 +83,8 @@ impl Batch {
         }
         let apart = seen.distance.wrapping_mul(127).checked_div(farthest.wrapping_add(1)).unwrap_or(0);
         let units = [4, 4, 4, 2, 1, 1, 1].into_iter().zip(seen.geometry);
-        let geometry = units.map(|(unit, value)| value.wrapping_mul(unit).clamp(-127, 127));
+        let rounded = |value: i32| value.wrapping_add(1_i32.wrapping_shl(ignored) >> 1).wrapping_shr(ignored);
+        let geometry = units.map(|(unit, value)| rounded(value).wrapping_mul(unit).clamp(-127, 127));
         rest.iter_mut().zip(geometry.chain([apart as i32])).for_each(|(input, value)| *input = value);
         if header.gated() {
             let weight = seen.affinity as i32;

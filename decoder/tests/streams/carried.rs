@@ -3,11 +3,12 @@
 use crate::write::{Plan, decoded};
 use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::increment::field;
-use splatstream_decoder::increment::values::PreparedSections;
+use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::{DecodedFrame, Options, Shift};
+use splatstream_decoder::steps::StepRule;
 use splatstream_format::Limits;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::FramePayload;
@@ -30,7 +31,9 @@ fn fields(plan: &Plan) -> Vec<CellField> {
         };
         let mut models = ModelsInForce::default();
         let sections = core::slice::from_ref(&cells.coded);
-        let prepared = PreparedSections::new(sections, 0, ShCoding::None, &mut models, &mut ()).unwrap();
+        let coding =
+            SectionCoding { dc_rank: 0, sh: ShCoding::None, steps: StepRule::new(&sequence, [0; 5]) };
+        let prepared = PreparedSections::new(sections, &coding, &mut models, &mut ()).unwrap();
         let values = prepared.decode(&sequence).unwrap();
         fields.push(field(values.section(Section::Cells), cells.cell_log2, &sequence, 0).unwrap());
     }

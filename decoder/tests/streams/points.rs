@@ -58,7 +58,7 @@ fn what_a_point_costs_follows_from_headers_alone() {
             // All but the file header, copies of sequence parameters, index and end.
             let part = extract(&bytes, info.point, &Limits::default()).unwrap().len() as u64;
             let entries = 16 * plan.gops.len() as u64;
-            let others = 16 + plan.gops.len() as u64 * 96 + (24 + entries) + 36;
+            let others = 16 + plan.gops.len() as u64 * 126 + (24 + entries) + 36;
             assert_eq!(info.bytes, part - others, "{}", info.point);
         }
     }

@@ -93,7 +93,7 @@ fn batch(header: &NetworkHeader, neighbours: usize, spread: Spread, numbers: &mu
                 [(); 7].map(|()| numbers.one(spread, -65_535, 65_535) as i32 >> (numbers.next() % 14));
             let affinity = numbers.one(spread, 0, 4096).max(1);
             let distance = numbers.one(spread, 0, 1 << 41).unsigned_abs();
-            let seen = Seen { components: &components, geometry, affinity, distance };
+            let seen = Seen { components: &components, geometry, affinity, distance, ..Seen::default() };
             batch.set_token(header, (lane, rank), &seen, 1 << 41);
             offsets.push([(); 3].map(|()| numbers.one(spread, -(1 << 20) + 1, (1 << 20) - 1) as i32));
         }

@@ -146,7 +146,9 @@ pub(crate) fn code_cells(
     }
     let values = cell_values(&motion, from.coder.block());
     let field = field(&values, motion.cell_log2, sequence, 0)?;
-    let section = from.coder.code_values(Section::Cells, &values, models)?;
+    let coder = &from.coder;
+    let drafted = coder.section_draft(Section::Cells, &values, coder.steps([0; 5]), models);
+    let section = drafted.code(Section::Cells, &coder.plan, models)?;
     let (cell_count, cell_log2) = (motion.cells.len() as u32, motion.cell_log2);
     Ok((field, Some(CellsBytes { cell_count, cell_log2, section })))
 }

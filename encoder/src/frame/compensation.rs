@@ -10,7 +10,8 @@ use splatstream_scene::GaussianFrame;
 /// Views that a prefix is judged in, and their lines: holes are large. Fuzzing wants streams, not pictures.
 const VIEWS: u32 = 2;
 const LINES: u32 = if cfg!(fuzzing) { 12 } else { 120 };
-/// Largest offset that is tried, steps.
+/// Offsets of log-scale and of opacity that are tried, and up to so many of them.
+const UNITS: [f32; 2] = [0.12, 0.15];
 const MOST: i8 = 6;
 const BACKGROUND: [f32; 3] = [0.0; 3];
 
@@ -32,14 +33,16 @@ impl Compensator {
     /// Offsets of log-scale and opacity for the Gaussians of some lists: as far as each step up brings the pictures
     /// nearer to those of the whole frame, first of the scale, then of the opacity.
     pub(crate) fn offsets(&self, lists: &[GaussianList], sequence: &SequenceParameters) -> (i8, i8) {
+        let steps = [sequence.log_scale_step(), sequence.opacity_step()];
+        let [scale, opacity] = [0, 1].map(|which: usize| {
+            libm::roundf(UNITS[which] / steps[which]).clamp(1.0, f32::from(i8::MAX / MOST)) as i8
+        });
         let mut best = (self.error(lists, (0, 0), sequence), (0, 0));
-        for grow in
-            [|(scale, opacity): (i8, i8)| (scale + 1, opacity), |(scale, opacity)| (scale, opacity + 1)]
-        {
-            loop {
-                let tried = grow(best.1);
+        for (scale, opacity) in [(scale, 0), (0, opacity)] {
+            for _ in 0..MOST {
+                let tried = (best.1.0 + scale, best.1.1 + opacity);
                 let error = self.error(lists, tried, sequence);
-                if tried.0 > MOST || tried.1 > MOST || error >= best.0 {
+                if error >= best.0 {
                     break;
                 }
                 best = (error, tried);

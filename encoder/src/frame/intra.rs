@@ -5,18 +5,18 @@
 use super::compensation::Compensator;
 use super::new_list::NewList;
 use super::predictors::{Chooser, used};
-use super::unit::{Draft, UnitCoder};
-use super::wanted::{Wanted, nearest};
+use super::unit::{Draft, Grain, UnitCoder};
+use super::wanted::Wanted;
 use super::{CodedFrame, CodedUnit, Reference};
 use crate::error::Error;
 use splatstream_decoder::digest::{ListDigest, lists_digest};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::Situation;
-use splatstream_decoder::increment::residual::{Attributes, Stage};
+use splatstream_decoder::increment::residual::Attributes;
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsOfFrame;
-use splatstream_format::syntax::prefix_length;
+use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, prefix_length};
 
 /// Share of the Gaussians, most important first, up to each spatial layer, percent.
 const fn shares(layers: u8) -> &'static [u8] {
@@ -82,6 +82,7 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> Res
         // What is carried matters in whole anchors only.
         carried: if sequence.whole_anchor() { lists.clone() } else { Vec::new() },
         lists,
+        span_log2: 0,
         models: models.first,
     };
     Ok(CodedFrame { cells: None, carried_digest: None, units, reference })
@@ -92,7 +93,6 @@ impl Intra<'_> {
     fn layer(&mut self, layer: u8) -> Result<(), Error> {
         let sequence = self.coder.sequence;
         let layers = sequence.spatial_layer_count;
-        let shift = (layers - 1 - layer).min(sequence.position_bits - 1);
         let total = self.target.order.len() as u32;
         let end = prefix_length(shares(layers)[usize::from(layer)], total) as usize;
         let start = match layer {
@@ -103,13 +103,14 @@ impl Intra<'_> {
         let mut added = Vec::new();
         for refinement in 0..sequence.refinement_count {
             let after = sequence.prefix_length(refinement, total) as usize;
-            added.push(self.target.order.get(start.max(before)..end.min(after)).unwrap_or_default().to_vec());
+            let rows = self.target.order.get(start.max(before)..end.min(after)).unwrap_or_default();
+            added.push((rows.to_vec(), self.grain(layer, refinement)));
             before = after;
         }
-        let new = NewList::all(self.coder, self.target.wanted, added, shift, self.models.before(0))?;
+        let new = NewList::all(self.coder, self.target.wanted, added, self.models.before(0));
         let mut digests = Vec::new();
         for (refinement, new) in (0..).zip(new) {
-            self.unit(layer, refinement, shift, new, &mut digests)?;
+            self.unit(layer, refinement, new, &mut digests)?;
         }
         Ok(())
     }
@@ -118,17 +119,16 @@ impl Intra<'_> {
         &mut self,
         layer: u8,
         refinement: u8,
-        shift: u8,
         mut new: NewList,
         digests: &mut Vec<ListDigest>,
     ) -> Result<(), Error> {
         let list = usize::from(refinement);
         let parents = core::mem::take(&mut self.lists[list]);
-        let mut draft = self.coder.blank(shift, self.shifts(shift));
-        self.refine(&mut draft, &parents, list, shift);
+        let mut draft = self.coder.blank(self.grain(layer, refinement));
+        self.refine(&mut draft, &parents, list)?;
         draft.add(core::mem::take(&mut new.values));
         let lower: Vec<&QuantizedFrame> = self.lists[..list].iter().map(|list| &list.planes).collect();
-        let situation = Situation { around: [&lower, &[]], parents_follow: true };
+        let situation = Situation { around: [&lower, &[]], temporal: None };
         let mut models = self.models.before(refinement).clone();
         let chooser = self.target.chooser;
         chooser.choose(self.coder, &mut draft, &parents, &situation, (self.target.wanted, &new), &models)?;
@@ -162,17 +162,27 @@ impl Intra<'_> {
         (draft.header.compensation_log_scale, draft.header.compensation_opacity) = (log_scale, opacity);
     }
 
-    /// attribute_shift of a layer. Entries of codebooks are not shifted: no layer refines them.
-    fn shifts(&self, shift: u8) -> [u8; 5] {
+    /// How finely a unit is coded: every layer halves the steps of the one below. Entries of codebooks keep their step: no
+    /// layer refines them.
+    fn grain(&self, layer: u8, refinement: u8) -> Grain {
+        let sequence = self.coder.sequence;
+        let above = sequence.spatial_layer_count - 1 - layer;
+        let Grain { position_shift, attribute_step } = self.coder.grains.of(refinement);
         let book = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
-        [shift, shift, shift, shift, if book { 0 } else { shift }]
+        let [scale, opacity, rotation, dc, sh] =
+            attribute_step.map(|step| (step + 2 * above).min(MAX_ATTRIBUTE_STEP));
+        let sh = if book { attribute_step[4] } else { sh };
+        Grain {
+            position_shift: (position_shift + above).min(sequence.position_bits - 1),
+            attribute_step: [scale, opacity, rotation, dc, sh],
+        }
     }
 
-    /// Halves the steps of what lower layers have coded.
-    fn refine(&self, draft: &mut Draft, parents: &GaussianList, list: usize, shift: u8) {
+    /// Refines what lower layers have coded.
+    fn refine(&self, draft: &mut Draft, parents: &GaussianList, list: usize) -> Result<(), Error> {
         let members = &self.members[list];
         if members.is_empty() {
-            return;
+            return Ok(());
         }
         let count = members.len() as u32;
         (draft.header.parent_count, draft.header.move_count, draft.header.update_count) =
@@ -180,21 +190,12 @@ impl Intra<'_> {
         draft.values.set(Section::Modes, self.coder.section(vec![vec![3; members.len()]]));
         let wanted = self.target.wanted.select(members);
         let last = (1 << self.coder.sequence.position_bits) - 1;
-        draft.values.set(Section::Moves, self.coder.section(wanted.moves(parents, shift, last)));
+        let moves = wanted.moves(parents, draft.header.position_shift, last);
+        draft.values.set(Section::Moves, self.coder.section(moves));
         let rows: Vec<u32> = (0..count).collect();
         let now = Attributes::of_list(parents, &rows);
-        let residuals = |stage| wanted.residuals(stage, &now, shift, &self.coder.colour, false);
-        let planes = Stage::ALL.into_iter().flat_map(residuals).collect();
+        let planes = wanted.updates(now, draft.header.attribute_step, self.coder)?;
         draft.values.set(Section::Updates, self.coder.section(planes));
+        Ok(())
     }
-}
-
-/// What brings log-scales near those wanted: of the largest, and of the two differences (7.6.2).
-pub(crate) fn scale_residuals(now: [i32; 3], wanted: [i32; 3], shift: u8) -> [i32; 3] {
-    let first = nearest(wanted[0] - now[0], shift);
-    let largest = now[0] + (first << shift);
-    let second = nearest(largest - wanted[1] - (now[0] - now[1]), shift);
-    let middle = largest - (now[0] - now[1]) - (second << shift);
-    let third = nearest(middle - wanted[2] - (now[1] - now[2]), shift);
-    [first, second, third]
 }

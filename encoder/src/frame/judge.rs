@@ -8,7 +8,6 @@ use super::price::Goal;
 use super::survivors::{Apart, Kept, Survivors};
 use super::worth::{Seen, Shown};
 use crate::grid::nearest_integer;
-use crate::vq;
 use splatstream_format::payload::Codebook;
 use splatstream_render::Camera;
 use splatstream_render::contribution::worth;
@@ -31,9 +30,6 @@ const CALM: f32 = 0.02;
 
 /// What is further from its partner moves: the square of its distance, in widths of the Gaussian.
 const STILL: f32 = 1.0;
-
-/// Steps that are left where everything is sent: what rounding leaves.
-const EVERYTHING: [f32; 2] = [0.5; 2];
 
 /// Bits of a new Gaussian, nearly.
 const NEW_BITS: f32 = 60.0;
@@ -93,30 +89,32 @@ impl Judge {
 
     /// What is sent of the differences between a Gaussian and its partner in the target.
     pub(crate) fn kept(&self, survivors: &Survivors<'_>, apart: &Apart, index: usize) -> Kept {
-        let Some(seen) = self.seen.get(index) else { return survivors.all_kept(apart, EVERYTHING) };
+        let Some(seen) = self.seen.get(index) else { return survivors.all_kept(apart) };
         let shown = Shown::new(seen, &apart.pose);
         let step = survivors.sequence.position_step();
         let widths = shown.widths(apart.position.map(|steps| steps * step));
         let calm = if widths <= STILL { CALM } else { 0.0 };
         let with_calm = |term: Term| Term { calm, ..term };
-        let moved = self.group(&spread(&apart.position, shown.moved(widths)).map(with_calm), 0.0);
+        let moves = apart.position.map(|steps| steps / apart.move_step);
+        let moved = self.group(&spread(&moves, shown.moved(widths)).map(with_calm), 0.0);
         let terms: Vec<Term> = terms(survivors, apart, &shown).into_iter().map(with_calm).collect();
         let (coded, sh) = match survivors.book {
             None => (terms.as_slice(), &[][..]),
             Some(_) => terms.split_at(terms.len() - apart.sh().len()),
         };
-        let (entry, gain) = survivors.book.map_or((0, 0.0), |book| self.entry(book, apart.sh(), sh));
+        let (entry, gain) = survivors.book.map_or((0, 0.0), |book| self.entry(book, apart, sh));
         let mut attributes = self.group(coded, gain);
         let alone = attributes.iter().all(|&steps| steps == 0);
         let entry = if alone && gain < self.price * NAMED_BITS { 0 } else { entry };
         attributes.resize(terms.len(), 0);
+        let changes = (0..).zip(attributes).map(|(attribute, steps)| steps as f32 * apart.step_of(attribute));
         let entry = survivors.book.map(|_| entry);
-        Kept { moved: [moved[0], moved[1], moved[2]], attributes, entry }
+        Kept { moves: moved.iter().any(|&steps| steps != 0), attributes: changes.collect(), entry }
     }
 
     /// The entry of the codebook of SH residuals that is the best bargain, and what it wins over none, which is entry 0.
-    fn entry(&self, book: &Codebook, sh: &[f32], terms: &[Term]) -> (i32, f32) {
-        let entry = vq::nearest_entry(book, sh);
+    fn entry(&self, book: &Codebook, apart: &Apart, terms: &[Term]) -> (i32, f32) {
+        let entry = Survivors::nearest_entry(book, apart);
         let values = book.entries[entry as usize * terms.len()..].iter().map(|&value| f32::from(value));
         let gain: f32 = terms.iter().zip(values).map(|(term, value)| term.gain(value)).sum();
         let gain = gain - self.price * ENTRY_BITS;
@@ -162,25 +160,26 @@ fn spread(steps: &[f32; 3], error: f32) -> [Term; 3] {
     steps.map(|steps| Term { steps, weight: error / square.max(f32::MIN_POSITIVE), calm: 0.0 })
 }
 
-/// All differences of attributes.
+/// All differences of attributes, in the steps that they are coded with.
 fn terms(survivors: &Survivors<'_>, apart: &Apart, shown: &Shown) -> Vec<Term> {
     let sequence = survivors.sequence;
-    let steps = &apart.attributes;
+    let changes = &apart.attributes;
     let square = |step: f32| step * step;
-    let mut terms = Vec::with_capacity(steps.len());
-    terms.extend([0, 1, 2].map(|axis: usize| {
-        let weight = shown.grown(axis) * square(sequence.log_scale_step());
-        Term { steps: steps[axis], weight, calm: 0.0 }
-    }));
-    let from = apart.logit - steps[3] * sequence.opacity_step();
-    let weight = shown.faded(from, apart.logit) * square(sequence.opacity_step());
-    terms.push(Term { steps: steps[3], weight, calm: 0.0 });
-    terms.extend(spread(&[steps[4], steps[5], steps[6]], shown.turned(apart.reference.rotation)));
-    let colour =
-        |steps: &f32, step: f32| Term { steps: *steps, weight: shown.coloured() * square(step), calm: 0.0 };
-    let (dc, sh) = steps[7..].split_at(steps.len() - 7 - apart.sh().len());
-    terms.extend(dc.iter().map(|steps| colour(steps, sequence.dc_step())));
-    terms.extend(sh.iter().map(|steps| colour(steps, sequence.sh_step())));
+    let of = |attribute: usize, weight: f32| {
+        let step = apart.step_of(attribute);
+        Term { steps: changes[attribute] / step, weight: weight * square(step), calm: 0.0 }
+    };
+    let mut terms = Vec::with_capacity(changes.len());
+    terms
+        .extend([0, 1, 2].map(|axis: usize| of(axis, shown.grown(axis) * square(sequence.log_scale_step()))));
+    let from = apart.logit - changes[3] * sequence.opacity_step();
+    terms.push(of(3, shown.faded(from, apart.logit) * square(sequence.opacity_step())));
+    let turns = [4, 5, 6].map(|part: usize| changes[part] / apart.step_of(part));
+    terms.extend(spread(&turns, shown.turned(apart.reference.rotation)));
+    let harmonics = changes.len() - apart.sh().len();
+    let coloured = |step: f32| shown.coloured() * square(step);
+    terms.extend((7..harmonics).map(|part| of(part, coloured(sequence.dc_step()))));
+    terms.extend((harmonics..changes.len()).map(|part| of(part, coloured(sequence.sh_step()))));
     terms
 }
 

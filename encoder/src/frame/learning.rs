@@ -137,6 +137,7 @@ fn recorded(
         network: Some(zero(architecture)?),
         limits: Limits::default(),
         recorder: Some(&recorder),
+        looked_at: 0,
     };
     coder.run(&mut |_, _| {})?;
     Ok(recorder.samples.into_inner())

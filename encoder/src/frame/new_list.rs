@@ -2,12 +2,10 @@
 //!
 //! They need nothing of other units: those of all units of a frame are put in order, coded and given models at once.
 
-use super::unit::UnitCoder;
+use super::unit::{Grain, UnitCoder};
 use super::wanted::Wanted;
-use crate::error::Error;
 use crate::section::{SectionDraft, biases};
 use rayon::prelude::*;
-use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::Section;
 use splatstream_format::entropy::in_force::ModelsInForce;
@@ -23,31 +21,30 @@ pub(crate) struct NewList {
 }
 
 impl NewList {
-    /// The new Gaussians of each list of a frame or layer, with steps of 2^shift. `added`: for each list their indices
-    /// in `all`. `models`: those in force before the first list.
-    ///
-    /// # Errors
-    /// What the decoder's own checks refuse.
+    /// The new Gaussians of each list of a frame or layer: for each list their indices in `all`, and how finely they are
+    /// coded. `models`: those in force before the first list.
     pub(crate) fn all(
         coder: &UnitCoder<'_>,
         all: &Wanted,
-        added: Vec<Vec<u32>>,
-        shift: u8,
+        added: Vec<(Vec<u32>, Grain)>,
         models: &ModelsInForce,
-    ) -> Result<Vec<Self>, Error> {
-        let placed: Vec<(Vec<u32>, SectionValues)> = added
-            .into_par_iter()
-            .map(|added| unpredicted(coder, all, added, shift))
-            .collect::<Result<_, Error>>()?;
-        let layout = coder.layout(Section::New);
-        let values: Vec<&SectionValues> = placed.iter().map(|(_, values)| values).collect();
-        // One bias for all lists: so that a unit may use the models of the one before.
-        let biases = biases(Section::New, &layout, &values, models, &coder.plan);
-        let list = |(added, values): (Vec<u32>, SectionValues)| {
-            let coded = SectionDraft::new(layout.clone(), &values, &biases, &coder.plan);
-            Self { added, values, coded }
+    ) -> Vec<Self> {
+        let place = |(added, grain): (Vec<u32>, Grain)| {
+            let (added, values) = unpredicted(coder, all, added, grain);
+            (added, values, grain)
         };
-        Ok(placed.into_par_iter().map(list).collect())
+        let placed: Vec<(Vec<u32>, SectionValues, Grain)> = added.into_par_iter().map(place).collect();
+        let layout = coder.layout(Section::New);
+        let list = |(added, values, grain): &(Vec<u32>, SectionValues, Grain)| {
+            // Lists with equal steps have one bias, so that a unit may use the models of the one before.
+            let alike = placed.iter().filter(|(_, _, other)| other.attribute_step == grain.attribute_step);
+            let alike: Vec<&SectionValues> = alike.map(|(_, values, _)| values).collect();
+            let biases = biases(Section::New, &layout, &alike, models, &coder.plan);
+            let steps = coder.steps(grain.attribute_step);
+            let coded = SectionDraft::new(layout.clone(), values, &biases, steps, &coder.plan);
+            Self { added: added.clone(), values: values.clone(), coded }
+        };
+        placed.par_iter().map(list).collect()
     }
 
     /// How many there are.
@@ -56,38 +53,21 @@ impl NewList {
     }
 }
 
-/// Puts `added`, indices in `all`, in Morton order on the grid of every 2^shift-th point, and gives their values without
+/// Puts `added`, indices in `all`, in Morton order on the grid of positions of the unit, and gives their values without
 /// prediction.
-///
-/// # Errors
-/// What the decoder's own checks refuse.
 pub(crate) fn unpredicted(
     coder: &UnitCoder<'_>,
     all: &Wanted,
     added: Vec<u32>,
-    shift: u8,
-) -> Result<(Vec<u32>, SectionValues), Error> {
+    grain: Grain,
+) -> (Vec<u32>, SectionValues) {
+    let shift = grain.position_shift;
     let mut codes: Vec<(u64, u32)> = added.par_iter().map(|&index| (all.code(index, shift), index)).collect();
     codes.par_sort_unstable();
     let (codes, added): (Vec<u64>, Vec<u32>) = codes.into_iter().unzip();
-    let planes = match shift {
-        0 => all.direct(&added),
-        _ => shifted(coder, &all.select(&added), shift)?,
-    };
+    let planes = all.direct(&added, &coder.steps(grain.attribute_step), coder);
     let block = coder.block();
-    Ok((added, SectionValues { deltas: deltas(&codes, block), planes, block }))
-}
-
-/// Residuals on top of nothing, with coarser steps.
-fn shifted(coder: &UnitCoder<'_>, wanted: &Wanted, shift: u8) -> Result<Vec<Vec<i32>>, Error> {
-    let sh_planes = usize::from(coder.sequence.sh_dimension());
-    let mut now = Attributes::unpredicted(wanted.len(), &coder.colour, sh_planes);
-    let mut planes = Vec::new();
-    for stage in Stage::ALL {
-        planes.extend(wanted.residuals(stage, &now, shift, &coder.colour, true));
-        now.add_stage(stage, AttributeValues(&planes), &coder.coding([shift; 5]), 0)?;
-    }
-    Ok(planes)
+    (added, SectionValues { deltas: deltas(&codes, block), planes, block })
 }
 
 /// Differences of rising codes; they start again in each block.

@@ -1,22 +1,25 @@
 //! Predicted frames: Gaussians of the reference that go on, and new ones.
 
 use super::cells::{CellPlan, code_cells};
+use super::moves::{self, Aim, MovePlan};
 use super::new_list::{NewList, unpredicted};
 use super::predictors::{Chooser, used};
 use super::price::Goal;
-use super::survivors::{Fate, Survivors};
-use super::unit::{Draft, UnitCoder};
+use super::survivors::{Fate, Parents, REMOVED, Survivors};
+use super::unit::{Draft, Grain, UnitCoder};
 use super::wanted::Wanted;
 use super::{CodedFrame, CodedUnit, Reference, Target};
+use crate::entropy_cost::entropy_of;
 use crate::error::Error;
-use crate::grid::Spacing;
 use crate::matching::Matching;
+use splatstream_decoder::attribute::ATTRIBUTE_RANGE;
 use splatstream_decoder::digest::{ListDigest, lists_digest};
 use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::increment::Situation;
+use splatstream_decoder::increment::{Situation, Temporal};
 use splatstream_decoder::layout::Section;
 use splatstream_decoder::list::GaussianList;
+use splatstream_decoder::moves::{MoveSpace, SpanRatio};
 use splatstream_format::entropy::in_force::ModelsOfFrame;
 use splatstream_format::payload::CellsBytes;
 use splatstream_scene::importance;
@@ -31,12 +34,12 @@ pub(crate) struct PredictedTarget<'a> {
     /// How new Gaussians are predicted.
     pub(crate) chooser: Chooser<'a>,
     pub(crate) reference: &'a Reference,
+    /// log2 of how many frames it is later than the reference.
+    pub(crate) span_log2: u8,
     /// The lists of the I frame of the GOP, if new Gaussians may be predicted from all of them: in whole anchors.
     pub(crate) anchor: &'a [GaussianList],
     pub(crate) target: &'a Target,
     pub(crate) survivors: Survivors<'a>,
-    /// Whether the steps of the last list are doubled, as in I frames.
-    pub(crate) coarse_tail: bool,
     /// What fills the holes of each prefix: log-scale and opacity, as in the I frame.
     pub(crate) compensation: &'a [(i8, i8)],
 }
@@ -63,6 +66,14 @@ struct Done {
     added: Vec<QuantizedFrame>,
 }
 
+/// What becomes of the parents of a unit.
+struct Changed {
+    /// A unit that adds nothing.
+    draft: Draft,
+    /// The bits of its modes, moves and updates, nearly.
+    bits: f64,
+}
+
 /// New Gaussians of a frame.
 struct Fresh {
     /// Their indices in the target.
@@ -87,7 +98,8 @@ impl<'a> Predicted<'a> {
             Some(plan) => code_cells(&from, &matching, plan, &mut models.first)?,
             None => (CellField::default(), None),
         };
-        let mut displaced = from.reference.lists.clone();
+        let mut displaced: Vec<GaussianList> =
+            from.reference.lists.iter().map(GaussianList::unchanged).collect();
         displaced.iter_mut().for_each(|list| {
             list.displace(&field);
         });
@@ -109,15 +121,17 @@ impl<'a> Predicted<'a> {
         if let Some(goal) = goal {
             self.set_judge(goal)?;
         }
-        let Fresh { indices, wanted, of_list } = self.fresh()?;
+        let Fresh { indices, wanted, of_list } = self.fresh();
         let mut done = Done { models: core::mem::take(&mut self.models), ..Done::default() };
-        let new = NewList::all(&self.from.coder, &wanted, of_list, 0, done.models.before(0))?;
+        let added = (0..).zip(of_list).map(|(list, added)| (added, self.grain(list))).collect();
+        let new = NewList::all(&self.from.coder, &wanted, added, done.models.before(0));
+        let mut space = self.space();
         let mut rows = Vec::new();
         for (list, new) in new.into_iter().enumerate() {
             let new_rows = new.added.iter().map(|&index| self.row(indices[index as usize]));
             let continued = self.continued(list).map(|(_, partner)| partner.map_or(NO_ROW, |i| self.row(i)));
             rows.push(continued.chain(new_rows).collect());
-            self.unit(list, &wanted, new, &mut done)?;
+            self.unit(list, &wanted, new, &mut space, &mut done)?;
         }
         let carry = |list: &GaussianList| list.clone().carried(&self.field, true);
         let carried: Vec<GaussianList> = self.from.reference.carried.iter().map(carry).collect();
@@ -125,24 +139,35 @@ impl<'a> Predicted<'a> {
         let carried_digest = (!carried.is_empty()).then(digest);
         let Done { models, units, lists, .. } = done;
         let row_count = self.from.target.row_count;
-        let reference = Reference { lists, carried, models: models.first, rows, row_count };
+        let span_log2 = self.from.span_log2;
+        let reference = Reference { lists, span_log2, carried, models: models.first, rows, row_count };
         Ok(CodedFrame { cells: self.cells, carried_digest, units, reference })
     }
 
     /// Codes the unit of a list. `new`: its new Gaussians, which shall become what `wanted` says.
-    fn unit(&self, list: usize, wanted: &Wanted, mut new: NewList, done: &mut Done) -> Result<(), Error> {
+    fn unit(
+        &self,
+        list: usize,
+        wanted: &Wanted,
+        mut new: NewList,
+        space: &mut MoveSpace,
+        done: &mut Done,
+    ) -> Result<(), Error> {
         let PredictedTarget { coder, chooser, compensation, .. } = &self.from;
         let refinement = list as u8;
-        let mut draft = self.drafted(list);
-        draft.add(core::mem::take(&mut new.values));
         let parents = &self.displaced[list];
+        space.push(&self.from.reference.lists[list], parents);
+        let mut draft = self.drafted(list, space, true);
+        draft.add(core::mem::take(&mut new.values));
         let lower: Vec<&QuantizedFrame> = self.displaced[..list].iter().map(|list| &list.planes).collect();
         let anchor = self.from.anchor.iter().skip(list + 1).map(|list| &list.planes);
         let after: Vec<&QuantizedFrame> = anchor.chain(&done.added).collect();
-        let situation = Situation { around: [&lower, &after], parents_follow: false };
+        let temporal = self.temporal(list, space);
+        let situation = Situation { around: [&lower, &after], temporal: Some(temporal) };
         let mut models = done.models.before(refinement).clone();
         chooser.choose(coder, &mut draft, parents, &situation, (wanted, &new), &models)?;
         let applied = coder.apply(&draft, parents.clone(), &situation)?;
+        space.settle(&applied.list, &applied.keep);
         done.digests.push(applied.list.digest());
         draft.header.refinement_digest = lists_digest(&done.digests);
         if let Some(&(log_scale, opacity)) = compensation.get(list) {
@@ -162,24 +187,41 @@ impl<'a> Predicted<'a> {
         Ok(())
     }
 
+    /// Parents of no unit yet.
+    fn space(&self) -> MoveSpace {
+        MoveSpace::new(self.ratio(), self.from.coder.sequence.position_bits)
+    }
+
+    /// How much longer the step to this frame is than that to its reference frame.
+    fn ratio(&self) -> SpanRatio {
+        SpanRatio::new(self.from.span_log2, self.from.reference.span_log2)
+    }
+
+    /// What the parents of a unit come from.
+    fn temporal<'s>(&'s self, list: usize, space: &'s MoveSpace) -> Temporal<'s> {
+        Temporal { reference: &self.from.reference.lists[list], ratio: self.ratio(), moves: Some(space) }
+    }
+
     /// The frame as far as lists show it, without prediction, which changes nothing that shows.
     ///
     /// # Errors
     /// What the decoder's own checks refuse.
     pub(crate) fn lists(&self) -> Result<Vec<GaussianList>, Error> {
-        let Fresh { wanted, of_list, .. } = self.fresh()?;
+        let Fresh { wanted, of_list, .. } = self.fresh();
         let list = |(list, added): (usize, Vec<u32>)| {
             let coder = &self.from.coder;
-            let mut draft = self.drafted(list);
-            draft.add(unpredicted(coder, &wanted, added, 0)?.1);
-            let situation = Situation { around: [&[], &[]], parents_follow: false };
+            let mut space = self.space();
+            space.push(&self.from.reference.lists[list], &self.displaced[list]);
+            let mut draft = self.drafted(list, &space, false);
+            draft.add(unpredicted(coder, &wanted, added, self.grain(list)).1);
+            let situation = Situation { around: [&[], &[]], temporal: Some(self.temporal(list, &space)) };
             Ok(coder.apply(&draft, self.displaced[list].clone(), &situation)?.list)
         };
         of_list.into_iter().enumerate().map(list).collect()
     }
 
     /// The Gaussians that continue none, on the grids, and the lists they go to.
-    fn fresh(&self) -> Result<Fresh, Error> {
+    fn fresh(&self) -> Fresh {
         let PredictedTarget { coder, target, survivors, .. } = &self.from;
         let mut indices = self.matching.wanted(target.frame.len());
         if let Some(judge) = &survivors.judge {
@@ -201,21 +243,60 @@ impl<'a> Predicted<'a> {
             of_list.push(now.to_vec());
             rest = later;
         }
-        let wanted = Wanted::new(&frame, &Spacing::default(), None, coder)?;
-        Ok(Fresh { indices, wanted, of_list })
+        let wanted = Wanted::new(&frame, None, coder);
+        Fresh { indices, wanted, of_list }
     }
 
-    /// A unit that decides about the parents in a list.
-    fn drafted(&self, list: usize) -> Draft {
+    /// How finely a list is coded.
+    fn grain(&self, list: usize) -> Grain {
+        self.from.coder.grains.of(list as u8)
+    }
+
+    /// A unit that decides about the parents in a list, which were added to `space` last. Without `predicts` nothing is
+    /// made of earlier changes.
+    fn drafted(&self, list: usize, space: &MoveSpace, predicts: bool) -> Draft {
+        let plain = self.changed(list, space, predicts, &[]);
+        let fading = if predicts { self.fading(list) } else { Vec::new() };
+        if fading.is_empty() {
+            return plain.draft;
+        }
+        let mut extrapolated = self.changed(list, space, predicts, &fading);
+        extrapolated.draft.header.extrapolates_opacity = true;
+        if extrapolated.bits < plain.bits { extrapolated.draft } else { plain.draft }
+    }
+
+    /// The opacities of the parents in a list if they go on changing; nothing if none does.
+    fn fading(&self, list: usize) -> Vec<i32> {
+        let fade = &self.from.reference.lists[list].change.fade;
+        if fade.iter().all(|&fade| fade == 0) {
+            return Vec::new();
+        }
+        let ratio = self.ratio();
+        let opacity = self.displaced[list].planes.opacity.iter().zip(fade);
+        let gone_on = |(&opacity, &fade): (&i32, &i32)| {
+            (opacity + ratio.scaled(fade)).clamp(*ATTRIBUTE_RANGE.start(), *ATTRIBUTE_RANGE.end())
+        };
+        opacity.map(gone_on).collect()
+    }
+
+    /// A unit that changes parents. `opacity`: what updates of theirs start from, if not from what they are.
+    fn changed(&self, list: usize, space: &MoveSpace, predicts: bool, opacity: &[i32]) -> Changed {
         let PredictedTarget { coder, survivors, .. } = &self.from;
+        let displaced = &self.displaced[list];
         let range = self.range(list);
-        let last = list + 1 == self.displaced.len();
-        let coarse = last && list > 0 && self.from.coarse_tail;
-        let partners = &self.matching.target_of[range.clone()];
-        let fates = survivors.fates(&self.displaced[list], range.start, partners, coarse);
-        let mut draft = coder.blank(0, [0; 5]);
-        set_fates(coder, &mut draft, &fates);
-        draft
+        let grain = self.grain(list);
+        let position_shift = grain.position_shift;
+        let rule = coder.steps(grain.attribute_step);
+        let parents = Parents { list: displaced, opacity, rule, position_shift };
+        let fates = survivors.fates(parents, range.start, &self.matching.target_of[range]);
+        let aims: Vec<Option<Aim>> = fates.iter().map(|fate| fate.aim).collect();
+        let bits = coder.sequence.position_bits;
+        let price = survivors.price.moves;
+        let moves = moves::plan(space, displaced, &aims, (position_shift, bits), price, predicts);
+        let mut draft = coder.blank(grain);
+        set_changes(coder, &mut draft, &fates, moves);
+        let bits = bits_of(&draft);
+        Changed { draft, bits }
     }
 
     /// The indices of a list's Gaussians among those of all lists.
@@ -238,21 +319,33 @@ impl<'a> Predicted<'a> {
 }
 
 /// Puts what becomes of parents in a draft.
-fn set_fates(coder: &UnitCoder<'_>, draft: &mut Draft, fates: &[Fate]) {
-    let count = |holds: &dyn Fn(i32) -> bool| fates.iter().filter(|fate| holds(fate.mode)).count() as u32;
+fn set_changes(coder: &UnitCoder<'_>, draft: &mut Draft, fates: &[Fate], moves: MovePlan) {
+    let mode = |(fate, &moved): (&Fate, &bool)| match fate.aim {
+        None => REMOVED,
+        Some(_) => i32::from(moved) + 2 * i32::from(!fate.updated.is_empty()),
+    };
+    let modes: Vec<i32> = fates.iter().zip(&moves.moved).map(mode).collect();
+    let count = |holds: &dyn Fn(i32) -> bool| modes.iter().filter(|&&mode| holds(mode)).count() as u32;
     let header = &mut draft.header;
     header.parent_count = fates.len() as u32;
     header.move_count = count(&|mode| mode & 1 != 0);
     header.update_count = count(&|mode| mode & 2 != 0);
-    header.remove_count = count(&|mode| mode == 4);
-    let modes = fates.iter().map(|fate| fate.mode).collect();
+    header.remove_count = count(&|mode| mode == REMOVED);
+    header.move_block_log2 = moves.block_log2;
     draft.values.set(Section::Modes, coder.section(vec![modes]));
-    let moved =
-        |axis: usize| fates.iter().filter(|fate| fate.mode & 1 != 0).map(|fate| fate.moved[axis]).collect();
-    draft.values.set(Section::Moves, coder.section([0, 1, 2].map(moved).to_vec()));
-    let width = fates.iter().map(|fate| fate.updated.len()).max().unwrap_or(0);
-    let updated = |plane: usize| {
-        fates.iter().filter(|fate| fate.mode & 2 != 0).map(|fate| fate.updated[plane]).collect()
-    };
-    draft.values.set(Section::Updates, coder.section((0..width).map(updated).collect()));
+    draft.values.set(Section::MovePredictors, coder.section(vec![moves.predictors]));
+    draft.values.set(Section::Moves, coder.section(moves.planes.to_vec()));
+    let updated: Vec<&Vec<i32>> =
+        fates.iter().filter(|fate| fate.aim.is_some()).map(|fate| &fate.updated).collect();
+    let width = updated.iter().map(|values| values.len()).max().unwrap_or(0);
+    let plane = |plane: usize| updated.iter().filter_map(|values| values.get(plane).copied()).collect();
+    draft.values.set(Section::Updates, coder.section((0..width).map(plane).collect()));
+}
+
+/// Zero-order bits of what a draft says of parents.
+fn bits_of(draft: &Draft) -> f64 {
+    let planes = [Section::Modes, Section::Moves, Section::Updates]
+        .into_iter()
+        .flat_map(|section| &draft.values.section(section).planes);
+    planes.map(|plane| entropy_of(plane)).sum()
 }

@@ -108,9 +108,9 @@ impl Chooser<'_> {
         if self.predictors == Predictors::NONE || count < FEW || codebook {
             return Ok(None);
         }
-        let set = match situation.parents_follow {
-            false => reference_set(situation, &parents.planes),
-            true => {
+        let set = match situation.temporal {
+            Some(_) => reference_set(situation, &parents.planes),
+            None => {
                 let mut before = draft.clone();
                 before.header.new_count = 0;
                 before.values.set(Section::New, SectionValues::default());
@@ -223,7 +223,13 @@ fn predicted(
     let predictors = vec![predictor; wanted.len()];
     let slices = position.each_ref().map(Vec::as_slice);
     let mut planes = Vec::new();
-    let by = Predicting { header, colour: coder.colour, network: coder.network };
+    let by = Predicting {
+        header,
+        colour: coder.colour,
+        network: coder.network,
+        feature_shift: coder.sequence.feature_shift,
+    };
+    let rule = coder.steps(header.attribute_step);
     let mut prediction = Prediction::new(set, slices, &predictors, &by);
     for stage in Stage::ALL {
         if let Some(prediction) = &prediction {
@@ -232,8 +238,8 @@ fn predicted(
             }
             prediction.predict(stage, &mut now);
         }
-        planes.extend(wanted.residuals(stage, &now, shift, &coder.colour, true));
-        now.add_stage(stage, AttributeValues(&planes), &coder.coding([shift; 5]), 0)?;
+        planes.extend(wanted.residuals(stage, &now, &rule, coder, true));
+        now.add_stage(stage, AttributeValues(&planes), &coder.coding(header.attribute_step), 0)?;
         if let Some(prediction) = &mut prediction {
             prediction.learn(stage, &now);
         }

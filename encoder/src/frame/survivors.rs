@@ -3,50 +3,86 @@
 use super::Target;
 use super::align::{Namings, Pose};
 use super::judge::Judge;
-use crate::settings::Steps;
+use super::moves::Aim;
+use crate::grid::nearest_integer;
 use crate::vq;
 use rayon::prelude::*;
 use splatstream_decoder::colour::COMPONENT_RANGE;
+use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::list::{FINE, GaussianList};
+use splatstream_decoder::steps::{StepRule, step};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::SequenceParameters;
 
-/// Largest difference, in steps, that is left as it is. A Gaussian that moves smoothly keeps the error of its intra
-/// frame, up to half a step; sending each change as soon as it rounds to a step costs three times the bits.
-pub(crate) const LEFT: f32 = 0.75;
+/// The largest difference, in steps, that is left of an attribute, and of a position. Rounding would leave half a step; a
+/// residual of one step takes about two bits more than none.
+pub(crate) const LEFT: f32 = 0.55;
+const LEFT_OF_MOVES: f32 = 0.7;
+
+/// What is sent whatever it takes: differences of more steps than this show.
+pub(crate) const MOST: f32 = 1.5;
+
+/// What a bit of a move and one of an update are worth, squared steps. Updates change more Gaussians that show for fewer
+/// bits.
+const MOVE_BIT: f32 = 0.2;
+const UPDATE_BIT: f32 = 0.04;
+
+/// What bits are worth, squared steps of what they bring nearer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct BitPrice {
+    pub(crate) moves: f32,
+    pub(crate) updates: f32,
+}
+
+impl BitPrice {
+    /// So many times the usual one.
+    pub(crate) fn at(level: f32) -> Self {
+        Self { moves: level * MOVE_BIT, updates: level * UPDATE_BIT }
+    }
+}
+
+/// Bits of a zero among residuals, of one step, and what each doubling adds; and by which an update is named.
+const ZERO_BITS: f32 = 0.3;
+const FIRST_BITS: f32 = 3.0;
+const DOUBLING_BITS: f32 = 1.6;
+const NAMED_BITS: f32 = 2.0;
 
 /// The largest move that the attribute alphabet carries is 2^16 - 1 steps.
 const REACH: f32 = 65_000.0;
 
 /// A difference rounded to steps; 0 up to the difference that is left.
-fn kept(difference: f32, left: f32) -> i32 {
-    if difference.abs() <= left { 0 } else { crate::grid::nearest_integer(difference) }
+fn kept(difference: f32) -> i32 {
+    if difference.abs() <= LEFT { 0 } else { nearest_integer(difference) }
 }
 
 /// What becomes of a parent.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Fate {
-    /// The value of its mode.
-    pub(crate) mode: i32,
-    /// Position residual, if the mode has one.
-    pub(crate) moved: [i32; 3],
-    /// Residuals of log-scales, opacity, rotation, dc and sh, if the mode has them.
+    /// Where it shall be; none: nothing continues it, it is removed.
+    pub(crate) aim: Option<Aim>,
+    /// Residuals of log-scales, opacity, rotation, dc and sh; empty if it has none.
     pub(crate) updated: Vec<i32>,
 }
 
-/// Removed: nothing continues it.
-const REMOVED: i32 = 4;
+/// The mode of a parent that is removed.
+pub(crate) const REMOVED: i32 = 4;
 
-/// Attributes before dc: log-scales, opacity, rotation.
+/// Where the opacity, the rotation and dc are among the attributes, after the log-scales.
+const OPACITY: usize = 3;
+const ROTATION: usize = 4;
 const COLOUR: usize = 7;
 
-/// How far a Gaussian is from its partner, in steps.
+/// How far a Gaussian is from its partner, in steps of the sequence.
 pub(crate) struct Apart {
     pub(crate) position: [f32; 3],
     /// Log-scales, opacity, rotation, components of dc and of sh.
     pub(crate) attributes: Vec<f32>,
     /// Where the components of sh begin.
     colours: usize,
+    /// The steps that each is coded with, nearly: those of a Gaussian of this size and opacity.
+    pub(crate) steps: [f32; 5],
+    /// The step of moves.
+    pub(crate) move_step: f32,
     /// The partner, written like the Gaussian, and the Gaussian.
     pub(crate) pose: Pose,
     pub(crate) reference: Pose,
@@ -59,24 +95,62 @@ impl Apart {
     pub(crate) fn sh(&self) -> &[f32] {
         &self.attributes[self.colours..]
     }
+
+    /// Components of sh, in the steps that they are coded with.
+    fn coded_sh(&self) -> Vec<f32> {
+        self.sh().iter().map(|value| value / self.steps[4]).collect()
+    }
+
+    /// The step of an attribute.
+    pub(crate) fn step_of(&self, attribute: usize) -> f32 {
+        let stage = match attribute {
+            0..OPACITY => 0,
+            OPACITY => 1,
+            ROTATION..COLOUR => 2,
+            _ if attribute < self.colours => 3,
+            _ => 4,
+        };
+        self.steps[stage]
+    }
 }
 
-/// What is sent of the differences, in steps.
+/// What is sent of the differences.
 pub(crate) struct Kept {
-    pub(crate) moved: [i32; 3],
-    pub(crate) attributes: Vec<i32>,
+    /// Whether the position is worth a move.
+    pub(crate) moves: bool,
+    /// What the attributes shall change by, steps of the sequence.
+    pub(crate) attributes: Vec<f32>,
     /// The entry of the codebook of SH residuals, if there is one.
     pub(crate) entry: Option<i32>,
+}
+
+/// The parents of a unit, and how finely it codes them.
+#[derive(Clone, Copy)]
+pub(crate) struct Parents<'a> {
+    /// Displaced by the cells.
+    pub(crate) list: &'a GaussianList,
+    /// Where their opacities would go if they went on changing; empty: nowhere.
+    pub(crate) opacity: &'a [i32],
+    pub(crate) rule: StepRule,
+    pub(crate) position_shift: u8,
+}
+
+impl Parents<'_> {
+    /// The opacity that updates start from.
+    fn opacity(&self, row: usize) -> i32 {
+        self.opacity.get(row).copied().unwrap_or(self.list.planes.opacity[row])
+    }
 }
 
 /// What survivors are measured with.
 pub(crate) struct Survivors<'a> {
     pub(crate) target: &'a Target,
     pub(crate) sequence: &'a SequenceParameters,
-    pub(crate) steps: &'a Steps,
     pub(crate) dc: &'a Transform,
     pub(crate) sh: Option<&'a Transform>,
     pub(crate) namings: Namings,
+    /// What bits are worth where no picture says so.
+    pub(crate) price: BitPrice,
     /// What pictures say; none: all differences count.
     pub(crate) judge: Option<Judge>,
     /// The codebook of SH residuals, if they are vector quantised: the second stage, after that of whole values.
@@ -84,19 +158,12 @@ pub(crate) struct Survivors<'a> {
 }
 
 impl Survivors<'_> {
-    /// The fates of the Gaussians of a list, already displaced. `start`: index of the first in the reference. `coarse`:
-    /// pictures hardly show them, their steps are twice as large.
-    pub(crate) fn fates(
-        &self,
-        list: &GaussianList,
-        start: usize,
-        partner: &[Option<u32>],
-        coarse: bool,
-    ) -> Vec<Fate> {
+    /// The fates of parents, of which the first is that with index `start` of the reference.
+    pub(crate) fn fates(&self, parents: Parents<'_>, start: usize, partner: &[Option<u32>]) -> Vec<Fate> {
         let fate = |(row, partner): (usize, &Option<u32>)| match *partner {
-            Some(index) => self.fate(list, row, index, coarse),
-            None if self.goes_on(start + row, None) => Fate::default(),
-            None => Fate { mode: REMOVED, ..Fate::default() },
+            Some(index) => self.fate(parents, row, index),
+            None if self.goes_on(start + row, None) => self.unchanged(parents, row),
+            None => Fate::default(),
         };
         partner.par_iter().enumerate().map(fate).collect()
     }
@@ -106,31 +173,47 @@ impl Survivors<'_> {
         partner.is_some() || self.judge.as_ref().is_some_and(|judge| judge.may_stay(from))
     }
 
-    fn fate(&self, list: &GaussianList, row: usize, index: u32, coarse: bool) -> Fate {
-        let index = index as usize;
-        let last = ((1 << self.sequence.position_bits) - 1) * FINE;
-        let apart = self.apart(list, row, index);
-        let Kept { moved, attributes, entry } = match &self.judge {
-            None => self.all_kept(&apart, [LEFT, if coarse { 2.0 * LEFT } else { LEFT }]),
-            Some(judge) => judge.kept(self, &apart, index),
-        };
-        let moved = [0, 1, 2].map(|axis: usize| {
-            let now = list.position_fine[axis][row];
-            // A fraction of a step is left between the outermost point and the end of the grid.
-            moved[axis].clamp(-(now / FINE), (last - now) / FINE)
-        });
-        let updated = self.residuals(list, row, &attributes, entry);
-        let mode = i32::from(moved != [0; 3]) + 2 * i32::from(updated.iter().any(|&value| value != 0));
-        Fate { mode, moved, updated }
+    /// The fate of a parent that stays although nothing continues it.
+    fn unchanged(&self, parents: Parents<'_>, row: usize) -> Fate {
+        let place = parents.list.position_fine.each_ref().map(|plane| plane[row] as f32 / FINE as f32);
+        Fate { aim: Some(Aim { place, left: LEFT_OF_MOVES, moves: false }), updated: Vec::new() }
     }
 
-    /// All differences but those up to so many steps: of position, of attributes.
-    pub(crate) fn all_kept(&self, apart: &Apart, left: [f32; 2]) -> Kept {
-        Kept {
-            moved: apart.position.map(|steps| kept(steps, left[0])),
-            attributes: apart.attributes.iter().map(|&steps| kept(steps, left[1])).collect(),
-            entry: self.book.map(|book| vq::nearest_entry(book, apart.sh())),
+    fn fate(&self, parents: Parents<'_>, row: usize, index: u32) -> Fate {
+        let index = index as usize;
+        let apart = self.apart(parents, row, index);
+        let Kept { moves, attributes, entry } = match &self.judge {
+            None => self.all_kept(&apart),
+            Some(judge) => judge.kept(self, &apart, index),
+        };
+        let place = self.target.position.each_ref().map(|plane| plane[index]);
+        let update = self.update(parents, row, &attributes, entry);
+        let is_worth_it = match &self.judge {
+            None => {
+                let bits = NAMED_BITS + update.bits();
+                let is_cheap = update.gain > self.price.updates * bits;
+                is_cheap || update.most > MOST || entry.is_some_and(|entry| entry != 0)
+            }
+            Some(_) => update.residuals.iter().any(|&value| value != 0),
+        };
+        Fate {
+            aim: Some(Aim { place, left: LEFT_OF_MOVES, moves }),
+            updated: if is_worth_it { update.residuals } else { Vec::new() },
         }
+    }
+
+    /// All differences.
+    pub(crate) fn all_kept(&self, apart: &Apart) -> Kept {
+        Kept {
+            moves: true,
+            attributes: apart.attributes.clone(),
+            entry: self.book.map(|book| vq::nearest_entry(book, &apart.coded_sh())),
+        }
+    }
+
+    /// The entry of a codebook that is nearest to the components of sh.
+    pub(crate) fn nearest_entry(book: &Codebook, apart: &Apart) -> i32 {
+        vq::nearest_entry(book, &apart.coded_sh())
     }
 
     /// Whether a Gaussian is so far from its partner that no residual brings it there.
@@ -143,15 +226,20 @@ impl Survivors<'_> {
 
     /// How far a Gaussian is from its partner. Pictures show what fractions are rounded to; who goes by attributes
     /// lets a fraction be, which motion has brought.
-    fn apart(&self, list: &GaussianList, row: usize, index: usize) -> Apart {
+    fn apart(&self, parents: Parents<'_>, row: usize, index: usize) -> Apart {
         let (scale_step, turn_step) = (self.sequence.log_scale_step(), self.sequence.rotation_step());
+        let Parents { list, rule, position_shift, .. } = parents;
         let planes = &list.planes;
         let now = planes.log_scale.each_ref().map(|plane| plane[row]);
         let turn = match self.judge {
             None => list.rotation_fine.each_ref().map(|plane| plane[row] as f32 / FINE as f32),
             Some(_) => planes.rotation.each_ref().map(|plane| plane[row] as f32),
         };
-        let (pose, reference) = self.poses(index, now, turn);
+        let of = |stage| rule.of(stage, now, planes.opacity[row]);
+        let steps =
+            [rule.of_largest(), of(Stage::Opacity), of(Stage::Rotation), of(Stage::Dc), of(Stage::Sh)]
+                .map(|exponent| step(exponent) as f32);
+        let (pose, reference) = self.poses(index, now, turn, &steps);
         let round = now[0] == now[1] && now[1] == now[2];
         let mut attributes = Vec::with_capacity(10 + planes.sh.len());
         attributes.extend([0, 1, 2].map(|axis: usize| {
@@ -160,7 +248,7 @@ impl Survivors<'_> {
         }));
         let logit = self.target.frame.opacity_logit()[index];
         let opacity = (logit - self.sequence.opacity_offset()) / self.sequence.opacity_step();
-        attributes.push(opacity - planes.opacity[row] as f32);
+        attributes.push(opacity - parents.opacity(row) as f32);
         attributes.extend(
             [0, 1, 2].map(
                 |axis: usize| {
@@ -175,12 +263,7 @@ impl Survivors<'_> {
         attributes.extend(projected(self.dc, &[dc(0), dc(1), dc(2)]));
         let colours = attributes.len();
         if let Some(transform) = self.sh {
-            let sh = |plane: usize| {
-                let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[index]);
-                wanted / self.sequence.sh_step() - planes.sh[plane][row] as f32 / 64.0
-            };
-            let differences: Vec<f32> = (0..planes.sh.len()).map(sh).collect();
-            attributes.extend(projected(transform, &differences));
+            attributes.extend(projected(transform, &self.sh_differences(list, row, index)));
         }
         let position = [0, 1, 2].map(|axis: usize| {
             let now = match self.judge {
@@ -189,43 +272,68 @@ impl Survivors<'_> {
             };
             self.target.position[axis][index] - now
         });
-        Apart { position, attributes, colours, pose, reference, logit }
+        let move_step = (1_u32 << position_shift) as f32;
+        Apart { position, attributes, colours, steps, move_step, pose, reference, logit }
     }
 
-    /// The residuals that change attributes by these steps.
-    fn residuals(&self, list: &GaussianList, row: usize, steps: &[i32], entry: Option<i32>) -> Vec<i32> {
-        let now = list.planes.log_scale.each_ref().map(|plane| plane[row]);
-        let wanted = [0, 1, 2].map(|axis: usize| now[axis] + steps[axis]);
-        let mut residuals = super::intra::scale_residuals(now, wanted, 0).to_vec();
-        residuals.extend(&steps[3..COLOUR]);
-        let colours = COLOUR + usize::from(self.dc.header.rank);
-        let coded = if entry.is_some() { &steps[COLOUR..colours] } else { &steps[COLOUR..] };
-        residuals.extend(coded.iter().map(|part| part.clamp(COMPONENT_RANGE.start(), COMPONENT_RANGE.end())));
-        residuals.extend(entry.into_iter().flat_map(|entry| [0, entry]));
-        residuals
+    /// The update that changes attributes by these steps of the sequence, nearly.
+    ///
+    /// The steps of a unit follow from what has been decoded of a Gaussian: each attribute in turn.
+    fn update(&self, parents: Parents<'_>, row: usize, changes: &[f32], entry: Option<i32>) -> Update {
+        let rule = &parents.rule;
+        let now = parents.list.planes.log_scale.each_ref().map(|plane| plane[row]);
+        let mut update = Update::default();
+        let scales = update.scale(rule, now, [changes[0], changes[1], changes[2]]);
+        let faded = update.add(changes[OPACITY], rule.of(Stage::Opacity, scales, 0));
+        let opacity = parents.opacity(row) + faded;
+        let (dc, sh) = changes[COLOUR..].split_at(usize::from(self.dc.header.rank));
+        let sh: &[f32] = if entry.is_some() { &[] } else { sh };
+        let rotation = &changes[ROTATION..COLOUR];
+        let rest = [(Stage::Rotation, rotation), (Stage::Dc, dc), (Stage::Sh, sh)];
+        for (stage, changes) in rest {
+            let exponent = rule.of(stage, scales, opacity);
+            changes.iter().for_each(|&change| {
+                update.add(change, exponent);
+            });
+        }
+        update.residuals.extend(entry.into_iter().flat_map(|entry| [0, entry]));
+        update
     }
 
     /// SH residuals as components, of every `stride`-th pair: rows of the transform's rank.
-    pub(crate) fn sh_rows(&self, lists: &[GaussianList], partner: &[Option<u32>], stride: usize) -> Vec<f32> {
+    pub(crate) fn sh_rows(
+        &self,
+        lists: &[GaussianList],
+        rules: &[StepRule],
+        partner: &[Option<u32>],
+        stride: usize,
+    ) -> Vec<f32> {
         let Some(transform) = self.sh else { return Vec::new() };
-        let indices = lists.iter().flat_map(|list| (0..list.len()).map(move |row| (list, row)));
+        let indices = lists.iter().zip(rules).flat_map(|pair| (0..pair.0.len()).map(move |row| (pair, row)));
         let pairs =
             indices.zip(partner).filter_map(|((list, row), index)| Some((list, row, (*index)? as usize)));
-        let differences = |(list, row, index): (&GaussianList, usize, usize)| -> Vec<f32> {
-            let plane = |(plane, values): (usize, &Vec<i32>)| {
-                let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[index]);
-                wanted / self.sequence.sh_step() - values[row] as f32 / 64.0
-            };
-            list.planes.sh.iter().enumerate().map(plane).collect()
-        };
         pairs
             .step_by(stride.max(1))
-            .flat_map(|pair| projected(transform, &differences(pair)).collect::<Vec<_>>())
+            .flat_map(|((list, rule), row, index)| {
+                let now = list.planes.log_scale.each_ref().map(|plane| plane[row]);
+                let step = step(rule.of(Stage::Sh, now, list.planes.opacity[row])) as f32;
+                let differences = self.sh_differences(list, row, index);
+                projected(transform, &differences).map(|component| component / step).collect::<Vec<_>>()
+            })
             .collect()
     }
 
-    /// The target written like its reference, and the reference.
-    fn poses(&self, index: usize, now: [i32; 3], turn: [f32; 3]) -> (Pose, Pose) {
+    /// By how much the harmonics of a Gaussian differ from those of its partner.
+    fn sh_differences(&self, list: &GaussianList, row: usize, index: usize) -> Vec<f32> {
+        let plane = |(plane, values): (usize, &Vec<i32>)| {
+            let wanted = self.target.frame.sh().get(plane).map_or(0.0, |values| values[index]);
+            wanted / self.sequence.sh_step() - values[row] as f32 / 64.0
+        };
+        list.planes.sh.iter().enumerate().map(plane).collect()
+    }
+
+    /// The target written like its reference, and the reference. `coded`: the steps that attributes are coded with.
+    fn poses(&self, index: usize, now: [i32; 3], turn: [f32; 3], coded: &[f32; 5]) -> (Pose, Pose) {
         let frame = &self.target.frame;
         let target = Pose {
             log_scale: frame.log_scale().each_ref().map(|plane| plane[index]),
@@ -236,7 +344,57 @@ impl Survivors<'_> {
         let w = (1.0 - (x * x + y * y + z * z)).max(0.0).sqrt();
         let log_scale = now.map(|q| self.sequence.log_scale_offset() + scale_step * q as f32);
         let reference = Pose { log_scale, rotation: [w, x, y, z] };
-        (self.namings.nearest(target, reference, (self.steps.log_scale, self.steps.rotation)), reference)
+        let sizes = (scale_step * coded[0], turn_step * coded[2]);
+        (self.namings.nearest(target, reference, sizes), reference)
+    }
+}
+
+/// Residuals of one parent.
+#[derive(Default)]
+struct Update {
+    residuals: Vec<i32>,
+    /// How much nearer they bring the parent, squared steps.
+    gain: f32,
+    /// The largest difference without them, steps.
+    most: f32,
+}
+
+impl Update {
+    /// Adds the residual of a difference in steps of the sequence, and gives what it changes.
+    fn add(&mut self, change: f32, exponent: u8) -> i32 {
+        let step = step(exponent);
+        let apart = change / step as f32;
+        let most = COMPONENT_RANGE.end() / step;
+        let residual = kept(apart).clamp(-most, most);
+        let rest = apart - residual as f32;
+        self.residuals.push(residual);
+        self.gain += apart * apart - rest * rest;
+        self.most = self.most.max(apart.abs());
+        residual * step
+    }
+
+    /// Adds the residuals of log-scales, of the largest and of the two differences (7.6.2), and gives what these make of them.
+    fn scale(&mut self, rule: &StepRule, now: [i32; 3], changes: [f32; 3]) -> [i32; 3] {
+        let mut before = now[0];
+        let mut after = [now[0] + self.add(changes[0], rule.of_largest()); 3];
+        let exponent = rule.of_log_scale(after[0]);
+        for axis in 1..3 {
+            // Each goes with the one before it, and its residual takes off.
+            let carried = now[axis] + after[axis - 1] - before;
+            let off = self.add(carried as f32 - now[axis] as f32 - changes[axis], exponent);
+            before = now[axis];
+            after[axis] = carried - off;
+        }
+        after
+    }
+
+    /// Bits, nearly.
+    fn bits(&self) -> f32 {
+        let bits = |&value: &i32| match value.unsigned_abs() {
+            0 => ZERO_BITS,
+            size => FIRST_BITS + DOUBLING_BITS * libm::log2f(size as f32),
+        };
+        self.residuals.iter().map(bits).sum()
     }
 }
 

@@ -3,16 +3,20 @@
 use super::new_list::NewList;
 use crate::error::Error;
 use crate::section::{SectionDraft, SectionPlan, biases};
+use crate::settings::Settings;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::increment::residual::AttributeCoding;
 use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::increment::{Applied, Situation, Unit, apply};
 use splatstream_decoder::layout::{Layout, Section};
 use splatstream_decoder::list::GaussianList;
+use splatstream_decoder::steps::StepRule;
 use splatstream_format::Limits;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{Network, SectionBytes, write_increment};
-use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR, SequenceParameters, ShHeader};
+use splatstream_format::syntax::{
+    IncrementHeader, MAX_REFINEMENTS, NO_PREDICTOR, SequenceParameters, ShHeader,
+};
 
 /// What the units of a frame have in common.
 #[derive(Clone, Copy)]
@@ -21,14 +25,46 @@ pub(crate) struct UnitCoder<'a> {
     pub(crate) colour: Colour<'a>,
     pub(crate) sh: ShHeader,
     pub(crate) plan: SectionPlan,
-    /// Whether the frame is an I frame.
-    pub(crate) intra: bool,
+    /// How finely each refinement is coded.
+    pub(crate) grains: Grains,
     /// Whether something may be coded as a difference to other Gaussians.
     pub(crate) has_differences: bool,
     /// The learned predictor of the GOP.
     pub(crate) network: Option<&'a Network>,
     /// New Gaussians of a unit that it may predict.
     pub(crate) max_learned: u32,
+}
+
+/// How finely a unit codes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Grain {
+    /// Low bits of positions that are left out.
+    pub(crate) position_shift: u8,
+    /// Exponents of the steps of log_scale, opacity, rotation, dc, sh.
+    pub(crate) attribute_step: [u8; 5],
+}
+
+/// How finely the refinements of a sequence are coded.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Grains([Grain; MAX_REFINEMENTS as usize]);
+
+impl Grains {
+    /// As the settings of a sequence ask for.
+    pub(crate) fn new(settings: &Settings, sequence: &SequenceParameters) -> Self {
+        let mut grains = Self::default();
+        for (refinement, grain) in (0..).zip(&mut grains.0) {
+            *grain = Grain {
+                position_shift: settings.laws.position_shift(sequence, refinement),
+                attribute_step: settings.laws.attribute_step(&settings.steps, sequence, refinement),
+            };
+        }
+        grains
+    }
+
+    /// Of a refinement.
+    pub(crate) fn of(&self, refinement: u8) -> Grain {
+        self.0.get(usize::from(refinement)).copied().unwrap_or_default()
+    }
 }
 
 /// A unit before it is coded.
@@ -52,12 +88,13 @@ impl Draft {
 }
 
 impl UnitCoder<'_> {
-    /// A unit that changes and adds nothing, with steps of 2^shift.
-    pub(crate) fn blank(&self, position_shift: u8, attribute_shift: [u8; 5]) -> Draft {
+    /// A unit that changes and adds nothing.
+    pub(crate) fn blank(&self, grain: Grain) -> Draft {
+        let Grain { position_shift, attribute_step } = grain;
         let ShHeader { sh_mode, vq_stage_count, codebook_ids } = self.sh;
         let header = IncrementHeader {
             position_shift,
-            attribute_shift,
+            attribute_step,
             sh_mode,
             vq_stage_count,
             codebook_ids,
@@ -76,12 +113,16 @@ impl UnitCoder<'_> {
         SectionValues { deltas: Vec::new(), planes, block: self.block() }
     }
 
-    /// How attributes are coded with some shifts.
-    pub(crate) fn coding(&self, shift: [u8; 5]) -> AttributeCoding<'_> {
+    /// The steps of a unit with these exponents.
+    pub(crate) fn steps(&self, attribute_step: [u8; 5]) -> StepRule {
+        StepRule::new(self.sequence, attribute_step)
+    }
+
+    /// How attributes are coded with these exponents of steps.
+    pub(crate) fn coding(&self, attribute_step: [u8; 5]) -> AttributeCoding<'_> {
         AttributeCoding {
-            shift,
+            steps: self.steps(attribute_step),
             canonical_axes: self.sequence.canonical_axes(),
-            rotation_thresholds: self.sequence.rotation_threshold,
             colour: self.colour,
         }
     }
@@ -104,9 +145,8 @@ impl UnitCoder<'_> {
         let unit = Unit {
             header: &draft.header,
             values: &draft.values,
-            coding: self.coding(draft.header.attribute_shift),
+            coding: self.coding(draft.header.attribute_step),
             sequence: self.sequence,
-            intra: self.intra,
             network: self.network,
             max_learned: self.max_learned,
             at: 0,
@@ -130,7 +170,10 @@ impl UnitCoder<'_> {
         let new = match (draft.is_predicted(), header.new_count) {
             (_, 0) => return Ok(write_increment(&header, self.sequence, &sections)?),
             (false, _) => &new.coded,
-            (true, _) => &self.section_draft(Section::New, draft.values.section(Section::New), models),
+            (true, _) => {
+                let steps = self.steps(header.attribute_step);
+                &self.section_draft(Section::New, draft.values.section(Section::New), steps, models)
+            }
         };
         let before = models.clone();
         sections.push(new.code(Section::New, &self.plan, models)?);
@@ -178,32 +221,22 @@ impl UnitCoder<'_> {
         draft: &Draft,
         models: &mut ModelsInForce,
     ) -> Result<SectionBytes, Error> {
-        self.code_values(section, draft.values.section(section), models)
+        let steps = self.steps(draft.header.attribute_step);
+        let coded = self.section_draft(section, draft.values.section(section), steps, models);
+        coded.code(section, &self.plan, models)
     }
 
-    /// A section with these values.
-    ///
-    /// # Errors
-    /// A value that no token codes.
-    pub(crate) fn code_values(
-        &self,
-        section: Section,
-        values: &SectionValues,
-        models: &mut ModelsInForce,
-    ) -> Result<SectionBytes, Error> {
-        self.section_draft(section, values, models).code(section, &self.plan, models)
-    }
-
-    /// Values divided into blocks, with models of their own.
+    /// Values divided into blocks, with models of their own; `steps` are those of the unit.
     pub(crate) fn section_draft(
         &self,
         section: Section,
         values: &SectionValues,
+        steps: StepRule,
         models: &ModelsInForce,
     ) -> SectionDraft {
         let layout = self.layout(section);
         let biases = biases(section, &layout, &[values], models, &self.plan);
-        SectionDraft::new(layout, values, &biases, &self.plan)
+        SectionDraft::new(layout, values, &biases, steps, &self.plan)
     }
 }
 
@@ -222,7 +255,7 @@ fn trimmed(header: IncrementHeader) -> IncrementHeader {
         trimmed.position_shift = plain.position_shift;
     }
     if header.new_count == 0 && header.update_count == 0 {
-        trimmed.attribute_shift = plain.attribute_shift;
+        trimmed.attribute_step = plain.attribute_step;
         let ShHeader { sh_mode, vq_stage_count, codebook_ids } = plain.sh();
         (trimmed.sh_mode, trimmed.vq_stage_count, trimmed.codebook_ids) =
             (sh_mode, vq_stage_count, codebook_ids);

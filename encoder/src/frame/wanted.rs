@@ -1,94 +1,98 @@
 //! What a run of Gaussians shall become, on the output grids, and the residuals that bring it there.
 
-use super::intra::scale_residuals;
 use super::unit::UnitCoder;
 use crate::colour;
 use crate::gop_tools::{dc_planes, sh_planes};
-use crate::grid::{Geometry, Spacing, geometry};
+use crate::grid::{Geometry, geometry, nearest_integer};
+use crate::shape::{Shape, nearest_multiple, scale_residuals};
+use crate::vq;
 use rayon::prelude::*;
-use splatstream_decoder::colour::{COMPONENT_RANGE, Colour, inverse};
-use splatstream_decoder::increment::residual::{Attributes, Stage};
+use splatstream_decoder::colour::{COMPONENT_RANGE, Colour};
+use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
 use splatstream_decoder::layout::ShCoding;
-use splatstream_decoder::list::{FINE, GaussianList};
+use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::position::morton;
+use splatstream_decoder::steps::{Exponents, StepRule, step};
 use splatstream_format::Result;
-use splatstream_format::payload::{Codebook, Transform};
+use splatstream_format::payload::Transform;
 use splatstream_scene::GaussianFrame;
 
-/// The integers of Gaussians; all planes of one length, or empty where a comment says so.
+/// The integers of Gaussians; all planes of one length, or empty where a comment says so. Attributes are in
+/// [parts](crate::grid::PARTS) of a step: they are rounded once, when their steps are known.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Wanted {
+    /// Codes.
     pub(crate) position: [Vec<u32>; 3],
     log_scale: [Vec<i32>; 3],
     opacity: Vec<i32>,
     rotation: [Vec<i32>; 3],
-    /// Components of dc, and of sh or codebook indices: how colours are coded where nothing is known of them.
-    components: [Vec<Vec<i32>>; 2],
-    /// Colours in steps / 64. Empty where nothing is coded as a difference.
+    /// Components of dc and of sh, steps: how colours are coded where nothing is known of them.
+    components: [Vec<Vec<f32>>; 2],
+    /// Colours. Empty where nothing is coded as a difference.
     pub(crate) dc: [Vec<i32>; 3],
     pub(crate) sh: Vec<Vec<i32>>,
 }
 
-/// Colours nearer to what components give than this, steps / 64, are within the range of components.
-const NEAR: f32 = 512.0;
-
 impl Wanted {
     /// Of a canonical frame whose reach has been checked. `sh_components`: those of sh, if they are known.
-    ///
-    /// # Errors
-    /// Components out of range.
     pub(crate) fn new(
         frame: &GaussianFrame,
-        spacing: &Spacing,
-        sh_components: Option<Vec<Vec<i32>>>,
+        sh_components: Option<Vec<Vec<f32>>>,
         coder: &UnitCoder<'_>,
-    ) -> Result<Self> {
+    ) -> Self {
         let UnitCoder { sequence, colour, .. } = coder;
         let (dc_step, sh_step) = (sequence.dc_step(), sequence.sh_step());
         let zeros = vec![0.0; frame.len()];
         let (dc_planes, sh_planes) = (dc_planes(frame), sh_planes(frame, sequence, &zeros));
-        let dc = colour::components(colour.dc, &dc_planes, dc_step, spacing);
-        let books: Vec<&Codebook> = colour.codebooks.iter().flatten().copied().collect();
-        let sh = sh_components.unwrap_or_else(|| match (colour.mode, colour.sh) {
-            (ShCoding::Coefficients { .. }, Some(transform)) => {
-                colour::components(transform, &sh_planes, sh_step, spacing)
-            }
-            (ShCoding::VectorQuantised { .. }, Some(transform)) => {
-                colour::stages(transform, &sh_planes, sh_step, &books)
-            }
-            _ => Vec::new(),
+        let dc = colour::components(colour.dc, &dc_planes, dc_step);
+        let sh = sh_components.unwrap_or_else(|| match colour.sh {
+            Some(transform) => colour::components(transform, &sh_planes, sh_step),
+            None => Vec::new(),
         });
-        let Geometry { position, log_scale, opacity, rotation } = geometry(frame, sequence, spacing);
+        let Geometry { position, log_scale, opacity, rotation } = geometry(frame, sequence);
         let mut wanted = Self { position, log_scale, opacity, rotation, ..Self::default() };
         if coder.has_differences {
-            let mut red_green_blue = fine(&dc_planes, dc_step, colour.dc, &dc, spacing)?.into_iter();
+            let mut red_green_blue = fine(&dc_planes, dc_step).into_iter();
             wanted.dc = [(); 3].map(|()| red_green_blue.next().unwrap_or_default());
-            wanted.sh = match (colour.mode, colour.sh) {
-                (ShCoding::Coefficients { .. }, Some(transform)) => {
-                    fine(&sh_planes, sh_step, transform, &sh, spacing)?
-                }
-                _ => vec![vec![0; frame.len()]; sh_planes.len()],
-            };
+            wanted.sh = fine(&sh_planes, sh_step);
         }
         wanted.components = [dc, sh];
-        Ok(wanted)
+        wanted
     }
 
-    /// The planes of some of the Gaussians without prediction, on the finest grids, in coding order.
-    pub(crate) fn direct(&self, rows: &[u32]) -> Vec<Vec<i32>> {
-        let [largest, middle, smallest] = &self.log_scale;
-        let pick = |plane: &Vec<i32>| -> Vec<i32> { rows.iter().map(|&row| plane[row as usize]).collect() };
-        let difference = |a: &[i32], b: &[i32]| -> Vec<i32> {
-            rows.iter().map(|&row| a[row as usize] - b[row as usize]).collect()
-        };
-        let mut planes = vec![pick(largest), difference(largest, middle), difference(middle, smallest)];
-        let others: Vec<&Vec<i32>> = [&self.opacity]
-            .into_iter()
-            .chain(&self.rotation)
-            .chain(self.components.iter().flatten())
-            .collect();
-        planes.par_extend(others.into_par_iter().map(pick));
+    /// The planes of some of the Gaussians without prediction, in coding order.
+    pub(crate) fn direct(&self, rows: &[u32], rule: &StepRule, coder: &UnitCoder<'_>) -> Vec<Vec<i32>> {
+        let sorted = coder.sequence.canonical_axes();
+        let shapes: Vec<Shape> = rows.par_iter().map(|&row| self.shape(row, rule, sorted)).collect();
+        let mut planes: Vec<Vec<i32>> =
+            (0..4).map(|plane: usize| shapes.iter().map(|shape| shape.values[plane]).collect()).collect();
+        let exponents =
+            |stage: Stage| -> Vec<u8> { shapes.iter().map(|shape| shape.exponent(stage, rule)).collect() };
+        let turned = exponents(Stage::Rotation);
+        planes.extend(self.rotation.iter().map(|plane| {
+            let value = |((&row, shape), &exponent): ((&u32, &Shape), &u8)| {
+                if shape.is_sphere() { 0 } else { nearest_multiple(plane[row as usize], exponent) }
+            };
+            rows.iter().zip(&shapes).zip(&turned).map(value).collect::<Vec<i32>>()
+        }));
+        let [dc, sh] = &self.components;
+        planes.extend(rounded(dc, rows, &exponents(Stage::Dc)));
+        let exponents = exponents(Stage::Sh);
+        match coder.colour.mode {
+            ShCoding::None => {}
+            ShCoding::Coefficients { .. } => planes.extend(rounded(sh, rows, &exponents)),
+            ShCoding::VectorQuantised { .. } => {
+                let values = scaled_rows(sh, rows, &exponents);
+                let books: Vec<_> = coder.colour.codebooks.iter().flatten().copied().collect();
+                planes.extend(vq::stages(values, sh.len(), &books));
+            }
+        }
         planes
+    }
+
+    fn shape(&self, row: u32, rule: &StepRule, sorted: bool) -> Shape {
+        let row = row as usize;
+        Shape::new(self.log_scale.each_ref().map(|plane| plane[row]), self.opacity[row], rule, sorted)
     }
 
     /// Some of the Gaussians.
@@ -102,7 +106,9 @@ impl Wanted {
             log_scale: self.log_scale.each_ref().map(pick),
             opacity: pick(&self.opacity),
             rotation: self.rotation.each_ref().map(pick),
-            components: self.components.each_ref().map(picked),
+            components: self.components.each_ref().map(|planes| {
+                planes.iter().map(|plane| rows.iter().map(|&row| plane[row as usize]).collect()).collect()
+            }),
             dc: self.dc.each_ref().map(pick),
             sh: picked(&self.sh),
         }
@@ -131,32 +137,35 @@ impl Wanted {
         self.position.iter().zip(&list.planes.position).map(of_axis).collect()
     }
 
-    /// The residual planes of one attribute on top of what is known or predicted. `is_new`: for new Gaussians, which
-    /// have a codebook index where others keep their SH.
+    /// The residual planes of one attribute on top of what is known or predicted; those before it are what residuals have
+    /// made of them. `is_new`: for new Gaussians, which have a codebook index where others keep their SH.
     pub(crate) fn residuals(
         &self,
         stage: Stage,
         now: &Attributes,
-        shift: u8,
-        colour: &Colour<'_>,
+        rule: &StepRule,
+        coder: &UnitCoder<'_>,
         is_new: bool,
     ) -> Vec<Vec<i32>> {
+        let exponents = || rule.exponents(stage, now.log_scale.each_ref().map(Vec::as_slice), &now.opacity);
+        let colour = &coder.colour;
         match stage {
-            Stage::LogScale => self.scale_planes(now, shift),
-            Stage::Opacity => vec![differences(&self.opacity, &now.opacity, shift)],
+            Stage::LogScale => self.scale_planes(now, rule, coder.sequence.canonical_axes()),
+            Stage::Opacity => vec![differences(&self.opacity, &now.opacity, &exponents())],
             Stage::Rotation => {
+                let exponents = exponents();
                 let fine = |(wanted, now): (&Vec<i32>, &Vec<i32>)| {
-                    let shift = shift + FINE.ilog2() as u8;
-                    wanted.iter().zip(now).map(|(&w, &n)| nearest(w * FINE - n, shift)).collect()
+                    let pairs = wanted.iter().zip(now).enumerate();
+                    pairs.map(|(row, (&w, &n))| nearest_multiple(w - n, exponents.at(row))).collect()
                 };
                 self.rotation.iter().zip(&now.rotation_fine).map(fine).collect()
             }
-            Stage::Dc => components(colour.dc, &self.dc, &now.dc, shift),
+            Stage::Dc => components(colour.dc, &self.dc, &now.dc, &exponents()),
             Stage::Sh => match (colour.mode, colour.sh) {
                 (ShCoding::Coefficients { .. }, Some(transform)) => {
-                    components(transform, &self.sh, &now.sh, shift)
+                    components(transform, &self.sh, &now.sh, &exponents())
                 }
-                (ShCoding::VectorQuantised { .. }, _) if is_new => self.components[1].clone(),
+                (ShCoding::VectorQuantised { .. }, Some(_)) if is_new => self.indices(&exponents(), colour),
                 // Entry 0 is zero.
                 (ShCoding::VectorQuantised { stages }, _) => vec![vec![0; self.len()]; usize::from(stages)],
                 _ => Vec::new(),
@@ -164,60 +173,99 @@ impl Wanted {
         }
     }
 
-    fn scale_planes(&self, now: &Attributes, shift: u8) -> Vec<Vec<i32>> {
+    /// The residual planes of all attributes of Gaussians of which coarser ones are known.
+    ///
+    /// # Errors
+    /// What the decoder's own checks refuse.
+    pub(crate) fn updates(
+        &self,
+        mut now: Attributes,
+        attribute_step: [u8; 5],
+        coder: &UnitCoder<'_>,
+    ) -> Result<Vec<Vec<i32>>> {
+        let rule = coder.steps(attribute_step);
+        let mut planes = Vec::new();
+        for stage in Stage::ALL {
+            planes.extend(self.residuals(stage, &now, &rule, coder, false));
+            now.add_stage(stage, AttributeValues(&planes), &coder.coding(attribute_step), 0)?;
+        }
+        Ok(planes)
+    }
+
+    /// The codebook indices of all Gaussians.
+    fn indices(&self, exponents: &Exponents, colour: &Colour<'_>) -> Vec<Vec<i32>> {
+        let [_, sh] = &self.components;
+        let rows: Vec<u32> = (0..self.len() as u32).collect();
+        let exponents: Vec<u8> = (0..self.len()).map(|row| exponents.at(row)).collect();
+        let books: Vec<_> = colour.codebooks.iter().flatten().copied().collect();
+        vq::stages(scaled_rows(sh, &rows, &exponents), sh.len(), &books)
+    }
+
+    fn scale_planes(&self, now: &Attributes, rule: &StepRule, sorted: bool) -> Vec<Vec<i32>> {
         let at = |planes: &[Vec<i32>; 3], row: usize| planes.each_ref().map(|plane| plane[row]);
         let mut planes = [const { Vec::new() }; 3];
         for row in 0..self.len() {
-            let residuals = scale_residuals(at(&now.log_scale, row), at(&self.log_scale, row), shift);
+            let residuals = scale_residuals(at(&now.log_scale, row), at(&self.log_scale, row), rule, sorted);
             planes.iter_mut().zip(residuals).for_each(|(plane, value)| plane.push(value));
         }
         planes.to_vec()
     }
 }
 
-/// Planes of colour in steps / 64. A Gaussian that takes every second point shall become what its components give; any
-/// other what it is, so that a residual on top of a prediction is rounded once.
-fn fine(
-    planes: &[&[f32]],
-    step: f32,
-    transform: &Transform,
-    components: &[Vec<i32>],
-    spacing: &Spacing,
-) -> Result<Vec<Vec<i32>>> {
-    let count = planes.first().map_or(0, |plane| plane.len());
-    let mut coded = vec![vec![0; count]; planes.len()];
-    inverse(transform, components, &mut coded.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>(), 0)?;
-    let fine = 64.0 / step;
-    for (coded, plane) in coded.iter_mut().zip(planes) {
-        for (row, (slot, &value)) in coded.iter_mut().zip(*plane).enumerate() {
-            let exact = libm::rintf(value * fine);
-            // Beyond the range of components the coded colour is the nearest.
-            let is_near = (exact - *slot as f32).abs() < NEAR;
-            if !spacing.is_coarse(row) && is_near {
-                *slot = exact as i32;
-            }
-        }
-    }
-    Ok(coded)
+/// Components of some Gaussians to the nearest multiples of their steps.
+fn rounded(components: &[Vec<f32>], rows: &[u32], exponents: &[u8]) -> Vec<Vec<i32>> {
+    let plane = |plane: &Vec<f32>| {
+        let value = |(&row, &exponent): (&u32, &u8)| {
+            let step = step(exponent);
+            let most = COMPONENT_RANGE.end() / step;
+            nearest_integer(plane[row as usize] / step as f32).clamp(-most, most)
+        };
+        rows.iter().zip(exponents).map(value).collect()
+    };
+    components.par_iter().map(plane).collect()
+}
+
+/// The components of some Gaussians in their own steps, Gaussian by Gaussian.
+fn scaled_rows(components: &[Vec<f32>], rows: &[u32], exponents: &[u8]) -> Vec<f32> {
+    let of_row = |(&row, &exponent): (&u32, &u8)| {
+        components.iter().map(move |plane| plane[row as usize] / step(exponent) as f32)
+    };
+    rows.iter().zip(exponents).flat_map(of_row).collect()
+}
+
+/// Planes of colour in parts of a step.
+fn fine(planes: &[&[f32]], step: f32) -> Vec<Vec<i32>> {
+    let scale = crate::grid::PARTS / step;
+    let most = (COMPONENT_RANGE.end() * crate::shape::PARTS) as f32;
+    let value = |&value: &f32| nearest_integer((value * scale).clamp(-most, most));
+    planes.par_iter().map(|plane| plane.iter().map(value).collect()).collect()
 }
 
 /// x / 2^shift to the nearest integer, halves up.
-pub(crate) fn nearest(x: i32, shift: u8) -> i32 {
+fn nearest(x: i32, shift: u8) -> i32 {
     if shift == 0 { x } else { (x + (1 << (shift - 1))) >> shift }
 }
 
-fn differences(wanted: &[i32], now: &[i32], shift: u8) -> Vec<i32> {
-    wanted.iter().zip(now).map(|(&wanted, &now)| nearest(wanted - now, shift)).collect()
+fn differences(wanted: &[i32], now: &[i32], exponents: &Exponents) -> Vec<i32> {
+    let pairs = wanted.iter().zip(now).enumerate();
+    pairs
+        .map(|(row, (&wanted, &now))| nearest_multiple(wanted - crate::shape::PARTS * now, exponents.at(row)))
+        .collect()
 }
 
-/// Colour differences as components of a transform, in steps of 2^shift.
-fn components(transform: &Transform, wanted: &[Vec<i32>], now: &[Vec<i32>], shift: u8) -> Vec<Vec<i32>> {
+/// Colour differences as components of a transform, in steps of each Gaussian.
+fn components(
+    transform: &Transform,
+    wanted: &[Vec<i32>],
+    now: &[Vec<i32>],
+    exponents: &Exponents,
+) -> Vec<Vec<i32>> {
     let count = wanted.first().map_or(0, Vec::len);
-    // Basis in Q12, colours in 1/64: one step is 2^18.
-    let unit = 1_i64 << (18 + shift);
-    // In range when a decoder has shifted it back.
-    let most = i64::from(COMPONENT_RANGE.end() >> shift);
     let row_sum = |weights: &[i16], row: usize| -> i32 {
+        let step = step(exponents.at(row));
+        // Basis in Q12, colours in 1/64: a finest step is 2^18.
+        let unit = i64::from(step) << 18;
+        let most = i64::from(COMPONENT_RANGE.end() / step);
         let term = |(&weight, (wanted, now)): (&i16, (&Vec<i32>, &Vec<i32>))| {
             i64::from(weight) * (i64::from(wanted[row]) - i64::from(now[row]))
         };

@@ -1,5 +1,6 @@
 //! Matching where things move further than their own size.
 
+use super::registration::registered;
 use super::rigid::{Point, Vector};
 use super::tree::Tree;
 use crate::matching::{CLOSE, Cloud, LIMIT, Link, Matching, Measure, Reach, by_index, features, links};
@@ -18,7 +19,7 @@ const PAIRS_IN_CELL: usize = 16;
 const FEWEST: usize = 256;
 
 /// How far from where it is expected a Gaussian may be: three times its size, or as far as rounding alone may put it.
-const REACH: Reach = Reach { scales: 3.0, least: 4.0 };
+pub(super) const REACH_OF_SURE: Reach = Reach { scales: 3.0, least: 4.0 };
 
 /// Pairs by row, then by place and attributes about where a guess of the motion expects them.
 pub(crate) fn follow(
@@ -35,6 +36,9 @@ pub(crate) fn follow(
     let mut guess = reference.position.map(<[f32]>::to_vec);
     if free.len().min(wanted.len()) >= FEWEST {
         let side = side(target);
+        if let Some(places) = registered(reference, target, (&free, &wanted), measure, side) {
+            guess = places;
+        }
         for (part, reach) in ROUNDS {
             let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
             let reach = Reach { scales: 0.0, least: reach * side };
@@ -45,17 +49,17 @@ pub(crate) fn follow(
         let mut found = Vec::new();
         for _ in 0..SURE {
             let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
-            found.extend(matching.add_nearest(&expected, target, measure, REACH, CLOSE));
+            found.extend(matching.add_nearest(&expected, target, measure, REACH_OF_SURE, CLOSE));
             guess = expected_places(reference, &points(reference, target, &found), position_bits);
         }
     }
     let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
-    matching.add_nearest(&expected, target, measure, REACH, LIMIT);
+    matching.add_nearest(&expected, target, measure, REACH_OF_SURE, LIMIT);
     matching
 }
 
 /// Where Gaussians were and where they are now.
-fn points(reference: &Cloud<'_>, target: &Cloud<'_>, links: &[Link]) -> Vec<Point> {
+pub(super) fn points(reference: &Cloud<'_>, target: &Cloud<'_>, links: &[Link]) -> Vec<Point> {
     let point = |link: &Link| Point {
         from: reference.at(link.from).map(f64::from),
         to: target.at(link.to).map(f64::from),
@@ -84,7 +88,7 @@ fn expected_places(reference: &Cloud<'_>, points: &[Point], position_bits: u8) -
 }
 
 /// One in `part` of these, those that cover most.
-fn largest(cloud: &Cloud<'_>, indices: &[u32], part: usize) -> Vec<u32> {
+pub(super) fn largest(cloud: &Cloud<'_>, indices: &[u32], part: usize) -> Vec<u32> {
     let mut ranked: Vec<(f32, u32)> = indices.iter().map(|&index| (-cloud.coverage(index), index)).collect();
     ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let kept = (indices.len() / part).max(FEWEST).min(indices.len());

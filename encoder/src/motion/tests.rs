@@ -3,10 +3,10 @@
 use super::follow::follow;
 use super::stale::{Held, stale_cells};
 use super::*;
-use crate::grid::{Extent, inner_side, position_grid};
+use crate::grid::PositionGrid;
 use crate::matching::tests::{Random, Scene, measure, shuffled};
 use crate::matching::{Cloud, Kind, Matching, Measure, shares_little};
-use crate::settings::Quality;
+use crate::settings::{Quality, Settings};
 use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
 use std::path::Path;
 
@@ -200,10 +200,14 @@ fn a_real_head() {
     let (Some(first), Some(second)) = (real(0), real(8)) else { return };
     let steps = Quality::High.steps();
     let all = |frame: &GaussianFrame| (0..frame.len() as u32).collect::<Vec<_>>();
-    let extent = Extent::NONE.with(&first, &all(&first)).with(&second, &all(&second));
-    let (offset, step, bits) = position_grid(extent, inner_side(&first), &steps);
+    let mut found = crate::sequence::Scene::new();
+    [&first, &second].into_iter().for_each(|frame| found.add(frame, &all(frame)));
+    let sequence = found.parameters(&Settings { steps, ..Settings::default() }, 2, 0, 0);
+    let (grid, bits) = (PositionGrid::of(&sequence), sequence.position_bits);
+    let step = sequence.position_step();
     let scene = |frame: &GaussianFrame| {
-        let plane = |axis: usize| frame.position()[axis].iter().map(|v| (v - offset[axis]) / step).collect();
+        let plane =
+            |axis: usize| frame.position()[axis].iter().map(|&value| grid.steps(axis, value)).collect();
         Scene {
             position: [0, 1, 2].map(plane),
             log_scale: frame.log_scale().clone(),

@@ -76,7 +76,7 @@ fn any_batch(header: &NetworkHeader, neighbours: usize, random: &mut Random) -> 
                 .collect();
             let geometry = [(); 7].map(|()| random.within(40));
             let (affinity, distance) = (4096 - random.below(2000) as i64, 10 * neighbour as u64 + 5);
-            let seen = Seen { components: &components, geometry, affinity, distance };
+            let seen = Seen { components: &components, geometry, affinity, distance, ..Seen::default() };
             batch.set_token(header, (lane, neighbour), &seen, 10 * neighbours as u64);
         }
         let offsets: Vec<[i32; 3]> = (0..neighbours).map(|_| [(); 3].map(|()| random.within(1000))).collect();

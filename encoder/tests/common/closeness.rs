@@ -1,5 +1,6 @@
 //! How far decoded Gaussians are from their sources, in quantiser steps.
 
+use splatstream_decoder::companding::Companding;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::GaussianFrame;
@@ -21,9 +22,12 @@ pub(crate) struct Bounds {
 impl Bounds {
     /// Of an intra frame: half a step.
     pub(crate) const INTRA: Self = Self { value: 0.5, colour: 0.5, place: 0.5, sh: true };
-    /// Of a predicted frame: the encoder leaves up to three quarters of a step.
-    pub(crate) const PREDICTED: Self = Self { value: 0.75, colour: 0.75, place: 1.25, sh: true };
+    /// Of a predicted frame: the encoder leaves up to one and a half steps where a change would take many bits.
+    pub(crate) const PREDICTED: Self = Self { value: 1.5, colour: 1.5, place: 2.0, sh: true };
 }
+
+/// Steps that are asked for are so many of the finest.
+const NOMINAL: f32 = 8.0;
 
 /// What f32 rounds on the way, steps.
 const SLACK: f32 = 0.03;
@@ -47,9 +51,11 @@ fn source_row(frame: &GaussianFrame, row: usize, sequence: &SequenceParameters) 
     Row {
         position: [0, 1, 2]
             .map(|axis: usize| (frame.position()[axis][row] - offset[axis]) / sequence.position_step()),
-        log_scale: [0, 1, 2].map(|axis: usize| frame.log_scale()[axis][row] / sequence.log_scale_step()),
+        log_scale: [0, 1, 2].map(|axis: usize| {
+            (frame.log_scale()[axis][row] - sequence.log_scale_offset()) / sequence.log_scale_step()
+        }),
         rotation: turn.map(|part| part / norm),
-        opacity: frame.opacity_logit()[row] / sequence.opacity_step(),
+        opacity: (frame.opacity_logit()[row] - sequence.opacity_offset()) / sequence.opacity_step(),
         colour: (0..3).map(|plane: usize| frame.dc()[plane][row] / sequence.dc_step()).collect(),
         sh: (0..usize::from(sequence.sh_dimension())).map(sh).collect(),
     }
@@ -101,7 +107,8 @@ fn is_near_in_shape(source: &Row, log_scale: [f32; 3], turn: [f32; 3], step: f32
         let (scales, rotation) = renamed(source.log_scale, source.rotation, naming);
         let sign = if rotation[0] < 0.0 { -1.0 } else { 1.0 };
         (0..3).all(|k| within(scales[k], log_scale[k], bounds.value))
-            && (round || (0..3).all(|k| within(sign * rotation[k + 1] / step, turn[k], bounds.place)))
+            && (round
+                || (0..3).all(|k| within(sign * rotation[k + 1] / step, turn[k], NOMINAL * bounds.place)))
     })
 }
 
@@ -123,13 +130,20 @@ pub(crate) fn assert_close(
 ) {
     let rows: Vec<Row> = (0..source.len()).map(|row| source_row(source, row, sequence)).collect();
     let mut used = vec![false; rows.len()];
+    let companding = Companding::new(sequence);
+    let bounds = Bounds { value: NOMINAL * bounds.value, colour: NOMINAL * bounds.colour, ..bounds };
     for i in 0..decoded.len() {
         let log_scale = decoded.log_scale.each_ref().map(|plane| plane[i] as f32);
         let turn = decoded.rotation.each_ref().map(|plane| plane[i] as f32);
         let is_source = |row: &Row| {
             (0..3).all(|axis: usize| {
                 let rounding = row.position[axis].abs() * 4.0 * f32::EPSILON;
-                within(row.position[axis], decoded.position[axis][i] as f32, bounds.place + rounding)
+                let code = decoded.position[axis][i];
+                let point = companding.expand(code) as f32;
+                // Outside the linear part of the grid steps are larger.
+                let step = (companding.expand(code + 1) as f32 - point)
+                    .max(point - companding.expand(code.max(1) - 1) as f32);
+                within(row.position[axis], point, bounds.place * step + rounding)
             }) && within(row.opacity, decoded.opacity[i] as f32, bounds.value)
                 && is_near_in_colour(&row.colour, &decoded.dc, i, bounds.colour)
                 && (!bounds.sh || is_near_in_colour(&row.sh, &decoded.sh, i, bounds.colour))

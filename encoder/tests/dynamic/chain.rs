@@ -2,6 +2,7 @@
 
 use crate::common::closeness::{Bounds, assert_close};
 use crate::common::dynamic::{Whole, coded, predicted, scene};
+use splatstream_decoder::companding::Companding;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_encoder::{Settings, Tools};
 use splatstream_format::syntax::SequenceParameters;
@@ -13,9 +14,11 @@ const FRAMES: u32 = 300;
 /// Mean distance of decoded Gaussians from the nearest source, grid steps.
 fn mean_error(source: &GaussianFrame, decoded: &QuantizedFrame, sequence: &SequenceParameters) -> f32 {
     let (offset, step) = (sequence.position_offset(), sequence.position_step());
+    let companding = Companding::new(sequence);
     let distance = |i: usize, row: usize| {
         let error = |axis: usize| {
-            (source.position()[axis][row] - offset[axis]) / step - decoded.position[axis][i] as f32
+            (source.position()[axis][row] - offset[axis]) / step
+                - companding.expand(decoded.position[axis][i]) as f32
         };
         (0..3).map(error).map(|error| error * error).sum::<f32>()
     };
@@ -28,7 +31,7 @@ fn mean_error(source: &GaussianFrame, decoded: &QuantizedFrame, sequence: &Seque
 fn three_hundred_predicted_frames_do_not_drift() {
     let frames = scene(100, FRAMES, 0, Tracking::Tracked);
     for layers in [1, 3] {
-        let tools = Tools { coarse_tail: false, ..Tools::default() };
+        let tools = Tools::default();
         let settings = Settings { gop: FRAMES, refinements: vec![20, 100], tools, ..predicted(layers) };
         let (bytes, report) = coded(&frames, &settings, "a chain");
         assert!(report.coded[1..].iter().all(|frame| frame.new + frame.removed < 20), "tracked frames go on");

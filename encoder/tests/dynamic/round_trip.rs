@@ -65,7 +65,7 @@ fn harmonics_of_every_degree_are_coded_either_way() {
             for spatial_layers in [1, 3] {
                 let steps = Steps { sh: 0.02, ..quick().steps };
                 let sh_degree = Some(degree);
-                let tools = Tools { coarse_tail: false, ..Tools::default() };
+                let tools = Tools::default();
                 let settings = Settings { sh, steps, sh_degree, spatial_layers, tools, ..predicted(2) };
                 let what = format!("degree {degree}, {sh:?}, {spatial_layers} spatial layers");
                 let (bytes, report) = coded(&frames, &settings, &what);
@@ -166,9 +166,9 @@ fn the_last_point_of_the_grid_is_reached_through_every_number_of_layers() {
 }
 
 #[test]
-fn predicted_frames_are_within_three_quarters_of_a_step_of_the_source() {
+fn predicted_frames_are_within_one_and_a_half_steps_of_the_source() {
     let steps = Steps { sh: 0.02, ..quick().steps };
-    let tools = Tools { coarse_tail: false, ..Tools::default() };
+    let tools = Tools::default();
     for tracking in [Tracking::Tracked, Tracking::Untracked] {
         let frames = scene(300, 6, 1, tracking);
         for layers in [1, 3] {
@@ -213,13 +213,8 @@ fn settings() -> impl Strategy<Value = Settings> {
     let importance = Some(splatstream_encoder::Importance::Volume);
     let network = any_network();
     let tools =
-        any::<[bool; 5]>().prop_map(|[contexts, table_reuse, coarse_tail, cell_motion, survivors]| Tools {
-            contexts,
-            table_reuse,
-            coarse_tail,
-            cell_motion,
-            survivors,
-            ..Tools::default()
+        any::<[bool; 5]>().prop_map(|[contexts, table_reuse, adaptive_steps, cell_motion, survivors]| {
+            Tools { contexts, table_reuse, adaptive_steps, cell_motion, survivors, ..Tools::default() }
         });
     (structure, 1_u8..=4, sh, refinements, predictors, tools, preset, 1_u32..6).prop_map(
         move |(structure, spatial_layers, sh, refinements, predictors, tools, preset, gop)| Settings {

@@ -13,7 +13,7 @@ use splatstream_scene::{GaussianFrame, Planes, sh_coefficients};
 /// Encodes with one temporal layer and looks at every decoded frame.
 fn close(frames: &[GaussianFrame], what: &str) -> Report {
     let predictor_choice = PredictorChoice::Difference;
-    let tools = Tools { coarse_tail: false, ..Tools::default() };
+    let tools = Tools::default();
     close_with(frames, &Settings { predictor_choice, tools, ..predicted(1) }, what)
 }
 
@@ -117,7 +117,7 @@ fn one_point_that_moves_across_the_grid_is_found_again() {
 fn a_scene_that_jumps_further_than_its_size_is_found_again() {
     let frame = still(300, 0);
     let at = |t: f32| changed(&frame, |planes| planes.position[0].iter_mut().for_each(|x| *x += 15.0 * t));
-    let tools = Tools { coarse_tail: false, ..Tools::default() };
+    let tools = Tools::default();
     let settings = Settings { steps: Quality::High.steps(), tools, ..predicted(1) };
     close_with(&[at(0.0), at(1.0), at(0.0)], &settings, "a jump");
 }
@@ -165,7 +165,7 @@ fn axes_named_otherwise_in_every_frame_update_nothing() {
             }
         })
     };
-    let tools = Tools { coarse_tail: false, ..Tools::default() };
+    let tools = Tools::default();
     let settings = Settings { predictors: Predictors::NONE, tools, ..predicted(1) };
     let report = close_with(&[rename(0), rename(1), rename(2)], &settings, "renamed");
     for frame in &report.coded[1..] {
@@ -221,7 +221,7 @@ fn a_scene_cut_starts_a_gop() {
 
 #[test]
 fn a_frame_that_shares_nothing_with_its_reference_is_all_new() {
-    let tools = Tools { survivors: false, coarse_tail: false, ..Tools::default() };
+    let tools = Tools { survivors: false, ..Tools::default() };
     let frames = scene(200, 4, 1, Tracking::Tracked);
     let none = (Predictors::NONE, PredictorChoice::Bits);
     let choices =
@@ -276,7 +276,7 @@ fn changing_degrees(cases: &[[u8; 4]]) {
         GaussianFrame::from_planes(degree, planes).unwrap()
     };
     let steps = Steps { sh: 0.02, ..quick().steps };
-    let tools = Tools { coarse_tail: false, ..Tools::default() };
+    let tools = Tools::default();
     let settings = Settings { steps, sh: ShChoice::Coefficients, tools, ..predicted(1) };
     for degrees in cases {
         close_with(&degrees.map(of_degree), &settings, &format!("degrees {degrees:?}"));

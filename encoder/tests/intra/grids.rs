@@ -2,12 +2,15 @@
 
 use crate::common::{Random, decoded, encoded, strict};
 use proptest::prelude::*;
+use splatstream_decoder::companding::Companding;
+use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::position::morton;
 use splatstream_decoder::process::Options;
+use splatstream_decoder::steps::{StepRule, step};
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::canonical::canonicalise;
-use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice};
+use splatstream_encoder::{Importance, Laws, Preset, Quality, Settings, ShChoice};
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_scene::{GaussianFrame, Planes, importance, sh_coefficients};
 use std::ops::ControlFlow;
@@ -68,11 +71,19 @@ fn frame(kind: Kind, count: usize, sh_degree: u8, seed: u64) -> GaussianFrame {
 }
 
 fn grid_point(frame: &GaussianFrame, row: usize, sequence: &SequenceParameters) -> [u32; 3] {
-    let last = ((1_u32 << sequence.position_bits) - 1) as f32;
+    let companding = Companding::new(sequence);
+    let last = (1_u32 << sequence.position_bits) - 1;
     [0, 1, 2].map(|axis| {
-        let value =
-            (frame.position()[axis][row] - sequence.position_offset()[axis]) / sequence.position_step();
-        value.clamp(0.0, last).round_ties_even() as u32
+        let offset = f64::from(sequence.position_offset()[axis]);
+        let value = (f64::from(frame.position()[axis][row]) - offset) / f64::from(sequence.position_step());
+        // The last point that is not beyond, or the one after it.
+        let (mut low, mut high) = (0, last + 1);
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            if companding.expand(middle) as f64 <= value { low = middle } else { high = middle }
+        }
+        let apart = |code: u32| (companding.expand(code) as f64 - value).abs();
+        if low < last && (apart(low + 1), low % 2) < (apart(low), 1) { low + 1 } else { low }
     })
 }
 
@@ -115,10 +126,15 @@ fn check(
     let all: Vec<u32> = (0..count as u32).collect();
     let canonical = canonicalise(&source, &all, sequence.canonical_axes());
     prop_assert_eq!(output.len(), count);
+    let companding = Companding::new(&sequence);
+    // At the border of two segments the step to one side is larger.
+    let gap = |code: u32| companding.expand(code + 1) - companding.expand(code);
+    let step_at = |code: u32| gap(code).max(gap(code.max(1) - 1)) as f32;
     for (i, row) in coded_order(&canonical, &sequence).into_iter().enumerate() {
         let within = |what: &str, before: f32, after: f32, step: f32| {
-            // Half a step, and the rounding of two sums and a quotient in f32.
-            let bound = 0.5 * step + 4.0 * f32::EPSILON * (before.abs() + after.abs() + step);
+            // Half a step, the fraction of a step to which values are known, and the rounding of two sums and a
+            // quotient in f32.
+            let bound = 0.502 * step + 4.0 * f32::EPSILON * (before.abs() + after.abs() + step);
             prop_assert!((before - after).abs() <= bound, "{:?} {}: {} became {}", kind, what, before, after);
             Ok(())
         };
@@ -129,21 +145,16 @@ fn check(
                 "position",
                 canonical.position()[axis][row],
                 output.position()[axis][i],
-                sequence.position_step() + slack,
+                sequence.position_step() * step_at(grid_point(&canonical, row, &sequence)[axis]) + slack,
             )?;
             within(
                 "log_scale",
                 canonical.log_scale()[axis][row],
                 output.log_scale()[axis][i],
-                sequence.log_scale_step(),
+                settings.steps.log_scale,
             )?;
         }
-        within(
-            "opacity",
-            canonical.opacity_logit()[row],
-            output.opacity_logit()[i],
-            sequence.opacity_step(),
-        )?;
+        within("opacity", canonical.opacity_logit()[row], output.opacity_logit()[i], settings.steps.opacity)?;
         let scales = [0, 1, 2].map(|axis| output.log_scale()[axis][i]);
         let is_sphere = scales[0] == scales[1] && scales[1] == scales[2];
         for part in 1..4 {
@@ -151,7 +162,7 @@ fn check(
             if is_sphere {
                 prop_assert_eq!(after, 0.0, "a sphere needs no rotation");
             } else {
-                within("rotation", before, after, sequence.rotation_step())?;
+                within("rotation", before, after, settings.steps.rotation)?;
             }
         }
     }
@@ -189,21 +200,38 @@ proptest! {
 }
 
 #[test]
-fn what_pictures_hardly_show_takes_every_second_point_of_its_grids() {
+fn steps_follow_from_the_refinement_and_the_size() {
+    let mut laws = Laws { area: 0.25, area_reference: -8.0, ..Laws::default() };
+    laws.coarser[1] = 4;
     let settings = Settings {
+        laws,
         refinements: vec![50, 100],
         importance: Some(Importance::Contribution),
         keep_invisible: true,
         ..Settings::default()
     };
     let (bytes, _) = encoded(vec![frame(Kind::Plain, 400, 0, 3)], &settings);
-    let (frames, _) = decoded(&bytes, &strict());
-    let planes = &frames[0].planes;
-    for plane in planes.log_scale.iter().chain(&planes.rotation) {
-        let odd = |values: &[i32]| values.iter().filter(|value| *value % 2 != 0).count();
-        assert!(odd(&plane[..200]) > 20, "the first half takes every point");
-        assert_eq!(odd(&plane[200..]), 0);
+    let mut found = None;
+    let summary = decode_stream(&bytes, &strict(), |sequence, frame| {
+        found = Some((*sequence, frame.planes));
+        ControlFlow::Continue(())
+    });
+    assert_eq!(summary.verdict(), None);
+    let (sequence, planes) = found.unwrap();
+    assert!(sequence.size_weight[0] > 0);
+    let rules = [[5; 5], [9; 5]].map(|announced| StepRule::new(&sequence, announced));
+    let mut exponents = Vec::new();
+    for row in 0..400 {
+        let rule = &rules[row / 200];
+        let log_scale = planes.log_scale.each_ref().map(|plane| plane[row]);
+        let exponent = rule.of(Stage::Rotation, log_scale, planes.opacity[row]);
+        assert!(planes.rotation.iter().all(|plane| plane[row] % step(exponent) == 0));
+        assert_eq!(log_scale[0] % step(rule.of_largest()), 0);
+        exponents.push(exponent);
     }
+    exponents.sort_unstable();
+    exponents.dedup();
+    assert!(exponents.len() > 4, "{exponents:?}");
 }
 
 // covers: SS-OP-004

@@ -3,7 +3,7 @@
 use crate::common::{encoded, strict};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Quality, Settings, Tools};
+use splatstream_encoder::{Settings, Steps, Tools};
 use splatstream_scene::{GaussianFrame, ReadLimits, ply};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -71,8 +71,15 @@ fn rows_of(ply: &[u8]) -> Vec<Row> {
 fn through_a_stream(rows: &[Row]) -> (GaussianFrame, Vec<Row>) {
     let frame = ply::read(&ply_of(rows), &ReadLimits::default()).unwrap();
     let settings = Settings {
-        steps: Quality::VisuallyLossless.steps(),
-        tools: Tools { coarse_tail: false, ..Tools::default() },
+        steps: Steps {
+            position_bits: 15.0,
+            log_scale: 0.05,
+            rotation: 0.009,
+            opacity: 0.05,
+            dc: 0.03,
+            sh: 0.03,
+        },
+        tools: Tools::default(),
         keep_invisible: true,
         ..Settings::default()
     };

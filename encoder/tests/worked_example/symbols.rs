@@ -1,11 +1,12 @@
 //! Clause 8.4 step by step, written again: the table of D.4, and a check of the fast reader.
 
 use splatstream_decoder::context::{delta_contexts, plane_contexts};
-use splatstream_decoder::increment::values::PreparedSections;
+use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
+use splatstream_decoder::steps::StepRule;
 use splatstream_format::Limits;
 use splatstream_format::bits::BitReader;
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
-use splatstream_format::entropy::layout::{Attribute, ShCoding};
+use splatstream_format::entropy::layout::{Attribute, PlaneInfo, ShCoding};
 use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::entropy::token::{Alphabet, join, unzigzag};
 use splatstream_format::payload::Increment;
@@ -32,16 +33,18 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
             UnitType::Increment => {
                 let sequence = sequence.as_ref().unwrap();
                 let increment = Increment::parse(payload, at, sequence, Profile::Intra, &limits).unwrap();
+                let steps = StepRule::new(sequence, increment.header.attribute_step);
+                let coding = SectionCoding { dc_rank: 3, sh: ShCoding::None, steps };
                 let prepared =
-                    PreparedSections::new(&increment.sections, 3, ShCoding::None, &mut in_force, &mut ())
-                        .unwrap();
+                    PreparedSections::new(&increment.sections, &coding, &mut in_force, &mut ()).unwrap();
                 let (coded, models) = prepared.sections().next().unwrap();
                 let fast = prepared.blocks(coded, models, sequence).unwrap();
                 let ([fast], [(block, _)]) = (fast.as_slice(), coded.blocks.as_slice()) else {
                     panic!("one block")
                 };
                 write!(text, "\n### The block of increment {}\n", unit.header.refinement).unwrap();
-                let slow = one(text, models, block, coded.count as usize, coded.lanes_log2);
+                assert_eq!(coded.lanes_log2, 0, "a small block has one lane");
+                let slow = one(text, models, block, coded.count as usize, steps);
                 assert_eq!(slow, (fast.deltas.clone(), fast.coded[1..].to_vec()), "two readers of a block");
             }
             _ => {}
@@ -52,27 +55,25 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
 /// The deltas and the coded planes of a block.
 type Values = (Vec<u64>, Vec<Vec<i32>>);
 
-fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, lanes_log2: u8) -> Values {
+fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, steps: StepRule) -> Values {
     assert!(block[0] < 128, "a small block has a one-byte word_count");
-    let lanes = 1 << lanes_log2;
     let mut bytes = block[1..].iter().copied();
     let mut number =
         |size: usize| (0..size).fold(0, |sum, index| sum | u32::from(bytes.next().unwrap()) << (8 * index));
-    let mut states: Vec<u32> = (0..lanes).map(|_| number(4)).collect();
+    let mut state = number(4);
     let words: Vec<u32> = (0..block[0]).map(|_| number(2)).collect();
-    let mut raw = BitReader::new(&block[1 + 4 * lanes + 2 * words.len()..]);
+    let mut raw = BitReader::new(&block[1 + 4 + 2 * words.len()..]);
     let mut next_word = words.into_iter();
     text.push_str(
         "\n| Plane | i | Context | State before | Slot | Token | Word | Raw bits | State after | Coded value |\n\
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
     let (mut deltas, mut planes) = (Vec::new(), vec![Vec::new()]);
-    let mut known = splatstream_decoder::block::CodedBlock::new(Vec::new());
+    let mut known = splatstream_decoder::block::CodedBlock::new(vec![0; count], 0, steps);
     for (plane, (&info, model)) in section.layout.planes().iter().zip(&section.models).enumerate() {
         for i in 0..count {
-            let context = context(model, plane, info.alphabet, &known, &deltas, &planes[plane]);
+            let context = context(model, plane, info, &known, &deltas, &planes[plane]);
             let table = &model.tables[usize::from(model.table_of_context[context])];
-            let state = states[i % lanes];
             let slot = state % 4096;
             let (token, first) = token_of(table.of_token(), slot);
             let mut after = u32::from(table.of_token()[token]) * (state >> 12) + slot - first;
@@ -82,7 +83,6 @@ fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, l
                 after = (after << 16) + taken;
                 word = format!("{taken:04x}");
             }
-            states[i % lanes] = after;
             let (base, raw_bits) = join(token as u8, model.direct_log2);
             let value = base + raw.bits(raw_bits);
             let coded = match info.alphabet {
@@ -95,6 +95,7 @@ fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, l
                 "| {name} | {i} | {context} | {state:08x} | {slot} | {token} | {word} | {raw_bits} | {after:08x} | {coded} |"
             )
             .unwrap();
+            state = after;
             if info.attribute == Attribute::Position {
                 deltas.push(value);
             } else {
@@ -102,10 +103,10 @@ fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, l
             }
         }
         known.deltas.clone_from(&deltas);
-        remember(&mut known, info, planes[plane].clone(), model.bias);
+        known.push(info, planes[plane].clone(), model.bias);
         planes.push(Vec::new());
     }
-    assert!(states.iter().all(|&state| state == 65_536) && next_word.next().is_none());
+    assert!(state == 65_536 && next_word.next().is_none());
     planes.pop();
     (deltas, planes.split_off(1))
 }
@@ -114,21 +115,21 @@ fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, l
 fn context(
     model: &PlaneModel,
     plane: usize,
-    alphabet: Alphabet,
+    info: PlaneInfo,
     known: &splatstream_decoder::block::CodedBlock,
     deltas: &[u64],
     values: &[i32],
 ) -> usize {
-    let contexts = if alphabet == Alphabet::Position {
+    let contexts = if info.is_position() {
         let mut with_next = deltas.to_vec();
         with_next.push(0);
-        delta_contexts(&model.axes, &with_next)
+        delta_contexts(&model.axes, &with_next, known.segments())
     } else {
         let mut with_next = values.to_vec();
         with_next.push(0);
-        plane_contexts(&model.axes, plane, known, &with_next)
+        plane_contexts(&model.axes, plane, info, known, &with_next)
     };
-    let next = if alphabet == Alphabet::Position { deltas.len() } else { values.len() };
+    let next = if info.is_position() { deltas.len() } else { values.len() };
     contexts.get(next).copied().unwrap_or(0).into()
 }
 
@@ -142,27 +143,4 @@ fn token_of(frequencies: &[u16], slot: u32) -> (usize, u32) {
         first += u32::from(frequency);
     }
     panic!("a table has 4096 slots");
-}
-
-/// What later contexts need of a plane, clause 7.6.2.
-fn remember(
-    known: &mut splatstream_decoder::block::CodedBlock,
-    info: splatstream_format::entropy::layout::PlaneInfo,
-    values: Vec<i32>,
-    bias: i32,
-) {
-    let index = usize::from(info.index);
-    match info.attribute {
-        Attribute::LogScale if index == 0 => {
-            known.log_scale[0] = values.iter().map(|value| value + bias).collect();
-        }
-        Attribute::LogScale => {
-            let larger = known.log_scale[index - 1].clone();
-            known.log_scale[index] =
-                larger.iter().zip(&values).map(|(larger, value)| larger - value - bias).collect();
-        }
-        Attribute::Opacity => known.opacity = values.iter().map(|value| value + bias).collect(),
-        _ => {}
-    }
-    known.push(info, values);
 }

@@ -65,6 +65,7 @@ impl Values {
             // Positions lie near the origin, beyond which nothing may move.
             Attribute::Stale | Attribute::Move => self.between(0, 1),
             Attribute::Predictor => self.between(0, self.last_predictor),
+            Attribute::MovePredictor => self.between(0, 3),
             _ if plane.alphabet == Alphabet::Index => 0,
             _ => self.between(-2, 2),
         }

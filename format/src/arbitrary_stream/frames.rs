@@ -5,8 +5,8 @@ use super::{ArbitraryFrame, ArbitraryIncrement, LayeredCodebook, codebook, secti
 use crate::entropy::layout::{Layout, Section, ShCoding};
 use crate::payload::{CellsBytes, SectionBytes, Transform};
 use crate::syntax::{
-    FrameHeader, FrameRole, GopHeader, IncrementHeader, MAX_NEIGHBOURS, Profile, SequenceParameters,
-    ShHeader, ShMode, TransformKind,
+    FrameHeader, FrameRole, GopHeader, IncrementHeader, MAX_ATTRIBUTE_STEP, MAX_NEIGHBOURS, Profile,
+    SequenceParameters, ShHeader, ShMode, TransformKind,
 };
 use arbitrary::{Result, Unstructured};
 
@@ -193,6 +193,10 @@ impl Maker<'_> {
         let count = |bit: i32| modes.iter().filter(|&&mode| mode != 4 && mode & bit != 0).count();
         header.move_count = u32::try_from(count(1)).unwrap_or(u32::MAX);
         header.update_count = u32::try_from(count(2)).unwrap_or(u32::MAX);
+        if !self.intra && header.move_count > 0 && u.arbitrary()? {
+            header.move_block_log2 = u.int_in_range(0..=16)?;
+        }
+        header.extrapolates_opacity = !self.intra && parents > 0 && u.arbitrary()?;
         let more =
             if u.arbitrary()? { IncrementHeader::POSITION_SHIFT | IncrementHeader::COMPENSATION } else { 0 };
         header = header.with_flags();
@@ -237,8 +241,8 @@ impl Maker<'_> {
             vq_stage_count: header.vq_stage_count,
             codebook_ids: header.codebook_ids,
         } = self.sh(u)?;
-        for shift in &mut header.attribute_shift {
-            *shift = if u.arbitrary()? { u.int_in_range(0..=7)? } else { 0 };
+        for step in &mut header.attribute_step {
+            *step = if u.arbitrary()? { u.int_in_range(0..=MAX_ATTRIBUTE_STEP)? } else { 0 };
         }
         // Large ones put everything outside the grid.
         let last_bit = self.sequence.position_bits.saturating_sub(1);

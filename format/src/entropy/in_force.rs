@@ -16,7 +16,7 @@ pub struct SectionModels {
 /// For each section, the models of the last unit that had it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ModelsInForce {
-    sections: [Option<Arc<SectionModels>>; 6],
+    sections: [Option<Arc<SectionModels>>; Section::COUNT],
 }
 
 impl ModelsInForce {

@@ -34,11 +34,13 @@ pub enum Attribute {
     Move,
     /// Predictor of a run of new Gaussians, one plane.
     Predictor,
+    /// Predictor of a run of moves, one plane.
+    MovePredictor,
 }
 
 impl Attribute {
     /// Every attribute: those of a Gaussian in coding order, then what increments code besides.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Position,
         Self::LogScale,
         Self::Opacity,
@@ -52,6 +54,7 @@ impl Attribute {
         Self::Mode,
         Self::Move,
         Self::Predictor,
+        Self::MovePredictor,
     ];
 
     /// The name used in reports.
@@ -70,6 +73,7 @@ impl Attribute {
             Self::Mode => "mode",
             Self::Move => "move",
             Self::Predictor => "predictor",
+            Self::MovePredictor => "move_predictor",
         }
     }
 }
@@ -81,6 +85,8 @@ pub enum Section {
     Cells,
     /// What becomes of each parent.
     Modes,
+    /// Predictors of the moves.
+    MovePredictors,
     /// Position residuals of parents.
     Moves,
     /// Attribute residuals of parents.
@@ -93,18 +99,29 @@ pub enum Section {
 
 impl Section {
     /// The sections of an increment, in stream order.
-    pub const OF_INCREMENT: [Self; 5] =
-        [Self::Modes, Self::Moves, Self::Updates, Self::Predictors, Self::New];
+    pub const OF_INCREMENT: [Self; 6] =
+        [Self::Modes, Self::MovePredictors, Self::Moves, Self::Updates, Self::Predictors, Self::New];
 
     /// Every section, in stream order.
-    pub const ALL: [Self; 6] =
-        [Self::Cells, Self::Modes, Self::Moves, Self::Updates, Self::Predictors, Self::New];
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Cells,
+        Self::Modes,
+        Self::MovePredictors,
+        Self::Moves,
+        Self::Updates,
+        Self::Predictors,
+        Self::New,
+    ];
+
+    /// How many sections there are; their indices are below it.
+    pub const COUNT: usize = 7;
 
     /// The name in the table of clause 8.1.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Cells => "cells",
             Self::Modes => "modes",
+            Self::MovePredictors => "move_predictors",
             Self::Moves => "moves",
             Self::Updates => "updates",
             Self::Predictors => "predictors",
@@ -117,10 +134,11 @@ impl Section {
         match self {
             Self::Cells => 0,
             Self::Modes => 1,
-            Self::Moves => 2,
-            Self::Updates => 3,
-            Self::Predictors => 4,
-            Self::New => 5,
+            Self::MovePredictors => 2,
+            Self::Moves => 3,
+            Self::Updates => 4,
+            Self::Predictors => 5,
+            Self::New => 6,
         }
     }
 }
@@ -211,6 +229,9 @@ impl Layout {
                 layout.add(section, Attribute::CellRotation, 3, Alphabet::Attribute);
             }
             Section::Modes => layout.add(section, Attribute::Mode, 1, Alphabet::Attribute),
+            Section::MovePredictors => {
+                layout.add(section, Attribute::MovePredictor, 1, Alphabet::Attribute);
+            }
             Section::Moves => layout.add(section, Attribute::Move, 3, Alphabet::Attribute),
             Section::Updates => layout.add_attributes(section, dc_rank, sh),
             Section::Predictors => layout.add(section, Attribute::Predictor, 1, Alphabet::Attribute),
@@ -293,7 +314,7 @@ pub fn is_available(plane: PlaneInfo, source: Source) -> bool {
         Source::PositionSpacing => true,
         Source::LargestLogScale => attribute != LogScale || index > 0,
         Source::MiddleLogScale => attribute != LogScale || index > 1,
-        Source::LogVolume | Source::Anisotropy => attribute >= Opacity,
+        Source::LogVolume | Source::Anisotropy | Source::StepExponent => attribute >= Opacity,
         Source::Opacity => attribute >= Rotation,
     }
 }
@@ -302,7 +323,12 @@ pub fn is_available(plane: PlaneInfo, source: Source) -> bool {
 fn follows_signed(plane: PlaneInfo) -> bool {
     let first = matches!(
         plane.attribute,
-        Attribute::LogScale | Attribute::Stale | Attribute::Mode | Attribute::Move | Attribute::Predictor
+        Attribute::LogScale
+            | Attribute::Stale
+            | Attribute::Mode
+            | Attribute::MovePredictor
+            | Attribute::Move
+            | Attribute::Predictor
     );
     !first && plane.alphabet == Alphabet::Attribute
 }

@@ -31,11 +31,13 @@ pub enum Source {
     Opacity,
     /// How far the neighbours in Morton order are.
     PositionSpacing,
+    /// The exponent of the step of the plane's own attribute.
+    StepExponent,
 }
 
 impl Source {
     /// Every source, in the order of the codes.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::None,
         Self::NeighbourSum,
         Self::NeighbourMagnitude,
@@ -47,6 +49,7 @@ impl Source {
         Self::Anisotropy,
         Self::Opacity,
         Self::PositionSpacing,
+        Self::StepExponent,
     ];
 
     /// The code in the stream.
@@ -72,10 +75,11 @@ impl Source {
             Self::Anisotropy => "anisotropy",
             Self::Opacity => "opacity",
             Self::PositionSpacing => "position_spacing",
+            Self::StepExponent => "step_exponent",
         }
     }
 
-    /// The source of a code; codes above 10 are reserved.
+    /// The source of a code; codes above 11 are reserved.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.get(usize::from(code)).copied()
     }
@@ -111,40 +115,92 @@ impl ContextAxis {
     }
 }
 
-/// Values between the outermost thresholds up to which an axis is looked up instead of compared.
-const LOOKUP_SPAN: i64 = 1 << 12;
+/// Values looked up together.
+const RUN: usize = 16;
+/// Entries of a lookup table.
+const LOOKUP: usize = 1 << 12;
 
-/// The thresholds of an axis as a table of contexts: one load where a serial source waits for the value before.
+/// The contexts of an axis, times a factor, as a table: one load in place of a comparison with each threshold.
 #[derive(Debug, Clone)]
 pub struct AxisLookup {
     axis: ContextAxis,
+    factor: u8,
     /// The value of the first entry, which stands for all smaller values too.
     least: i32,
-    /// Context of each value from `least` on; the last stands for all greater values. Empty: not used.
-    contexts: Vec<u8>,
+    /// That of the last entry that is used, which stands for all greater values too.
+    greatest: i32,
+    /// None: the thresholds are too far apart.
+    table: Option<Box<[u8; LOOKUP]>>,
 }
 
 impl AxisLookup {
-    /// The contexts of an axis.
-    pub fn new(axis: &ContextAxis) -> Self {
-        let (Some(&first), Some(&last)) = (axis.thresholds.first(), axis.thresholds.last()) else {
-            return Self { axis: axis.clone(), least: 0, contexts: vec![0] };
-        };
-        let span = i64::from(last).wrapping_sub(i64::from(first));
-        let least = first.saturating_sub(1);
-        if span > LOOKUP_SPAN {
-            return Self { axis: axis.clone(), least, contexts: Vec::new() };
-        }
-        let contexts = (least..=last).map(|value| axis.context(value)).collect();
-        Self { axis: axis.clone(), least, contexts }
+    /// The contexts of an axis, times a factor. A plane has at most 64 contexts, so that no product is above 255.
+    pub fn new(axis: &ContextAxis, factor: u8) -> Self {
+        let least = axis.thresholds.first().map_or(0, |&first| first.saturating_sub(1));
+        let greatest = axis.thresholds.last().copied().unwrap_or(0);
+        let last = i64::from(greatest).wrapping_sub(i64::from(least)).max(0);
+        let context = |value: i32| axis.context(value).wrapping_mul(factor);
+        let entries = usize::try_from(last).unwrap_or(usize::MAX);
+        let table = (entries < LOOKUP).then(|| {
+            let mut table = Box::new([0; LOOKUP]);
+            table.iter_mut().zip(least..=greatest).for_each(|(entry, value)| *entry = context(value));
+            table
+        });
+        Self { axis: axis.clone(), factor, least, greatest, table }
     }
 
-    /// [`ContextAxis::context`] of the axis.
+    /// [`ContextAxis::context`] of the axis, times the factor.
     #[inline(always)]
     pub fn context(&self, value: i32) -> u8 {
-        let Some((&greatest, _)) = self.contexts.split_last() else { return self.axis.context(value) };
-        let place = usize::try_from(value.saturating_sub(self.least).max(0)).unwrap_or(0);
-        self.contexts.get(place).copied().unwrap_or(greatest)
+        match &self.table {
+            Some(table) => Self::entry(table, self.place(value)),
+            None => self.axis.context(value).wrapping_mul(self.factor),
+        }
+    }
+
+    /// Adds the contexts of some values to others.
+    #[inline(always)]
+    pub fn add_contexts(&self, values: &[i32], contexts: &mut [u8]) {
+        match &self.table {
+            Some(table) => {
+                let length = contexts.len().min(values.len());
+                let (values, last_values) = values.get(..length).unwrap_or_default().as_chunks();
+                let (slots, last_slots) = contexts.as_chunks_mut();
+                for (slots, values) in slots.iter_mut().zip(values) {
+                    self.add_run(table, values, slots);
+                }
+                for (slot, &value) in last_slots.iter_mut().zip(last_values) {
+                    *slot = slot.wrapping_add(Self::entry(table, self.place(value)));
+                }
+            }
+            None => {
+                for (slot, &value) in contexts.iter_mut().zip(values) {
+                    *slot = slot.wrapping_add(self.axis.context(value).wrapping_mul(self.factor));
+                }
+            }
+        }
+    }
+
+    /// The numbers of a run of entries first, which vectors compute: branches on values would be guessed wrong.
+    #[inline(always)]
+    fn add_run(&self, table: &[u8; LOOKUP], values: &[i32; RUN], slots: &mut [u8; RUN]) {
+        let places = values.map(|value| self.place(value));
+        for (slot, place) in slots.iter_mut().zip(places) {
+            *slot = slot.wrapping_add(Self::entry(table, place));
+        }
+    }
+
+    /// The number of the entry of a value.
+    #[inline(always)]
+    fn place(&self, value: i32) -> u32 {
+        value.max(self.least).min(self.greatest).wrapping_sub(self.least).cast_unsigned()
+    }
+
+    /// An entry; its number is below the length of the table, so that nothing is checked.
+    #[inline(always)]
+    fn entry(table: &[u8; LOOKUP], place: u32) -> u8 {
+        let index = usize::try_from(place & 0xFFF).unwrap_or(0);
+        table.get(index).copied().unwrap_or(0)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Clause 8.4 from the other side: coding the symbols of a block.
 
+use super::lanes::Segments;
 use super::model::PlaneModel;
 use super::token::split;
 use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
@@ -76,14 +77,15 @@ impl BlockWriter {
         contexts: &[u8],
         values: impl ExactSizeIterator<Item = u64>,
     ) -> Result<()> {
+        let values: Vec<u64> = values.collect();
         self.symbols.reserve(values.len());
-        let mask = 1_usize.wrapping_shl(u32::from(self.lanes_log2)).wrapping_sub(1);
         let uncodable = Error::new(
             0,
             "8.3",
             ErrorKind::Constraint { rule: "a coded token has a frequency of at least 1" },
         );
-        for (index, value) in values.enumerate() {
+        for (lane, index) in Segments::new(values.len(), self.lanes_log2).order() {
+            let value = values.get(index).copied().unwrap_or(0);
             let context = contexts.get(index).copied().unwrap_or(0);
             let token = split(value, encoder.direct_log2);
             let (frequency, first) = encoder
@@ -93,7 +95,7 @@ impl BlockWriter {
                 .and_then(|table| table.interval_of_token.get(usize::from(token.token)).copied())
                 .filter(|&(frequency, _)| frequency > 0)
                 .ok_or(uncodable)?;
-            let lane = u8::try_from(index & mask).unwrap_or(0);
+            let lane = u8::try_from(lane).unwrap_or(0);
             self.symbols.push(Symbol { lane, frequency, first });
             if token.raw_bits > 0 {
                 self.raw.bits(token.raw, token.raw_bits);

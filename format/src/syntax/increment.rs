@@ -5,15 +5,16 @@ use super::{NO_CODEBOOK, Profile, SequenceParameters, ShHeader, ShMode, Spot, en
 use crate::entropy::layout::Section;
 use crate::{ErrorKind, Limits, Result};
 
-/// `predictor_block_log2` of a unit whose new Gaussians are not predicted. It does not occur in a stream.
+/// `predictor_block_log2` of a unit whose new Gaussians are not predicted, and `move_block_log2` of one whose moves are
+/// not. It does not occur in a stream.
 pub const NO_PREDICTOR: u8 = 255;
 /// Neighbours of a prediction, at most.
 pub const MAX_NEIGHBOURS: u8 = 16;
 
-/// The largest run of new Gaussians with one predictor, log2.
+/// The largest run of new Gaussians, or of moves, with one predictor, log2.
 const MAX_PREDICTOR_BLOCK_LOG2: u8 = 16;
-/// Shift of an attribute, at most.
-const MAX_ATTRIBUTE_SHIFT: u8 = 7;
+/// The largest exponent of a step, in half octaves.
+pub const MAX_ATTRIBUTE_STEP: u8 = 24;
 
 table! {
     /// 5.14 — the fixed part of an increment; the elements of `increment_flags` follow, then the sections.
@@ -45,8 +46,8 @@ pub struct IncrementHeader {
     pub new_count: u32,
     /// Low bits of positions that are not coded, less than `position_bits`.
     pub position_shift: u8,
-    /// Low bits not coded of log_scale, opacity, rotation, dc, sh; 0 to 7.
-    pub attribute_shift: [u8; 5],
+    /// Exponents of the steps of log_scale, opacity, rotation, dc, sh, in half octaves; 0 to 24.
+    pub attribute_step: [u8; 5],
     /// log2 of the new Gaussians that share a predictor, 0 to 16; [`NO_PREDICTOR`] without predictors.
     pub predictor_block_log2: u8,
     /// Neighbours of a prediction, 1 to 16.
@@ -65,6 +66,10 @@ pub struct IncrementHeader {
     pub compensation_log_scale: i8,
     /// Added to opacities where the frame is shown up to this refinement, steps.
     pub compensation_opacity: i8,
+    /// log2 of the moves that share a predictor, 0 to 16; [`NO_PREDICTOR`] without move predictors.
+    pub move_block_log2: u8,
+    /// Whether opacities of parents first go on changing as they did to the reference frame. A flag without an element.
+    pub extrapolates_opacity: bool,
 }
 
 /// What the frame says about the sizes of the list that an increment changes.
@@ -93,29 +98,37 @@ impl IncrementHeader {
     pub const NEW: u16 = 1 << 4;
     /// Bit 5: `position_shift`.
     pub const POSITION_SHIFT: u16 = 1 << 5;
-    /// Bit 6: `attribute_shift`.
-    pub const ATTRIBUTE_SHIFT: u16 = 1 << 6;
+    /// Bit 6: `attribute_step`.
+    pub const ATTRIBUTE_STEP: u16 = 1 << 6;
     /// Bit 7: the four elements of prediction.
     pub const PREDICTORS: u16 = 1 << 7;
     /// Bit 8: `sh_mode` and what it needs.
     pub const SH: u16 = 1 << 8;
     /// Bit 9: the two elements of compensation.
     pub const COMPENSATION: u16 = 1 << 9;
+    /// Bit 10: `move_block_log2`.
+    pub const MOVE_PREDICTORS: u16 = 1 << 10;
+    /// Bit 11: opacities are extrapolated. It has no element.
+    pub const EXTRAPOLATES_OPACITY: u16 = 1 << 11;
     /// The bits that have a meaning.
-    const FLAGS: u16 = (1 << 10) - 1;
+    const FLAGS: u16 = (1 << 12) - 1;
+    /// The bits that no unit of an I frame has.
+    const TEMPORAL: u16 = Self::MOVE_PREDICTORS | Self::EXTRAPOLATES_OPACITY;
 
     /// The names of the bits of `increment_flags`, from bit 0 on.
-    pub const FLAG_NAMES: [&'static str; 10] = [
+    pub const FLAG_NAMES: [&'static str; 12] = [
         "has_parents",
         "has_moves",
         "has_updates",
         "has_removals",
         "has_new",
         "has_position_shift",
-        "has_attribute_shift",
+        "has_attribute_step",
         "has_predictors",
         "has_sh",
         "has_compensation",
+        "has_move_predictors",
+        "extrapolates_opacity",
     ];
 
     /// Of a unit that changes and adds nothing: no element is present.
@@ -128,7 +141,7 @@ impl IncrementHeader {
         remove_count: 0,
         new_count: 0,
         position_shift: 0,
-        attribute_shift: [0; 5],
+        attribute_step: [0; 5],
         predictor_block_log2: NO_PREDICTOR,
         neighbour_count: 1,
         bilateral_spatial: 0,
@@ -138,6 +151,8 @@ impl IncrementHeader {
         codebook_ids: [NO_CODEBOOK; 4],
         compensation_log_scale: 0,
         compensation_opacity: 0,
+        move_block_log2: NO_PREDICTOR,
+        extrapolates_opacity: false,
     };
 
     /// Reads and checks the header of a payload that stands at offset `at`; gives the bytes after it.
@@ -190,8 +205,8 @@ impl IncrementHeader {
         if flags & Self::POSITION_SHIFT != 0 {
             self.position_shift = reader.u8("position_shift")?;
         }
-        if flags & Self::ATTRIBUTE_SHIFT != 0 {
-            self.attribute_shift = reader.array("attribute_shift")?;
+        if flags & Self::ATTRIBUTE_STEP != 0 {
+            self.attribute_step = reader.array("attribute_step")?;
         }
         if flags & Self::PREDICTORS != 0 {
             self.predictor_block_log2 = reader.u8("predictor_block_log2")?;
@@ -211,6 +226,10 @@ impl IncrementHeader {
             self.compensation_log_scale = reader.array("compensation_log_scale").map(i8::from_le_bytes)?;
             self.compensation_opacity = reader.array("compensation_opacity").map(i8::from_le_bytes)?;
         }
+        if flags & Self::MOVE_PREDICTORS != 0 {
+            self.move_block_log2 = reader.u8("move_block_log2")?;
+        }
+        self.extrapolates_opacity = flags & Self::EXTRAPOLATES_OPACITY != 0;
         Ok(())
     }
 
@@ -235,10 +254,12 @@ impl IncrementHeader {
             (self.remove_count > 0, Self::REMOVALS),
             (self.new_count > 0, Self::NEW),
             (self.position_shift > 0, Self::POSITION_SHIFT),
-            (self.attribute_shift != plain.attribute_shift, Self::ATTRIBUTE_SHIFT),
+            (self.attribute_step != plain.attribute_step, Self::ATTRIBUTE_STEP),
             (prediction(self) != prediction(&plain), Self::PREDICTORS),
             (self.sh() != plain.sh(), Self::SH),
             (compensation != (0, 0), Self::COMPENSATION),
+            (self.move_block_log2 != plain.move_block_log2, Self::MOVE_PREDICTORS),
+            (self.extrapolates_opacity, Self::EXTRAPOLATES_OPACITY),
         ]
         .into_iter()
         .filter(|(needed, _)| *needed)
@@ -269,12 +290,13 @@ impl IncrementHeader {
             [self.predictor_block_log2, self.neighbour_count, self.bilateral_spatial, self.bilateral_feature];
         let compensation = [self.compensation_log_scale, self.compensation_opacity].map(i8::cast_unsigned);
         let sh = self.sh().to_bytes();
-        let rest: [(u16, &[u8]); 5] = [
+        let rest: [(u16, &[u8]); 6] = [
             (Self::POSITION_SHIFT, &[self.position_shift]),
-            (Self::ATTRIBUTE_SHIFT, &self.attribute_shift),
+            (Self::ATTRIBUTE_STEP, &self.attribute_step),
             (Self::PREDICTORS, &prediction),
             (Self::SH, &sh),
             (Self::COMPENSATION, &compensation),
+            (Self::MOVE_PREDICTORS, &[self.move_block_log2]),
         ];
         for (_, element) in rest.into_iter().filter(|(flag, _)| increment_flags & flag != 0) {
             bytes.extend_from_slice(element);
@@ -293,7 +315,7 @@ impl IncrementHeader {
     }
 
     /// The elements after the fixed part, each with its flag and the bytes that it has if it is present.
-    fn elements(&self) -> [(&'static str, u16, usize); 16] {
+    fn elements(&self) -> [(&'static str, u16, usize); 17] {
         let [parents, moves, updates, removals, new] = self.counts().map(|(_, count)| leb128_length(count));
         let stages = usize::from(self.vq_stage_count);
         [
@@ -303,7 +325,7 @@ impl IncrementHeader {
             ("remove_count", Self::REMOVALS, removals),
             ("new_count", Self::NEW, new),
             ("position_shift", Self::POSITION_SHIFT, 1),
-            ("attribute_shift", Self::ATTRIBUTE_SHIFT, 5),
+            ("attribute_step", Self::ATTRIBUTE_STEP, 5),
             ("predictor_block_log2", Self::PREDICTORS, 1),
             ("neighbour_count", Self::PREDICTORS, 1),
             ("bilateral_spatial", Self::PREDICTORS, 1),
@@ -313,6 +335,7 @@ impl IncrementHeader {
             ("codebook_ids", Self::SH, stages),
             ("compensation_log_scale", Self::COMPENSATION, 1),
             ("compensation_opacity", Self::COMPENSATION, 1),
+            ("move_block_log2", Self::MOVE_PREDICTORS, 1),
         ]
     }
 
@@ -348,10 +371,13 @@ impl IncrementHeader {
         let spot = self.spot(at, "increment_flags", 0);
         let flags = self.increment_flags;
         spot.reserved_bits(flags & !Self::FLAGS)?;
-        let predictors = flags & Self::PREDICTORS != 0;
+        let has = |bit: u16| flags & bit != 0;
+        let dynamic = has(Self::PREDICTORS | Self::TEMPORAL);
         let kind = ErrorKind::Reserved { element: "increment_flags", value: flags.into() };
-        spot.holds(!predictors || profile == Profile::Dynamic, kind)?;
-        spot.rule(!predictors || flags & Self::NEW != 0, "only new Gaussians are predicted")
+        spot.holds(!dynamic || profile == Profile::Dynamic, kind)?;
+        spot.rule(!has(Self::PREDICTORS) || has(Self::NEW), "only new Gaussians are predicted")?;
+        spot.rule(!has(Self::MOVE_PREDICTORS) || has(Self::MOVES), "only moves have move predictors")?;
+        spot.rule(!has(Self::EXTRAPOLATES_OPACITY) || has(Self::PARENTS), "only parents are extrapolated")
     }
 
     /// 6.14, as far as it needs nothing but the sequence.
@@ -364,8 +390,8 @@ impl IncrementHeader {
         }
         let last_bit = sequence.position_bits.saturating_sub(1);
         self.spot(at, "position_shift", 0).range(self.position_shift, 0, last_bit)?;
-        for (index, shift) in self.attribute_shift.into_iter().enumerate() {
-            self.spot(at, "attribute_shift", index).range(shift, 0, MAX_ATTRIBUTE_SHIFT)?;
+        for (index, step) in self.attribute_step.into_iter().enumerate() {
+            self.spot(at, "attribute_step", index).range(step, 0, MAX_ATTRIBUTE_STEP)?;
         }
         if self.increment_flags & Self::PREDICTORS != 0 {
             let spot = self.spot(at, "predictor_block_log2", 0);
@@ -374,6 +400,10 @@ impl IncrementHeader {
         }
         if self.increment_flags & Self::SH != 0 {
             self.sh().validate(|element, index| self.spot(at, element, index))?;
+        }
+        if self.increment_flags & Self::MOVE_PREDICTORS != 0 {
+            let spot = self.spot(at, "move_block_log2", 0);
+            spot.range(self.move_block_log2, 0, MAX_PREDICTOR_BLOCK_LOG2)?;
         }
         Ok(())
     }
@@ -388,12 +418,14 @@ impl IncrementHeader {
         Limits::check(new_at, "new Gaussians of the payload", self.new_count.into(), most)
     }
 
-    /// 6.14 and 7.14: the counts fit the parents there are, and the list has the size that the frame prescribes.
+    /// 6.14 and 7.14: the flags fit the frame, the counts fit the parents there are, and the list has the size that the frame prescribes.
     pub fn validate_counts(&self, at: u64, sizes: &ListSizes) -> Result<()> {
         let equal = |element, value: u32, expected: u32| {
             self.spot(at, element, 0).equal(value.into(), expected.into())
         };
-        let parents = sizes.parents;
+        let (parents, flags) = (sizes.parents, self.increment_flags);
+        let allowed = if sizes.intra { flags & !Self::TEMPORAL } else { flags };
+        self.spot(at, "increment_flags", 0).equal(flags.into(), allowed.into())?;
         equal("parent_count", self.parent_count, parents)?;
         equal("move_count", self.move_count, self.move_count.min(parents))?;
         equal("update_count", self.update_count, self.update_count.min(parents))?;
@@ -415,6 +447,14 @@ impl IncrementHeader {
         self.new_count.div_ceil(1_u32.wrapping_shl(self.predictor_block_log2.into()))
     }
 
+    /// Runs of moves that share a predictor.
+    pub fn move_predictor_count(&self) -> u32 {
+        if self.move_block_log2 == NO_PREDICTOR {
+            return 0;
+        }
+        self.move_count.div_ceil(1_u32.wrapping_shl(self.move_block_log2.into()))
+    }
+
     /// Gaussians of the list after the unit, where the counts are consistent.
     pub const fn list_size(&self) -> u32 {
         self.parent_count.saturating_sub(self.remove_count).saturating_add(self.new_count)
@@ -431,6 +471,7 @@ impl IncrementHeader {
             Section::Cells => 0,
             Section::Modes if !self.has_modes() => 0,
             Section::Modes => self.parent_count,
+            Section::MovePredictors => self.move_predictor_count(),
             Section::Moves => self.move_count,
             Section::Updates => self.update_count,
             Section::Predictors => self.predictor_count(),

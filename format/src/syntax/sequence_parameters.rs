@@ -8,11 +8,20 @@ pub const MAX_REFINEMENTS: u8 = 10;
 /// The most spatial layers, and the most temporal layers.
 pub const MAX_LAYERS: u8 = 4;
 
+/// The largest `linear_log2`: every position of the finest grid is linear.
+pub const MAX_LINEAR_LOG2: u8 = 20;
+/// The most segments on a side of the companded part of the position grid.
+const MAX_SEGMENTS: u32 = 24;
+/// The largest weight of a size, an opacity or an anisotropy in a step.
+const MAX_WEIGHT: u16 = 8191;
+
 /// Bits of `sequence_flags`.
 const CANONICAL_AXES: u8 = 1;
 const ANTIALIASED: u8 = 2;
 const WHOLE_ANCHOR: u8 = 4;
 
+/// 1 as the bits of a binary32.
+const ONE: u32 = 127 << 23;
 /// 2^-40, the smallest step.
 const MIN_STEP: f32 = f32::from_bits((127 - 40) << 23);
 /// 2^20, the largest step.
@@ -41,8 +50,24 @@ table! {
         block_log2: u8,
         /// bit 0 canonical_axes, bit 1 antialiased, bit 2 whole_anchor; the others are zero
         sequence_flags: u8,
-        /// anisotropy from which the rotation is finer, not increasing; 0 disables
-        rotation_threshold: u8[3],
+        /// positions are linear within 2^linear_log2 steps of the middle of the grid, 0 to 20
+        linear_log2: u8,
+        /// log2 of the codes of a segment of the companded part, at most linear_log2
+        segment_log2: u8,
+        /// low bits of attributes that comparisons ignore, 0 to 7
+        feature_shift: u8,
+        /// how steps follow from the size: log_scale, opacity, rotation, dc, sh; 0 to 8191
+        size_weight: u16[5],
+        /// how steps follow from the opacity: rotation, dc, sh; 0 to 8191
+        opacity_weight: u16[3],
+        /// how the step of the rotation follows from the anisotropy, 0 to 8191
+        anisotropy_weight: u16,
+        /// size from which steps are as announced, -65536 to 65535
+        size_reference: i32,
+        /// opacity from which steps are as announced, -32768 to 32767
+        opacity_reference: i32,
+        /// anisotropy from which the step of the rotation is as announced, 0 to 65535
+        anisotropy_reference: i32,
         /// frames in the stream; 0 is not known in advance
         frame_count: u32,
         /// ticks in a second, 1 or more
@@ -80,6 +105,39 @@ pub fn prefix_length(percent: u8, gaussian_count: u32) -> u32 {
 }
 
 impl SequenceParameters {
+    /// One layer, one refinement, positions of 20 bits without companding, and steps of 1 that follow from nothing.
+    pub const PLAIN: Self = Self {
+        sh_degree: 0,
+        spatial_layer_count: 1,
+        temporal_layer_count: 1,
+        refinement_count: 1,
+        refinement_percent: [100, 0, 0, 0, 0, 0, 0, 0, 0, 0],
+        position_bits: 20,
+        block_log2: 16,
+        sequence_flags: 0,
+        linear_log2: MAX_LINEAR_LOG2,
+        segment_log2: 0,
+        feature_shift: 0,
+        size_weight: [0; 5],
+        opacity_weight: [0; 3],
+        anisotropy_weight: 0,
+        size_reference: 0,
+        opacity_reference: 0,
+        anisotropy_reference: 0,
+        frame_count: 0,
+        ticks_per_second: 30,
+        ticks_per_frame: 1,
+        position_offset: [0; 3],
+        position_step: ONE,
+        log_scale_offset: 0,
+        log_scale_step: ONE,
+        rotation_step: ONE,
+        opacity_offset: 0,
+        opacity_step: ONE,
+        dc_step: ONE,
+        sh_step: ONE,
+    };
+
     /// 6.4.
     pub fn validate(&self, at: u64, profile: Profile) -> Result<()> {
         let check = Self::TABLE.check(at);
@@ -94,10 +152,8 @@ impl SequenceParameters {
         let dynamic = if profile == Profile::Intra { 0 } else { WHOLE_ANCHOR };
         let known = CANONICAL_AXES | ANTIALIASED | dynamic;
         check.reserved_bits("sequence_flags", 0, self.sequence_flags & !known)?;
-        let thresholds = self.rotation_threshold;
-        for (index, (before, this)) in (1..).zip(thresholds.iter().zip(thresholds.iter().skip(1))) {
-            check.range_in("rotation_threshold", index, *this, 0, *before)?;
-        }
+        self.validate_companding(at)?;
+        self.validate_steps(at)?;
         check.range("ticks_per_second", self.ticks_per_second, 1, u32::MAX)?;
         self.validate_grids(at)
     }
@@ -179,6 +235,34 @@ impl SequenceParameters {
             }
         }
         Ok(())
+    }
+
+    /// The codes outside the linear part fill no more segments than a position has room for.
+    fn validate_companding(&self, at: u64) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        check.range("linear_log2", self.linear_log2, 0, MAX_LINEAR_LOG2)?;
+        check.range("segment_log2", self.segment_log2, 0, self.linear_log2)?;
+        let half = 1_u32.wrapping_shl(u32::from(self.position_bits).saturating_sub(1));
+        let outside = half.saturating_sub(1_u32.wrapping_shl(self.linear_log2.into()));
+        let segments = outside.div_ceil(1_u32.wrapping_shl(self.segment_log2.into()));
+        let rule = "the companded part of the position grid has at most 24 segments on a side";
+        check.rule(segments <= MAX_SEGMENTS, "segment_log2", 0, rule)
+    }
+
+    /// What the steps of attributes follow from.
+    fn validate_steps(&self, at: u64) -> Result<()> {
+        let check = Self::TABLE.check(at);
+        check.range("feature_shift", self.feature_shift, 0, 7)?;
+        for (index, weight) in self.size_weight.into_iter().enumerate() {
+            check.range_in("size_weight", index, weight, 0, MAX_WEIGHT)?;
+        }
+        for (index, weight) in self.opacity_weight.into_iter().enumerate() {
+            check.range_in("opacity_weight", index, weight, 0, MAX_WEIGHT)?;
+        }
+        check.range("anisotropy_weight", self.anisotropy_weight, 0, MAX_WEIGHT)?;
+        check.range("size_reference", self.size_reference, -65_536, 65_535)?;
+        check.range("opacity_reference", self.opacity_reference, -32_768, 32_767)?;
+        check.range("anisotropy_reference", self.anisotropy_reference, 0, 65_535)
     }
 
     fn validate_grids(&self, at: u64) -> Result<()> {

@@ -24,7 +24,6 @@ const DIRECT_LOG2: u8 = 4;
 
 /// Parameters with SH of degree 3.
 pub(crate) fn sequence(spatial: u8, temporal: u8, percents: &[u8], block_log2: u8) -> SequenceParameters {
-    let one = 1.0_f32.to_bits();
     let mut refinement_percent = [0; 10];
     refinement_percent[..percents.len()].copy_from_slice(percents);
     SequenceParameters {
@@ -36,19 +35,15 @@ pub(crate) fn sequence(spatial: u8, temporal: u8, percents: &[u8], block_log2: u
         position_bits: 20,
         block_log2,
         sequence_flags: SequenceParameters::flags(false, false, false),
-        rotation_threshold: [20, 10, 5],
+        size_weight: [100; 5],
+        opacity_weight: [100; 3],
+        anisotropy_weight: 100,
+        opacity_reference: 10,
+        anisotropy_reference: 20,
         frame_count: 0,
         ticks_per_second: 30,
         ticks_per_frame: 0,
-        position_offset: [0; 3],
-        position_step: one,
-        log_scale_offset: 0,
-        log_scale_step: one,
-        rotation_step: one,
-        opacity_offset: 0,
-        opacity_step: one,
-        dc_step: one,
-        sh_step: one,
+        ..SequenceParameters::PLAIN
     }
 }
 

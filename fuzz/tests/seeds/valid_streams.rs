@@ -67,7 +67,6 @@ fn stream(sh_degree: u8, frames: u32, settings: &Settings) -> Vec<u8> {
 
 /// Everything at once, in blocks of 64.
 fn one_refinement() -> SequenceParameters {
-    let one = 1.0_f32.to_bits();
     let mut refinement_percent = [0; 10];
     refinement_percent[0] = 100;
     SequenceParameters {
@@ -79,19 +78,15 @@ fn one_refinement() -> SequenceParameters {
         position_bits: 10,
         block_log2: 6,
         sequence_flags: SequenceParameters::flags(true, false, false),
-        rotation_threshold: [20, 10, 5],
+        size_weight: [100; 5],
+        opacity_weight: [100; 3],
+        anisotropy_weight: 100,
+        opacity_reference: 10,
+        anisotropy_reference: 20,
         frame_count: 1,
         ticks_per_second: 30,
         ticks_per_frame: 1,
-        position_offset: [0; 3],
-        position_step: one,
-        log_scale_offset: 0,
-        log_scale_step: one,
-        rotation_step: one,
-        opacity_offset: 0,
-        opacity_step: one,
-        dc_step: one,
-        sh_step: one,
+        ..SequenceParameters::PLAIN
     }
 }
 

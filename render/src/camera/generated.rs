@@ -1,7 +1,7 @@
 //! Cameras for a scene that comes without.
 
 use super::Camera;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use splatstream_scene::GaussianFrame;
 use std::f32::consts::{PI, TAU};
 
@@ -82,6 +82,34 @@ pub fn spiral(frame: &GaussianFrame, up: Up, count: u32, height: u32) -> Vec<Cam
     (0..count).map(view).collect()
 }
 
+/// The angle by which [`held_out`] turns given cameras about the scene, radians: 5 degrees.
+const TURN: f32 = 5.0 / 180.0 * PI;
+
+/// `count` cameras that coincide with none of a ring or a spiral, between 10 degrees below and 40 above: to judge what
+/// was chosen by other views. Where the scene comes with cameras they stand near some of these, turned about the middle
+/// of what they see by 5 degrees to one side or the other.
+pub fn held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, height: u32) -> Vec<Camera> {
+    let subject = Subject::of(frame, up);
+    let golden = PI * (3.0 - 5.0_f32.sqrt());
+    let made = |number: u32| {
+        let share = (number as f32 + 0.5) / count as f32;
+        let elevation = libm::asinf(-0.174 + (0.643 + 0.174) * share);
+        subject.seen_from(format!("held_out_{number:02}"), 1.9 + golden * number as f32, elevation, height)
+    };
+    let turned = |number: u32| {
+        let at = (2 * number as usize + 1) * given.len() / (2 * count as usize);
+        given.get(at).map(|camera| subject.turned(camera, number, height))
+    };
+    (0..count).map(|number| turned(number).unwrap_or_else(|| made(number))).collect()
+}
+
+/// Percentiles between which the box of a scene is measured, from the outermost to the innermost.
+const BOXES: [[usize; 2]; 3] = [[3, 97], [20, 80], [35, 65]];
+
+/// A box that is more than this many times as large as the one inside it holds surroundings: those of a ball or a block
+/// are less than 2.5 times as large.
+const SURROUNDINGS: f32 = 4.0;
+
 /// What a camera looks at.
 struct Subject {
     middle: Vec3,
@@ -94,25 +122,51 @@ struct Subject {
 impl Subject {
     /// The box of what is visible, less 3 % at either end of each axis: stray Gaussians do not push the cameras
     /// away. Where that box is more than four times as large as that of the inner 60 %, the scene has
-    /// surroundings, and the inner box is the subject.
+    /// surroundings, and the inner box is the subject; and so on to the inner 30 %.
     fn of(frame: &GaussianFrame, up: Up) -> Self {
         let shown = |row: &usize| frame.opacity_logit()[*row] > VISIBLE_LOGIT;
         let mut rows: Vec<usize> = (0..frame.len()).filter(shown).collect();
         if rows.is_empty() {
             rows = (0..frame.len()).collect();
         }
-        let axes = frame.position().each_ref().map(|plane| {
+        let sorted = frame.position().each_ref().map(|plane| {
             let mut values: Vec<f32> = rows.iter().map(|&row| plane[row]).collect();
             values.sort_unstable_by(f32::total_cmp);
-            let at = |percent: usize| values.get(values.len() * percent / 100).copied().unwrap_or_default();
-            [3, 20, 80, 97].map(at)
+            values
         });
-        let [low, inner_low, inner_high, high] =
-            [0, 1, 2, 3].map(|part| Vec3::from(axes.map(|axis| axis[part])));
-        let (outer, inner) = ((high - low).length(), (inner_high - inner_low).length());
-        let (low, high) = if outer > 4.0 * inner { (inner_low, inner_high) } else { (low, high) };
-        let radius = 0.5 * (high - low).length();
+        let at = |percent: usize| {
+            let value = |values: &Vec<f32>| values.get(values.len() * percent / 100).copied();
+            Vec3::from(sorted.each_ref().map(|values| value(values).unwrap_or_default()))
+        };
+        let boxes = BOXES.map(|percents| percents.map(at));
+        let side = |[low, high]: [Vec3; 2]| (high - low).length();
+        let mut subject = boxes[0];
+        for inner in &boxes[1..] {
+            if side(subject) <= SURROUNDINGS * side(*inner) {
+                break;
+            }
+            subject = *inner;
+        }
+        let [low, high] = subject;
+        let radius = 0.5 * side(subject);
         Self { middle: 0.5 * (low + high), radius: if radius > 0.0 { radius } else { 1.0 }, axes: up.axes() }
+    }
+
+    /// A camera that has gone a little way around the part of the scene that it sees, to one side or the other.
+    fn turned(&self, camera: &Camera, number: u32, height: u32) -> Camera {
+        let [down, ahead] = [camera.rotation[1], camera.rotation[2]].map(Vec3::from);
+        let position = Vec3::from(camera.position);
+        // A camera that looks past the scene turns about a point near it.
+        let depth = ahead.dot(self.middle - position).max(0.1 * self.radius);
+        let half = if number.is_multiple_of(2) { 0.5 * TURN } else { -0.5 * TURN };
+        let turn = Quat::from_vec4((down * libm::sinf(half)).extend(libm::cosf(half)));
+        let middle = position + ahead * depth;
+        Camera {
+            name: format!("held_out_{number:02}"),
+            rotation: camera.rotation.map(|axis| (turn * Vec3::from(axis)).to_array()),
+            position: (middle + turn * (position - middle)).to_array(),
+            ..camera.scaled_to_height(height)
+        }
     }
 
     /// A camera `turn` about the vertical from the front and `elevation` above it, radians.

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use splatstream_scene::{GaussianFrame, sh_basis, sh_coefficients};
 use std::f32::consts::LOG2_E;
 
-/// Gaussians nearer to the camera's plane than this are not drawn, scene units.
-const NEAR: f32 = 0.01;
+/// Gaussians nearer to the camera's plane than this share of the mean depth are not drawn: see [`near`].
+const NEAR: f32 = 1.0 / 256.0;
 
 /// Variance that the low-pass filter adds on each axis, square pixels.
 const LOW_PASS: f32 = 0.3;
@@ -91,6 +91,8 @@ struct View<'a> {
     to_camera: Mat3,
     rows: [Vec3; 3],
     position: Vec3,
+    /// The least depth that is drawn, scene units.
+    near: f32,
     focal: [f32; 2],
     principal: [f32; 2],
     size: [f32; 2],
@@ -113,6 +115,7 @@ impl<'a> View<'a> {
             to_camera,
             rows: camera.rotation.map(Vec3::from),
             position: camera.position.into(),
+            near: near(frame, camera),
             focal: camera.focal,
             principal: camera.principal,
             size,
@@ -124,7 +127,7 @@ impl<'a> View<'a> {
     fn project(&self, row: usize) -> Option<(f32, Splat)> {
         let offset = Vec3::from(self.frame.position().each_ref().map(|plane| plane[row])) - self.position;
         let at = self.to_camera * offset;
-        if at.z.is_nan() || at.z < NEAR {
+        if at.z.is_nan() || at.z < self.near {
             return None;
         }
         let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(row, at);
@@ -191,6 +194,24 @@ impl<'a> View<'a> {
         }
         colour.map(|channel| channel.max(0.0))
     }
+}
+
+/// The near plane of a view, scene units: a share of the geometric mean of the depths in front of the camera, so that
+/// a scene looks the same in any unit of length, and far Gaussians hardly move it.
+///
+/// The bits of a positive float, read as an integer, are close to a logarithm of it: their mean is exact and does not
+/// depend on the order.
+fn near(frame: &GaussianFrame, camera: &Camera) -> f32 {
+    let [x, y, z] = frame.position();
+    let [ahead, position] = [camera.rotation[2], camera.position].map(Vec3::from);
+    let depth = |row: usize| ahead.dot(Vec3::new(x[row], y[row], z[row]) - position);
+    let rows = (0..frame.len()).into_par_iter().with_min_len(CHUNK);
+    let in_front = rows.map(depth).filter(|depth| *depth > 0.0 && depth.is_finite());
+    let (sum, count) = in_front
+        .map(|depth| (u64::from(depth.to_bits()), 1))
+        .reduce(|| (0, 0), |one, other| (one.0 + other.0, one.1 + other.1));
+    let mean = sum.checked_div(count).unwrap_or_default();
+    (NEAR * f32::from_bits(mean as u32)).max(f32::MIN_POSITIVE)
 }
 
 /// Covariance in the picture, square pixels.

@@ -3,7 +3,7 @@
 use crate::gaussian::{BALL, Gaussian, frame};
 use glam::Vec3;
 use proptest::prelude::*;
-use splatstream_render::camera::{Up, forward, read_cameras, ring, spiral};
+use splatstream_render::camera::{Up, forward, held_out, read_cameras, ring, spiral};
 use splatstream_render::{Camera, render};
 
 const UPS: [Up; 6] = [Up::MinusY, Up::PlusY, Up::MinusZ, Up::PlusZ, Up::MinusX, Up::PlusX];
@@ -73,7 +73,9 @@ fn cameras_that_are_made_see_the_middle_of_the_scene() {
     let corners = [[-1.0, -2.0, 4.0], [1.0, -2.0, 4.0], [-1.0, 0.0, 4.0], [1.0, 0.0, 6.0]];
     let frame = frame(&corners.map(|position| Gaussian { position, ..BALL }));
     for up in UPS {
-        let made = [ring, forward, spiral].map(|cameras| cameras(&frame, up, 6, 90));
+        let held_out = |frame: &_, up, count, height| held_out(frame, up, &[], count, height);
+        let mut made = [ring, forward, spiral].map(|cameras| cameras(&frame, up, 6, 90)).to_vec();
+        made.push(held_out(&frame, up, 6, 90));
         for camera in made.iter().flatten() {
             let [x, y, z] = seen(camera, Vec3::new(0.0, -1.0, 5.0));
             assert!((x - 80.0).abs() < 0.05 && (y - 45.0).abs() < 0.05 && z > 0.0, "{camera:?}");
@@ -101,10 +103,45 @@ fn cameras_of_one_view_are_all_different() {
     let frame = frame(&[BALL, Gaussian { position: [1.0, 1.0, 4.0], ..BALL }]);
     let mut cameras = ring(&frame, Up::MinusY, 8, 90);
     cameras.extend(spiral(&frame, Up::MinusY, 8, 90));
+    cameras.extend(held_out(&frame, Up::MinusY, &[], 8, 90));
+    let given = spiral(&frame, Up::MinusY, 8, 90);
+    cameras.extend(
+        held_out(&frame, Up::MinusY, &given, 3, 80)
+            .into_iter()
+            .map(|camera| Camera { name: format!("turned {}", camera.name), ..camera }),
+    );
     for (at, camera) in cameras.iter().enumerate() {
         assert!(
             cameras[..at].iter().all(|other| other.position != camera.position && other.name != camera.name)
         );
+    }
+}
+
+#[test]
+fn held_out_cameras_stand_five_degrees_from_given_ones_and_see_the_same() {
+    let frame = frame(&[BALL, Gaussian { position: [1.0, 1.0, 4.0], ..BALL }]);
+    let given = ring(&frame, Up::MinusY, 6, 90);
+    for (camera, from) in held_out(&frame, Up::MinusY, &given, 3, 45).iter().zip([1, 3, 5]) {
+        let (one, other) = (Vec3::from(camera.rotation[2]), Vec3::from(given[from].rotation[2]));
+        assert!((one.dot(other).acos().to_degrees() - 5.0).abs() < 0.1, "{one} {other}");
+        let [x, y, z] = seen(camera, Vec3::new(0.5, 0.5, 3.5));
+        assert!((x - 40.0).abs() < 0.1 && (y - 22.5).abs() < 0.1 && z > 0.0, "{x} {y} {z}");
+    }
+}
+
+#[test]
+fn far_gaussians_do_not_push_cameras_away_from_the_scene() {
+    // Two of five Gaussians are a thousand times as far as the rest, in all directions.
+    let place = |number: u32| {
+        let part = |by: f32| 2.0 * (number as f32 * by).fract() - 1.0;
+        let far = if number % 5 < 2 { 1000.0 } else { 1.0 };
+        [part(0.618) * far, part(0.755) * far, part(0.570) * far]
+    };
+    let gaussians: Vec<Gaussian> =
+        (0..500).map(|number| Gaussian { position: place(number), ..BALL }).collect();
+    for camera in ring(&frame(&gaussians), Up::MinusY, 4, 90) {
+        let distance = Vec3::from(camera.position).length();
+        assert!((1.0..10.0).contains(&distance), "{distance}");
     }
 }
 

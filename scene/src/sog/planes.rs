@@ -24,7 +24,7 @@ const PADDING: u64 = 1 << 16;
 /// Labels of 16 bits choose among this many rows of the palette at most.
 const PALETTE_PIXELS: u64 = 1024 * 960;
 
-/// Fetches files by name and reads the scene they make.
+/// Fetches files by name and reads the scene they make; values are not checked.
 pub(crate) fn read(
     mut fetch: impl FnMut(&str) -> Result<Vec<u8>, SceneError>,
     limits: &ReadLimits,
@@ -52,7 +52,7 @@ pub(crate) fn read(
     if let Some((labels, palette)) = &images.palette {
         palette.look_up(pixels(labels), &mut planes.sh)?;
     }
-    GaussianFrame::from_read(sh_degree, planes)
+    GaussianFrame::from_file(sh_degree, planes)
 }
 
 /// The images of a scene, each compared with the count before any plane gets room for it.

@@ -9,18 +9,18 @@ use splatstream_render::metrics::Comparison;
 pub(super) const NOT_MEASURED: &str = "not measured: no weights given";
 
 /// One sentence that says what to look at.
-pub(super) fn how_to_read(sentence: &str) -> Markup {
+pub(in crate::chart) fn how_to_read(sentence: &str) -> Markup {
     html! { p.read { strong { "How to read: " } (sentence) } }
 }
 
 /// The command that makes a figure or a table.
-pub(super) fn made_by(command: &str) -> Markup {
+pub(in crate::chart) fn made_by(command: &str) -> Markup {
     html! { p.made { "made by " code { @for word in command.split(' ') { span { (word) } " " } } } }
 }
 
 /// What stands over a column.
 #[derive(Clone, Copy)]
-pub(super) enum Heading<'a> {
+pub(in crate::chart) enum Heading<'a> {
     /// Over words.
     Words(&'a str),
     /// Over numbers.
@@ -28,7 +28,7 @@ pub(super) enum Heading<'a> {
 }
 
 /// A table that scrolls where it is wider than the screen.
-pub(super) fn table(headings: &[Heading<'_>], rows: &Markup) -> Markup {
+pub(in crate::chart) fn table(headings: &[Heading<'_>], rows: &Markup) -> Markup {
     html! {
         div.scroll tabindex="0" {
             table {
@@ -49,7 +49,7 @@ pub(super) fn table(headings: &[Heading<'_>], rows: &Markup) -> Markup {
 }
 
 /// Figures side by side, each with its title and its file.
-pub(super) fn figures(figures: &[Figure]) -> Markup {
+pub(in crate::chart) fn figures(figures: &[Figure]) -> Markup {
     html! {
         div.figures {
             @for drawing in figures {

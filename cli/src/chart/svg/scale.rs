@@ -61,6 +61,11 @@ impl Scale {
                     return ticks.into_iter().map(|value| (value, number(value))).collect();
                 }
             }
+            let decades = decade_ticks(low, high, &[1.0]);
+            if decades.len() > most {
+                let every = decades.len().div_ceil(most);
+                return decades.into_iter().step_by(every).map(|value| (value, number(value))).collect();
+            }
         }
         let step = round_step((high - low) / most as f64);
         let first = libm::ceil(low / step - 1e-9) as i64;
@@ -91,6 +96,9 @@ fn round_step(step: f64) -> f64 {
 
 /// A number of an axis, without digits that say nothing.
 fn number(value: f64) -> String {
+    if value >= 1e7 || (value > 0.0 && value < 1e-3) {
+        return format!("{value:.0e}");
+    }
     if value >= 1000.0 {
         return grouped(libm::round(value) as u64);
     }
@@ -116,6 +124,14 @@ mod tests {
         let scale = Scale::over([3.0, 300.0].into_iter(), true, (0.0, 100.0));
         assert_eq!(texts(scale, 8), ["5", "10", "20", "50", "100", "200"]);
         assert_eq!(texts(Scale::from_zero(4000.0, (0.0, 1.0)), 4), ["0", "1,000", "2,000", "3,000", "4,000"]);
+    }
+
+    #[test]
+    fn many_decades_have_few_ticks() {
+        let scale = Scale::over([1e2, 1e10].into_iter(), true, (0.0, 100.0));
+        assert_eq!(texts(scale, 8), ["100", "10,000", "1,000,000", "1e8", "1e10"]);
+        let scale = Scale::over([1e-6, 1.0].into_iter(), true, (0.0, 100.0));
+        assert_eq!(texts(scale, 4), ["1e-6", "1e-4", "0.01", "1"]);
     }
 
     #[test]

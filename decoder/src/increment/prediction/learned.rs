@@ -19,6 +19,8 @@ pub struct Learned<'s> {
     pub(super) projection: Projection,
     pub(super) set: &'s QuantizedFrame,
     pub(super) rows: &'s Rows,
+    /// Low bits of differences that are ignored.
+    pub(super) feature_shift: u8,
 }
 
 /// A new Gaussian that the network predicts.
@@ -127,8 +129,15 @@ impl Learned<'_> {
                 let mut apart = components.get(index as usize).copied().unwrap_or_default();
                 apart.iter_mut().zip(&own).for_each(|(apart, own)| *apart = apart.wrapping_sub(*own));
                 let mut theirs = self.rows.row(index).iter();
-                let geometry = geometry.map(|own| theirs.next().map_or(0, |theirs| theirs.wrapping_sub(own)));
-                let seen = Seen { components: &apart, geometry, affinity, distance: neighbour.distance };
+                let difference = |own: i32| theirs.next().map_or(0, |theirs| theirs.wrapping_sub(own));
+                let geometry = geometry.map(difference);
+                let seen = Seen {
+                    components: &apart,
+                    geometry,
+                    feature_shift: self.feature_shift,
+                    affinity,
+                    distance: neighbour.distance,
+                };
                 batch.set_token(header, (lane, rank), &seen, farthest);
             }
             let offsets = self.offsets(target);

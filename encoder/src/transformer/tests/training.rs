@@ -22,7 +22,13 @@ fn problem(header: &NetworkHeader, samples: usize, seed: u64) -> Vec<Sample> {
                 let components: Vec<i64> = colour.iter().map(|&value| i64::from(value) << 12).collect();
                 let opacity = if neighbour == alike { 0 } else { 60 };
                 let geometry = [random.within(9), 0, 0, opacity, 0, random.within(9), 0];
-                let seen = Seen { components: &components, geometry, affinity: 4096, distance: 7 };
+                let seen = Seen {
+                    components: &components,
+                    geometry,
+                    affinity: 4096,
+                    distance: 7,
+                    ..Seen::default()
+                };
                 batch.set_token(header, (lane, neighbour), &seen, 99);
                 if neighbour == alike {
                     wanted.iter_mut().zip(colour).for_each(|(row, value)| row[lane] = value);

@@ -61,7 +61,7 @@ fn overview(text: &mut String, common: &Common, frames: &[Walked]) {
     text.push_str(
         "## E.1 The frames\n\nThe layers and references are those of 7.3.1 with `temporal_depth` 1. Each unit (s, r) \
          is listed with its parents, what becomes of them, and how many Gaussians it adds.\n\n\
-         | Frame | Kind | Temporal layer | Refers to | Unit | position_shift | attribute_shift | Parents | Moves | \
+         | Frame | Kind | Temporal layer | Refers to | Unit | position_shift | attribute_step | Parents | Moves | \
          Updates | Removed | New |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for frame in frames {
@@ -77,7 +77,7 @@ fn overview(text: &mut String, common: &Common, frames: &[Walked]) {
                 id.spatial_layer,
                 id.refinement,
                 header.position_shift,
-                list(header.attribute_shift),
+                list(header.attribute_step),
                 header.parent_count,
                 header.move_count,
                 header.update_count,

@@ -82,7 +82,7 @@ impl Case<'_> {
         let at: [Vec<u32>; 3] =
             step.list.planes.position.each_ref().map(|plane| vec![*plane.last().unwrap()]);
         let position = at.each_ref().map(Vec::as_slice);
-        let by = Predicting { header: &step.header, colour: coding.colour, network: None };
+        let by = Predicting { header: &step.header, colour: coding.colour, network: None, feature_shift: 0 };
         let mut decoder = Prediction::new(&step.set, position, &[self.predictor], &by).unwrap();
         let mut known = Attributes::unpredicted(1, &coding.colour, 0);
         let values = AttributeValues(&step.values.section(Section::New).planes);

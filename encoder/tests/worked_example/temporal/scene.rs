@@ -18,7 +18,7 @@ struct Plan {
     /// Frame, spatial layer, refinement.
     at: (u32, u8, u8),
     position_shift: u8,
-    attribute_shift: [u8; 5],
+    attribute_step: [u8; 5],
     modes: Vec<i32>,
     moves: Vec<[i32; 3]>,
     updates: Vec<Values>,
@@ -43,9 +43,14 @@ pub(crate) fn sequence() -> SequenceParameters {
         refinement_count: 2,
         refinement_percent: [50, 100, 0, 0, 0, 0, 0, 0, 0, 0],
         position_bits: 10,
+        linear_log2: 8,
+        segment_log2: 7,
         block_log2: BLOCK_LOG2,
         sequence_flags: SequenceParameters::flags(true, false, false),
-        rotation_threshold: [4, 0, 0],
+        size_weight: [0, 1000, 0, 0, 0],
+        anisotropy_weight: 4096,
+        size_reference: 12,
+        anisotropy_reference: 4,
         frame_count: 3,
         ticks_per_second: 30,
         ticks_per_frame: 1,
@@ -54,10 +59,9 @@ pub(crate) fn sequence() -> SequenceParameters {
         log_scale_offset: (-6.0_f32).to_bits(),
         log_scale_step: 0.25_f32.to_bits(),
         rotation_step: 0.03125_f32.to_bits(),
-        opacity_offset: 0,
         opacity_step: 0.5_f32.to_bits(),
         dc_step: 0.125_f32.to_bits(),
-        sh_step: 1.0_f32.to_bits(),
+        ..SequenceParameters::PLAIN
     }
 }
 
@@ -103,7 +107,7 @@ pub(crate) fn increments() -> Vec<Planned> {
 
 /// Frame 0: three Gaussians in layer 0 with steps twice as large, two more and finer steps in layer 1.
 fn intra() -> [Plan; 4] {
-    let coarse = || Plan { position_shift: 1, attribute_shift: [1; 5], ..Plan::default() };
+    let coarse = || Plan { position_shift: 1, attribute_step: [1; 5], ..Plan::default() };
     [
         Plan {
             new: vec![
@@ -163,7 +167,7 @@ fn predicted() -> [Plan; 2] {
         Plan {
             at: (2, 1, 0),
             position_shift: 1,
-            attribute_shift: [1, 0, 0, 1, 0],
+            attribute_step: [1, 0, 0, 1, 0],
             modes: vec![3, 0, 1],
             moves: vec![[2, -1, 0], [-2, 3, 1]],
             updates: vec![[-1, 1, 0, 0, 1, 0, 0, 2, 0, -1]],
@@ -173,7 +177,7 @@ fn predicted() -> [Plan; 2] {
         Plan {
             at: (2, 1, 1),
             position_shift: 1,
-            attribute_shift: [1, 0, 0, 1, 0],
+            attribute_step: [1, 0, 0, 1, 0],
             modes: vec![4, 2],
             updates: vec![[1, 0, 0, 2, 0, -1, 0, 0, 1, 0]],
             predictor: Some(1),
@@ -219,7 +223,7 @@ impl Plan {
             remove_count: count(|mode| mode == 4),
             new_count: self.new.len() as u32,
             position_shift: self.position_shift,
-            attribute_shift: self.attribute_shift,
+            attribute_step: self.attribute_step,
             compensation_log_scale: self.compensation.0,
             compensation_opacity: self.compensation.1,
             ..IncrementHeader::PLAIN

@@ -2,9 +2,10 @@
 
 use super::walk::{Common, Step, Walked};
 use super::{list, of};
-use splatstream_decoder::attribute::rotation_shift;
 use splatstream_decoder::displacement::{Cell, isqrt, rotation_unit};
+use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::layout::Section;
+use splatstream_decoder::steps::{StepRule, step as size_of_step};
 use std::fmt::Write as _;
 
 type Three = [i64; 3];
@@ -126,27 +127,33 @@ pub(crate) fn residual(text: &mut String, common: &Common, step: &Step, row: usi
     write!(
         text,
         "\n## E.6 One residual\n\nEntry {entry} of section updates of unit {}, about its parent {row}, by 7.6. \
-         `attribute_shift` is {}.\n\n```text\n",
+         `attribute_step` is {}.\n\n```text\n",
         step.name(),
-        list(step.header.attribute_shift)
+        list(step.header.attribute_step)
     )
     .unwrap();
     let mut lines = Lines(text);
-    let shift = step.header.attribute_shift;
+    let rule = StepRule::new(&common.sequence, step.header.attribute_step);
     let planes = &step.displaced.planes;
-    let q = log_scales(&mut lines, of(&planes.log_scale, row).map(i64::from), &v, shift[0]);
+    let q = log_scales(&mut lines, of(&planes.log_scale, row).map(i64::from), &v, &rule);
     let o = i64::from(planes.opacity[row]);
     lines.one("pred.o", o);
-    let o = o + (v[3] << shift[1]);
-    lines.one(&format!("o = pred.o + ({} << {})", v[3], shift[1]), o);
+    let shape = q.map(|q| q as i32);
+    let mut step_of = |stage, opacity: i64, name: &str| {
+        let exponent = rule.of(stage, shape, opacity as i32);
+        lines.one(&format!("exponent({name})"), exponent.into());
+        i64::from(size_of_step(exponent))
+    };
+    let of_opacity = step_of(Stage::Opacity, 0, "opacity");
+    let o = o + v[3] * of_opacity;
+    let [of_rotation, of_dc] =
+        [(Stage::Rotation, "rotation"), (Stage::Dc, "dc")].map(|(stage, name)| step_of(stage, o, name));
+    lines.one(&format!("o = pred.o + {} * {of_opacity}", v[3]), o);
     let before = of(&step.displaced.rotation_fine, row).map(i64::from);
-    let c = rotation_shift((q[0] - q[2]) as i32, common.sequence.rotation_threshold);
-    let bits = c + u32::from(shift[2]) + 6;
     lines.three("pred.rotation_fine", before);
-    lines.one("c, with q[0] - q[2]", c.into());
-    let rotation = three(|k| before[k] + (v[4 + k] << bits));
-    lines.three(&format!("rotation_fine = pred.rotation_fine + (v << {bits})"), rotation);
-    let dc = colour(&mut lines, common, of(&planes.dc, row).map(i64::from), &v[7..], shift[3]);
+    let rotation = three(|k| before[k] + ((v[4 + k] * of_rotation) << 6));
+    lines.three(&format!("rotation_fine = pred.rotation_fine + ((v * {of_rotation}) << 6)"), rotation);
+    let dc = colour(&mut lines, common, of(&planes.dc, row).map(i64::from), &v[7..], of_dc);
     text.push_str("```\n");
     let planes = &step.list.planes;
     assert_eq!(q, of(&planes.log_scale, kept).map(i64::from));
@@ -155,11 +162,15 @@ pub(crate) fn residual(text: &mut String, common: &Common, step: &Step, row: usi
     assert_eq!(dc, of(&planes.dc, kept).map(i64::from));
 }
 
-fn log_scales(lines: &mut Lines<'_>, p: Three, v: &[i64], shift: u8) -> Three {
-    let x = three(|k| v[k] << shift);
+fn log_scales(lines: &mut Lines<'_>, p: Three, v: &[i64], rule: &StepRule) -> Three {
+    let of_largest = i64::from(size_of_step(rule.of_largest()));
+    let exponent = rule.of_log_scale((p[0] + v[0] * of_largest) as i32);
+    let of_others = i64::from(size_of_step(exponent));
+    let steps = [of_largest, of_others, of_others];
+    let x = three(|k| v[k] * steps[k]);
     lines.three("pred.q", p);
     lines.three("v_log_scale", three(|k| v[k]));
-    lines.three(&format!("x = v_log_scale << {shift}"), x);
+    lines.three(&format!("x = v_log_scale * {}", list(steps)), x);
     let (d1, d2) = (p[0] - p[1] + x[1], p[1] - p[2] + x[2]);
     lines.one("d1 = pred.q[0] - pred.q[1] + x[1]", d1);
     lines.one("d2 = pred.q[1] - pred.q[2] + x[2]", d2);
@@ -168,12 +179,12 @@ fn log_scales(lines: &mut Lines<'_>, p: Three, v: &[i64], shift: u8) -> Three {
     q
 }
 
-fn colour(lines: &mut Lines<'_>, common: &Common, p: Three, v: &[i64], shift: u8) -> Three {
-    let component = three(|k| v[k] << shift);
+fn colour(lines: &mut Lines<'_>, common: &Common, p: Three, v: &[i64], step: i64) -> Three {
+    let component = three(|k| v[k] * step);
     let basis = &common.transform.basis;
     let sum = three(|j| (0..3).map(|k| i64::from(basis[k * 3 + j]) * component[k]).sum());
     lines.three("pred.dc", p);
-    lines.three(&format!("component = v_dc << {shift}"), component);
+    lines.three(&format!("component = v_dc * {step}"), component);
     lines.three("sum", sum);
     lines.three("Round(sum, 6)", sum.map(|sum| round(sum, 6)));
     let dc = three(|j| p[j] + round(sum[j], 6));

@@ -7,9 +7,11 @@ use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::residual::AttributeCoding;
 use splatstream_decoder::increment::values::UnitValues;
-use splatstream_decoder::increment::{Situation, Unit, apply, field, reference_set};
+use splatstream_decoder::increment::{Situation, Temporal, Unit, apply, field, reference_set};
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
+use splatstream_decoder::moves::SpanRatio;
+use splatstream_decoder::steps::StepRule;
 use splatstream_format::entropy::in_force::ModelsOfFrame;
 use splatstream_format::payload::Transform;
 use splatstream_format::syntax::{GopHeader, IncrementHeader, SequenceParameters, UnitId};
@@ -48,9 +50,8 @@ pub(crate) struct Walked {
 impl Common {
     pub(crate) fn coding(&self, header: &IncrementHeader) -> AttributeCoding<'_> {
         AttributeCoding {
-            shift: header.attribute_shift,
+            steps: StepRule::new(&self.sequence, header.attribute_step),
             canonical_axes: self.sequence.canonical_axes(),
-            rotation_thresholds: self.sequence.rotation_threshold,
             colour: Colour { dc: &self.transform, sh: None, mode: ShCoding::None, codebooks: [None; 4] },
         }
     }
@@ -84,16 +85,17 @@ impl Common {
             values: &values,
             coding: self.coding(&header),
             sequence: &self.sequence,
-            intra,
             network: None,
             max_learned: 0,
             at: 0,
         };
         let parents = parents(frames, frame, &id);
-        let mut displaced = parents.clone();
+        let mut displaced = parents.unchanged();
         displaced.displace(&frame.field);
         let [before, after] = around(frame, &id);
-        let situation = Situation { around: [&before, &after], parents_follow: intra };
+        let ratio = SpanRatio::default();
+        let temporal = (!intra).then_some(Temporal { reference: &parents, ratio, moves: None });
+        let situation = Situation { around: [&before, &after], temporal };
         let applied = apply(&unit, displaced.clone(), &situation).unwrap();
         let mut left = applied.list.planes.clone();
         left.truncate(left.len() - applied.added.len());

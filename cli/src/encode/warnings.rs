@@ -1,0 +1,193 @@
+//! What a user should know of a stream that was encoded without an error.
+
+use super::pictures::Goal;
+use crate::numbers::{bits_per_gaussian, grouped};
+use serde::Serialize;
+use splatstream_encoder::{Dropped, Isolated, Report, Settings, Size};
+use splatstream_format::syntax::FrameType;
+
+/// A PSNR is missed by more than this, decibels.
+const MISSED: f64 = 0.5;
+
+/// P and B frames may be below I frames by so much, decibels.
+const PULSE: f64 = 1.0;
+
+/// And one frame below what was asked for.
+const OUTLIER: f64 = 2.0;
+
+/// A size is missed by more than this part of it.
+const MISSED_SIZE: f64 = 0.03;
+
+/// A warning. Codes do not change, messages may.
+#[derive(Serialize)]
+pub(crate) struct Warning {
+    /// What it is about.
+    pub(crate) code: &'static str,
+    /// In words.
+    pub(crate) message: String,
+}
+
+impl Warning {
+    fn new(code: &'static str, message: String) -> Self {
+        Self { code, message }
+    }
+
+    /// For people.
+    pub(super) fn text(&self) -> String {
+        format!("warning: {}", self.message)
+    }
+}
+
+/// All warnings about a stream; `file_of` says what a frame is called.
+pub(crate) fn warnings(
+    report: &Report,
+    settings: &Settings,
+    file_of: &dyn Fn(u32) -> String,
+) -> Vec<Warning> {
+    let mut warnings: Vec<Warning> =
+        report.dropped.iter().take(1).map(|first| dropped(report, first, file_of)).collect();
+    warnings.extend(report.isolated.iter().map(|isolated| isolated_values(isolated, file_of)));
+    match Goal::of(settings) {
+        Goal::Psnr(wanted) => warnings.extend(psnr(report, wanted)),
+        Goal::Size(size) => warnings.extend(missed_size(report, size)),
+        Goal::Nothing => {}
+    }
+    warnings.extend(pulses(report));
+    warnings.extend(short_gops(report, settings));
+    warnings
+}
+
+fn psnr(report: &Report, wanted: f64) -> Vec<Warning> {
+    let Some(pictures) = &report.pictures else { return Vec::new() };
+    let Some(measured) = pictures.psnr() else {
+        let message = "the quality could not be checked: pictures of the scene are blank from all around; \
+                       give views of it with --cameras";
+        return vec![Warning::new("blank-pictures", message.to_owned())];
+    };
+    let below = wanted - measured;
+    if below > MISSED {
+        let advice = match report.isolated.is_empty() {
+            true => {
+                "give a higher --psnr, or look for Gaussians that are far larger or brighter than all others"
+            }
+            false => "repair the values that are far beyond what a scene has",
+        };
+        let message = format!(
+            "pictures have a PSNR of {measured:.1} dB, {below:.1} dB less than the {wanted} dB asked for; {advice}"
+        );
+        return vec![Warning::new("psnr-missed", message)];
+    }
+    if below < -MISSED {
+        let message = format!(
+            "pictures have a PSNR of {measured:.1} dB, {:.1} dB more than the {wanted} dB asked for; \
+             the stream is larger than it needs to be",
+            -below
+        );
+        return vec![Warning::new("psnr-exceeded", message)];
+    }
+    let worst = pictures.frames.iter().filter_map(|frame| Some((frame.psnr?, frame.number)));
+    let worst = worst.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let far = worst.filter(|(psnr, _)| wanted - psnr > OUTLIER);
+    far.map(|(psnr, frame)| {
+        let message = format!(
+            "pictures of frame {frame} have a PSNR of {psnr:.1} dB, {:.1} dB less than the {wanted} dB asked for; \
+             give a higher --psnr, or encode that part of the sequence by itself",
+            wanted - psnr
+        );
+        Warning::new("frame-psnr-missed", message)
+    })
+    .into_iter()
+    .collect()
+}
+
+fn missed_size(report: &Report, size: Size) -> Option<Warning> {
+    let (asked, has, unit) = match size {
+        Size::BitsPerGaussian(bits) => {
+            (bits, bits_per_gaussian(report.bytes, report.gaussians), "bits per Gaussian")
+        }
+        Size::Bytes(bytes) => (bytes as f64 / 1e6, report.bytes as f64 / 1e6, "megabytes"),
+    };
+    let missed = has / asked - 1.0;
+    if missed.abs() <= MISSED_SIZE {
+        return None;
+    }
+    let advice = match missed > 0.0 {
+        true => {
+            "it cannot be made smaller: leave out spherical harmonics with --sh-degree 0, use fewer layers \
+                 or refinements, or thin the scene out"
+        }
+        false => "finer quantisers would change nothing that can be seen",
+    };
+    let message = format!(
+        "the stream has {has:.3} {unit}, {:.1} % {} the {asked} asked for; {advice}",
+        100.0 * missed.abs(),
+        if missed > 0.0 { "above" } else { "below" },
+    );
+    Some(Warning::new("size-missed", message))
+}
+
+/// Predicted frames that are worse than the I frames between them are seen as a pulse.
+fn pulses(report: &Report) -> Option<Warning> {
+    let pictures = report.pictures.as_ref()?;
+    let intra = pictures.psnr_of(FrameType::Intra)?;
+    let types = [FrameType::Predicted, FrameType::Enhancement];
+    let means = types.iter().filter_map(|&of| Some((pictures.psnr_of(of)?, of)));
+    let (worst, of) = means.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let below = intra - worst;
+    let tolerance = match report.coded.iter().any(|frame| frame.by_pictures) {
+        true => "lower --tolerance, or ",
+        false => "",
+    };
+    (below > PULSE).then(|| {
+        let message = format!(
+            "{} frames have {below:.1} dB less than I frames ({worst:.1} and {intra:.1} dB), which may be seen as a pulse \
+             at each I frame; {tolerance}code every frame by itself with --all-intra if that is seen",
+            of.name()
+        );
+        Warning::new("quality-pulses", message)
+    })
+}
+
+/// A sequence in which hardly any frame can be predicted.
+fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
+    let asked = (report.frames as usize).div_ceil(settings.gop.max(1) as usize);
+    let count = report.gops.len();
+    (count > 2 * asked && 2 * count > report.frames as usize).then(|| {
+        let message = format!(
+            "{count} GOPs for {} frames: most frames have too little in common with the one before to be predicted; \
+             --all-intra codes them as small, and faster",
+            report.frames
+        );
+        Warning::new("short-gops", message)
+    })
+}
+
+fn dropped(report: &Report, first: &Dropped, file_of: &dyn Fn(u32) -> String) -> Warning {
+    let all: u64 = report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum();
+    let properties: Vec<String> =
+        first.properties.iter().map(|(name, count)| format!("{name} {}", grouped((*count).into()))).collect();
+    let message = format!(
+        "{} {} left out, of {}: they have values that are not finite; {} has {} ({})",
+        grouped(all),
+        if all == 1 { "Gaussian was" } else { "Gaussians were" },
+        match report.dropped.len() {
+            1 => "one frame".to_owned(),
+            frames => format!("{frames} frames"),
+        },
+        file_of(first.frame),
+        grouped(first.gaussians.into()),
+        properties.join(", "),
+    );
+    Warning::new("dropped", message)
+}
+
+fn isolated_values(isolated: &Isolated, file_of: &dyn Fn(u32) -> String) -> Warning {
+    let Isolated { attribute, count, frame, row, value } = *isolated;
+    let message = format!(
+        "{} a {attribute} far beyond what a scene has, for example Gaussian {row} of {} with {value}; the nearest \
+         sensible value is coded instead, and nothing else is worse for it; remove or repair such Gaussians",
+        if count == 1 { "1 Gaussian has".to_owned() } else { format!("{} Gaussians have", grouped(count)) },
+        file_of(frame),
+    );
+    Warning::new("isolated-values", message)
+}

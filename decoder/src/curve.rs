@@ -1,0 +1,77 @@
+//! Points in the order of their Morton codes.
+//!
+//! A radix sort, digit by digit from the lowest: its time grows with the number of points alone, whatever a stream makes
+//! of their codes.
+
+/// Bits of a digit.
+const DIGIT: u32 = 11;
+/// Values of a digit.
+const VALUES: usize = 1 << DIGIT;
+/// Digits of a code, which has at most 63 bits.
+const DIGITS: usize = 6;
+/// Codes below which comparisons are faster.
+const FEW: usize = 512;
+
+/// The indices of codes in the order of (code, index).
+pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>) -> Vec<(u64, u32)> {
+    let mut points: Vec<(u64, u32)> = codes.zip(0..).collect();
+    if points.len() < FEW {
+        points.sort_unstable();
+        return points;
+    }
+    let mut counts = vec![[0_u32; VALUES]; DIGITS];
+    for (code, _) in &points {
+        for (position, counts) in (0_u32..).zip(&mut counts) {
+            if let Some(count) = counts.get_mut(digit(*code, position)) {
+                *count = count.wrapping_add(1);
+            }
+        }
+    }
+    let mut sorted = vec![(0, 0); points.len()];
+    for (position, counts) in (0_u32..).zip(&mut counts) {
+        let most = counts.iter().copied().max().map_or(0, |most| most as usize);
+        if most == points.len() {
+            // All points have the same digit.
+            continue;
+        }
+        let mut next = 0_u32;
+        for count in counts.iter_mut() {
+            let first = next;
+            next = next.wrapping_add(*count);
+            *count = first;
+        }
+        for point in &points {
+            let Some(place) = counts.get_mut(digit(point.0, position)) else { continue };
+            if let Some(slot) = sorted.get_mut(*place as usize) {
+                *slot = *point;
+            }
+            *place = place.wrapping_add(1);
+        }
+        core::mem::swap(&mut points, &mut sorted);
+    }
+    points
+}
+
+#[inline(always)]
+fn digit(code: u64, position: u32) -> usize {
+    (code.wrapping_shr(position.wrapping_mul(DIGIT)) as usize) & (VALUES - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn codes_come_in_their_order(
+            mut codes in proptest::collection::vec(prop_oneof![0_u64..1 << 63, 0_u64..99, Just(7)], 0..2000),
+            shift in 0_u32..60,
+        ) {
+            codes.iter_mut().for_each(|code| *code >>= shift);
+            let mut expected: Vec<(u64, u32)> = codes.iter().copied().zip(0..).collect();
+            expected.sort_unstable();
+            prop_assert_eq!(order(codes.into_iter()), expected);
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Frames as the encoder takes them: every value is finite, every rotation has a direction.
+
+use crate::error::Error;
+use crate::report::Dropped;
+use crate::source::FrameSource;
+use splatstream_scene::{Defects, GaussianFrame};
+use std::collections::BTreeMap;
+
+/// Refuses Gaussians with values that no frame may hold, or leaves them out.
+pub(crate) struct CheckedSource<'a> {
+    source: &'a mut dyn FrameSource,
+    drop_invalid: bool,
+    /// By frame.
+    dropped: BTreeMap<u32, Defects>,
+}
+
+/// A frame with values that no frame may hold.
+#[derive(Debug, thiserror::Error)]
+#[error("{} of its Gaussians have values that are not finite, or a rotation without direction", .0.rows.len())]
+struct Invalid(Defects);
+
+impl<'a> CheckedSource<'a> {
+    pub(crate) fn new(source: &'a mut dyn FrameSource, drop_invalid: bool) -> Self {
+        Self { source, drop_invalid, dropped: BTreeMap::new() }
+    }
+
+    /// What was left out of each frame that was read.
+    pub(crate) fn into_dropped(self) -> Vec<Dropped> {
+        let of_frame = |(frame, defects): (u32, Defects)| Dropped {
+            frame,
+            gaussians: defects.rows.len() as u32,
+            properties: defects.properties,
+            first: defects.first,
+        };
+        self.dropped.into_iter().map(of_frame).collect()
+    }
+}
+
+impl FrameSource for CheckedSource<'_> {
+    fn len(&self) -> u32 {
+        self.source.len()
+    }
+
+    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        let frame = self.source.frame(number)?;
+        let Some(defects) = frame.defects() else { return Ok(frame) };
+        if !self.drop_invalid {
+            return Err(Box::new(Invalid(defects)));
+        }
+        let frame = without(frame, &defects.rows);
+        self.dropped.insert(number, defects);
+        Ok(frame)
+    }
+}
+
+/// The error of a frame that was refused is one of the frame, not of reading it.
+pub(crate) fn named(error: Error) -> Error {
+    match error {
+        Error::Source { frame, source } => match source.downcast::<Invalid>() {
+            Ok(invalid) => {
+                let Defects { rows, first, .. } = invalid.0;
+                Error::Invalid { frame, count: rows.len(), first }
+            }
+            Err(source) => Error::Source { frame, source },
+        },
+        other => other,
+    }
+}
+
+/// A frame in which some rows hold nothing: their opacity is 0, that is, its logit is minus infinity, which
+/// [`visible`](crate::canonical::visible) leaves out. All other rows keep their places, by which frames are tracked.
+fn without(frame: GaussianFrame, rows: &[u32]) -> GaussianFrame {
+    let (degree, antialiased) = (frame.sh_degree(), frame.antialiased());
+    // A row that is in the scene, so that nothing else is told apart from the rest.
+    let model = (0..frame.len() as u32).find(|row| rows.binary_search(row).is_err());
+    let mut planes = frame.into_planes();
+    for &row in rows {
+        let row = row as usize;
+        for plane in planes.position.iter_mut().chain(&mut planes.log_scale) {
+            plane[row] = model.map_or(0.0, |model| plane[model as usize]);
+        }
+        for plane in planes.dc.iter_mut().chain(&mut planes.sh).chain(&mut planes.rotation) {
+            plane[row] = 0.0;
+        }
+        planes.rotation[0][row] = 1.0;
+        planes.opacity_logit[row] = f32::NEG_INFINITY;
+    }
+    GaussianFrame::from_planes(degree, planes).unwrap_or_default().with_antialiased(antialiased)
+}

@@ -1,0 +1,221 @@
+//! Predicted frames: which parents move, how their moves are predicted, and what is left of them.
+//!
+//! Runs of parents in which most have to move are moved as a whole: a zero among moves costs less than saying which of
+//! them stay. Each block of moves takes the predictor that leaves the fewest bits. As in a decoder, the motion of a
+//! parent is predicted from what is known of those before it, so that the blocks follow one after the other.
+
+use super::survivors::{MOST, REMOVED};
+use splatstream_decoder::list::{FINE, GaussianList, canonical};
+use splatstream_decoder::moves::{MovePredictor, MoveSpace, Moves};
+use splatstream_format::syntax::NO_PREDICTOR;
+
+/// log2 of the moves that share a predictor, and of all of them where one suits them all.
+const BLOCK_LOG2: u8 = 6;
+const WHOLE_LOG2: u8 = 16;
+
+/// Parents that are moved together or each by itself.
+const RUN: usize = 64;
+
+/// How often a run is looked at again: what a move takes depends on how many there are.
+const ROUNDS: usize = 3;
+
+/// Where more than this share of a run, in quarters, has to move, all of it is moved.
+const RUN_QUARTERS: usize = 3;
+
+/// Bits of a coordinate that is left as predicted, of one step, and what each doubling adds.
+const ZERO_BITS: f32 = 0.5;
+const FIRST_BITS: f32 = 2.2;
+const DOUBLING_BITS: f32 = 1.6;
+
+/// Bits by which a block names its predictor.
+const NAMED_BITS: f32 = 1.5;
+
+/// Where a parent shall be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Aim {
+    /// Grid steps.
+    pub(crate) place: [f32; 3],
+    /// How far from there it may be left, steps of its moves.
+    pub(crate) left: f32,
+    /// Whether it is worth a move at all.
+    pub(crate) moves: bool,
+}
+
+/// The moves of a unit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct MovePlan {
+    /// Of each parent, whether it moves.
+    pub(crate) moved: Vec<bool>,
+    /// Residuals of those that do.
+    pub(crate) planes: [Vec<i32>; 3],
+    /// log2 of the moves that share a predictor; [`NO_PREDICTOR`] where none is needed.
+    pub(crate) block_log2: u8,
+    /// The codes of the predictors.
+    pub(crate) predictors: Vec<i32>,
+}
+
+/// The grid of the moves of a unit.
+#[derive(Debug, Clone, Copy)]
+struct MoveGrid {
+    /// The step of moves, fine units, and in grid steps.
+    step: i32,
+    size: f32,
+    /// The largest fine coordinate.
+    last: i32,
+    /// What a bit is worth, squared steps.
+    price: f32,
+}
+
+impl MoveGrid {
+    /// How far a fine coordinate is shown from where it shall be, steps: without its fraction.
+    fn apart(self, fine: i32, place: f32) -> f32 {
+        (place - canonical(fine) as f32) / self.size
+    }
+
+    /// What brings a predicted coordinate near to where it shall be: nothing if it is left as it is.
+    fn residual(self, predicted: i32, place: f32, left: f32) -> i32 {
+        let apart = self.apart(predicted, place);
+        let wanted = if apart.abs() <= left { 0 } else { crate::grid::nearest_integer(apart) };
+        // A fraction of a step is left between the outermost point and the end of the grid.
+        wanted.clamp(-(predicted / self.step), (self.last - predicted) / self.step)
+    }
+}
+
+/// Moves the parents that were [added](MoveSpace::push) last.
+///
+/// `displaced`: as their cells bring them; `aims`: where they shall be, those without one are removed. `shift` and `bits`
+/// are `position_shift` of the unit and `position_bits`; `price` is what a bit is worth, squared steps. Without
+/// `predicts` cells alone predict.
+pub(crate) fn plan(
+    space: &MoveSpace,
+    displaced: &GaussianList,
+    aims: &[Option<Aim>],
+    (shift, bits): (u8, u8),
+    price: f32,
+    predicts: bool,
+) -> MovePlan {
+    let step = FINE << shift;
+    let grid = MoveGrid { step, size: (1_u32 << shift) as f32, last: ((1 << bits) - 1) * FINE, price };
+    let moved = moving(displaced, aims, grid, predicts);
+    let modes: Vec<i32> = aims
+        .iter()
+        .zip(&moved)
+        .map(|(aim, &moved)| if aim.is_none() { REMOVED } else { moved.into() })
+        .collect();
+    let mut moves = space.moves(&modes, |_| predicts);
+    let count = moves.rows().len();
+    let mut plan = MovePlan { moved, block_log2: NO_PREDICTOR, ..MovePlan::default() };
+    plan.planes.iter_mut().for_each(|plane| plane.reserve(count));
+    let tried = if predicts { &MovePredictor::ALL[..] } else { &MovePredictor::ALL[..1] };
+    let mut last = MovePredictor::Cells;
+    let block = 1_usize << BLOCK_LOG2;
+    for start in (0..count).step_by(block) {
+        let numbers = start..count.min(start + block);
+        let mut cheapest = (f32::INFINITY, MovePredictor::Cells);
+        for &predictor in tried {
+            let named = if predictor == last { 0.0 } else { NAMED_BITS };
+            let residuals = numbers.clone().map(|number| residual(&mut moves, number, predictor, aims, grid));
+            let cost = named + residuals.flatten().map(bits_of).sum::<f32>();
+            if cost < cheapest.0 {
+                cheapest = (cost, predictor);
+            }
+        }
+        let (_, predictor) = cheapest;
+        last = predictor;
+        plan.predictors.push(predictor.code());
+        for number in numbers {
+            let residual = residual(&mut moves, number, predictor, aims, grid);
+            plan.planes.iter_mut().zip(residual).for_each(|(plane, value)| plane.push(value));
+        }
+    }
+    plan.name_predictors();
+    plan
+}
+
+impl MovePlan {
+    /// Says which predictors the blocks have, as shortly as it can be said.
+    fn name_predictors(&mut self) {
+        let first = self.predictors.first().copied().unwrap_or(0);
+        let alike = self.predictors.iter().all(|&code| code == first);
+        if alike && first == MovePredictor::Cells.code() {
+            self.predictors.clear();
+            return;
+        }
+        self.block_log2 = BLOCK_LOG2;
+        if alike {
+            self.block_log2 = WHOLE_LOG2;
+            let blocks = self.planes[0].len().div_ceil(1 << WHOLE_LOG2);
+            self.predictors = vec![first; blocks];
+        }
+    }
+}
+
+/// The residual of a move under a predictor; its parent goes where that brings it.
+fn residual(
+    moves: &mut Moves<'_>,
+    number: usize,
+    predictor: MovePredictor,
+    aims: &[Option<Aim>],
+    grid: MoveGrid,
+) -> [i32; 3] {
+    let row = moves.rows()[number] as usize;
+    let predicted = moves.predicted(number, predictor);
+    let Some(aim) = aims[row] else { return [0; 3] };
+    let residual = [0, 1, 2].map(|axis: usize| grid.residual(predicted[axis], aim.place[axis], aim.left));
+    moves.set(number, [0, 1, 2].map(|axis: usize| predicted[axis] + residual[axis] * grid.step));
+    residual
+}
+
+/// Which parents move: those of which a move brings more than its bits are worth and, where moves are predicted, all of
+/// runs of which most do.
+fn moving(displaced: &GaussianList, aims: &[Option<Aim>], grid: MoveGrid, predicts: bool) -> Vec<bool> {
+    let mut moved = Vec::with_capacity(aims.len());
+    for (start, aims) in (0..).step_by(RUN).zip(aims.chunks(RUN)) {
+        let won = |(row, aim): (usize, &Option<Aim>)| {
+            aim.map_or(f32::MIN, |aim| bargain(displaced, row, aim, grid))
+        };
+        let bargains: Vec<f32> = (start..).zip(aims).map(won).collect();
+        let mut moving: Vec<bool> = bargains.iter().map(|&bits| bits > 0.0).collect();
+        for _ in 0..ROUNDS {
+            let named = naming_bits(moving.iter().filter(|&&moving| moving).count(), aims.len());
+            moving = bargains.iter().map(|&bits| bits > named).collect();
+        }
+        let able = aims.iter().flatten().filter(|aim| aim.moves).count();
+        if predicts && 4 * moving.iter().filter(|&&moving| moving).count() > RUN_QUARTERS * able {
+            moving = aims.iter().map(|aim| aim.is_some_and(|aim| aim.moves)).collect();
+        }
+        moved.extend(moving);
+    }
+    moved
+}
+
+/// What a move of a parent is worth, in bits, beyond those that it takes. What is far off is moved in any case.
+fn bargain(displaced: &GaussianList, row: usize, aim: Aim, grid: MoveGrid) -> f32 {
+    if !aim.moves {
+        return f32::MIN;
+    }
+    let of_axis = |axis: usize| {
+        let now = displaced.position_fine[axis][row];
+        let apart = grid.apart(now, aim.place[axis]);
+        let residual = grid.residual(now, aim.place[axis], aim.left);
+        let rest = apart - residual as f32;
+        (apart * apart - rest * rest) / grid.price - bits_of(residual)
+    };
+    let is_far =
+        (0..3).any(|axis| grid.apart(displaced.position_fine[axis][row], aim.place[axis]).abs() > MOST);
+    if is_far { f32::MAX } else { of_axis(0) + of_axis(1) + of_axis(2) }
+}
+
+/// Bits by which saying that a parent moves costs more than saying that it stays, where so many of some do.
+fn naming_bits(moving: usize, of: usize) -> f32 {
+    let (moving, staying) = (moving as f32 + 0.5, (of - moving) as f32 + 0.5);
+    libm::log2f(staying / moving)
+}
+
+/// Bits of a coordinate, nearly.
+fn bits_of(value: i32) -> f32 {
+    match value.unsigned_abs() {
+        0 => ZERO_BITS,
+        size => FIRST_BITS + DOUBLING_BITS * libm::log2f(size as f32),
+    }
+}

@@ -1,0 +1,74 @@
+//! Keeps predicted frames about as good as the I frame that they follow.
+//!
+//! What a bit is worth decides how much of a difference is left, and errors that are left stay in later frames. How much
+//! they show depends on the scene. So the pictures of each predicted frame are compared with its source, as those of the I
+//! frame were, and the price of the next frame follows: nothing is coded twice.
+
+use super::price::{Pictures, shown};
+use super::survivors::BitPrice;
+use super::{CodedFrame, Target};
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_render::Camera;
+
+/// Views that are looked at, and their lines: the mean of a few small ones is steady.
+const VIEWS: usize = 3;
+const LINES: u32 = 180;
+
+/// How far the pictures of predicted frames may be below those of the I frame, dB: beyond the first of these a bit
+/// becomes cheaper, up to the second dearer.
+const FAR: f64 = 0.6;
+const NEAR: f64 = 0.3;
+
+/// The price of the first predicted frame, by how much it changes from frame to frame, and how far it may.
+const FIRST: f32 = 0.7;
+const CHEAPER: f32 = 0.6;
+const DEARER: f32 = 1.25;
+const LEVELS: core::ops::RangeInclusive<f32> = 1.0 / 32.0..=2.0;
+
+/// The pictures of a GOP and the price that follows from them.
+pub(crate) struct Steadiness {
+    cameras: Vec<Camera>,
+    /// PSNR of the I frame, dB.
+    of_intra: f64,
+    level: f32,
+}
+
+impl Steadiness {
+    /// Of a GOP that starts with this I frame, seen by some of the cameras.
+    pub(crate) fn new(
+        cameras: &[Camera],
+        target: &Target,
+        coded: &CodedFrame,
+        sequence: &SequenceParameters,
+    ) -> Self {
+        let stride = cameras.len().div_ceil(VIEWS).max(1);
+        let small = |camera: &Camera| camera.scaled_to_height(LINES.min(camera.height));
+        let cameras = cameras.iter().step_by(stride).map(small).collect();
+        let mut steadiness = Self { cameras, of_intra: 0.0, level: FIRST };
+        steadiness.of_intra = steadiness.psnr(target, coded, sequence);
+        steadiness
+    }
+
+    /// What a bit is worth in the next frame.
+    pub(crate) fn price(&self) -> BitPrice {
+        BitPrice::at(self.level)
+    }
+
+    /// Looks at a predicted frame.
+    pub(crate) fn follow(&mut self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) {
+        let below = self.of_intra - self.psnr(target, coded, sequence);
+        if below > FAR {
+            self.level *= CHEAPER;
+        } else if below < NEAR {
+            self.level *= DEARER;
+        }
+        self.level = self.level.clamp(*LEVELS.start(), *LEVELS.end());
+    }
+
+    /// PSNR of the pictures of a frame, mean of the views, dB.
+    fn psnr(&self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) -> f64 {
+        let views = Pictures::new(&target.frame, self.cameras.clone());
+        let all = views.psnr(&shown(&coded.reference.lists, sequence));
+        all.iter().sum::<f64>() / all.len().max(1) as f64
+    }
+}

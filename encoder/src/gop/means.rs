@@ -1,0 +1,181 @@
+//! What the frames of a GOP are coded with.
+
+use super::{Gop, SequenceCoder};
+use crate::colour;
+use crate::frame::cells::ReferenceCloud;
+use crate::frame::predictors::Chooser;
+use crate::frame::price::{Goal, Pictures};
+use crate::frame::steadiness::Steadiness;
+use crate::frame::survivors::{BitPrice, Survivors};
+use crate::frame::unit::{Grains, UnitCoder};
+use crate::frame::{CodedFrame, Namings, Reference, Target};
+use crate::matching::{Kind, Matching, Measure, shares_little, shares_much};
+use crate::section::SectionPlan;
+use crate::settings::{Fidelity, Predictors, ShChoice};
+use crate::vq;
+use splatstream_decoder::colour::Colour;
+use splatstream_decoder::layout::ShCoding;
+use splatstream_decoder::steps::StepRule;
+use splatstream_format::payload::Codebook;
+use splatstream_format::syntax::Profile;
+
+/// Pairs on which coefficients and a codebook of SH residuals are compared, and on which the codebook is trained.
+const TRIAL: usize = 1 << 13;
+
+/// Entries of a codebook of SH residuals, at most: it is carried with each frame.
+const RESIDUAL_ENTRIES: usize = 256;
+
+/// Rows of the same Gaussian may differ by this many steps in attributes that motion leaves alone.
+const SAME: f32 = 1.5;
+
+impl SequenceCoder<'_, '_> {
+    /// Which Gaussian of a frame continues each of a reference; none if they share too little.
+    pub(super) fn matching(
+        &self,
+        reference: &Reference,
+        target: &Target,
+        measure: &Measure,
+    ) -> Option<Matching> {
+        let cloud = ReferenceCloud::new(reference, &self.sequence);
+        let mut matching = cloud.matching(target, measure, self.sequence.position_bits);
+        // Who goes by pictures has a use for partners that differ a lot.
+        let useful = self.by_pictures() && shares_much(&matching);
+        if shares_little(&matching) && !useful && !target.frame.is_empty() {
+            return None;
+        }
+        if !self.settings.tools.survivors {
+            matching.target_of.iter_mut().for_each(|partner| *partner = None);
+        }
+        Some(matching)
+    }
+
+    /// Whether the level of the stream allows a frame: what stays although nothing continues it may make it larger than
+    /// any of the source.
+    pub(super) fn is_within_limits(&self, coded: &CodedFrame) -> bool {
+        let gaussians = coded.gaussians();
+        let rate = self.sequence.gaussian_rate(gaussians);
+        gaussians <= self.limits.max_gaussians && rate <= self.limits.max_gaussian_rate
+    }
+
+    /// What becomes of the Gaussians of a reference is found with this.
+    pub(super) fn survivors<'s>(&'s self, gop: &'s Gop, target: &'s Target) -> Survivors<'s> {
+        Survivors {
+            target,
+            sequence: &self.sequence,
+            dc: &gop.tools.dc,
+            sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
+            namings: Namings::new(),
+            price: gop.steadiness.as_ref().map_or(BitPrice::at(1.0), Steadiness::price),
+            judge: None,
+            book: None,
+        }
+    }
+
+    pub(super) fn measure(&self) -> Measure {
+        Measure { position_step: self.sequence.position_step(), steps: self.settings.steps, same: SAME }
+    }
+
+    /// Whether frames of which no row keeps its meaning are true to their pictures. What a network is trained with is
+    /// the same either way, and sooner found without them.
+    pub(super) fn by_pictures(&self) -> bool {
+        let may = self.settings.tools.survivors && self.recorder.is_none();
+        may && self.settings.fidelity() == Fidelity::Pictures
+    }
+
+    /// How good the pictures of a frame must be, if it is them that the frame is true to.
+    pub(super) fn goal(&mut self, gop: &Gop, matching: &Matching, target: &Target) -> Option<Goal> {
+        if !self.by_pictures() || matching.kind != Kind::Untracked || target.frame.is_empty() {
+            return None;
+        }
+        let cameras = self.ranking.cameras(&target.frame).to_vec();
+        Some(Goal {
+            pictures: Pictures::new(&target.frame, cameras),
+            tolerance: f64::from(self.settings.tolerance),
+            least: Vec::new(),
+            level: gop.price_level,
+        })
+    }
+
+    /// The codebook of the SH residuals of a frame, where a codebook serves them better than coefficients. Only a
+    /// GOP whose I frame has a codebook has them: a new Gaussian takes an entry of each.
+    pub(super) fn residual_book(
+        &self,
+        gop: &Gop,
+        survivors: &Survivors<'_>,
+        reference: &Reference,
+        matching: &Matching,
+        temporal_layer: u8,
+    ) -> Option<Codebook> {
+        let (transform, plan) = gop.tools.sh.as_ref()?;
+        plan.codebooks.first()?;
+        let rank = usize::from(transform.header.rank);
+        let pairs = matching.target_of.iter().flatten().count();
+        let grains = Grains::new(self.settings, &self.sequence);
+        let rule = |list: u8| StepRule::new(&self.sequence, grains.of(list).attribute_step);
+        let rules: Vec<StepRule> = (0..self.sequence.refinement_count).map(rule).collect();
+        let rows = survivors.sh_rows(&reference.lists, &rules, &matching.target_of, pairs / TRIAL);
+        let forced = self.settings.sh == ShChoice::VectorQuantised;
+        let entries = vq::entry_count(pairs, false).min(RESIDUAL_ENTRIES);
+        if rows.len() < 4 * rank || !forced && !colour::compare(&rows, rank, pairs, entries).1 {
+            return None;
+        }
+        let mut book = vq::train(&rows, rank, entries.min(rows.len() / rank));
+        book.entries[..rank].fill(0);
+        // Each temporal layer has a codebook of its own, which only its frames replace.
+        book.header.codebook_id = 1 + temporal_layer;
+        Some(book)
+    }
+
+    /// How new Gaussians are predicted.
+    pub(super) fn chooser(&self) -> Chooser<'_> {
+        Chooser {
+            predictors: match self.settings.profile() {
+                Profile::Intra => Predictors::NONE,
+                Profile::Dynamic => self.settings.predictors,
+            },
+            choice: self.settings.predictor_choice,
+            neighbours: self.settings.neighbours,
+            recorder: self.recorder,
+        }
+    }
+
+    /// How the units of a frame are coded: an I frame, or one with or without a codebook of SH residuals.
+    pub(super) fn coder<'g>(
+        &'g self,
+        gop: &'g Gop,
+        predicted: Option<Option<&'g Codebook>>,
+    ) -> UnitCoder<'g> {
+        let sh = gop.tools.sh.as_ref();
+        let whole = sh.and_then(|(_, plan)| plan.codebooks.first());
+        let residual = predicted.flatten();
+        let coding = match (sh, predicted) {
+            (Some((transform, _)), Some(None)) => ShCoding::Coefficients { rank: transform.header.rank },
+            (Some(_), Some(Some(_))) => ShCoding::VectorQuantised { stages: 2 },
+            _ => gop.tools.sh_coding(),
+        };
+        let books = match coding {
+            ShCoding::VectorQuantised { .. } => [whole, residual, None, None],
+            _ => [None; 4],
+        };
+        UnitCoder {
+            sequence: &self.sequence,
+            colour: Colour {
+                dc: &gop.tools.dc,
+                sh: sh.map(|(transform, _)| transform),
+                mode: coding,
+                codebooks: books,
+            },
+            sh: coding.header(books.iter().flatten().map(|book| book.header.codebook_id)),
+            plan: SectionPlan {
+                block_log2: self.sequence.block_log2,
+                preset: self.settings.preset,
+                tools: self.settings.tools,
+            },
+            grains: Grains::new(self.settings, &self.sequence),
+            has_differences: self.chooser().predictors != Predictors::NONE
+                || self.sequence.spatial_layer_count > 1,
+            network: self.network.as_ref(),
+            max_learned: self.limits.max_learned,
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! Steps for a quality or a size that is asked for.
+//!
+//! The [fit](Fit) makes steps for a PSNR out of models of errors and bits. What comes out is measured: the PSNR
+//! of the [verification](crate::verification), or the size of the stream. Where that misses, the fit is asked for more
+//! or less, by the [secant](crate::secant) through what is known.
+
+use crate::allocation::Fit;
+use crate::canonical::{canonicalise, visible};
+use crate::error::Error;
+use crate::importance::Ranking;
+use crate::isolated;
+use crate::report::{Report, TargetReport};
+use crate::secant::Secant;
+use crate::settings::{Settings, Size, Steps};
+use crate::source::FrameSource;
+use crate::stream::{Progress, encode_once};
+use splatstream_format::syntax::FrameType;
+use splatstream_scene::GaussianFrame;
+use std::io::Write;
+
+/// A PSNR is near enough within so many decibels, and a size within this part of it.
+const NEAR_DECIBELS: f64 = 0.3;
+const NEAR_SIZE: f64 = 0.015;
+
+/// The PSNR that is tried first for a size, decibels, and by how much the logarithm of the size grows for each: from real
+/// scenes.
+const FIRST: f64 = 47.0;
+const GROWTH: f64 = 0.036;
+
+/// Steps are shared differently among attributes where the PSNR is another by more than this, decibels.
+const ALIKE: f64 = 4.0;
+
+/// What halving all steps brings.
+const DECIBELS_AN_OCTAVE: f64 = 6.02;
+
+/// Finer steps are given up where pictures gain less than this share of what they should.
+const LEAST_GAIN: f64 = 0.25;
+
+/// Encodings for a PSNR and for a size, at most.
+const MOST_FOR_PSNR: usize = 4;
+const MOST_FOR_SIZE: usize = 6;
+
+/// Frames of a sequence on which sizes are tried: with one or two temporal layers, and with more.
+const PART: [u32; 2] = [5, 9];
+
+/// Encodes so that the quality or the size of the settings is reached, as far as it can be.
+///
+/// # Errors
+/// As [`encode`](crate::encode).
+pub(crate) fn reach(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    sink: &mut dyn Write,
+    progress: Progress<'_>,
+) -> Result<Report, Error> {
+    check(settings)?;
+    let fitting = Fitting::new(source, settings)?;
+    let seeker = Seeker { source, fitting, progress, encodings: 0, trials: 0 };
+    match (settings.size, settings.psnr) {
+        (Some(size), _) => seeker.size(size, sink),
+        (None, decibels) => seeker.quality(decibels.unwrap_or_default().into(), sink),
+    }
+}
+
+fn check(settings: &Settings) -> Result<(), Error> {
+    let setting = |name, value: String, allowed| Err(Error::Setting { name, value, allowed });
+    match (settings.size, settings.psnr) {
+        (Some(Size::BitsPerGaussian(bits)), _) if !(bits > 0.0 && bits.is_finite()) => {
+            setting("size", format!("{bits} bits per Gaussian"), "a finite number above 0")
+        }
+        (Some(Size::Bytes(0)), _) => setting("size", "0 bytes".into(), "1 or more"),
+        (None, Some(decibels)) if !(20.0..=90.0).contains(&decibels) => {
+            setting("psnr", decibels.to_string(), "20 to 90")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Fits steps to the first frame.
+struct Fitting<'a> {
+    settings: &'a Settings,
+    fit: Fit,
+    /// Knows the order of the first frame.
+    ranking: Ranking,
+    /// Steps by the PSNR that they were fitted for.
+    known: Vec<(f64, Steps)>,
+}
+
+impl<'a> Fitting<'a> {
+    fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
+        let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
+        let shown = visible(&first, settings.keep_invisible);
+        let frame = canonicalise(&first, &shown, true);
+        let (frame, _) = isolated::colours(frame, &shown, 0);
+        let mut ranking = Ranking::new(settings);
+        let ranked = ranking.rank_first(&frame);
+        Ok(Self { settings, fit: Fit::new(frame, &ranked, settings), ranking, known: Vec::new() })
+    }
+
+    /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
+    /// ones.
+    fn at(&mut self, decibels: f64) -> Settings {
+        let apart = |known: &&(f64, Steps)| (known.0 - decibels).abs();
+        let nearest = self.known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
+            Some((from, steps)) => finer(*steps, ((decibels - from) / DECIBELS_AN_OCTAVE) as f32),
+            None => {
+                let steps = self.fit.at(decibels as f32);
+                self.known.push((decibels, steps));
+                steps
+            }
+        };
+        Settings { steps, laws: self.fit.laws(), ..self.settings.clone() }
+    }
+}
+
+/// All steps, halved so many times.
+fn finer(steps: Steps, octaves: f32) -> Steps {
+    let scale = libm::exp2f(-octaves);
+    Steps {
+        position_bits: (steps.position_bits + octaves).clamp(1.0, 20.0),
+        log_scale: steps.log_scale * scale,
+        rotation: steps.rotation * scale,
+        opacity: steps.opacity * scale,
+        dc: steps.dc * scale,
+        sh: steps.sh * scale,
+    }
+}
+
+/// Looks for the PSNR to fit for.
+struct Seeker<'a> {
+    source: &'a mut dyn FrameSource,
+    fitting: Fitting<'a>,
+    progress: Progress<'a>,
+    encodings: u32,
+    trials: u32,
+}
+
+/// A stream and what it was fitted for.
+struct Encoded {
+    fitted: f64,
+    bytes: Vec<u8>,
+    report: Report,
+}
+
+impl Seeker<'_> {
+    /// A stream with pictures of a PSNR. Of a sequence its first frames are tried: one of each type.
+    fn quality(mut self, wanted: f64, sink: &mut dyn Write) -> Result<Report, Error> {
+        let mut secant = Secant::new(wanted, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
+        let frames_of_part = match self.fitting.settings.temporal_layers() {
+            0 => 1,
+            layers => 1 + (1 << (layers - 1)),
+        };
+        let is_sequence = self.source.len() > frames_of_part;
+        let mut best: Option<Encoded> = None;
+        // The PSNR that was measured first.
+        let mut start = None;
+        let mut next = Some(wanted);
+        while let Some(at) = next {
+            let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.whole(at)? };
+            // Where nothing can be seen nothing is too bad.
+            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.psnr());
+            let measured = measured.unwrap_or(wanted);
+            let first = *start.get_or_insert(measured);
+            // Something else than the steps spoils the pictures: finer ones would only cost bits.
+            if at > wanted && measured - first < LEAST_GAIN * (at - wanted) {
+                break;
+            }
+            if secant.take(at, measured) {
+                best = Some(encoded);
+            }
+            next = secant.next();
+        }
+        let Some(best) = best else { return Err(Error::NoFrames) };
+        let best = if is_sequence { self.whole(best.fitted)? } else { best };
+        self.written(best, sink)
+    }
+
+    /// A stream of a size. Of a long sequence a part is tried first.
+    fn size(mut self, size: Size, sink: &mut dyn Write) -> Result<Report, Error> {
+        let goal = libm::log(match size {
+            Size::BitsPerGaussian(bits) => bits,
+            Size::Bytes(bytes) => bytes as f64,
+        });
+        let (frames, frames_of_part) = (self.source.len(), self.frames_of_part());
+        let (mut first, mut slope) = (FIRST, GROWTH);
+        if frames > 2 * frames_of_part {
+            let mut secant = Secant::new(goal, NEAR_SIZE, slope, MOST_FOR_SIZE);
+            let mut next = Some(first);
+            while let Some(at) = next {
+                let part = self.part(at, frames_of_part)?;
+                secant.take(at, libm::log(self.size_from_part(size, &part.report)));
+                next = secant.next();
+            }
+            (first, slope) = (secant.best(), secant.slope());
+        }
+        let mut secant = Secant::new(goal, NEAR_SIZE, slope, MOST_FOR_SIZE);
+        let mut best: Option<Encoded> = None;
+        let mut next = Some(first);
+        while let Some(at) = next {
+            let encoded = self.whole(at)?;
+            let measured = size_of(size, encoded.report.bytes as f64, encoded.report.gaussians as f64);
+            if secant.take(at, libm::log(measured)) {
+                best = Some(encoded);
+            }
+            next = secant.next();
+        }
+        self.written(best.ok_or(Error::NoFrames)?, sink)
+    }
+
+    fn frames_of_part(&self) -> u32 {
+        let [few_layers, many_layers] = PART;
+        if self.fitting.settings.temporal_layers() > 2 { many_layers } else { few_layers }
+    }
+
+    /// The size of the whole sequence if the rest is like a part from its start: a GOP is one frame like the first and
+    /// others like the others.
+    fn size_from_part(&self, size: Size, part: &Report) -> f64 {
+        let frames = f64::from(self.source.len());
+        let mean = |is_first: bool, value: fn(&crate::FrameReport) -> f64| {
+            let of =
+                || part.coded.iter().filter(|f| (f.frame_type == FrameType::Intra) == is_first).map(value);
+            of().sum::<f64>() / of().count().max(1) as f64
+        };
+        let gops = match part.coded.iter().any(|frame| frame.frame_type != FrameType::Intra) {
+            true => (frames / f64::from(self.fitting.settings.gop)).ceil().min(frames),
+            false => frames,
+        };
+        let of_frames: u64 = part.coded.iter().map(|frame| frame.bytes).sum();
+        let once = (part.bytes - of_frames) as f64 / part.gops.len().max(1) as f64;
+        let bytes = gops * mean(true, |frame| frame.bytes as f64)
+            + (frames - gops) * mean(false, |frame| frame.bytes as f64)
+            + once * (frames / f64::from(self.fitting.settings.gop)).ceil();
+        let gaussians = part.gaussians as f64 / part.coded.len().max(1) as f64 * frames;
+        size_of(size, bytes, gaussians)
+    }
+
+    /// All frames, with the steps for a PSNR.
+    fn whole(&mut self, fitted: f64) -> Result<Encoded, Error> {
+        self.encodings += 1;
+        let (settings, ranking) = (self.fitting.at(fitted), self.fitting.ranking.clone());
+        let mut bytes = Vec::new();
+        let report = encode_once(self.source, &settings, ranking, &mut bytes, self.progress)?;
+        Ok(Encoded { fitted, bytes, report })
+    }
+
+    /// The first frames.
+    fn part(&mut self, fitted: f64, frames: u32) -> Result<Encoded, Error> {
+        self.trials += 1;
+        let (settings, ranking) = (self.fitting.at(fitted), self.fitting.ranking.clone());
+        let mut bytes = Vec::new();
+        let mut part = FirstFrames { source: self.source, frames };
+        let report = encode_once(&mut part, &settings, ranking, &mut bytes, &mut |_, _| ())?;
+        Ok(Encoded { fitted, bytes, report })
+    }
+
+    fn written(self, encoded: Encoded, sink: &mut dyn Write) -> Result<Report, Error> {
+        let Encoded { fitted, bytes, mut report } = encoded;
+        sink.write_all(&bytes)?;
+        let (encodings, trials) = (self.encodings, self.trials);
+        report.target = Some(TargetReport { fitted: fitted as f32, encodings, trials });
+        Ok(report)
+    }
+}
+
+/// A size in the unit that it is asked for in; never 0.
+fn size_of(size: Size, bytes: f64, gaussians: f64) -> f64 {
+    match size {
+        Size::BitsPerGaussian(_) => 8.0 * bytes / gaussians.max(1.0),
+        Size::Bytes(_) => bytes,
+    }
+}
+
+/// The first frames of a source.
+struct FirstFrames<'a> {
+    source: &'a mut dyn FrameSource,
+    frames: u32,
+}
+
+impl FrameSource for FirstFrames<'_> {
+    fn len(&self) -> u32 {
+        self.frames.min(self.source.len())
+    }
+
+    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        self.source.frame(number)
+    }
+}

@@ -1,0 +1,171 @@
+//! The finished stream, decoded and looked at: what its pictures are worth, in views that nothing was chosen by.
+//!
+//! While a stream is written the units of up to three of its GOPs are kept: those of the first, the middle and the last
+//! frame. Each is decoded when it is complete, as any receiver would who starts there, and a few of its frames are
+//! drawn beside those of the source. What is measured is the stream, not what the encoder believes of it.
+
+use crate::error::Error;
+use crate::report::{PictureReport, VerifiedFrame};
+use crate::settings::Settings;
+use crate::source::FrameSource;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
+use splatstream_format::Limits;
+use splatstream_format::syntax::{FrameType, GopHeader, UnitHeader};
+use splatstream_format::unit::Stream;
+use splatstream_render::camera::{Up, held_out};
+use splatstream_render::metrics::{LOSSLESS_DB, psnr};
+use splatstream_render::{Camera, render};
+use splatstream_scene::GaussianFrame;
+
+/// Views of each frame, and their height: with other heights PSNR is another number.
+const VIEWS: (u32, u32) = (4, 540);
+
+/// Around the scene.
+const BACKGROUND: [f32; 3] = [0.0; 3];
+
+/// Keeps units while they are written, and the frames that they decode to.
+pub(crate) struct Verifier {
+    /// Display indices of the first, the middle and the last frame.
+    wanted: [u32; 3],
+    /// The file header and the sequence parameters.
+    head: Vec<u8>,
+    /// The units of the current GOP and which frames of it are taken; none if it is not decoded.
+    gop: Option<(Vec<u8>, Taken)>,
+    frames: Vec<Decoded>,
+}
+
+/// A frame as a receiver has it.
+struct Decoded {
+    number: u32,
+    frame_type: FrameType,
+    frame: GaussianFrame,
+}
+
+/// Which frames of a GOP are taken.
+#[derive(Clone, Copy)]
+enum Taken {
+    /// The last of each type.
+    OfEachType,
+    /// One.
+    Only(u32),
+}
+
+impl Verifier {
+    /// For a sequence of so many frames.
+    pub(crate) fn new(frames: u32) -> Self {
+        let last = frames.saturating_sub(1);
+        Self { wanted: [0, last / 2, last], head: Vec::new(), gop: None, frames: Vec::new() }
+    }
+
+    /// Takes what stands at the beginning of the stream.
+    pub(crate) fn head(&mut self, bytes: &[u8]) {
+        self.head.extend_from_slice(bytes);
+    }
+
+    /// A GOP begins.
+    ///
+    /// # Errors
+    /// The GOP before does not decode.
+    pub(crate) fn start_gop(&mut self, header: &GopHeader, first: u32) -> Result<(), Error> {
+        self.end_gop()?;
+        let frames = first..first.saturating_add(header.gop_frame_count);
+        let [start, middle, end] = self.wanted;
+        let taken = match frames.contains(&middle) {
+            true => Some(Taken::OfEachType),
+            false => [start, end].into_iter().find(|frame| frames.contains(frame)).map(Taken::Only),
+        };
+        self.gop = taken.map(|taken| (Vec::new(), taken));
+        Ok(())
+    }
+
+    /// Takes a unit as it is written.
+    ///
+    /// # Errors
+    /// None of a unit that can be written.
+    pub(crate) fn unit(&mut self, header: &UnitHeader, payload: &[u8]) -> Result<(), Error> {
+        if let Some((units, _)) = &mut self.gop {
+            units.extend(header.to_bytes()?);
+            units.extend_from_slice(payload);
+        }
+        Ok(())
+    }
+
+    /// Decodes the GOP that has ended.
+    ///
+    /// # Errors
+    /// A GOP that does not decode.
+    pub(crate) fn end_gop(&mut self) -> Result<(), Error> {
+        let Some((units, taken)) = self.gop.take() else { return Ok(()) };
+        let bytes = [self.head.as_slice(), &units].concat();
+        let limits = Limits::of_level(*Limits::LEVELS.end());
+        let stream = Stream::open(&bytes, &limits).map_err(Error::Verification)?;
+        let mut decoder = Decoder::starting_inside(stream.header(), Options { limits, ..Options::default() });
+        let mut found: [Option<DecodedFrame>; 3] = [const { None }; 3];
+        let mut take = |frame: DecodedFrame| {
+            if matches!(taken, Taken::OfEachType) || matches!(taken, Taken::Only(one) if one == frame.index) {
+                let slot = usize::from(frame.frame_type.code());
+                found[slot] = Some(frame);
+            }
+        };
+        let mut units = stream.units();
+        // These bytes have no end unit.
+        while units.position() < bytes.len() as u64 {
+            let Some(unit) = units.next_unit() else { break };
+            decoder.unit(&unit.map_err(Error::Verification)?).into_iter().for_each(&mut take);
+        }
+        decoder.finish().into_iter().for_each(&mut take);
+        if let Some(&error) = decoder.errors().first() {
+            return Err(Error::Verification(error));
+        }
+        let Some(sequence) = decoder.sequence() else { return Ok(()) };
+        self.frames.extend(found.into_iter().flatten().map(|frame| Decoded {
+            number: frame.index,
+            frame_type: frame.frame_type,
+            frame: to_gaussians(frame.into_shown(), sequence),
+        }));
+        Ok(())
+    }
+
+    /// Draws the frames that were taken beside those of the source.
+    ///
+    /// # Errors
+    /// A source that cannot be read again.
+    pub(crate) fn compare(
+        mut self,
+        source: &mut dyn FrameSource,
+        settings: &Settings,
+    ) -> Result<PictureReport, Error> {
+        self.frames.sort_by_key(|decoded| decoded.number);
+        let mut frames = Vec::new();
+        for Decoded { number, frame_type, frame } in &self.frames {
+            let original =
+                source.frame(*number).map_err(|source| Error::Source { frame: *number, source })?;
+            frames.push(VerifiedFrame {
+                number: *number,
+                frame_type: *frame_type,
+                psnr: mean_psnr(&original, frame, &cameras(&original, settings)),
+            });
+        }
+        Ok(PictureReport { frames, views: VIEWS.0, height: VIEWS.1 })
+    }
+}
+
+/// Views of a frame that nothing was chosen by.
+fn cameras(frame: &GaussianFrame, settings: &Settings) -> Vec<Camera> {
+    let (count, height) = VIEWS;
+    held_out(frame, Up::default(), &settings.cameras, count, height)
+}
+
+/// The mean of the decibels of the views in which something can be seen; none if there is no such view.
+fn mean_psnr(original: &GaussianFrame, decoded: &GaussianFrame, cameras: &[Camera]) -> Option<f64> {
+    let mut decibels = Vec::new();
+    for camera in cameras {
+        let [one, other] = [original, decoded].map(|frame| render(frame, camera, BACKGROUND));
+        let is_blank = one.alpha.iter().chain(&other.alpha).all(|&alpha| alpha <= 0.0);
+        if !is_blank {
+            decibels.push(psnr(&one.colour, &other.colour).min(LOSSLESS_DB));
+        }
+    }
+    (!decibels.is_empty()).then(|| decibels.iter().sum::<f64>() / decibels.len() as f64)
+}

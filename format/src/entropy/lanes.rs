@@ -1,0 +1,83 @@
+//! Clause 8.4: which lane codes which entries of a block.
+//!
+//! Lane j codes a segment of its own, entries `j * length` to `(j + 1) * length - 1`. All lanes go forward together, one
+//! entry in each step: what a symbol needs of the entries before it is in its own lane, so that no lane waits for
+//! another.
+
+use super::MAX_LANES;
+use core::ops::Range;
+
+/// The segments of a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Segments {
+    count: usize,
+    lanes: usize,
+    length: usize,
+}
+
+impl Segments {
+    /// The segments of a block of `count` entries and 2^`lanes_log2` lanes, at most 32.
+    pub fn new(count: usize, lanes_log2: u8) -> Self {
+        let lanes = 1_usize.wrapping_shl(lanes_log2.into()).min(MAX_LANES);
+        Self { count, lanes, length: count.div_ceil(lanes).max(1) }
+    }
+
+    /// Entries of a segment, 1 or more; the last segments may have fewer or none.
+    pub const fn length(&self) -> usize {
+        self.length
+    }
+
+    /// Lanes of the block, with or without entries.
+    pub const fn lanes(&self) -> usize {
+        self.lanes
+    }
+
+    /// Whether an entry is the first of its lane: nothing before it is known to it.
+    pub fn is_first(&self, entry: usize) -> bool {
+        entry.checked_rem(self.length) == Some(0)
+    }
+
+    /// Lanes that have an entry in a step: the first ones.
+    #[inline]
+    pub fn active(&self, step: usize) -> usize {
+        self.count.saturating_sub(step).div_ceil(self.length)
+    }
+
+    /// The entries of a lane in the steps from `start` on, `steps` of them or as many as there are.
+    #[inline]
+    pub fn entries(&self, lane: usize, start: usize, steps: usize) -> Range<usize> {
+        let first = lane.wrapping_mul(self.length);
+        let end = first.wrapping_add(self.length.min(start.wrapping_add(steps))).min(self.count);
+        first.wrapping_add(start).min(end)..end
+    }
+
+    /// The entries in the order of their symbols, each with its lane.
+    pub fn order(self) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.length).flat_map(move |step| {
+            let entry = move |lane: usize| (lane, lane.wrapping_mul(self.length).wrapping_add(step));
+            (0..self.lanes).map(entry).take_while(move |(_, entry)| *entry < self.count)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_lane_has_a_segment_and_the_last_ones_may_be_short() {
+        let order = |count, lanes_log2| Segments::new(count, lanes_log2).order().collect::<Vec<_>>();
+        assert_eq!(order(5, 1), [(0, 0), (1, 3), (0, 1), (1, 4), (0, 2)]);
+        assert_eq!(order(3, 2), [(0, 0), (1, 1), (2, 2)]);
+        assert_eq!(order(5, 2), [(0, 0), (1, 2), (2, 4), (0, 1), (1, 3)]);
+        assert_eq!(order(3, 0), [(0, 0), (0, 1), (0, 2)]);
+        assert_eq!(order(0, 3), []);
+    }
+
+    #[test]
+    fn an_entry_is_the_first_of_its_lane_or_follows_one() {
+        let segments = Segments::new(10, 2);
+        let first: Vec<usize> = (0..10).filter(|&entry| segments.is_first(entry)).collect();
+        assert_eq!((segments.length(), first), (3, vec![0, 3, 6, 9]));
+    }
+}
