@@ -83,8 +83,7 @@ class Increment:
     """Decodes unit (s, r) of a frame.
 
     Afterwards: `list`, `new` (its new Gaussians), `parents` (moves.Parents, in a P or B frame), `models` after the unit,
-         `header` (its elements), `coded` (planes,
-    models and blocks of each section).
+    `header` (its elements), `coded` (planes, models and blocks of each section).
     """
 
     def __init__(self, unit, frame, context):

@@ -29,7 +29,7 @@ def blocks(log2, **more_fixed):
 
 
 MOVING = dict(KEEP, **blocks(0), gops=[(1, 0, 4)], most=12, percent=[100], modes=(1, 3, 1, 1), cells=TURNING, cell_log2=7,
-     move=near(9))
+              move=near(9))
 DEEP = dict(MOVING, gops=[(1, 3, 10)], temporal_layer_count=4, most=7, move_predictors=(0, 1, 1, 1))
 
 

@@ -266,8 +266,8 @@ STEEP = [24, 24, 24, 14, 14]
 
 
 def large_steps(tamper=None):
-    small = {**attribute("log_scale", signs(12, 0, 1, -1), [0] * 12, signs(12, 0, 1)), **attribute("opacity", signs(12, 1, -1,
-         0)),
+    small = {**attribute("log_scale", signs(12, 0, 1, -1), [0] * 12, signs(12, 0, 1)),
+             **attribute("opacity", signs(12, 1, -1, 0)),
              **attribute("rotation", signs(12, 1, -1), [0] * 12, [1] * 12), **attribute("dc", *[signs(12, 1, -1, 0)] * 3),
              **{("sh", k): signs(12, 0, 1) for k in range(9)}}
     return one_frame(12, small, sh={}, sh_degree=1, attribute_step=STEEP, tamper=tamper)
