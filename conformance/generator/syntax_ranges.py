@@ -17,7 +17,7 @@ def free(high):
     return 0, high, (), True
 
 
-FILE_HEADER = {"signature": some(0x0A, 0x89), "version_major": some(130, 130), "version_minor": some(2, 2),
+FILE_HEADER = {"signature": some(0x0A, 0x89), "version_major": some(130, 130), "version_minor": some(3, 3),
                "profile": some(0, 1),
                "level": some(1, 4), "header_crc": free(U32)}
 UNIT_HEADER = {"unit_type": some(1, U8), "unit_flags": some(0, 1), "spatial_layer": some(0, 3),

@@ -1,7 +1,7 @@
 """Clause 3: symbols and constants, and the limits of annex A."""
 
 SIGNATURE = bytes([0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A])
-VERSION = (130, 2)                                  # SS-FH-003: version_major, version_minor
+VERSION = (130, 3)                                  # SS-FH-003: version_major, version_minor
 PROFILE_INTRA = 0
 PROFILE_DYNAMIC = 1
 FILE_HEADER_BYTES = 16

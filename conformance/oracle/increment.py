@@ -189,7 +189,8 @@ class Increment:
                     "dc": parent.dc, "sh": parent.sh}[attribute]
 
         result = list(parents)
-        values = Residuals(len(updaters), predict, take, self.header, self.context, at).run()
+        updated = [parents[i] for i in updaters]
+        values = Residuals(len(updaters), predict, take, self.header, self.context, at, updated).run()
         for i, v in zip(updaters, values):
             result[i] = parents[i]._replace(q=v.q, o=v.o, rotation_fine=v.rotation_fine, dc=v.dc, sh=v.sh)
         return result

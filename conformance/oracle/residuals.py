@@ -17,11 +17,12 @@ class Residuals:
 
     predict(attribute, i, values) gives the prediction of an attribute of entry i, whose attributes before it are in
     `values`. take(attribute, predictions, factors) gives the planes of the attribute; the factors, one for each entry, are
-    those of 7.6.6, of log_scale that of its first plane.
+    those of 7.6.6, of log_scale that of its first plane. `parents`: the Gaussians that the entries update; none of new
+    Gaussians.
     """
 
-    def __init__(self, count, predict, take, increment, context, at):
-        self.count, self.predict, self.take = count, predict, take
+    def __init__(self, count, predict, take, increment, context, at, parents=None):
+        self.count, self.predict, self.take, self.parents = count, predict, take, parents
         self.increment, self.context, self.at = increment, context, at
         self.rule = StepRule(context.seq, increment.attribute_step)
         self.values = [Values() for _ in range(count)]
@@ -37,14 +38,32 @@ class Residuals:
     def run(self):
         for number, attribute in enumerate(ATTRIBUTES):
             p = [self.predict(attribute, i, values) for i, values in enumerate(self.values)]
-            factors = [self.rule.factor(number, values.q, values.o) if number else self.rule.first()
-                       for values in self.values]
+            factors = [self.rule.factor(number, shape.q, shape.o) if number else self.rule.first()
+                       for shape in self.parents or self.values]                      # SS-AT-004
             getattr(self, attribute)(p, self.take(attribute, p, factors), factors)
         return self.values
 
     # ---- 7.6.2 ----
 
     def log_scale(self, p, v, factors):
+        if self.parents is None:
+            self.new_log_scale(p, v, factors)
+        else:
+            self.updated_log_scale(v, factors)
+
+    def updated_log_scale(self, v, factors):
+        others = [self.rule.factor(LOG_SCALE, parent.q) for parent in self.parents]
+        x = [[value * factor for value, factor in zip(plane, of_plane)]
+             for plane, of_plane in zip(v, (factors, others, others))]
+        q = [[parent.q[k] + value for parent, value in zip(self.parents, x[k])] for k in range(3)]
+        self.check_planes(x, VALUE_MIN, VALUE_MAX)                                    # SS-RC-001
+        self.check_planes(q, VALUE_MIN, VALUE_MAX)
+        for i, values in enumerate(self.values):
+            values.q = (q[0][i], q[1][i], q[2][i])
+            if self.context.seq.canonical_axes == 1:
+                self.check(q[0][i] >= q[1][i] >= q[2][i], "CONSTRAINT")               # SS-RC-002
+
+    def new_log_scale(self, p, v, factors):
         x = [[value * factor for value, factor in zip(v[0], factors)], [], []]
         q, steps = [[], [], []], []
         for i in range(self.count):

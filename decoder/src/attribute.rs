@@ -60,10 +60,15 @@ pub fn check_log_scales(log_scale: [&[i32]; 3], canonical_axes: bool, at: u64) -
     }
     in_range(&[least, greatest], &ATTRIBUTE_RANGE, "log_scale", "7.6.2", at)?;
     if canonical_axes && least < 0 {
-        let rule = "canonical axes are sorted from largest to smallest";
-        return Err(Error::new(at, "7.6.2", ErrorKind::Constraint { rule }));
+        return Err(unsorted(at));
     }
     Ok(())
+}
+
+/// The error of canonical axes whose log-scales increase.
+pub(crate) fn unsorted(at: u64) -> Error {
+    let rule = "canonical axes are sorted from largest to smallest";
+    Error::new(at, "7.6.2", ErrorKind::Constraint { rule })
 }
 
 /// Clause 7.6.3. The rotations of Gaussians that are not predicted, in place of their coded values: with their bias, times

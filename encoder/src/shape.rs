@@ -67,6 +67,22 @@ pub(crate) fn scale_residuals(now: [i32; 3], wanted: [i32; 3], rule: &StepRule, 
     [first, difference(1), difference(2)]
 }
 
+/// What brings the log-scales of a parent near those wanted, parts of a step (7.6.2). `sorted`: none becomes larger than
+/// the one before it.
+pub(crate) fn scale_updates(now: [i32; 3], wanted: [i32; 3], rule: &StepRule, sorted: bool) -> [i32; 3] {
+    let of_others = rule.of_log_scale(now[0]);
+    let exponents = [rule.of_largest(), of_others, of_others];
+    let mut limit = i32::MAX;
+    [0, 1, 2].map(|axis: usize| {
+        let step = step(exponents[axis]);
+        let nearest = nearest_multiple(wanted[axis] - PARTS * now[axis], exponents[axis]);
+        let value =
+            if axis > 0 && sorted { nearest.min((limit - now[axis]).div_euclid(step)) } else { nearest };
+        limit = now[axis] + value * step;
+        value
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,6 +112,26 @@ mod tests {
                 let is_at_limit = shape.log_scale[axis] == shape.log_scale[axis - 1];
                 prop_assert!(within(shape.log_scale[axis], wanted[axis], others) || is_at_limit);
                 prop_assert!(shape.log_scale[axis] <= shape.log_scale[axis - 1]);
+            }
+        }
+
+        #[test]
+        fn updates_bring_log_scales_nearest_to_what_is_wanted(
+            now in proptest::array::uniform3(-500_i32..500), wanted in proptest::array::uniform3(-30_000_i32..30_000),
+            announced in 0_u8..12,
+        ) {
+            let (mut now, mut wanted): ([i32; 3], [i32; 3]) = (now, wanted);
+            now.sort_unstable_by(|a, b| b.cmp(a));
+            wanted.sort_unstable_by(|a, b| b.cmp(a));
+            let rule = rule(announced);
+            let steps = [rule.of_largest(), rule.of_log_scale(now[0]), rule.of_log_scale(now[0])].map(step);
+            let values = scale_updates(now, wanted, &rule, true);
+            let after = [0, 1, 2].map(|axis: usize| now[axis] + values[axis] * steps[axis]);
+            for axis in 0..3 {
+                let is_near = (PARTS * after[axis] - wanted[axis]).abs() <= PARTS * steps[axis] / 2;
+                let is_at_limit = axis > 0 && after[axis] + steps[axis] > after[axis - 1];
+                prop_assert!(is_near || is_at_limit);
+                prop_assert!(axis == 0 || after[axis] <= after[axis - 1]);
             }
         }
     }

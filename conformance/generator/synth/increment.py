@@ -37,6 +37,7 @@ class IncrementWriter:
         self.s, self.r, self.size = s, r, size
         self.tamper = tamper or (lambda stage, value, writer: value)
         self.v = dict.fromkeys(SECTIONS, ())        # section -> planes of values
+        self.chosen = None                          # the section whose values are being chosen
         self.u = Elements(INCREMENT)
 
     def payload(self):
@@ -165,6 +166,7 @@ class IncrementWriter:
     def taker(self, name):
         """A `take` of residuals.Residuals that chooses values and keeps them."""
         def take(attribute, predictions, factors):
+            self.chosen = name
             rows = [self.choose(attribute, *one) for one in zip(predictions, factors)]
             planes = [list(plane) for plane in zip(*rows)] if rows and rows[0] else []
             self.v[name] = self.v[name] + planes
@@ -177,6 +179,8 @@ class IncrementWriter:
         return getattr(self, "choose_" + attribute)(prediction, factor)
 
     def choose_log_scale(self, p, factor):
+        if self.chosen == "updates":
+            return self.choose_updated_log_scale(p, factor)
         rng = self.rng
         fresh = tuple(p) == (0, 0, 0)
         reach = min(rng.choice([0, 1, 4, 4, 40 if not fresh else 400]), 8000 // factor)
@@ -193,6 +197,21 @@ class IncrementWriter:
                 d[k] += more * factor
         q = [q0, q0 - d[0], q0 - d[0] - d[1]]
         x = [q0 - p[0], v[1] * factor, v[2] * factor]
+        return v if all(-32768 <= value <= 32767 for value in x + q) else [0, 0, 0]
+
+    def choose_updated_log_scale(self, p, factor):
+        """7.6.2, updates"""
+        factors = [factor] + 2 * [self.rule.factor(LOG_SCALE, p)]
+        reach = min(self.rng.choice([0, 1, 4, 4, 40]), 8000 // max(factors))
+        v = [self.rng.randint(-reach, reach) for _ in range(3)]
+        if self.rng.random() < 0.005:
+            v[self.rng.randrange(3)] = self.rng.choice([30000, -30000, 9000])
+        if self.seq.canonical_axes:                 # none becomes larger than the one before it
+            for k in (1, 2):
+                most = p[k - 1] + v[k - 1] * factors[k - 1] - p[k]
+                v[k] = min(v[k], most // factors[k])
+        x = [value * factor for value, factor in zip(v, factors)]
+        q = [now + change for now, change in zip(p, x)]
         return v if all(-32768 <= value <= 32767 for value in x + q) else [0, 0, 0]
 
     def choose_opacity(self, p, factor):

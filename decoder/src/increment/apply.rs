@@ -364,7 +364,7 @@ fn new_gaussians(
         }
         None => unpredicted(count, sh_planes, values, unit)?,
     };
-    let Attributes { log_scale, opacity, rotation_fine, dc, sh } = attributes;
+    let Attributes { log_scale, opacity, rotation_fine, dc, sh, parents: _ } = attributes;
     let rotation = [(); 3].map(|()| vec![0; count]);
     let mut list =
         GaussianList::of_planes(QuantizedFrame { position, log_scale, opacity, rotation, dc, sh }, anchor);

@@ -1,13 +1,13 @@
 //! Clause 7.6: residuals on top of a prediction, attribute by attribute.
 
-use crate::attribute::{ATTRIBUTE_RANGE, in_range};
+use crate::attribute::{ATTRIBUTE_RANGE, in_range, unsorted};
 use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
 use crate::layout::{Attribute, ShCoding};
 use crate::list::{FINE, FRACTION_BITS, GaussianList};
 use crate::steps::{Exponents, StepRule, step};
 use core::ops::RangeInclusive;
+use splatstream_format::Result;
 use splatstream_format::payload::Transform;
-use splatstream_format::{Error, ErrorKind, Result};
 
 /// The values of a fine rotation.
 const ROTATION_FINE_RANGE: RangeInclusive<i32> = -32_767 * FINE..=32_767 * FINE;
@@ -68,6 +68,18 @@ pub struct Attributes {
     pub dc: [Vec<i32>; 3],
     /// SH planes.
     pub sh: Vec<Vec<i32>>,
+    /// Of updates: the parents before them, from which steps follow. Steps of new Gaussians follow from what these have
+    /// become.
+    pub parents: Option<Shapes>,
+}
+
+/// What steps follow from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Shapes {
+    /// Log-scales.
+    pub log_scale: [Vec<i32>; 3],
+    /// Opacity.
+    pub opacity: Vec<i32>,
 }
 
 /// The value planes of a section that codes attributes, in plane order without the position.
@@ -111,6 +123,7 @@ impl Attributes {
             rotation_fine: zeros(),
             dc: [0, 1, 2].map(|plane| vec![mean(colour.dc, plane); count]),
             sh,
+            parents: None,
         }
     }
 
@@ -143,12 +156,15 @@ impl Attributes {
             rows.iter().map(|row| value(row).unwrap_or(0)).collect()
         };
         let planes = &list.planes;
+        let shapes =
+            Shapes { log_scale: planes.log_scale.each_ref().map(pick), opacity: pick(&planes.opacity) };
         Self {
-            log_scale: planes.log_scale.each_ref().map(pick),
-            opacity: pick(&planes.opacity),
+            log_scale: shapes.log_scale.clone(),
+            opacity: shapes.opacity.clone(),
             rotation_fine: list.rotation_fine.each_ref().map(pick),
             dc: planes.dc.each_ref().map(pick),
             sh: planes.sh.iter().map(pick).collect(),
+            parents: Some(shapes),
         }
     }
 
@@ -189,11 +205,40 @@ impl Attributes {
         at: u64,
     ) -> Result<()> {
         match stage {
+            Stage::LogScale if self.parents.is_some() => self.update_log_scales(values, coding, at),
             Stage::LogScale => self.add_log_scales(values, coding, at),
             Stage::Opacity => self.add_opacity(values, coding, at),
             Stage::Rotation => self.add_rotation(values, coding, at),
             Stage::Dc => self.add_dc(values, coding, at),
             Stage::Sh => self.add_sh(values, coding, at),
+        }
+    }
+
+    /// Residuals of the log-scales of parents, each by itself.
+    ///
+    /// # Errors
+    /// Invalid if a value leaves its range, or canonical axes are not sorted.
+    fn update_log_scales(
+        &mut self,
+        values: AttributeValues<'_>,
+        coding: &AttributeCoding<'_>,
+        at: u64,
+    ) -> Result<()> {
+        let of_others = self.exponents(Stage::LogScale, &coding.steps);
+        let of_largest = Exponents::Same(coding.steps.of_largest());
+        let exponents = [&of_largest, &of_others, &of_others];
+        let residuals = values.of_stage(Stage::LogScale, &coding.colour).iter();
+        for ((plane, residual), exponents) in self.log_scale.iter_mut().zip(residuals).zip(exponents) {
+            let residual = exponents.scaled(residual);
+            in_range(&residual, &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
+            add(plane, &residual);
+            in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
+        }
+        let [largest, middle, smallest] = &self.log_scale;
+        let mut pairs = largest.iter().zip(middle).chain(middle.iter().zip(smallest));
+        match coding.canonical_axes && pairs.any(|(larger, smaller)| larger < smaller) {
+            true => Err(unsorted(at)),
+            false => Ok(()),
         }
     }
 
@@ -234,8 +279,7 @@ impl Attributes {
             in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.6", at)?;
         }
         if coding.canonical_axes && least < 0 {
-            let rule = "canonical axes are sorted from largest to smallest";
-            return Err(Error::new(at, "7.6", ErrorKind::Constraint { rule }));
+            return Err(unsorted(at));
         }
         Ok(())
     }
@@ -250,16 +294,20 @@ impl Attributes {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        let exponents = self.exponents(Stage::Opacity, coding);
+        let exponents = self.exponents(Stage::Opacity, &coding.steps);
         for residual in scaled(values.of_stage(Stage::Opacity, &coding.colour), &exponents) {
             add(&mut self.opacity, &residual);
         }
         in_range(&self.opacity, &ATTRIBUTE_RANGE, "opacity", "7.6", at)
     }
 
-    /// The exponents of the steps of an attribute; those before it have been reconstructed.
-    fn exponents(&self, stage: Stage, coding: &AttributeCoding<'_>) -> Exponents {
-        coding.steps.exponents(stage, self.log_scale.each_ref().map(Vec::as_slice), &self.opacity)
+    /// The exponents of the steps of an attribute. Of new Gaussians the attributes before it have been reconstructed.
+    pub fn exponents(&self, stage: Stage, steps: &StepRule) -> Exponents {
+        let (log_scale, opacity) = match &self.parents {
+            Some(parents) => (&parents.log_scale, &parents.opacity),
+            None => (&self.log_scale, &self.opacity),
+        };
+        steps.exponents(stage, log_scale.each_ref().map(Vec::as_slice), opacity)
     }
 
     /// Residuals of the rotation.
@@ -272,7 +320,7 @@ impl Attributes {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        let exponents = self.exponents(Stage::Rotation, coding);
+        let exponents = self.exponents(Stage::Rotation, &coding.steps);
         for (plane, residual) in
             self.rotation_fine.iter_mut().zip(values.of_stage(Stage::Rotation, &coding.colour))
         {
@@ -294,7 +342,7 @@ impl Attributes {
     /// # Errors
     /// Invalid if a value leaves its range.
     fn add_dc(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
-        let exponents = self.exponents(Stage::Dc, coding);
+        let exponents = self.exponents(Stage::Dc, &coding.steps);
         let components = scaled(values.of_stage(Stage::Dc, &coding.colour), &exponents);
         let mut out: Vec<&mut [i32]> = self.dc.iter_mut().map(Vec::as_mut_slice).collect();
         add_inverse(coding.colour.dc, &components, &mut out, at)?;
@@ -308,7 +356,7 @@ impl Attributes {
     fn add_sh(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
         let planes = values.of_stage(Stage::Sh, &coding.colour);
         let Some(transform) = coding.colour.sh else { return Ok(()) };
-        let exponents = self.exponents(Stage::Sh, coding);
+        let exponents = self.exponents(Stage::Sh, &coding.steps);
         let components = match coding.colour.mode {
             ShCoding::None => return Ok(()),
             ShCoding::Coefficients { .. } => scaled(planes, &exponents),

@@ -235,7 +235,7 @@ impl Survivors<'_> {
             None => list.rotation_fine.each_ref().map(|plane| plane[row] as f32 / FINE as f32),
             Some(_) => planes.rotation.each_ref().map(|plane| plane[row] as f32),
         };
-        let of = |stage| rule.of(stage, now, planes.opacity[row]);
+        let of = |stage| rule.of(stage, now, parents.opacity(row));
         let steps =
             [rule.of_largest(), of(Stage::Opacity), of(Stage::Rotation), of(Stage::Dc), of(Stage::Sh)]
                 .map(|exponent| step(exponent) as f32);
@@ -277,24 +277,26 @@ impl Survivors<'_> {
     }
 
     /// The update that changes attributes by these steps of the sequence, nearly.
-    ///
-    /// The steps of a unit follow from what has been decoded of a Gaussian: each attribute in turn.
     fn update(&self, parents: Parents<'_>, row: usize, changes: &[f32], entry: Option<i32>) -> Update {
         let rule = &parents.rule;
         let now = parents.list.planes.log_scale.each_ref().map(|plane| plane[row]);
+        let of = |stage| rule.of(stage, now, parents.opacity(row));
+        let of_others = rule.of_log_scale(now[0]);
         let mut update = Update::default();
-        let scales = update.scale(rule, now, [changes[0], changes[1], changes[2]]);
-        let faded = update.add(changes[OPACITY], rule.of(Stage::Opacity, scales, 0));
-        let opacity = parents.opacity(row) + faded;
+        for (&change, exponent) in changes.iter().zip([rule.of_largest(), of_others, of_others]) {
+            update.add(change, exponent);
+        }
         let (dc, sh) = changes[COLOUR..].split_at(usize::from(self.dc.header.rank));
         let sh: &[f32] = if entry.is_some() { &[] } else { sh };
-        let rotation = &changes[ROTATION..COLOUR];
-        let rest = [(Stage::Rotation, rotation), (Stage::Dc, dc), (Stage::Sh, sh)];
+        let rest = [
+            (Stage::Opacity, &changes[OPACITY..ROTATION]),
+            (Stage::Rotation, &changes[ROTATION..COLOUR]),
+            (Stage::Dc, dc),
+            (Stage::Sh, sh),
+        ];
         for (stage, changes) in rest {
-            let exponent = rule.of(stage, scales, opacity);
-            changes.iter().for_each(|&change| {
-                update.add(change, exponent);
-            });
+            let exponent = of(stage);
+            changes.iter().for_each(|&change| update.add(change, exponent));
         }
         update.residuals.extend(entry.into_iter().flat_map(|entry| [0, entry]));
         update
@@ -360,8 +362,8 @@ struct Update {
 }
 
 impl Update {
-    /// Adds the residual of a difference in steps of the sequence, and gives what it changes.
-    fn add(&mut self, change: f32, exponent: u8) -> i32 {
+    /// Adds the residual of a difference in steps of the sequence.
+    fn add(&mut self, change: f32, exponent: u8) {
         let step = step(exponent);
         let apart = change / step as f32;
         let most = COMPONENT_RANGE.end() / step;
@@ -370,22 +372,6 @@ impl Update {
         self.residuals.push(residual);
         self.gain += apart * apart - rest * rest;
         self.most = self.most.max(apart.abs());
-        residual * step
-    }
-
-    /// Adds the residuals of log-scales, of the largest and of the two differences (7.6.2), and gives what these make of them.
-    fn scale(&mut self, rule: &StepRule, now: [i32; 3], changes: [f32; 3]) -> [i32; 3] {
-        let mut before = now[0];
-        let mut after = [now[0] + self.add(changes[0], rule.of_largest()); 3];
-        let exponent = rule.of_log_scale(after[0]);
-        for axis in 1..3 {
-            // Each goes with the one before it, and its residual takes off.
-            let carried = now[axis] + after[axis - 1] - before;
-            let off = self.add(carried as f32 - now[axis] as f32 - changes[axis], exponent);
-            before = now[axis];
-            after[axis] = carried - off;
-        }
-        after
     }
 
     /// Bits, nearly.

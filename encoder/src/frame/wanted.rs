@@ -4,7 +4,7 @@ use super::unit::UnitCoder;
 use crate::colour;
 use crate::gop_tools::{dc_planes, sh_planes};
 use crate::grid::{Geometry, geometry, nearest_integer};
-use crate::shape::{Shape, nearest_multiple, scale_residuals};
+use crate::shape::{Shape, nearest_multiple, scale_residuals, scale_updates};
 use crate::vq;
 use rayon::prelude::*;
 use splatstream_decoder::colour::{COMPONENT_RANGE, Colour};
@@ -147,7 +147,7 @@ impl Wanted {
         coder: &UnitCoder<'_>,
         is_new: bool,
     ) -> Vec<Vec<i32>> {
-        let exponents = || rule.exponents(stage, now.log_scale.each_ref().map(Vec::as_slice), &now.opacity);
+        let exponents = || now.exponents(stage, rule);
         let colour = &coder.colour;
         match stage {
             Stage::LogScale => self.scale_planes(now, rule, coder.sequence.canonical_axes()),
@@ -204,8 +204,10 @@ impl Wanted {
     fn scale_planes(&self, now: &Attributes, rule: &StepRule, sorted: bool) -> Vec<Vec<i32>> {
         let at = |planes: &[Vec<i32>; 3], row: usize| planes.each_ref().map(|plane| plane[row]);
         let mut planes = [const { Vec::new() }; 3];
+        // What brings parents nearer, each log-scale by itself, or new Gaussians, by differences.
+        let residuals_of = if now.parents.is_some() { scale_updates } else { scale_residuals };
         for row in 0..self.len() {
-            let residuals = scale_residuals(at(&now.log_scale, row), at(&self.log_scale, row), rule, sorted);
+            let residuals = residuals_of(at(&now.log_scale, row), at(&self.log_scale, row), rule, sorted);
             planes.iter_mut().zip(residuals).for_each(|(plane, value)| plane.push(value));
         }
         planes.to_vec()

@@ -6,8 +6,8 @@ use crate::{ErrorKind, Result};
 /// The first eight bytes: line ends and the eighth bit show a transfer that took the file for text.
 pub const SIGNATURE: [u8; 8] = [0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A];
 
-/// The version that this crate reads and writes, 2.0 release candidate 2: 128 + 2, and the number of the candidate.
-const VERSION: (u8, u8) = (130, 2);
+/// The version that this crate reads and writes, 2.0 release candidate 3: 128 + 2, and the number of the candidate.
+const VERSION: (u8, u8) = (130, 3);
 /// Levels of annex A.
 const LEVELS: core::ops::RangeInclusive<u8> = 1..=4;
 /// `header_crc` itself, which it does not cover.
@@ -20,7 +20,7 @@ table! {
         signature: u8[8],
         /// 130: a release candidate of version 2.0
         version_major: u8,
-        /// number of the release candidate, 2
+        /// number of the release candidate, 3
         version_minor: u8,
         /// 0 is Intra, 1 is Dynamic
         profile: u8,
