@@ -178,7 +178,7 @@ impl CameraArgs {
 }
 
 /// The cameras of a scene description, which says nothing of the width of pictures: they are 16:9.
-fn of_stream(description: &SceneDescription, height: u32) -> Vec<Camera> {
+pub(crate) fn of_stream(description: &SceneDescription, height: u32) -> Vec<Camera> {
     let size = [(height * 16 / 9).max(1), height];
     let one = |(index, camera): (usize, &StreamCamera)| {
         let StreamCamera { position, rotation, vertical_field_of_view } = *camera;

@@ -3,6 +3,7 @@
 mod costs;
 mod deps;
 mod hex;
+mod hull;
 mod points;
 mod tree;
 mod units;
@@ -44,7 +45,8 @@ struct View {
     /// One line per unit.
     #[arg(long)]
     units: bool,
-    /// The operating points: bytes, Gaussians and bits per Gaussian of each.
+    /// The operating points: bytes, Gaussians, bits per Gaussian and PSNR of each, and the hull of those that no other
+    /// beats.
     #[arg(long)]
     ops: bool,
     /// The units of each GOP and frame, and what each needs to be decoded.

@@ -9,6 +9,7 @@ pub(crate) mod cells;
 pub(crate) mod compensation;
 pub(crate) mod intra;
 mod judge;
+pub(crate) mod ladder;
 pub(crate) mod learning;
 mod moves;
 mod new_list;

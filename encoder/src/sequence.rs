@@ -226,7 +226,7 @@ impl Scene {
         let colour = |step: f32, norm: f32| finest(step, 1.25 * norm, *COMPONENT_RANGE.end() as f32);
         let mut parameters = SequenceParameters {
             sh_degree,
-            spatial_layer_count: settings.spatial_layers,
+            spatial_layer_count: settings.spatial_layer_count(),
             temporal_layer_count: settings.temporal_layers().max(1),
             refinement_count: settings.refinements.len() as u8,
             refinement_percent,

@@ -1,5 +1,6 @@
 //! What a user asks for: quality, effort, layers.
 
+use crate::frame::ladder::Ladder;
 use crate::laws::Laws;
 use crate::transformer::Architecture;
 use splatstream_decoder::predictor::Predictor;
@@ -332,6 +333,11 @@ impl Settings {
             Structure::Intra => 0,
             Structure::Predicted { layers } => layers,
         }
+    }
+
+    /// Spatial layers of the stream: no more than have something to add.
+    pub fn spatial_layer_count(&self) -> u8 {
+        self.spatial_layers.min(Ladder::most_layers(self.refinements.len()))
     }
 
     /// Whether predicted GOPs have whole anchors.

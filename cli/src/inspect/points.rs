@@ -1,6 +1,7 @@
 //! The operating points of a stream.
 
 use super::Shown;
+use super::hull::{Quality, qualities};
 use crate::console::Console;
 use crate::numbers::{bits_per_gaussian, grouped, hex_digest};
 use crate::stream_file::StreamFile;
@@ -27,6 +28,10 @@ struct Point {
     gaussians: u64,
     percent: u8,
     bpg: f64,
+    /// PSNR of the first frame in three views of 270 lines, against the highest point; null of that.
+    psnr_db: Option<f64>,
+    /// Whether no point with as many frames has better pictures for as many bytes.
+    on_hull: bool,
     /// Whether the list in the stream says the same; none if it does not have the point.
     listed: Option<bool>,
     /// Of each frame; only where JSON is asked for, since every frame is decoded.
@@ -59,7 +64,9 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
         Ok(found) => found,
         Err(error) => return Ok(Some(error)),
     };
-    let mut points: Vec<Point> = infos.iter().map(|info| Point::new(info, list.as_ref())).collect();
+    let qualities = qualities(stream, &infos, limits);
+    let point = |(info, quality)| Point::new(info, list.as_ref(), quality);
+    let mut points: Vec<Point> = infos.iter().zip(qualities).map(point).collect();
     let mut error = None;
     if console.is_json() {
         for (point, info) in points.iter_mut().zip(&infos) {
@@ -116,7 +123,7 @@ fn point_of(entry: &OperatingPointEntry) -> OperatingPoint {
 }
 
 impl Point {
-    fn new(info: &OperatingPointInfo, list: Option<&List>) -> Self {
+    fn new(info: &OperatingPointInfo, list: Option<&List>, quality: Quality) -> Self {
         Self {
             op: info.point.to_string(),
             spatial_layer: info.point.spatial,
@@ -127,6 +134,8 @@ impl Point {
             gaussians: info.gaussians,
             percent: info.percent,
             bpg: bits_per_gaussian(info.bytes, info.gaussians),
+            psnr_db: quality.psnr_db,
+            on_hull: quality.on_hull,
             listed: list.and_then(|list| list.agrees(info)),
             digests: Vec::new(),
         }
@@ -150,8 +159,16 @@ impl Point {
 }
 
 fn text(points: &[Point]) -> String {
-    let mut table =
-        Table::new(["point", "bytes", "frames", "Gaussians", "% of a frame", "bits per Gaussian"]);
+    let mut table = Table::new([
+        "point",
+        "bytes",
+        "frames",
+        "Gaussians",
+        "% of a frame",
+        "bits per Gaussian",
+        "dB",
+        "hull",
+    ]);
     for point in points {
         table.row([
             point.op.clone(),
@@ -160,7 +177,11 @@ fn text(points: &[Point]) -> String {
             grouped(point.gaussians),
             point.percent.to_string(),
             format!("{:.2}", point.bpg),
+            point.psnr_db.map_or_else(|| "-".to_owned(), |decibels| format!("{decibels:.1}")),
+            if point.on_hull { "*" } else { "" }.to_owned(),
         ]);
     }
     table.text()
+        + "\ndB: PSNR of the first frame against the highest point, mean of three views of 270 lines\n\
+           *: no point with as many frames looks better for as many bytes\n"
 }

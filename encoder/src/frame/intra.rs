@@ -1,8 +1,9 @@
-//! I frames: each spatial layer adds Gaussians and halves the steps of those below it.
+//! I frames: the lowest spatial layer has all Gaussians, and the layers above refine them ([`super::ladder`]).
 //!
 //! A static frame is the simplest case: one layer, so that no unit has parents, and nothing that is predicted.
 
 use super::compensation::Compensator;
+use super::ladder::Ladder;
 use super::new_list::NewList;
 use super::predictors::{Chooser, used};
 use super::unit::{Draft, Grain, UnitCoder};
@@ -16,17 +17,10 @@ use splatstream_decoder::increment::residual::Attributes;
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsOfFrame;
-use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, prefix_length};
 
-/// Share of the Gaussians, most important first, up to each spatial layer, percent.
-const fn shares(layers: u8) -> &'static [u8] {
-    match layers {
-        0 | 1 => &[100],
-        2 => &[60, 100],
-        3 => &[50, 75, 100],
-        _ => &[40, 60, 80, 100],
-    }
-}
+/// Bits of the mode of a parent.
+const MOVED: i32 = 1;
+const UPDATED: i32 = 2;
 
 /// A frame on the finest grids, in the order of its source.
 pub(crate) struct IntraTarget<'a> {
@@ -47,6 +41,7 @@ pub(crate) struct IntraTarget<'a> {
 /// An I frame being coded.
 struct Intra<'a> {
     coder: &'a UnitCoder<'a>,
+    ladder: Ladder,
     target: &'a IntraTarget<'a>,
     lists: Vec<GaussianList>,
     /// Gaussians of each list, by index in the target.
@@ -63,8 +58,10 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> Res
     let sequence = coder.sequence;
     let refinements = usize::from(sequence.refinement_count);
     let sh_planes = usize::from(sequence.sh_dimension());
+    let percents = &sequence.refinement_percent[..refinements];
     let mut intra = Intra {
         coder,
+        ladder: Ladder::new(sequence.spatial_layer_count, percents),
         target,
         lists: vec![GaussianList::empty(sh_planes); refinements],
         members: vec![Vec::new(); refinements],
@@ -89,21 +86,16 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> Res
 }
 
 impl Intra<'_> {
-    /// Codes the units of a layer.
+    /// Codes the units of a layer. The lowest one adds all Gaussians.
     fn layer(&mut self, layer: u8) -> Result<(), Error> {
         let sequence = self.coder.sequence;
-        let layers = sequence.spatial_layer_count;
-        let total = self.target.order.len() as u32;
-        let end = prefix_length(shares(layers)[usize::from(layer)], total) as usize;
-        let start = match layer {
-            0 => 0,
-            _ => prefix_length(shares(layers)[usize::from(layer) - 1], total) as usize,
-        };
+        let order = self.target.order;
+        let total = order.len() as u32;
         let mut before = 0_usize;
         let mut added = Vec::new();
         for refinement in 0..sequence.refinement_count {
-            let after = sequence.prefix_length(refinement, total) as usize;
-            let rows = self.target.order.get(start.max(before)..end.min(after)).unwrap_or_default();
+            let after = if layer == 0 { sequence.prefix_length(refinement, total) as usize } else { 0 };
+            let rows = order.get(before..after).unwrap_or_default();
             added.push((rows.to_vec(), self.grain(layer, refinement)));
             before = after;
         }
@@ -125,7 +117,10 @@ impl Intra<'_> {
         let list = usize::from(refinement);
         let parents = core::mem::take(&mut self.lists[list]);
         let mut draft = self.coder.blank(self.grain(layer, refinement));
-        self.refine(&mut draft, &parents, list)?;
+        draft.header.parent_count = self.members[list].len() as u32;
+        if self.ladder.refines(layer, list) {
+            self.refine(&mut draft, &parents, list)?;
+        }
         draft.add(core::mem::take(&mut new.values));
         let lower: Vec<&QuantizedFrame> = self.lists[..list].iter().map(|list| &list.planes).collect();
         let situation = Situation { around: [&lower, &[]], temporal: None };
@@ -162,36 +157,31 @@ impl Intra<'_> {
         (draft.header.compensation_log_scale, draft.header.compensation_opacity) = (log_scale, opacity);
     }
 
-    /// How finely a unit is coded: every layer halves the steps of the one below. Entries of codebooks keep their step: no
-    /// layer refines them.
+    /// How finely a unit is coded.
     fn grain(&self, layer: u8, refinement: u8) -> Grain {
-        let sequence = self.coder.sequence;
-        let above = sequence.spatial_layer_count - 1 - layer;
-        let Grain { position_shift, attribute_step } = self.coder.grains.of(refinement);
-        let book = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
-        let [scale, opacity, rotation, dc, sh] =
-            attribute_step.map(|step| (step + 2 * above).min(MAX_ATTRIBUTE_STEP));
-        let sh = if book { attribute_step[4] } else { sh };
-        Grain {
-            position_shift: (position_shift + above).min(sequence.position_bits - 1),
-            attribute_step: [scale, opacity, rotation, dc, sh],
-        }
+        let last = self.coder.grains.of(refinement);
+        let has_books = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
+        self.ladder.grain(layer, refinement.into(), last, has_books, self.coder.sequence.position_bits)
     }
 
-    /// Refines what lower layers have coded.
+    /// Brings what the lowest layer has coded to its final steps.
     fn refine(&self, draft: &mut Draft, parents: &GaussianList, list: usize) -> Result<(), Error> {
         let members = &self.members[list];
         if members.is_empty() {
             return Ok(());
         }
         let count = members.len() as u32;
-        (draft.header.parent_count, draft.header.move_count, draft.header.update_count) =
-            (count, count, count);
-        draft.values.set(Section::Modes, self.coder.section(vec![vec![3; members.len()]]));
         let wanted = self.target.wanted.select(members);
         let last = (1 << self.coder.sequence.position_bits) - 1;
         let moves = wanted.moves(parents, draft.header.position_shift, last);
-        draft.values.set(Section::Moves, self.coder.section(moves));
+        let moves_any = moves.iter().flatten().any(|&value| value != 0);
+        let mode = UPDATED + if moves_any { MOVED } else { 0 };
+        draft.values.set(Section::Modes, self.coder.section(vec![vec![mode; members.len()]]));
+        draft.header.update_count = count;
+        if moves_any {
+            draft.header.move_count = count;
+            draft.values.set(Section::Moves, self.coder.section(moves));
+        }
         let rows: Vec<u32> = (0..count).collect();
         let now = Attributes::of_list(parents, &rows);
         let planes = wanted.updates(now, draft.header.attribute_step, self.coder)?;

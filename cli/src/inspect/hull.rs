@@ -1,0 +1,86 @@
+//! What operating points look like, and which of them no other beats.
+
+use crate::cameras::of_stream;
+use crate::stream_file::StreamFile;
+use rayon::prelude::*;
+use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo};
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_format::Limits;
+use splatstream_render::camera::{Up, held_out};
+use splatstream_render::metrics::psnr;
+use splatstream_render::{Camera, Image, render};
+use splatstream_scene::GaussianFrame;
+use std::ops::ControlFlow;
+
+/// Views of the first frame, and their height.
+const VIEWS: (u32, u32) = (3, 270);
+
+/// How good the pictures of a point are.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Quality {
+    /// PSNR of the first frame against that of the highest point, decibels; none of points that show the same pictures
+    /// as that, or none.
+    pub(super) psnr_db: Option<f64>,
+    /// Whether no point with as many frames has better pictures for as many bytes.
+    pub(super) on_hull: bool,
+}
+
+/// The quality of each point, the pictures of the highest one being right.
+pub(super) fn qualities(stream: &StreamFile, points: &[OperatingPointInfo], limits: &Limits) -> Vec<Quality> {
+    let bytes = stream.bytes.as_slice();
+    let highest = points.iter().max_by_key(|info| {
+        let OperatingPoint { spatial, temporal, refinement } = info.point;
+        (spatial, refinement, temporal)
+    });
+    let Some(reference) = highest.and_then(|info| first_frame(bytes, info.point, limits)) else {
+        return vec![Quality::default(); points.len()];
+    };
+    let given = of_stream(&stream.description(limits).unwrap_or_default(), VIEWS.1);
+    let cameras = held_out(&reference, Up::default(), &given, VIEWS.0, VIEWS.1);
+    let right = pictures(&reference, &cameras);
+    let seen = |info: &OperatingPointInfo| {
+        let frame = first_frame(bytes, info.point, limits)?;
+        Some(mean_psnr(&right, &pictures(&frame, &cameras)))
+    };
+    let decibels: Vec<Option<f64>> = points.par_iter().map(seen).collect();
+    let is_beaten = |index: usize| {
+        let (info, own) = (&points[index], decibels[index].unwrap_or(0.0));
+        points.iter().zip(&decibels).enumerate().any(|(other, (rival, decibels))| {
+            let its = decibels.unwrap_or(0.0);
+            let is_as_good = rival.bytes <= info.bytes && its >= own;
+            let is_alike = rival.bytes == info.bytes && its == own;
+            rival.frames == info.frames && is_as_good && (!is_alike || other < index)
+        })
+    };
+    let quality = |index: usize| Quality {
+        psnr_db: decibels[index].filter(|decibels| decibels.is_finite()),
+        on_hull: decibels[index].is_some() && !is_beaten(index),
+    };
+    (0..points.len()).map(quality).collect()
+}
+
+/// The first frame of which something is shown.
+fn first_frame(bytes: &[u8], operating_point: OperatingPoint, limits: &Limits) -> Option<GaussianFrame> {
+    let options = Options { limits: *limits, operating_point, ..Options::default() };
+    let mut first = None;
+    let _faults = decode_stream(bytes, &options, |sequence, frame| {
+        if frame.is_lost {
+            return ControlFlow::Continue(());
+        }
+        first = Some(to_gaussians(frame.into_shown(), sequence));
+        ControlFlow::Break(())
+    });
+    first
+}
+
+fn pictures(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Image> {
+    cameras.iter().map(|camera| render(frame, camera, [0.0; 3]).colour).collect()
+}
+
+/// The mean over the views.
+fn mean_psnr(right: &[Image], pictures: &[Image]) -> f64 {
+    right.iter().zip(pictures).map(|(right, picture)| psnr(right, picture)).sum::<f64>()
+        / right.len().max(1) as f64
+}
