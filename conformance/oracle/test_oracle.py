@@ -74,7 +74,7 @@ class Conventions(unittest.TestCase):
 
 class Parsing(unittest.TestCase):
     def test_headers_of_annex_b(self):
-        data = bytes.fromhex("89475353 0d0a1a0a 82020002 bb67661d 020100000000 e4a2 00000000 0c000000 f1c67fb7"
+        data = bytes.fromhex("89475353 0d0a1a0a 82030002 8c0da41c 020100000000 e4a2 00000000 0c000000 f1c67fb7"
                              "0000000001000000 00000000")
         self.assertEqual(parse_file_header(data).level, 2)
         unit = parse_unit_header(data, 16)

@@ -1,22 +1,26 @@
 #!/usr/bin/env python3
-"""Checks of positions, steps, lanes and predicted motion with the examples of the text; python3 -m unittest oracle.test_values"""
+"""Checks of positions, steps, lanes, motion and the network with the examples of the text; python3 -m unittest oracle.test_values"""
 
 import os
 import random
+import re
 import sys
 import unittest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 
 from oracle import moves, tables
-from oracle.conventions import Round
+from oracle.conventions import ByteReader, Round
 from oracle.errors import StreamError
 from oracle.frame import Frame, Gop
 from oracle.lists import MOVE, MOVE_AND_UPDATE, REMOVE, SKIP, UPDATE, Gaussian
+from oracle.network import DATA, REGISTERED, REGISTRY, parse_network
 from oracle.output import expand
 from oracle.parsing import BlockDecoder
+from oracle.prediction import Reference, mean
 from oracle.semantics import check_segments
 from oracle.steps import DC, LOG_SCALE, OPACITY, ROTATION, SH, StepRule
+from oracle.transformer import Transformer, act, product
 
 
 class Sequence:
@@ -197,6 +201,72 @@ class Moves(unittest.TestCase):
 
     def test_round(self):
         self.assertEqual([Round(x, s) for x, s in ((7, 0), (-7, 0), (7, 1), (-7, 1))], [7, -7, 4, -3])
+
+
+class Learned(unittest.TestCase):
+    """The example of 7.7.6, read from the text"""
+
+    OWN = ((100, 200, 300), (10, 8, 5), 6, (1, -2, 3))
+    NEIGHBOURS = [Reference((103, 198, 300), (12, 8, 4), 9, (0, -4, 6), (900, 300, -200), ()),
+                  Reference((90, 205, 304), (9, 9, 6), 2, (5, 0, 0), (-700, 1400, 300), ())]
+    IDENTITY = (4096, 0, 0, 0, 4096, 0, 0, 0, 4096)
+
+    @classmethod
+    def setUpClass(cls):
+        with open(os.path.join(os.path.dirname(DATA), "07-decoding.md"), encoding="utf-8") as f:
+            lines = f.read().partition("Example with the registered network")[2].partition("### 7.7.7")[0].splitlines()
+        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("| ")]
+        cls.rows = {row[0]: [[numbers(part) for part in cell.split(";")] for cell in row[1:]] for row in rows}
+
+    def test_example(self):
+        model = REGISTRY[bytes.fromhex(REGISTERED[0][0])]
+        network = parse_network(ByteReader(model, 0, len(model)))
+        transform = Sequence(rank=3, dimension=3, basis=self.IDENTITY)
+        t = Transformer(network, transform, None)
+        distances = [sum((a - b) ** 2 for a, b in zip(x.position, self.OWN[0])) for x in self.NEIGHBOURS]
+        weight = [2 ** 16 * (distances[0] + 1) // (d + 1) for d in distances]
+        self.found("`D2`; `weight` of 7.7.3", *[[[d], [w]] for d, w in zip(distances, weight)])
+        base = {"dc": [mean(weight, column) for column in zip(*(x.dc for x in self.NEIGHBOURS))], "sh": ()}
+        neighbours = list(zip(self.NEIGHBOURS, distances))
+        token, near = t.tokens(self.OWN, neighbours, [0, 0], base), t.near(self.OWN[0], neighbours)
+        h = [t.embedded(j, *both) for j, both in enumerate(zip(token, near))]
+        (row,), (origin,) = t.rows(h, near)
+        u = [act(product(weights, row), network.layer_shift[2]) for weights in network.attention]
+        sums = [(product(u, h_j), product(u, h_j) + t.fourier(near_j, origin)) for h_j, near_j in zip(h, near)]
+        logit = [Round(total, network.layer_shift[3]) for _, total in sums]
+        power = [tables.EXP[min(255, max(logit) - x)] for x in logit]
+        share = [Round(x * (2 ** 26 // sum(power)), 18) for x in power]
+        hidden = [[max(0, act(product(w, near_j) + bias, network.layer_shift[0]))
+                   for w, bias in zip(network.geometry, network.geometry_bias[0])] for near_j in near]
+        for name, values in (("`token`", token), ("`near`", near), ("`hidden`", hidden), ("`h`", h)):
+            self.found(name, *[[value] for value in values])
+        self.found("sum of `u[i] * h[j][i]`; sum with `fourier`", *[[[a], [b]] for a, b in sums])
+        self.found("`logit`; `power`; `share`", *[[[a], [b], [c]] for a, b, c in zip(logit, power, share)])
+        x = t.attended(row, origin, h, near)
+        fed = t.fed_forward(x)
+        out = t.outputs([fed])
+        for name, value in (("`base.dc`", base["dc"]), ("`row[0]`", row), ("`u`", u),
+                            ("`z`", [act(product(share, column), 8) for column in zip(*h)]), ("`x[0]` after attention", x),
+                            ("`x[0]` after the feed-forward block", fed), ("`out`", out),
+                            ("`pred.dc`", t.predict(self.OWN, neighbours, [0, 0], base)["dc"])):
+            self.found(name, [value])
+        wide = [max(0, act(product(w, x) + bias, network.layer_shift[5]))
+                for w, bias in zip(network.widening, network.widening_bias[0])]
+        self.found("`wide[i]` that are not 0", [[value for value in wide if value] + [i for i, value in enumerate(wide) if value]])
+
+    def test_given(self):
+        """The values that the example starts from"""
+        self.found("`position`", *[[x.position] for x in self.NEIGHBOURS])
+        self.found("`q`; `o`; `rotation`", *[[x.q, [x.o], x.rotation] for x in self.NEIGHBOURS])
+        self.found("`dc`", *[[x.dc] for x in self.NEIGHBOURS])
+
+    def found(self, name, *cells):
+        self.assertEqual(self.rows[name], [[list(part) for part in cell] for cell in cells], name)
+
+
+def numbers(text):
+    """The integers of a cell of a table."""
+    return [int(number) for number in re.findall(r"-?\d+", text)]
 
 
 if __name__ == "__main__":

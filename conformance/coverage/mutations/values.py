@@ -17,8 +17,8 @@ MUTATIONS = [
      "Round(w * r[k] + v[k] * W + cross(v, result + list(r)[len(result):])[k], 14)"),
 
     # 7.6
-    ("SS-RC-001", RESIDUALS, "self.check_planes(x, VALUE_MIN, VALUE_MAX)", "pass"),
-    ("SS-RC-001", RESIDUALS, "self.check_planes(q, VALUE_MIN, VALUE_MAX)", "pass"),
+    ("SS-RC-001", RESIDUALS, "steps += [d1, d2] self.check_planes(x, VALUE_MIN, VALUE_MAX)", "steps += [d1, d2]"),
+    ("SS-RC-001", RESIDUALS, "self.check_planes(q, VALUE_MIN, VALUE_MAX) if self", "if self"),
     ("SS-RC-001", RESIDUALS, "self.check_planes([o], VALUE_MIN, VALUE_MAX)", "pass"),
     ("SS-RC-002", RESIDUALS, 'self.check(d >= 0, "CONSTRAINT")', "pass"),
     ("SS-RC-003", RESIDUALS, "self.check_planes([v[k]], VALUE_MIN, VALUE_MAX)", "pass"),

@@ -1,11 +1,10 @@
 """All vectors by name, those of each area from a module of its own."""
 
 from . import (blocks, entropy, grid, headers, increments, lanes, learned, limits, losses, mixed, motion, narrow, nested,
-               noticed, order, parameters, records, scene, steps, stream, structure, tools, values, weights)
+               noticed, order, parameters, records, scene, steps, stream, structure, tools, updates, values, weights)
 
-MODULES = (stream, values, grid, steps, entropy, lanes, structure, nested, tools, motion, learned, weights, mixed, headers,
-           parameters, records, order, losses, increments, blocks, limits, scene, narrow,
-           noticed)
+MODULES = (stream, values, grid, steps, entropy, lanes, structure, nested, tools, motion, updates, learned, weights, mixed,
+           headers, parameters, records, order, losses, increments, blocks, limits, scene, narrow, noticed)
 
 
 def collected():

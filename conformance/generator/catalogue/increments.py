@@ -92,8 +92,8 @@ def first_move_out(v, w):
 
 
 def log_scales_rise(v, w):
-    """d1 becomes -1 or less (SS-RC-002) while all ranges hold."""
-    v[2][0] -= 30000 // STEP[w.u.attribute_step[0]]
+    """q[2] becomes larger than q[1] (SS-RC-002) while all ranges hold."""
+    v[2][0] += 30000 // STEP[w.u.attribute_step[0]]
     return v
 
 

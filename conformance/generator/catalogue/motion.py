@@ -190,7 +190,7 @@ FADES = [
     ("fading-in-one-list", "SS-PA-012", "One of three lists extrapolates",
      dict(FADING, percent=[30, 60, 100], fixed=fixed(extrapolates_opacity=lambda w: int(w.r == 1 and not w.frame.intra)))),
     ("fading-with-steps", "SS-PA-012 SS-AT-004",
-     "Steps of rotations and colours follow from opacities after extrapolation and update",
+     "Steps of rotations and colours follow from opacities after extrapolation, before the update",
      dict(FADING, opacity_weight=[300, 400, 500], opacity_reference=40, sh_degree=1, modes=(0, 0, 1, 0),
           values={**FADING["values"], "rotation": lambda w, p, factor: [1, -1, 0]})),
     ("fading-of-fewer-units", "SS-PA-012 SS-CA-004", "Lists that a frame lacks are carried, with opacities as in the I frame",

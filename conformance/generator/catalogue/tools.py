@@ -256,7 +256,7 @@ def every_tool(seed):
 
 
 # The parents of catalogue_increments.py: name and a function of a tamper
-ALL_TOOLS = [("stability-every-tool", every_tool(10), 10), ("stability-every-tool-without-sh", every_tool(18), 18)]
+ALL_TOOLS = [("stability-every-tool", every_tool(22), 22), ("stability-every-tool-without-sh", every_tool(2), 2)]
 COLOURS = ("prediction-colour-ends", lambda tamper=None: DirectedSynth(COLOUR_SEED, tamper, **MEANS))
 # Updates at which a value may be out of range while what it gives is not
 LARGE = ("survivors-large-updates", lambda tamper=None: DirectedSynth(

@@ -55,7 +55,7 @@ def unit(kind, payload, frame=0, refinement=0, flags=None, spatial=0, temporal=0
     return head + struct.pack("<H", crc32(head + tail) & 0xFFFF) + tail + payload
 
 
-def file_header(profile, level, minor=2, major=130):
+def file_header(profile, level, minor=3, major=130):
     head = c.SIGNATURE + bytes([major, minor, profile, level])
     return head + struct.pack("<I", crc32(head))
 
