@@ -83,7 +83,13 @@ pub const VARIABLE_ROWS: [VariableRow; 42] = [
     row("5.14", "increment", "remove_count", "leb128", "parents that are removed"),
     row("5.14", "increment", "new_count", "leb128", "Gaussians that the unit adds"),
     row("5.14", "increment", "position_shift", "u8", "low bits of positions that are not coded"),
-    row("5.14", "increment", "attribute_step", "u8[5]", "exponents of the steps of the other attributes"),
+    row(
+        "5.14",
+        "increment",
+        "attribute_step",
+        "u8[5]",
+        "exponents of the steps of log_scale, opacity, rotation, dc and sh",
+    ),
     row(
         "5.14",
         "increment",

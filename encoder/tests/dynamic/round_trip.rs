@@ -122,24 +122,25 @@ fn predicted_gaussians_are_within_half_a_step_of_the_source() {
     assert_close(&frames[0], &whole.all()[0].planes, &whole.sequence, Bounds::INTRA, "predicted");
 }
 
-/// A lower layer has fewer Gaussians, each on a grid twice as coarse as that of the next.
+/// The lowest layer has all Gaussians with coarse steps, and each layer above brings some of the lists to their final ones.
 #[test]
-fn lower_layers_are_coarser_and_have_fewer_gaussians() {
+fn layers_have_all_gaussians_and_refine_one_list_after_the_other() {
     let frames = scene(300, 1, 0, Tracking::Tracked);
     let (bytes, _) = coded(&frames, &Settings { spatial_layers: 4, ..quick() }, "layers");
     let whole = Whole::new(&bytes);
     let last = whole.sequence.refinement_count - 1;
-    for (layer, count, coarseness) in [(0, 120, 8.0), (1, 180, 4.0), (2, 240, 2.0), (3, 300, 1.0)] {
-        let planes = &whole.at(layer, 0, last)[0].planes;
-        assert_eq!(planes.len(), count, "layer {layer}");
-        // Half a step of the layer, and half of the finest, to which everything has been rounded before.
-        let most = 0.5 * coarseness + 0.5;
-        let bounds = Bounds { value: most, colour: most, place: most, sh: false };
+    let planes: Vec<_> = (0..4).map(|layer| whole.at(layer, 0, last)[0].planes.clone()).collect();
+    // Half of a coarse step, of a place in its cell, and half of the finest, to which everything was rounded before.
+    let bounds = Bounds { value: 2.0, colour: 2.0, place: 2.5, sh: false };
+    for (layer, planes) in planes.iter().enumerate() {
+        assert_eq!(planes.len(), 300, "layer {layer}");
         assert_close(&frames[0], planes, &whole.sequence, bounds, &format!("layer {layer}"));
-        if layer < 3 {
-            let mask = (1_i32 << (3 - layer)) - 1;
-            assert!(planes.opacity.iter().all(|&q| q & mask == 0), "layer {layer}");
-        }
+    }
+    // The lists end at 20, 50 and 100 per cent, and each layer refines one of them.
+    for (refined, lower, upper) in [(0..60, 0, 1), (60..150, 1, 2), (150..300, 2, 3)] {
+        let differs = |row: usize| planes[lower].opacity[row] != planes[upper].opacity[row];
+        let changed: Vec<usize> = (0..300).filter(|&row| differs(row)).collect();
+        assert!(!changed.is_empty() && changed.iter().all(|row| refined.contains(row)), "layer {upper}");
     }
 }
 

@@ -41,8 +41,11 @@ fn one(base: &str, element: &str, number: u64) -> String {
     if base == "f32" {
         return u32::try_from(number).map(f32::from_bits).unwrap_or_default().to_string();
     }
-    if base == "i8" {
-        return u8::try_from(number).map(u8::cast_signed).unwrap_or_default().to_string();
+    match base {
+        "i8" => return u8::try_from(number).map(u8::cast_signed).unwrap_or_default().to_string(),
+        "i16" => return u16::try_from(number).map(u16::cast_signed).unwrap_or_default().to_string(),
+        "i32" => return u32::try_from(number).map(u32::cast_signed).unwrap_or_default().to_string(),
+        _ => {}
     }
     match element {
         "signature" => format!("{number:02X}"),

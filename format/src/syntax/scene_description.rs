@@ -8,7 +8,7 @@ table! {
     "5.9" "6.9" scene_description SceneDescriptionHeader {
         /// 0 is unknown, 1 +x, 2 -x, 3 +y, 4 -y, 5 +z, 6 -z
         up_axis: u8,
-        /// 0 is the ellipse
+        /// 0 is the ellipsoid
         kernel: u8,
         /// 0 is sRGB, 1 is linear; BT.709 primaries, display-referred
         colour_space: u8,

@@ -46,7 +46,7 @@ table! {
         refinement_percent: u8[10],
         /// bits of a position on one axis, 1 to 20
         position_bits: u8,
-        /// log2 of the Gaussians in an entropy block, 6 to 16
+        /// log2 of the entries in an entropy block, 6 to 16
         block_log2: u8,
         /// bit 0 canonical_axes, bit 1 antialiased, bit 2 whole_anchor; the others are zero
         sequence_flags: u8,

@@ -16,7 +16,7 @@ struct Case<'s> {
     step: &'s Step,
     predictor: Predictor,
     near: Vec<Neighbour>,
-    /// `f` of each neighbour so far.
+    /// `feature` of each neighbour so far.
     features: Vec<u64>,
 }
 
@@ -91,7 +91,7 @@ impl Case<'_> {
             writeln!(text, "\nThe weights of the neighbours, for all attributes: {}.", list(self.weights()))
                 .unwrap();
         } else {
-            text.push_str("\n| Attribute | f | xs | xf | weight |\n|---|---|---|---|---|\n");
+            text.push_str("\n| Attribute | feature | far | unlike | weight |\n|---|---|---|---|---|\n");
         }
         for (stage, name) in NAMES {
             if self.predictor == Predictor::Bilateral {
@@ -133,10 +133,10 @@ impl Case<'_> {
     fn weight_row(&self, text: &mut String, name: &str) {
         let header = &self.step.header;
         let last = self.near.last().unwrap().distance + 1;
-        let xs = self.near.iter().map(|near| near.distance * u64::from(header.bilateral_spatial) / last);
-        let xf = self.features.iter().map(|f| ((f * u64::from(header.bilateral_feature)) >> 6).min(255));
-        let (f, xs, xf) = (list(&self.features), list(xs), list(xf));
-        writeln!(text, "| {name} | {f} | {xs} | {xf} | {} |", list(self.weights())).unwrap();
+        let far = self.near.iter().map(|near| near.distance * u64::from(header.bilateral_spatial) / last);
+        let unlike = self.features.iter().map(|f| ((f * u64::from(header.bilateral_feature)) >> 6).min(255));
+        let (features, far, unlike) = (list(&self.features), list(far), list(unlike));
+        writeln!(text, "| {name} | {features} | {far} | {unlike} | {} |", list(self.weights())).unwrap();
     }
 
     fn neighbours(&self, plane: &[i32]) -> Vec<i32> {
@@ -169,8 +169,8 @@ impl Case<'_> {
         let (top, bottom) = (2 * sum + total, 2 * total);
         write!(
             text,
-            "\nThe mean that is `pred.q[0]`:\n\n```text\nweight           = {}\nx                = {}\nW                = {total}\n\
-             sum              = {sum}\n(2 * sum + W) / (2 * W) = {top} / {bottom} = {}\n```\n",
+            "\nThe mean that is `pred.q[0]`:\n\n```text\nweight           = {}\nx                = {}\ntotal            = {total}\n\
+             sum              = {sum}\n(2 * sum + total) / (2 * total) = {top} / {bottom} = {}\n```\n",
             list(&weights),
             list(&x),
             WeightedMean::new(&weights).of(x.iter().copied())

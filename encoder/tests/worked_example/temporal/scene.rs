@@ -153,7 +153,7 @@ fn enhancement() -> [Plan; 2] {
         Plan {
             at: (1, 1, 1),
             modes: vec![2, 0],
-            updates: vec![[1, -1, 1, 1, 0, 2, 0, 0, 0, 1]],
+            updates: vec![[1, 0, -1, 1, 0, 2, 0, 0, 0, 1]],
             predictor: Some(1),
             new: vec![([325, 655, 90], [0, 0, 0, 1, 0, 0, 1, 1, -1, 0])],
             ..Plan::default()

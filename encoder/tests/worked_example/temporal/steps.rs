@@ -75,45 +75,45 @@ fn position(lines: &mut Lines<'_>, common: &Common, cell: &Cell, cell_log2: u8, 
     lines.three("v = cell_rotation", v);
     lines.one(&format!("w = isqrt(2^28 - {})", dot(v, v)), w);
     let centre = x.map(|x| (x << (cell_log2 + 6)) + (1 << (cell_log2 + 5)));
-    let d = three(|a| fine[a] - centre[a]);
-    let m = cross(v, d);
-    let u = cross(v, m);
+    let arm = three(|a| fine[a] - centre[a]);
+    let first = cross(v, arm);
+    let second = cross(v, first);
     lines.three("centre", centre);
-    lines.three("d = position_fine - centre", d);
-    lines.three("m = cross(v, d)", m);
-    lines.three("u = cross(v, m)", u);
-    lines.three("w * m + u", three(|a| w * m[a] + u[a]));
-    let turned = three(|a| round(w * m[a] + u[a], 27));
-    lines.three("Round(w * m + u, 27)", turned);
+    lines.three("arm = position_fine - centre", arm);
+    lines.three("first = cross(v, arm)", first);
+    lines.three("second = cross(v, first)", second);
+    lines.three("w * first + second", three(|a| w * first[a] + second[a]));
+    let turned = three(|a| round(w * first[a] + second[a], 27));
+    lines.three("Round(w * first + second, 27)", turned);
     let shift = cell.translation.map(|translation| i64::from(translation) * 8);
     lines.three("translation * 8", shift);
-    let p = three(|a| centre[a] + d[a] + turned[a] + shift[a]);
-    lines.three("p", p);
+    let moved = three(|a| centre[a] + arm[a] + turned[a] + shift[a]);
+    lines.three("moved", moved);
     let last = ((1 << common.sequence.position_bits) - 1) * 64;
-    let placed = p.map(|p| p.clamp(0, last));
-    lines.three(&format!("position_fine = clamp(p, 0, {last})"), placed);
+    let placed = moved.map(|moved| moved.clamp(0, last));
+    lines.three(&format!("position_fine = clamp(moved, 0, {last})"), placed);
     placed
 }
 
-fn rotation_of(lines: &mut Lines<'_>, common: &Common, cell: &Cell, r: Three) -> Three {
+fn rotation_of(lines: &mut Lines<'_>, common: &Common, cell: &Cell, fine: Three) -> Three {
     let v = cell.rotation.map(i64::from);
     let w = root((1 << 28) - dot(v, v));
     let unit = rotation_unit(common.sequence.rotation_step);
     let one = 64 * unit;
-    let big = root((one * one - dot(r, r)).max(0));
-    let c = cross(v, r);
-    let sums = three(|k| w * r[k] + v[k] * big + c[k]);
-    let real = w * big - dot(v, r);
-    lines.three("r = rotation_fine", r);
+    let scalar = root((one * one - dot(fine, fine)).max(0));
+    let third = cross(v, fine);
+    let sums = three(|k| w * fine[k] + v[k] * scalar + third[k]);
+    let real = w * scalar - dot(v, fine);
+    lines.three("rotation_fine", fine);
     lines.one("U", unit);
-    lines.one(&format!("W = isqrt(({one} * {one}) - {})", dot(r, r)), big);
-    lines.three("c = cross(v, r)", c);
-    lines.three("w * r + v * W + c", sums);
-    lines.one("w * W - dot(v, r)", real);
-    let n = sums.map(|sum| if real < 0 { -round(sum, 14) } else { round(sum, 14) });
-    lines.three("n", n);
-    let turned = n.map(|n| n.clamp(-32767 * 64, 32767 * 64));
-    lines.three("rotation_fine = clamp(n, ...)", turned);
+    lines.one(&format!("scalar = isqrt(({one} * {one}) - {})", dot(fine, fine)), scalar);
+    lines.three("third = cross(v, rotation_fine)", third);
+    lines.three("w * rotation_fine + v * scalar + third", sums);
+    lines.one("w * scalar - dot(v, rotation_fine)", real);
+    let rotated = sums.map(|sum| if real < 0 { -round(sum, 14) } else { round(sum, 14) });
+    lines.three("rotated", rotated);
+    let turned = rotated.map(|rotated| rotated.clamp(-32767 * 64, 32767 * 64));
+    lines.three("rotation_fine = clamp(rotated, ...)", turned);
     turned
 }
 
@@ -135,19 +135,18 @@ pub(crate) fn residual(text: &mut String, common: &Common, step: &Step, row: usi
     let mut lines = Lines(text);
     let rule = StepRule::new(&common.sequence, step.header.attribute_step);
     let planes = &step.displaced.planes;
-    let q = log_scales(&mut lines, of(&planes.log_scale, row).map(i64::from), &v, &rule);
-    let o = i64::from(planes.opacity[row]);
-    lines.one("pred.o", o);
-    let shape = q.map(|q| q as i32);
-    let mut step_of = |stage, opacity: i64, name: &str| {
-        let exponent = rule.of(stage, shape, opacity as i32);
-        lines.one(&format!("exponent({name})"), exponent.into());
+    let shape = of(&planes.log_scale, row);
+    let q = log_scales(&mut lines, shape.map(i64::from), &v, &rule);
+    let opacity = planes.opacity[row];
+    lines.one("pred.o", opacity.into());
+    let mut step_of = |stage, attribute: u8| {
+        let exponent = rule.of(stage, shape, opacity);
+        lines.one(&format!("exponent({attribute}, pred.q, pred.o)"), exponent.into());
         i64::from(size_of_step(exponent))
     };
-    let of_opacity = step_of(Stage::Opacity, 0, "opacity");
-    let o = o + v[3] * of_opacity;
-    let [of_rotation, of_dc] =
-        [(Stage::Rotation, "rotation"), (Stage::Dc, "dc")].map(|(stage, name)| step_of(stage, o, name));
+    let [of_opacity, of_rotation, of_dc] = [(Stage::Opacity, 1), (Stage::Rotation, 2), (Stage::Dc, 3)]
+        .map(|(stage, number)| step_of(stage, number));
+    let o = i64::from(opacity) + v[3] * of_opacity;
     lines.one(&format!("o = pred.o + {} * {of_opacity}", v[3]), o);
     let before = of(&step.displaced.rotation_fine, row).map(i64::from);
     lines.three("pred.rotation_fine", before);
@@ -164,18 +163,17 @@ pub(crate) fn residual(text: &mut String, common: &Common, step: &Step, row: usi
 
 fn log_scales(lines: &mut Lines<'_>, p: Three, v: &[i64], rule: &StepRule) -> Three {
     let of_largest = i64::from(size_of_step(rule.of_largest()));
-    let exponent = rule.of_log_scale((p[0] + v[0] * of_largest) as i32);
+    let exponent = rule.of_log_scale(p[0] as i32);
     let of_others = i64::from(size_of_step(exponent));
     let steps = [of_largest, of_others, of_others];
     let x = three(|k| v[k] * steps[k]);
     lines.three("pred.q", p);
     lines.three("v_log_scale", three(|k| v[k]));
     lines.three(&format!("x = v_log_scale * {}", list(steps)), x);
-    let (d1, d2) = (p[0] - p[1] + x[1], p[1] - p[2] + x[2]);
-    lines.one("d1 = pred.q[0] - pred.q[1] + x[1]", d1);
-    lines.one("d2 = pred.q[1] - pred.q[2] + x[2]", d2);
-    let q = [p[0] + x[0], p[0] + x[0] - d1, p[0] + x[0] - d1 - d2];
-    lines.three("q", q);
+    let q = three(|k| p[k] + x[k]);
+    lines.three("q = pred.q + x", q);
+    lines.one("first = q[0] - q[1]", q[0] - q[1]);
+    lines.one("second = q[1] - q[2]", q[1] - q[2]);
     q
 }
 
