@@ -42,6 +42,8 @@ pub(crate) struct IntraTarget<'a> {
     /// Row of each Gaussian in its file, and rows of the file.
     pub(crate) rows: &'a [u32],
     pub(crate) row_count: u32,
+    /// Whether the lowest spatial layer holds everything, and those above add nothing.
+    pub(crate) in_one_layer: bool,
 }
 
 /// An I frame being coded.
@@ -94,10 +96,11 @@ impl Intra<'_> {
         let sequence = self.coder.sequence;
         let layers = sequence.spatial_layer_count;
         let total = self.target.order.len() as u32;
-        let end = prefix_length(shares(layers)[usize::from(layer)], total) as usize;
+        let shares = if self.target.in_one_layer { &[100; 4] } else { shares(layers) };
+        let end = prefix_length(shares[usize::from(layer)], total) as usize;
         let start = match layer {
             0 => 0,
-            _ => prefix_length(shares(layers)[usize::from(layer) - 1], total) as usize,
+            _ => prefix_length(shares[usize::from(layer) - 1], total) as usize,
         };
         let mut before = 0_usize;
         let mut added = Vec::new();
@@ -166,7 +169,7 @@ impl Intra<'_> {
     /// layer refines them.
     fn grain(&self, layer: u8, refinement: u8) -> Grain {
         let sequence = self.coder.sequence;
-        let above = sequence.spatial_layer_count - 1 - layer;
+        let above = if self.target.in_one_layer { 0 } else { sequence.spatial_layer_count - 1 - layer };
         let Grain { position_shift, attribute_step } = self.coder.grains.of(refinement);
         let book = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
         let [scale, opacity, rotation, dc, sh] =
@@ -185,6 +188,10 @@ impl Intra<'_> {
             return Ok(());
         }
         let count = members.len() as u32;
+        if self.target.in_one_layer {
+            draft.header.parent_count = count;
+            return Ok(());
+        }
         (draft.header.parent_count, draft.header.move_count, draft.header.update_count) =
             (count, count, count);
         draft.values.set(Section::Modes, self.coder.section(vec![vec![3; members.len()]]));
