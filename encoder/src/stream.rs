@@ -41,15 +41,7 @@ pub fn encode(
     let has_target = settings.psnr.is_some() || settings.size.is_some();
     let encoded = match has_target && !source.is_empty() {
         true => target::reach(&mut source, settings, sink, progress),
-        false if settings.temporal_layers() == 0 => {
-            encode_once(&mut source, settings, Ranking::new(settings), sink, progress)
-        }
-        false => encode_smaller(&mut source, settings, Ranking::new(settings), progress).and_then(
-            |(bytes, report)| {
-                sink.write_all(&bytes)?;
-                Ok(report)
-            },
-        ),
+        false => encode_once(&mut source, settings, Ranking::new(settings), sink, progress),
     };
     let mut report = encoded.map_err(named)?;
     report.dropped = source.into_dropped();
@@ -57,7 +49,8 @@ pub fn encode(
     Ok(report)
 }
 
-/// Encodes with the steps of the settings: no larger than if each frame stood for itself.
+/// Encodes with the steps of the settings: no larger than if each frame stood for itself. Who gives the steps and no goal
+/// has the layers of the settings in any case.
 ///
 /// # Errors
 /// As [`encode`].
