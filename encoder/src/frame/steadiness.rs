@@ -16,18 +16,18 @@ const LINES: u32 = 180;
 
 /// How far the pictures of predicted frames may be below those of the I frame, dB: beyond the first of these a bit
 /// becomes cheaper, up to the second dearer. A decibel would be seen as a pulse; what is left saves bits.
-const FAR: f64 = 0.8;
-const NEAR: f64 = 0.5;
+const FAR: f64 = 0.6;
+const NEAR: f64 = 0.35;
 
 /// How much of the mean of the frames so far a frame replaces: single frames are easier or harder than others.
 const FRESH: f64 = 0.5;
 
 /// The price of the first predicted frame, by how much it changes from frame to frame, and how far it may: below the least
 /// nothing more is sent, above the most more bits are saved by coarser steps.
-const FIRST: f32 = 1.2;
+const FIRST: f32 = 1.0;
 const CHEAPER: f32 = 0.6;
 const DEARER: f32 = 1.25;
-const LEVELS: core::ops::RangeInclusive<f32> = 0.25..=3.0;
+const LEVELS: core::ops::RangeInclusive<f32> = 0.125..=3.0;
 
 /// The pictures of a GOP and the price that follows from them.
 pub(crate) struct Steadiness {
