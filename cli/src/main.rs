@@ -32,13 +32,15 @@ mod validate;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::Console;
 use failure::Failure;
+use splatstream_format::syntax::SPECIFICATION;
 use std::iter;
 use std::process::ExitCode;
 
 /// SplatStream: scalable, exact bitstreams of dynamic 3D Gaussian splatting.
 #[derive(Parser)]
 #[command(
-    version,
+    name = "splatstream",
+    version = format!("{} (specification {SPECIFICATION})", env!("CARGO_PKG_VERSION")),
     about,
     after_help = "Example:\n  splatstream demo\n\n\
         Exit codes: 0 done, 1 files or settings, 2 usage, 3 a decoder that failed; of streams: 10 malformed, 11 invalid,\n\

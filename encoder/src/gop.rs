@@ -37,6 +37,9 @@ const MAX_FRAMES: u32 = 1024;
 /// and an I frame is where decoding can start.
 const DEAR: f64 = 0.97;
 
+/// A GOP whose predicted frames take more than this part, on average, is tried as I frames too.
+const DOUBTFUL: f64 = 0.5;
+
 /// Codes the frames of a sequence one after the other.
 pub(crate) struct SequenceCoder<'a, 'w> {
     pub(crate) source: &'a mut dyn FrameSource,
@@ -97,6 +100,8 @@ struct Gop {
     is_open: bool,
     /// Whether a new Gaussian takes the network.
     has_learned: bool,
+    /// Whether no frame refers to another although some might have: spatial layers would only cost bits.
+    in_one_layer: bool,
 }
 
 impl SequenceCoder<'_, '_> {
@@ -118,54 +123,102 @@ impl SequenceCoder<'_, '_> {
     /// Codes a GOP of the frames from `first` up to `last` at most, and gives the frame after it: it ends where a
     /// frame shares little with the one it would refer to.
     fn gop(&mut self, first: u32, last: u32, progress: Progress<'_>) -> Result<u32, Error> {
-        self.ranking.start_gop();
+        let before = (self.report.clone(), self.looked_at);
         let intra = self.intra_target(first)?;
         let mut gop = self.start(first, last - first, &intra)?;
         self.intra(&mut gop, first, intra)?;
-        let mut end = first + 1;
-        progress(end, self.source.len());
-        let mut verdict = Verdict::Predicted;
-        while end < last {
-            let role = gop.header.role(end - first);
-            match role.reference {
-                None => {
-                    let intra = self.intra_target(end)?;
-                    self.intra(&mut gop, end, intra)?;
-                }
-                Some(reference) => {
-                    let target = self.target(end)?;
-                    verdict = self.predicted(&mut gop, end, &role, first + reference, &target)?;
-                    if verdict != Verdict::Predicted {
-                        break;
-                    }
-                }
-            }
-            end += 1;
-            progress(end, self.source.len());
-        }
+        let (end, verdict) = self.others(&mut gop, (first + 1, last), progress)?;
         gop.header = self.header(end - first);
-        if end == first + 1 && verdict != Verdict::Predicted {
-            end = self.intra_run(&mut gop, (end, last), verdict, progress)?;
+        if end == first + 1 && (verdict != Verdict::Predicted || self.is_rest(first)) {
+            (*self.report, self.looked_at) = before;
+            return self.intra_run((first, last), verdict, progress);
+        }
+        if self.is_doubtful(&before.0, &gop) {
+            let after = (self.report.clone(), self.looked_at);
+            (*self.report, self.looked_at) = before;
+            let mut alone = self.alone(first, last)?;
+            for number in first + 1..end {
+                let intra = self.intra_target(number)?;
+                self.intra(&mut alone, number, intra)?;
+            }
+            alone.header = GopHeader::intra(self.writer.gops(), end - first);
+            match alone.bytes() < gop.bytes() {
+                true => gop = alone,
+                false => (*self.report, self.looked_at) = after,
+            }
         }
         self.write(&mut gop)?;
         Ok(end)
     }
 
-    /// Goes on with I frames in a GOP of which the first frame alone has been coded, and gives the frame after it.
+    /// Codes the frames of a GOP after its first, as far as they can be predicted, and gives the frame after them.
+    fn others(
+        &mut self,
+        gop: &mut Gop,
+        (second, last): (u32, u32),
+        progress: Progress<'_>,
+    ) -> Result<(u32, Verdict), Error> {
+        progress(second, self.source.len());
+        for number in second..last {
+            let role = gop.header.role(number - gop.first);
+            match role.reference {
+                None => {
+                    let intra = self.intra_target(number)?;
+                    self.intra(gop, number, intra)?;
+                }
+                Some(reference) => {
+                    let target = self.target(number)?;
+                    let verdict = self.predicted(gop, number, &role, gop.first + reference, &target)?;
+                    if verdict != Verdict::Predicted {
+                        return Ok((number, verdict));
+                    }
+                }
+            }
+            progress(number + 1, self.source.len());
+        }
+        Ok((last, Verdict::Predicted))
+    }
+
+    /// Whether a frame is what is left of a sequence that may predict frames.
+    fn is_rest(&self, first: u32) -> bool {
+        let may_predict = self.settings.temporal_layers() > 0 && self.settings.gop > 1;
+        may_predict && first > 0 && first + 1 == self.source.len()
+    }
+
+    /// Whether the frames of a GOP might take fewer bits if each stood for itself. `before`: what was written before it.
+    fn is_doubtful(&self, before: &Report, gop: &Gop) -> bool {
+        let frames = self.report.coded.iter().skip(before.coded.len());
+        let predicted = frames.filter(|frame| frame.frame_type != FrameType::Intra);
+        let (bytes, gaussians) =
+            predicted.fold((0, 0), |sum, frame| (sum.0 + frame.bytes, sum.1 + u64::from(frame.gaussians)));
+        let is_trained_with = self.recorder.is_some() || !self.settings.tools.survivors;
+        !is_trained_with && bytes as f64 > DOUBTFUL * gop.intra_bytes * gaussians as f64
+    }
+
+    /// A GOP of I frames in one layer: its first frame.
+    fn alone(&mut self, first: u32, last: u32) -> Result<Gop, Error> {
+        self.ranking.start_gop();
+        let intra = self.intra_target(first)?;
+        let mut gop = self.start(first, last - first, &intra)?;
+        gop.header = GopHeader::intra(self.writer.gops(), last - first);
+        gop.in_one_layer = true;
+        self.intra(&mut gop, first, intra)?;
+        Ok(gop)
+    }
+
+    /// Codes a GOP of I frames, where the second could not be predicted from the first, and gives the frame after it.
     ///
     /// Frames that share little are I frames until two share much again, which begins a GOP; those of which the
     /// differences are dear are I frames as far as the GOP goes.
     fn intra_run(
         &mut self,
-        gop: &mut Gop,
-        (second, last): (u32, u32),
+        (first, last): (u32, u32),
         verdict: Verdict,
         progress: Progress<'_>,
     ) -> Result<u32, Error> {
-        gop.header = GopHeader::intra(self.writer.gops(), last - gop.first);
-        gop.references.fill_with(|| None);
-        let mut end = second;
-        let mut next = (verdict == Verdict::Unlike).then(|| self.target(second)).transpose()?;
+        let mut gop = self.alone(first, last)?;
+        let mut end = first + 1;
+        let mut next = (verdict == Verdict::Unlike).then(|| self.target(end)).transpose()?;
         while end < last {
             if let Some(target) = next.take()
                 && end + 1 < last
@@ -177,11 +230,12 @@ impl SequenceCoder<'_, '_> {
                 next = Some(after);
             }
             let intra = self.intra_target(end)?;
-            self.intra(gop, end, intra)?;
+            self.intra(&mut gop, end, intra)?;
             end += 1;
             progress(end, self.source.len());
         }
-        gop.header = GopHeader::intra(self.writer.gops(), end - gop.first);
+        gop.header = GopHeader::intra(self.writer.gops(), end - first);
+        self.write(&mut gop)?;
         Ok(end)
     }
 
@@ -211,6 +265,7 @@ impl SequenceCoder<'_, '_> {
             steadiness: None,
             is_open: false,
             has_learned: false,
+            in_one_layer: false,
         })
     }
 
@@ -281,6 +336,7 @@ impl SequenceCoder<'_, '_> {
                 order,
                 rows: &target.rows,
                 row_count: target.row_count,
+                in_one_layer: gop.in_one_layer,
             },
         )?;
         let role = FrameRole { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
@@ -292,7 +348,7 @@ impl SequenceCoder<'_, '_> {
         }
         if is_predicted {
             gop.start_with(number, coded, self.sequence.whole_anchor());
-        } else if self.network.is_none() {
+        } else if self.network.is_none() && !gop.in_one_layer {
             self.write(gop)?;
         }
         Ok(())
@@ -402,6 +458,11 @@ impl SequenceCoder<'_, '_> {
 }
 
 impl Gop {
+    /// Bytes of its units so far.
+    fn bytes(&self) -> usize {
+        self.units.iter().map(|(_, payload)| UnitHeader::SIZE + payload.len()).sum()
+    }
+
     /// Keeps the I frame of a predicted GOP.
     fn start_with(&mut self, number: u32, coded: CodedFrame, whole_anchor: bool) {
         if whole_anchor {

@@ -4,6 +4,7 @@
 //! with those [near it](nearest), cheapest pair first. Nothing depends on threads or on the order of a hash table.
 
 mod nearest;
+mod order;
 
 use crate::settings::Steps;
 pub(crate) use nearest::{CLOSE, LIMIT, Link, Reach, features, links};
@@ -81,6 +82,10 @@ impl Cloud<'_> {
     }
 }
 
+/// By how much attributes of one Gaussian may differ, in units: what is unlike does not depend on how finely it is coded.
+const UNLIKE: Steps =
+    Steps { position_bits: 13.4, log_scale: 0.12, rotation: 0.02, opacity: 0.14, dc: 0.074, sh: 0.08 };
+
 /// In what units attributes are compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Measure {
@@ -90,6 +95,18 @@ pub(crate) struct Measure {
     pub(crate) steps: Steps,
     /// Quantiser steps that attributes of one Gaussian may differ by.
     pub(crate) same: f32,
+}
+
+impl Measure {
+    /// The units in which attributes are compared where they are coded with these steps: a reference has their errors.
+    pub(crate) fn steps_beside(coded: &Steps) -> Steps {
+        Steps {
+            log_scale: UNLIKE.log_scale.max(coded.log_scale),
+            opacity: UNLIKE.opacity.max(coded.opacity),
+            dc: UNLIKE.dc.max(coded.dc),
+            ..UNLIKE
+        }
+    }
 }
 
 /// How far rows keep their meaning.

@@ -51,6 +51,8 @@ pub struct Report {
     pub target: Option<TargetReport>,
     /// Gaussians left out because a value of theirs is not finite, by frame.
     pub dropped: Vec<Dropped>,
+    /// Whether each frame stands for itself in one layer although frames might have been predicted: that is smaller.
+    pub stands_alone: bool,
 }
 
 impl Report {

@@ -13,7 +13,7 @@ use crate::report::{Report, TargetReport};
 use crate::secant::Secant;
 use crate::settings::{Settings, Size, Steps};
 use crate::source::FrameSource;
-use crate::stream::{Progress, encode_once};
+use crate::stream::{Progress, encode_once, encode_smaller};
 use splatstream_format::syntax::FrameType;
 use splatstream_scene::GaussianFrame;
 use std::io::Write;
@@ -239,8 +239,7 @@ impl Seeker<'_> {
     fn whole(&mut self, fitted: f64) -> Result<Encoded, Error> {
         self.encodings += 1;
         let (settings, ranking) = (self.fitting.at(fitted), self.fitting.ranking.clone());
-        let mut bytes = Vec::new();
-        let report = encode_once(self.source, &settings, ranking, &mut bytes, self.progress)?;
+        let (bytes, report) = encode_smaller(self.source, &settings, ranking, self.progress)?;
         Ok(Encoded { fitted, bytes, report })
     }
 

@@ -150,3 +150,27 @@ fn invalid_gaussians_are_left_out_and_the_others_stay_tracked() {
         assert!(psnr(&report) > 30.0);
     }
 }
+
+/// Frames that have nothing in common.
+fn strangers(frames: u32) -> Vec<GaussianFrame> {
+    let frame =
+        |seed| BuiltinScene { gaussians: 500, seed, sh_degree: 0, ..BuiltinScene::default() }.frame(0);
+    (0..frames).map(|number| frame(u64::from(number))).collect()
+}
+
+#[test]
+fn no_sequence_is_larger_than_all_intra() {
+    let wanted = Settings { psnr: Some(45.0), ..fast() };
+    let structure = Structure::Predicted { layers: 2 };
+    let layered = Settings { structure, spatial_layers: 3, ..wanted.clone() };
+    let (alone, intra) = encoded(strangers(4), &wanted);
+    assert!(!intra.stands_alone);
+    let (bytes, report) = encoded(strangers(4), &layered);
+    assert!(report.stands_alone);
+    // Steps are fitted to the first frames, of which there are more here: a decibel takes about 5 % of the bytes.
+    let finer = psnr(&report) - psnr(&intra);
+    let most = 1.01 * alone.len() as f64 * (0.05 * finer.max(0.0)).exp();
+    assert!(bytes.len() as f64 <= most, "{} and {}, {finer} dB better", bytes.len(), alone.len());
+    let (_, report) = encoded(sequence(4), &layered);
+    assert!(!report.stands_alone && report.coded.iter().any(|frame| frame.frame_type != FrameType::Intra));
+}

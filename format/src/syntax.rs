@@ -25,7 +25,7 @@ mod weights;
 
 pub use codebook::CodebookHeader;
 pub use end::EndOfStream;
-pub use file_header::{FileHeader, Profile, SIGNATURE};
+pub use file_header::{FileHeader, Profile, SIGNATURE, SPECIFICATION};
 pub use frame_header::{FrameHeader, FrameType, NO_TRANSFORM};
 pub use gop_header::{FrameRole, GopHeader};
 pub use increment::{IncrementHeader, ListSizes, MAX_ATTRIBUTE_STEP, MAX_NEIGHBOURS, NO_PREDICTOR};

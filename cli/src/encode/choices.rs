@@ -136,7 +136,11 @@ fn layers(report: &Report, settings: &Settings) -> Option<Choice> {
     if report.coded.is_empty() {
         return None;
     }
-    let temporal = match settings.structure {
+    let (spatial, structure) = match report.stands_alone {
+        true => (1, Structure::Intra),
+        false => (settings.spatial_layers, settings.structure),
+    };
+    let temporal = match structure {
         Structure::Intra => "every frame by itself".to_owned(),
         Structure::Predicted { layers } => format!("{layers} temporal"),
     };
@@ -154,7 +158,7 @@ fn layers(report: &Report, settings: &Settings) -> Option<Choice> {
     };
     let types = [FrameType::Intra, FrameType::Predicted, FrameType::Enhancement];
     let costs: Vec<String> = types.into_iter().filter_map(of_type).collect();
-    Some(Choice::new("layers", format!("{} spatial, {temporal}", settings.spatial_layers), costs.join(", ")))
+    Some(Choice::new("layers", format!("{spatial} spatial, {temporal}"), costs.join(", ")))
 }
 
 /// What became of the Gaussians of references.

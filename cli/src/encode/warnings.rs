@@ -150,6 +150,11 @@ fn pulses(report: &Report) -> Option<Warning> {
 
 /// A sequence in which hardly any frame can be predicted.
 fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
+    if report.stands_alone {
+        let message = "no layers, and every frame by itself: frames have too little in common with the ones before to be \
+                       predicted for fewer bytes; --all-intra does the same, and faster";
+        return Some(Warning::new("short-gops", message.to_owned()));
+    }
     let asked = (report.frames as usize).div_ceil(settings.gop.max(1) as usize);
     let count = report.gops.len();
     (count > 2 * asked && 2 * count > report.frames as usize).then(|| {

@@ -4,6 +4,7 @@ use crate::digest;
 use crate::error::{Error, Result};
 use crate::report::summary::counted;
 use crate::vector::{Kind, Mode, SCHEMA, Vector};
+use splatstream_format::syntax::SPECIFICATION;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -43,7 +44,8 @@ impl Suite {
     /// Reads a folder of vectors, or the folder that holds it as `vectors`. Every stream is compared with its record.
     ///
     /// # Errors
-    /// The folder does not exist or has no vectors; a record cannot be understood or contradicts its folder or its stream.
+    /// The folder does not exist or has no vectors; they are for another specification; a record cannot be understood or
+    /// contradicts its folder or its stream.
     pub fn read(folder: &Path) -> Result<Self> {
         let inner = folder.join("vectors");
         let (root, vectors) = match inner.is_dir() {
@@ -63,6 +65,13 @@ impl Suite {
         }
         suite.check_names(vectors)?;
         suite.read_version(&root.join("VERSION"));
+        if let Some(other) = suite.specification.as_deref().filter(|&other| other != SPECIFICATION) {
+            let message = format!(
+                "these vectors are for specification {other}, and this program tests decoders of {SPECIFICATION}: take \
+                 both from the same release"
+            );
+            return Err(Error::content(folder, message));
+        }
         suite.compare_manifest(&root.join("MANIFEST"));
         Ok(suite)
     }

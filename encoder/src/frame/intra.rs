@@ -36,6 +36,8 @@ pub(crate) struct IntraTarget<'a> {
     /// Row of each Gaussian in its file, and rows of the file.
     pub(crate) rows: &'a [u32],
     pub(crate) row_count: u32,
+    /// Whether the lowest spatial layer holds everything, and those above add nothing.
+    pub(crate) in_one_layer: bool,
 }
 
 /// An I frame being coded.
@@ -61,7 +63,7 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> Res
     let percents = &sequence.refinement_percent[..refinements];
     let mut intra = Intra {
         coder,
-        ladder: Ladder::new(sequence.spatial_layer_count, percents),
+        ladder: Ladder::new(if target.in_one_layer { 1 } else { sequence.spatial_layer_count }, percents),
         target,
         lists: vec![GaussianList::empty(sh_planes); refinements],
         members: vec![Vec::new(); refinements],

@@ -15,21 +15,27 @@ const VIEWS: usize = 3;
 const LINES: u32 = 180;
 
 /// How far the pictures of predicted frames may be below those of the I frame, dB: beyond the first of these a bit
-/// becomes cheaper, up to the second dearer.
+/// becomes cheaper, up to the second dearer. A decibel would be seen as a pulse; what is left saves bits.
 const FAR: f64 = 0.6;
-const NEAR: f64 = 0.3;
+const NEAR: f64 = 0.35;
 
-/// The price of the first predicted frame, by how much it changes from frame to frame, and how far it may.
-const FIRST: f32 = 0.7;
+/// How much of the mean of the frames so far a frame replaces: single frames are easier or harder than others.
+const FRESH: f64 = 0.5;
+
+/// The price of the first predicted frame, by how much it changes from frame to frame, and how far it may: below the least
+/// nothing more is sent, above the most more bits are saved by coarser steps.
+const FIRST: f32 = 1.0;
 const CHEAPER: f32 = 0.6;
 const DEARER: f32 = 1.25;
-const LEVELS: core::ops::RangeInclusive<f32> = 1.0 / 32.0..=2.0;
+const LEVELS: core::ops::RangeInclusive<f32> = 0.125..=3.0;
 
 /// The pictures of a GOP and the price that follows from them.
 pub(crate) struct Steadiness {
     cameras: Vec<Camera>,
     /// PSNR of the I frame, dB.
     of_intra: f64,
+    /// How far predicted frames have been below it, dB: a mean in which late ones count more.
+    below: Option<f64>,
     level: f32,
 }
 
@@ -44,7 +50,7 @@ impl Steadiness {
         let stride = cameras.len().div_ceil(VIEWS).max(1);
         let small = |camera: &Camera| camera.scaled_to_height(LINES.min(camera.height));
         let cameras = cameras.iter().step_by(stride).map(small).collect();
-        let mut steadiness = Self { cameras, of_intra: 0.0, level: FIRST };
+        let mut steadiness = Self { cameras, of_intra: 0.0, below: None, level: FIRST };
         steadiness.of_intra = steadiness.psnr(target, coded, sequence);
         steadiness
     }
@@ -56,7 +62,9 @@ impl Steadiness {
 
     /// Looks at a predicted frame.
     pub(crate) fn follow(&mut self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) {
-        let below = self.of_intra - self.psnr(target, coded, sequence);
+        let now = self.of_intra - self.psnr(target, coded, sequence);
+        let below = self.below.map_or(now, |before| before + FRESH * (now - before));
+        self.below = Some(below);
         if below > FAR {
             self.level *= CHEAPER;
         } else if below < NEAR {

@@ -72,7 +72,8 @@ impl SequenceCoder<'_, '_> {
     }
 
     pub(super) fn measure(&self) -> Measure {
-        Measure { position_step: self.sequence.position_step(), steps: self.settings.steps, same: SAME }
+        let steps = Measure::steps_beside(&self.settings.steps);
+        Measure { position_step: self.sequence.position_step(), steps, same: SAME }
     }
 
     /// Whether frames of which no row keeps its meaning are true to their pictures. What a network is trained with is

@@ -25,6 +25,9 @@ const COMPARED: usize = 192;
 /// The most of them that it keeps as possible partners.
 const KEPT: usize = 6;
 
+/// What each doubling of a difference adds to its bits.
+const DOUBLING_BITS: f32 = 1.6;
+
 /// Beyond this logit Gaussians are opaque or invisible alike.
 const LOGIT: f32 = 7.0;
 
@@ -41,7 +44,7 @@ pub(crate) struct Reach {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Feature {
     /// Its index in its frame.
-    index: u32,
+    pub(super) index: u32,
     /// Grid steps.
     position: [f32; 3],
     /// Size in grid steps: the geometric mean of the two largest axes.
@@ -150,6 +153,13 @@ fn cost(from: &Feature, to: &Feature, radius: f32) -> f32 {
         return f32::INFINITY;
     }
     LIMIT * distance + ATTRIBUTE_WEIGHT * squares(&from.attributes, &to.attributes)
+}
+
+/// Bits that the differences of two Gaussians take, nearly.
+pub(super) fn apart_bits(from: &Feature, to: &Feature) -> f32 {
+    let bits = |(a, b): (&f32, &f32)| DOUBLING_BITS * libm::log2f(1.0 + (a - b).abs());
+    let position: f32 = from.position.iter().zip(&to.position).map(bits).sum();
+    position + from.attributes.iter().zip(&to.attributes).map(bits).sum::<f32>()
 }
 
 /// Possible partners of one Gaussian of the target, cheapest first.

@@ -219,3 +219,50 @@ fn threads_change_nothing() {
     };
     assert_eq!(with(1), with(3));
 }
+
+/// A frame without some of the rows, and another without others, in which a fifth of the Gaussians fade in: as captures are
+/// written that leave out what cannot be seen.
+fn thinned(scene: &Scene) -> (Scene, Scene, Vec<usize>, Vec<usize>) {
+    let count = scene.opacity.len();
+    let without = |every: usize| -> Vec<usize> { (0..count).filter(|row| row % every != 3).collect() };
+    let (before, after) = (without(37), without(23));
+    let mut faded = scene.clone().noisy(0, 5);
+    faded.opacity.iter_mut().step_by(5).for_each(|opacity| *opacity += 5.0);
+    (scene.select(&before), faded.select(&after), before, after)
+}
+
+#[test]
+fn rows_that_shift_but_keep_their_order_match() {
+    let (reference, target, before, after) = thinned(&Scene::random(2000, 4));
+    let mut matching = matched(&reference, &target);
+    let found = |matching: &Matching| {
+        let same =
+            |&(from, to): &(usize, &Option<u32>)| to.is_some_and(|to| after[to as usize] == before[from]);
+        matching.target_of.iter().enumerate().filter(same).count()
+    };
+    let by_place = found(&matching);
+    matching.add_ordered(&reference.cloud(), &target.cloud(), &measure());
+    let both = before.iter().filter(|row| after.contains(row)).count();
+    assert!(by_place * 100 < both * 90, "{by_place} of {both}");
+    assert!(found(&matching) * 100 >= both * 99, "{} of {both}", found(&matching));
+    assert_eq!(matching.kind, Kind::Partly);
+}
+
+#[test]
+fn rows_in_another_order_are_left_alone() {
+    let scene = Scene::random(2000, 4);
+    let target = scene.clone().noisy(0, 5).select(&shuffled(0, 2000, 6));
+    let mut matching = matched(&scene, &target);
+    let before = matching.clone();
+    matching.add_ordered(&scene.cloud(), &target.cloud(), &measure());
+    assert_eq!(matching, before);
+}
+
+#[test]
+fn what_is_unlike_does_not_depend_on_how_finely_it_is_coded() {
+    let fine = Measure::steps_beside(&Quality::VisuallyLossless.steps());
+    let finer = Steps { log_scale: 1e-4, opacity: 1e-4, dc: 1e-4, ..fine };
+    let coarse = Steps { opacity: 2.0, ..finer };
+    assert_eq!(Measure::steps_beside(&finer).log_scale, UNLIKE.log_scale);
+    assert_eq!(Measure::steps_beside(&coarse).opacity, 2.0);
+}

@@ -54,6 +54,8 @@ pub(crate) fn follow(
         }
     }
     let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
+    matching.add_ordered(&expected, target, measure);
+    let expected = Cloud { position: guess.each_ref().map(Vec::as_slice), ..*reference };
     matching.add_nearest(&expected, target, measure, REACH_OF_SURE, LIMIT);
     matching
 }

@@ -320,3 +320,21 @@ fn frames_of_which_pruning_leaves_nothing_are_empty() {
         assert_eq!(report.gaussians + report.invisible, 300);
     }
 }
+
+#[test]
+fn what_stands_alone_is_in_the_lowest_spatial_layer() {
+    let seeds = (0..3_u64).map(|seed| splatstream_scene::builtin::BuiltinScene {
+        gaussians: 300,
+        seed,
+        ..Default::default()
+    });
+    let frames: Vec<GaussianFrame> = seeds.map(|scene| scene.frame(0)).collect();
+    let layered = Settings { spatial_layers: 3, ..predicted(1) };
+    let (bytes, report) = coded(&frames, &layered, "strangers");
+    assert_eq!(types(&report), [FrameType::Intra; 3]);
+    let intra = Settings { structure: splatstream_encoder::Structure::Intra, spatial_layers: 1, ..layered };
+    let (alone, _) = encoded(frames, &intra);
+    // Units that add nothing have a header: three refinements in two more layers of three frames.
+    let headers = 3 * 3 * 2 * 100;
+    assert!(bytes.len() <= alone.len() + headers, "{} and {}", bytes.len(), alone.len());
+}

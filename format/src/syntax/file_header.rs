@@ -8,6 +8,8 @@ pub const SIGNATURE: [u8; 8] = [0x89, 0x47, 0x53, 0x53, 0x0D, 0x0A, 0x1A, 0x0A];
 
 /// The version that this crate reads and writes, 2.0 release candidate 3: 128 + 2, and the number of the candidate.
 const VERSION: (u8, u8) = (130, 3);
+/// The same as people write it; conformance suites name theirs so.
+pub const SPECIFICATION: &str = "2.0-rc.3";
 /// Levels of annex A.
 const LEVELS: core::ops::RangeInclusive<u8> = 1..=4;
 /// `header_crc` itself, which it does not cover.
