@@ -25,11 +25,13 @@ pub(crate) struct Case {
 
 type Make = fn(u8, &Limits) -> Case;
 
-pub(crate) const ALL: [(&str, Make); 16] = [
+pub(crate) const ALL: [(&str, Make); 18] = [
     ("static", of_intra_frames),
     ("codebooks", codebooks),
     ("layers", spatial_layers),
     ("parents", parents),
+    ("move-neighbours", |level, limits| moved(level, limits, &[100])),
+    ("move-neighbours-10", |level, limits| moved(level, limits, &TENTHS)),
     ("replaced", |level, limits| replaced(level, limits, 0, &[100])),
     ("neighbours", |level, limits| replaced(level, limits, 2, &[100])),
     ("neighbours-10", |level, limits| replaced(level, limits, 2, &TENTHS)),
@@ -53,12 +55,16 @@ const CARRIED: u64 = 28;
 /// Parents that are moved and changed.
 const MODE_BOTH: i32 = 3;
 const MODE_REMOVED: i32 = 4;
+/// Parents that are moved only, and the move predictor that looks for neighbours.
+const MODE_MOVED: i32 = 1;
+const NEIGHBOURS_OF_MOVES: i32 = 2;
 
 /// A section in which every Gaussian is like the others.
 fn section(section: Section, count: u32, mode: i32, predictor: i32) -> SectionBytes {
     constant((section, SH), count, BLOCK_LOG2, |plane: PlaneInfo| match plane.attribute {
         Attribute::Mode => mode,
         Attribute::Predictor => predictor,
+        Attribute::MovePredictor => NEIGHBOURS_OF_MOVES,
         Attribute::Move | Attribute::Position => 0,
         _ => 1,
     })
@@ -156,6 +162,27 @@ fn parents(level: u8, limits: &Limits) -> Case {
         writer.increment(frame, (0, 0), changed(n), |kind, count| section(kind, count, MODE_BOTH, 0));
     }
     case(writer, limits, frames, (59 * u64::from(n), "symbols"), 2 * (EXACT + CARRIED) * u64::from(n))
+}
+
+/// P frames that move every Gaussian of the one before, as its neighbours moved. All Gaussians are at one position.
+fn moved(level: u8, limits: &Limits, percents: &[u8]) -> Case {
+    let n = limits.max_gaussians;
+    let frames = 3;
+    let mut writer = Writer::new(Profile::Dynamic, level, sequence(1, 1, percents, BLOCK_LOG2));
+    writer.gop(0, GopHeader::predicted(0, frames, 0));
+    anchor(&mut writer, n);
+    for frame in 1..frames {
+        writer.frame(frame, n, None, None);
+        for r in 0..writer.sequence.refinement_count {
+            let count = writer.sequence.refinement_length(r, n);
+            let plain = IncrementHeader::PLAIN;
+            let header =
+                IncrementHeader { parent_count: count, move_count: count, move_block_log2: 16, ..plain };
+            writer.increment(frame, (0, r), header, |kind, count| section(kind, count, MODE_MOVED, 0));
+        }
+    }
+    let memory = 2 * (EXACT + CARRIED) * u64::from(n);
+    case(writer, limits, frames - 1, (32 * u64::from(n), "distances"), memory)
 }
 
 /// P frames that replace every Gaussian of the one before by a predicted one. All Gaussians are at one position.
