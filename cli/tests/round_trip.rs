@@ -28,14 +28,17 @@ fn what_is_decoded_is_close_to_what_was_encoded() {
     assert_eq!(report["gaussians"], encoded["gaussians"]);
     assert_eq!(files(&decoded).len(), 3);
     for other in [&stream, &decoded] {
-        let views = ["--cameras", "ring:3", "--height", "270"];
+        let height = encoded["view_height"].to_string();
+        let views = ["--cameras", "ring:3", "--height", &height];
         let compared = json(&[&["compare", text(&frames), text(other)][..], &views].concat());
         assert_eq!(compared["frames"], 3);
         let mean = |attribute: &str| compared["attributes"][attribute]["rmse"].as_f64().unwrap();
         // Steps follow what pictures show: a Gaussian that hardly shows may be farther off than the mean.
         assert!(mean("position") <= 0.02, "{}", mean("position"));
         let psnr = compared["psnr_db"].as_f64().unwrap();
-        assert!(psnr >= 55.0, "{psnr}");
+        // Other views than those of the encoder: how much of a picture the scene fills changes the PSNR.
+        let verified = encoded["psnr_db"].as_f64().unwrap();
+        assert!(verified >= 56.5 && psnr >= verified - 3.0, "{psnr} and {verified} dB");
     }
 }
 

@@ -13,6 +13,7 @@ use splatstream_conformance::result::CaseResult;
 use splatstream_conformance::run::{Settings, run};
 use splatstream_conformance::session::Decoder;
 use splatstream_conformance::suite::Suite;
+use splatstream_format::syntax::SPECIFICATION;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -80,7 +81,7 @@ impl Vectors {
     /// Adds VERSION and MANIFEST: version 9 of a suite.
     pub(crate) fn seal(&self) {
         let suite = self.suite();
-        fs::write(self.around.path().join("VERSION"), "9\n1.0\n").unwrap();
+        fs::write(self.around.path().join("VERSION"), format!("9\n{SPECIFICATION}\n")).unwrap();
         let manifest = format!("{}\n{}\n", suite.vectors.len(), suite.sha256());
         fs::write(self.around.path().join("MANIFEST"), manifest).unwrap();
     }
