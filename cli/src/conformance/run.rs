@@ -32,8 +32,8 @@ use std::time::Duration;
     Exit codes: 0 every case passed that the decoder claims, 1 files or settings, 2 usage,\n\
     3 some case failed, or an expectation no longer holds, 130 interrupted.")]
 pub(super) struct Run {
-    /// The command of the decoder, once a case: {in} is the stream, {out} an empty folder, {op} like s0,t0,r2, {mode} full
-    /// or subset. Both paths are absolute. It is split as a shell would; no shell runs, so write sh -c '...' for pipes.
+    /// The command of the decoder, once a case: {in} is the stream, {out} an empty folder, {op} like s0,t0,r2, {mode} full,
+    /// subset or inside. Both paths are absolute. It is split as a shell would; no shell runs, so write sh -c '...' for pipes.
     #[arg(long, value_name = "CMD", conflicts_with = "stdio")]
     decoder: Option<String>,
     /// The command of a decoder that answers many cases, line by line; --jobs N starts N of them.
