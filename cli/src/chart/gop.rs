@@ -73,10 +73,18 @@ pub(crate) struct Level {
     pub(crate) subset: Subset,
 }
 
-/// The settings of the GOP: those of the baseline, with the structure of the paper's experiment.
+/// The settings of the GOP: those of the baseline, with the structure of the paper's experiment, whatever would be
+/// smaller for the quality.
 pub(crate) fn settings(baseline: Settings, frames: u32) -> Settings {
     let structure = Structure::Predicted { layers: TEMPORAL };
-    Settings { structure, anchor: Anchor::Whole, spatial_layers: SPATIAL, gop: frames, ..baseline }
+    Settings {
+        structure,
+        anchor: Anchor::Whole,
+        spatial_layers: SPATIAL,
+        gop: frames,
+        psnr: None,
+        ..baseline
+    }
 }
 
 /// Whether a scene has a second frame in its first GOP.

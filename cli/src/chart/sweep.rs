@@ -66,9 +66,10 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
-    /// The settings at a quality.
+    /// The settings at a quality: fitted to the scene, as `encode` does.
     pub(crate) fn at(&self, quality: QualityName) -> Settings {
-        Settings { steps: Quality::from(quality).steps(), ..self.settings.clone() }
+        let quality = Quality::from(quality);
+        Settings { steps: quality.steps(), psnr: Some(quality.decibels()), ..self.settings.clone() }
     }
 }
 
