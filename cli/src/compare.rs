@@ -10,6 +10,7 @@ use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::numbers::grouped;
+use crate::output_file::STANDARD;
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::{Args, ValueEnum};
@@ -32,7 +33,7 @@ use std::path::{Path, PathBuf};
     splatstream compare garden.ply garden.gss --match nearest --json\n  \
     splatstream compare garden.ply garden.gss --cameras ring:8 --height 1080")]
 pub(crate) struct Compare {
-    /// A stream, a scene, or a directory of frames.
+    /// A stream, a scene, or a directory of frames; - is a stream on standard input.
     a: PathBuf,
     /// Another.
     b: PathBuf,
@@ -80,6 +81,9 @@ struct Report {
 impl Compare {
     /// Compares frame by frame; frames that only one side has are counted and left alone.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        if [&self.a, &self.b].iter().all(|path| path.as_path() == Path::new(STANDARD)) {
+            return Err(Failure::Usage("only one of A and B can be standard input".to_owned()));
+        }
         let limits = self.limits.limits();
         let (opened_a, opened_b) = (Opened::open(&self.a)?, Opened::open(&self.b)?);
         let (mut frames_a, mut frames_b) = (opened_a.frames(&limits, None)?, opened_b.frames(&limits, None)?);

@@ -4,8 +4,10 @@
 //! no panic.
 
 use crate::failure::Failure;
+use crate::output_file::is_standard;
 use serde::Serialize;
 use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::Path;
 
 /// Where results and complaints go.
 pub(crate) struct Console {
@@ -34,6 +36,32 @@ impl Console {
             output.push('\n');
         }
         written(io::stdout().lock().write_all(output.as_bytes()))
+    }
+
+    /// Refuses JSON and a file on standard output at once.
+    pub(crate) fn claim(&self, out: Option<&Path>) -> Result<(), Failure> {
+        match out {
+            Some(out) if self.json && is_standard(out) => Err(Failure::Usage(format!(
+                "{}: --json prints on standard output too; give a file, or leave --json out",
+                out.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// As [`Console::report`], for a command that writes to `out`: beside a file on standard output the report goes to
+    /// standard error.
+    pub(crate) fn report_beside(
+        &self,
+        out: Option<&Path>,
+        report: &impl Serialize,
+        text: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        if out.is_some_and(is_standard) {
+            self.complain(text().trim_end());
+            return Ok(());
+        }
+        self.report(report, text)
     }
 
     /// The same for a result of any length, which is written as it comes; JSON without indentation.

@@ -9,7 +9,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::progress::Progress;
 use crate::setting_names::{
     AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
@@ -40,10 +40,10 @@ use warnings::{Warning, warnings};
     splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small\n  \
     splatstream encode garden.ply -o garden.gss --target-mb 8")]
 pub(crate) struct Encode {
-    /// Files, or one directory of frames.
+    /// Files, or one directory of frames; - is one .ply, .spz or .sog file on standard input.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// The stream to write.
+    /// The stream to write; - is standard output.
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
     /// How much to search: smaller files take longer.
@@ -240,10 +240,14 @@ struct Encoded {
 impl Encode {
     /// Encodes to a file that appears when it is whole.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        console.claim(Some(&self.out))?;
+        check_stream_name(&self.out)?;
         let mut source = FrameFiles::find(&self.inputs)?.unchecked();
+        let inputs = self.read_files(&source);
+        // At once, and not after minutes of work.
+        refuse_inputs(&self.out, &inputs)?;
         let settings = self.settings(&mut source)?;
-        self.check_out(&source)?;
-        let mut file = OutputFile::create(&self.out)?;
+        let mut file = OutputFile::create(&self.out, &inputs)?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
         let report = encode(&mut source, &settings, &mut file, &mut |done, _| progress.at(done))
@@ -252,19 +256,20 @@ impl Encode {
         file.finish()?;
         let encoded = self.encoded(&report, &settings, &source, start.elapsed().as_secs_f64());
         encoded.warnings.iter().for_each(|warning| console.complain(&warning.text()));
-        console.report(&encoded, || encoded.text())
+        console.report_beside(Some(&self.out), &encoded, || encoded.text())
     }
 
-    /// Nobody wants a stream in the place of a frame.
-    fn check_out(&self, source: &FrameFiles) -> Result<(), Failure> {
-        let Ok(out) = self.out.canonicalize() else { return Ok(()) };
-        if source.paths().iter().any(|path| path.canonicalize().is_ok_and(|path| path == out)) {
-            let out = self.out.display();
-            return Err(Failure::Usage(format!(
-                "{out}: is a frame to encode; give another file for the stream"
-            )));
-        }
-        Ok(())
+    /// Every file that is read: frames, cameras, a network.
+    fn read_files(&self, source: &FrameFiles) -> Vec<PathBuf> {
+        let cameras = match &self.cameras {
+            Some(Views::File(path)) => Some(path),
+            _ => None,
+        };
+        let network = match &self.network {
+            Some(NetworkName::File(path)) => Some(path),
+            _ => None,
+        };
+        source.paths().iter().chain(cameras).chain(network).cloned().collect()
     }
 
     fn settings(&self, source: &mut FrameFiles) -> Result<Settings, Failure> {
@@ -351,7 +356,7 @@ impl Encode {
             Error::Source { source, .. } => Failure::other(source.to_string()),
             Error::Invalid { frame, count, first } => {
                 let Defect { row, property, value, kind } = first;
-                let path = source.paths().get(*frame as usize).unwrap_or(&self.out).display();
+                let path = source.name(*frame);
                 let more = match count - 1 {
                     0 => String::new(),
                     more => format!(
@@ -366,20 +371,13 @@ impl Encode {
             }
             Error::TooManyGaussians { frame, .. }
             | Error::TooManyPerSecond { frame, .. }
-            | Error::OutOfGrid { frame, .. } => {
-                let path = source.paths().get(*frame as usize).unwrap_or(&self.out);
-                Failure::other(format!("{}: {error}", path.display()))
-            }
+            | Error::OutOfGrid { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
             Error::Output(cause) => Failure::file("write", &self.out, cause),
             _ => Failure::other(error.to_string()),
         }
     }
 
     fn encoded(&self, report: &Report, settings: &Settings, source: &FrameFiles, seconds: f64) -> Encoded {
-        let path = |frame: u32| source.paths().get(frame as usize);
-        let name = |frame: u32| {
-            path(frame).map_or_else(|| format!("frame {frame}"), |path| path.display().to_string())
-        };
         Encoded {
             output: self.out.clone(),
             bytes: report.bytes,
@@ -391,7 +389,7 @@ impl Encode {
             dropped: report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum(),
             chosen: choices(report, settings),
             pictures: Pictures::of(report, settings, Goal::of(settings)),
-            warnings: warnings(report, settings, &name),
+            warnings: warnings(report, settings, &|frame| source.name(frame)),
             digests: report.digests.iter().copied().map(hex_digest).collect(),
         }
     }

@@ -27,6 +27,7 @@ mod stream_file;
 mod structure;
 mod table;
 mod train;
+mod unfinished;
 mod validate;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};

@@ -5,7 +5,7 @@ use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::Opened;
 use crate::numbers::{FrameRange, grouped};
-use crate::output_file::{OutputFile, make_directory};
+use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::Args;
@@ -26,7 +26,7 @@ use std::time::Instant;
     splatstream render talk.gss --camera ring:4 -o pictures/ --op s0,t0,r0 --frames 0..1"
 )]
 pub(crate) struct Render {
-    /// A stream, a scene file, or a directory of frames.
+    /// A stream, a scene file, or a directory of frames; - is a stream on standard input.
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame. Default are the cameras
@@ -82,6 +82,7 @@ struct Picture {
 impl Render {
     /// Draws every frame from every camera.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        check_directory(&self.out, "pictures")?;
         let opened = Opened::open(&self.input)?;
         let limits = self.limits.limits();
         let description = opened.description(&limits).unwrap_or_default();

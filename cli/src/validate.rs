@@ -18,7 +18,7 @@ use std::path::PathBuf;
 #[command(after_help = "Example:\n  splatstream validate talk.gss && echo good\n\n\
     Exit codes: 0 accept, 10 malformed, 11 invalid, 12 unsupported, 13 over a limit, 14 truncated.")]
 pub(crate) struct Validate {
-    /// The stream.
+    /// The stream; - is standard input.
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
     #[command(flatten)]
