@@ -195,17 +195,19 @@ fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<(u32, Gaussia
 impl Report {
     fn text(&self) -> String {
         let side = |name, path: &Path, frames: u32, gaussians, errors: &[StreamFault]| {
-            let (path, frames, gaussians) = (path.display(), grouped(frames.into()), grouped(gaussians));
+            let (path, frames, gaussians) =
+                (path.display(), crate::numbers::frames(frames), grouped(gaussians));
             let errors = faults_text(errors);
-            format!("{name} {path}: {frames} frames, {gaussians} Gaussians in those compared\n{errors}")
+            format!("{name} {path}: {frames}, {gaussians} Gaussians in those compared\n{errors}")
         };
         let mut text = side("A", &self.a, self.frames_a, self.gaussians_a, &self.errors_a);
         text += &side("B", &self.b, self.frames_b, self.gaussians_b, &self.errors_b);
         let by_order = self.matched_by.iter().filter(|matching| **matching == Matching::Order).count() as u32;
         text += &format!(
-            "{} frames compared, {} pairs; {by_order} frames matched by order, {} by nearest position\n\n",
-            grouped(self.frames.into()),
+            "{} compared, {} pairs; {} matched by order, {} by nearest position\n\n",
+            crate::numbers::frames(self.frames),
             grouped(self.pairs),
+            crate::numbers::frames(by_order),
             self.frames - by_order,
         );
         text + &self.attributes.text() + &self.pictures.text()

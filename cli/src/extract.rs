@@ -5,9 +5,11 @@ use crate::failure::Failure;
 use crate::numbers::{grouped, percent};
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::stream_file::{LimitArgs, StreamFile};
+use crate::structure::{Frame, Structure};
 use clap::Args;
 use serde::Serialize;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::slice;
 
@@ -35,6 +37,14 @@ struct Report {
     op: String,
     bytes: u64,
     bytes_in: u64,
+    /// Frames in it, of those that the stream says it has.
+    frames: u32,
+    frames_in_stream: Option<u32>,
+    /// Frames that the stream says it has and that are not there; first and last of each run.
+    lost: Vec<(u32, u32)>,
+    /// Frames of which a unit that was written is damaged.
+    damaged: Vec<u32>,
+    complete: bool,
 }
 
 impl Extract {
@@ -48,20 +58,66 @@ impl Extract {
         stream.check_point(self.op, &limits)?;
         let extracted = extract(&stream.bytes, self.op, &limits).map_err(|error| stream.fault(error))?;
         OutputFile::write_apart(&self.out, slice::from_ref(&self.input), &extracted)?;
+        let (whole, part) = (Structure::of(&stream.bytes, &limits), Structure::of(&extracted, &limits));
+        let announced =
+            stream.sequence(&limits).map(|sequence| sequence.frame_count).filter(|&count| count > 0);
+        let lost = lost(&whole, announced.unwrap_or(0));
+        let damaged: Vec<u32> =
+            frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
         let report = Report {
             output: self.out.clone(),
             op: self.op.to_string(),
             bytes: extracted.len() as u64,
             bytes_in: stream.bytes.len() as u64,
+            frames: frames_of(&part).count() as u32,
+            frames_in_stream: announced,
+            complete: lost.is_empty() && damaged.is_empty() && part.error.is_none() && announced.is_some(),
+            lost,
+            damaged,
         };
         console.report_beside(Some(&self.out), &report, || report.text())
     }
+}
+
+fn frames_of(structure: &Structure) -> impl Iterator<Item = &Frame> {
+    structure.gops.iter().flat_map(|gop| &gop.frames)
+}
+
+fn is_damaged(frame: &Frame) -> bool {
+    frame.span.damaged || frame.increments.iter().any(|increment| increment.span.damaged)
+}
+
+/// What a stream lacks of the frames that it announces.
+fn lost(whole: &Structure, announced: u32) -> Vec<(u32, u32)> {
+    let there: BTreeSet<u32> = frames_of(whole).map(|frame| frame.index).collect();
+    let mut next = 0;
+    let mut lost = Vec::new();
+    for index in there.into_iter().chain([announced]) {
+        if index > next {
+            lost.push((next, index - 1));
+        }
+        next = index.saturating_add(1);
+    }
+    lost
 }
 
 impl Report {
     fn text(&self) -> String {
         let share = percent(self.bytes, self.bytes_in);
         let (bytes, all) = (grouped(self.bytes), grouped(self.bytes_in));
-        format!("{}: {}, {bytes} of {all} bytes ({share:.1} %)", self.output.display(), self.op)
+        let of_stream = self.frames_in_stream.map_or_else(String::new, |count| format!(" of {count}"));
+        let mut text = format!(
+            "{}: {}, {}{of_stream} frames, {bytes} of {all} bytes ({share:.1} %)\n",
+            self.output.display(),
+            self.op,
+            self.frames
+        );
+        for (first, last) in &self.lost {
+            text += &format!("  lost         frames {first}..={last}\n");
+        }
+        for frame in &self.damaged {
+            text += &format!("  damaged      frame {frame}\n");
+        }
+        text
     }
 }
