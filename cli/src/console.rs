@@ -3,21 +3,24 @@
 //! Output goes through `write!` and not `println!`: a reader that has gone away (`| head`) is no error and
 //! no panic.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureReport};
 use crate::output_file::is_standard;
 use serde::Serialize;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Where results and complaints go.
 pub(crate) struct Console {
     json: bool,
+    /// Whether there is JSON on standard output already: it is one value.
+    has_printed: AtomicBool,
 }
 
 impl Console {
     /// Results as JSON, or as text for people.
     pub(crate) fn new(json: bool) -> Self {
-        Self { json }
+        Self { json, has_printed: AtomicBool::new(false) }
     }
 
     /// Whether results are printed as JSON.
@@ -31,6 +34,7 @@ impl Console {
         report: &impl Serialize,
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
+        self.has_printed.store(true, Ordering::Relaxed);
         let mut output = if self.json { to_json(report)? } else { text() };
         if !output.is_empty() && !output.ends_with('\n') {
             output.push('\n');
@@ -70,6 +74,7 @@ impl Console {
         report: &impl Serialize,
         text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Failure> {
+        self.has_printed.store(true, Ordering::Relaxed);
         let mut out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
         let result = match self.json {
             true => {
@@ -78,6 +83,15 @@ impl Console {
             false => text(&mut out),
         };
         written(result.and_then(|()| out.flush()))
+    }
+
+    /// Says why a command failed; with `--json` also on standard output, unless a report is there that says it.
+    pub(crate) fn fail(&self, failure: &Failure) {
+        if self.json && !self.has_printed.load(Ordering::Relaxed) {
+            // Whoever reads neither is told by the exit code.
+            let _nobody_listens = self.report(&FailureReport::from(failure), String::new);
+        }
+        self.complain(&failure.to_string());
     }
 
     /// Writes to standard error. If nobody listens there, nobody can be told.

@@ -26,6 +26,8 @@ pub(crate) struct FrameFiles {
     as_is: bool,
     /// What came by standard input, until it is read.
     spooled: Option<Unfinished>,
+    /// The fewest and the most Gaussians of the frames read so far.
+    counts: Option<(usize, usize)>,
 }
 
 /// What standard input is called in messages.
@@ -52,7 +54,7 @@ impl FrameFiles {
             }
         };
         paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-        Ok(Self { paths, last: None, as_is: false, spooled })
+        Ok(Self { paths, last: None, as_is: false, spooled, counts: None })
     }
 
     /// Values are not checked.
@@ -63,6 +65,11 @@ impl FrameFiles {
     /// The files, in the order of the frames.
     pub(crate) fn paths(&self) -> &[PathBuf] {
         &self.paths
+    }
+
+    /// The fewest and the most Gaussians of the frames that were read.
+    pub(crate) fn counts(&self) -> (usize, usize) {
+        self.counts.unwrap_or_default()
     }
 
     /// What a frame is called in messages.
@@ -110,6 +117,8 @@ impl FrameSource for FrameFiles {
             None => Box::<dyn std::error::Error + Send + Sync>::from(error),
         };
         let frame = read(path, &ReadLimits::default()).map_err(name)?;
+        let (fewest, most) = self.counts.unwrap_or((frame.len(), frame.len()));
+        self.counts = Some((fewest.min(frame.len()), most.max(frame.len())));
         self.last = Some((number, frame.clone()));
         Ok(frame)
     }

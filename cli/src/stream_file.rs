@@ -50,7 +50,8 @@ impl StreamFile {
 
     /// A failure of this stream.
     pub(crate) fn fault(&self, error: Error) -> Failure {
-        Failure::stream(&self.path, error)
+        let is_scene = !self.bytes.starts_with(&SIGNATURE) && splatstream_scene::detect(&self.path).is_ok();
+        Failure::Stream { path: self.path.clone(), error, is_scene }
     }
 
     /// The first sequence parameters that are intact.
