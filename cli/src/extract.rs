@@ -9,6 +9,7 @@ use crate::structure::{Frame, Structure};
 use clap::Args;
 use serde::Serialize;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
+use splatstream_format::Limits;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::slice;
@@ -58,23 +59,7 @@ impl Extract {
         stream.check_point(self.op, &limits)?;
         let extracted = extract(&stream.bytes, self.op, &limits).map_err(|error| stream.fault(error))?;
         OutputFile::write_apart(&self.out, slice::from_ref(&self.input), &extracted)?;
-        let (whole, part) = (Structure::of(&stream.bytes, &limits), Structure::of(&extracted, &limits));
-        let announced =
-            stream.sequence(&limits).map(|sequence| sequence.frame_count).filter(|&count| count > 0);
-        let lost = lost(&whole, announced.unwrap_or(0));
-        let damaged: Vec<u32> =
-            frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
-        let report = Report {
-            output: self.out.clone(),
-            op: self.op.to_string(),
-            bytes: extracted.len() as u64,
-            bytes_in: stream.bytes.len() as u64,
-            frames: frames_of(&part).count() as u32,
-            frames_in_stream: announced,
-            complete: lost.is_empty() && damaged.is_empty() && part.error.is_none() && announced.is_some(),
-            lost,
-            damaged,
-        };
+        let report = Report::new(self, &stream, &extracted, &limits);
         console.report_beside(Some(&self.out), &report, || report.text())
     }
 }
@@ -102,6 +87,25 @@ fn lost(whole: &Structure, announced: u32) -> Vec<(u32, u32)> {
 }
 
 impl Report {
+    fn new(command: &Extract, stream: &StreamFile, extracted: &[u8], limits: &Limits) -> Self {
+        let (whole, part) = (Structure::of(&stream.bytes, limits), Structure::of(extracted, limits));
+        let announced = whole.sequence.map(|sequence| sequence.frame_count).filter(|&count| count > 0);
+        let lost = lost(&whole, announced.unwrap_or(0));
+        let damaged: Vec<u32> =
+            frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
+        Self {
+            output: command.out.clone(),
+            op: command.op.to_string(),
+            bytes: extracted.len() as u64,
+            bytes_in: stream.bytes.len() as u64,
+            frames: frames_of(&part).count() as u32,
+            frames_in_stream: announced,
+            complete: lost.is_empty() && damaged.is_empty() && part.error.is_none() && announced.is_some(),
+            lost,
+            damaged,
+        }
+    }
+
     fn text(&self) -> String {
         let share = percent(self.bytes, self.bytes_in);
         let (bytes, all) = (grouped(self.bytes), grouped(self.bytes_in));
