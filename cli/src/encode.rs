@@ -259,6 +259,7 @@ impl Encode {
             return each::run(self, console);
         }
         console.claim(Some(&self.out))?;
+        refuse_inputs(&self.out, &self.inputs)?;
         check_stream_name(&self.out)?;
         let encoded = self.one(console, &self.inputs, &self.out)?;
         console.report_beside(Some(&self.out), &encoded, || encoded.text())
