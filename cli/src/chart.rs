@@ -24,7 +24,7 @@ use crate::compare::pictures::read_weights;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::parse_frame_rate;
-use crate::output_file::{OutputFile, make_directory};
+use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use crate::setting_names::spelled;
 use clap::Args;
@@ -115,6 +115,7 @@ struct Charting<'a> {
 impl Chart {
     /// Measures every scene, then writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        check_directory(&self.out, "charts")?;
         if self.stability {
             return stability::run(self, console);
         }

@@ -10,6 +10,7 @@ use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::numbers::grouped;
+use crate::output_file::STANDARD;
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::{Args, ValueEnum};
@@ -32,7 +33,7 @@ use std::path::{Path, PathBuf};
     splatstream compare garden.ply garden.gss --match nearest --json\n  \
     splatstream compare garden.ply garden.gss --cameras ring:8 --height 1080")]
 pub(crate) struct Compare {
-    /// A stream, a scene, or a directory of frames.
+    /// A stream, a scene, or a directory of frames; - is a stream on standard input.
     a: PathBuf,
     /// Another.
     b: PathBuf,
@@ -80,6 +81,9 @@ struct Report {
 impl Compare {
     /// Compares frame by frame; frames that only one side has are counted and left alone.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        if [&self.a, &self.b].iter().all(|path| path.as_path() == Path::new(STANDARD)) {
+            return Err(Failure::Usage("only one of A and B can be standard input".to_owned()));
+        }
         let limits = self.limits.limits();
         let (opened_a, opened_b) = (Opened::open(&self.a)?, Opened::open(&self.b)?);
         let (mut frames_a, mut frames_b) = (opened_a.frames(&limits, None)?, opened_b.frames(&limits, None)?);
@@ -191,17 +195,19 @@ fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<(u32, Gaussia
 impl Report {
     fn text(&self) -> String {
         let side = |name, path: &Path, frames: u32, gaussians, errors: &[StreamFault]| {
-            let (path, frames, gaussians) = (path.display(), grouped(frames.into()), grouped(gaussians));
+            let (path, frames, gaussians) =
+                (path.display(), crate::numbers::frames(frames), grouped(gaussians));
             let errors = faults_text(errors);
-            format!("{name} {path}: {frames} frames, {gaussians} Gaussians in those compared\n{errors}")
+            format!("{name} {path}: {frames}, {gaussians} Gaussians in those compared\n{errors}")
         };
         let mut text = side("A", &self.a, self.frames_a, self.gaussians_a, &self.errors_a);
         text += &side("B", &self.b, self.frames_b, self.gaussians_b, &self.errors_b);
         let by_order = self.matched_by.iter().filter(|matching| **matching == Matching::Order).count() as u32;
         text += &format!(
-            "{} frames compared, {} pairs; {by_order} frames matched by order, {} by nearest position\n\n",
-            grouped(self.frames.into()),
+            "{} compared, {} pairs; {} matched by order, {} by nearest position\n\n",
+            crate::numbers::frames(self.frames),
             grouped(self.pairs),
+            crate::numbers::frames(by_order),
             self.frames - by_order,
         );
         text + &self.attributes.text() + &self.pictures.text()

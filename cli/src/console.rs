@@ -3,19 +3,24 @@
 //! Output goes through `write!` and not `println!`: a reader that has gone away (`| head`) is no error and
 //! no panic.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureReport};
+use crate::output_file::is_standard;
 use serde::Serialize;
 use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Where results and complaints go.
 pub(crate) struct Console {
     json: bool,
+    /// Whether there is JSON on standard output already: it is one value.
+    has_printed: AtomicBool,
 }
 
 impl Console {
     /// Results as JSON, or as text for people.
     pub(crate) fn new(json: bool) -> Self {
-        Self { json }
+        Self { json, has_printed: AtomicBool::new(false) }
     }
 
     /// Whether results are printed as JSON.
@@ -29,11 +34,38 @@ impl Console {
         report: &impl Serialize,
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
+        self.has_printed.store(true, Ordering::Relaxed);
         let mut output = if self.json { to_json(report)? } else { text() };
         if !output.is_empty() && !output.ends_with('\n') {
             output.push('\n');
         }
         written(io::stdout().lock().write_all(output.as_bytes()))
+    }
+
+    /// Refuses JSON and a file on standard output at once.
+    pub(crate) fn claim(&self, out: Option<&Path>) -> Result<(), Failure> {
+        match out {
+            Some(out) if self.json && is_standard(out) => Err(Failure::Usage(format!(
+                "{}: --json prints on standard output too; give a file, or leave --json out",
+                out.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// As [`Console::report`], for a command that writes to `out`: beside a file on standard output the report goes to
+    /// standard error.
+    pub(crate) fn report_beside(
+        &self,
+        out: Option<&Path>,
+        report: &impl Serialize,
+        text: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        if out.is_some_and(is_standard) {
+            self.complain(text().trim_end());
+            return Ok(());
+        }
+        self.report(report, text)
     }
 
     /// The same for a result of any length, which is written as it comes; JSON without indentation.
@@ -42,6 +74,7 @@ impl Console {
         report: &impl Serialize,
         text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Failure> {
+        self.has_printed.store(true, Ordering::Relaxed);
         let mut out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
         let result = match self.json {
             true => {
@@ -50,6 +83,15 @@ impl Console {
             false => text(&mut out),
         };
         written(result.and_then(|()| out.flush()))
+    }
+
+    /// Says why a command failed; with `--json` also on standard output, unless a report is there that says it.
+    pub(crate) fn fail(&self, failure: &Failure) {
+        if self.json && !self.has_printed.load(Ordering::Relaxed) {
+            // Whoever reads neither is told by the exit code.
+            let _nobody_listens = self.report(&FailureReport::from(failure), String::new);
+        }
+        self.complain(&failure.to_string());
     }
 
     /// Writes to standard error. If nobody listens there, nobody can be told.

@@ -21,7 +21,7 @@ use splatstream_format::syntax::SequenceParameters;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use target::{Format, Target};
+use target::{Format, Target, Wanted};
 
 /// Decode a stream to files of Gaussians.
 ///
@@ -33,12 +33,13 @@ use target::{Format, Target};
 #[command(after_help = "Examples:\n  splatstream decode talk.gss -o frames/\n  \
     splatstream decode talk.gss -o poster.ply --op s0,t0,r2 --frames 0..1\n  \
     splatstream decode talk.gss -o frames/ --frames 300..310\n  \
+    splatstream decode talk.gss -o - --frames 7..8 --format spz | wc -c\n  \
     splatstream decode talk.gss --dry-run --json")]
 pub(crate) struct Decode {
-    /// The stream.
+    /// The stream; - is standard input.
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
-    /// A directory for frame_0000.ply and so on, or a .ply, .spz or .splat file for one frame.
+    /// A directory for frame_0000.ply and so on, or a .ply, .spz or .splat file for one frame; - is standard output.
     #[arg(short, long = "out", value_name = "DIR_OR_FILE", required_unless_present = "dry_run")]
     out: Option<PathBuf>,
     /// The operating point: highest spatial layer, temporal layer and refinement; default is everything.
@@ -50,6 +51,9 @@ pub(crate) struct Decode {
     /// Format of the files; default is that of the file's name, or ply.
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// Remove frames of an earlier run from the directory: files that have the names that this command gives.
+    #[arg(long)]
+    force: bool,
     /// Show only the Gaussians of the operating point's units, not those that are carried from the I frame.
     #[arg(long)]
     subset: bool,
@@ -69,7 +73,7 @@ pub(crate) struct Decode {
 /// What has come out of the stream so far.
 struct Decoding<'a> {
     frames: FrameRange,
-    target: Option<&'a Target>,
+    target: Option<&'a mut Target>,
     progress: Progress,
     gaussians: u64,
     /// Gaussians of the frames before the first one asked for: decoded too.
@@ -84,6 +88,7 @@ struct Decoding<'a> {
 impl Decode {
     /// Decodes, writes, and reports; an error of the stream comes after what could be written.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        console.claim(self.out.as_deref())?;
         let stream = StreamFile::read(&self.input)?;
         let options = self.options();
         stream.check_point(options.operating_point, &options.limits)?;
@@ -93,8 +98,8 @@ impl Decode {
             let path = stream.path.display();
             return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));
         }
-        let target = self.target(frames.count_in(announced))?;
-        let mut decoding = Decoding::new(frames, target.as_ref(), announced);
+        let mut target = self.target(frames.count_in(announced))?;
+        let mut decoding = Decoding::new(frames, target.as_mut(), announced);
         let start = Instant::now();
         let seek = gop_of(&stream, frames.first, &options.limits);
         let summary = decoding.run(&stream.bytes, seek, &options);
@@ -106,7 +111,7 @@ impl Decode {
         let loss = Loss::new(&stream, announced, &options, &summary, frames);
         let report = Report { seek, ..self.report(decoding, loss, announced, total) };
         // Of a file that is no stream there is nothing to say but the error.
-        console.report(&report, || {
+        console.report_beside(self.out.as_deref(), &report, || {
             if report.frames > 0 || verdict.is_none() { report.text() } else { String::new() }
         })?;
         verdict.map_or(Ok(()), |error| Err(stream.fault(error)))
@@ -125,7 +130,9 @@ impl Decode {
 
     /// Where `frames` frames go; none for a dry run.
     fn target(&self, frames: u32) -> Result<Option<Target>, Failure> {
-        self.out.as_deref().map(|path| Target::new(path, self.format, frames)).transpose()
+        let wanted =
+            |path| Wanted { path, input: &self.input, format: self.format, frames, force: self.force };
+        self.out.as_deref().map(|path| Target::new(wanted(path))).transpose()
     }
 
     fn report(&self, decoding: Decoding<'_>, loss: Loss, announced: u32, total: Duration) -> Report {
@@ -161,7 +168,7 @@ impl Decode {
 }
 
 impl<'a> Decoding<'a> {
-    fn new(frames: FrameRange, target: Option<&'a Target>, announced: u32) -> Self {
+    fn new(frames: FrameRange, target: Option<&'a mut Target>, announced: u32) -> Self {
         Self {
             frames,
             target,
@@ -191,7 +198,7 @@ impl<'a> Decoding<'a> {
             self.count(sequence, &frame);
             let gaussians = to_gaussians(frame.into_shown(), sequence);
             let start = Instant::now();
-            self.failed = self.target.and_then(|target| target.write(number, &gaussians).err());
+            self.failed = self.target.as_mut().and_then(|target| target.write(number, &gaussians).err());
             self.writing += start.elapsed();
         } else {
             self.passed += frame.planes.len() as u64;

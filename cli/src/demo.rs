@@ -7,7 +7,7 @@ use crate::compare::{Match, compare_frames};
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
 use crate::numbers::bits_per_gaussian;
-use crate::output_file::{OutputFile, make_directory};
+use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::Args;
 use report::{Demonstration, Encoding, Point, Scene};
@@ -51,6 +51,7 @@ const STREAM: &str = "demo.gss";
 impl Demo {
     /// Makes, encodes, decodes, verifies, reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        check_directory(&self.out, "files of the demo")?;
         make_directory(&self.out)?;
         let tracking = if self.untracked { Tracking::Untracked } else { Tracking::Tracked };
         let scene = BuiltinScene {

@@ -1,6 +1,7 @@
 //! `splatstream encode`: frames in files to a stream.
 
 mod choices;
+mod each;
 mod pictures;
 pub(crate) mod warnings;
 
@@ -9,7 +10,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::progress::Progress;
 use crate::setting_names::{
     AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
@@ -25,10 +26,10 @@ use splatstream_format::payload::{Network, SceneDescription};
 use splatstream_render::Camera;
 use splatstream_scene::Defect;
 use std::convert::Infallible;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
-use warnings::{Warning, warnings};
+use warnings::{Warning, unlike_frames, warnings};
 
 /// Encode frames of Gaussians to a stream.
 ///
@@ -38,14 +39,18 @@ use warnings::{Warning, warnings};
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream encode frames/ -o talk.gss --fps 30\n  \
     splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small\n  \
-    splatstream encode garden.ply -o garden.gss --target-mb 8")]
+    splatstream encode garden.ply -o garden.gss --target-mb 8\n  \
+    splatstream encode garden.ply plant.spz talk/ --each -o streams/")]
 pub(crate) struct Encode {
-    /// Files, or one directory of frames.
+    /// Files, or one directory of frames; - is one .ply, .spz or .sog file on standard input.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// The stream to write.
+    /// The stream to write; - is standard output.
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
+    /// Every input is a scene of its own: encode each to a stream of its name in the directory OUT.
+    #[arg(long)]
+    each: bool,
     /// How much to search: smaller files take longer.
     #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
     preset: PresetName,
@@ -156,6 +161,16 @@ enum ImportanceName {
     Volume,
 }
 
+fn check_refinements(percents: &[u8]) -> Result<(), Failure> {
+    let is_rising = percents.is_sorted_by(|a, b| a < b) && percents.first() != Some(&0);
+    if is_rising && percents.len() <= 10 && percents.last() == Some(&100) {
+        return Ok(());
+    }
+    Err(Failure::Usage(
+        "--refinements takes 1 to 10 rising percentages, the last 100, as 10,20,50,100".to_owned(),
+    ))
+}
+
 fn parse_psnr(text: &str) -> Result<f32, String> {
     let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
     decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
@@ -240,31 +255,49 @@ struct Encoded {
 impl Encode {
     /// Encodes to a file that appears when it is whole.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
-        let mut source = FrameFiles::find(&self.inputs)?.unchecked();
+        if self.each {
+            return each::run(self, console);
+        }
+        console.claim(Some(&self.out))?;
+        refuse_inputs(&self.out, &self.inputs)?;
+        check_stream_name(&self.out)?;
+        let encoded = self.one(console, &self.inputs, &self.out)?;
+        console.report_beside(Some(&self.out), &encoded, || encoded.text())
+    }
+
+    /// Encodes one scene or sequence; warnings are said.
+    fn one(&self, console: &Console, inputs: &[PathBuf], out: &Path) -> Result<Encoded, Failure> {
+        let mut source = FrameFiles::find(inputs)?.unchecked();
+        let read = self.read_files(&source);
+        // At once, and not after minutes of work.
+        refuse_inputs(out, &read)?;
         let settings = self.settings(&mut source)?;
-        self.check_out(&source)?;
-        let mut file = OutputFile::create(&self.out)?;
+        let mut file = OutputFile::create(out, &read)?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
         let report = encode(&mut source, &settings, &mut file, &mut |done, _| progress.at(done))
-            .map_err(|error| self.failed(&source, &error))?;
+            .map_err(|error| failed(&source, out, &error))?;
         drop(progress);
         file.finish()?;
-        let encoded = self.encoded(&report, &settings, &source, start.elapsed().as_secs_f64());
+        let mut encoded = Encoded::new(out, &report, &settings, &source, start.elapsed().as_secs_f64());
+        if inputs.len() > 1 {
+            encoded.warnings.extend(unlike_frames(source.counts()));
+        }
         encoded.warnings.iter().for_each(|warning| console.complain(&warning.text()));
-        console.report(&encoded, || encoded.text())
+        Ok(encoded)
     }
 
-    /// Nobody wants a stream in the place of a frame.
-    fn check_out(&self, source: &FrameFiles) -> Result<(), Failure> {
-        let Ok(out) = self.out.canonicalize() else { return Ok(()) };
-        if source.paths().iter().any(|path| path.canonicalize().is_ok_and(|path| path == out)) {
-            let out = self.out.display();
-            return Err(Failure::Usage(format!(
-                "{out}: is a frame to encode; give another file for the stream"
-            )));
-        }
-        Ok(())
+    /// Every file that is read: frames, cameras, a network.
+    fn read_files(&self, source: &FrameFiles) -> Vec<PathBuf> {
+        let cameras = match &self.cameras {
+            Some(Views::File(path)) => Some(path),
+            _ => None,
+        };
+        let network = match &self.network {
+            Some(NetworkName::File(path)) => Some(path),
+            _ => None,
+        };
+        source.paths().iter().chain(cameras).chain(network).cloned().collect()
     }
 
     fn settings(&self, source: &mut FrameFiles) -> Result<Settings, Failure> {
@@ -283,6 +316,7 @@ impl Encode {
             layers if layers.is_sorted_by(|a, b| a < b) && layers.len() <= 4 => layers.len() as u8,
             _ => return Err(Failure::Usage("--layers takes 1 to 4 rising heights, as 540,720,1080".into())),
         };
+        check_refinements(&self.refinements)?;
         let structure = match sequence && !self.all_intra {
             true => Structure::Predicted { layers: self.temporal_layers },
             false => Structure::Intra,
@@ -342,46 +376,41 @@ impl Encode {
             ..SceneDescription::default()
         }
     }
+}
 
-    /// The encoder counts frames; a user has files.
-    fn failed(&self, source: &FrameFiles, error: &splatstream_encoder::Error) -> Failure {
-        use splatstream_encoder::Error;
-        match error {
-            // Errors of reading name the file.
-            Error::Source { source, .. } => Failure::other(source.to_string()),
-            Error::Invalid { frame, count, first } => {
-                let Defect { row, property, value, kind } = first;
-                let path = source.paths().get(*frame as usize).unwrap_or(&self.out).display();
-                let more = match count - 1 {
-                    0 => String::new(),
-                    more => format!(
-                        ", and {} more Gaussians of this frame have such values",
-                        grouped(more as u64)
-                    ),
-                };
-                Failure::other(format!(
-                    "{path}: frame {frame}, Gaussian {row}: {property} is {value}: {kind}{more}\n  \
-                     repair the file, or leave such Gaussians out with --drop-invalid"
-                ))
-            }
-            Error::TooManyGaussians { frame, .. }
-            | Error::TooManyPerSecond { frame, .. }
-            | Error::OutOfGrid { frame, .. } => {
-                let path = source.paths().get(*frame as usize).unwrap_or(&self.out);
-                Failure::other(format!("{}: {error}", path.display()))
-            }
-            Error::Output(cause) => Failure::file("write", &self.out, cause),
-            _ => Failure::other(error.to_string()),
+/// The encoder counts frames; a user has files.
+fn failed(source: &FrameFiles, out: &Path, error: &splatstream_encoder::Error) -> Failure {
+    use splatstream_encoder::Error;
+    match error {
+        // Errors of reading name the file.
+        Error::Source { source, .. } => Failure::other(source.to_string()),
+        Error::Invalid { frame, count, first } => {
+            let Defect { row, property, value, kind } = first;
+            let path = source.name(*frame);
+            let more = match count - 1 {
+                0 => String::new(),
+                more => {
+                    format!(", and {} more Gaussians of this frame have such values", grouped(more as u64))
+                }
+            };
+            Failure::other(format!(
+                "{path}: frame {frame}, Gaussian {row}: {property} is {value}: {kind}{more}\n  \
+                 repair the file, or leave such Gaussians out with --drop-invalid"
+            ))
         }
+        Error::TooManyGaussians { frame, .. }
+        | Error::TooManyPerSecond { frame, .. }
+        | Error::OutOfGrid { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
+        Error::Output(cause) => Failure::file("write", out, cause),
+        Error::Setting { .. } => Failure::Usage(error.to_string()),
+        _ => Failure::other(error.to_string()),
     }
+}
 
-    fn encoded(&self, report: &Report, settings: &Settings, source: &FrameFiles, seconds: f64) -> Encoded {
-        let path = |frame: u32| source.paths().get(frame as usize);
-        let name = |frame: u32| {
-            path(frame).map_or_else(|| format!("frame {frame}"), |path| path.display().to_string())
-        };
-        Encoded {
-            output: self.out.clone(),
+impl Encoded {
+    fn new(out: &Path, report: &Report, settings: &Settings, source: &FrameFiles, seconds: f64) -> Self {
+        Self {
+            output: out.to_path_buf(),
             bytes: report.bytes,
             frames: report.frames,
             gaussians: report.gaussians,
@@ -391,13 +420,11 @@ impl Encode {
             dropped: report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum(),
             chosen: choices(report, settings),
             pictures: Pictures::of(report, settings, Goal::of(settings)),
-            warnings: warnings(report, settings, &name),
+            warnings: warnings(report, settings, &|frame| source.name(frame)),
             digests: report.digests.iter().copied().map(hex_digest).collect(),
         }
     }
-}
 
-impl Encoded {
     fn text(&self) -> String {
         let chosen: String = self.chosen.iter().map(Choice::text).collect();
         format!(

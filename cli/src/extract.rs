@@ -3,24 +3,28 @@
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::{grouped, percent};
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::stream_file::{LimitArgs, StreamFile};
+use crate::structure::{Frame, Structure};
 use clap::Args;
 use serde::Serialize;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
+use splatstream_format::Limits;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::slice;
 
 /// Write the part of a stream that an operating point needs. Nothing is decoded.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream extract talk.gss --op s0,t0,r1 -o talk-small.gss")]
 pub(crate) struct Extract {
-    /// The stream.
+    /// The stream; - is standard input.
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
     /// The operating point: highest spatial layer, temporal layer and refinement, counted from 0.
     #[arg(long, value_name = "sS,tT,rR")]
     op: OperatingPoint,
-    /// The stream to write.
+    /// The stream to write; - is standard output.
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
     #[command(flatten)]
@@ -34,44 +38,90 @@ struct Report {
     op: String,
     bytes: u64,
     bytes_in: u64,
+    /// Frames in it, of those that the stream says it has.
+    frames: u32,
+    frames_in_stream: Option<u32>,
+    /// Frames that the stream says it has and that are not there; first and last of each run.
+    lost: Vec<(u32, u32)>,
+    /// Frames of which a unit that was written is damaged.
+    damaged: Vec<u32>,
+    complete: bool,
 }
 
 impl Extract {
     /// Copies the units of the operating point.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        console.claim(Some(&self.out))?;
+        check_stream_name(&self.out)?;
+        refuse_inputs(&self.out, slice::from_ref(&self.input))?;
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
         stream.check_point(self.op, &limits)?;
-        self.check_out()?;
         let extracted = extract(&stream.bytes, self.op, &limits).map_err(|error| stream.fault(error))?;
-        OutputFile::write(&self.out, &extracted)?;
-        let report = Report {
-            output: self.out.clone(),
-            op: self.op.to_string(),
-            bytes: extracted.len() as u64,
-            bytes_in: stream.bytes.len() as u64,
-        };
-        console.report(&report, || report.text())
+        OutputFile::write_apart(&self.out, slice::from_ref(&self.input), &extracted)?;
+        let report = Report::new(self, &stream, &extracted, &limits);
+        console.report_beside(Some(&self.out), &report, || report.text())
     }
 }
 
-impl Extract {
-    /// Nobody wants to lose the whole stream for a part of it.
-    fn check_out(&self) -> Result<(), Failure> {
-        match (self.input.canonicalize(), self.out.canonicalize()) {
-            (Ok(input), Ok(out)) if input == out => Err(Failure::Usage(format!(
-                "{}: is the stream to extract from; give another file",
-                self.out.display()
-            ))),
-            _ => Ok(()),
+fn frames_of(structure: &Structure) -> impl Iterator<Item = &Frame> {
+    structure.gops.iter().flat_map(|gop| &gop.frames)
+}
+
+fn is_damaged(frame: &Frame) -> bool {
+    frame.span.damaged || frame.increments.iter().any(|increment| increment.span.damaged)
+}
+
+/// What a stream lacks of the frames that it announces.
+fn lost(whole: &Structure, announced: u32) -> Vec<(u32, u32)> {
+    let there: BTreeSet<u32> = frames_of(whole).map(|frame| frame.index).collect();
+    let mut next = 0;
+    let mut lost = Vec::new();
+    for index in there.into_iter().chain([announced]) {
+        if index > next {
+            lost.push((next, index - 1));
         }
+        next = index.saturating_add(1);
     }
+    lost
 }
 
 impl Report {
+    fn new(command: &Extract, stream: &StreamFile, extracted: &[u8], limits: &Limits) -> Self {
+        let (whole, part) = (Structure::of(&stream.bytes, limits), Structure::of(extracted, limits));
+        let announced = whole.sequence.map(|sequence| sequence.frame_count).filter(|&count| count > 0);
+        let lost = lost(&whole, announced.unwrap_or(0));
+        let damaged: Vec<u32> =
+            frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
+        Self {
+            output: command.out.clone(),
+            op: command.op.to_string(),
+            bytes: extracted.len() as u64,
+            bytes_in: stream.bytes.len() as u64,
+            frames: frames_of(&part).count() as u32,
+            frames_in_stream: announced,
+            complete: lost.is_empty() && damaged.is_empty() && part.error.is_none() && announced.is_some(),
+            lost,
+            damaged,
+        }
+    }
+
     fn text(&self) -> String {
         let share = percent(self.bytes, self.bytes_in);
         let (bytes, all) = (grouped(self.bytes), grouped(self.bytes_in));
-        format!("{}: {}, {bytes} of {all} bytes ({share:.1} %)", self.output.display(), self.op)
+        let of_stream = self.frames_in_stream.map_or_else(String::new, |count| format!(" of {count}"));
+        let mut text = format!(
+            "{}: {}, {}{of_stream} frames, {bytes} of {all} bytes ({share:.1} %)\n",
+            self.output.display(),
+            self.op,
+            self.frames
+        );
+        for (first, last) in &self.lost {
+            text += &format!("  lost         frames {first}..={last}\n");
+        }
+        for frame in &self.damaged {
+            text += &format!("  damaged      frame {frame}\n");
+        }
+        text
     }
 }

@@ -17,6 +17,8 @@ pub(crate) enum Failure {
         path: PathBuf,
         /// Its first error.
         error: Error,
+        /// Whether it is a scene instead, in a format that `encode` reads.
+        is_scene: bool,
     },
     /// Files and settings.
     Other(String),
@@ -53,7 +55,7 @@ impl Failure {
 
     /// A stream that breaks the specification.
     pub(crate) fn stream(path: &Path, error: Error) -> Self {
-        Self::Stream { path: path.to_path_buf(), error }
+        Self::Stream { path: path.to_path_buf(), error, is_scene: false }
     }
 
     /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error, 130 interrupted.
@@ -77,13 +79,18 @@ impl fmt::Display for Failure {
             | Self::Decoder(message)
             | Self::Interrupted(message) => f.write_str(message),
             Self::Verdict { line, .. } => f.write_str(line),
-            Self::Stream { path, error } => {
+            Self::Stream { path, error, is_scene } => {
                 let path = path.display();
-                write!(f, "{path}: {error}\n  {}", advice(error.class()).replace("FILE", &path.to_string()))
+                let advice = if *is_scene { OF_SCENE } else { advice(error.class()) };
+                write!(f, "{path}: {error}\n  {}", advice.replace("FILE", &path.to_string()))
             }
         }
     }
 }
+
+/// What to do with a scene that is given for a stream.
+const OF_SCENE: &str =
+    "this is a scene, not a stream: `splatstream encode FILE -o STREAM.gss` makes one of it";
 
 /// What to do about an error of a class; FILE stands for the stream.
 fn advice(class: Class) -> &'static str {
@@ -102,6 +109,41 @@ fn advice(class: Class) -> &'static str {
         Class::Truncated => {
             "the file is cut short: copy it again; `splatstream decode FILE -o DIR` writes what is there"
         }
+    }
+}
+
+/// A failure, as `--json` prints it where there is no report.
+#[derive(Serialize)]
+pub(crate) struct FailureReport {
+    pub(crate) error: FailureWords,
+}
+
+#[derive(Serialize)]
+pub(crate) struct FailureWords {
+    kind: &'static str,
+    exit_code: u8,
+    /// The text on standard error.
+    message: String,
+    /// Of a stream, its file and what is wrong there.
+    file: Option<PathBuf>,
+    fault: Option<StreamFault>,
+}
+
+impl From<&Failure> for FailureReport {
+    fn from(failure: &Failure) -> Self {
+        let kind = match failure {
+            Failure::Usage(_) => "usage",
+            Failure::Stream { .. } | Failure::Verdict { .. } => "stream",
+            Failure::Other(_) => "other",
+            Failure::Decoder(_) => "decoder",
+            Failure::Interrupted(_) => "interrupted",
+        };
+        let (file, fault) = match failure {
+            Failure::Stream { path, error, .. } => (Some(path.clone()), Some(StreamFault::from(*error))),
+            _ => (None, None),
+        };
+        let (exit_code, message) = (failure.exit_code(), failure.to_string());
+        Self { error: FailureWords { kind, exit_code, message, file, fault } }
     }
 }
 

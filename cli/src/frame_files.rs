@@ -1,10 +1,14 @@
 //! Frames in files: which files, in which order, each read when it is needed.
 
 use crate::failure::Failure;
+use crate::output_file::STANDARD;
+use crate::stream_file::is_stream;
+use crate::unfinished::Unfinished;
 use splatstream_encoder::FrameSource;
 use splatstream_scene::{GaussianFrame, ReadLimits, read_scene, read_scene_as_is};
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Extensions of the scene formats.
@@ -20,12 +24,29 @@ pub(crate) struct FrameFiles {
     last: Option<(u32, GaussianFrame)>,
     /// Whether values that no frame may hold are left to whoever asks for the frames.
     as_is: bool,
+    /// What came by standard input, until it is read.
+    spooled: Option<Unfinished>,
+    /// The fewest and the most Gaussians of the frames read so far.
+    counts: Option<(usize, usize)>,
 }
+
+/// What standard input is called in messages.
+const STANDARD_INPUT: &str = "standard input";
 
 impl FrameFiles {
     /// The frames that the arguments of a command name: files, or one directory of frames.
     pub(crate) fn find(inputs: &[PathBuf]) -> Result<Self, Failure> {
+        let mut spooled = None;
         let mut paths = match inputs {
+            [only] if only.as_path() == Path::new(STANDARD) => {
+                let file = spool()?;
+                let path = file.path().to_path_buf();
+                if is_stream(&path) {
+                    return Err(is_encoded(STANDARD_INPUT));
+                }
+                spooled = Some(file);
+                vec![path]
+            }
             [directory] if directory.is_dir() && !is_sog(directory) => frames_in(directory)?,
             files => {
                 files.iter().try_for_each(|path| check_file(path))?;
@@ -33,7 +54,7 @@ impl FrameFiles {
             }
         };
         paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-        Ok(Self { paths, last: None, as_is: false })
+        Ok(Self { paths, last: None, as_is: false, spooled, counts: None })
     }
 
     /// Values are not checked.
@@ -45,6 +66,37 @@ impl FrameFiles {
     pub(crate) fn paths(&self) -> &[PathBuf] {
         &self.paths
     }
+
+    /// The fewest and the most Gaussians of the frames that were read.
+    pub(crate) fn counts(&self) -> (usize, usize) {
+        self.counts.unwrap_or_default()
+    }
+
+    /// What a frame is called in messages.
+    pub(crate) fn name(&self, frame: u32) -> String {
+        match self.paths.get(frame as usize) {
+            Some(_) if self.spooled.is_some() => STANDARD_INPUT.to_owned(),
+            Some(path) => path.display().to_string(),
+            None => format!("frame {frame}"),
+        }
+    }
+}
+
+/// Standard input in a file: scenes are read more than once.
+fn spool() -> Result<Unfinished, Failure> {
+    let directory = std::env::temp_dir();
+    let failed = |error| Failure::file("keep standard input in", &directory, &error);
+    let (mut file, unfinished) = Unfinished::create(&directory, false).map_err(failed)?;
+    io::copy(&mut io::stdin().lock(), &mut file).map_err(failed)?;
+    Ok(unfinished)
+}
+
+/// A stream that is given to `encode`.
+fn is_encoded(name: &str) -> Failure {
+    Failure::other(format!(
+        "{name}: is a stream already\n  `splatstream extract` writes a part of it, \
+         `splatstream decode` the frames, which can be encoded again"
+    ))
 }
 
 impl FrameSource for FrameFiles {
@@ -60,7 +112,13 @@ impl FrameSource for FrameFiles {
         }
         let path = self.paths.get(number as usize).ok_or_else(|| format!("there is no frame {number}"))?;
         let read = if self.as_is { read_scene_as_is } else { read_scene };
-        let frame = read(path, &ReadLimits::default())?;
+        let name = |error: splatstream_scene::SceneError| match self.spooled {
+            Some(_) => error.to_string().replace(&*path.to_string_lossy(), STANDARD_INPUT).into(),
+            None => Box::<dyn std::error::Error + Send + Sync>::from(error),
+        };
+        let frame = read(path, &ReadLimits::default()).map_err(name)?;
+        let (fewest, most) = self.counts.unwrap_or((frame.len(), frame.len()));
+        self.counts = Some((fewest.min(frame.len()), most.max(frame.len())));
         self.last = Some((number, frame.clone()));
         Ok(frame)
     }
@@ -72,7 +130,11 @@ fn check_file(path: &Path) -> Result<(), Failure> {
         let path = path.display();
         return Err(Failure::Usage(format!("{path}: give one directory of frames by itself, or only files")));
     }
+    if path == Path::new(STANDARD) {
+        return Err(Failure::Usage("-: only one scene can come by standard input, and by itself".to_owned()));
+    }
     match path.metadata() {
+        Ok(_) if is_stream(path) => Err(is_encoded(&path.display().to_string())),
         Ok(_) => Ok(()),
         Err(error) => Err(Failure::file("read", path, &error)),
     }

@@ -2,6 +2,7 @@
 
 use crate::failure::{Failure, StreamFault};
 use crate::frame_files::FrameFiles;
+use crate::output_file::STANDARD;
 use crate::stream_file::{StreamFile, is_stream};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
@@ -40,7 +41,8 @@ pub(crate) struct Decoding<'a> {
 impl Opened {
     /// What a user named; its content decides what it is.
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
-        if is_stream(path) {
+        // Scenes come as files and directories; what comes by a pipe is a stream, or an error that says so.
+        if path == Path::new(STANDARD) || is_stream(path) {
             return StreamFile::read(path).map(Self::Stream);
         }
         Ok(Self::Scene(path.to_path_buf()))

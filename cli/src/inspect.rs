@@ -24,7 +24,7 @@ use std::path::PathBuf;
     splatstream inspect talk.gss --deps --dot | dot -Tsvg > talk.svg\n  \
     splatstream inspect talk.gss --hex 3")]
 pub(crate) struct Inspect {
-    /// The stream.
+    /// The stream; - is standard input.
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
     #[command(flatten)]

@@ -27,11 +27,12 @@ mod stream_file;
 mod structure;
 mod table;
 mod train;
+mod unfinished;
 mod validate;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::Console;
-use failure::Failure;
+use failure::{Failure, FailureReport};
 use splatstream_format::syntax::SPECIFICATION;
 use std::iter;
 use std::process::ExitCode;
@@ -74,20 +75,29 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let matches = Cli::command().get_matches();
+    let matches = Cli::command().try_get_matches().unwrap_or_else(|error| refuse(&error));
     let command = name_of(&matches);
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let console = Console::new(cli.json);
     match in_threads(cli.threads, || cli.command.run(&console)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            console.complain(&failure.to_string());
+            console.fail(&failure);
             if matches!(failure, Failure::Usage(_)) {
                 console.complain(&format!("  {command} --help shows an example"));
             }
             ExitCode::from(failure.exit_code())
         }
     }
+}
+
+/// Arguments that make no command: told as usual, and as JSON where that is among them. Help is no error.
+fn refuse(error: &clap::Error) -> ! {
+    if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+        let failure = Failure::Usage(error.to_string().trim_end().to_owned());
+        let _nobody_listens = Console::new(true).report(&FailureReport::from(&failure), String::new);
+    }
+    error.exit()
 }
 
 /// The command with its subcommands, as it was called.

@@ -15,6 +15,11 @@ pub(crate) fn grouped(count: u64) -> String {
     text
 }
 
+/// A number of frames: 1 frame, 2 frames.
+pub(crate) fn frames(count: u32) -> String {
+    format!("{} frame{}", grouped(count.into()), if count == 1 { "" } else { "s" })
+}
+
 /// A digest as reports write it.
 pub(crate) fn hex_digest(digest: u64) -> String {
     format!("{digest:016x}")

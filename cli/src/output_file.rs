@@ -1,78 +1,236 @@
-//! Files appear whole or not at all: written under another name beside it, then renamed.
+//! Files appear whole or not at all: written under another name beside it, then renamed. None replaces what a command
+//! reads, a directory or a device; what is at the end of a symbolic link is replaced, not the link.
 
 use crate::failure::Failure;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use crate::unfinished::Unfinished;
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use tempfile::TempPath;
+
+/// The name that stands for standard input and standard output.
+pub(crate) const STANDARD: &str = "-";
+
+/// The links that a name may go through.
+const MAX_LINKS: usize = 40;
 
 /// A file that is being written. Dropped before [`OutputFile::finish`], it leaves nothing on the disk.
 pub(crate) struct OutputFile {
-    writer: BufWriter<File>,
-    /// The name that it has until it is whole.
-    temporary: TempPath,
+    /// Before the file, so that it is closed first.
+    writer: BufWriter<Box<dyn Write>>,
+    /// The file until it is whole, and its final path; none for standard output, devices and pipes.
+    unfinished: Option<(Unfinished, PathBuf)>,
     path: PathBuf,
 }
 
 impl OutputFile {
-    /// A file that will be at `path`.
-    pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
-        let parent = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
+    /// A file that will be at `path`, or standard output; not in the place of what is read. `inputs` are files that the
+    /// command reads.
+    pub(crate) fn create(path: &Path, inputs: &[PathBuf]) -> Result<Self, Failure> {
+        let (writer, unfinished): (Box<dyn Write>, _) = if is_standard(path) {
+            refuse_terminal(io::stdout().is_terminal(), path)?;
+            (Box::new(io::stdout()), None)
+        } else {
+            refuse_inputs(path, inputs)?;
+            match path.metadata() {
+                Ok(found) if found.is_dir() => return Err(is_directory(path)),
+                Ok(found) if !found.is_file() => (Box::new(open_device(path, &found)?), None),
+                found => {
+                    let target = end_of_links(path)?;
+                    let (file, unfinished) = beside(path, &target, found.ok().as_ref())?;
+                    (Box::new(file), Some((unfinished, target)))
+                }
+            }
         };
-        if !parent.is_dir() {
-            let (path, parent) = (path.display(), parent.display());
-            return Err(Failure::other(format!(
-                "{path}: cannot write: there is no directory {parent}\n  make it first"
-            )));
-        }
-        if path.is_dir() {
-            return Err(Failure::other(format!(
-                "{} is a directory: give the name of a file",
-                path.display()
-            )));
-        }
-        let file = builder().tempfile_in(parent).map_err(|error| Failure::file("write", path, &error))?;
-        let (file, temporary) = file.into_parts();
-        Ok(Self { writer: BufWriter::with_capacity(1 << 20, file), temporary, path: path.to_path_buf() })
+        let writer = BufWriter::with_capacity(1 << 20, writer);
+        Ok(Self { writer, unfinished, path: path.to_path_buf() })
     }
 
     /// Gives the file its name, in place of one that may be there.
-    pub(crate) fn finish(self) -> Result<(), Failure> {
-        let failed = |error: std::io::Error| Failure::file("write", &self.path, &error);
-        self.writer.into_inner().map_err(|error| failed(error.into_error()))?;
-        self.temporary.persist(&self.path).map_err(|error| failed(error.error))
+    pub(crate) fn finish(mut self) -> Result<(), Failure> {
+        let failed = |error: io::Error| Failure::file("write", &self.path, &error);
+        self.writer.flush().map_err(failed)?;
+        match self.unfinished {
+            None => Ok(()),
+            Some((unfinished, target)) => unfinished.rename(&target).map_err(failed),
+        }
     }
 
-    /// Writes a whole file.
+    /// Writes a whole file that is made of nothing that a user named.
     pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-        let mut file = Self::create(path)?;
+        Self::write_apart(path, &[], bytes)
+    }
+
+    /// Writes a whole file, not in the place of `inputs`.
+    pub(crate) fn write_apart(path: &Path, inputs: &[PathBuf], bytes: &[u8]) -> Result<(), Failure> {
+        let mut file = Self::create(path, inputs)?;
         file.writer.write_all(bytes).map_err(|error| Failure::file("write", path, &error))?;
         file.finish()
     }
 }
 
 impl Write for OutputFile {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.writer.write(bytes)
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
     }
 }
 
-/// Temporary files are private to their owner; what becomes a result has the permissions of any other file.
-fn builder() -> tempfile::Builder<'static, 'static> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".splatstream-");
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder
+/// Whether a path stands for standard input or output. A file of that name is `./-`.
+pub(crate) fn is_standard(path: &Path) -> bool {
+    path == Path::new(STANDARD) || ["/dev/stdout", "/dev/fd/1"].iter().any(|name| path == Path::new(name))
+}
+
+/// Refuses standard output for a file whose command reports there.
+pub(crate) fn refuse_standard(path: &Path) -> Result<(), Failure> {
+    match is_standard(path) {
+        true => Err(Failure::Usage(format!("{}: the report goes there; give a file", path.display()))),
+        false => Ok(()),
+    }
+}
+
+/// Nobody wants to lose what a command reads to what it writes.
+pub(crate) fn refuse_inputs(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    if inputs.iter().any(|input| is_same_file(path, input)) {
+        let path = path.display();
+        return Err(Failure::Usage(format!("{path}: is read by this command; give another file to write")));
+    }
+    Ok(())
+}
+
+/// Refuses a name for a stream that promises another format, or none that there is.
+pub(crate) fn check_stream_name(path: &Path) -> Result<(), Failure> {
+    let is_other = path.extension().is_some_and(|extension| !extension.eq_ignore_ascii_case("gss"));
+    // Devices and pipes have any name.
+    if !is_other || path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "{}: what is written is a stream: give a name that ends in .gss; \
+         `splatstream decode` writes .ply, .spz and .splat",
+        path.display()
+    )))
+}
+
+/// Refuses a name that is no directory, or that looks like that of a file; `what` goes there.
+pub(crate) fn check_directory(path: &Path, what: &str) -> Result<(), Failure> {
+    let name = path.display();
+    if is_standard(path) || path.exists() && !path.is_dir() {
+        return Err(Failure::Usage(format!("{name}: is no directory; {what} go to a directory")));
+    }
+    if path.is_dir() || path.extension().is_none() || ends_with_separator(path) {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "{name}: looks like a file, and {what} go to a directory; if one shall have this name, write {name}/"
+    )))
+}
+
+/// Whether a path says that it is a directory.
+pub(crate) fn ends_with_separator(path: &Path) -> bool {
+    path.to_string_lossy().ends_with(std::path::is_separator)
+}
+
+/// Binary data spoil a terminal.
+pub(crate) fn refuse_terminal(is_terminal: bool, path: &Path) -> Result<(), Failure> {
+    if is_terminal {
+        let path = path.display();
+        return Err(Failure::Usage(format!(
+            "{path}: is a terminal, which cannot show this; give a file, or pipe it into another command"
+        )));
+    }
+    Ok(())
 }
 
 /// Makes a directory and those above it.
 pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(path).map_err(|error| Failure::file("make the directory", path, &error))
+}
+
+/// Devices and pipes are written to as they are.
+fn open_device(path: &Path, found: &Metadata) -> Result<File, Failure> {
+    if is_block_device(found) {
+        let path = path.display();
+        return Err(Failure::Usage(format!("{path}: is a disk; give the name of a file")));
+    }
+    let file = OpenOptions::new().write(true).open(path);
+    let file = file.map_err(|error| Failure::file("write", path, &error))?;
+    refuse_terminal(file.is_terminal(), path)?;
+    Ok(file)
+}
+
+/// A file beside `target`, which `path` leads to, with the permissions of the one that it will replace.
+fn beside(path: &Path, target: &Path, old: Option<&Metadata>) -> Result<(File, Unfinished), Failure> {
+    let parent = match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    if !parent.is_dir() {
+        let (path, parent) = (path.display(), parent.display());
+        return Err(Failure::other(format!(
+            "{path}: cannot write: there is no directory {parent}\n  make it first"
+        )));
+    }
+    let failed = |error: io::Error| Failure::file("write", path, &without_path(error));
+    if old.is_some() {
+        // A file that may not be written may not be replaced either.
+        OpenOptions::new().write(true).open(target).map_err(failed)?;
+    }
+    let (file, unfinished) = Unfinished::create(parent, true).map_err(failed)?;
+    if let Some(old) = old {
+        file.set_permissions(old.permissions()).map_err(failed)?;
+    }
+    Ok((file, unfinished))
+}
+
+/// An error of the system without the name of a temporary file, which says nothing to anybody.
+fn without_path(error: io::Error) -> io::Error {
+    match error.to_string().split_once(" at path ") {
+        Some((text, _)) => io::Error::new(error.kind(), text.to_owned()),
+        None => error,
+    }
+}
+
+/// Where a name leads by symbolic links, whether or not there is something.
+fn end_of_links(path: &Path) -> Result<PathBuf, Failure> {
+    let mut target = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        let Ok(next) = std::fs::read_link(&target) else { return Ok(target) };
+        target = target.parent().unwrap_or(Path::new("")).join(next);
+    }
+    Err(Failure::other(format!("{}: too many symbolic links", path.display())))
+}
+
+/// Whether two names lead to one file; devices are no files that could be lost.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let (Ok(a_found), Ok(b_found)) = (a.metadata(), b.metadata()) else { return false };
+    let is_one = a.canonicalize().ok() == b.canonicalize().ok();
+    a_found.is_file() && (is_one || is_same_inode(&a_found, &b_found))
+}
+
+#[cfg(unix)]
+fn is_same_inode(a: &Metadata, b: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+#[cfg(not(unix))]
+fn is_same_inode(_: &Metadata, _: &Metadata) -> bool {
+    false
+}
+
+#[cfg(unix)]
+fn is_block_device(found: &Metadata) -> bool {
+    std::os::unix::fs::FileTypeExt::is_block_device(&found.file_type())
+}
+
+#[cfg(not(unix))]
+fn is_block_device(_: &Metadata) -> bool {
+    false
+}
+
+fn is_directory(path: &Path) -> Failure {
+    Failure::other(format!("{} is a directory: give the name of a file", path.display()))
 }

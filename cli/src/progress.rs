@@ -5,6 +5,9 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+/// What is shown of one frame.
+const ONE_FRAME: &str = "{spinner} {msg}, {elapsed} gone";
+
 /// Between two lines where nobody sees a bar.
 const LINES: Duration = Duration::from_secs(30);
 
@@ -12,25 +15,31 @@ const LINES: Duration = Duration::from_secs(30);
 pub(crate) struct Progress {
     bar: ProgressBar,
     /// The last line, of a command that writes lines instead of a bar.
-    line: Option<Mutex<Instant>>,
+    line: Option<Mutex<Option<Instant>>>,
 }
 
 impl Progress {
     /// A bar for `frames` frames; 0 if their number is not known. `verb` is "encoding" or the like.
     pub(crate) fn frames(verb: &'static str, frames: u32) -> Self {
-        Self::new(frames, "{msg} {wide_bar} {pos}/{len} frames, {eta} left").named(verb)
+        // A bar of one frame would stand at 0 until all is done.
+        let template =
+            if frames == 1 { ONE_FRAME } else { "{msg} {wide_bar} {pos}/{len} frames, {eta} left" };
+        Self::new(frames, template).named(verb)
     }
 
     /// A bar for `cases` cases of a conformance suite; where standard error is no terminal, a line now and then.
     pub(crate) fn cases(cases: u32) -> Self {
         let mut progress = Self::new(cases, "testing {wide_bar} {pos}/{len} cases, {eta} left");
-        progress.line = (!io::stderr().is_terminal()).then(|| Mutex::new(Instant::now()));
+        progress.line = (!io::stderr().is_terminal()).then(|| Mutex::new(Some(Instant::now())));
         progress
     }
 
-    /// A bar for `steps` steps that take about the same time, each with a name.
+    /// A bar for `steps` steps that take about the same time, each with a name; where standard error is no terminal, the
+    /// first name and then one now and then.
     pub(crate) fn steps(steps: u32) -> Self {
-        Self::new(steps, "{pos}/{len} {wide_bar} {elapsed} gone, {eta} left\n{msg}")
+        let mut progress = Self::new(steps, "{pos}/{len} {wide_bar} {elapsed} gone, {eta} left\n{msg}");
+        progress.line = (!io::stderr().is_terminal()).then(|| Mutex::new(None));
+        progress
     }
 
     fn new(length: u32, template: &str) -> Self {
@@ -60,18 +69,28 @@ impl Progress {
 
     /// The step that is under way.
     pub(crate) fn step(&self, name: String) {
+        self.tell(&name);
         self.bar.set_message(name);
     }
 
     /// A step is done.
     pub(crate) fn advance(&self) {
         self.bar.inc(1);
+        self.tell("");
+    }
+
+    /// Writes a line, if it is time for one.
+    fn tell(&self, step: &str) {
         let Some(line) = &self.line else { return };
         let mut last = line.lock().unwrap_or_else(PoisonError::into_inner);
-        if last.elapsed() >= LINES {
-            *last = Instant::now();
-            let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
-            let _nobody_listens = writeln!(io::stderr().lock(), "{done} of {all} cases");
+        if last.is_none_or(|last| last.elapsed() >= LINES) {
+            *last = Some(Instant::now());
+            let done = match self.bar.length() {
+                Some(all) => format!("{} of {all} done", self.bar.position()),
+                None => "working".to_owned(),
+            };
+            let step = if step.is_empty() { String::new() } else { format!(": {step}") };
+            let _nobody_listens = writeln!(io::stderr().lock(), "{done}{step}");
         }
     }
 }

@@ -4,8 +4,8 @@ use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::Opened;
-use crate::numbers::{FrameRange, grouped};
-use crate::output_file::{OutputFile, make_directory};
+use crate::numbers::{FrameRange, frames, grouped};
+use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::Args;
@@ -26,7 +26,7 @@ use std::time::Instant;
     splatstream render talk.gss --camera ring:4 -o pictures/ --op s0,t0,r0 --frames 0..1"
 )]
 pub(crate) struct Render {
-    /// A stream, a scene file, or a directory of frames.
+    /// A stream, a scene file, or a directory of frames; - is a stream on standard input.
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame. Default are the cameras
@@ -58,6 +58,9 @@ pub(crate) struct Render {
 struct Drawn {
     output: PathBuf,
     frames: u32,
+    /// Frames that the stream or the files have; 0 if that is not known.
+    #[serde(skip)]
+    expected: u32,
     pictures: Vec<Picture>,
     /// Of drawing alone.
     seconds: f64,
@@ -82,6 +85,7 @@ struct Picture {
 impl Render {
     /// Draws every frame from every camera.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        check_directory(&self.out, "pictures")?;
         let opened = Opened::open(&self.input)?;
         let limits = self.limits.limits();
         let description = opened.description(&limits).unwrap_or_default();
@@ -111,6 +115,7 @@ impl Render {
             frames.verdict()?;
             return Err(Failure::Usage(format!("{}: it has no such frame", self.input.display())));
         }
+        drawn.expected = expected;
         drawn.seconds = drawn.pictures.iter().map(|picture| picture.seconds).sum();
         drawn.errors = frames.faults();
         console.report(&drawn, || drawn.text())?;
@@ -127,6 +132,7 @@ impl Render {
         Drawn {
             output: self.out.clone(),
             frames: 0,
+            expected: 0,
             pictures: Vec::new(),
             seconds: 0.0,
             errors: Vec::new(),
@@ -180,10 +186,13 @@ impl Drawn {
             false => "",
         };
         format!(
-            "{}: {} pictures of {} frames; {:.3} seconds per picture\n{hint}{}",
+            "{}: {} pictures of {}; {:.3} seconds per picture\n{hint}{}",
             self.output.display(),
             grouped(count),
-            grouped(self.frames.into()),
+            match self.expected {
+                expected if expected > self.frames => format!("{} of {}", self.frames, frames(expected)),
+                _ => frames(self.frames),
+            },
             self.seconds / count.max(1) as f64,
             faults_text(&self.errors),
         )

@@ -1,6 +1,7 @@
 //! A stream on disk, and how much a command agrees to decode of it.
 
 use crate::failure::Failure;
+use crate::output_file::STANDARD;
 use clap::Args;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::payload::SceneDescription;
@@ -8,7 +9,7 @@ use splatstream_format::syntax::{FileHeader, SIGNATURE, SequenceParameters, Unit
 use splatstream_format::unit::{Landmark, Stream};
 use splatstream_format::{Error, Limits};
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// How much a stream may ask of this machine.
@@ -36,15 +37,21 @@ pub(crate) struct StreamFile {
 }
 
 impl StreamFile {
-    /// Reads a file; its content is not looked at.
+    /// Reads a file, or standard input. Of one that does not start like a stream only the start, which says so: it may be
+    /// of any length, or have no end.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let bytes = std::fs::read(path).map_err(|error| Failure::file("read", path, &error))?;
+        let bytes = match path == Path::new(STANDARD) {
+            true => read_stream(io::stdin().lock()),
+            false => File::open(path).and_then(read_stream),
+        };
+        let bytes = bytes.map_err(|error| Failure::file("read", path, &error))?;
         Ok(Self { path: path.to_path_buf(), bytes })
     }
 
     /// A failure of this stream.
     pub(crate) fn fault(&self, error: Error) -> Failure {
-        Failure::stream(&self.path, error)
+        let is_scene = !self.bytes.starts_with(&SIGNATURE) && splatstream_scene::detect(&self.path).is_ok();
+        Failure::Stream { path: self.path.clone(), error, is_scene }
     }
 
     /// The first sequence parameters that are intact.
@@ -91,6 +98,15 @@ impl StreamFile {
              `splatstream inspect --ops {path}` lists them"
         )))
     }
+}
+
+fn read_stream(mut file: impl Read) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.by_ref().take(FileHeader::SIZE as u64).read_to_end(&mut bytes)?;
+    if bytes.starts_with(&SIGNATURE) {
+        file.read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
 }
 
 /// Whether a file starts like a stream; no if it cannot be read.

@@ -4,7 +4,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::numbers::grouped;
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, refuse_standard};
 use crate::progress::Progress;
 use crate::setting_names::QualityName;
 use clap::Args;
@@ -61,6 +61,7 @@ struct Trained {
 impl Train {
     /// Collects, trains, writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        refuse_standard(&self.out)?;
         let mut found = Vec::new();
         for architecture in Architecture::BASES {
             found.push((architecture, self.samples(&architecture)?));

@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
-use crate::numbers::grouped;
+use crate::numbers::{frames, grouped};
 use crate::progress::Progress;
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 #[command(after_help = "Example:\n  splatstream validate talk.gss && echo good\n\n\
     Exit codes: 0 accept, 10 malformed, 11 invalid, 12 unsupported, 13 over a limit, 14 truncated.")]
 pub(crate) struct Validate {
-    /// The stream.
+    /// The stream; - is standard input.
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
     #[command(flatten)]
@@ -79,12 +79,11 @@ impl Verdict {
     }
 
     fn text(&self, path: &std::path::Path) -> String {
-        let (path, frames, gaussians) =
-            (path.display(), grouped(self.frames.into()), grouped(self.gaussians));
+        let (path, frames, gaussians) = (path.display(), frames(self.frames), grouped(self.gaussians));
         match self.class {
-            None => format!("{path}: accept ({frames} frames, {gaussians} Gaussians, every digest agrees)"),
+            None => format!("{path}: accept ({frames}, {gaussians} Gaussians, every digest agrees)"),
             Some(class) => {
-                format!("{path}: {class}, {frames} frames decoded\n{}", faults_text(&self.errors))
+                format!("{path}: {class}, {frames} decoded\n{}", faults_text(&self.errors))
             }
         }
     }

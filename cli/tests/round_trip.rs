@@ -95,8 +95,8 @@ fn decoding_an_extracted_stream_is_decoding_at_its_operating_point() {
         succeed(&["extract", text(&stream), "--op", op, "-o", text(&part)]);
         succeed(&["validate", text(&part)]);
         let [whole, extracted] = ["whole", "extracted"].map(|name| directory.path().join(name));
-        succeed(&["decode", text(&stream), "--op", op, "-o", text(&whole)]);
-        succeed(&["decode", text(&part), "-o", text(&extracted)]);
+        succeed(&["decode", text(&stream), "--op", op, "-o", text(&whole), "--force"]);
+        succeed(&["decode", text(&part), "-o", text(&extracted), "--force"]);
         let contents = |place: &Path| -> Vec<Vec<u8>> {
             files(place).iter().map(|path| fs::read(path).unwrap()).collect()
         };

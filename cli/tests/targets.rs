@@ -3,18 +3,10 @@
 
 mod common;
 
-use common::{directory, fail, json, run, scene, text, write_frames};
+use common::{directory, fail, json, run, scene, text, write_frames, write_still};
 use serde_json::Value;
 use splatstream_scene::{GaussianFrame, ply};
 use std::fs;
-use std::path::{Path, PathBuf};
-
-/// One frame of the small scene in a file.
-fn write_still(directory: &Path) -> PathBuf {
-    let path = directory.join("still.ply");
-    fs::write(&path, ply::write(&scene().frame(0))).unwrap();
-    path
-}
 
 /// The codes of the warnings in a report.
 fn codes(report: &Value) -> Vec<&str> {

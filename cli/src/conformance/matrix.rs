@@ -3,7 +3,7 @@
 use super::refused;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, refuse_standard};
 use clap::Args;
 use serde::Serialize;
 use splatstream_conformance::matrix;
@@ -35,13 +35,14 @@ struct Written<'a> {
 impl Matrix {
     /// Reads the reports and writes the page.
     pub(super) fn run(&self, console: &Console) -> Result<(), Failure> {
+        refuse_standard(&self.out)?;
         let reports = self
             .reports
             .iter()
             .map(|path| Report::read(path))
             .collect::<Result<Vec<_>, _>>()
             .map_err(refused)?;
-        OutputFile::write(&self.out, matrix::page(&reports).as_bytes())?;
+        OutputFile::write_apart(&self.out, &self.reports, matrix::page(&reports).as_bytes())?;
         let decoders = reports.iter().map(|report| report.decoder.name.as_str()).collect();
         let written = Written { output: &self.out, decoders };
         console.report(&written, || format!("{}: {}", self.out.display(), counted(reports.len(), "decoder")))

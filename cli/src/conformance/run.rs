@@ -3,8 +3,9 @@
 use super::{SuiteArgs, refused, text_of};
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
+use crate::unfinished;
 use clap::Args;
 use splatstream_conformance::cancel::Cancel;
 use splatstream_conformance::capabilities::Capabilities;
@@ -76,6 +77,10 @@ pub(super) struct Run {
 impl Run {
     /// Runs, writes the reports; fails if the decoder did.
     pub(super) fn run(&self, console: &Console) -> Result<(), Failure> {
+        [&self.report, &self.junit, &self.markdown]
+            .into_iter()
+            .flatten()
+            .try_for_each(|path| refuse_standard(path).and_then(|()| refuse_inputs(path, &self.inputs())))?;
         let settings = self.settings()?;
         if let Some(word) = shell_word(settings.decoder.words()) {
             console
@@ -160,6 +165,11 @@ impl Run {
         self.decoder.is_none() && self.stdio.is_none()
     }
 
+    /// The files that it reads besides the suite.
+    fn inputs(&self) -> Vec<PathBuf> {
+        [&self.capabilities, &self.expectations].into_iter().flatten().cloned().collect()
+    }
+
     fn write(&self, report: &Report) -> Result<(), Failure> {
         if let Some(path) = &self.report {
             OutputFile::write(path, (to_json(report)? + "\n").as_bytes())?;
@@ -186,8 +196,7 @@ fn name(words: &[String]) -> String {
 /// Lets whoever interrupts or ends this program end the run instead: what was found so far is told, and nothing is left.
 fn stop_on_signals(cancel: &Cancel) -> Result<(), Failure> {
     let cancel = cancel.clone();
-    ctrlc::set_handler(move || cancel.set())
-        .map_err(|error| Failure::other(format!("cannot listen to signals: {error}")))
+    unfinished::stop_by(move || cancel.set())
 }
 
 /// A time in seconds, which need not be whole.

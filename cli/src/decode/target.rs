@@ -1,9 +1,12 @@
-//! Where decoded frames go: a file for one frame, a directory for any number.
+//! Where decoded frames go: a file or standard output for one frame, a directory for any number.
 
 use crate::failure::Failure;
-use crate::output_file::{OutputFile, make_directory};
+use crate::output_file::{
+    OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_inputs, refuse_terminal,
+};
 use clap::ValueEnum;
 use splatstream_scene::{GaussianFrame, SceneError, ply, splat, spz};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 /// The formats that can be written.
@@ -21,52 +24,125 @@ pub(crate) enum Format {
 pub(crate) struct Target {
     path: PathBuf,
     format: Format,
-    is_file: bool,
+    is_directory: bool,
+    /// What no frame may replace.
+    inputs: Vec<PathBuf>,
+    /// Frames of an earlier run, removed with the first frame that is written.
+    stale: Vec<PathBuf>,
+}
+
+/// What a user says about the files.
+#[derive(Clone, Copy)]
+pub(crate) struct Wanted<'a> {
+    /// A file, a directory, or `-`.
+    pub(crate) path: &'a Path,
+    /// The stream.
+    pub(crate) input: &'a Path,
+    /// Their format.
+    pub(crate) format: Option<Format>,
+    /// How many there will be; 0 if that is not known.
+    pub(crate) frames: u32,
+    /// Whether frames of an earlier run are removed.
+    pub(crate) force: bool,
 }
 
 impl Target {
-    /// The file or directory that a user named; `frames` frames are expected there, 0 if that is not known.
-    pub(crate) fn new(path: &Path, format: Option<Format>, frames: u32) -> Result<Self, Failure> {
-        let named = Format::of_name(path).filter(|_| !path.is_dir());
-        let target = Self {
-            path: path.to_path_buf(),
-            format: format.or(named).unwrap_or(Format::Ply),
-            is_file: named.is_some(),
-        };
-        if target.is_file && frames > 1 {
+    /// The file or directory that a user named.
+    pub(crate) fn new(wanted: Wanted<'_>) -> Result<Self, Failure> {
+        let Wanted { path, format, frames, .. } = wanted;
+        let name = path.display();
+        let is_directory = !is_standard(path) && is_directory(path)?;
+        let named = Format::of_name(path).filter(|_| !is_directory);
+        if !is_directory && frames > 1 {
             return Err(Failure::Usage(format!(
-                "{}: {frames} frames do not fit in one file; give a directory, or choose one with --frames 0..1",
-                path.display()
+                "{name}: {frames} frames do not fit in one file; give a directory, or choose one with --frames 0..1"
             )));
         }
         if let (Some(format), Some(named)) = (format, named)
             && format != named
         {
-            let (path, asked) = (path.display(), format.extension());
-            return Err(Failure::Usage(format!("{path}: --format {asked} contradicts the name of the file")));
+            let asked = format.extension();
+            return Err(Failure::Usage(format!("{name}: --format {asked} contradicts the name of the file")));
         }
-        Ok(target)
+        if is_standard(path) {
+            refuse_terminal(io::stdout().is_terminal(), path)?;
+        }
+        Ok(Self {
+            path: path.to_path_buf(),
+            format: format.or(named).unwrap_or(Format::Ply),
+            is_directory,
+            inputs: vec![wanted.input.to_path_buf()],
+            stale: if is_directory { stale(&wanted)? } else { Vec::new() },
+        })
     }
 
-    /// Writes one frame; the directory is made with the first.
-    pub(crate) fn write(&self, number: u32, frame: &GaussianFrame) -> Result<(), Failure> {
-        if !self.is_file {
+    /// Writes one frame; the directory is made, or cleared, with the first.
+    pub(crate) fn write(&mut self, number: u32, frame: &GaussianFrame) -> Result<(), Failure> {
+        if self.is_directory {
             make_directory(&self.path)?;
+        }
+        for path in self.stale.drain(..) {
+            std::fs::remove_file(&path).map_err(|error| Failure::file("remove", &path, &error))?;
         }
         let path = self.path_of(number);
         let bytes = self
             .format
             .bytes(frame)
             .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
-        OutputFile::write(&path, &bytes)
+        OutputFile::write_apart(&path, &self.inputs, &bytes)
     }
 
     fn path_of(&self, number: u32) -> PathBuf {
-        if self.is_file {
+        if !self.is_directory {
             return self.path.clone();
         }
         self.path.join(format!("frame_{number:04}.{}", self.format.extension()))
     }
+}
+
+/// Whether a name is that of a directory, there or not; one that is neither that nor a file that can be written is
+/// refused.
+fn is_directory(path: &Path) -> Result<bool, Failure> {
+    if path.is_dir() || ends_with_separator(path) {
+        return Ok(true);
+    }
+    let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let is_device = path.metadata().is_ok_and(|found| !found.is_file());
+    if is_device || Format::of_name(path).is_some() && !name.ends_with(".compressed.ply") {
+        return Ok(false);
+    }
+    if path.extension().is_some() || path.exists() {
+        let path = path.display();
+        return Err(Failure::Usage(format!(
+            "{path}: no format that decode writes: end the name of a file in .ply, .spz or .splat, \
+             and that of a directory in /; {STANDARD} is standard output"
+        )));
+    }
+    Ok(true)
+}
+
+/// The frames of an earlier run in a directory, if they may be removed.
+fn stale(wanted: &Wanted<'_>) -> Result<Vec<PathBuf>, Failure> {
+    let Ok(entries) = std::fs::read_dir(wanted.path) else { return Ok(Vec::new()) };
+    let mut stale: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    stale.retain(|path| is_frame(path) && !path.is_dir());
+    if !stale.is_empty() && !wanted.force {
+        let (path, count) = (wanted.path.display(), stale.len());
+        let frames = if count == 1 { "1 file has" } else { &format!("{count} files have") };
+        return Err(Failure::Usage(format!(
+            "{path}: {frames} the names of frames, as from an earlier run; \
+             give another directory, or --force to remove them"
+        )));
+    }
+    stale.iter().try_for_each(|path| refuse_inputs(path, &[wanted.input.to_path_buf()]))?;
+    Ok(stale)
+}
+
+/// Whether a file has a name that frames are given.
+fn is_frame(path: &Path) -> bool {
+    let number = path.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("frame_"));
+    Format::of_name(path).is_some()
+        && number.is_some_and(|number| number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 impl Format {

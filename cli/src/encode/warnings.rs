@@ -18,6 +18,9 @@ const OUTLIER: f64 = 2.0;
 /// A size is missed by more than this part of it.
 const MISSED_SIZE: f64 = 0.03;
 
+/// Files are unlike if one has more than so many times the Gaussians of another.
+const UNLIKE: usize = 2;
+
 /// A warning. Codes do not change, messages may.
 #[derive(Serialize)]
 pub(crate) struct Warning {
@@ -55,6 +58,17 @@ pub(crate) fn warnings(
     warnings.extend(pulses(report));
     warnings.extend(short_gops(report, settings));
     warnings
+}
+
+/// Frames of a sequence have about as many Gaussians; files that have not are hardly one.
+pub(super) fn unlike_frames((fewest, most): (usize, usize)) -> Option<Warning> {
+    let message = format!(
+        "the files were encoded as the frames of one sequence, and have from {} to {} Gaussians: \
+         if they are scenes of their own, encode them with --each -o DIR",
+        grouped(fewest as u64),
+        grouped(most as u64)
+    );
+    (most > fewest.saturating_mul(UNLIKE)).then(|| Warning::new("unlike-frames", message))
 }
 
 fn psnr(report: &Report, wanted: f64) -> Vec<Warning> {

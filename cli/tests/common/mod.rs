@@ -4,8 +4,9 @@
 use serde_json::Value;
 use splatstream_scene::builtin::BuiltinScene;
 use splatstream_scene::ply;
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 
 /// A directory that goes away with the test.
@@ -16,6 +17,22 @@ pub(crate) fn directory() -> TempDir {
 /// Runs `splatstream` with these arguments.
 pub(crate) fn run(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_splatstream")).args(arguments).output().expect("the binary starts")
+}
+
+/// Runs `splatstream` with bytes on its standard input.
+pub(crate) fn run_with(arguments: &[&str], input: &[u8]) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_splatstream"))
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    let mut stdin = child.stdin.take().expect("a pipe");
+    // A command that refuses its arguments does not read.
+    let _not_read = stdin.write_all(input);
+    drop(stdin);
+    child.wait_with_output().expect("it ends")
 }
 
 /// Runs `splatstream`, which shall succeed; gives standard output.
@@ -59,6 +76,13 @@ pub(crate) fn write_frames(directory: &Path) -> PathBuf {
         std::fs::write(path, ply::write(&scene().frame(number))).expect("a file");
     }
     frames
+}
+
+/// One frame of the small scene in a file.
+pub(crate) fn write_still(directory: &Path) -> PathBuf {
+    let path = directory.join("still.ply");
+    std::fs::write(&path, ply::write(&scene().frame(0))).expect("a file");
+    path
 }
 
 /// Encodes the small scene to a stream in a directory.

@@ -103,6 +103,9 @@ struct TransformFrame {
     intrinsics: Intrinsics,
 }
 
+/// The side of the pictures of NeRF-synthetic, pixels.
+const NERF_SYNTHETIC_SIDE: f64 = 800.0;
+
 impl Transforms {
     fn cameras(self) -> Result<Vec<Camera>, CameraError> {
         let shared = self.intrinsics;
@@ -116,8 +119,13 @@ impl Transforms {
 impl TransformFrame {
     fn camera(&self, shared: &Intrinsics, at: usize) -> Result<Camera, &'static str> {
         let own = &self.intrinsics;
+        // The files of the NeRF-synthetic scenes say nothing but the angle: their pictures are squares of one size.
+        let is_bare = [own.w, own.h, shared.w, shared.h].iter().all(Option::is_none)
+            && [own.fl_x, shared.fl_x].iter().all(Option::is_none);
+        let assumed = is_bare.then_some(NERF_SYNTHETIC_SIDE);
         let side = |own: Option<f64>, shared: Option<f64>| {
-            own.or(shared).map(|side| side as u32).ok_or("there is no picture size: add w and h to the file")
+            let side = own.or(shared).or(assumed).map(|side| side as u32);
+            side.ok_or("there is no picture size: add w and h to the file")
         };
         let (width, height) = (side(own.w, shared.w)?, side(own.h, shared.h)?);
         let from_angle = own
@@ -202,9 +210,18 @@ mod tests {
 
     #[test]
     fn a_camera_without_size_says_what_to_add() {
-        let studio = br#"{"camera_angle_x": 0.7, "frames": [{"transform_matrix": [[1]]}]}"#;
+        let studio = br#"{"h": 32, "camera_angle_x": 0.7, "frames": [{"transform_matrix": [[1]]}]}"#;
         let error = parse_cameras(studio).unwrap_err();
         assert_eq!(error.to_string(), "camera 0: there is no picture size: add w and h to the file");
+    }
+
+    #[test]
+    fn an_angle_alone_is_that_of_a_nerf_synthetic_scene() {
+        let bare = br#"{"camera_angle_x": 0.7, "frames": [{"transform_matrix": [[1, 0, 0, 1], [0, -1, 0, 2],
+            [0, 0, -1, 3], [0, 0, 0, 1]]}]}"#;
+        let camera = parse_cameras(bare).unwrap().remove(0);
+        assert_eq!((camera.width, camera.height), (800, 800));
+        assert!((camera.focal[0] - 400.0 / libm::tanf(0.35)).abs() < 1e-2);
     }
 
     #[test]
