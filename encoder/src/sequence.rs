@@ -92,7 +92,11 @@ fn level(sequence: &SequenceParameters, (frame, count): (u32, usize)) -> Result<
     Limits::lowest_level(asked).ok_or(Error::TooManyPerSecond { frame, count, max })
 }
 
-fn check(settings: &Settings) -> Result<(), Error> {
+/// Whether a stream can carry what the settings ask for.
+///
+/// # Errors
+/// The first setting that none can.
+pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
     let percents = &settings.refinements;
     let increasing = percents.iter().zip(percents.iter().skip(1)).all(|(a, b)| a < b);
     let first = percents.first().is_some_and(|&first| first > 0);

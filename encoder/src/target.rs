@@ -11,6 +11,7 @@ use crate::importance::Ranking;
 use crate::isolated;
 use crate::report::{Report, TargetReport};
 use crate::secant::Secant;
+use crate::sequence;
 use crate::settings::{Settings, Size, Steps};
 use crate::source::FrameSource;
 use crate::stream::{Progress, encode_once, encode_smaller};
@@ -53,6 +54,7 @@ pub(crate) fn reach(
     sink: &mut dyn Write,
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
+    sequence::check(settings)?;
     check(settings)?;
     let fitting = Fitting::new(source, settings)?;
     let seeker = Seeker { source, fitting, progress, encodings: 0, trials: 0 };

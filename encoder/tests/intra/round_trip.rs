@@ -241,6 +241,9 @@ fn settings_that_no_stream_can_carry_are_refused_with_a_reason() {
         [&[][..], &[50], &[100, 100], &[0, 100], &[60, 50, 100], &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 100]]
     {
         assert!(refused(refinements(wrong)).contains("increasing percentages"));
+        // Where a quality is asked for, before anything is ranked for it.
+        let fitted = Settings { psnr: Some(50.0), ..refinements(wrong) };
+        assert!(refused(fitted).contains("increasing percentages"));
     }
     assert!(refused(Settings { gop: 0, ..Settings::default() }).contains("gop is 0"));
     assert!(refused(Settings { sh_degree: Some(4), ..Settings::default() }).contains("0 to 3"));
