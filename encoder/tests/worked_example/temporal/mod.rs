@@ -9,10 +9,12 @@ mod writing;
 
 use crate::elements;
 use core::fmt::Display;
+use scene::sequence;
 use splatstream_decoder::displacement::Cell;
 use splatstream_decoder::layout::{Layout, Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::position::collect;
+use splatstream_format::syntax::SequenceParameters;
 use std::fmt::Write as _;
 use walk::{Common, Step, Walked};
 pub(crate) use writing::written;
@@ -29,9 +31,21 @@ pub(crate) fn annex(bytes: &[u8], common: &Common, frames: &[Walked]) -> String 
          to 9 disagree, the clauses are right.\n\n",
     );
     overview(&mut text, common, frames);
-    text.push_str(
+    let SequenceParameters {
+        size_weight,
+        anisotropy_weight,
+        size_reference,
+        opacity_reference,
+        anisotropy_reference,
+        ..
+    } = sequence();
+    let [a, b, c, d, e] = size_weight;
+    let _ = write!(
+        text,
         "\n## E.2 Elements\n\nThe payloads of frame_headers and increments up to their models and blocks. The other \
-         units are like those of annex D.\n",
+         units are like those of annex D, except that sequence_parameters has\n`size_weight` {a}, {b}, {c}, {d}, {e}, \
+         `anisotropy_weight` {anisotropy_weight}, `size_reference` {size_reference}, `opacity_reference` \
+         {opacity_reference} and `anisotropy_reference` {anisotropy_reference}.\n",
     );
     elements(
         &mut text,
