@@ -8,7 +8,7 @@ use crate::colour;
 use crate::entropy_cost::entropy_of;
 use crate::frame::unit::Grains;
 use crate::grid::{Geometry, geometry, nearest_integer};
-use crate::importance::Ranked;
+use crate::importance::{Ranked, parts};
 use crate::laws::Laws;
 use crate::pca::Components;
 use crate::sequence::Scene;
@@ -115,11 +115,8 @@ impl Fit {
         let mut scene = Scene::new();
         scene.add(&frame, &all);
         let mut refinement = vec![0; frame.len()];
-        let mut start = 0;
-        for (number, &percent) in (0..).zip(&settings.refinements) {
-            let length = splatstream_format::syntax::prefix_length(percent, frame.len() as u32) as usize;
-            ranked.order[start..length.max(start)].iter().for_each(|&row| refinement[row as usize] = number);
-            start = length.max(start);
+        for (number, part) in (0..).zip(parts(&settings.refinements, frame.len())) {
+            ranked.order[part].iter().for_each(|&row| refinement[row as usize] = number);
         }
         let slices =
             |planes: &[Vec<f32>]| Components::of(&planes.iter().map(Vec::as_slice).collect::<Vec<_>>());

@@ -3,6 +3,7 @@
 use crate::colour::{self, ShPlan};
 use crate::error::Error;
 use crate::grid::{Geometry, geometry};
+use crate::importance::parts;
 use crate::pca::Components;
 use crate::report::Report;
 use crate::settings::Settings;
@@ -130,18 +131,15 @@ fn sh_exponents(
 ) -> Vec<u8> {
     let Geometry { log_scale, opacity, .. } = geometry(frame, sequence);
     let mut exponents = vec![0; frame.len()];
-    let mut start = 0;
-    for refinement in 0..sequence.refinement_count {
-        let end = (sequence.prefix_length(refinement, order.len() as u32) as usize).max(start);
+    for (refinement, part) in (0..).zip(parts(&settings.refinements, order.len())) {
         let announced = settings.laws.attribute_step(&settings.steps, sequence, refinement);
         let rule = StepRule::new(sequence, announced);
-        for &row in &order[start..end] {
+        for &row in &order[part] {
             let row = row as usize;
             let wanted = log_scale.each_ref().map(|plane| plane[row]);
             let shape = Shape::new(wanted, opacity[row], &rule, sequence.canonical_axes());
             exponents[row] = shape.exponent(Stage::Sh, &rule);
         }
-        start = end;
     }
     exponents
 }

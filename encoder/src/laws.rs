@@ -7,6 +7,7 @@
 //! show cost least. A decoder knows sizes, opacities and shapes; what is hidden it learns from the refinements, which
 //! are in the order of importance and have steps of their own.
 
+use crate::importance::parts;
 use crate::settings::{Settings, Steps};
 use splatstream_decoder::steps::STEPS;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, MAX_REFINEMENTS, SequenceParameters};
@@ -140,13 +141,9 @@ fn shape(frame: &GaussianFrame, row: usize) -> (f32, f32) {
 /// show of its Gaussians.
 fn coarser(order: &[u32], energy: &[f64], refinements: &[u8]) -> [u8; MAX_REFINEMENTS as usize] {
     let mut coarser = [0; MAX_REFINEMENTS as usize];
-    let total = order.len() as u32;
-    let length = |percent: u8| splatstream_format::syntax::prefix_length(percent, total) as usize;
-    let mut start = 0;
     let mut first = None;
-    for (slot, &percent) in coarser.iter_mut().zip(refinements) {
-        let end = length(percent).max(start);
-        let rows = &order[start..end];
+    for (slot, part) in coarser.iter_mut().zip(parts(refinements, order.len())) {
+        let rows = &order[part];
         let of_row = |&row: &u32| energy.get(row as usize).copied().unwrap_or(0.0);
         let least = first.map_or(f64::MIN_POSITIVE, |(mean, _)| LEAST_ENERGY * mean);
         let count = rows.len().max(1) as f64;
@@ -154,7 +151,6 @@ fn coarser(order: &[u32], energy: &[f64], refinements: &[u8]) -> [u8; MAX_REFINE
         let log = rows.iter().map(|row| libm::log2(of_row(row).max(least))).sum::<f64>() / count;
         let &mut (_, of_first) = first.get_or_insert((mean, log));
         *slot = libm::round((2.0 * ENERGY_POWER * (of_first - log)).clamp(0.0, MOST_COARSER)) as u8;
-        start = end;
     }
     coarser
 }

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::grid::{MAX_COLOUR, MAX_LOG_SCALE, MAX_OPACITY, check_reach, nearest_integer};
 use crate::laws::{FEATURE_SHIFT, finest};
 use crate::reach::{Core, Extent, Reach};
-use crate::settings::{Settings, Structure};
+use crate::settings::{Settings, Size, Structure};
 use crate::source::FrameSource;
 use splatstream_decoder::attribute::ROTATION_RANGE;
 use splatstream_decoder::colour::COMPONENT_RANGE;
@@ -104,8 +104,15 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
         return Err(Error::Refinements(percents.clone()));
     }
     let setting = |name, value: String, allowed| Err(Error::Setting { name, value, allowed });
-    if settings.psnr.is_some_and(|decibels| !(20.0..=90.0).contains(&decibels)) {
-        return setting("psnr", format!("{:?}", settings.psnr), "20 to 90");
+    if let Some(decibels) = settings.psnr.filter(|decibels| !(20.0..=90.0).contains(decibels)) {
+        return setting("psnr", decibels.to_string(), "20 to 90");
+    }
+    match settings.size {
+        Some(Size::BitsPerGaussian(bits)) if !(bits > 0.0 && bits.is_finite()) => {
+            return setting("size", format!("{bits} bits per Gaussian"), "a finite number above 0");
+        }
+        Some(Size::Bytes(0)) => return setting("size", "0 bytes".into(), "1 or more"),
+        _ => {}
     }
     if !(1.0..=20.0).contains(&settings.steps.position_bits) {
         return setting("position_bits", settings.steps.position_bits.to_string(), "1 to 20");

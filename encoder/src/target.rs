@@ -54,27 +54,13 @@ pub(crate) fn reach(
     sink: &mut dyn Write,
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
+    // Before anything is fitted to what no stream can carry.
     sequence::check(settings)?;
-    check(settings)?;
     let fitting = Fitting::new(source, settings)?;
     let seeker = Seeker { source, fitting, progress, encodings: 0, trials: 0 };
     match (settings.size, settings.psnr) {
         (Some(size), _) => seeker.size(size, sink),
         (None, decibels) => seeker.quality(decibels.unwrap_or_default().into(), sink),
-    }
-}
-
-fn check(settings: &Settings) -> Result<(), Error> {
-    let setting = |name, value: String, allowed| Err(Error::Setting { name, value, allowed });
-    match (settings.size, settings.psnr) {
-        (Some(Size::BitsPerGaussian(bits)), _) if !(bits > 0.0 && bits.is_finite()) => {
-            setting("size", format!("{bits} bits per Gaussian"), "a finite number above 0")
-        }
-        (Some(Size::Bytes(0)), _) => setting("size", "0 bytes".into(), "1 or more"),
-        (None, Some(decibels)) if !(20.0..=90.0).contains(&decibels) => {
-            setting("psnr", decibels.to_string(), "20 to 90")
-        }
-        _ => Ok(()),
     }
 }
 

@@ -128,3 +128,14 @@ impl FileHeader {
         Ok(bytes.split_last_chunk::<CRC_SIZE>().map_or(0, |(covered, _)| crc32fast::hash(covered)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_specification_is_named_by_its_version() {
+        let (major, candidate) = VERSION;
+        assert_eq!(SPECIFICATION, format!("{}.0-rc.{candidate}", major - 128));
+    }
+}
