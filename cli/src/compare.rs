@@ -19,7 +19,7 @@ use matching::Matching;
 use pictures::{PictureArgs, PictureErrors, Pictures};
 use serde::Serialize;
 use splatstream_encoder::canonical::canonicalise;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 

@@ -23,8 +23,8 @@ use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
 };
 use splatstream_format::payload::{Network, SceneDescription};
+use splatstream_gaussians::Defect;
 use splatstream_render::Camera;
-use splatstream_scene::Defect;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

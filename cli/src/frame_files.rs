@@ -5,7 +5,8 @@ use crate::output_file::STANDARD;
 use crate::stream_file::is_stream;
 use crate::unfinished::Unfinished;
 use splatstream_encoder::FrameSource;
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene, read_scene_as_is};
+use splatstream_files::{ReadLimits, read_scene, read_scene_as_is};
+use splatstream_gaussians::GaussianFrame;
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::io;
@@ -112,7 +113,7 @@ impl FrameSource for FrameFiles {
         }
         let path = self.paths.get(number as usize).ok_or_else(|| format!("there is no frame {number}"))?;
         let read = if self.as_is { read_scene_as_is } else { read_scene };
-        let name = |error: splatstream_scene::SceneError| match self.spooled {
+        let name = |error: splatstream_files::SceneError| match self.spooled {
             Some(_) => error.to_string().replace(&*path.to_string_lossy(), STANDARD_INPUT).into(),
             None => Box::<dyn std::error::Error + Send + Sync>::from(error),
         };

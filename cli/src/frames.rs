@@ -11,7 +11,7 @@ use splatstream_encoder::FrameSource;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::unit::{Stream, Units};
 use splatstream_format::{Error, Limits};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
 
 /// Frames that a user named: a stream, or files.

@@ -12,8 +12,8 @@ use clap::Args;
 use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::payload::{SceneDescription, UpAxis};
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, render};
-use splatstream_scene::GaussianFrame;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

@@ -14,8 +14,8 @@ use splatstream_encoder::transformer::{Architecture, Sample};
 use splatstream_encoder::{
     FrameSource, Quality, Settings, ShChoice, Structure, nearer, samples, train_network,
 };
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::{BuiltinScene, Tracking};
+use splatstream_files::builtin::{BuiltinScene, Tracking};
+use splatstream_gaussians::GaussianFrame;
 use std::path::PathBuf;
 
 /// Train a network that predicts new Gaussians, for encode --network.

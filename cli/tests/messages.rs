@@ -5,8 +5,8 @@ mod common;
 
 use common::{directory, fail, json, run, scene, succeed, text, write_frames, write_still};
 use serde_json::Value;
-use splatstream_scene::builtin::BuiltinScene;
-use splatstream_scene::ply;
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::ply;
 use std::fs;
 use std::path::{Path, PathBuf};
 

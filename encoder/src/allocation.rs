@@ -20,10 +20,10 @@ use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::position::refine;
 use splatstream_decoder::steps::{StepRule, step};
 use splatstream_format::syntax::{SequenceParameters, TransformKind};
+use splatstream_gaussians::{GaussianFrame, Planes};
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::metrics::psnr;
 use splatstream_render::{Camera, Rendering, render};
-use splatstream_scene::{GaussianFrame, Planes};
 
 /// Views made for the scene, and their height, where none are given.
 const VIEWS: (u32, u32) = (3, 540);

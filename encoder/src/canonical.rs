@@ -4,7 +4,7 @@
 //! no Gaussian that can never reach an alpha of 1/255.
 
 use rayon::prelude::*;
-use splatstream_scene::{GaussianFrame, Planes};
+use splatstream_gaussians::{GaussianFrame, Planes};
 
 /// The logit below which opacity stays under 1/255: ln(1/254).
 pub const INVISIBLE_LOGIT: f32 = -5.537_334;

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::report::Dropped;
 use crate::source::FrameSource;
-use splatstream_scene::{Defects, GaussianFrame};
+use splatstream_gaussians::{Defects, GaussianFrame};
 use std::collections::BTreeMap;
 
 /// Refuses Gaussians with values that no frame may hold, or leaves them out.

@@ -29,7 +29,7 @@ use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::CellsBytes;
 use splatstream_format::syntax::IncrementHeader;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// A frame to be coded.
 pub(crate) struct Target {

@@ -13,7 +13,7 @@ use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{Profile, SequenceParameters, TransformKind, UnitId, UnitType};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Transforms and codebooks, made for the first frame of a GOP.
 pub(crate) struct GopTools {

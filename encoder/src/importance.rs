@@ -3,10 +3,10 @@
 use crate::settings::{Importance, Preset, Settings};
 use core::ops::Range;
 use splatstream_format::syntax::prefix_length;
+use splatstream_gaussians::{GaussianFrame, importance};
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::contribution::{Worth, worth};
-use splatstream_scene::{GaussianFrame, importance};
 
 /// The Gaussians of a frame, most important first, and what pictures show of them.
 #[derive(Debug, Clone, Default)]

@@ -1,7 +1,7 @@
 //! Absurd values: taken for the nearest that are sensible, so that one Gaussian spoils nothing else, and reported.
 
 use crate::grid::{MAX_COLOUR, PositionGrid};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Values of one attribute that were too far out and are coded as the nearest that are not.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,7 +85,7 @@ pub(crate) fn positions(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     #[test]
     fn absurd_colours_are_counted_and_become_sensible() {

@@ -11,7 +11,7 @@ use crate::importance::parts;
 use crate::settings::{Settings, Steps};
 use splatstream_decoder::steps::STEPS;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, MAX_REFINEMENTS, SequenceParameters};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// The exponent of the steps that are asked for: finer ones have room below it, coarser ones above.
 const NOMINAL: u8 = 5;

@@ -6,7 +6,7 @@
 
 use crate::settings::Steps;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// The most bits of an axis that the syntax carries.
 const MAX_POSITION_BITS: u8 = 20;

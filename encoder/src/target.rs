@@ -16,7 +16,7 @@ use crate::settings::{Settings, Size, Steps};
 use crate::source::FrameSource;
 use crate::stream::{Progress, encode_once, encode_smaller};
 use splatstream_format::syntax::FrameType;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
 
 /// A PSNR is near enough within so many decibels, and a size within this part of it.

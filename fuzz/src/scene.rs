@@ -1,6 +1,7 @@
 //! The readers of scene files, on any bytes.
 
-use splatstream_scene::{GaussianFrame, ReadLimits, SceneError, compressed_ply, ply, sog, splat, spz};
+use splatstream_files::{ReadLimits, SceneError, compressed_ply, ply, sog, splat, spz};
+use splatstream_gaussians::GaussianFrame;
 
 /// Small, so that an input which keeps within them is cheap.
 pub const LIMITS: ReadLimits = ReadLimits { max_gaussians: 1 << 12, max_bytes: 1 << 20 };

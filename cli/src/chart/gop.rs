@@ -16,8 +16,8 @@ pub(crate) use ablation::AblationRow;
 use decoded::{Shown, label, shown};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{Anchor, Settings, Structure, encode};
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::Comparison;
-use splatstream_scene::GaussianFrame;
 use subset::Subset;
 pub(crate) use tools::ToolRow;
 

@@ -1,8 +1,8 @@
 //! How good decoded frames look: rendered from the cameras of the chart and compared with the source.
 
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{Comparison, StLpips, compare};
 use splatstream_render::{Camera, Rendering, render};
-use splatstream_scene::GaussianFrame;
 use std::collections::BTreeMap;
 
 /// Behind every scene.

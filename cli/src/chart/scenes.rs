@@ -4,8 +4,8 @@ use super::gop::FRAMES;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use splatstream_encoder::FrameSource;
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::BuiltinScene;
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
 
 /// A scene or the first frames of a sequence.

@@ -3,7 +3,7 @@
 use crate::table::Table;
 use rayon::prelude::*;
 use serde::Serialize;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Pairs that one task adds up: sums in tasks of a fixed size are the same with any number of threads.
 const TASK: usize = 1 << 14;

@@ -7,9 +7,9 @@ use crate::table::Table;
 use clap::Args;
 use serde::Serialize;
 use splatstream_format::payload::SceneDescription;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{Comparison, StLpips, compare};
 use splatstream_render::{Camera, Image, Rendering, render};
-use splatstream_scene::GaussianFrame;
 use std::path::{Path, PathBuf};
 
 /// What is drawn and compared.

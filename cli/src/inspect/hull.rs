@@ -8,10 +8,10 @@ use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::Limits;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, held_out};
 use splatstream_render::metrics::psnr;
 use splatstream_render::{Camera, Image, render};
-use splatstream_scene::GaussianFrame;
 use std::ops::ControlFlow;
 
 /// Views of the first frame, and their height.

@@ -9,9 +9,9 @@ use super::survivors::{Apart, Kept, Survivors};
 use super::worth::{Seen, Shown};
 use crate::grid::nearest_integer;
 use splatstream_format::payload::Codebook;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::contribution::worth;
-use splatstream_scene::GaussianFrame;
 
 /// Bits of a difference of one step, and what each doubling adds; what a zero takes among others that are none.
 const FIRST_BITS: f32 = 3.0;

@@ -22,7 +22,7 @@ use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::moves::{MoveSpace, SpanRatio};
 use splatstream_format::entropy::in_force::ModelsOfFrame;
 use splatstream_format::payload::CellsBytes;
-use splatstream_scene::importance;
+use splatstream_gaussians::importance;
 use std::ops::Range;
 
 /// The row of a Gaussian that no file has any more.

@@ -7,8 +7,8 @@ use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, Image, metrics, render};
-use splatstream_scene::GaussianFrame;
 
 const BACKGROUND: [f32; 3] = [0.0; 3];
 

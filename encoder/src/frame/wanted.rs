@@ -15,7 +15,7 @@ use splatstream_decoder::position::morton;
 use splatstream_decoder::steps::{Exponents, StepRule, step};
 use splatstream_format::Result;
 use splatstream_format::payload::Transform;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// The integers of Gaussians; all planes of one length, or empty where a comment says so. Attributes are in
 /// [parts](crate::grid::PARTS) of a step: they are rounded once, when their steps are known.

@@ -7,7 +7,8 @@ use crate::grid::PositionGrid;
 use crate::matching::tests::{Random, Scene, measure, shuffled};
 use crate::matching::{Cloud, Kind, Matching, Measure, shares_little};
 use crate::settings::{Quality, Settings};
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
+use splatstream_files::{ReadLimits, read_scene};
+use splatstream_gaussians::GaussianFrame;
 use std::path::Path;
 
 const BITS: u8 = 12;

@@ -12,7 +12,7 @@ use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::canonical::canonicalise;
 use splatstream_encoder::{Importance, Laws, Preset, Quality, Settings, ShChoice};
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::{GaussianFrame, Planes, importance, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, Planes, importance, sh_coefficients};
 use std::ops::ControlFlow;
 
 /// What is special about the Gaussians of a frame.

@@ -15,8 +15,8 @@ use splatstream_encoder::{NetworkSource, PredictorChoice, Predictors, Settings, 
 use splatstream_format::Limits;
 use splatstream_format::entropy::layout::{Attribute, Section};
 use splatstream_format::syntax::{FrameType, UnitType};
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::Comparison;
-use splatstream_scene::GaussianFrame;
 use std::ops::ControlFlow;
 use std::time::Instant;
 

@@ -144,7 +144,7 @@ mod tests {
     use crate::chart::gop::{SPATIAL, TEMPORAL, encoded, settings};
     use splatstream_decoder::operating_point::operating_points;
     use splatstream_encoder::{Importance, Settings};
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     #[test]
     fn the_frames_of_a_point_take_what_the_point_takes() {

@@ -11,8 +11,8 @@ use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Importance, Settings, Structure};
 use splatstream_format::Limits;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::Comparison;
-use splatstream_scene::GaussianFrame;
 use std::ops::ControlFlow;
 
 /// The frames after the first, each by itself.

@@ -7,8 +7,8 @@ use crate::setting_names::ToolName;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{PredictorChoice, Predictors, Settings, encode};
 use splatstream_format::syntax::FrameType;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::Comparison;
-use splatstream_scene::GaussianFrame;
 
 /// A GOP with some tools.
 #[derive(Debug, Clone)]

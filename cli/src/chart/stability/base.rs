@@ -2,8 +2,8 @@
 
 use super::edits::{another, thinned};
 use crate::chart::scenes::Scene;
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::BuiltinScene;
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_gaussians::GaussianFrame;
 
 /// How much is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

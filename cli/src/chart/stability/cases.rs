@@ -3,7 +3,7 @@
 use super::base::{Base, Size};
 use super::sample::Sample;
 use super::{scenes, sequences};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Something that a codec may fail at.
 pub(super) struct Case {

@@ -1,7 +1,7 @@
 //! Changes of whole frames, from which cases are made.
 
 use super::dice::Dice;
-use splatstream_scene::{GaussianFrame, Planes, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
 
 /// Where the inner scene is.
 pub(super) struct Place {
@@ -115,7 +115,7 @@ pub(super) fn with_degree(frame: &GaussianFrame, degree: u8) -> GaussianFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     fn frame() -> GaussianFrame {
         BuiltinScene { gaussians: 200, frames: 1, sh_degree: 1, ..BuiltinScene::default() }.frame(0)

@@ -9,7 +9,7 @@ use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_encoder::{FrameReport, Quality, Report, Settings, Structure, encode};
 use splatstream_format::syntax::FrameType;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::ops::ControlFlow;
 
 /// Spatial and temporal layers of a sequence, as `splatstream encode` has them without options.

@@ -3,7 +3,8 @@
 use super::sample::Sample;
 use super::sog::quantised;
 use super::tools::Attempt;
-use splatstream_scene::{GaussianFrame, ReadLimits, SceneError, splat, spz};
+use splatstream_files::{ReadLimits, SceneError, splat, spz};
+use splatstream_gaussians::GaussianFrame;
 
 /// A frame that came back, and the bytes it took; none where nothing is packed.
 pub(super) type Returned = (GaussianFrame, Option<u64>);

@@ -2,9 +2,9 @@
 
 use super::edits::zoomed;
 use crate::chart::judge::Judge;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, ring};
 use splatstream_render::metrics::Comparison;
-use splatstream_scene::GaussianFrame;
 use std::ops::Range;
 
 /// What is coded, and what is judged.

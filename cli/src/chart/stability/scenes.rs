@@ -3,7 +3,7 @@
 use super::dice::Dice;
 use super::edits::{Place, edited, fewer, pushed, zoomed};
 use super::sample::Sample;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Opacities before the sigmoid: one of what can be seen, one of what never is.
 const VISIBLE: f32 = 2.0;
@@ -95,7 +95,7 @@ pub(super) fn transparent(scene: &GaussianFrame, share: f64) -> Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     fn scene() -> GaussianFrame {
         BuiltinScene { gaussians: 200, frames: 1, sh_degree: 0, ..BuiltinScene::default() }.frame(0)

@@ -4,7 +4,7 @@ use super::base::Base;
 use super::dice::Dice;
 use super::edits::{Place, edited, fewer, moved, shuffled, thinned, with_degree, zoomed};
 use super::sample::Sample;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Gaussians of each frame of a long chain, at most.
 const CHAIN: usize = 200;

@@ -5,7 +5,7 @@
 //! whole sets of harmonics from a palette; for scenes as small as these it has a row for each Gaussian.
 
 use super::edits::edited;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::f64::consts::SQRT_2;
 
 /// Values of a codebook, and rounds of choosing them.
@@ -97,7 +97,7 @@ fn rotation(parts: [f64; 4]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     #[test]
     fn values_come_back_within_a_step() {

@@ -3,7 +3,7 @@
 use super::sample::Sample;
 use super::{ours, peers};
 use splatstream_encoder::Report;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// A codec and how it is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

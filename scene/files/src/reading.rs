@@ -1,0 +1,34 @@
+//! What all readers share: a file as bytes, planes as a frame, and the check of its values.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::SceneError;
+use crate::limits::ReadLimits;
+use splatstream_gaussians::{GaussianFrame, Planes};
+
+/// The whole of a file, unless it is larger than `limits` allow.
+pub(crate) fn read_file(path: &Path, limits: &ReadLimits) -> Result<Vec<u8>, SceneError> {
+    let read = || -> Result<Vec<u8>, SceneError> {
+        let file = File::open(path)?;
+        let size = limits.bytes(file.metadata()?.len())?;
+        let mut bytes = Vec::with_capacity(size);
+        // The file may grow while it is read.
+        file.take(limits.max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+        limits.bytes(bytes.len() as u64)?;
+        Ok(bytes)
+    };
+    read().map_err(|error| error.in_file(path))
+}
+
+/// The frame of `planes`, its rotations at unit length. Values are not checked.
+pub(crate) fn frame_of(sh_degree: u8, planes: Planes) -> Result<GaussianFrame, SceneError> {
+    Ok(GaussianFrame::from_planes(sh_degree, planes)?.with_unit_rotations())
+}
+
+/// The frame, if it holds no value that it may not hold.
+pub(crate) fn checked(frame: GaussianFrame) -> Result<GaussianFrame, SceneError> {
+    frame.validate()?;
+    Ok(frame)
+}

@@ -1,0 +1,97 @@
+//! `.splat`: 32 bytes a Gaussian and nothing else; no header, no spherical harmonics.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 0–11 | centre, three `f32` little endian |
+//! | 12–23 | semi-axes (not their logs), three `f32` little endian |
+//! | 24–27 | red, green, blue, opacity; 0 to 255 |
+//! | 28–31 | rotation w, x, y, z; (byte − 128) / 128 |
+
+use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
+use crate::error::SceneError;
+use crate::limits::ReadLimits;
+use crate::reading::{checked, frame_of};
+use splatstream_gaussians::activation::{colour_of_dc, dc_of_colour};
+use splatstream_gaussians::rotation::normalised;
+use splatstream_gaussians::{GaussianFrame, Planes};
+
+/// Bytes of one Gaussian.
+pub const RECORD: usize = 32;
+
+/// The smallest semi-axis told from zero: smaller ones, zero among them, have no finite log.
+const SMALLEST_SCALE: f32 = 1e-10;
+
+/// Reads `.splat` records. Opacity 0 and 255 become finite logits, half a step inside.
+///
+/// # Errors
+/// A length that is no multiple of 32 (there is no other way to tell a `.splat` file from any other bytes),
+/// more than `limits` allow, or a value that no frame may hold (row and property are named).
+pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    checked(read_as_is(bytes, limits)?)
+}
+
+/// As [`read`], with values as they are: none is checked.
+pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    limits.bytes(bytes.len() as u64)?;
+    let over = bytes.len() % RECORD;
+    if over != 0 {
+        let what = format!("{over} bytes over the last whole 32-byte record");
+        return Err(SceneError::malformed(
+            bytes.len() - over,
+            what,
+            "this is no .splat file, or it is cut short",
+        ));
+    }
+    let rows = limits.gaussians((bytes.len() / RECORD) as u64)?;
+    let mut planes = Planes::with_capacity(0, rows);
+    for record in bytes.as_chunks::<RECORD>().0 {
+        push(&mut planes, record);
+    }
+    frame_of(0, planes)
+}
+
+fn push(planes: &mut Planes, record: &[u8; RECORD]) {
+    let float = |at: usize| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]);
+    for axis in 0..3 {
+        planes.position[axis].push(float(axis * 4));
+        let scale = float(12 + axis * 4);
+        // Not `max`, which would hide a NaN.
+        let scale = if scale < SMALLEST_SCALE { SMALLEST_SCALE } else { scale };
+        planes.log_scale[axis].push(libm::log(f64::from(scale)) as f32);
+        planes.dc[axis].push(dc_of_colour(f64::from(record[24 + axis]) / 255.0));
+    }
+    planes.opacity_logit.push(logit_of_byte(record[27]));
+    for part in 0..4 {
+        planes.rotation[part].push((f32::from(record[28 + part]) - 128.0) / 128.0);
+    }
+}
+
+/// Writes `.splat` records, in the order of the frame. Spherical harmonics are dropped.
+///
+/// Centres are exact. Log scales come back within 2⁻²² of their size plus 2⁻²², down to ln 1e-10, below
+/// which they come back as that; colours, 0 to 1, and opacities within 1/510; rotation components, before
+/// they are normalised again, within 1/256, and 1/128 where one is 1.
+///
+/// # Errors
+/// A frame that does not pass [`GaussianFrame::validate`].
+pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
+    frame.validate()?;
+    let mut out = Vec::with_capacity(frame.len() * RECORD);
+    for row in 0..frame.len() {
+        for plane in frame.position() {
+            out.extend_from_slice(&plane[row].to_le_bytes());
+        }
+        for plane in frame.log_scale() {
+            // `as` gives infinity beyond the largest float: the largest is nearer.
+            let scale = (libm::exp(f64::from(plane[row])) as f32).min(f32::MAX);
+            out.extend_from_slice(&scale.to_le_bytes());
+        }
+        out.extend(frame.dc().iter().map(|plane| to_byte(colour_of_dc(plane[row]) * 255.0)));
+        out.push(byte_of_logit(frame.opacity_logit()[row]));
+        let rotation = frame.rotation().each_ref().map(|plane| plane[row]);
+        // Validated: no quaternion is zero.
+        let rotation = normalised(rotation).unwrap_or([1.0, 0.0, 0.0, 0.0]);
+        out.extend(rotation.map(|part| to_byte(f64::from(part) * 128.0 + 128.0)));
+    }
+    Ok(out)
+}
