@@ -42,4 +42,20 @@ impl<'a> Cursor<'a> {
     ) -> Result<&'a [u8], SceneError> {
         self.take(rows.saturating_mul(stride), what)
     }
+
+    /// The next `N` bytes.
+    pub(crate) fn array<const N: usize>(&mut self, what: &'static str) -> Result<[u8; N], SceneError> {
+        let short = SceneError::truncated(self.at, what, N as u64, self.rest.len());
+        self.take(N as u64, what)?.first_chunk().copied().ok_or(short)
+    }
+
+    /// The next four bytes as a number, least significant first.
+    pub(crate) fn u32(&mut self, what: &'static str) -> Result<u32, SceneError> {
+        self.array(what).map(u32::from_le_bytes)
+    }
+
+    /// The next eight bytes as a number, least significant first.
+    pub(crate) fn u64(&mut self, what: &'static str) -> Result<u64, SceneError> {
+        self.array(what).map(u64::from_le_bytes)
+    }
 }

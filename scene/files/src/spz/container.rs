@@ -2,7 +2,6 @@
 
 use std::io::Write;
 
-use deku::prelude::{DekuContainerRead, DekuContainerWrite, DekuRead, DekuWrite};
 use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
@@ -24,11 +23,12 @@ const COORDINATE_SYSTEM: u32 = 0xadbe_0003;
 /// Extensions are descriptions of a few bytes: more than this is not looked at.
 const EXTENSIONS: u64 = 64 << 10;
 
+const CONTENTS: &str = "the table of contents";
+const HEADER: &str = "the header";
 const NOT_SPZ: &str = "this is no SPZ file, or it is damaged";
 
-/// Header of versions 1 to 3, at the start of the decompressed stream; the first half of version 4's.
-#[derive(DekuRead, DekuWrite)]
-#[deku(endian = "little")]
+/// Header of versions 1 to 3, at the start of the decompressed stream; the first half of version 4's,
+/// where it is at the start of the file and `reserved` is the number of streams.
 struct StreamHeader {
     magic: u32,
     version: u32,
@@ -39,21 +39,18 @@ struct StreamHeader {
     reserved: u8,
 }
 
-/// What follows in version 4, where the header is at the start of the file and `reserved` above is the
-/// number of streams.
-#[derive(DekuRead)]
-#[deku(endian = "little")]
-struct FileHeader {
-    contents_at: u32,
-    _reserved: [u8; 12],
-}
+impl StreamHeader {
+    fn read(cursor: &mut Cursor<'_>) -> Result<Self, SceneError> {
+        let [magic, version, gaussians] = [cursor.u32(HEADER)?, cursor.u32(HEADER)?, cursor.u32(HEADER)?];
+        let [sh_degree, fractional_bits, flags, reserved] = cursor.array(HEADER)?;
+        Ok(Self { magic, version, gaussians, sh_degree, fractional_bits, flags, reserved })
+    }
 
-/// One row of version 4's table of contents.
-#[derive(DekuRead)]
-#[deku(endian = "little")]
-struct Entry {
-    compressed: u64,
-    decompressed: u64,
+    fn write(&self) -> Vec<u8> {
+        let mut out = [self.magic, self.version, self.gaussians].map(u32::to_le_bytes).concat();
+        out.extend([self.sh_degree, self.fractional_bits, self.flags, self.reserved]);
+        out
+    }
 }
 
 /// What the header says that the attributes need to be understood.
@@ -121,7 +118,8 @@ pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams)
 
 fn read_gzip(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), SceneError> {
     let mut content = GzDecoder::new(bytes);
-    let header: StreamHeader = parse(&decompress::read_exactly(&mut content, 16, 0, "the header")?, 0)?;
+    let header = decompress::read_exactly(&mut content, 16, 0, HEADER)?;
+    let header = StreamHeader::read(&mut Cursor::new(&header))?;
     if !(1..=3).contains(&header.version) {
         let what = format!("gzip SPZ of version {}", header.version);
         return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
@@ -143,14 +141,15 @@ fn read_gzip(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
 
 fn read_zstd(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), SceneError> {
     let mut cursor = Cursor::new(bytes);
-    let header: StreamHeader = parse(cursor.take(16, "the header")?, 0)?;
+    let header = StreamHeader::read(&mut cursor)?;
     if header.magic == MAGIC && header.version != 4 {
         let what = format!("SPZ of version {} without gzip", header.version);
         return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
     }
     let mut shape = Shape::of_header(&header, limits)?;
-    let tail: FileHeader = parse(cursor.take(16, "the header")?, 16)?;
-    let extensions = u64::from(tail.contents_at)
+    let contents_at = cursor.u32(HEADER)?;
+    cursor.take(12, HEADER)?;
+    let extensions = u64::from(contents_at)
         .checked_sub(32)
         .ok_or_else(|| SceneError::malformed(16, "the table of contents lies inside the header", NOT_SPZ))?;
     let extensions = cursor.take(extensions, "extensions")?;
@@ -164,31 +163,28 @@ fn read_zstd(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
 fn read_frames(cursor: &mut Cursor<'_>, shape: &Shape, count: u8) -> Result<Streams, SceneError> {
     let sizes = shape.strides().map(|stride| shape.size(stride));
     // An attribute without bytes has no stream.
-    let present = || sizes.into_iter().zip(NAMES).enumerate().filter(|(_, (size, _))| *size > 0);
-    if usize::from(count) != present().count() {
-        let what = format!("{count} streams, these attributes are {}", present().count());
+    let present = sizes.iter().filter(|&&size| size > 0).count();
+    if usize::from(count) != present {
+        let what = format!("{count} streams, these attributes are {present}");
         return Err(SceneError::malformed(15, what, NOT_SPZ));
     }
-    let at = cursor.at();
-    let entries = cursor.take_rows(u64::from(count), 16, "the table of contents")?.as_chunks::<16>().0;
+    let mut contents = *cursor;
+    cursor.take_rows(u64::from(count), 16, CONTENTS)?;
     let mut streams = Streams::default();
-    for ((row, entry), (place, (size, name))) in entries.iter().enumerate().zip(present()) {
-        let entry: Entry = parse(entry, at + row * 16)?;
-        if entry.decompressed != size {
-            let what = format!("{name} is {} bytes, its Gaussians have {size}", entry.decompressed);
-            return Err(SceneError::malformed(at + row * 16 + 8, what, NOT_SPZ));
+    for (stream, (size, name)) in streams.iter_mut().zip(sizes.into_iter().zip(NAMES)) {
+        if size == 0 {
+            continue;
+        }
+        let (compressed, at) = (contents.u64(CONTENTS)?, contents.at());
+        let decompressed = contents.u64(CONTENTS)?;
+        if decompressed != size {
+            let what = format!("{name} is {decompressed} bytes, its Gaussians have {size}");
+            return Err(SceneError::malformed(at, what, NOT_SPZ));
         }
         let at = cursor.at();
-        streams[place] = decompress::zstd(cursor.take(entry.compressed, name)?, size, at, name)?;
+        *stream = decompress::zstd(cursor.take(compressed, name)?, size, at, name)?;
     }
     Ok(streams)
-}
-
-/// A fixed-size record; `bytes` has that size.
-fn parse<'a, T: DekuContainerRead<'a>>(bytes: &'a [u8], at: usize) -> Result<T, SceneError> {
-    T::from_bytes((bytes, 0))
-        .map(|(_, record)| record)
-        .map_err(|error| SceneError::malformed(at, error.to_string(), NOT_SPZ))
 }
 
 /// The flip that extensions ask for. Each is a type, a length and that many bytes; unknown ones describe
@@ -224,9 +220,8 @@ pub(crate) fn write(shape: &Shape, streams: &Streams) -> Result<Vec<u8>, SceneEr
         flags: if shape.antialiased { ANTIALIASED } else { 0 },
         reserved: 0,
     };
-    let header = header.to_bytes().map_err(|error| SceneError::malformed(0, error.to_string(), NOT_SPZ))?;
     let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
-    gzip.write_all(&header)?;
+    gzip.write_all(&header.write())?;
     streams.iter().try_for_each(|stream| gzip.write_all(stream))?;
     Ok(gzip.finish()?)
 }
