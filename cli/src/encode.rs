@@ -9,7 +9,7 @@ use crate::cameras::{BackgroundArg, CameraArgs, Views, to_stream};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
-use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
+use crate::numbers::{hex_digest, parse_frame_rate};
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::progress::Progress;
 use crate::setting_names::{
@@ -19,6 +19,7 @@ use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
+use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
 };

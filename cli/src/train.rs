@@ -3,13 +3,14 @@
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
-use crate::numbers::grouped;
 use crate::output_file::{OutputFile, refuse_standard};
 use crate::progress::Progress;
 use crate::setting_names::QualityName;
 use clap::Args;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use splatstream_chart::Progress as _;
+use splatstream_chart::numbers::grouped;
 use splatstream_encoder::transformer::{Architecture, Sample};
 use splatstream_encoder::{
     FrameSource, Quality, Settings, ShChoice, Structure, nearer, samples, train_network,
@@ -111,7 +112,7 @@ impl Train {
             let found = samples(frames, &settings, architecture);
             all.extend(found.map_err(|error| Failure::other(format!("{name}: {error}")))?);
             progress.advance();
-            Ok(())
+            Ok::<(), Failure>(())
         };
         for path in &self.sequences {
             let mut files = FrameFiles::find(std::slice::from_ref(path))?;

@@ -28,6 +28,7 @@ mod models;
 mod motion;
 mod parametric_fit;
 mod pca;
+mod random;
 mod reach;
 mod report;
 mod secant;

@@ -52,6 +52,19 @@ pub struct Steps {
 }
 
 impl Quality {
+    /// All of them, coarsest first.
+    pub const ALL: [Self; 4] = [Self::Low, Self::Medium, Self::High, Self::VisuallyLossless];
+
+    /// Its name in reports and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Low => "low",
+            Self::Medium => "medium",
+            Self::High => "high",
+            Self::VisuallyLossless => "visually-lossless",
+        }
+    }
+
     /// The PSNR of pictures that a quality stands for, decibels.
     pub const fn decibels(self) -> f32 {
         match self {

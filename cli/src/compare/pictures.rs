@@ -3,9 +3,9 @@
 use super::flicker::{Flicker, FlickerSums};
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::failure::Failure;
-use crate::table::Table;
 use clap::Args;
 use serde::Serialize;
+use splatstream_chart::table::Table;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{Comparison, StLpips, compare};

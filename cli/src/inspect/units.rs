@@ -3,10 +3,10 @@
 use super::{Shown, span};
 use crate::console::Console;
 use crate::failure::StreamFault;
-use crate::numbers::grouped;
 use crate::stream_file::StreamFile;
-use crate::table::Table;
 use serde::Serialize;
+use splatstream_chart::numbers::grouped;
+use splatstream_chart::table::Table;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::levels::Levels;
 use splatstream_format::payload::FramePayload;
