@@ -8,6 +8,7 @@ use crate::console::Console;
 use crate::encode::warnings::warnings;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
+use crate::input_args::InputArgs;
 use crate::numbers::parse_frame_rate;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
@@ -15,7 +16,7 @@ use clap::Args;
 use serde::Serialize;
 use splatstream_chart::charting::{Charting, FRAMES, Subject};
 use splatstream_chart::numbers::grouped;
-use splatstream_chart::peers::Peers;
+use splatstream_chart::peers::{OpenFrames, Peers};
 use splatstream_chart::scenes::{Scene, name_of, tell_apart};
 use splatstream_chart::stability::{self, Size, Stability};
 use splatstream_chart::{Error, File, Report};
@@ -74,6 +75,8 @@ pub(crate) struct Chart {
     #[arg(long, requires = "stability", conflicts_with = "quick")]
     full: bool,
     #[command(flatten)]
+    reading: InputArgs,
+    #[command(flatten)]
     sweep: SweepArgs,
     /// Results of other codecs on the same scenes.
     #[arg(long, value_name = "PEERS.json")]
@@ -123,13 +126,17 @@ impl Chart {
         let with_cameras = |scene: Scene| Ok(Subject { cameras: self.cameras(&scene)?, scene });
         let subjects: Vec<Subject> =
             self.scenes()?.into_iter().map(with_cameras).collect::<Result<_, Failure>>()?;
+        let open = |decoded: &Path| -> Result<Box<dyn FrameSource>, String> {
+            let files = FrameFiles::find(&[decoded.to_path_buf()], self.reading);
+            Ok(Box::new(files.map_err(|error| error.to_string())?))
+        };
         let charting = Charting {
             sweep: self.sweep.sweep(self.fps),
             fps: f64::from(self.fps.0) / f64::from(self.fps.1),
             gop: self.gop,
             ablation: self.ablation,
             learned: self.st_lpips.as_deref().map(read_weights).transpose()?,
-            peers: self.peers.as_deref().map(read_peers).transpose()?,
+            peers: self.peers.as_deref().map(|path| read_peers(path, &open)).transpose()?,
             command: command_line(),
         };
         let progress = Progress::steps(charting.steps(&subjects));
@@ -142,7 +149,7 @@ impl Chart {
         let builtin = self.builtin || self.scenes.is_empty();
         let mut scenes: Vec<Scene> = builtin.then(|| stability::builtin(size)).into_iter().collect();
         for path in &self.scenes {
-            scenes.push(read_scene(path, self.frames.unwrap_or(size.frames()))?);
+            scenes.push(read_scene(path, self.frames.unwrap_or(size.frames()), self.reading)?);
         }
         tell_apart(&mut scenes);
         let stability = Stability {
@@ -165,7 +172,7 @@ impl Chart {
             scenes.push(Scene::builtin(self.sweep.quick, frames));
         }
         for path in &self.scenes {
-            scenes.push(read_scene(path, frames.unwrap_or(FRAMES))?);
+            scenes.push(read_scene(path, frames.unwrap_or(FRAMES), self.reading)?);
         }
         tell_apart(&mut scenes);
         Ok(scenes)
@@ -198,8 +205,8 @@ impl Chart {
 }
 
 /// The first frames of a file or of a directory of frames.
-fn read_scene(path: &Path, frames: u32) -> Result<Scene, Failure> {
-    let mut files = FrameFiles::find(&[path.to_path_buf()])?;
+fn read_scene(path: &Path, frames: u32, reading: InputArgs) -> Result<Scene, Failure> {
+    let mut files = FrameFiles::find(&[path.to_path_buf()], reading)?;
     let count = files.len().min(frames);
     let frame = |number| files.frame(number).map_err(|error| Failure::other(error.to_string()));
     let frames: Vec<GaussianFrame> = (0..count).map(frame).collect::<Result<_, _>>()?;
@@ -211,14 +218,10 @@ fn read_scene(path: &Path, frames: u32) -> Result<Scene, Failure> {
 }
 
 /// Results of other codecs.
-fn read_peers(path: &Path) -> Result<Peers<'static>, Failure> {
+fn read_peers<'a>(path: &Path, open: OpenFrames<'a>) -> Result<Peers<'a>, Failure> {
     let text = std::fs::read(path).map_err(|error| Failure::file("read", path, &error))?;
     let directory = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    Peers::new(&text, directory, &|decoded| {
-        let files = FrameFiles::find(&[decoded.to_path_buf()]).map_err(|error| error.to_string())?;
-        Ok(Box::new(files))
-    })
-    .map_err(|error| Failure::other(format!("{}: {error}", path.display())))
+    Peers::new(&text, directory, open).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
 }
 
 impl From<Error> for Failure {

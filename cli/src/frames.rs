@@ -2,6 +2,7 @@
 
 use crate::failure::{Failure, StreamFault};
 use crate::frame_files::FrameFiles;
+use crate::input_args::InputArgs;
 use crate::output_file::STANDARD;
 use crate::stream_file::{StreamFile, is_stream};
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -18,8 +19,8 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Opened {
     /// The bytes of a stream.
     Stream(StreamFile),
-    /// A scene file or a directory of frames.
-    Scene(PathBuf),
+    /// A scene file or a directory of frames, and how it is read.
+    Scene(PathBuf, InputArgs),
 }
 
 /// The frames, in order.
@@ -40,19 +41,19 @@ pub(crate) struct Decoding<'a> {
 
 impl Opened {
     /// What a user named; its content decides what it is.
-    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn open(path: &Path, reading: InputArgs) -> Result<Self, Failure> {
         // Scenes come as files and directories; what comes by a pipe is a stream, or an error that says so.
         if path == Path::new(STANDARD) || is_stream(path) {
             return StreamFile::read(path).map(Self::Stream);
         }
-        Ok(Self::Scene(path.to_path_buf()))
+        Ok(Self::Scene(path.to_path_buf(), reading))
     }
 
     /// What a stream says about its scene.
     pub(crate) fn description(&self, limits: &Limits) -> Option<SceneDescription> {
         match self {
             Self::Stream(file) => file.description(limits),
-            Self::Scene(_) => None,
+            Self::Scene(..) => None,
         }
     }
 
@@ -72,12 +73,12 @@ impl Opened {
                 let decoder = Decoder::new(stream.header(), options);
                 Ok(Frames::Stream(Box::new(Decoding { file, units: stream.units(), decoder, expected })))
             }
-            Self::Scene(path) if point.is_some() => Err(Failure::Usage(format!(
+            Self::Scene(path, _) if point.is_some() => Err(Failure::Usage(format!(
                 "{}: only a stream has operating points; leave --op out",
                 path.display()
             ))),
-            Self::Scene(path) => {
-                let files = Box::new(FrameFiles::find(std::slice::from_ref(path))?);
+            Self::Scene(path, reading) => {
+                let files = Box::new(FrameFiles::find(std::slice::from_ref(path), *reading)?);
                 Ok(Frames::Files { files, next: 0 })
             }
         }

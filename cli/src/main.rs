@@ -14,6 +14,7 @@ mod extract;
 mod failure;
 mod frame_files;
 mod frames;
+mod input_args;
 mod inspect;
 mod numbers;
 mod output_file;

@@ -3,6 +3,7 @@
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
+use crate::input_args::InputArgs;
 use crate::output_file::{OutputFile, refuse_standard};
 use crate::progress::Progress;
 use crate::setting_names::QualityName;
@@ -42,6 +43,8 @@ pub(crate) struct Train {
     /// How close decoded scenes are to the source.
     #[arg(long, value_enum, default_value_t = QualityName::High)]
     quality: QualityName,
+    #[command(flatten)]
+    reading: InputArgs,
 }
 
 /// What `--json` prints.
@@ -115,7 +118,7 @@ impl Train {
             Ok::<(), Failure>(())
         };
         for path in &self.sequences {
-            let mut files = FrameFiles::find(std::slice::from_ref(path))?;
+            let mut files = FrameFiles::find(std::slice::from_ref(path), self.reading)?;
             let count = self.frames.min(files.len());
             let read = |number| files.frame(number).map_err(|error| Failure::other(error.to_string()));
             let mut frames: Vec<_> = (0..count).map(read).collect::<Result<_, _>>()?;

@@ -12,7 +12,7 @@ use std::f64::consts::SQRT_2;
 
 use crate::byte_values::logit_of_byte;
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
+use crate::limits::{Budget, ReadLimits};
 use crate::ply::{Body, Element, Header, degree_of_rest, parse_header, planes_of_rest, require, rest_names};
 use crate::reading::{checked, frame_of};
 use crate::smallest_three::from_smallest_three;
@@ -52,28 +52,28 @@ const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", 
 /// A header that is not understood, missing elements or properties (all are named), fewer chunks than the
 /// vertices need, more than `limits` allow, or a value that no frame may hold.
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    checked(read_as_is(bytes, limits)?)
+    checked(read_as_is(bytes, &mut Budget::new(limits))?)
 }
 
 /// As [`read`], with values as they are: none is checked.
-pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    limits.bytes(bytes.len() as u64)?;
-    let header = parse_header(bytes)?;
-    let layout = Layout::of(&header, limits)?;
+pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
+    let header = parse_header(bytes, budget)?;
+    let layout = Layout::of(&header)?;
     let (mut ranges, mut rest) = (Vec::new(), Vec::new());
     let mut words: [Vec<u32>; 4] = Default::default();
     let mut body = Body::new(bytes, &header);
     for element in &header.elements {
         match element.name.as_str() {
-            "chunk" => ranges = body.columns(element, &layout.ranges)?,
+            "chunk" => ranges = body.columns(element, &layout.ranges, budget)?,
             "vertex" => {
-                words.iter_mut().zip(body.columns(element, &owned(&WORDS))?).for_each(|(to, from)| *to = from)
+                let columns = body.columns(element, &owned(&WORDS), budget)?;
+                words.iter_mut().zip(columns).for_each(|(to, from)| *to = from);
             }
-            "sh" => rest = body.columns(element, &layout.rest)?,
+            "sh" => rest = body.columns(element, &layout.rest, budget)?,
             _ => body.skip(element)?,
         }
     }
-    let mut planes = unpack(&ranges, &words);
+    let mut planes = unpack(&ranges, &words, budget)?;
     planes.sh = planes_of_rest(layout.sh_degree, rest);
     planes.sh.iter_mut().flatten().for_each(|value| *value = sh_of_byte(*value));
     frame_of(layout.sh_degree, planes)
@@ -88,10 +88,9 @@ struct Layout {
 
 impl Layout {
     /// Checks that a header has what it needs, and enough chunks for its vertices.
-    fn of(header: &Header, limits: &ReadLimits) -> Result<Self, SceneError> {
+    fn of(header: &Header) -> Result<Self, SceneError> {
         let (vertex, chunk) = (wanted(header, "vertex")?, wanted(header, "chunk")?);
         require(vertex, &owned(&WORDS))?;
-        limits.gaussians(vertex.count)?;
         let coloured = chunk.has("min_r");
         let ranges = owned(if coloured { &RANGES } else { &RANGES[..12] });
         require(chunk, &ranges)?;
@@ -120,9 +119,9 @@ fn owned(names: &[&str]) -> Vec<String> {
 }
 
 /// The planes of vertices: `ranges` holds columns in the order of [`RANGES`], `words` in that of [`WORDS`].
-fn unpack(ranges: &[Vec<f32>], words: &[Vec<u32>; 4]) -> Planes {
+fn unpack(ranges: &[Vec<f32>], words: &[Vec<u32>; 4], budget: &mut Budget) -> Result<Planes, SceneError> {
     let [positions, rotations, scales, colours] = words;
-    let mut planes = Planes::with_capacity(0, positions.len());
+    let mut planes = budget.planes(0, positions.len() as u64)?;
     let rows = positions.iter().zip(rotations).zip(scales).zip(colours);
     for (row, (((&position, &turn), &scale), &colour)) in rows.enumerate() {
         let chunk = row / CHUNK;
@@ -139,7 +138,7 @@ fn unpack(ranges: &[Vec<f32>], words: &[Vec<u32>; 4]) -> Planes {
             plane.push(part);
         }
     }
-    planes
+    Ok(planes)
 }
 
 /// A fraction of a chunk's range: six columns, the minima of three axes and then the maxima; without columns

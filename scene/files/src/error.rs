@@ -61,17 +61,25 @@ pub enum SceneErrorKind {
         /// What to do.
         advice: &'static str,
     },
-    /// The file asks for more than [`crate::ReadLimits`] allows.
-    #[error("it has {asked} {unit}; at most {allowed} are read ({limit})")]
+    /// The file asks for more memory than [`crate::ReadLimits::max_memory`] allows.
+    #[error(
+        "with {what}, reading takes {asked} bytes of memory or more; at most {allowed} are allowed (max_memory)"
+    )]
     OverLimit {
-        /// The field of `ReadLimits`.
-        limit: &'static str,
-        /// What is counted.
-        unit: &'static str,
-        /// What the file asks for.
+        /// What would have been allocated next.
+        what: &'static str,
+        /// Bytes in use with it; more may follow.
         asked: u64,
         /// What the limit is.
         allowed: u64,
+    },
+    /// The limit allows it, but the machine has not as much memory.
+    #[error("{what} takes {bytes} bytes of memory, which this machine does not have")]
+    OutOfMemory {
+        /// What was to be allocated.
+        what: &'static str,
+        /// Its bytes.
+        bytes: u64,
     },
     /// A value that no frame may hold.
     #[error(transparent)]

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::{SceneError, SceneErrorKind};
-use crate::limits::ReadLimits;
+use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
 use crate::{compressed_ply, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
@@ -58,17 +58,19 @@ pub fn read_scene(path: &Path, limits: &ReadLimits) -> Result<GaussianFrame, Sce
 /// # Errors
 /// As [`read_scene`], without those of values.
 pub fn read_scene_as_is(path: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    let mut budget = Budget::new(limits);
     if let Some(directory) = sog_directory(path) {
-        return sog::read_dir_as_is(&directory, limits);
+        return sog::read_dir_as_is(&directory, &mut budget);
     }
-    let read = || {
-        let bytes = read_file(path, limits)?;
+    let mut read = || {
+        let budget = &mut budget;
+        let bytes = read_file(path, budget)?;
         match format_of(&bytes, path)? {
-            SceneFormat::Ply => ply::read_as_is(&bytes, limits),
-            SceneFormat::CompressedPly => compressed_ply::read_as_is(&bytes, limits),
-            SceneFormat::Splat => splat::read_as_is(&bytes, limits),
-            SceneFormat::Spz => spz::read_as_is(&bytes, limits),
-            SceneFormat::Sog => sog::read_zip_as_is(&bytes, limits),
+            SceneFormat::Ply => ply::read_as_is(&bytes, budget),
+            SceneFormat::CompressedPly => compressed_ply::read_as_is(&bytes, budget),
+            SceneFormat::Splat => splat::read_as_is(&bytes, budget),
+            SceneFormat::Spz => spz::read_as_is(&bytes, budget),
+            SceneFormat::Sog => sog::read_zip_as_is(&bytes, budget),
         }
     };
     read().map_err(|error| error.in_file(path))
@@ -84,7 +86,7 @@ fn sog_directory(path: &Path) -> Option<PathBuf> {
 
 fn format_of(bytes: &[u8], path: &Path) -> Result<SceneFormat, SceneError> {
     if ply::is_ply(bytes) {
-        let header = ply::parse_header(bytes)?;
+        let header = ply::parse_header(bytes, &mut Budget::new(&ReadLimits::default()))?;
         let packed = header.element("vertex").is_some_and(ply::is_packed);
         return Ok(if packed { SceneFormat::CompressedPly } else { SceneFormat::Ply });
     }

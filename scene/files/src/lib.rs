@@ -11,6 +11,8 @@
 //! with [`ReadLimits`] before anything is allocated. All maths that is not a single IEEE operation goes
 //! through `libm`, so the same input gives the same frame on every machine.
 
+#![deny(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
 pub mod builtin;
 pub mod compressed_ply;
 pub mod ply;

@@ -11,7 +11,7 @@ pub(crate) use header::{Element, Header, is_ply, parse as parse_header};
 pub(crate) use table::Body;
 
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
+use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, frame_of};
 use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, rest_index, sh_coefficients};
 
@@ -21,13 +21,12 @@ use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, rest_index, sh
 /// A header that is not understood, missing properties (all of them are named), fewer bytes than the header
 /// promises, more than `limits` allow, or a value that no frame may hold (row and property are named).
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    checked(read_as_is(bytes, limits)?)
+    checked(read_as_is(bytes, &mut Budget::new(limits))?)
 }
 
 /// As [`read`], with values as they are: none is checked.
-pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    limits.bytes(bytes.len() as u64)?;
-    let header = parse_header(bytes)?;
+pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
+    let header = parse_header(bytes, budget)?;
     let vertex = header.element("vertex").ok_or_else(|| {
         SceneError::inconsistent("no element is called vertex", "this PLY file holds no Gaussians")
     })?;
@@ -38,12 +37,11 @@ pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFr
     let sh_degree = degree_of_rest(vertex)?;
     let names = names(sh_degree);
     require(vertex, &names)?;
-    limits.gaussians(vertex.count)?;
     let mut body = Body::new(bytes, &header);
     for element in header.elements.iter().take_while(|element| element.name != "vertex") {
         body.skip(element)?;
     }
-    let columns = body.columns(vertex, &names)?;
+    let columns = body.columns(vertex, &names, budget)?;
     frame_of(sh_degree, planes_of_columns(sh_degree, columns))
 }
 

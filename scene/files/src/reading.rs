@@ -5,18 +5,19 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
+use crate::limits::Budget;
 use splatstream_gaussians::{GaussianFrame, Planes};
 
-/// The whole of a file, unless it is larger than `limits` allow.
-pub(crate) fn read_file(path: &Path, limits: &ReadLimits) -> Result<Vec<u8>, SceneError> {
-    let read = || -> Result<Vec<u8>, SceneError> {
+/// The whole of a file, which counts as long as the budget lives.
+pub(crate) fn read_file(path: &Path, budget: &mut Budget) -> Result<Vec<u8>, SceneError> {
+    const WHAT: &str = "the file";
+    let mut read = || -> Result<Vec<u8>, SceneError> {
         let file = File::open(path)?;
-        let size = limits.bytes(file.metadata()?.len())?;
-        let mut bytes = Vec::with_capacity(size);
-        // The file may grow while it is read.
-        file.take(limits.max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
-        limits.bytes(bytes.len() as u64)?;
+        let size = file.metadata()?.len();
+        let mut bytes = budget.room(size, WHAT)?;
+        // A pipe has no size, and a file may grow while it is read.
+        file.take(size.saturating_add(budget.left()).saturating_add(1)).read_to_end(&mut bytes)?;
+        budget.take((bytes.len() as u64).saturating_sub(size), WHAT)?;
         Ok(bytes)
     };
     read().map_err(|error| error.in_file(path))

@@ -9,7 +9,7 @@
 
 use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
+use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, frame_of};
 use splatstream_gaussians::activation::{colour_of_dc, dc_of_colour};
 use splatstream_gaussians::rotation::normalised;
@@ -27,12 +27,11 @@ const SMALLEST_SCALE: f32 = 1e-10;
 /// A length that is no multiple of 32 (there is no other way to tell a `.splat` file from any other bytes),
 /// more than `limits` allow, or a value that no frame may hold (row and property are named).
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    checked(read_as_is(bytes, limits)?)
+    checked(read_as_is(bytes, &mut Budget::new(limits))?)
 }
 
 /// As [`read`], with values as they are: none is checked.
-pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    limits.bytes(bytes.len() as u64)?;
+pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
     let over = bytes.len() % RECORD;
     if over != 0 {
         let what = format!("{over} bytes over the last whole 32-byte record");
@@ -42,8 +41,7 @@ pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFr
             "this is no .splat file, or it is cut short",
         ));
     }
-    let rows = limits.gaussians((bytes.len() / RECORD) as u64)?;
-    let mut planes = Planes::with_capacity(0, rows);
+    let mut planes = budget.planes(0, (bytes.len() / RECORD) as u64)?;
     for record in bytes.as_chunks::<RECORD>().0 {
         push(&mut planes, record);
     }

@@ -21,7 +21,7 @@ mod axes;
 mod container;
 
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
+use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, frame_of};
 use splatstream_gaussians::GaussianFrame;
 
@@ -50,14 +50,13 @@ impl Default for WriteOptions {
 /// Bytes that are no SPZ or end early, SH degree 4, axes that are more than flipped, more than `limits`
 /// allow, or a value that no frame may hold.
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    checked(read_as_is(bytes, limits)?)
+    checked(read_as_is(bytes, &mut Budget::new(limits))?)
 }
 
 /// As [`read`], with values as they are: none is checked.
-pub(crate) fn read_as_is(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    limits.bytes(bytes.len() as u64)?;
-    let (shape, streams) = container::read(bytes, limits)?;
-    let frame = frame_of(shape.sh_degree, attributes::unpack(&shape, &streams))?;
+pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
+    let (shape, streams, planes) = container::read(bytes, budget)?;
+    let frame = frame_of(shape.sh_degree, attributes::unpack(&shape, &streams, planes))?;
     Ok(frame.with_antialiased(shape.antialiased))
 }
 

@@ -2,6 +2,7 @@
 
 use crate::rotation::normalise_rows;
 use crate::sh::{MAX_SH_DEGREE, rest_index, sh_coefficients};
+use std::collections::TryReserveError;
 use std::fmt;
 
 /// The attributes of a frame, one vector a scalar; row `i` of every vector belongs to Gaussian `i`.
@@ -77,15 +78,31 @@ impl std::error::Error for FrameError {}
 impl Planes {
     /// Empty planes with as many SH planes as `sh_degree` has, and room for `rows`.
     pub fn with_capacity(sh_degree: u8, rows: usize) -> Self {
-        let room = || Vec::with_capacity(rows);
-        Self {
-            position: std::array::from_fn(|_| room()),
-            log_scale: std::array::from_fn(|_| room()),
-            rotation: std::array::from_fn(|_| room()),
-            opacity_logit: room(),
-            dc: std::array::from_fn(|_| room()),
-            sh: (0..sh_coefficients(sh_degree) * 3).map(|_| room()).collect(),
-        }
+        let mut planes = Self::of_degree(sh_degree);
+        planes.each_mut().for_each(|plane| plane.reserve_exact(rows));
+        planes
+    }
+
+    /// As [`Planes::with_capacity`], and memory that there is not is an error.
+    ///
+    /// # Errors
+    /// The machine refuses the memory.
+    pub fn try_with_capacity(sh_degree: u8, rows: usize) -> Result<Self, TryReserveError> {
+        let mut planes = Self::of_degree(sh_degree);
+        planes.each_mut().try_for_each(|plane| plane.try_reserve_exact(rows))?;
+        Ok(planes)
+    }
+
+    /// Empty planes, as many as `sh_degree` has.
+    fn of_degree(sh_degree: u8) -> Self {
+        Self { sh: vec![Vec::new(); sh_coefficients(sh_degree) * 3], ..Self::default() }
+    }
+
+    /// Every plane.
+    fn each_mut(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
+        let first = position.iter_mut().chain(log_scale).chain(rotation);
+        first.chain(std::iter::once(opacity_logit)).chain(dc).chain(sh)
     }
 
     /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.

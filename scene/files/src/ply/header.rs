@@ -10,6 +10,10 @@ use nom::sequence::{delimited, preceded, terminated};
 use nom::{IResult, Parser};
 
 use crate::error::SceneError;
+use crate::limits::Budget;
+
+/// Bytes of memory that a line of a header takes beside its name, at most.
+const LINE: u64 = 192;
 
 const NOT_PLY: &str = "check that this is a PLY file and that the transfer did not change its line ends";
 
@@ -103,7 +107,7 @@ pub(crate) fn is_ply(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// The byte offset of the first line that is not understood.
-pub(crate) fn parse(bytes: &[u8]) -> Result<Header, SceneError> {
+pub(crate) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<Header, SceneError> {
     let refuse = |rest: &[u8], what: String| SceneError::malformed(bytes.len() - rest.len(), what, NOT_PLY);
     let (mut rest, ()) =
         first_line(bytes).map_err(|_| refuse(bytes, "the first line is not \"ply\"".into()))?;
@@ -111,20 +115,24 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, SceneError> {
     let mut elements: Vec<Element> = Vec::new();
     let mut names = BTreeSet::new();
     loop {
+        budget.take(LINE, "a PLY header")?;
         let (after, line) =
             line(rest).map_err(|_| refuse(rest, format!("no PLY header line: \"{}\"", excerpt(rest))))?;
         match line {
             Line::Format(found) => encoding = Some(found),
             Line::Remark => {}
             Line::Element(element) => {
+                budget.take(element.name.len() as u64 * 2, "a PLY header")?;
                 unique(&mut names, None, &element.name).map_err(|what| refuse(rest, what))?;
                 elements.push(element);
             }
             Line::Property(property) => {
+                let number = elements.len();
                 let owner = elements
                     .last_mut()
                     .ok_or_else(|| refuse(rest, "a property comes before any element".into()))?;
-                unique(&mut names, Some(&owner.name), &property.name).map_err(|what| refuse(rest, what))?;
+                budget.take(property.name.len() as u64 * 2, "a PLY header")?;
+                unique(&mut names, Some(number), &property.name).map_err(|what| refuse(rest, what))?;
                 owner.properties.push(property);
             }
             Line::End => {
@@ -136,13 +144,13 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, SceneError> {
     }
 }
 
-/// Refuses a name that comes twice: which of the two is meant could not be told.
+/// Refuses a name that comes twice among elements, or among the properties of the element with a number: which of the two is meant could not be told.
 fn unique(
-    names: &mut BTreeSet<(Option<String>, String)>,
-    owner: Option<&str>,
+    names: &mut BTreeSet<(Option<usize>, String)>,
+    owner: Option<usize>,
     name: &str,
 ) -> Result<(), String> {
-    let new = names.insert((owner.map(str::to_owned), name.to_owned()));
+    let new = names.insert((owner, name.to_owned()));
     if new { Ok(()) } else { Err(format!("the name {name} comes twice")) }
 }
 
@@ -216,12 +224,17 @@ fn excerpt(line: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::limits::ReadLimits;
+
+    fn budget() -> Budget {
+        Budget::new(&ReadLimits::default())
+    }
 
     #[test]
     fn a_header_is_read_up_to_its_last_line_end() {
         let text = b"ply\r\nformat ascii 1.0\r\ncomment \xff\r\nelement vertex 3\r\nproperty float x\r\n\
                      property list uchar int of\r\nend_header\r\n1 2 3";
-        let header = parse(text).unwrap();
+        let header = parse(text, &mut budget()).unwrap();
         assert_eq!(header.length, text.len() - 5);
         assert_eq!(header.encoding, Encoding::Ascii);
         let vertex = header.element("vertex").unwrap();
@@ -231,7 +244,7 @@ mod tests {
 
     #[test]
     fn the_error_says_which_line() {
-        let error = parse(b"ply\nformat ascii 1.0\nelement vertex many\n").unwrap_err();
+        let error = parse(b"ply\nformat ascii 1.0\nelement vertex many\n", &mut budget()).unwrap_err();
         assert!(
             error.to_string().starts_with("byte 21: no PLY header line: \"element vertex many\""),
             "{error}"

@@ -3,10 +3,12 @@
 use super::header::{Element, Encoding, Header, Kind, Scalar};
 use crate::cursor::Cursor;
 use crate::error::SceneError;
+use crate::limits::Budget;
 
 /// Rows read a column at a time, so that a block of them stays in the first-level caches.
 const BLOCK_ROWS: usize = 128;
 
+const COLUMNS: &str = "the values of all Gaussians";
 const CUT_SHORT: &str = "the file is cut short or its header is wrong";
 
 /// Reads the values of a PLY body in the order of the file.
@@ -75,14 +77,17 @@ impl<'a> Body<'a> {
         &mut self,
         element: &Element,
         names: &[String],
+        budget: &mut Budget,
     ) -> Result<Vec<Vec<T>>, SceneError> {
         let stride = stride(element).ok_or_else(|| {
             let what = format!("element {} has a list property", element.name);
             SceneError::unsupported(what, "export it without list properties")
         })?;
         match self.encoding {
-            Encoding::Ascii => self.text_columns(element, names),
-            Encoding::LittleEndian | Encoding::BigEndian => self.binary_columns(element, names, stride),
+            Encoding::Ascii => self.text_columns(element, names, budget),
+            Encoding::LittleEndian | Encoding::BigEndian => {
+                self.binary_columns(element, names, stride, budget)
+            }
         }
     }
 
@@ -91,11 +96,13 @@ impl<'a> Body<'a> {
         element: &Element,
         names: &[String],
         stride: usize,
+        budget: &mut Budget,
     ) -> Result<Vec<Vec<T>>, SceneError> {
         let rows = self.cursor.take_rows(element.count, stride as u64, "the element's rows")?;
         let places: Vec<_> = names.iter().filter_map(|name| place(element, name)).collect();
         let count = rows.len() / stride.max(1);
-        let mut columns: Vec<Vec<T>> = places.iter().map(|_| Vec::with_capacity(count)).collect();
+        let room = places.iter().map(|_| budget.room(count as u64, COLUMNS));
+        let mut columns: Vec<Vec<T>> = room.collect::<Result<_, _>>()?;
         for block in rows.chunks(BLOCK_ROWS * stride.max(1)) {
             for (column, &(offset, kind)) in columns.iter_mut().zip(&places) {
                 extend(column, block, stride, offset, kind, self.encoding);
@@ -108,6 +115,7 @@ impl<'a> Body<'a> {
         &mut self,
         element: &Element,
         names: &[String],
+        budget: &mut Budget,
     ) -> Result<Vec<Vec<T>>, SceneError> {
         // A value takes a digit and a separator, the very last only a digit.
         let least = element.count.saturating_mul(element.properties.len() as u64 * 2).saturating_sub(1);
@@ -120,7 +128,8 @@ impl<'a> Body<'a> {
             .iter()
             .map(|property| names.iter().position(|name| *name == property.name))
             .collect();
-        let mut columns: Vec<Vec<T>> = names.iter().map(|_| Vec::new()).collect();
+        let room = names.iter().map(|_| budget.room(element.count, COLUMNS));
+        let mut columns: Vec<Vec<T>> = room.collect::<Result<_, _>>()?;
         for _ in 0..element.count {
             for target in &target {
                 let value = self.number()?;

@@ -6,9 +6,12 @@ use image::ImageDecoder;
 use image::codecs::webp::WebPDecoder;
 
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
+use crate::limits::Budget;
 
 const EXPORT: &str = "the file is damaged, or not lossless WebP; export the scene again";
+
+/// Bytes a pixel that the decoder takes for itself, at most.
+const DECODER_BYTES: u64 = 8;
 
 /// Pixels, row by row. Opaque images have no alpha channel and read as alpha 255.
 pub(crate) struct Image {
@@ -23,7 +26,7 @@ impl Image {
         name: &str,
         webp: &[u8],
         most: u64,
-        limits: &ReadLimits,
+        budget: &mut Budget,
     ) -> Result<Self, SceneError> {
         let refuse = |error| SceneError::inconsistent(format!("{name}: {error}"), EXPORT);
         let decoder = WebPDecoder::new(Cursor::new(webp)).map_err(refuse)?;
@@ -34,8 +37,14 @@ impl Image {
             return Err(SceneError::inconsistent(what, EXPORT));
         }
         let channels = usize::from(decoder.color_type().channel_count());
-        let mut pixels = vec![0; limits.bytes(decoder.total_bytes())?];
+        // The decoder has pixels of its own, and a cache of colours.
+        let working = pixels.saturating_mul(DECODER_BYTES);
+        budget.take(working, "a WebP decoder")?;
+        let total = decoder.total_bytes();
+        let mut pixels = budget.room(total, "an image")?;
+        pixels.resize(usize::try_from(total).unwrap_or(0), 0);
         decoder.read_image(&mut pixels).map_err(refuse)?;
+        budget.give_back(working);
         Ok(Self { width: width as usize, pixels, channels })
     }
 

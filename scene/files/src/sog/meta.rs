@@ -4,9 +4,14 @@ use serde::Deserialize;
 
 use super::META;
 use crate::error::SceneError;
+use crate::limits::Budget;
 
 /// Entries that a byte can choose from.
 const CODES: usize = 256;
+
+/// Bytes that a byte of JSON turns into, at most: an empty string of three takes 24, and a vector that grows
+/// has twice the room.
+const PARSED: u64 = 16;
 
 const EXPORT: &str = "export the scene again";
 
@@ -56,7 +61,8 @@ enum Range {
 pub(crate) type Codebook = Vec<f64>;
 
 impl Meta {
-    pub(crate) fn parse(json: &[u8]) -> Result<Self, SceneError> {
+    pub(crate) fn parse(json: &[u8], budget: &mut Budget) -> Result<Self, SceneError> {
+        budget.take((json.len() as u64).saturating_mul(PARSED), META)?;
         let meta: Self = serde_json::from_slice(json).map_err(|error| broken(error.to_string()))?;
         match meta.version.unwrap_or(1) {
             1 | 2 => Ok(meta),

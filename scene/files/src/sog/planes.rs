@@ -7,7 +7,7 @@ use super::image::Image;
 use super::meta::{Coded, Meta};
 use crate::byte_values::logit_of_byte;
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
+use crate::limits::{Budget, bytes_of_planes, refused};
 use crate::reading::frame_of;
 use crate::smallest_three::from_smallest_three;
 use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, sh_coefficients};
@@ -26,14 +26,19 @@ const PALETTE_PIXELS: u64 = 1024 * 960;
 
 /// Fetches files by name and reads the scene they make; values are not checked.
 pub(crate) fn read(
-    mut fetch: impl FnMut(&str) -> Result<Vec<u8>, SceneError>,
-    limits: &ReadLimits,
+    mut fetch: impl FnMut(&str, &mut Budget) -> Result<Vec<u8>, SceneError>,
+    budget: &mut Budget,
 ) -> Result<GaussianFrame, SceneError> {
-    let meta = Meta::parse(&fetch(META)?)?;
-    let rows = limits.gaussians(meta.count()?)?;
-    let images = Images::fetch(&meta, rows, fetch, limits)?;
+    let meta = Meta::parse(&fetch(META, budget)?, budget)?;
+    let count = meta.count()?;
+    // Without spherical harmonics, of which the images tell: refused before any image is decoded.
+    let least = bytes_of_planes(0, count);
+    budget.take(least, "the frame")?;
+    let rows = usize::try_from(count).map_err(|_| refused(least, "the frame"))?;
+    let images = Images::fetch(&meta, rows, fetch, budget)?;
     let sh_degree = images.palette.as_ref().map_or(0, |(_, palette)| palette.sh_degree);
-    let mut planes = Planes::with_capacity(sh_degree, rows);
+    budget.give_back(least);
+    let mut planes = budget.planes(sh_degree, count)?;
     let pixels = |image| Image::pixels(image).take(rows);
     positions(&meta, pixels(&images.low).zip(images.high.pixels()), &mut planes);
     rotations(pixels(&images.quats), &mut planes)?;
@@ -69,11 +74,16 @@ impl Images {
     fn fetch(
         meta: &Meta,
         rows: usize,
-        mut fetch: impl FnMut(&str) -> Result<Vec<u8>, SceneError>,
-        limits: &ReadLimits,
+        mut fetch: impl FnMut(&str, &mut Budget) -> Result<Vec<u8>, SceneError>,
+        budget: &mut Budget,
     ) -> Result<Self, SceneError> {
         let mut image = |name: &str| {
-            let image = Image::decode(name, &fetch(name)?, rows as u64 * 2 + PADDING, limits)?;
+            let image = Image::decode(
+                name,
+                &fetch(name, budget)?,
+                (rows as u64).saturating_mul(2).saturating_add(PADDING),
+                budget,
+            )?;
             if image.len() < rows {
                 let what = format!("{name} has {} pixels for {rows} Gaussians", image.len());
                 return Err(SceneError::inconsistent(what, EXPORT));
@@ -89,8 +99,8 @@ impl Images {
         };
         let labels = image(rest.file_with("label")?)?;
         let name = rest.file_with("centroid")?;
-        let centroids = Image::decode(name, &fetch(name)?, PALETTE_PIXELS, limits)?;
-        let palette = Some((labels, Palette::read(rest, name, &centroids)?));
+        let centroids = Image::decode(name, &fetch(name, budget)?, PALETTE_PIXELS, budget)?;
+        let palette = Some((labels, Palette::read(rest, name, &centroids, budget)?));
         Ok(Self { low, high, quats, scales, colours, palette })
     }
 }
@@ -145,7 +155,7 @@ struct Palette {
 }
 
 impl Palette {
-    fn read(coded: &Coded, name: &str, image: &Image) -> Result<Self, SceneError> {
+    fn read(coded: &Coded, name: &str, image: &Image, budget: &mut Budget) -> Result<Self, SceneError> {
         let degree = |&degree: &u8| sh_coefficients(degree) * ENTRIES_A_ROW == image.width;
         let sh_degree = (1..=MAX_SH_DEGREE).find(degree).ok_or_else(|| {
             let what = format!("{name} is {} pixels wide; 192, 512 and 960 are known", image.width);
@@ -153,7 +163,8 @@ impl Palette {
         })?;
         let books = [coded.codebook(0)?, coded.codebook(1)?, coded.codebook(2)?];
         let colours = image.pixels().flat_map(|pixel| [0, 1, 2].map(|channel| (channel, pixel[channel])));
-        let values = colours.map(|(channel, code)| books[channel][usize::from(code)] as f32).collect();
+        let mut values = budget.room((image.len() as u64).saturating_mul(3), "the palette")?;
+        values.extend(colours.map(|(channel, code)| books[channel][usize::from(code)] as f32));
         Ok(Self { sh_degree, values })
     }
 

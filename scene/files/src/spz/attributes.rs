@@ -18,9 +18,8 @@ const LARGEST_MAGNITUDE: f64 = 511.0;
 /// A 24-bit centre goes from −2²³ to this.
 const LARGEST_FIXED: f64 = 8_388_607.0;
 
-/// The planes of streams that have the lengths `shape` gives them.
-pub(crate) fn unpack(shape: &Shape, streams: &Streams) -> Planes {
-    let mut planes = Planes::with_capacity(shape.sh_degree, shape.gaussians);
+/// The planes of streams that have the lengths `shape` gives them; `planes` are empty and have room for them.
+pub(crate) fn unpack(shape: &Shape, streams: &Streams, mut planes: Planes) -> Planes {
     let [positions, alphas, colours, scales, rotations, sh] = streams;
     unpack_positions(shape, positions, &mut planes);
     planes.opacity_logit.extend(alphas.iter().map(|&byte| logit_of_byte(byte)));

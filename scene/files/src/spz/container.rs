@@ -10,8 +10,8 @@ use super::axes::Flip;
 use crate::cursor::Cursor;
 use crate::decompress;
 use crate::error::SceneError;
-use crate::limits::ReadLimits;
-use splatstream_gaussians::{MAX_SH_DEGREE, sh_coefficients};
+use crate::limits::{Budget, bytes_of_planes};
+use splatstream_gaussians::{MAX_SH_DEGREE, Planes, sh_coefficients};
 
 /// "NGSP" as the first four bytes.
 const MAGIC: u32 = 0x5053_474e;
@@ -78,7 +78,7 @@ impl Shape {
     }
 
     /// Checks a header: nothing in it is used before.
-    fn of_header(header: &StreamHeader, limits: &ReadLimits) -> Result<Self, SceneError> {
+    fn of_header(header: &StreamHeader) -> Result<Self, SceneError> {
         if header.magic != MAGIC {
             return Err(SceneError::malformed(0, format!("magic is {:#010x}", header.magic), NOT_SPZ));
         }
@@ -92,14 +92,22 @@ impl Shape {
         }
         let shape = Self {
             version: header.version,
-            gaussians: limits.gaussians(u64::from(header.gaussians))?,
+            gaussians: header.gaussians as usize,
             sh_degree: header.sh_degree,
             fractional_bits: header.fractional_bits,
             antialiased: header.flags & ANTIALIASED != 0,
             flip: Flip::default(),
         };
-        shape.strides().iter().try_for_each(|&stride| limits.bytes(shape.size(stride)).map(|_| ()))?;
         Ok(shape)
+    }
+
+    /// Counts all the attributes, and makes room for the planes they turn into: nothing is decompressed before.
+    fn room(&self, budget: &mut Budget) -> Result<Planes, SceneError> {
+        let streams: u64 = self.strides().into_iter().map(|stride| self.size(stride)).sum();
+        let planes = bytes_of_planes(self.sh_degree, self.gaussians as u64);
+        budget.take(streams.saturating_add(planes), "all its Gaussians")?;
+        budget.give_back(planes);
+        budget.planes(self.sh_degree, self.gaussians as u64)
     }
 
     fn size(&self, stride: usize) -> u64 {
@@ -112,11 +120,12 @@ pub(crate) fn is_spz(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC.to_le_bytes()) || bytes.starts_with(&GZIP)
 }
 
-pub(crate) fn read(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), SceneError> {
-    if bytes.starts_with(&GZIP) { read_gzip(bytes, limits) } else { read_zstd(bytes, limits) }
+/// The attributes of a file, and empty planes with room for what they hold.
+pub(crate) fn read(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Planes), SceneError> {
+    if bytes.starts_with(&GZIP) { read_gzip(bytes, budget) } else { read_zstd(bytes, budget) }
 }
 
-fn read_gzip(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), SceneError> {
+fn read_gzip(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Planes), SceneError> {
     let mut content = GzDecoder::new(bytes);
     let header = decompress::read_exactly(&mut content, 16, 0, HEADER)?;
     let header = StreamHeader::read(&mut Cursor::new(&header))?;
@@ -124,7 +133,8 @@ fn read_gzip(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
         let what = format!("gzip SPZ of version {}", header.version);
         return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
     }
-    let mut shape = Shape::of_header(&header, limits)?;
+    let mut shape = Shape::of_header(&header)?;
+    let planes = shape.room(budget)?;
     let mut streams = Streams::default();
     let mut at = 16;
     for ((stream, stride), name) in streams.iter_mut().zip(shape.strides()).zip(NAMES) {
@@ -136,17 +146,18 @@ fn read_gzip(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
     if header.flags & HAS_EXTENSIONS != 0 {
         shape.flip = flip_of(&extensions)?;
     }
-    Ok((shape, streams))
+    Ok((shape, streams, planes))
 }
 
-fn read_zstd(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), SceneError> {
+fn read_zstd(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Planes), SceneError> {
     let mut cursor = Cursor::new(bytes);
     let header = StreamHeader::read(&mut cursor)?;
     if header.magic == MAGIC && header.version != 4 {
         let what = format!("SPZ of version {} without gzip", header.version);
         return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
     }
-    let mut shape = Shape::of_header(&header, limits)?;
+    let mut shape = Shape::of_header(&header)?;
+    let planes = shape.room(budget)?;
     let contents_at = cursor.u32(HEADER)?;
     cursor.take(12, HEADER)?;
     let extensions = u64::from(contents_at)
@@ -156,11 +167,17 @@ fn read_zstd(bytes: &[u8], limits: &ReadLimits) -> Result<(Shape, Streams), Scen
     if header.flags & HAS_EXTENSIONS != 0 {
         shape.flip = flip_of(extensions)?;
     }
-    Ok((shape, read_frames(&mut cursor, &shape, header.reserved)?))
+    let streams = read_frames(&mut cursor, &shape, header.reserved, budget)?;
+    Ok((shape, streams, planes))
 }
 
 /// The table of contents with its `count` rows, and the zstd frames that follow it.
-fn read_frames(cursor: &mut Cursor<'_>, shape: &Shape, count: u8) -> Result<Streams, SceneError> {
+fn read_frames(
+    cursor: &mut Cursor<'_>,
+    shape: &Shape,
+    count: u8,
+    budget: &Budget,
+) -> Result<Streams, SceneError> {
     let sizes = shape.strides().map(|stride| shape.size(stride));
     // An attribute without bytes has no stream.
     let present = sizes.iter().filter(|&&size| size > 0).count();
@@ -182,7 +199,7 @@ fn read_frames(cursor: &mut Cursor<'_>, shape: &Shape, count: u8) -> Result<Stre
             return Err(SceneError::malformed(at, what, NOT_SPZ));
         }
         let at = cursor.at();
-        *stream = decompress::zstd(cursor.take(compressed, name)?, size, at, name)?;
+        *stream = decompress::zstd(cursor.take(compressed, name)?, size, budget.left(), at, name)?;
     }
     Ok(streams)
 }

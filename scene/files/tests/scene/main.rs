@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that meets an error stops there")]
 
 mod any_bytes;
+mod bombs;
 mod builtin;
 mod messages;
 mod ply_variants;

@@ -64,11 +64,11 @@ fn a_count_beyond_the_bytes_says_how_many_are_missing() {
 }
 
 #[test]
-fn a_count_beyond_the_limit_names_the_limit() {
-    let error =
-        ply::read(&ply::write(&small_frame()), &ReadLimits { max_gaussians: 2, ..LIMITS }).unwrap_err();
-    assert!(matches!(error.kind, SceneErrorKind::OverLimit { asked: 3, allowed: 2, .. }));
-    assert!(error.to_string().contains("Gaussians; at most "));
+fn memory_beyond_the_limit_names_the_limit() {
+    let bytes = ply::write(&small_frame());
+    let error = ply::read(&bytes, &ReadLimits { max_memory: 6000 }).unwrap_err();
+    assert!(matches!(error.kind, SceneErrorKind::OverLimit { allowed: 6000, .. }), "{error}");
+    assert!(error.to_string().contains("at most 6000 are allowed (max_memory)"), "{error}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use splatstream_files::{ReadLimits, ply, splat, spz};
 use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
 
 /// Small, so that a test of broken files cannot take all memory.
-pub(crate) const LIMITS: ReadLimits = ReadLimits { max_gaussians: 1 << 14, max_bytes: 1 << 22 };
+pub(crate) const LIMITS: ReadLimits = ReadLimits { max_memory: 1 << 22 };
 
 /// The values of one Gaussian: position, log scale, rotation, opacity logit, DC, SH.
 type Row = ([f32; 3], [f32; 3], [f32; 4], f32, [f32; 3], Vec<f32>);

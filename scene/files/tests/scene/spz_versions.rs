@@ -108,5 +108,5 @@ fn a_count_beyond_the_bytes_is_refused_without_room_for_it() {
     let error = spz::read(&gzip(&header(3, 1 << 13, 3, 0)), &LIMITS).unwrap_err();
     assert!(error.to_string().contains("positions needs 73728 bytes, 0 are left"), "{error}");
     let error = spz::read(&gzip(&header(3, u32::MAX, 0, 0)), &LIMITS).unwrap_err();
-    assert!(error.to_string().contains("max_gaussians"), "{error}");
+    assert!(error.to_string().contains("max_memory"), "{error}");
 }
