@@ -125,14 +125,14 @@ fn unpack(ranges: &[Vec<f32>], words: &[Vec<u32>; 4], budget: &mut Budget) -> Re
     let rows = positions.iter().zip(rotations).zip(scales).zip(colours);
     for (row, (((&position, &turn), &scale), &colour)) in rows.enumerate() {
         let chunk = row / CHUNK;
-        let (position, scale) = (fractions(position), fractions(scale));
         let [red, green, blue, opacity] = colour.to_be_bytes();
-        for (axis, colour) in [red, green, blue].into_iter().enumerate() {
-            let colour = f64::from(colour) / 255.0;
-            planes.position[axis].push(within(ranges.get(..6), axis, chunk, position[axis]) as f32);
-            planes.log_scale[axis].push(within(ranges.get(6..12), axis, chunk, scale[axis]) as f32);
-            planes.dc[axis].push(dc_of_colour(within(ranges.get(12..), axis, chunk, colour)));
-        }
+        let colour = [red, green, blue].map(|byte| f64::from(byte) / 255.0);
+        let position = within(ranges.get(..6), chunk, fractions(position));
+        let scale = within(ranges.get(6..12), chunk, fractions(scale));
+        let colour = within(ranges.get(12..), chunk, colour);
+        planes.position.iter_mut().zip(position).for_each(|(plane, value)| plane.push(value as f32));
+        planes.log_scale.iter_mut().zip(scale).for_each(|(plane, value)| plane.push(value as f32));
+        planes.dc.iter_mut().zip(colour).for_each(|(plane, value)| plane.push(dc_of_colour(value)));
         planes.opacity_logit.push(logit_of_byte(opacity));
         for (plane, part) in planes.rotation.iter_mut().zip(rotation(turn)) {
             plane.push(part);
@@ -141,14 +141,15 @@ fn unpack(ranges: &[Vec<f32>], words: &[Vec<u32>; 4], budget: &mut Budget) -> Re
     Ok(planes)
 }
 
-/// A fraction of a chunk's range: six columns, the minima of three axes and then the maxima; without columns
-/// the range is 0 to 1.
-fn within(range: Option<&[Vec<f32>]>, axis: usize, chunk: usize, fraction: f64) -> f64 {
-    let Some([min_x, min_y, min_z, max_x, max_y, max_z]) = range else {
-        return fraction;
-    };
-    let (low, high) = ([min_x, min_y, min_z][axis][chunk], [max_x, max_y, max_z][axis][chunk]);
-    f64::from(low) + (f64::from(high) - f64::from(low)) * fraction
+/// Fractions of a chunk's ranges in x, y, z: six columns, the minima of three axes and then the maxima; without
+/// columns, or where a column has no such chunk, the range is 0 to 1.
+fn within(ranges: Option<&[Vec<f32>]>, chunk: usize, fractions: [f64; 3]) -> [f64; 3] {
+    let Some([min_x, min_y, min_z, max_x, max_y, max_z]) = ranges else { return fractions };
+    let [x, y, z] = fractions;
+    [(min_x, max_x, x), (min_y, max_y, y), (min_z, max_z, z)].map(|(low, high, fraction)| {
+        let (Some(&low), Some(&high)) = (low.get(chunk), high.get(chunk)) else { return fraction };
+        f64::from(low) + (f64::from(high) - f64::from(low)) * fraction
+    })
 }
 
 /// 11, 10 and 11 bits as fractions 0 to 1.

@@ -28,7 +28,7 @@ impl<'a> Cursor<'a> {
         let split = usize::try_from(count).ok().and_then(|count| self.rest.split_at_checked(count));
         let (taken, rest) =
             split.ok_or_else(|| SceneError::truncated(self.at, what, count, self.rest.len()))?;
-        self.at += taken.len();
+        self.at = taken.len().saturating_add(self.at);
         self.rest = rest;
         Ok(taken)
     }

@@ -11,8 +11,19 @@
 //! with [`ReadLimits`] before anything is allocated. All maths that is not a single IEEE operation goes
 //! through `libm`, so the same input gives the same frame on every machine.
 
-#![deny(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+#![deny(
+    clippy::arithmetic_side_effects,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used
+)]
 
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::indexing_slicing,
+    reason = "scenes are made from a few numbers that are clamped, not from input"
+)]
 pub mod builtin;
 pub mod compressed_ply;
 pub mod ply;

@@ -3,7 +3,7 @@
 use std::collections::TryReserveError;
 
 use crate::error::{SceneError, SceneErrorKind};
-use splatstream_gaussians::{Planes, sh_coefficients};
+use splatstream_gaussians::{Planes, sh_planes};
 
 /// The bound on the memory of one read.
 ///
@@ -78,7 +78,7 @@ impl Budget {
 
 /// Bytes of the planes of `rows` Gaussians: 14 and those of the spherical harmonics, four bytes a value.
 pub(crate) fn bytes_of_planes(sh_degree: u8, rows: u64) -> u64 {
-    let planes = (sh_coefficients(sh_degree) as u64).saturating_mul(3).saturating_add(14);
+    let planes = (sh_planes(sh_degree) as u64).saturating_add(14);
     planes.saturating_mul(4).saturating_mul(rows)
 }
 

@@ -13,7 +13,7 @@ pub(crate) use table::Body;
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, frame_of};
-use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, rest_index, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, rest_index, sh_planes};
 
 /// Reads a PLY file. Rotations come out at unit length.
 ///
@@ -55,11 +55,11 @@ pub fn write(frame: &GaussianFrame) -> Vec<u8> {
     }
     text.push_str("end_header\n");
     let mut out = text.into_bytes();
-    out.reserve(frame.len() * names.len() * 4);
+    out.reserve(frame.len().saturating_mul(names.len()).saturating_mul(4));
     let columns = columns_of_frame(frame);
     for row in 0..frame.len() {
         for column in &columns {
-            let value = column.map_or(0.0, |column| column[row]);
+            let value = column.and_then(|column| column.get(row)).copied().unwrap_or(0.0);
             out.extend_from_slice(&value.to_le_bytes());
         }
     }
@@ -94,18 +94,19 @@ pub(crate) fn degree_of_rest(element: &Element) -> Result<u8, SceneError> {
 
 /// The degree whose three channels have `values` coefficients in all: 0, 9, 24, 45; none otherwise.
 fn degree_of_values(values: usize) -> Option<u8> {
-    (0..=MAX_SH_DEGREE).find(|&degree| sh_coefficients(degree) * 3 == values)
+    (0..=MAX_SH_DEGREE).find(|&degree| sh_planes(degree) == values)
 }
 
 /// `f_rest_0` and on, as many as the degree has.
 pub(crate) fn rest_names(sh_degree: u8) -> impl Iterator<Item = String> {
-    (0..sh_coefficients(sh_degree) * 3).map(|at| format!("f_rest_{at}"))
+    (0..sh_planes(sh_degree)).map(|at| format!("f_rest_{at}"))
 }
 
 /// SH planes, coefficient by coefficient, of `f_rest_*` columns, channel by channel.
 pub(crate) fn planes_of_rest<T: Default>(sh_degree: u8, mut rest: Vec<T>) -> Vec<T> {
     let planes = 0..rest.len();
-    planes.map(|plane| std::mem::take(&mut rest[rest_index(plane, sh_degree)])).collect()
+    let mut take = |plane| rest.get_mut(rest_index(plane, sh_degree)).map(std::mem::take).unwrap_or_default();
+    planes.map(&mut take).collect()
 }
 
 /// The properties that make a Gaussian, in the order of the original code, without normals.
@@ -128,7 +129,7 @@ fn planes_of_columns(sh_degree: u8, columns: Vec<Vec<f32>>) -> Planes {
     let mut next = || columns.next().unwrap_or_default();
     let position = std::array::from_fn(|_| next());
     let dc = std::array::from_fn(|_| next());
-    let rest = (0..sh_coefficients(sh_degree) * 3).map(|_| next()).collect();
+    let rest = (0..sh_planes(sh_degree)).map(|_| next()).collect();
     let opacity_logit = next();
     let log_scale = std::array::from_fn(|_| next());
     let rotation = std::array::from_fn(|_| next());
@@ -139,7 +140,9 @@ fn planes_of_columns(sh_degree: u8, columns: Vec<Vec<f32>>) -> Planes {
 fn columns_of_frame(frame: &GaussianFrame) -> Vec<Option<&[f32]>> {
     let mut rest = vec![None; frame.sh().len()];
     for (plane, values) in frame.sh().iter().enumerate() {
-        rest[rest_index(plane, frame.sh_degree())] = Some(values.as_slice());
+        if let Some(column) = rest.get_mut(rest_index(plane, frame.sh_degree())) {
+            *column = Some(values.as_slice());
+        }
     }
     let some = |plane| Some(Vec::as_slice(plane));
     let mut columns: Vec<Option<&[f32]>> = frame.position().iter().map(some).collect();

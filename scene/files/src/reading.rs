@@ -33,3 +33,8 @@ pub(crate) fn checked(frame: GaussianFrame) -> Result<GaussianFrame, SceneError>
     frame.validate()?;
     Ok(frame)
 }
+
+/// The values of a row of planes. A frame has that row: its planes are of one length.
+pub(crate) fn row_of<const N: usize>(planes: &[Vec<f32>; N], row: usize) -> [f32; N] {
+    planes.each_ref().map(|plane| plane.get(row).copied().unwrap_or_default())
+}

@@ -20,15 +20,22 @@ pub(crate) fn from_smallest_three(largest: usize, smallest: [f64; 3]) -> [f32; 4
 /// The index of the component largest in magnitude (the first of equals), and the others in their order with
 /// the sign that makes the largest positive.
 pub(crate) fn to_smallest_three(quaternion: [f32; 4]) -> (usize, [f64; 3]) {
-    let mut largest = 0;
-    for place in 1..4 {
-        if quaternion[place].abs() > quaternion[largest].abs() {
-            largest = place;
+    let mut largest = (0, 0.0_f32);
+    for (index, part) in quaternion.into_iter().enumerate() {
+        if part.abs() > largest.1.abs() {
+            largest = (index, part);
         }
     }
-    let sign = if quaternion[largest] < 0.0 { -1.0 } else { 1.0 };
-    let others = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][largest];
-    (largest, others.map(|place| f64::from(quaternion[place]) * sign))
+    let (index, part) = largest;
+    let sign = if part < 0.0 { -1.0 } else { 1.0 };
+    let [a, b, c, d] = quaternion.map(|part| f64::from(part) * sign);
+    let others = match index {
+        0 => [b, c, d],
+        1 => [a, c, d],
+        2 => [a, b, d],
+        _ => [a, b, c],
+    };
+    (index, others)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@
 use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
-use crate::reading::{checked, frame_of};
+use crate::reading::{checked, frame_of, row_of};
 use splatstream_gaussians::activation::{colour_of_dc, dc_of_colour};
 use splatstream_gaussians::rotation::normalised;
 use splatstream_gaussians::{GaussianFrame, Planes};
@@ -36,7 +36,7 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
     if over != 0 {
         let what = format!("{over} bytes over the last whole 32-byte record");
         return Err(SceneError::malformed(
-            bytes.len() - over,
+            bytes.len().saturating_sub(over),
             what,
             "this is no .splat file, or it is cut short",
         ));
@@ -49,18 +49,24 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
 }
 
 fn push(planes: &mut Planes, record: &[u8; RECORD]) {
-    let float = |at: usize| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]);
-    for axis in 0..3 {
-        planes.position[axis].push(float(axis * 4));
-        let scale = float(12 + axis * 4);
+    let (floats, rest) = record.as_chunks::<4>().0.split_at(6);
+    let (positions, scales) = floats.split_at(3);
+    for (plane, &bytes) in planes.position.iter_mut().zip(positions) {
+        plane.push(f32::from_le_bytes(bytes));
+    }
+    for (plane, &bytes) in planes.log_scale.iter_mut().zip(scales) {
+        let scale = f32::from_le_bytes(bytes);
         // Not `max`, which would hide a NaN.
         let scale = if scale < SMALLEST_SCALE { SMALLEST_SCALE } else { scale };
-        planes.log_scale[axis].push(libm::log(f64::from(scale)) as f32);
-        planes.dc[axis].push(dc_of_colour(f64::from(record[24 + axis]) / 255.0));
+        plane.push(libm::log(f64::from(scale)) as f32);
     }
-    planes.opacity_logit.push(logit_of_byte(record[27]));
-    for part in 0..4 {
-        planes.rotation[part].push((f32::from(record[28 + part]) - 128.0) / 128.0);
+    let &[[red, green, blue, opacity], rotation] = rest else { return };
+    for (plane, byte) in planes.dc.iter_mut().zip([red, green, blue]) {
+        plane.push(dc_of_colour(f64::from(byte) / 255.0));
+    }
+    planes.opacity_logit.push(logit_of_byte(opacity));
+    for (plane, byte) in planes.rotation.iter_mut().zip(rotation) {
+        plane.push((f32::from(byte) - 128.0) / 128.0);
     }
 }
 
@@ -74,19 +80,19 @@ fn push(planes: &mut Planes, record: &[u8; RECORD]) {
 /// A frame that does not pass [`GaussianFrame::validate`].
 pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
     frame.validate()?;
-    let mut out = Vec::with_capacity(frame.len() * RECORD);
-    for row in 0..frame.len() {
-        for plane in frame.position() {
-            out.extend_from_slice(&plane[row].to_le_bytes());
+    let mut out = Vec::with_capacity(frame.len().saturating_mul(RECORD));
+    for (row, &opacity) in frame.opacity_logit().iter().enumerate() {
+        for value in row_of(frame.position(), row) {
+            out.extend_from_slice(&value.to_le_bytes());
         }
-        for plane in frame.log_scale() {
+        for log in row_of(frame.log_scale(), row) {
             // `as` gives infinity beyond the largest float: the largest is nearer.
-            let scale = (libm::exp(f64::from(plane[row])) as f32).min(f32::MAX);
+            let scale = (libm::exp(f64::from(log)) as f32).min(f32::MAX);
             out.extend_from_slice(&scale.to_le_bytes());
         }
-        out.extend(frame.dc().iter().map(|plane| to_byte(colour_of_dc(plane[row]) * 255.0)));
-        out.push(byte_of_logit(frame.opacity_logit()[row]));
-        let rotation = frame.rotation().each_ref().map(|plane| plane[row]);
+        out.extend(row_of(frame.dc(), row).map(|dc| to_byte(colour_of_dc(dc) * 255.0)));
+        out.push(byte_of_logit(opacity));
+        let rotation = row_of(frame.rotation(), row);
         // Validated: no quaternion is zero.
         let rotation = normalised(rotation).unwrap_or([1.0, 0.0, 0.0, 0.0]);
         out.extend(rotation.map(|part| to_byte(f64::from(part) * 128.0 + 128.0)));

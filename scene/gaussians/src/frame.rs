@@ -1,7 +1,7 @@
 //! One frame of Gaussians in PLY's domain.
 
 use crate::rotation::normalise_rows;
-use crate::sh::{MAX_SH_DEGREE, rest_index, sh_coefficients};
+use crate::sh::{MAX_SH_DEGREE, rest_index, sh_planes};
 use std::collections::TryReserveError;
 use std::fmt;
 
@@ -95,7 +95,7 @@ impl Planes {
 
     /// Empty planes, as many as `sh_degree` has.
     fn of_degree(sh_degree: u8) -> Self {
-        Self { sh: vec![Vec::new(); sh_coefficients(sh_degree) * 3], ..Self::default() }
+        Self { sh: vec![Vec::new(); sh_planes(sh_degree)], ..Self::default() }
     }
 
     /// Every plane.
@@ -143,7 +143,7 @@ impl GaussianFrame {
         if sh_degree > MAX_SH_DEGREE {
             return Err(FrameError::ShDegree(sh_degree));
         }
-        let (expected, found) = (sh_coefficients(sh_degree) * 3, planes.sh.len());
+        let (expected, found) = (sh_planes(sh_degree), planes.sh.len());
         if found != expected {
             return Err(FrameError::ShPlanes { degree: sh_degree, expected, found });
         }

@@ -21,4 +21,4 @@ mod sh;
 
 pub use defect::{Defect, DefectKind, Defects};
 pub use frame::{FrameError, GaussianFrame, Planes};
-pub use sh::{MAX_SH_DEGREE, rest_index, sh_basis, sh_coefficients};
+pub use sh::{MAX_SH_DEGREE, rest_index, sh_basis, sh_coefficients, sh_planes};

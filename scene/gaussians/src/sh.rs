@@ -9,6 +9,11 @@ pub fn sh_coefficients(degree: u8) -> usize {
     side * side - 1
 }
 
+/// Planes of bands 1 and up, one a coefficient and channel: 0, 9, 24, 45 for degrees 0 to 3.
+pub fn sh_planes(degree: u8) -> usize {
+    sh_coefficients(degree) * 3
+}
+
 /// The number in PLY's name for an SH plane, `f_rest_*`: planes interleave channels, PLY holds one channel after
 /// another.
 pub fn rest_index(plane: usize, degree: u8) -> usize {

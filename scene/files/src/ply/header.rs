@@ -108,7 +108,9 @@ pub(crate) fn is_ply(bytes: &[u8]) -> bool {
 /// # Errors
 /// The byte offset of the first line that is not understood.
 pub(crate) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<Header, SceneError> {
-    let refuse = |rest: &[u8], what: String| SceneError::malformed(bytes.len() - rest.len(), what, NOT_PLY);
+    let refuse = |rest: &[u8], what: String| {
+        SceneError::malformed(bytes.len().saturating_sub(rest.len()), what, NOT_PLY)
+    };
     let (mut rest, ()) =
         first_line(bytes).map_err(|_| refuse(bytes, "the first line is not \"ply\"".into()))?;
     let mut encoding = None;
@@ -122,7 +124,7 @@ pub(crate) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<Header, SceneEr
             Line::Format(found) => encoding = Some(found),
             Line::Remark => {}
             Line::Element(element) => {
-                budget.take(element.name.len() as u64 * 2, "a PLY header")?;
+                budget.take((element.name.len() as u64).saturating_mul(2), "a PLY header")?;
                 unique(&mut names, None, &element.name).map_err(|what| refuse(rest, what))?;
                 elements.push(element);
             }
@@ -131,13 +133,13 @@ pub(crate) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<Header, SceneEr
                 let owner = elements
                     .last_mut()
                     .ok_or_else(|| refuse(rest, "a property comes before any element".into()))?;
-                budget.take(property.name.len() as u64 * 2, "a PLY header")?;
+                budget.take((property.name.len() as u64).saturating_mul(2), "a PLY header")?;
                 unique(&mut names, Some(number), &property.name).map_err(|what| refuse(rest, what))?;
                 owner.properties.push(property);
             }
             Line::End => {
                 let encoding = encoding.ok_or_else(|| refuse(rest, "the format line is missing".into()))?;
-                return Ok(Header { encoding, elements, length: bytes.len() - after.len() });
+                return Ok(Header { encoding, elements, length: bytes.len().saturating_sub(after.len()) });
             }
         }
         rest = after;

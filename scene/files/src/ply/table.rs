@@ -100,10 +100,10 @@ impl<'a> Body<'a> {
     ) -> Result<Vec<Vec<T>>, SceneError> {
         let rows = self.cursor.take_rows(element.count, stride as u64, "the element's rows")?;
         let places: Vec<_> = names.iter().filter_map(|name| place(element, name)).collect();
-        let count = rows.len() / stride.max(1);
+        let count = rows.len().checked_div(stride).unwrap_or(0);
         let room = places.iter().map(|_| budget.room(count as u64, COLUMNS));
         let mut columns: Vec<Vec<T>> = room.collect::<Result<_, _>>()?;
-        for block in rows.chunks(BLOCK_ROWS * stride.max(1)) {
+        for block in rows.chunks(BLOCK_ROWS.saturating_mul(stride.max(1))) {
             for (column, &(offset, kind)) in columns.iter_mut().zip(&places) {
                 extend(column, block, stride, offset, kind, self.encoding);
             }
@@ -118,7 +118,8 @@ impl<'a> Body<'a> {
         budget: &mut Budget,
     ) -> Result<Vec<Vec<T>>, SceneError> {
         // A value takes a digit and a separator, the very last only a digit.
-        let least = element.count.saturating_mul(element.properties.len() as u64 * 2).saturating_sub(1);
+        let least =
+            element.count.saturating_mul(element.properties.len() as u64).saturating_mul(2).saturating_sub(1);
         let left = self.cursor.remaining().len();
         if least > left as u64 {
             return Err(SceneError::truncated(self.cursor.at(), "the element's rows", least, left));
@@ -175,7 +176,7 @@ impl<'a> Body<'a> {
 /// Bytes of one row, unless a list makes them vary.
 fn stride(element: &Element) -> Option<usize> {
     element.properties.iter().try_fold(0, |sum, property| match property.kind {
-        Kind::Scalar(kind) => Some(sum + kind.size()),
+        Kind::Scalar(kind) => kind.size().checked_add(sum),
         Kind::List { .. } => None,
     })
 }
@@ -190,7 +191,7 @@ fn place(element: &Element, name: &str) -> Option<(usize, Scalar)> {
         if property.name == name {
             return Some((offset, kind));
         }
-        offset += kind.size();
+        offset = kind.size().checked_add(offset)?;
     }
     None
 }
@@ -204,7 +205,7 @@ fn extend<T: Cell>(
     kind: Scalar,
     encoding: Encoding,
 ) {
-    let cells = block.chunks_exact(stride).filter_map(|row| row.get(offset..offset + kind.size()));
+    let cells = block.chunks_exact(stride).filter_map(|row| row.get(offset..)?.get(..kind.size()));
     // The common case has its own loop, free of the choice of type in each cell.
     if (kind, encoding) == (Scalar::F32, Encoding::LittleEndian) {
         let floats = cells.filter_map(|cell| cell.try_into().ok()).map(f32::from_le_bytes);
@@ -221,7 +222,7 @@ fn decode(cell: &[u8], kind: Scalar, encoding: Encoding) -> f64 {
         *to = *from;
     }
     if encoding == Encoding::BigEndian {
-        wide[..cell.len().min(8)].reverse();
+        wide.iter_mut().take(cell.len()).zip(cell.iter().rev()).for_each(|(to, &from)| *to = from);
     }
     let [a, b, c, d, ..] = wide;
     match kind {

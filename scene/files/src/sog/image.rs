@@ -31,7 +31,7 @@ impl Image {
         let refuse = |error| SceneError::inconsistent(format!("{name}: {error}"), EXPORT);
         let decoder = WebPDecoder::new(Cursor::new(webp)).map_err(refuse)?;
         let (width, height) = decoder.dimensions();
-        let pixels = u64::from(width) * u64::from(height);
+        let pixels = u64::from(width).saturating_mul(height.into());
         if pixels > most {
             let what = format!("{name} has {pixels} pixels, {most} are more than enough");
             return Err(SceneError::inconsistent(what, EXPORT));
@@ -60,6 +60,6 @@ impl Image {
 
     /// How many pixels.
     pub(crate) fn len(&self) -> usize {
-        self.pixels.len() / self.channels
+        self.pixels.len().checked_div(self.channels).unwrap_or(0)
     }
 }

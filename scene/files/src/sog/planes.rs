@@ -4,7 +4,7 @@ use std::f64::consts::SQRT_2;
 
 use super::META;
 use super::image::Image;
-use super::meta::{Coded, Meta};
+use super::meta::{Codebook, Coded, Meta};
 use crate::byte_values::logit_of_byte;
 use crate::error::SceneError;
 use crate::limits::{Budget, bytes_of_planes, refused};
@@ -106,18 +106,14 @@ impl Images {
 }
 
 fn positions(meta: &Meta, pixels: impl Iterator<Item = ([u8; 4], [u8; 4])>, planes: &mut Planes) {
-    let [x, y, z] = &mut planes.position;
-    let value = |axis: usize, low: [u8; 4], high: [u8; 4]| {
-        let (least, most) = (meta.means.mins[axis], meta.means.maxs[axis]);
-        let code = u16::from_le_bytes([low[axis], high[axis]]);
-        let log = least + (most - least) * f64::from(code) / 65535.0;
-        // The log keeps its sign apart, and is of one more, so that small centres stay small.
-        (libm::expm1(log.abs()) * log.signum()) as f32
-    };
     for (low, high) in pixels {
-        x.push(value(0, low, high));
-        y.push(value(1, low, high));
-        z.push(value(2, low, high));
+        let codes = low.into_iter().zip(high).map(|(low, high)| u16::from_le_bytes([low, high]));
+        let ranges = meta.means.mins.into_iter().zip(meta.means.maxs);
+        for ((plane, code), (least, most)) in planes.position.iter_mut().zip(codes).zip(ranges) {
+            let log = least + (most - least) * f64::from(code) / 65535.0;
+            // The log keeps its sign apart, and is of one more, so that small centres stay small.
+            plane.push((libm::expm1(log.abs()) * log.signum()) as f32);
+        }
     }
 }
 
@@ -143,8 +139,13 @@ fn look_up(
     plane: &mut Vec<f32>,
 ) -> Result<(), SceneError> {
     let codebook = coded.codebook(channel)?;
-    plane.extend(pixels.map(|pixel| codebook[usize::from(pixel[channel])] as f32));
+    plane.extend(pixels.map(|pixel| value_of(&codebook, pixel.get(channel).copied().unwrap_or(0))));
     Ok(())
+}
+
+/// What a byte stands for: a codebook has an entry for each.
+fn value_of(codebook: &Codebook, code: u8) -> f32 {
+    codebook.get(usize::from(code)).map_or(f32::NAN, |&value| value as f32)
 }
 
 /// The SH coefficients that labels choose from.
@@ -156,15 +157,15 @@ struct Palette {
 
 impl Palette {
     fn read(coded: &Coded, name: &str, image: &Image, budget: &mut Budget) -> Result<Self, SceneError> {
-        let degree = |&degree: &u8| sh_coefficients(degree) * ENTRIES_A_ROW == image.width;
+        let degree = |&degree: &u8| sh_coefficients(degree).saturating_mul(ENTRIES_A_ROW) == image.width;
         let sh_degree = (1..=MAX_SH_DEGREE).find(degree).ok_or_else(|| {
             let what = format!("{name} is {} pixels wide; 192, 512 and 960 are known", image.width);
             SceneError::inconsistent(what, EXPORT)
         })?;
         let books = [coded.codebook(0)?, coded.codebook(1)?, coded.codebook(2)?];
-        let colours = image.pixels().flat_map(|pixel| [0, 1, 2].map(|channel| (channel, pixel[channel])));
+        let colours = image.pixels().flat_map(|pixel| books.iter().zip(pixel));
         let mut values = budget.room((image.len() as u64).saturating_mul(3), "the palette")?;
-        values.extend(colours.map(|(channel, code)| books[channel][usize::from(code)] as f32));
+        values.extend(colours.map(|(book, code)| value_of(book, code)));
         Ok(Self { sh_degree, values })
     }
 
@@ -175,11 +176,12 @@ impl Palette {
     ) -> Result<(), SceneError> {
         for (row, [low, high, ..]) in labels.enumerate() {
             let label = usize::from(u16::from_le_bytes([low, high]));
-            let first = label * planes.len();
-            let entry = self.values.get(first..first + planes.len()).ok_or_else(|| {
-                let what = format!("Gaussian {row}: label {label} is past the end of the palette");
-                SceneError::inconsistent(what, EXPORT)
-            })?;
+            let first = label.saturating_mul(planes.len());
+            let entry =
+                self.values.get(first..).and_then(|rest| rest.get(..planes.len())).ok_or_else(|| {
+                    let what = format!("Gaussian {row}: label {label} is past the end of the palette");
+                    SceneError::inconsistent(what, EXPORT)
+                })?;
             for (plane, &value) in planes.iter_mut().zip(entry) {
                 plane.push(value);
             }

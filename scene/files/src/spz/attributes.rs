@@ -7,6 +7,7 @@ use super::axes::Flip;
 use super::container::{Shape, Streams};
 use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
 use crate::error::SceneError;
+use crate::reading::row_of;
 use crate::smallest_three::{from_smallest_three, to_smallest_three};
 use splatstream_gaussians::rotation::normalised;
 use splatstream_gaussians::{GaussianFrame, Planes};
@@ -33,8 +34,10 @@ pub(crate) fn unpack(shape: &Shape, streams: &Streams, mut planes: Planes) -> Pl
     unpack_rotations(shape, rotations, &mut planes);
     let signs = shape.flip.sh();
     let count = planes.sh.len();
-    for (at, plane) in planes.sh.iter_mut().enumerate() {
-        let sign = signs[at / 3];
+    // Three channels have the sign of their coefficient.
+    for ((at, plane), sign) in
+        planes.sh.iter_mut().enumerate().zip(signs.into_iter().flat_map(|sign| [sign; 3]))
+    {
         let bytes = sh.iter().skip(at).step_by(count);
         plane.extend(bytes.map(|&byte| sign * (f32::from(byte) - 128.0) / 128.0));
     }
@@ -44,16 +47,20 @@ pub(crate) fn unpack(shape: &Shape, streams: &Streams, mut planes: Planes) -> Pl
 fn unpack_positions(shape: &Shape, bytes: &[u8], planes: &mut Planes) {
     let signs = shape.flip.position();
     if shape.version == 1 {
-        for (at, &half) in bytes.as_chunks::<2>().0.iter().enumerate() {
-            planes.position[at % 3].push(float_of_half(u16::from_le_bytes(half)) * signs[at % 3]);
+        for row in bytes.as_chunks::<2>().0.as_chunks::<3>().0 {
+            for ((plane, &half), sign) in planes.position.iter_mut().zip(row).zip(signs) {
+                plane.push(float_of_half(u16::from_le_bytes(half)) * sign);
+            }
         }
         return;
     }
     let step = 1.0 / (1_u64 << shape.fractional_bits) as f32;
-    for (at, &[low, middle, high]) in bytes.as_chunks::<3>().0.iter().enumerate() {
-        // Read at the top of 32 bits, so that the shift back extends the sign.
-        let fixed = i32::from_le_bytes([0, low, middle, high]) >> 8;
-        planes.position[at % 3].push(fixed as f32 * step * signs[at % 3]);
+    for row in bytes.as_chunks::<3>().0.as_chunks::<3>().0 {
+        for ((plane, &[low, middle, high]), sign) in planes.position.iter_mut().zip(row).zip(signs) {
+            // Read at the top of 32 bits, so that the shift back extends the sign.
+            let fixed = i32::from_le_bytes([0, low, middle, high]) >> 8;
+            plane.push(fixed as f32 * step * sign);
+        }
     }
 }
 
@@ -75,7 +82,7 @@ fn unpack_rotations(shape: &Shape, bytes: &[u8], planes: &mut Planes) {
         let word = u32::from_le_bytes(word);
         let part = |shift: u32| {
             let magnitude = f64::from(word >> shift & 0x1ff) / LARGEST_MAGNITUDE * FRAC_1_SQRT_2;
-            if word >> (shift + 9) & 1 == 1 { -magnitude } else { magnitude }
+            if word >> shift >> 9 & 1 == 1 { -magnitude } else { magnitude }
         };
         push(from_smallest_three((word >> 30) as usize, [part(20), part(10), part(0)]));
     }
@@ -152,10 +159,10 @@ fn fractional_bits(frame: &GaussianFrame, options: &WriteOptions) -> Result<u8, 
 
 fn pack_positions(frame: &GaussianFrame, shape: &Shape) -> Vec<u8> {
     let steps = f64::from(1_u32 << shape.fractional_bits);
-    let mut out = Vec::with_capacity(frame.len() * 9);
+    let mut out = Vec::with_capacity(frame.len().saturating_mul(9));
     for row in 0..frame.len() {
-        for (plane, sign) in frame.position().iter().zip(shape.flip.position()) {
-            let fixed = (f64::from(plane[row] * sign) * steps).round() as i32;
+        for (value, sign) in row_of(frame.position(), row).into_iter().zip(shape.flip.position()) {
+            let fixed = (f64::from(value * sign) * steps).round() as i32;
             let [low, middle, high, _] = fixed.to_le_bytes();
             out.extend_from_slice(&[low, middle, high]);
         }
@@ -164,7 +171,7 @@ fn pack_positions(frame: &GaussianFrame, shape: &Shape) -> Vec<u8> {
 }
 
 fn pack_rotation(frame: &GaussianFrame, row: usize, flip: Flip) -> [u8; 4] {
-    let [w, x, y, z] = frame.rotation().each_ref().map(|plane| plane[row]);
+    let [w, x, y, z] = row_of(frame.rotation(), row);
     // Validated: no quaternion is zero.
     let [w, x, y, z] = normalised([w, x, y, z]).unwrap_or([1.0, 0.0, 0.0, 0.0]);
     let [sx, sy, sz] = flip.rotation();
@@ -178,11 +185,12 @@ fn pack_rotation(frame: &GaussianFrame, row: usize, flip: Flip) -> [u8; 4] {
 
 fn pack_sh(frame: &GaussianFrame, options: &WriteOptions, flip: Flip) -> Vec<u8> {
     let signs = flip.sh();
-    let mut out = Vec::with_capacity(frame.len() * frame.sh().len());
+    let mut out = Vec::with_capacity(frame.len().saturating_mul(frame.sh().len()));
     for row in 0..frame.len() {
-        for (at, plane) in frame.sh().iter().enumerate() {
+        let signs = signs.into_iter().flat_map(|sign| [sign; 3]);
+        for ((at, plane), sign) in frame.sh().iter().enumerate().zip(signs) {
             let bits = if at < 9 { options.sh1_bits } else { options.sh_rest_bits };
-            out.push(sh_byte(plane[row] * signs[at / 3], bits));
+            out.push(sh_byte(plane.get(row).map_or(0.0, |value| value * sign), bits));
         }
     }
     out
@@ -190,7 +198,7 @@ fn pack_sh(frame: &GaussianFrame, options: &WriteOptions, flip: Flip) -> Vec<u8>
 
 /// The nearest byte with zeros below its `bits` highest bits, so that 0 is exact whatever the bits.
 fn sh_byte(value: f32, bits: u8) -> u8 {
-    let step = f64::from(1_u32 << (8 - bits));
+    let step = f64::from(256_u32 >> bits);
     let steps = ((f64::from(value) * 128.0 + 128.0) / step).round();
     to_byte((steps * step).min(256.0 - step))
 }

@@ -35,7 +35,7 @@ impl Flip {
     }
 
     fn between(system: u32) -> Self {
-        let differing = (system - 1) ^ (RIGHT_DOWN_FORWARD - 1);
+        let differing = system.wrapping_sub(1) ^ (RIGHT_DOWN_FORWARD - 1);
         Self([0, 1, 2].map(|axis| if differing >> axis & 1 == 1 { -1.0 } else { 1.0 }))
     }
 

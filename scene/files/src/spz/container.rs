@@ -11,7 +11,7 @@ use crate::cursor::Cursor;
 use crate::decompress;
 use crate::error::SceneError;
 use crate::limits::{Budget, bytes_of_planes};
-use splatstream_gaussians::{MAX_SH_DEGREE, Planes, sh_coefficients};
+use splatstream_gaussians::{MAX_SH_DEGREE, Planes, sh_planes};
 
 /// "NGSP" as the first four bytes.
 const MAGIC: u32 = 0x5053_474e;
@@ -74,7 +74,7 @@ impl Shape {
     pub(crate) fn strides(&self) -> [usize; 6] {
         let position = if self.version == 1 { 6 } else { 9 };
         let rotation = if self.version < 3 { 3 } else { 4 };
-        [position, 1, 3, 3, rotation, sh_coefficients(self.sh_degree) * 3]
+        [position, 1, 3, 3, rotation, sh_planes(self.sh_degree)]
     }
 
     /// Checks a header: nothing in it is used before.
@@ -111,7 +111,7 @@ impl Shape {
     }
 
     fn size(&self, stride: usize) -> u64 {
-        self.gaussians as u64 * stride as u64
+        (self.gaussians as u64).saturating_mul(stride as u64)
     }
 }
 
@@ -139,7 +139,7 @@ fn read_gzip(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Plane
     let mut at = 16;
     for ((stream, stride), name) in streams.iter_mut().zip(shape.strides()).zip(NAMES) {
         *stream = decompress::read_exactly(&mut content, shape.size(stride), at, name)?;
-        at += stream.len();
+        at = stream.len().saturating_add(at);
     }
     // Read in any case: gzip's checksum lies behind the last byte.
     let extensions = decompress::read_up_to(&mut content, EXTENSIONS, at, "what follows the attributes")?;

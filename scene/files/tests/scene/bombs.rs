@@ -48,11 +48,11 @@ fn webp(width: u32, height: u32, alpha: u8) -> Vec<u8> {
         bits |= u128::from(value) << length;
         length += count;
     };
-    [(0x2f, 8), (width - 1, 14), (height - 1, 14), (1, 1), (0, 3), (0, 1), (0, 1), (0, 1)]
-        .map(|(value, count)| put(value, count));
+    let header = [(0x2f, 8), (width - 1, 14), (height - 1, 14), (1, 1), (0, 3), (0, 1), (0, 1), (0, 1)];
+    header.into_iter().for_each(|(value, count)| put(value, count));
     // Five prefix codes of one symbol each: green, red, blue, alpha, distance.
     for symbol in [0, 0, 0, u32::from(alpha), 0] {
-        [(1, 1), (0, 1), (1, 1), (symbol, 8)].map(|(value, count)| put(value, count));
+        [(1, 1), (0, 1), (1, 1), (symbol, 8)].into_iter().for_each(|(value, count)| put(value, count));
     }
     let data = &bits.to_le_bytes()[..length.div_ceil(16) as usize * 2];
     let chunk = [&b"WEBPVP8L"[..], &(data.len() as u32).to_le_bytes(), data].concat();
