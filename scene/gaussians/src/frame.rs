@@ -24,6 +24,23 @@ pub struct Planes {
     pub sh: Vec<Vec<f32>>,
 }
 
+/// The values of a [`GaussianFrame`], to be changed in place; the planes are those of [`Planes`].
+#[derive(Debug)]
+pub struct PlanesMut<'a> {
+    /// Centres.
+    pub position: [&'a mut [f32]; 3],
+    /// Natural log of the semi-axes.
+    pub log_scale: [&'a mut [f32]; 3],
+    /// Quaternions w, x, y, z.
+    pub rotation: [&'a mut [f32]; 4],
+    /// Opacity before the sigmoid.
+    pub opacity_logit: &'a mut [f32],
+    /// DC coefficients.
+    pub dc: [&'a mut [f32]; 3],
+    /// Bands 1 and up.
+    pub sh: Vec<&'a mut [f32]>,
+}
+
 /// A frame of Gaussians: structure of arrays, equal lengths by construction, `f32`, PLY's domain.
 ///
 /// Values are not checked by construction: see [`GaussianFrame::validate`]. Readers call it.
@@ -220,6 +237,19 @@ impl GaussianFrame {
     /// All the planes.
     pub fn planes(&self) -> &Planes {
         &self.planes
+    }
+
+    /// The values, to be changed; planes keep their number and their length, so that the frame stays one.
+    pub fn planes_mut(&mut self) -> PlanesMut<'_> {
+        let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = &mut self.planes;
+        PlanesMut {
+            position: position.each_mut().map(Vec::as_mut_slice),
+            log_scale: log_scale.each_mut().map(Vec::as_mut_slice),
+            rotation: rotation.each_mut().map(Vec::as_mut_slice),
+            opacity_logit,
+            dc: dc.each_mut().map(Vec::as_mut_slice),
+            sh: sh.iter_mut().map(Vec::as_mut_slice).collect(),
+        }
     }
 
     /// The planes themselves.

@@ -20,5 +20,5 @@ mod frame;
 mod sh;
 
 pub use defect::{Defect, DefectKind, Defects};
-pub use frame::{FrameError, GaussianFrame, Planes};
+pub use frame::{FrameError, GaussianFrame, Planes, PlanesMut};
 pub use sh::{MAX_SH_DEGREE, rest_index, sh_basis, sh_coefficients, sh_planes};

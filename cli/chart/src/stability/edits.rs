@@ -1,7 +1,7 @@
 //! Changes of whole frames, from which cases are made.
 
 use super::dice::Dice;
-use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, PlanesMut, sh_coefficients};
 
 /// Where the inner scene is.
 pub(super) struct Place {
@@ -33,12 +33,10 @@ impl Place {
 }
 
 /// A frame with other values.
-pub(super) fn edited(frame: &GaussianFrame, edit: impl FnOnce(&mut Planes)) -> GaussianFrame {
-    let mut planes = frame.planes().clone();
-    edit(&mut planes);
-    // Edits keep the planes and their lengths.
-    let made = GaussianFrame::from_planes(frame.sh_degree(), planes).unwrap_or_default();
-    made.with_antialiased(frame.antialiased())
+pub(super) fn edited(frame: &GaussianFrame, edit: impl FnOnce(&mut PlanesMut<'_>)) -> GaussianFrame {
+    let mut edited = frame.clone();
+    edit(&mut edited.planes_mut());
+    edited
 }
 
 /// Distances from a point and sizes times a factor, of some Gaussians.
@@ -86,7 +84,8 @@ pub(super) fn thinned(frame: &GaussianFrame, most: usize) -> GaussianFrame {
     let kept = fewer(frame, most);
     let growth = 0.5 * libm::log(frame.len().max(1) as f64 / kept.len().max(1) as f64);
     edited(&kept, |planes| {
-        planes.log_scale.iter_mut().flatten().for_each(|scale| *scale += growth as f32);
+        let scales = planes.log_scale.iter_mut().flat_map(|plane| plane.iter_mut());
+        scales.for_each(|scale| *scale += growth as f32);
     })
 }
 

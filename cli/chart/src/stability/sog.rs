@@ -45,8 +45,8 @@ fn position(plane: &mut [f32]) {
 
 /// Every value becomes the nearest of a codebook that is made for all planes together: k-means over sorted values, from
 /// their quantiles.
-fn by_codebook(planes: &mut [Vec<f32>]) {
-    let mut values: Vec<f32> = planes.iter().flatten().copied().collect();
+fn by_codebook(planes: &mut [&mut [f32]]) {
+    let mut values: Vec<f32> = planes.iter().flat_map(|plane| plane.iter().copied()).collect();
     if values.is_empty() {
         return;
     }
@@ -64,7 +64,7 @@ fn by_codebook(planes: &mut [Vec<f32>]) {
         means.for_each(|(entry, (sum, count))| *entry = sum / count);
         codebook.sort_unstable_by(f64::total_cmp);
     }
-    let values = planes.iter_mut().flatten();
+    let values = planes.iter_mut().flat_map(|plane| plane.iter_mut());
     values.for_each(|value| *value = codebook[nearest(&codebook, f64::from(*value))] as f32);
 }
 
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn one_value_is_its_own_codebook() {
         let mut planes = [vec![2.5f32; 3]];
-        by_codebook(&mut planes);
+        by_codebook(&mut planes.each_mut().map(Vec::as_mut_slice));
         assert_eq!(planes[0], [2.5; 3]);
     }
 }
