@@ -9,9 +9,10 @@ use divan::{Bencher, black_box};
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::prediction::{Predicting, Prediction};
-use splatstream_decoder::increment::residual::{Attributes, Stage};
+use splatstream_decoder::increment::residual::Attributes;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::predictor::Predictor;
+use splatstream_decoder::stage::Stage;
 use splatstream_format::payload::{Network, REGISTRY, Transform};
 use splatstream_format::syntax::{IncrementHeader, TransformHeader};
 

@@ -105,7 +105,7 @@ impl Carried {
 #[expect(clippy::arithmetic_side_effects, reason = "an overflow is a failed test")]
 mod tests {
     use super::*;
-    use crate::displacement::Cell;
+    use crate::cell::Cell;
     use crate::frame::QuantizedFrame;
 
     /// Shifts everything by eight steps along an axis; a part of the grid is stale.

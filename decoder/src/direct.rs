@@ -4,7 +4,8 @@
 //! block, whichever unit it is of, and writes to the part of the planes that belongs to it. This is how frames decode
 //! whose units only add Gaussians: all frames of static content, and I frames of one spatial layer.
 
-use crate::block::{Buffers, UnitParameters, decode_block};
+use crate::block::{UnitParameters, decode_block};
+use crate::coded_block::Buffers;
 use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, blocks_of};

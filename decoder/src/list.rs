@@ -5,7 +5,7 @@
 
 use crate::digest::{ListDigest, list_digest};
 use crate::displacement::CellField;
-use crate::frame::QuantizedFrame;
+use crate::frame::{QuantizedFrame, retain};
 use rayon::prelude::*;
 
 /// Fraction bits of positions and rotations inside the prediction loop.
@@ -176,12 +176,6 @@ impl GaussianList {
     pub fn digest(&self) -> ListDigest {
         list_digest(&self.planes, 0..self.len())
     }
-}
-
-/// Keeps the values whose flag is set; values without a flag stay.
-pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
-    let mut flags = keep.iter();
-    values.retain(|_| flags.next().copied().unwrap_or(true));
 }
 
 #[cfg(test)]

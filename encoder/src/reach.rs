@@ -4,7 +4,7 @@
 //! step of the grid comes from the [core] of the scene, whatever lies outside. How far the grid is linear, and how its
 //! steps grow outside, is what costs the fewest bits at equal error in pictures.
 
-use crate::settings::Steps;
+use crate::steps::Steps;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
 

@@ -2,7 +2,8 @@
 
 use crate::isolated::Isolated;
 use crate::sequence::Analysis;
-use crate::settings::{Importance, Settings, Steps};
+use crate::settings::{Importance, Settings};
+use crate::steps::Steps;
 use splatstream_format::syntax::{FrameType, IncrementHeader};
 use splatstream_gaussians::Defect;
 

@@ -5,15 +5,17 @@
 //! 3. Removed parents go, and the new Gaussians, predicted and corrected by their residuals, are appended.
 
 use super::prediction::{Predicting, Prediction};
-use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
+use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use super::values::{SectionValues, UnitValues};
 use crate::attribute::{ATTRIBUTE_RANGE, in_range};
-use crate::displacement::{Cell, CellField, rotation_unit};
+use crate::cell::{Cell, rotation_unit};
+use crate::displacement::CellField;
 use crate::frame::QuantizedFrame;
 use crate::list::{Change, FINE, GaussianList};
 use crate::moves::{MovePredictor, MoveSpace, Moves, SpanRatio};
 use crate::position::{collect, positions};
 use crate::predictor::Predictor;
+use crate::stage::Stage;
 use core::ops::RangeInclusive;
 use rayon::prelude::*;
 use splatstream_format::entropy::layout::Section;

@@ -3,12 +3,13 @@
 //! Attributes are predicted in coding order, each just before its residual is added, because the bilateral
 //! predictor compares what is known of a Gaussian with its neighbours.
 
-use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
+use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use crate::colour::Colour;
 use crate::frame::QuantizedFrame;
 use crate::list::{FINE, canonical};
 use crate::neighbours::{Neighbour, NeighbourSearch};
 use crate::predictor::{NEIGHBOURS_MAX, Predictor, WeightedMean, bilateral_weights, knn_weights};
+use crate::stage::Stage;
 use crate::transformer::LaneNetwork;
 use core::ops::Range;
 use learned::{Learned, Target};

@@ -1,7 +1,8 @@
 //! Clauses 8.1 to 8.6 for increments: the sections of a unit to the values of its planes.
 
 use crate::attribute;
-use crate::block::{Buffers, CodedBlock, CodedPlanes, decode_coded};
+use crate::block::{CodedPlanes, decode_coded};
+use crate::coded_block::{Buffers, CodedBlock};
 use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::Result;

@@ -1,7 +1,7 @@
 //! What a bit may cost in pictures, so that a frame is as good as it must be and no better.
 
-use super::judge::Judge;
 use super::predicted::Predicted;
+use super::update_decision::Judge;
 use crate::error::Error;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::list::GaussianList;

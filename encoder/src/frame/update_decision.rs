@@ -1,12 +1,12 @@
 //! Which differences pictures are worth the bits of.
 //!
-//! Each difference has an error that pictures show if it is left, [estimated](super::worth) from the source frame as
+//! Each difference has an error that pictures show if it is left, [estimated](super::visible_difference) from the source frame as
 //! the cameras in use see it, and a number of bits that it takes. It is sent where the error is above the price of the
-//! bits. The [price](super::price) is as high as the pictures of the frame allow.
+//! bits. The [price](super::rate_distortion) is as high as the pictures of the frame allow.
 
-use super::price::Goal;
+use super::rate_distortion::Goal;
 use super::survivors::{Apart, Kept, Survivors};
-use super::worth::{Seen, Shown};
+use super::visible_difference::{Seen, Shown};
 use crate::grid::nearest_integer;
 use splatstream_format::payload::Codebook;
 use splatstream_gaussians::GaussianFrame;

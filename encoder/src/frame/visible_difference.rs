@@ -4,7 +4,7 @@
 //! little changes them by a part of that: the part of its own square that the difference of two bells has. Its colour
 //! changes them by the square of the change times its [energy](splatstream_render::contribution::Worth::energy).
 
-use super::align::Pose;
+use super::axis_matching::Pose;
 use crate::canonical::product;
 
 /// The square of a bell's derivative by its place in units of its width, and by the log of its width on one axis, as a

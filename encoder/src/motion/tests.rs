@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a panic is a failed test")]
 
 use super::follow::follow;
-use super::stale::{Held, stale_cells};
+use super::stale_cells::{Held, stale_cells};
 use super::*;
 use crate::grid::PositionGrid;
 use crate::matching::tests::{Scene, measure, shuffled};

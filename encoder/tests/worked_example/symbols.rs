@@ -69,7 +69,7 @@ fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, s
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
     let (mut deltas, mut planes) = (Vec::new(), vec![Vec::new()]);
-    let mut known = splatstream_decoder::block::CodedBlock::new(vec![0; count], 0, steps);
+    let mut known = splatstream_decoder::coded_block::CodedBlock::new(vec![0; count], 0, steps);
     for (plane, (&info, model)) in section.layout.planes().iter().zip(&section.models).enumerate() {
         for i in 0..count {
             let context = context(model, plane, info, &known, &deltas, &planes[plane]);
@@ -116,7 +116,7 @@ fn context(
     model: &PlaneModel,
     plane: usize,
     info: PlaneInfo,
-    known: &splatstream_decoder::block::CodedBlock,
+    known: &splatstream_decoder::coded_block::CodedBlock,
     deltas: &[u64],
     values: &[i32],
 ) -> usize {

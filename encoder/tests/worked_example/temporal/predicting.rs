@@ -4,11 +4,12 @@ use super::walk::{Common, Step};
 use super::{list, of};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::prediction::{Predicting, Prediction};
-use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
+use splatstream_decoder::increment::residual::{AttributeValues, Attributes};
 use splatstream_decoder::layout::Section;
 use splatstream_decoder::list::{FINE, canonical};
 use splatstream_decoder::neighbours::{Neighbour, NeighbourSearch};
 use splatstream_decoder::predictor::{Predictor, WeightedMean, bilateral_weights, knn_weights};
+use splatstream_decoder::stage::Stage;
 use std::fmt::Write as _;
 
 /// The new Gaussian and its neighbours.
