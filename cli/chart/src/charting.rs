@@ -2,9 +2,9 @@
 
 use crate::Progress;
 use crate::gop;
-use crate::judge::Judge;
 use crate::page::{Page, SceneFigures};
 use crate::peers::Peers;
+use crate::picture_comparison::Judge;
 use crate::report::{File, Report};
 use crate::scene_chart::SceneChart;
 use crate::scenes::Scene;
@@ -14,9 +14,6 @@ use crate::sweep::Sweep;
 use crate::{Error, csv_files, figures, measure, pictures};
 use splatstream_render::Camera;
 use splatstream_render::metrics::StLpips;
-
-/// Frames of a sequence that are measured, and of its first GOP, unless somebody asks for more.
-pub const FRAMES: u32 = gop::FRAMES;
 
 /// A scene, and where it is looked at from.
 pub struct Subject {

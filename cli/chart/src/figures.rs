@@ -1,11 +1,11 @@
 //! The figures of a scene, from its numbers.
 
 use super::scene_chart::{METRICS, Metric, SceneChart};
-use super::standing::{Standing, pareto_front};
 use super::svg::Figure;
 use super::svg::bars::{Bar, Bars};
 use super::svg::plot::{Dot, Line, Plot, Series};
 use super::sweep::Group;
+use super::variant_comparison::{Standing, pareto_front};
 use crate::costs::Costs;
 
 /// Styles of curves: the first are qualities, then come peers, the last is what all have in common.

@@ -6,7 +6,7 @@ mod decoded;
 mod subset;
 mod tools;
 
-use super::judge::Judge;
+use super::picture_comparison::Judge;
 use super::scenes::Scene;
 use super::tables::{Mode, mbit_per_second};
 use crate::Error;
@@ -20,9 +20,6 @@ use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::Comparison;
 use subset::Subset;
 pub(crate) use tools::ToolRow;
-
-/// Frames of a GOP, and of a scene that are measured, unless the user says otherwise: the paper's GOP.
-pub(crate) const FRAMES: u32 = 4;
 
 /// Spatial layers: the paper's 540, 720 and 1080 lines.
 const SPATIAL: u8 = 3;

@@ -25,16 +25,16 @@ pub mod first_frame;
 mod gop;
 mod gop_files;
 mod gop_text;
-mod judge;
 mod measure;
 mod page;
+mod picture_comparison;
 mod pictures;
 mod progress;
 mod report;
 mod scene_chart;
-mod standing;
 mod svg;
 mod tables;
+mod variant_comparison;
 
 pub use error::Error;
 pub use progress::Progress;

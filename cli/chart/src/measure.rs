@@ -1,6 +1,6 @@
 //! One run: a scene encoded with a variant at a quality, timed, decoded, judged.
 
-use super::judge::Judge;
+use super::picture_comparison::Judge;
 use super::scenes::Scene;
 use super::sweep::{Group, Sweep, Variant};
 use crate::Error;

@@ -1,20 +1,20 @@
 //! The page: one file with everything in it, for people who have read nothing else.
 
+pub(super) mod elements;
 mod glossary;
 mod gop;
 mod peers;
 mod pictures;
 mod scene;
 mod tables;
-pub(super) mod words;
 
 use super::csv_files;
 use super::scene_chart::{METRICS, SceneChart};
 use super::svg::{Figure, STYLE as FIGURE_STYLE};
 use super::sweep::{Group, Sweep};
 use crate::numbers::grouped;
+use elements::{Heading, NOT_MEASURED, figure, size};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use words::{Heading, NOT_MEASURED, figure, size};
 
 const STYLE: &str = include_str!("page/style.css");
 
@@ -121,15 +121,15 @@ impl Page<'_> {
         html! {
             section {
                 h2 { "In short" }
-                (words::how_to_read(
+                (elements::how_to_read(
                     "each row is one scene with the baseline settings and all Gaussians sent: fewer bits and \
                      more dB are better; speeds are thousands (k) or millions (M) of Gaussians per second."
                 ))
-                (words::table(&headings, &html! { @for chart in self.charts { (summary_row(chart)) } }))
+                (elements::table(&headings, &html! { @for chart in self.charts { (summary_row(chart)) } }))
                 @if !self.charts.iter().any(SceneChart::has_learned) {
                     p.note { "ST-LPIPS, the learned metric: " (NOT_MEASURED) "." }
                 }
-                (words::made_by(self.command))
+                (elements::made_by(self.command))
             }
         }
     }
@@ -190,7 +190,7 @@ fn summary_row(chart: &SceneChart) -> Markup {
         return html! {};
     };
     let frames = chart.frames.0.max(1) as u64;
-    let speed = |seconds: f64| words::speed(run.gaussians as f64 / seconds.max(f64::MIN_POSITIVE));
+    let speed = |seconds: f64| elements::speed(run.gaussians as f64 / seconds.max(f64::MIN_POSITIVE));
     html! {
         tr {
             th scope="row" { a href=(format!("#{}", chart.name)) { (chart.name) } }

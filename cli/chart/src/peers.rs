@@ -1,6 +1,6 @@
 //! Other codecs on the same scenes: what a peers file says, and how their output looks here.
 
-use super::judge::Judge;
+use super::picture_comparison::Judge;
 use super::scenes::Scene;
 use crate::Error;
 use serde::Deserialize;

@@ -1,7 +1,7 @@
 //! Source, decoded, difference: one camera, each refinement level.
 
-use super::judge::{BACKGROUND, Judge};
 use super::measure::{Point, Run};
+use super::picture_comparison::{BACKGROUND, Judge};
 use crate::Error;
 use crate::first_frame::first_frame;
 use crate::report::File;

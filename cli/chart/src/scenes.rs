@@ -1,9 +1,11 @@
 //! The scenes of a chart, their frames in memory: timings shall not include a disk.
 
-use super::gop::FRAMES;
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
+
+/// Frames of a GOP, and of a scene that are measured, unless the user says otherwise: the paper's GOP.
+pub const FRAMES: u32 = 4;
 
 /// A scene or the first frames of a sequence.
 pub struct Scene {

@@ -3,7 +3,7 @@
 use super::decoded::shown;
 use crate::Error;
 use crate::Progress;
-use crate::judge::Judge;
+use crate::picture_comparison::Judge;
 use crate::statistics::stream_statistics;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::predictor::Predictor;

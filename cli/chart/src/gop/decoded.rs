@@ -1,7 +1,7 @@
 //! The frames of an operating point: what they take, what they show.
 
 use crate::Error;
-use crate::judge::Judge;
+use crate::picture_comparison::Judge;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;

@@ -3,7 +3,7 @@
 use super::decoded::mean;
 use super::encoded;
 use crate::Error;
-use crate::judge::Judge;
+use crate::picture_comparison::Judge;
 use splatstream_decoder::operating_point::{OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;

@@ -2,7 +2,7 @@
 
 use super::decoded::shown;
 use crate::Error;
-use crate::judge::Judge;
+use crate::picture_comparison::Judge;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{PredictorChoice, Predictors, Settings, Tools, encode};
 use splatstream_format::syntax::FrameType;

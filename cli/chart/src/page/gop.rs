@@ -1,7 +1,7 @@
 //! The first GOP of a sequence, with predicted frames: the two tables of the paper, and what tools are worth.
 
+use super::elements::{Heading, figure, how_to_read, made_by, signed, size, table};
 use super::tables::{METRIC_HEADINGS, metric_cells, mode_cells};
-use super::words::{Heading, figure, how_to_read, made_by, signed, size, table};
 use crate::gop::{Gop, Level, ToolRow};
 use crate::numbers::grouped;
 use crate::scene_chart::{METRICS, SceneChart};

@@ -1,10 +1,10 @@
 //! Other codecs on the same scene.
 
+use super::elements::{Heading, how_to_read, made_by, size, speed, table};
 use super::tables::{METRIC_HEADINGS, metric_cells};
-use super::words::{Heading, how_to_read, made_by, size, speed, table};
 use crate::peers::PeerPoint;
 use crate::scene_chart::SceneChart;
-use crate::standing::bytes_for_the_same;
+use crate::variant_comparison::bytes_for_the_same;
 use maud::{Markup, html};
 
 /// What others did, and who is missing; nothing without either.

@@ -1,6 +1,6 @@
 //! The pictures of a scene.
 
-use super::words::{how_to_read, made_by};
+use super::elements::{how_to_read, made_by};
 use crate::pictures::{AMPLIFICATION, Picture, Pictures, heat};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -1,6 +1,6 @@
 //! The part of a scene.
 
-use super::words::{NOT_MEASURED, figures, how_to_read, made_by};
+use super::elements::{NOT_MEASURED, figures, how_to_read, made_by};
 use super::{SceneFigures, gop, peers, pictures, tables};
 use crate::numbers::grouped;
 use crate::scene_chart::SceneChart;

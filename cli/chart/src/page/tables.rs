@@ -1,11 +1,11 @@
 //! The tables of a scene.
 
-use super::words::{Heading, NOT_MEASURED, figure, how_to_read, made_by, signed, size, speed, table};
+use super::elements::{Heading, NOT_MEASURED, figure, how_to_read, made_by, signed, size, speed, table};
 use crate::numbers::grouped;
 use crate::scene_chart::{METRICS, SceneChart};
-use crate::standing::Standing;
 use crate::sweep::Group;
 use crate::tables::Mode;
+use crate::variant_comparison::Standing;
 use maud::{Markup, html};
 use splatstream_render::metrics::Comparison;
 

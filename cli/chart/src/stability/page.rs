@@ -5,7 +5,7 @@ use super::files::FILE;
 use super::rows::{BaseReport, CaseReport, Row, Verdict, count, strength};
 use super::tools::Tool;
 use crate::page::document;
-use crate::page::words::{self, Heading, how_to_read, made_by, table};
+use crate::page::elements::{self, Heading, how_to_read, made_by, table};
 use crate::svg::Figure;
 use maud::{Markup, html};
 
@@ -96,7 +96,7 @@ fn part(report: &BaseReport, case: &CaseReport, figures: &[Figure]) -> Markup {
     html! {
         h3 { (case.case.title) }
         p { "The case: " (case.case.what) "." }
-        @if let Some(drawing) = drawn.and_then(|at| figures.get(at..=at)) { (words::figures(drawing)) }
+        @if let Some(drawing) = drawn.and_then(|at| figures.get(at..=at)) { (elements::figures(drawing)) }
         (rows(case))
     }
 }

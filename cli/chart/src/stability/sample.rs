@@ -1,7 +1,7 @@
 //! A case at a strength: what is coded, and from where it is looked at.
 
 use super::edits::zoomed;
-use crate::judge::Judge;
+use crate::picture_comparison::Judge;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, ring};
 use splatstream_render::metrics::Comparison;
