@@ -55,6 +55,18 @@ fn wrong_settings_are_usage() {
 }
 
 #[test]
+fn a_scene_that_takes_too_much_memory_names_the_option() {
+    let directory = directory();
+    let (still, out) = (write_still(directory.path()), directory.path().join("out.gss"));
+    let encode = ["encode", text(&still), "-o", text(&out), "--preset", "fast", "--psnr", "40"];
+    let said = fail(1, &[&encode[..], &["--max-input-memory", "100K"]].concat());
+    assert!(said.contains("at most 102400 are allowed (max_memory)"), "{said}");
+    assert!(said.contains("if you trust the file, give --max-input-memory 1G"), "{said}");
+    assert!(said.contains(text(&still)) && !out.exists(), "{said}");
+    succeed(&[&encode[..], &["--max-input-memory", "1G"]].concat());
+}
+
+#[test]
 fn outputs_are_refused_in_words() {
     let directory = directory();
     let stream = sequence(directory.path());
