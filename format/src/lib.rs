@@ -27,6 +27,7 @@ mod limits;
 pub mod payload;
 pub mod syntax;
 pub mod unit;
+pub mod unit_reader;
 
 pub use error::{Class, Error, ErrorKind, Result};
 pub use limits::Limits;
