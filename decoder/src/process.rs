@@ -72,15 +72,16 @@ struct Counted {
 }
 
 /// Decodes a stream unit by unit.
-pub struct Decoder<'a> {
+pub struct Decoder {
     options: Options,
     profile: Profile,
     /// Whether the units before the first gop_header are not known (B.3).
     starts_inside: bool,
     phase: Phase,
-    sequence: Option<(SequenceParameters, &'a [u8])>,
+    /// The first sequence parameters, and their bytes: copies are the same.
+    sequence: Option<(SequenceParameters, Vec<u8>)>,
     gop: Option<Gop>,
-    frame: Option<FrameInProgress<'a>>,
+    frame: Option<FrameInProgress>,
     references: References,
     /// The least `gop_index` of the next GOP.
     next_gop: u64,
@@ -98,13 +99,17 @@ pub struct Decoder<'a> {
     tally: Tally,
 }
 
-impl<'a> Decoder<'a> {
+impl Decoder {
     /// A decoder for the stream with this file header.
     pub fn new(file: &FileHeader, options: Options) -> Self {
         let limits = options.limits.at_most(Limits::of_level(file.level));
+        Self::with(file.profile(), Options { limits, ..options })
+    }
+
+    fn with(profile: Profile, options: Options) -> Self {
         Self {
-            options: Options { limits, ..options },
-            profile: file.profile(),
+            options,
+            profile,
             starts_inside: false,
             phase: Phase::Start,
             sequence: None,
@@ -119,7 +124,7 @@ impl<'a> Decoder<'a> {
             counted: Counted::default(),
             has_scene: false,
             has_discarded: false,
-            tally: Tally::new(file.profile()),
+            tally: Tally::new(profile),
         }
     }
 
@@ -127,6 +132,16 @@ impl<'a> Decoder<'a> {
     /// What relates to the start of the stream is not checked.
     pub fn starting_inside(file: &FileHeader, options: Options) -> Self {
         Self { starts_inside: true, ..Self::new(file, options) }
+    }
+
+    /// Forgets all but the sequence: the next unit is a gop_header anywhere in the stream, as for
+    /// [`Decoder::starting_inside`].
+    pub fn restart(&mut self) {
+        let sequence = self.sequence.take();
+        let phase = if sequence.is_some() { Phase::Sequence } else { Phase::Start };
+        let tally = self.tally.restarted();
+        *self =
+            Self { starts_inside: true, phase, sequence, tally, ..Self::with(self.profile, self.options) };
     }
 
     /// The sequence parameters, once they have come.
@@ -160,7 +175,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// Takes the next unit; gives the frame that it ends, if it does.
-    pub fn unit(&mut self, unit: &Unit<'a>) -> Option<DecodedFrame> {
+    pub fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
         self.counted.units = self.counted.units.saturating_add(1);
         if self.has_stopped() || self.phase == Phase::Lost && !self.wants(unit) {
             return None;
@@ -197,7 +212,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// A unit that is no increment: the frame that it ends, and whether it took effect.
-    fn take(&mut self, unit: &Unit<'a>) -> (Option<DecodedFrame>, Result<()>) {
+    fn take(&mut self, unit: &Unit<'_>) -> (Option<DecodedFrame>, Result<()>) {
         let unit_type = unit.header.unit_type();
         let header = unit.check_header(self.profile);
         if header.is_err() || !unit_type.is_known() {
@@ -229,7 +244,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// The payload of a unit that may come.
-    fn content(&mut self, unit: &Unit<'a>, was_lost: bool) -> Result<()> {
+    fn content(&mut self, unit: &Unit<'_>, was_lost: bool) -> Result<()> {
         if let Some((sequence, _)) = &self.sequence {
             unit.header.validate_layers(unit.at, sequence)?;
         }
@@ -251,7 +266,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// An increment. An error costs its list, or nothing if it is not of the frame in progress.
-    fn increment(&mut self, unit: &Unit<'a>) {
+    fn increment(&mut self, unit: &Unit<'_>) {
         if let Some(frame) = self.frame.as_mut().filter(|frame| frame.index == unit.header.frame) {
             frame.seen = true;
         }
@@ -281,13 +296,14 @@ impl<'a> Decoder<'a> {
         }
     }
 
-    fn accept(&mut self, unit: &Unit<'a>) -> core::result::Result<(), Refused> {
+    fn accept(&mut self, unit: &Unit<'_>) -> core::result::Result<(), Refused> {
         let Some(mut frame) = self.frame.take() else { return Ok(()) };
         let accepted = match self.context(frame.reference) {
             Some(context) => frame.accept(unit, &context),
             None => Ok(None),
         };
-        let accepted = accepted.map(|pending| pending.into_iter().for_each(|unit| frame.push(unit)));
+        let accepted =
+            accepted.map(|divided| divided.iter().for_each(|divided| frame.push(divided, unit.payload)));
         self.frame = Some(frame);
         accepted
     }
@@ -379,7 +395,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// In the lost state: whether a unit is not discarded (7.1.6).
-    fn wants(&self, unit: &Unit<'a>) -> bool {
+    fn wants(&self, unit: &Unit<'_>) -> bool {
         let has_reserved = unit.header.unit_flags > 1 || unit.header.reserved_zero != 0;
         let is_intact = |size| !has_reserved && unit.payload.len() == size && unit.check_payload().is_ok();
         match (unit.header.unit_type(), self.sequence.is_some()) {
@@ -391,7 +407,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// Whether a gop_header starts nothing that was there before.
-    fn is_acceptable(&self, unit: &Unit<'a>) -> bool {
+    fn is_acceptable(&self, unit: &Unit<'_>) -> bool {
         let gop_index = unit.payload.first_chunk().copied().map_or(0, u32::from_le_bytes);
         u64::from(gop_index) >= self.next_gop && u64::from(unit.header.frame) >= self.next_frame
     }

@@ -114,6 +114,12 @@ impl Tally {
         }
     }
 
+    /// Of the same sequence, without any unit.
+    pub(crate) fn restarted(&self) -> Self {
+        let Belonging { profile, sequence, .. } = self.belonging;
+        Self { belonging: Belonging { profile, sequence, gop: None }, ..Self::new(profile) }
+    }
+
     /// Whether a unit, which need not be counted, belongs to an operating point.
     pub(crate) fn takes(&self, point: OperatingPoint, header: &UnitHeader) -> bool {
         self.belonging.takes(point, header)

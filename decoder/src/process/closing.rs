@@ -20,7 +20,7 @@ pub(super) struct Closed {
     pub(super) fault: Option<Error>,
 }
 
-impl FrameInProgress<'_> {
+impl FrameInProgress {
     /// Ends the frame, all units of which have been decoded. The digest of carried lists is compared if a unit ends the
     /// frame, not if an error does.
     pub(super) fn close(

@@ -7,7 +7,7 @@
 //! Where units only add Gaussians without predictors, steps 2 and 3 are one: see [`crate::direct`].
 
 use super::decoded::Shift;
-use super::frame::{Context, FrameInProgress, PendingUnit, Refused};
+use super::frame::{Context, DividedUnit, FrameInProgress, Refused};
 use crate::digest::{ListDigest, list_digest, lists_digest};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
@@ -63,7 +63,7 @@ pub(super) struct Head {
 
 /// A pending unit with its models read.
 struct Prepared<'r, 'a> {
-    unit: &'r PendingUnit<'a>,
+    unit: &'r DividedUnit<'a>,
     sections: PreparedSections<'r, 'a>,
     coding: AttributeCoding<'r>,
     /// The models in force after the unit.
@@ -118,13 +118,22 @@ fn put<T>(values: &mut Vec<T>, index: usize, value: T) {
     }
 }
 
-impl<'a> FrameInProgress<'a> {
+impl FrameInProgress {
     /// Decodes the pending units; gives their errors in stream order.
     pub(super) fn decode(&mut self, context: &Context<'_>) -> Vec<Error> {
         let pending = core::mem::take(&mut self.pending);
+        let divided: Result<Vec<DividedUnit<'_>>> =
+            pending.iter().map(|unit| unit.divided(context)).collect();
+        match divided {
+            Ok(units) => self.decode_units(&units, context),
+            Err(error) => vec![error],
+        }
+    }
+
+    fn decode_units(&mut self, pending: &[DividedUnit<'_>], context: &Context<'_>) -> Vec<Error> {
         let mut errors = Vec::new();
-        let prepared = self.prepare(&pending, context);
-        let is_direct = self.is_direct(&pending, context);
+        let prepared = self.prepare(pending, context);
+        let is_direct = self.is_direct(pending, context);
         if !is_direct {
             self.lists.divide();
         }
@@ -143,22 +152,22 @@ impl<'a> FrameInProgress<'a> {
 
     /// Reads the models of the units. A unit whose models are wrong is the last: those after it are of no use, or they are
     /// judged again once the error has been reported.
-    fn prepare<'r>(
+    fn prepare<'r, 'a>(
         &self,
-        units: &'r [PendingUnit<'a>],
+        units: &'r [DividedUnit<'a>],
         context: &Context<'r>,
-    ) -> Vec<(&'r PendingUnit<'a>, Result<Prepared<'r, 'a>>)> {
+    ) -> Vec<(&'r DividedUnit<'a>, Result<Prepared<'r, 'a>>)> {
         let mut in_force = self.lists.models.clone();
-        let prepare = |unit: &'r PendingUnit<'a>| {
+        let prepare = |unit: &'r DividedUnit<'a>| {
             let prepared = self.prepared(unit, context, &mut in_force);
             (unit, prepared)
         };
         units.iter().map(prepare).collect()
     }
 
-    fn prepared<'r>(
+    fn prepared<'r, 'a>(
         &self,
-        unit: &'r PendingUnit<'a>,
+        unit: &'r DividedUnit<'a>,
         context: &Context<'r>,
         in_force: &mut ModelsOfFrame,
     ) -> Result<Prepared<'r, 'a>> {
@@ -177,16 +186,16 @@ impl<'a> FrameInProgress<'a> {
     }
 
     /// Whether the units can be decoded straight into planes. Entropy states need the values by themselves.
-    fn is_direct(&self, units: &[PendingUnit<'a>], context: &Context<'_>) -> bool {
-        let of_lowest_layer = |unit: &PendingUnit<'_>| self.is_intra() && unit.spatial_layer == 0;
-        let is_direct = |unit: &PendingUnit<'_>| of_lowest_layer(unit) && direct::is_direct(&unit.increment);
+    fn is_direct(&self, units: &[DividedUnit<'_>], context: &Context<'_>) -> bool {
+        let of_lowest_layer = |unit: &DividedUnit<'_>| self.is_intra() && unit.spatial_layer == 0;
+        let is_direct = |unit: &DividedUnit<'_>| of_lowest_layer(unit) && direct::is_direct(&unit.increment);
         self.lists.lists.is_empty() && !context.options.entropy && units.iter().all(is_direct)
     }
 
     /// Decodes units whose blocks go straight into planes. They are of one layer: after one that fails none is accepted.
     fn decode_direct(
         &mut self,
-        group: &[(&PendingUnit<'a>, Result<Prepared<'_, 'a>>)],
+        group: &[(&DividedUnit<'_>, Result<Prepared<'_, '_>>)],
         context: &Context<'_>,
         errors: &mut Vec<Error>,
     ) {
@@ -229,7 +238,7 @@ impl<'a> FrameInProgress<'a> {
     /// Decodes units whose lists depend on others.
     fn decode_group(
         &mut self,
-        group: &[(&PendingUnit<'a>, Result<Prepared<'_, 'a>>)],
+        group: &[(&DividedUnit<'_>, Result<Prepared<'_, '_>>)],
         context: &Context<'_>,
         errors: &mut Vec<Error>,
     ) {
@@ -252,7 +261,7 @@ impl<'a> FrameInProgress<'a> {
     /// Applies a unit and checks its digest.
     fn unit(
         &mut self,
-        prepared: &Prepared<'_, 'a>,
+        prepared: &Prepared<'_, '_>,
         values: &UnitValues,
         context: &Context<'_>,
     ) -> Result<()> {
@@ -359,7 +368,7 @@ impl<'a> FrameInProgress<'a> {
 
     fn check_list(
         &mut self,
-        unit: &PendingUnit<'_>,
+        unit: &DividedUnit<'_>,
         context: &Context<'_>,
         digest: impl FnOnce() -> ListDigest,
     ) -> Result<()> {
@@ -372,20 +381,20 @@ impl<'a> FrameInProgress<'a> {
     }
 
     /// Takes note of a unit that was decoded.
-    fn finish_unit(&mut self, unit: &PendingUnit<'_>, size: usize, prepared: &Prepared<'_, '_>) {
+    fn finish_unit(&mut self, unit: &DividedUnit<'_>, size: usize, prepared: &Prepared<'_, '_>) {
         self.bytes = self.bytes.saturating_add(unit.bytes);
         self.lists.models.follow(unit.refinement, prepared.models.clone());
         self.decoded.take(unit.spatial_layer, unit.refinement, u32::try_from(size).unwrap_or(u32::MAX));
     }
 
-    fn refuse(&mut self, unit: &PendingUnit<'_>, error: Error, errors: &mut Vec<Error>) {
+    fn refuse(&mut self, unit: &DividedUnit<'_>, error: Error, errors: &mut Vec<Error>) {
         self.fail(&Refused { error, limit: unit.refinement });
         errors.push(error);
     }
 }
 
 impl Head {
-    fn new(unit: &PendingUnit<'_>, size: usize, added: usize) -> Self {
+    fn new(unit: &DividedUnit<'_>, size: usize, added: usize) -> Self {
         let IncrementHeader { compensation_log_scale, compensation_opacity, .. } = unit.increment.header;
         let shift = Shift { log_scale: compensation_log_scale, opacity: compensation_opacity };
         Self { spatial_layer: unit.spatial_layer, shift, size, added }
@@ -398,9 +407,9 @@ fn known<'p, 'r, 'a>(prepared: &'p Result<Prepared<'r, 'a>>) -> Result<&'p Prepa
 }
 
 /// How many of the units, at least one, have their tables expanded and their values held at the same time.
-fn group_length(units: &[(&PendingUnit<'_>, Result<Prepared<'_, '_>>)], is_direct: bool) -> usize {
+fn group_length(units: &[(&DividedUnit<'_>, Result<Prepared<'_, '_>>)], is_direct: bool) -> usize {
     let (mut tables, mut values) = (0_usize, 0_u64);
-    let fits = |(_, prepared): &&(&PendingUnit<'_>, Result<Prepared<'_, '_>>)| {
+    let fits = |(_, prepared): &&(&DividedUnit<'_>, Result<Prepared<'_, '_>>)| {
         let more = prepared.as_ref().map_or(0, |prepared| prepared.sections.tables());
         tables = tables.saturating_add(more);
         values = values.saturating_add(prepared.as_ref().map_or(0, |prepared| prepared.sections.values()));

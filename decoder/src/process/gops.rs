@@ -19,16 +19,16 @@ use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Result};
 use std::sync::Arc;
 
-impl<'a> Decoder<'a> {
+impl Decoder {
     /// The first sequence_parameters count; copies are the same, byte for byte.
-    pub(super) fn sequence_parameters(&mut self, unit: &Unit<'a>) -> Result<()> {
+    pub(super) fn sequence_parameters(&mut self, unit: &Unit<'_>) -> Result<()> {
         let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at, self.profile)?;
         match &self.sequence {
             None => {
-                self.sequence = Some((sequence, unit.payload));
+                self.sequence = Some((sequence, unit.payload.to_vec()));
                 Ok(())
             }
-            Some((_, first)) if *first == unit.payload => Ok(()),
+            Some((_, first)) if first == unit.payload => Ok(()),
             Some(_) => {
                 let rule = "a stream has one set of sequence parameters";
                 Err(Error::new(unit.payload_at, "6.4", ErrorKind::Constraint { rule }))
@@ -37,7 +37,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// `was_lost` says that GOPs may be missing for a reason that has been reported.
-    pub(super) fn gop_header(&mut self, unit: &Unit<'a>, was_lost: bool) -> Result<()> {
+    pub(super) fn gop_header(&mut self, unit: &Unit<'_>, was_lost: bool) -> Result<()> {
         let header = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
         let layers = self.sequence().map_or(1, |sequence| sequence.temporal_layer_count);
         header.validate_layers(unit.payload_at, layers)?;
@@ -87,7 +87,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// A transform, codebook or weights unit.
-    pub(super) fn gop_tool(&mut self, unit: &Unit<'a>) -> Result<()> {
+    pub(super) fn gop_tool(&mut self, unit: &Unit<'_>) -> Result<()> {
         let (Some(gop), Some((sequence, _))) = (&mut self.gop, &self.sequence) else {
             return Err(unexpected(unit));
         };
@@ -96,7 +96,7 @@ impl<'a> Decoder<'a> {
         gop.tool(unit, sequence, &self.options.limits)
     }
 
-    pub(super) fn frame_header(&mut self, unit: &Unit<'a>) -> Result<()> {
+    pub(super) fn frame_header(&mut self, unit: &Unit<'_>) -> Result<()> {
         let role = self.role(unit)?;
         let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else {
             return Err(unexpected(unit));
@@ -138,7 +138,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// The type, temporal layer and reference of the frame that a frame_header starts: one of those still to come.
-    fn role(&self, unit: &Unit<'a>) -> Result<FrameRole> {
+    fn role(&self, unit: &Unit<'_>) -> Result<FrameRole> {
         let Some(gop) = &self.gop else { return Err(unexpected(unit)) };
         let to_come = self.next_frame..self.next_frame.saturating_add(self.frames_left);
         if !to_come.contains(&unit.header.frame.into()) {
@@ -150,14 +150,14 @@ impl<'a> Decoder<'a> {
         Ok(role)
     }
 
-    fn unexpected_frame(&self, unit: &Unit<'a>) -> Error {
+    fn unexpected_frame(&self, unit: &Unit<'_>) -> Error {
         let at = element_at(&UnitHeader::TABLE, unit.at, "frame");
         mismatch(at, "7.3.2", "frame", unit.header.frame.into(), self.next_frame)
     }
 
     /// Takes the frame that a frame_header starts, and those before it, from the frames that are to come. In an all-intra
     /// GOP none may be missing before it.
-    fn skip_to(&mut self, unit: &Unit<'a>) {
+    fn skip_to(&mut self, unit: &Unit<'_>) {
         let index = u64::from(unit.header.frame);
         let is_all_intra = self.gop.as_ref().is_some_and(|gop| !gop.header.is_predicted());
         if is_all_intra && index > self.next_frame {
