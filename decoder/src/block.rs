@@ -54,7 +54,7 @@ pub fn decode_block(
     at: u64,
     unit: &UnitParameters<'_>,
     decoders: &[PlaneDecoder],
-    buffers: &mut Buffers,
+    buffers: &mut Buffers<'_>,
     out: &mut FrameSlice<'_>,
 ) -> Result<()> {
     let count = out.planes.first().map_or(0, |plane| plane.len());
@@ -75,7 +75,7 @@ pub fn decode_coded(
     count: usize,
     unit: &CodedPlanes<'_>,
     decoders: &[PlaneDecoder],
-    buffers: &mut Buffers,
+    buffers: &mut Buffers<'_>,
 ) -> Result<CodedBlock> {
     let mut reader = BlockReader::open(bytes, at, unit.lanes_log2)?;
     let mut deltas = core::mem::take(&mut buffers.deltas);
@@ -86,6 +86,7 @@ pub fn decode_coded(
     let has_sums = has_sums(unit.layout, decoders);
     let planes = unit.layout.planes().iter().zip(decoders).zip(has_sums);
     for (plane, ((&info, decoder), has_sums)) in planes.enumerate() {
+        buffers.interrupt.check()?;
         if info.is_position() {
             reader.deltas(decoder, &mut DeltaContexts::new(decoder), &mut block.deltas);
             block.push_decoded(info, Vec::new(), 0, false, buffers);

@@ -1,6 +1,7 @@
 //! Clause 7.3: the values of a block as they are coded, and the memory that blocks hand on.
 
 use crate::attribute::{self};
+use crate::interrupt::Interrupt;
 use crate::layout::{Attribute, PlaneInfo, Section};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule};
@@ -69,7 +70,7 @@ impl CodedBlock {
         coded: Vec<i32>,
         bias: i32,
         has_sums: bool,
-        buffers: &mut Buffers,
+        buffers: &mut Buffers<'_>,
     ) {
         let last = self.magnitudes.last_mut().map(core::mem::take).unwrap_or_default();
         let is_first = info.index == 0;
@@ -88,7 +89,7 @@ impl CodedBlock {
     }
 
     /// Takes memory for what contexts need of the reconstruction.
-    pub(crate) fn reserve(&mut self, buffers: &mut Buffers) {
+    pub(crate) fn reserve(&mut self, buffers: &mut Buffers<'_>) {
         for plane in self.log_scale.iter_mut().chain([&mut self.opacity]) {
             *plane = buffers.planes.pop().unwrap_or_default();
             plane.clear();
@@ -173,13 +174,20 @@ impl CodedBlock {
 }
 
 /// Memory that blocks leave to the blocks after them: fresh memory costs more than what is done with it.
-#[derive(Debug, Default)]
-pub struct Buffers {
+#[derive(Debug)]
+pub struct Buffers<'i> {
     planes: Vec<Vec<i32>>,
     pub(crate) deltas: Vec<u64>,
+    /// Ends the work on these blocks.
+    pub(crate) interrupt: &'i Interrupt,
 }
 
-impl Buffers {
+impl<'i> Buffers<'i> {
+    /// No memory yet, for blocks on which the work ends where an interrupt is requested.
+    pub const fn new(interrupt: &'i Interrupt) -> Self {
+        Self { planes: Vec::new(), deltas: Vec::new(), interrupt }
+    }
+
     /// A plane of so many values, which mean nothing.
     pub(crate) fn plane(&mut self, count: usize) -> Vec<i32> {
         let mut plane = self.planes.pop().unwrap_or_default();

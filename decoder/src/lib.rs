@@ -43,6 +43,7 @@ pub use splatstream_format::entropy::layout;
 
 pub mod attribute;
 pub mod block;
+pub mod budget;
 mod carried;
 pub mod cell;
 pub mod coded_block;
@@ -58,6 +59,7 @@ pub mod frame;
 mod frame_state;
 pub mod gop;
 pub mod increment;
+pub mod interrupt;
 pub mod list;
 mod motion;
 pub mod moves;

@@ -164,12 +164,19 @@ impl GaussianList {
     /// `drops_stale` is set, that is if the frame has units that replace them.
     #[must_use]
     pub fn carried(mut self, field: &CellField, drops_stale: bool) -> Self {
-        let stale = self.displace(field);
-        if drops_stale {
-            let keep: Vec<bool> = stale.par_iter().map(|&stale| !stale).collect();
-            self.retain(&keep);
-        }
+        self.carry(field, drops_stale);
         self
+    }
+
+    /// Carries the list in place; gives which Gaussians stay, nothing if all do.
+    pub(crate) fn carry(&mut self, field: &CellField, drops_stale: bool) -> Vec<bool> {
+        let stale = self.displace(field);
+        if !drops_stale {
+            return Vec::new();
+        }
+        let keep: Vec<bool> = stale.par_iter().map(|&stale| !stale).collect();
+        self.retain(&keep);
+        keep
     }
 
     /// The digest of the list (7.9.2).

@@ -29,6 +29,16 @@ impl OperatingPoint {
     /// Everything in the stream.
     pub const ALL: Self = Self { spatial: u8::MAX, temporal: u8::MAX, refinement: u8::MAX };
 
+    /// The lower of two on each axis.
+    #[must_use]
+    pub fn at_most(self, other: Self) -> Self {
+        Self {
+            spatial: self.spatial.min(other.spatial),
+            temporal: self.temporal.min(other.temporal),
+            refinement: self.refinement.min(other.refinement),
+        }
+    }
+
     /// Clause 7.2: whether a unit belongs to the operating point. `whole_anchor` is the number of spatial
     /// layers if the unit is an increment of a whole anchor: a receiver of all layers takes all of it.
     pub fn takes(&self, header: &UnitHeader, whole_anchor: Option<u8>) -> bool {

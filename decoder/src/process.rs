@@ -5,7 +5,9 @@
 //! What an error costs follows from the unit alone: its list, the unit, or the rest of the GOP. After the last kind units
 //! are discarded up to a gop_header from which decoding can go on.
 
+use crate::budget::{Budget, Spent};
 use crate::gop::Gop;
+use crate::interrupt::Interrupt;
 use crate::operating_point::{OperatingPoint, Tally};
 use core::ops::RangeInclusive;
 use frame::{Context, FrameInProgress, Refused};
@@ -20,6 +22,7 @@ use splatstream_format::unit::{Landmark, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
 
 mod closing;
+mod control;
 mod decoded;
 mod decoding;
 mod frame;
@@ -46,6 +49,10 @@ pub struct Options {
     pub subset: bool,
     /// Give the entropy states of units in [`DecodedFrame::entropy`].
     pub entropy: bool,
+    /// Give the identities of Gaussians in [`DecodedFrame::identities`].
+    pub identities: bool,
+    /// What decoding may take.
+    pub budget: Budget,
 }
 
 impl Default for Options {
@@ -57,6 +64,8 @@ impl Default for Options {
             stop_at_first_error: false,
             subset: false,
             entropy: false,
+            identities: false,
+            budget: Budget::UNLIMITED,
         }
     }
 }
@@ -74,6 +83,14 @@ struct Counted {
 /// Decodes a stream unit by unit.
 pub struct Decoder {
     options: Options,
+    /// The operating point that is wanted from the next GOP on, and in this one if it is lower.
+    wanted_point: OperatingPoint,
+    interrupt: Interrupt,
+    spent: Spent,
+    /// Whether the budget does not suffice.
+    is_exhausted: bool,
+    /// The identity of the next new Gaussian.
+    next_identity: u32,
     profile: Profile,
     /// Whether the units before the first gop_header are not known (B.3).
     starts_inside: bool,
@@ -108,6 +125,11 @@ impl Decoder {
 
     fn with(profile: Profile, options: Options) -> Self {
         Self {
+            wanted_point: options.operating_point,
+            interrupt: Interrupt::default(),
+            spent: Spent::default(),
+            is_exhausted: false,
+            next_identity: 0,
             options,
             profile,
             starts_inside: false,
@@ -134,16 +156,6 @@ impl Decoder {
         Self { starts_inside: true, ..Self::new(file, options) }
     }
 
-    /// Forgets all but the sequence: the next unit is a gop_header anywhere in the stream, as for
-    /// [`Decoder::starting_inside`].
-    pub fn restart(&mut self) {
-        let sequence = self.sequence.take();
-        let phase = if sequence.is_some() { Phase::Sequence } else { Phase::Start };
-        let tally = self.tally.restarted();
-        *self =
-            Self { starts_inside: true, phase, sequence, tally, ..Self::with(self.profile, self.options) };
-    }
-
     /// The sequence parameters, once they have come.
     pub fn sequence(&self) -> Option<&SequenceParameters> {
         self.sequence.as_ref().map(|(sequence, _)| sequence)
@@ -166,7 +178,7 @@ impl Decoder {
 
     /// Whether units change nothing any more.
     pub fn has_stopped(&self) -> bool {
-        self.has_stopped || self.phase == Phase::Ended
+        self.has_stopped || self.interrupt.is_requested() || self.phase == Phase::Ended
     }
 
     /// What to look for where the end of a unit is not known.
@@ -180,6 +192,7 @@ impl Decoder {
         if self.has_stopped() || self.phase == Phase::Lost && !self.wants(unit) {
             return None;
         }
+        self.follow_point(unit.header.unit_type());
         let scope = unit.header.error_scope();
         if scope == ErrorScope::List {
             self.increment(unit);
@@ -302,6 +315,7 @@ impl Decoder {
             Some(context) => frame.accept(unit, &context),
             None => Ok(None),
         };
+        let accepted = accepted.and_then(|divided| self.spend(divided, frame.expected.limit));
         let accepted =
             accepted.map(|divided| divided.iter().for_each(|divided| frame.push(divided, unit.payload)));
         self.frame = Some(frame);
@@ -312,7 +326,8 @@ impl Decoder {
     fn context(&self, reference: Option<usize>) -> Option<Context<'_>> {
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };
         let reference = reference.and_then(|layer| self.references.get(layer));
-        Some(Context { options: &self.options, profile: self.profile, sequence, gop, reference })
+        let (options, interrupt) = (&self.options, &self.interrupt);
+        Some(Context { options, interrupt, profile: self.profile, sequence, gop, reference })
     }
 
     /// Whether a unit belongs to the operating point (7.2).
@@ -345,6 +360,7 @@ impl Decoder {
     }
 
     fn add(&mut self, error: Error) {
+        self.has_stopped |= self.interrupt.is_requested();
         if self.has_stopped {
             return;
         }
@@ -352,7 +368,7 @@ impl Decoder {
             frame.error.get_or_insert(error);
         }
         self.report.errors.push(error);
-        self.has_stopped = self.options.stop_at_first_error;
+        self.has_stopped = self.options.stop_at_first_error || self.is_exhausted;
     }
 
     /// Ends the frame in progress; `at` is the offset of the unit that ends it, if a unit that may do so does.
@@ -367,11 +383,19 @@ impl Decoder {
         }
         let (layer, reference) = (frame.role.temporal_layer, frame.reference);
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };
-        let context =
-            Context { options: &self.options, profile: self.profile, sequence, gop, reference: None };
+        let context = Context {
+            options: &self.options,
+            interrupt: &self.interrupt,
+            profile: self.profile,
+            sequence,
+            gop,
+            reference: None,
+        };
         let is_kept = gop.header.is_predicted() && (layer == 0 || layer < gop.header.temporal_depth);
         let reference = reference.and_then(|layer| self.references.get_mut(layer));
         let closed = frame.close(&context, reference, at.is_some());
+        self.next_identity = closed.next_identity;
+        self.has_stopped |= self.interrupt.is_requested();
         if is_kept {
             self.references.store(layer, closed.state);
         }

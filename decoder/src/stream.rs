@@ -1,5 +1,7 @@
 //! A whole stream through a [`Decoder`]: from bytes that are all there, or that arrive in pieces.
 
+use crate::interrupt::Interrupt;
+use crate::operating_point::OperatingPoint;
 use crate::process::{DecodedFrame, Decoder, Options};
 use core::ops::{ControlFlow, RangeInclusive};
 use splatstream_format::syntax::{FileHeader, SequenceParameters, UnitType};
@@ -55,19 +57,25 @@ pub enum Step {
 /// ```
 pub struct StreamDecoder {
     options: Options,
+    interrupt: Interrupt,
     reader: UnitReader,
     /// None before the file header.
     decoder: Option<Decoder>,
     /// Where decoding goes on once the sequence parameters have come.
     inside: Option<u64>,
     frames: u32,
+    /// The operating point of the frame that was given last.
+    frame_point: OperatingPoint,
 }
 
 impl StreamDecoder {
     /// A decoder of a stream from its first byte on.
     pub fn new(options: &Options) -> Self {
         let reader = UnitReader::new(&options.limits);
-        Self { options: *options, reader, decoder: None, inside: None, frames: 0 }
+        let frame_point = options.operating_point;
+        let interrupt = Interrupt::default();
+        let (decoder, inside) = (None, None);
+        Self { options: *options, interrupt, reader, decoder, inside, frames: 0, frame_point }
     }
 
     /// A decoder of the frames from the GOP on whose header stands at the absolute offset `gop`, as an index gives it
@@ -83,7 +91,10 @@ impl StreamDecoder {
                 decoder.restart();
                 self.reader = UnitReader::starting_at(gop, &self.options.limits);
             }
-            _ => *self = Self::inside(gop, &self.options),
+            _ => {
+                let interrupt = self.interrupt.clone();
+                *self = Self { interrupt, ..Self::inside(gop, &self.options) };
+            }
         }
     }
 
@@ -131,6 +142,7 @@ impl StreamDecoder {
                 _ => Ok(Some(Step::End)),
             };
         };
+        let point = decoder.operating_point();
         let frame = match event {
             Ok(Event::Unit(unit)) => self.unit(&unit),
             Err(error) => {
@@ -148,14 +160,37 @@ impl StreamDecoder {
             }
             Ok(_) => return Ok(Some(Step::End)),
         };
+        if frame.is_some() {
+            self.frame_point = point;
+        }
         Ok(frame.map(|frame| Step::Frame(Box::new(frame))))
     }
 
     fn start(&mut self, file: &FileHeader) {
-        self.decoder = Some(match self.inside {
+        let mut decoder = match self.inside {
             Some(_) => Decoder::starting_inside(file, self.options),
             None => Decoder::new(file, self.options),
-        });
+        };
+        decoder.set_interrupt(self.interrupt.clone());
+        self.decoder = Some(decoder);
+    }
+
+    /// Takes the units of another operating point from the next GOP on. Where it is lower on some axis, it holds there from
+    /// the next frame on.
+    pub fn set_operating_point(&mut self, point: OperatingPoint) {
+        self.options.operating_point = point;
+        self.decoder.iter_mut().for_each(|decoder| decoder.set_operating_point(point));
+    }
+
+    /// The operating point of the frame that was given last.
+    pub const fn frame_point(&self) -> OperatingPoint {
+        self.frame_point
+    }
+
+    /// Lets another thread end decoding: once it has been requested, no frame is given any more.
+    pub fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.decoder.iter_mut().for_each(|decoder| decoder.set_interrupt(interrupt.clone()));
+        self.interrupt = interrupt;
     }
 
     fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {

@@ -11,6 +11,7 @@ use crate::attribute::{ATTRIBUTE_RANGE, in_range};
 use crate::cell::{Cell, rotation_unit};
 use crate::displacement::CellField;
 use crate::frame::QuantizedFrame;
+use crate::interrupt::Interrupt;
 use crate::list::{Change, FINE, GaussianList};
 use crate::moves::{MovePredictor, MoveSpace, Moves, SpanRatio};
 use crate::position::{collect, positions};
@@ -50,6 +51,8 @@ pub struct Unit<'a> {
     pub network: Option<&'a Network>,
     /// How many new Gaussians the network may predict (A.2).
     pub max_learned: u32,
+    /// Ends the work on the unit.
+    pub interrupt: &'a Interrupt,
     /// Absolute offset of the payload, for errors.
     pub at: u64,
 }
@@ -156,6 +159,7 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
         list.change = Change::between(temporal.reference, &list);
     }
     list.retain(&keep);
+    unit.interrupt.check()?;
     let set = match predictors.iter().any(|&predictor| predictor != Predictor::None) {
         true => reference_set(situation, before.as_ref().unwrap_or(&list.planes)),
         false => QuantizedFrame::default(),
@@ -277,6 +281,9 @@ fn move_predicted(unit: &Unit<'_>, list: &mut GaussianList, space: &MoveSpace, m
     };
     let mut moves: Moves<'_> = space.moves(modes, |number| predictor_of(number).has_neighbours());
     for number in 0..moves.rows().len() {
+        if number.is_multiple_of(RUN) {
+            unit.interrupt.check()?;
+        }
         let mut position = moves.predicted(number, predictor_of(number));
         for (axis, coordinate) in position.iter_mut().enumerate() {
             let value = unit.values.plane(Section::Moves, axis).get(number).copied().unwrap_or(0);
@@ -356,6 +363,7 @@ fn new_gaussians(
         colour: unit.coding.colour,
         network: unit.network,
         feature_shift: unit.sequence.feature_shift,
+        interrupt: unit.interrupt,
     };
     let prediction = Prediction::new(set, position.each_ref().map(Vec::as_slice), predictors, &by);
     let attributes = match prediction {
@@ -379,6 +387,7 @@ fn new_gaussians(
 /// reconstructed on all cores.
 fn unpredicted(count: usize, sh_planes: usize, values: &[Vec<i32>], unit: &Unit<'_>) -> Result<Attributes> {
     let run = |start: usize| {
+        unit.interrupt.check()?;
         let range = start..count.min(start.saturating_add(RUN));
         let part: Vec<Vec<i32>> =
             values.iter().map(|plane| plane.get(range.clone()).unwrap_or_default().to_vec()).collect();

@@ -6,6 +6,7 @@
 use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use crate::colour::Colour;
 use crate::frame::QuantizedFrame;
+use crate::interrupt::Interrupt;
 use crate::list::{FINE, canonical};
 use crate::neighbours::{Neighbour, NeighbourSearch};
 use crate::predictor::{NEIGHBOURS_MAX, Predictor, WeightedMean, bilateral_weights, knn_weights};
@@ -35,6 +36,8 @@ pub struct Predicting<'a> {
     pub network: Option<&'a Network>,
     /// `feature_shift` of the sequence.
     pub feature_shift: u8,
+    /// Ends the work: what is predicted means nothing then.
+    pub interrupt: &'a Interrupt,
 }
 
 /// Items, at least, that are worth another thread.
@@ -66,6 +69,7 @@ pub struct Prediction<'s> {
     feature_shift: u8,
     /// The network, if a Gaussian takes it.
     network: Option<LaneNetwork>,
+    interrupt: &'s Interrupt,
 }
 
 impl<'s> Prediction<'s> {
@@ -93,7 +97,7 @@ impl<'s> Prediction<'s> {
         let position = [pick(x), pick(y), pick(z)];
         let count = usize::from(header.neighbour_count).min(set.len());
         let search = NeighbourSearch::new(set.position.each_ref().map(Vec::as_slice));
-        let neighbours = search.nearest_to_all(position.each_ref().map(Vec::as_slice), count);
+        let neighbours = search.nearest_unless(by.interrupt, position.each_ref().map(Vec::as_slice), count);
         let features = vec![0; neighbours.len()];
         let falloff = [header.bilateral_spatial, header.bilateral_feature];
         let network = by.network.filter(|_| predictors.contains(&Predictor::Transformer));
@@ -111,6 +115,7 @@ impl<'s> Prediction<'s> {
             falloff,
             feature_shift,
             network,
+            interrupt: by.interrupt,
         })
     }
 
@@ -126,6 +131,7 @@ impl<'s> Prediction<'s> {
         at: u64,
     ) -> Result<()> {
         for stage in Stage::ALL {
+            self.interrupt.check()?;
             self.predict(stage, attributes);
             attributes.add_stage(stage, values, coding, at)?;
             self.learn(stage, attributes);
@@ -159,10 +165,10 @@ impl<'s> Prediction<'s> {
 
     /// The network, if a Gaussian takes it.
     pub fn learned(&self) -> Option<Learned<'_>> {
-        let Self { network, set, rows, colour, feature_shift, .. } = self;
+        let Self { network, set, rows, colour, feature_shift, interrupt, .. } = self;
         network.as_ref().map(|network| {
             let projection = Projection::new(network.header(), colour.dc, colour.sh);
-            Learned { network, projection, set, rows, feature_shift: *feature_shift }
+            Learned { network, projection, set, rows, feature_shift: *feature_shift, interrupt }
         })
     }
 

@@ -3,6 +3,7 @@
 use crate::attribute;
 use crate::block::{CodedPlanes, decode_coded};
 use crate::coded_block::{Buffers, CodedBlock};
+use crate::interrupt::Interrupt;
 use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::Result;
@@ -119,10 +120,13 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
     ///
     /// # Errors
     /// Malformed; of several faults, that of the first block.
-    pub fn decode(&self, sequence: &SequenceParameters) -> Result<UnitValues> {
+    pub fn decode(&self, sequence: &SequenceParameters, interrupt: &Interrupt) -> Result<UnitValues> {
         let mut values = UnitValues::default();
         for (coded, models) in self.sections() {
-            values.set(coded.section, joined(self.blocks(coded, models, sequence)?, models, sequence));
+            values.set(
+                coded.section,
+                joined(self.blocks(coded, models, sequence, interrupt)?, models, sequence),
+            );
         }
         Ok(values)
     }
@@ -136,13 +140,14 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
         coded: &CodedSection<'a>,
         models: &SectionModels,
         sequence: &SequenceParameters,
+        interrupt: &Interrupt,
     ) -> Result<Vec<CodedBlock>> {
         let decoders: Vec<PlaneDecoder> = models.models.iter().map(PlaneDecoder::new).collect();
         let planes = CodedPlanes { lanes_log2: coded.lanes_log2, layout: &models.layout, steps: self.steps };
         let decoded: Vec<Result<CodedBlock>> = blocks_of(coded, sequence)
             .into_par_iter()
             .map(|(bytes, at, count)| {
-                decode_coded(bytes, at, count, &planes, &decoders, &mut Buffers::default())
+                decode_coded(bytes, at, count, &planes, &decoders, &mut Buffers::new(interrupt))
             })
             .collect();
         decoded.into_iter().collect()

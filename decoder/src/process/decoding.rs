@@ -49,7 +49,14 @@ pub(super) struct Lists {
     kept: Vec<Vec<bool>>,
     /// In a P or B frame: the parents of the first units, as far as moves were predicted from them.
     moves: Option<MoveSpace>,
+    /// The identities of the Gaussians of each list, if they are asked for.
+    pub(super) identities: Vec<Identities>,
+    /// The identity of the next new Gaussian.
+    pub(super) next_identity: u32,
 }
+
+/// The identities of the Gaussians of a list, in order.
+pub(crate) type Identities = Arc<Vec<u32>>;
 
 /// The last unit of a list.
 #[derive(Debug, Clone, Copy)]
@@ -71,19 +78,45 @@ struct Prepared<'r, 'a> {
 }
 
 impl Lists {
-    /// Of a frame with these models in force before its first unit.
-    pub(super) fn new(models: ModelsInForce) -> Self {
-        Self { models: ModelsOfFrame::starting_with(models), ..Self::default() }
+    /// Of a frame with these models in force before its first unit, whose new Gaussians have identities from this one on.
+    pub(super) fn new(models: ModelsInForce, next_identity: u32) -> Self {
+        Self { models: ModelsOfFrame::starting_with(models), next_identity, ..Self::default() }
     }
 
-    /// Makes lists of the planes.
-    pub(super) fn divide(&mut self) {
+    /// So many new identities.
+    pub(super) fn identify(&mut self, count: usize) -> impl Iterator<Item = u32> + use<> {
+        let first = self.next_identity;
+        self.next_identity = u32::try_from(count).unwrap_or(u32::MAX).wrapping_add(first);
+        (0..count).scan(first, |next, _| {
+            let identity = *next;
+            *next = next.wrapping_add(1);
+            Some(identity)
+        })
+    }
+
+    /// Takes note of what a unit made of the identities of its parents.
+    fn follow_identities(&mut self, r: usize, parents: Identities, keep: &[bool], added: usize) {
+        let mut identities = parents;
+        if added > 0 || !keep.iter().all(|&keep| keep) {
+            let changed = Arc::make_mut(&mut identities);
+            crate::frame::retain(changed, keep);
+            changed.extend(self.identify(added));
+        }
+        put(&mut self.identities, r, identities);
+    }
+
+    /// Makes lists of the planes; gives the Gaussians identities if `identifies` says so.
+    pub(super) fn divide(&mut self, identifies: bool) {
         if !self.lists.is_empty() {
             return;
         }
         let mut start = 0_usize;
-        for head in &self.heads {
+        for (r, head) in core::mem::take(&mut self.heads).into_iter().enumerate() {
             let end = start.saturating_add(head.size);
+            if identifies {
+                self.follow_identities(r, Arc::default(), &[], head.size);
+            }
+            self.heads.push(head);
             self.lists.push(Arc::new(GaussianList::of_planes(self.planes.part(start..end), true)));
             start = end;
         }
@@ -135,7 +168,7 @@ impl FrameInProgress {
         let prepared = self.prepare(pending, context);
         let is_direct = self.is_direct(pending, context);
         if !is_direct {
-            self.lists.divide();
+            self.lists.divide(context.options.identities);
         }
         let mut rest = prepared.as_slice();
         while !rest.is_empty() {
@@ -208,7 +241,7 @@ impl FrameInProgress {
                 coding: *coding,
             })
             .collect();
-        let (mut planes, results) = direct::decode(&units, context.sequence);
+        let (mut planes, results) = direct::decode(&units, context.sequence, context.interrupt);
         let mut results = results.into_iter();
         let mut kept = 0_usize;
         for (unit, prepared) in group {
@@ -244,7 +277,7 @@ impl FrameInProgress {
     ) {
         let values: Vec<Result<UnitValues>> = group
             .par_iter()
-            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence))
+            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence, context.interrupt))
             .collect();
         for ((unit, prepared), values) in group.iter().zip(values) {
             if unit.refinement >= self.decoded.limit {
@@ -274,6 +307,7 @@ impl FrameInProgress {
             sequence: context.sequence,
             network: context.gop.network(),
             max_learned: context.options.limits.max_learned,
+            interrupt: context.interrupt,
             at: pending.payload_at,
         };
         let Applied { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
@@ -284,6 +318,14 @@ impl FrameInProgress {
             self.entropy.extend(state.map(|state| UnitEntropy { payload_at, state }));
         }
         let (size, head) = (list.len(), Head::new(pending, list.len(), added.len()));
+        if context.options.identities {
+            let r = usize::from(pending.refinement);
+            let parents = match context.reference {
+                Some(reference) => reference.identities.get(r),
+                None => self.lists.identities.get(r),
+            };
+            self.lists.follow_identities(r, parents.cloned().unwrap_or_default(), &keep, added.len());
+        }
         self.lists.take(pending.refinement, list, head);
         put(&mut self.lists.kept, pending.refinement.into(), keep);
         self.finish_unit(pending, size, prepared);

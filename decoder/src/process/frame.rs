@@ -12,6 +12,7 @@ use crate::displacement::CellField;
 use crate::entropy_state::UnitEntropy;
 use crate::frame_state::FrameState;
 use crate::gop::{Gop, element_at};
+use crate::interrupt::Interrupt;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{
     FrameHeader, FrameRole, IncrementHeader, ListSizes, Profile, SequenceParameters, UnitHeader,
@@ -24,6 +25,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy)]
 pub(super) struct Context<'d> {
     pub(super) options: &'d Options,
+    pub(super) interrupt: &'d Interrupt,
     pub(super) profile: Profile,
     pub(super) sequence: &'d SequenceParameters,
     pub(super) gop: &'d Gop,

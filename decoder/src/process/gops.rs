@@ -5,6 +5,7 @@ use super::frame::{FrameInProgress, Progress, unit_bytes};
 use super::phase::{mismatch, same, unexpected};
 use super::references::References;
 use super::{Context, Decoder};
+use crate::budget::Shape;
 use crate::displacement::CellField;
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::gop::{Gop, element_at};
@@ -14,7 +15,7 @@ use crate::layout::{Section, ShCoding};
 use crate::steps::StepRule;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{Cells, FramePayload};
-use splatstream_format::syntax::{FrameRole, GopHeader, SequenceParameters, UnitHeader};
+use splatstream_format::syntax::{FrameHeader, FrameRole, GopHeader, SequenceParameters, UnitHeader};
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Result};
 use std::sync::Arc;
@@ -62,6 +63,7 @@ impl Decoder {
         }
         self.report.lose(self.next_frame, frame);
         self.references = References::default();
+        self.spent.start_gop();
         self.next_gop = gop_index.saturating_add(1);
         self.next_frame = frame;
         self.frames_left = header.gop_frame_count.into();
@@ -105,6 +107,11 @@ impl Decoder {
         let FramePayload { header, carried_digest, carried_digest_at, cells } =
             FramePayload::parse(unit.payload, at, sequence, &self.options.limits)?;
         header.validate_role(at, &role)?;
+        let of_count = element_at(&FrameHeader::TABLE, at, "gaussian_count");
+        let shape = Shape::new(sequence, &gop.header);
+        let spent = self.spent.frame(header.gaussian_count, &shape, &self.options.budget, of_count);
+        self.is_exhausted = spent.is_err();
+        spent?;
         gop.transforms(&header, at)?;
         let reference = role.reference.map(|reference| gop.first_frame.saturating_add(reference));
         let kept = reference.and_then(|reference| self.references.find(reference));
@@ -128,7 +135,7 @@ impl Decoder {
             pending: Vec::new(),
             expected: Progress::new(limit),
             decoded: Progress::new(limit),
-            lists: Lists::new(moved.models),
+            lists: Lists::new(moved.models, self.next_identity),
             bytes: unit_bytes(unit),
             entropy: moved.entropy.into_iter().collect(),
             error: absent,
@@ -194,7 +201,7 @@ impl Context<'_> {
         let steps = StepRule::new(self.sequence, [0; 5]);
         let coding = SectionCoding { dc_rank: 0, sh: ShCoding::None, steps };
         let prepared = PreparedSections::new(sections, &coding, &mut moved.models, &mut ())?;
-        let values = prepared.decode(self.sequence)?;
+        let values = prepared.decode(self.sequence, self.interrupt)?;
         moved.field = field(values.section(Section::Cells), cells.cell_log2, self.sequence, at)?;
         if self.options.entropy {
             moved.entropy = of_sections(sections, &values).map(|state| UnitEntropy { payload_at: at, state });

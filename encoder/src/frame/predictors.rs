@@ -11,6 +11,7 @@ use splatstream_decoder::increment::prediction::{Predicting, Prediction};
 use splatstream_decoder::increment::residual::{AttributeValues, Attributes};
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::increment::{Situation, reference_set};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::position::refine;
@@ -225,6 +226,7 @@ fn predicted(
     let slices = position.each_ref().map(Vec::as_slice);
     let mut planes = Vec::new();
     let by = Predicting {
+        interrupt: Interrupt::NEVER,
         header,
         colour: coder.colour,
         network: coder.network,

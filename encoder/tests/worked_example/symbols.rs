@@ -2,6 +2,7 @@
 
 use splatstream_decoder::context::{delta_contexts, plane_contexts};
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::Limits;
 use splatstream_format::bits::BitReader;
@@ -38,7 +39,7 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
                 let prepared =
                     PreparedSections::new(&increment.sections, &coding, &mut in_force, &mut ()).unwrap();
                 let (coded, models) = prepared.sections().next().unwrap();
-                let fast = prepared.blocks(coded, models, sequence).unwrap();
+                let fast = prepared.blocks(coded, models, sequence, Interrupt::NEVER).unwrap();
                 let ([fast], [(block, _)]) = (fast.as_slice(), coded.blocks.as_slice()) else {
                     panic!("one block")
                 };

@@ -4,6 +4,7 @@ use super::symbols::BitsOfPlanes;
 use super::{Planes, Statistics};
 use splatstream_decoder::gop::{Gop, Transforms};
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
@@ -82,7 +83,7 @@ fn add(
     let mut bits = trace.bits.as_slice();
     for (coded, models) in prepared.sections() {
         let (here, after) = bits.split_at_checked(models.models.len()).unwrap_or((bits, &[]));
-        let blocks = prepared.blocks(coded, models, sequence)?;
+        let blocks = prepared.blocks(coded, models, sequence, Interrupt::NEVER)?;
         let planes = Planes { layout: &models.layout, models: &models.models, blocks: &blocks };
         statistics.add(coded.count, &planes, here);
         bits = after;
