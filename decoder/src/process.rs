@@ -176,6 +176,11 @@ impl Decoder {
         &self.report.lost
     }
 
+    /// Takes the errors and the lost frames since the last call: what a stream of any length leaves need not be kept.
+    pub fn take_report(&mut self) -> (Vec<Error>, Vec<RangeInclusive<u32>>) {
+        self.report.take()
+    }
+
     /// Whether units change nothing any more.
     pub fn has_stopped(&self) -> bool {
         self.has_stopped || self.interrupt.is_requested() || self.phase == Phase::Ended

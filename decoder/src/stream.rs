@@ -222,6 +222,12 @@ impl StreamDecoder {
         self.decoder.as_ref().and_then(Decoder::sequence)
     }
 
+    /// Takes the errors and the lost frames since the last call, in stream order. A [`StreamDecoder::summary`] does not
+    /// have them any more.
+    pub fn take_report(&mut self) -> (Vec<Error>, Vec<RangeInclusive<u32>>) {
+        self.decoder.as_mut().map(Decoder::take_report).unwrap_or_default()
+    }
+
     /// How decoding went so far.
     pub fn summary(&self) -> Summary {
         let Some(decoder) = &self.decoder else { return Summary::default() };

@@ -25,6 +25,7 @@ pub mod inspect;
 pub mod levels;
 mod limits;
 pub mod payload;
+pub mod seek;
 pub mod syntax;
 pub mod unit;
 pub mod unit_reader;
