@@ -1,4 +1,5 @@
 //! The frames of a file: `cargo run --example decode IN.gss`.
+#![expect(clippy::print_stdout, reason = "an example shows what it has")]
 
 use splatstream::Decoder;
 

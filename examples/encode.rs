@@ -1,4 +1,5 @@
 //! Frames to a stream: `cargo run --example encode [OUT.gss]`. Without a name it makes examples/talk.gss again.
+#![expect(clippy::print_stdout, reason = "an example shows what it has")]
 
 use splatstream::settings::Structure;
 use splatstream::{Encoder, Settings};

@@ -1,4 +1,5 @@
 //! A smaller stream: `cargo run --example extract IN.gss s0,t0,r1 OUT.gss`.
+#![expect(clippy::print_stdout, reason = "an example shows what it has")]
 
 use splatstream::{Limits, extract};
 

@@ -1,4 +1,5 @@
 //! Frames of bytes as they arrive: `cat IN.gss | cargo run --example push`.
+#![expect(clippy::print_stdout, reason = "an example shows what it has")]
 
 use splatstream::{Decoder, Frame};
 use std::io::Read;

@@ -1,4 +1,5 @@
 //! From a frame on, and with a lower operating point after it: `cargo run --example seek IN.gss FRAME`.
+#![expect(clippy::print_stdout, reason = "an example shows what it has")]
 
 use splatstream::{Decoder, Position};
 

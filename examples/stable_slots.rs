@@ -1,4 +1,5 @@
 //! What a renderer uploads, frame by frame: `cargo run --example stable_slots IN.gss`.
+#![expect(clippy::print_stdout, reason = "an example shows what it has")]
 
 use splatstream::{Decoder, Slots};
 

@@ -8,6 +8,7 @@ use crate::source::{Source, Window};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::{Step, StreamDecoder};
+use splatstream_format::Class;
 use splatstream_format::seek::gop_of;
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -149,13 +150,17 @@ impl Decoder {
         self.cancel = cancel;
     }
 
-    /// Takes the next bytes of the stream. Those that are no longer needed are dropped as frames are taken.
+    /// Takes the next bytes of the stream. Those that are no longer needed are dropped as frames are taken, and so is what
+    /// comes after decoding is [finished](Decoder::is_finished).
     ///
     /// # Errors
     /// A decoder that reads by itself or that has been told the [end](Decoder::end); more bytes than
     /// [`Limits::max_memory`] or the longest unit lets wait.
     pub fn push(&mut self, bytes: &[u8]) -> Result<()> {
-        self.source.push(bytes, self.limits.max_memory)
+        match self.state {
+            State::Decoding => self.source.push(bytes, self.limits.max_memory),
+            State::Ended | State::Failed => Ok(()),
+        }
     }
 
     /// No more bytes will be pushed: the last frame can be given out.
@@ -190,13 +195,17 @@ impl Decoder {
             if self.cancel.is_requested() {
                 return Err(Error::Cancelled);
             }
-            let step = step.map_err(Error::Stream)?;
-            self.collect()?;
-            match step {
+            match step.map_err(Error::Stream)? {
                 Step::Frame(frame) => {
+                    self.collect()?;
                     if let Some(frame) = self.frame(*frame) {
                         return Ok(Some(frame));
                     }
+                }
+                // Nothing will come, whatever follows.
+                Step::NeedMoreData(_) if self.has_failed() => {
+                    self.collect()?;
+                    return self.finish();
                 }
                 Step::NeedMoreData(more) => {
                     // Shared bytes are all there: the decoder has gone to another place.
@@ -204,16 +213,25 @@ impl Decoder {
                         return Ok(None);
                     }
                 }
-                Step::End => return self.finish(),
+                Step::End => {
+                    self.collect()?;
+                    return self.finish();
+                }
             }
         }
     }
 
-    /// Takes what the decoder has found wrong.
+    fn has_failed(&self) -> bool {
+        self.stream.decoder().is_some_and(|decoder| decoder.has_failed())
+    }
+
+    /// Takes what the decoder has found wrong since the last frame.
+    ///
+    /// # Errors
+    /// Something was over a limit.
     fn collect(&mut self) -> Result<()> {
         let (errors, lost) = self.stream.take_report();
-        let is_exhausted = self.stream.decoder().is_some_and(|decoder| decoder.is_exhausted());
-        if let (true, Some(&error)) = (is_exhausted, errors.last()) {
+        if let Some(&error) = errors.iter().find(|error| error.class() == Class::OverLimit) {
             return Err(Error::Stream(error));
         }
         self.warnings.extend(errors.into_iter().map(Warning::Damaged));
@@ -232,7 +250,8 @@ impl Decoder {
             return None;
         }
         let warnings = core::mem::take(&mut self.warnings);
-        Some(Frame::new(decoded, self.stream.frame_point(), sequence, warnings))
+        let point = self.stream.decoder()?.frame_point();
+        Some(Frame::new(decoded, point, sequence, warnings))
     }
 
     fn finish(&mut self) -> Result<Option<Frame>> {

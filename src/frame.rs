@@ -46,7 +46,11 @@ impl Frame {
         Self {
             index: decoded.index,
             kind: decoded.frame_type,
-            point,
+            point: point.at_most(OperatingPoint {
+                spatial: sequence.spatial_layer_count.saturating_sub(1),
+                temporal: sequence.temporal_layer_count.saturating_sub(1),
+                refinement: sequence.refinement_count.saturating_sub(1),
+            }),
             refinements: decoded.level,
             carried: decoded.carried,
             sequence,

@@ -52,7 +52,8 @@ impl Window {
             None => {
                 self.bytes.clear();
                 self.start = 0;
-                self.is_end = false;
+                // What lies after the end is at the end too.
+                self.is_end &= at > self.at;
             }
         }
         self.at = at;
@@ -126,15 +127,6 @@ impl Source {
 
     pub(crate) fn is_shared(&self) -> bool {
         matches!(self, Self::Shared(_))
-    }
-
-    /// Bytes that wait in memory that is not shared.
-    #[cfg(test)]
-    pub(crate) fn waiting(&self) -> usize {
-        match self {
-            Self::Shared(_) => 0,
-            Self::Reader(_, window) | Self::Pushed(window) => window.bytes.len(),
-        }
     }
 }
 

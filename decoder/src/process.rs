@@ -85,6 +85,8 @@ pub struct Decoder {
     options: Options,
     /// The operating point that is wanted from the next GOP on, and in this one if it is lower.
     wanted_point: OperatingPoint,
+    /// That of the frame that has ended last.
+    frame_point: OperatingPoint,
     interrupt: Interrupt,
     spent: Spent,
     /// Whether the budget does not suffice.
@@ -126,6 +128,7 @@ impl Decoder {
     fn with(profile: Profile, options: Options) -> Self {
         Self {
             wanted_point: options.operating_point,
+            frame_point: options.operating_point,
             interrupt: Interrupt::default(),
             spent: Spent::default(),
             is_exhausted: false,
@@ -184,6 +187,11 @@ impl Decoder {
     /// Whether units change nothing any more.
     pub fn has_stopped(&self) -> bool {
         self.has_stopped || self.interrupt.is_requested() || self.phase == Phase::Ended
+    }
+
+    /// Whether an error that ends decoding has been found: the first one of all if decoding stops there, or one of the budget.
+    pub const fn has_failed(&self) -> bool {
+        self.has_stopped
     }
 
     /// What to look for where the end of a unit is not known.
@@ -387,6 +395,7 @@ impl Decoder {
             frame.error.get_or_insert(error);
         }
         let (layer, reference) = (frame.role.temporal_layer, frame.reference);
+        self.frame_point = frame.point;
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };
         let context = Context {
             options: &self.options,

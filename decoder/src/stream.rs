@@ -64,18 +64,15 @@ pub struct StreamDecoder {
     /// Where decoding goes on once the sequence parameters have come.
     inside: Option<u64>,
     frames: u32,
-    /// The operating point of the frame that was given last.
-    frame_point: OperatingPoint,
 }
 
 impl StreamDecoder {
     /// A decoder of a stream from its first byte on.
     pub fn new(options: &Options) -> Self {
         let reader = UnitReader::new(&options.limits);
-        let frame_point = options.operating_point;
         let interrupt = Interrupt::default();
         let (decoder, inside) = (None, None);
-        Self { options: *options, interrupt, reader, decoder, inside, frames: 0, frame_point }
+        Self { options: *options, interrupt, reader, decoder, inside, frames: 0 }
     }
 
     /// A decoder of the frames from the GOP on whose header stands at the absolute offset `gop`, as an index gives it
@@ -113,10 +110,13 @@ impl StreamDecoder {
     pub fn next_step(&mut self, bytes: &[u8], is_end: bool) -> Result<Step> {
         let start = self.position();
         loop {
-            let used = usize::try_from(self.position().saturating_sub(start)).unwrap_or(usize::MAX);
-            // Going to another place asks for other bytes.
-            let Some(rest) = bytes.get(used..).filter(|_| self.position() >= start) else {
-                return Ok(Step::NeedMoreData(1));
+            let used = self.position().checked_sub(start).and_then(|used| usize::try_from(used).ok());
+            let rest = match used.map(|used| bytes.get(used..)) {
+                Some(Some(rest)) => rest,
+                // After the last byte there is nothing.
+                Some(None) if is_end => &[],
+                // Another place asks for other bytes.
+                _ => return Ok(Step::NeedMoreData(1)),
             };
             match self.step(rest, is_end)? {
                 Some(Step::Frame(frame)) => {
@@ -142,7 +142,6 @@ impl StreamDecoder {
                 _ => Ok(Some(Step::End)),
             };
         };
-        let point = decoder.operating_point();
         let frame = match event {
             Ok(Event::Unit(unit)) => self.unit(&unit),
             Err(error) => {
@@ -160,9 +159,6 @@ impl StreamDecoder {
             }
             Ok(_) => return Ok(Some(Step::End)),
         };
-        if frame.is_some() {
-            self.frame_point = point;
-        }
         Ok(frame.map(|frame| Step::Frame(Box::new(frame))))
     }
 
@@ -180,11 +176,6 @@ impl StreamDecoder {
     pub fn set_operating_point(&mut self, point: OperatingPoint) {
         self.options.operating_point = point;
         self.decoder.iter_mut().for_each(|decoder| decoder.set_operating_point(point));
-    }
-
-    /// The operating point of the frame that was given last.
-    pub const fn frame_point(&self) -> OperatingPoint {
-        self.frame_point
     }
 
     /// Lets another thread end decoding: once it has been requested, no frame is given any more.

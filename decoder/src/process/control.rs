@@ -34,19 +34,14 @@ impl Decoder {
         self.wanted_point = point;
     }
 
-    /// The operating point in force.
-    pub const fn operating_point(&self) -> OperatingPoint {
-        self.options.operating_point
+    /// The operating point that was in force where the frame that has ended last started.
+    pub const fn frame_point(&self) -> OperatingPoint {
+        self.frame_point
     }
 
     /// Lets another thread end decoding: once it has been requested, no frame is given any more.
     pub fn set_interrupt(&mut self, interrupt: Interrupt) {
         self.interrupt = interrupt;
-    }
-
-    /// Whether decoding has ended because the budget does not suffice. The last error says for what.
-    pub const fn is_exhausted(&self) -> bool {
-        self.is_exhausted
     }
 
     /// Changes the operating point where it may change.

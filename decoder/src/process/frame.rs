@@ -13,6 +13,7 @@ use crate::entropy_state::UnitEntropy;
 use crate::frame_state::FrameState;
 use crate::gop::{Gop, element_at};
 use crate::interrupt::Interrupt;
+use crate::operating_point::OperatingPoint;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{
     FrameHeader, FrameRole, IncrementHeader, ListSizes, Profile, SequenceParameters, UnitHeader,
@@ -37,6 +38,8 @@ pub(super) struct Context<'d> {
 pub(super) struct FrameInProgress {
     /// Display index.
     pub(super) index: u32,
+    /// The operating point in force where it starts.
+    pub(super) point: OperatingPoint,
     /// Absolute offset of the payload of its header.
     pub(super) payload_at: u64,
     pub(super) header: FrameHeader,

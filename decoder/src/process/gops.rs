@@ -125,6 +125,7 @@ impl Decoder {
         self.skip_to(unit);
         self.frame = Some(FrameInProgress {
             index: unit.header.frame,
+            point: self.options.operating_point,
             payload_at: at,
             header,
             role,
