@@ -31,6 +31,8 @@ pub struct Slots {
     planes: Planes,
     /// The slot of each identity in the last frame.
     slot_of: HashMap<u32, usize, BuildHasherDefault<Spread>>,
+    /// Slots of Gaussians whose identity another one of the last frame has: identities are numbers of 32 bits.
+    doubled: Vec<usize>,
     /// Slots without a Gaussian; the lowest is taken first.
     free: Vec<usize>,
     is_dirty: Vec<bool>,
@@ -64,6 +66,7 @@ impl Slots {
             sh_degree: 0,
             planes: empty(capacity, 0),
             slot_of: HashMap::default(),
+            doubled: Vec::new(),
             free: (0..capacity).rev().collect(),
             is_dirty: vec![false; capacity],
         }
@@ -99,49 +102,30 @@ impl Slots {
             let count = 3 * sh_coefficients(self.sh_degree);
             self.planes.sh.resize_with(count, || vec![0.0; self.capacity]);
         }
-        let before = core::mem::take(&mut self.slot_of);
-        let (slots, kept) = self.assign(frame, before.clone());
-        let mut disappeared = 0;
-        for (identity, slot) in before {
-            if self.slot_of.get(&identity) != Some(&slot) {
-                disappeared += 1;
-                self.clear(slot);
-            }
-        }
+        let mut before = core::mem::take(&mut self.slot_of);
+        let slots: Vec<Option<usize>> =
+            frame.identities().iter().map(|identity| before.remove(identity)).collect();
+        let kept = slots.iter().flatten().count();
+        let gone: Vec<usize> = before.into_values().chain(core::mem::take(&mut self.doubled)).collect();
+        gone.iter().for_each(|&slot| self.clear(slot));
         self.free.sort_unstable_by(|a, b| b.cmp(a));
-        let slots = self.place(slots);
+        let slots = self.place(frame.identities(), slots);
         write(&mut self.planes, gaussians.planes(), &slots, &mut self.is_dirty);
-        let appeared = frame.len() - kept;
+        let (appeared, disappeared) = (frame.len() - kept, gone.len());
         Ok(Update { dirty: self.take_dirty(), kept, appeared, disappeared, has_new_planes })
     }
 
-    /// The slots of the Gaussians that have one, and how many these are.
-    fn assign(
-        &mut self,
-        frame: &Frame,
-        mut before: HashMap<u32, usize, BuildHasherDefault<Spread>>,
-    ) -> (Vec<(u32, Option<usize>)>, usize) {
-        self.slot_of.reserve(frame.len());
-        let slots: Vec<(u32, Option<usize>)> =
-            frame.identities().iter().map(|identity| (*identity, before.remove(identity))).collect();
-        let kept = slots.iter().filter_map(|&(identity, slot)| Some((identity, slot?)));
-        self.slot_of.extend(kept);
-        (slots, self.slot_of.len())
-    }
-
     /// Gives the Gaussians that have none a slot.
-    fn place(&mut self, slots: Vec<(u32, Option<usize>)>) -> Vec<usize> {
-        let Self { free, slot_of, .. } = self;
-        let place = |(identity, slot): (u32, Option<usize>)| match slot {
-            Some(slot) => slot,
-            None => {
-                // There are as many as are needed: those of the frame fit.
-                let slot = free.pop().unwrap_or(usize::MAX);
-                slot_of.insert(identity, slot);
-                slot
-            }
-        };
-        slots.into_iter().map(place).collect()
+    fn place(&mut self, identities: &[u32], slots: Vec<Option<usize>>) -> Vec<usize> {
+        self.slot_of.reserve(identities.len());
+        let mut placed = Vec::with_capacity(slots.len());
+        for (&identity, slot) in identities.iter().zip(slots) {
+            // There are as many as are needed: the frame fits.
+            let slot = slot.or_else(|| self.free.pop()).unwrap_or(usize::MAX);
+            self.doubled.extend(self.slot_of.insert(identity, slot));
+            placed.push(slot);
+        }
+        placed
     }
 
     fn clear(&mut self, slot: usize) {

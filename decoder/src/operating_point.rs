@@ -2,11 +2,11 @@
 
 mod tally;
 
-pub(crate) use tally::Belonging;
 pub use tally::{OperatingPointInfo, Tally, all_points, operating_points};
 
 use core::fmt;
 use core::str::FromStr;
+use splatstream_format::follower::Follower;
 use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{
     EndOfStream, FileHeader, IndexEntry, OperatingPointEntry, UnitHeader, UnitType,
@@ -100,21 +100,21 @@ pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatRe
     let stream = Stream::open(bytes, limits)?;
     let mut out = bytes.get(..FileHeader::SIZE).unwrap_or_default().to_vec();
     let (profile, mut reader) = (stream.header().profile(), stream.units());
-    let mut belonging = Belonging::new(profile);
+    let mut follower = Follower::new(profile);
     let mut units = 0_u32;
     let mut frames = 0_u32;
     let mut entries = Vec::new();
     let mut index_offset = 0;
     while let Some(unit) = reader.next_unit() {
         let unit = unit?;
-        if !belonging.takes(point, &unit.header) {
+        if !point.takes(&unit.header, follower.whole_anchor_layers(&unit.header)) {
             continue;
         }
         unit.check_header(profile)?;
         if unit.header.unit_type() != UnitType::Increment {
             unit.check_payload()?;
         }
-        belonging.follow(&unit);
+        follower.follow(&unit);
         let here = u64::try_from(out.len()).unwrap_or(u64::MAX);
         match unit.header.unit_type() {
             UnitType::Index => {

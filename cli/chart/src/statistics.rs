@@ -10,11 +10,9 @@ use splatstream_decoder::coded_block::CodedBlock;
 use splatstream_decoder::gop::Gop;
 use splatstream_format::entropy::layout::{Attribute, Layout, Section};
 use splatstream_format::entropy::model::PlaneModel;
-use splatstream_format::levels::Levels;
+use splatstream_format::follower::{Content, Follower, Standing};
 use splatstream_format::payload::{FramePayload, Increment};
-use splatstream_format::syntax::{
-    FrameHeader, FrameType, GopHeader, Profile, SequenceParameters, UnitHeader, UnitType,
-};
+use splatstream_format::syntax::{FrameHeader, FrameType, Profile, UnitHeader, UnitType};
 use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Limits, Result};
 use symbols::symbol_bits;
@@ -90,7 +88,6 @@ pub fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
     let mut state = State::new(profile, *limits);
     while let Some(unit) = units.next_unit() {
         let unit = unit?;
-        unit.check_header(profile)?;
         statistics.count(&unit.header);
         state.unit(&unit, &mut statistics)?;
     }
@@ -101,50 +98,41 @@ pub fn stream_statistics(bytes: &[u8], limits: &Limits) -> Result<Statistics> {
 }
 
 struct State {
-    profile: Profile,
+    follower: Follower,
     limits: Limits,
-    sequence: Option<SequenceParameters>,
     gop: Option<Gop>,
     frame: Option<FrameHeader>,
     models: Models,
-    levels: Levels,
     frames: FrameCosts,
 }
 
 impl State {
     fn new(profile: Profile, limits: Limits) -> Self {
         Self {
-            profile,
+            follower: Follower::new(profile),
             limits,
-            sequence: None,
             gop: None,
             frame: None,
             models: Models::default(),
-            levels: Levels::default(),
             frames: FrameCosts::default(),
         }
     }
 
     /// Adds what a unit costs. The payload of one that decoders discard may be anything.
     fn unit(&mut self, unit: &Unit<'_>, statistics: &mut Statistics) -> Result<()> {
-        if !self.levels.takes(&unit.header) {
+        if self.follower.take(unit)? == Standing::Discarded {
             self.frames.unit(unit, None);
             return Ok(());
         }
-        unit.check_payload()?;
-        self.levels.follow(unit, self.profile);
-        let (payload, at) = (unit.payload, unit.payload_at);
         match unit.header.unit_type() {
-            UnitType::SequenceParameters => {
-                self.sequence = Some(SequenceParameters::parse_payload(payload, at, self.profile)?);
-            }
-            UnitType::GopHeader => {
-                let header = GopHeader::parse_payload(payload, at, self.profile)?;
-                self.models = Models::default();
-                self.gop = Some(Gop::new(header, unit.header.frame));
+            UnitType::SequenceParameters | UnitType::GopHeader => {
+                if let Content::GopHeader(header) = self.follower.content(unit)? {
+                    self.models = Models::default();
+                    self.gop = Some(Gop::new(header, unit.header.frame));
+                }
             }
             UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
-                if let (Some(gop), Some(sequence)) = (&mut self.gop, &self.sequence) {
+                if let (Some(gop), Some(sequence)) = (&mut self.gop, self.follower.sequence()) {
                     gop.tool(unit, sequence, &self.limits)?;
                 }
             }
@@ -156,7 +144,7 @@ impl State {
     }
 
     fn frame_header(&mut self, unit: &Unit<'_>, statistics: &mut Statistics) -> Result<()> {
-        let (Some(sequence), Some(gop)) = (&self.sequence, &self.gop) else { return Ok(()) };
+        let (Some(sequence), Some(gop)) = (self.follower.sequence(), &self.gop) else { return Ok(()) };
         let frame = FramePayload::parse(unit.payload, unit.payload_at, sequence, &self.limits)?;
         self.models.start_frame(unit.header.frame, gop);
         if let Some(cells) = &frame.cells {
@@ -169,11 +157,12 @@ impl State {
     }
 
     fn increment(&mut self, unit: &Unit<'_>, statistics: &mut Statistics) -> Result<()> {
-        let (Some(sequence), Some(gop), Some(frame)) = (&self.sequence, &self.gop, &self.frame) else {
+        let (Some(sequence), Some(gop), Some(frame)) = (self.follower.sequence(), &self.gop, &self.frame)
+        else {
             return Ok(());
         };
         let (at, refinement) = (unit.payload_at, unit.header.refinement);
-        let increment = Increment::parse(unit.payload, at, sequence, self.profile, &self.limits)?;
+        let increment = Increment::parse(unit.payload, at, sequence, self.follower.profile(), &self.limits)?;
         let tools = gop.transforms(frame, at)?;
         self.models.increment(&increment, refinement, tools, sequence, statistics)?;
         self.frames.unit(unit, Some(increment.header.list_size()));
