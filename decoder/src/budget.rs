@@ -92,7 +92,7 @@ impl Shape {
             }
             // Blocks go straight into planes.
             (false, 1) => 0,
-            (false, _) => of_list.saturating_mul(2).saturating_add(of_values),
+            (false, _) => of_list.saturating_mul(3).saturating_add(of_values),
         };
         // What is shown is copied once, and becomes the output plane by plane.
         let shown = of_planes.saturating_mul(shown).saturating_add(output.saturating_mul(shown));

@@ -388,6 +388,10 @@ impl Decoder {
     fn close_frame(&mut self, at: Option<u64>) -> Option<DecodedFrame> {
         self.settle();
         let mut frame = self.frame.take()?;
+        if self.interrupt.is_requested() {
+            self.has_stopped = true;
+            return None;
+        }
         if let (Some(at), true) = (at, frame.is_intra() && !frame.seen) {
             let rule = "an I frame has an increment";
             let error = Error::new(at, "7.1.5", ErrorKind::Constraint { rule });

@@ -164,11 +164,13 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
         true => reference_set(situation, before.as_ref().unwrap_or(&list.planes)),
         false => QuantizedFrame::default(),
     };
+    unit.interrupt.check()?;
     if !set.is_empty() {
         check_learned(unit, &predictors)?;
     }
     let position = new_positions(unit)?;
     let added = new_gaussians(unit, situation.temporal.is_none(), position, &predictors, &set)?;
+    unit.interrupt.check()?;
     list.append(&added);
     Ok(Applied { list, added: added.planes, keep })
 }
@@ -205,7 +207,10 @@ fn change_parents(
     if !updated.is_empty() {
         let mut attributes = Attributes::of_list(list, &updated);
         let values = AttributeValues(&unit.values.section(Section::Updates).planes);
-        attributes.add(values, &unit.coding, unit.at)?;
+        for stage in Stage::ALL {
+            unit.interrupt.check()?;
+            attributes.add_stage(stage, values, &unit.coding, unit.at)?;
+        }
         attributes.write_to(list, &updated);
     }
     if !moved.is_empty() || !updated.is_empty() {

@@ -133,6 +133,7 @@ impl<'s> Prediction<'s> {
         for stage in Stage::ALL {
             self.interrupt.check()?;
             self.predict(stage, attributes);
+            self.interrupt.check()?;
             attributes.add_stage(stage, values, coding, at)?;
             self.learn(stage, attributes);
         }
@@ -228,7 +229,8 @@ impl<'s> Prediction<'s> {
         let mut means = vec![0; self.items.len().wrapping_mul(out.len())];
         let each = means.par_chunks_exact_mut(out.len().max(1)).zip(&self.items).enumerate();
         each.with_min_len(RUN).for_each(|(index, (means, item))| {
-            if !(colour && item.predictor == Predictor::Transformer) {
+            let is_learned = colour && item.predictor == Predictor::Transformer;
+            if !is_learned && !self.interrupt.is_requested() {
                 let rows = self.rows.of(self.range(index)).filter_map(|row| row.get(columns.clone()));
                 let weighted = WeightedMean::new(&self.weights(index, item.predictor));
                 weighted.of_rows(rows, means);
@@ -247,7 +249,7 @@ impl<'s> Prediction<'s> {
         let columns = self.rows.columns(stage);
         let mut mine = [0; 3];
         for (index, item) in self.items.iter().enumerate() {
-            if !self.is_compared(item) {
+            if !self.is_compared(item) || self.interrupt.is_requested() {
                 continue;
             }
             mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = grid(at(plane, item.row)));

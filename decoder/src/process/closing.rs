@@ -7,6 +7,7 @@ use crate::carried::Carried;
 use crate::digest::lists_digest;
 use crate::frame::QuantizedFrame;
 use crate::frame_state::{FrameState, span_log2};
+use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
 use splatstream_format::{Error, ErrorKind};
 use std::sync::Arc;
@@ -72,7 +73,7 @@ impl FrameInProgress {
             state.anchor = sequence.whole_anchor().then(|| self.lists.lists.as_slice().into());
             state.is_exact = level == refinements;
         }
-        decoded.planes = self.lists.planes(sh_planes);
+        decoded.planes = self.lists.planes(sh_planes, context.interrupt);
         if context.options.identities {
             decoded.identities = self.lists.shown_identities(decoded.planes.len());
         }
@@ -92,7 +93,7 @@ impl FrameInProgress {
         let level = usize::from(decoded.level);
         let shows_subset = context.options.subset && level > 0;
         let mut fault = None;
-        decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()));
+        decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()), context.interrupt);
         if context.options.identities {
             decoded.identities = self.lists.shown_identities(decoded.planes.len());
             state.identities = self.lists.identities.clone();
@@ -143,12 +144,13 @@ fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried) {
 
 impl Lists {
     /// The exact Gaussians, list by list.
-    fn planes(&mut self, sh_planes: usize) -> QuantizedFrame {
+    fn planes(&mut self, sh_planes: usize, interrupt: &Interrupt) -> QuantizedFrame {
         if self.lists.is_empty() && !self.planes.is_empty() {
             return core::mem::take(&mut self.planes);
         }
         let mut planes = QuantizedFrame::zeroed(0, sh_planes);
-        self.lists.iter().for_each(|list| planes.append(&list.planes));
+        let lists = self.lists.iter().take_while(|_| !interrupt.is_requested());
+        lists.for_each(|list| planes.append(&list.planes));
         planes
     }
 

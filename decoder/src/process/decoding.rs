@@ -8,7 +8,7 @@
 
 use super::decoded::Shift;
 use super::frame::{Context, DividedUnit, FrameInProgress, Refused};
-use crate::digest::{ListDigest, list_digest, lists_digest};
+use crate::digest::{ListDigest, list_digest_unless, lists_digest};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::frame::QuantizedFrame;
@@ -16,6 +16,7 @@ use crate::frame_state::{FrameState, span_log2};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, SectionCoding, UnitValues};
 use crate::increment::{Applied, Situation, Temporal, Unit, apply};
+use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::list::GaussianList;
 use crate::moves::{MoveSpace, SpanRatio};
@@ -251,7 +252,8 @@ impl FrameInProgress {
             let taken = known(prepared).and_then(|prepared| {
                 let added = results.next().unwrap_or(Ok(0))?;
                 let end = kept.wrapping_add(added);
-                self.check_list(unit, context, || list_digest(&planes, kept..end))?;
+                let digest = || list_digest_unless(context.interrupt, &planes, kept..end);
+                self.check_list(unit, context, digest)?;
                 put(&mut self.lists.heads, unit.refinement.into(), Head::new(unit, added, added));
                 self.finish_unit(unit, added, prepared);
                 Ok(end)
@@ -311,7 +313,8 @@ impl FrameInProgress {
             at: pending.payload_at,
         };
         let Applied { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
-        self.check_list(pending, context, || list.digest())?;
+        let digest = || list_digest_unless(context.interrupt, &list.planes, 0..list.len());
+        self.check_list(pending, context, digest)?;
         if context.options.entropy {
             let state = of_sections(&pending.increment.sections, values);
             let payload_at = pending.payload_at;
@@ -333,6 +336,7 @@ impl FrameInProgress {
     }
 
     fn applied(&mut self, unit: &Unit<'_>, refinement: u8, context: &Context<'_>) -> Result<Applied> {
+        context.interrupt.check()?;
         let r = usize::from(refinement);
         let sh_planes = usize::from(context.sequence.sh_dimension());
         let empty = || GaussianList::empty(sh_planes);
@@ -349,7 +353,7 @@ impl FrameInProgress {
         let predicts_moves = unit.header.move_predictor_count() > 0;
         let predicts_new = unit.header.predictor_count() > 0;
         if predicts_moves || predicts_new {
-            self.displace_before(r, reference);
+            self.displace_before(r, reference, context.interrupt);
         }
         let mut moves = None;
         if predicts_moves {
@@ -373,8 +377,11 @@ impl FrameInProgress {
     }
 
     /// Displaces the lists before list r of the reference frame, unless units before have asked for them.
-    fn displace_before(&mut self, r: usize, reference: &FrameState) {
+    fn displace_before(&mut self, r: usize, reference: &FrameState, interrupt: &Interrupt) {
         for list in reference.lists.iter().take(r).skip(self.lists.displaced.len()) {
+            if interrupt.is_requested() {
+                return;
+            }
             let mut list = list.unchanged();
             list.displace(&self.field);
             self.lists.displaced.push(list);
