@@ -4,9 +4,9 @@ use crate::failure::Failure;
 use clap::{Args, ValueEnum};
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_format::syntax::Camera as StreamCamera;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, forward, read_cameras, ring};
-use splatstream_scene::GaussianFrame;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 

@@ -1,43 +1,30 @@
 //! `splatstream chart`: what quality costs, measured on this machine, as one page.
 
-mod csv_files;
-mod figures;
-mod gop;
-mod gop_files;
-mod gop_text;
-mod judge;
-mod measure;
-mod page;
-mod peers;
-mod pictures;
-mod scene_chart;
-mod scenes;
-mod stability;
-mod standing;
-mod summary;
-mod svg;
-mod sweep;
-mod tables;
+mod sweep_args;
 
 use crate::cameras::{CameraArgs, Views};
 use crate::compare::pictures::read_weights;
 use crate::console::Console;
+use crate::encode::warnings::warnings;
 use crate::failure::Failure;
+use crate::frame_files::FrameFiles;
+use crate::input_args::InputArgs;
 use crate::numbers::parse_frame_rate;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
-use crate::setting_names::spelled;
 use clap::Args;
-use judge::Judge;
-use page::Page;
-use peers::Peers;
-use scene_chart::SceneChart;
-use scenes::Scene;
+use serde::Serialize;
+use splatstream_chart::charting::{Charting, Subject};
+use splatstream_chart::numbers::grouped;
+use splatstream_chart::peers::{OpenFrames, Peers};
+use splatstream_chart::scenes::{FRAMES, Scene, name_of, tell_apart};
+use splatstream_chart::stability::{self, Size, Stability};
+use splatstream_chart::{Error, File, Report};
+use splatstream_encoder::FrameSource;
 use splatstream_format::payload::SceneDescription;
-use splatstream_render::metrics::StLpips;
-use std::path::PathBuf;
-use summary::Summary;
-use sweep::{Sweep, SweepArgs};
+use splatstream_gaussians::GaussianFrame;
+use std::path::{Path, PathBuf};
+use sweep_args::SweepArgs;
 
 /// Draw rate-distortion and speed-accuracy charts of scenes: one page, SVG and CSV.
 ///
@@ -74,7 +61,7 @@ pub(crate) struct Chart {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Frames in the GOP whose operating points are measured: the first of each sequence, with predicted frames.
-    #[arg(long, value_name = "N", default_value_t = gop::FRAMES)]
+    #[arg(long, value_name = "N", default_value_t = FRAMES)]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=64))]
     gop: u32,
     /// Of that GOP, measure each predictor of new Gaussians alone and together, and the network without each of its
@@ -87,6 +74,8 @@ pub(crate) struct Chart {
     /// All strengths of the cases, on larger scenes.
     #[arg(long, requires = "stability", conflicts_with = "quick")]
     full: bool,
+    #[command(flatten)]
+    reading: InputArgs,
     #[command(flatten)]
     sweep: SweepArgs,
     /// Results of other codecs on the same scenes.
@@ -103,54 +92,89 @@ pub(crate) struct Chart {
 /// Rows of pictures of a quick chart.
 const QUICK_HEIGHT: u32 = 120;
 
-/// What the charts of all scenes have in common.
-struct Charting<'a> {
-    sweep: Sweep,
-    fps: f64,
-    learned: Option<StLpips>,
-    peers: Option<Peers>,
-    progress: &'a Progress,
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Written<S> {
+    page: PathBuf,
+    files: Vec<String>,
+    #[serde(flatten)]
+    summary: S,
 }
 
 impl Chart {
     /// Measures every scene, then writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "charts")?;
-        if self.stability {
-            return stability::run(self, console);
-        }
         make_directory(&self.out)?;
-        let mut scenes = self.scenes()?;
-        let sweep = self.sweep.sweep(self.fps);
-        let peers = self.peers.as_deref().map(Peers::read).transpose()?;
-        let peer_steps = |scene: &Scene| peers.as_ref().map_or(0, |peers| peers.count(scene));
-        let gop_steps =
-            |scene: &Scene| if gop::is_sequence(scene, self.gop) { gop::steps(self.ablation) } else { 0 };
-        let of_scene = |scene: &Scene| {
-            scene.frames.len() as u32 + measure::steps(&sweep) + gop_steps(scene) + peer_steps(scene)
+        if self.stability {
+            let report = self.failures()?;
+            let written = self.write(report)?;
+            let page = written.page.display();
+            return console
+                .report(&written, || format!("{}open {page} in a browser\n", written.summary.text()));
+        }
+        let report = self.charts()?;
+        let written = self.write(report)?;
+        console.report(&written, || {
+            let (page, files) = (written.page.display(), grouped(written.files.len() as u64));
+            let text = written.summary.text();
+            format!("{text}open {page} in a browser; {files} CSV and SVG files are beside it\n")
+        })
+    }
+
+    fn charts(&self) -> Result<Report<splatstream_chart::summary::Summary>, Failure> {
+        let with_cameras = |scene: Scene| Ok(Subject { cameras: self.cameras(&scene)?, scene });
+        let subjects: Vec<Subject> =
+            self.scenes()?.into_iter().map(with_cameras).collect::<Result<_, Failure>>()?;
+        let open = |decoded: &Path| -> Result<Box<dyn FrameSource>, String> {
+            let files = FrameFiles::find(&[decoded.to_path_buf()], self.reading);
+            Ok(Box::new(files.map_err(|error| error.to_string())?))
         };
-        let progress = Progress::steps(scenes.iter().map(of_scene).sum());
-        let learned = self.st_lpips.as_deref().map(read_weights).transpose()?;
-        let fps = f64::from(self.fps.0) / f64::from(self.fps.1);
-        let charting = Charting { sweep, fps, learned, peers, progress: &progress };
-        let charts: Vec<SceneChart> =
-            scenes.iter_mut().map(|scene| self.chart(scene, &charting)).collect::<Result<_, _>>()?;
-        let summary = self.write(&charts, &charting)?;
-        drop(progress);
-        console.report(&summary, || summary.text())
+        let charting = Charting {
+            sweep: self.sweep.sweep(self.fps),
+            fps: f64::from(self.fps.0) / f64::from(self.fps.1),
+            gop: self.gop,
+            ablation: self.ablation,
+            learned: self.st_lpips.as_deref().map(read_weights).transpose()?,
+            peers: self.peers.as_deref().map(|path| read_peers(path, &open)).transpose()?,
+            command: command_line(),
+        };
+        let progress = Progress::steps(charting.steps(&subjects));
+        Ok(charting.run(subjects, &progress)?)
+    }
+
+    fn failures(&self) -> Result<Report<stability::Summary>, Failure> {
+        let size = Size::of(self.sweep.quick, self.full);
+        // The built-in scene, unless there are others; then only if it is asked for.
+        let builtin = self.builtin || self.scenes.is_empty();
+        let mut scenes: Vec<Scene> = builtin.then(|| stability::builtin(size)).into_iter().collect();
+        for path in &self.scenes {
+            scenes.push(read_scene(path, self.frames.unwrap_or(size.frames()), self.reading)?);
+        }
+        tell_apart(&mut scenes);
+        let stability = Stability {
+            size,
+            height: self.drawing.height,
+            warnings: &|report, settings| {
+                let said = warnings(report, settings, &|frame| format!("frame {frame}"));
+                said.into_iter().map(stability::Warning::from).collect()
+            },
+            command: command_line(),
+        };
+        Ok(stability.run(&scenes, Progress::steps)?)
     }
 
     fn scenes(&self) -> Result<Vec<Scene>, Failure> {
         let mut scenes = Vec::new();
         // Whoever asks for a long GOP wants it whole.
-        let frames = self.frames.or((self.gop > gop::FRAMES).then_some(self.gop));
+        let frames = self.frames.or((self.gop > FRAMES).then_some(self.gop));
         if self.builtin {
             scenes.push(Scene::builtin(self.sweep.quick, frames));
         }
         for path in &self.scenes {
-            scenes.push(Scene::read(path, frames)?);
+            scenes.push(read_scene(path, frames.unwrap_or(FRAMES), self.reading)?);
         }
-        scenes::tell_apart(&mut scenes);
+        tell_apart(&mut scenes);
         Ok(scenes)
     }
 
@@ -166,47 +190,46 @@ impl Chart {
         )
     }
 
-    /// Measures a scene; its pictures are written on the way.
-    fn chart(&self, scene: &mut Scene, charting: &Charting<'_>) -> Result<SceneChart, Failure> {
-        let Charting { sweep, progress, .. } = charting;
-        progress.step(format!("{}: pictures of the source", scene.name));
-        let cameras = self.cameras(scene)?;
-        let mut judge = Judge::new(&scene.frames, cameras, charting.learned.as_ref(), || progress.advance());
-        let runs = measure::measure(scene, sweep, &mut judge, progress)?;
-        let mut chart = SceneChart::new(scene, judge.cameras(), runs, spelled(sweep.quality()), charting.fps);
-        if gop::is_sequence(scene, self.gop) {
-            let settings = gop::settings(sweep.headline(), self.gop);
-            chart.gop =
-                Some(gop::measure(scene, &settings, (charting.fps, self.ablation), &mut judge, progress)?);
+    /// Writes the files of a report, the page last.
+    fn write<S>(&self, report: Report<S>) -> Result<Written<S>, Failure> {
+        for File { name, bytes } in report.files.iter().chain(&report.pictures) {
+            let path = self.out.join(name);
+            path.parent().map_or(Ok(()), make_directory)?;
+            OutputFile::write(&path, bytes)?;
         }
-        if let Some(peers) = &charting.peers {
-            progress.step(format!("{}: pictures of other codecs", scene.name));
-            (chart.peers, chart.missing) = peers.judged(scene, &judge, || progress.advance());
-        }
-        if let Some(run) = chart.headline() {
-            chart.pictures = pictures::pictures(&scene.name, run, &judge, &self.out)?;
-        }
-        Ok(chart)
+        let page = self.out.join("index.html");
+        OutputFile::write(&page, report.page.as_bytes())?;
+        let files = report.files.into_iter().map(|file| file.name).collect();
+        Ok(Written { page, files, summary: report.summary })
     }
+}
 
-    fn write(&self, charts: &[SceneChart], charting: &Charting<'_>) -> Result<Summary, Failure> {
-        let mut files = csv_files::write(charts, &self.out)?;
-        let figures: Vec<_> = charts
-            .iter()
-            .map(|scene| page::SceneFigures {
-                rates: figures::rate_figures(scene),
-                speeds: figures::speed_figures(scene),
-                costs: figures::cost_figures(scene),
-            })
-            .collect();
-        for figure in figures.iter().flat_map(page::SceneFigures::all) {
-            let name = format!("{}.svg", figure.id);
-            OutputFile::write(&self.out.join(&name), figure.file().as_bytes())?;
-            files.push(name);
+/// The first frames of a file or of a directory of frames.
+fn read_scene(path: &Path, frames: u32, reading: InputArgs) -> Result<Scene, Failure> {
+    let mut files = FrameFiles::find(&[path.to_path_buf()], reading)?;
+    let count = files.len().min(frames);
+    let frame = |number| files.frame(number).map_err(|error| Failure::other(error.to_string()));
+    let frames: Vec<GaussianFrame> = (0..count).map(frame).collect::<Result<_, _>>()?;
+    if frames.iter().all(GaussianFrame::is_empty) {
+        return Err(Failure::other(format!("{}: there is no Gaussian in it", path.display())));
+    }
+    let path_of_scene = Some(path.to_path_buf());
+    Ok(Scene { name: name_of(path), path: path_of_scene, frames, frames_of_source: files.len() })
+}
+
+/// Results of other codecs.
+fn read_peers<'a>(path: &Path, open: OpenFrames<'a>) -> Result<Peers<'a>, Failure> {
+    let text = std::fs::read(path).map_err(|error| Failure::file("read", path, &error))?;
+    let directory = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    Peers::new(&text, directory, open).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Stream(error) => Self::stream(Path::new("the stream just encoded"), error),
+            Error::Other(message) => Self::other(message),
         }
-        let page = Page { charts, figures: &figures, sweep: &charting.sweep, command: &command_line() };
-        OutputFile::write(&self.out.join("index.html"), page.html().as_bytes())?;
-        Ok(Summary::new(&self.out, charts, files))
     }
 }
 

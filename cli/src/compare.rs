@@ -9,7 +9,7 @@ pub(crate) mod pictures;
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
-use crate::numbers::grouped;
+use crate::input_args::InputArgs;
 use crate::output_file::STANDARD;
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
@@ -18,8 +18,9 @@ use errors::{AttributeErrors, ErrorSums};
 use matching::Matching;
 use pictures::{PictureArgs, PictureErrors, Pictures};
 use serde::Serialize;
+use splatstream_chart::numbers::grouped;
 use splatstream_encoder::canonical::canonicalise;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
@@ -44,6 +45,8 @@ pub(crate) struct Compare {
     pictures: PictureArgs,
     #[command(flatten)]
     limits: LimitArgs,
+    #[command(flatten)]
+    reading: InputArgs,
 }
 
 /// How Gaussians find their partners.
@@ -85,7 +88,8 @@ impl Compare {
             return Err(Failure::Usage("only one of A and B can be standard input".to_owned()));
         }
         let limits = self.limits.limits();
-        let (opened_a, opened_b) = (Opened::open(&self.a)?, Opened::open(&self.b)?);
+        let (opened_a, opened_b) =
+            (Opened::open(&self.a, self.reading)?, Opened::open(&self.b, self.reading)?);
         let (mut frames_a, mut frames_b) = (opened_a.frames(&limits, None)?, opened_b.frames(&limits, None)?);
         let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
         let mut report = self.empty_report();

@@ -9,7 +9,8 @@ use crate::cameras::{BackgroundArg, CameraArgs, Views, to_stream};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
-use crate::numbers::{bits_per_gaussian, grouped, hex_digest, parse_frame_rate};
+use crate::input_args::InputArgs;
+use crate::numbers::{hex_digest, parse_frame_rate};
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::progress::Progress;
 use crate::setting_names::{
@@ -19,12 +20,13 @@ use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
+use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
 };
 use splatstream_format::payload::{Network, SceneDescription};
+use splatstream_gaussians::Defect;
 use splatstream_render::Camera;
-use splatstream_scene::Defect;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -125,6 +127,8 @@ pub(crate) struct Encode {
     /// around. The first 64 cameras of a file go into the stream, for viewers to start from.
     #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
     cameras: Option<Views>,
+    #[command(flatten)]
+    reading: InputArgs,
     #[command(flatten)]
     views: CameraArgs,
     #[command(flatten)]
@@ -267,7 +271,7 @@ impl Encode {
 
     /// Encodes one scene or sequence; warnings are said.
     fn one(&self, console: &Console, inputs: &[PathBuf], out: &Path) -> Result<Encoded, Failure> {
-        let mut source = FrameFiles::find(inputs)?.unchecked();
+        let mut source = FrameFiles::find(inputs, self.reading)?.unchecked();
         let read = self.read_files(&source);
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;

@@ -2,12 +2,12 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::numbers::{grouped, percent};
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::stream_file::{LimitArgs, StreamFile};
 use crate::structure::{Frame, Structure};
 use clap::Args;
 use serde::Serialize;
+use splatstream_chart::numbers::{grouped, percent};
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_format::Limits;
 use std::collections::BTreeSet;

@@ -1,11 +1,13 @@
 //! Frames in files: which files, in which order, each read when it is needed.
 
 use crate::failure::Failure;
+use crate::input_args::{InputArgs, with_advice};
 use crate::output_file::STANDARD;
 use crate::stream_file::is_stream;
 use crate::unfinished::Unfinished;
 use splatstream_encoder::FrameSource;
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene, read_scene_as_is};
+use splatstream_files::{read_scene, read_scene_as_is};
+use splatstream_gaussians::GaussianFrame;
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::io;
@@ -20,6 +22,7 @@ const SOG_META: &str = "meta.json";
 /// A frame a file, in natural order of their names.
 pub(crate) struct FrameFiles {
     paths: Vec<PathBuf>,
+    reading: InputArgs,
     /// The frame read last: of a single frame, the encoder's second pass needs no second reading.
     last: Option<(u32, GaussianFrame)>,
     /// Whether values that no frame may hold are left to whoever asks for the frames.
@@ -35,7 +38,7 @@ const STANDARD_INPUT: &str = "standard input";
 
 impl FrameFiles {
     /// The frames that the arguments of a command name: files, or one directory of frames.
-    pub(crate) fn find(inputs: &[PathBuf]) -> Result<Self, Failure> {
+    pub(crate) fn find(inputs: &[PathBuf], reading: InputArgs) -> Result<Self, Failure> {
         let mut spooled = None;
         let mut paths = match inputs {
             [only] if only.as_path() == Path::new(STANDARD) => {
@@ -54,7 +57,7 @@ impl FrameFiles {
             }
         };
         paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-        Ok(Self { paths, last: None, as_is: false, spooled, counts: None })
+        Ok(Self { paths, reading, last: None, as_is: false, spooled, counts: None })
     }
 
     /// Values are not checked.
@@ -112,11 +115,11 @@ impl FrameSource for FrameFiles {
         }
         let path = self.paths.get(number as usize).ok_or_else(|| format!("there is no frame {number}"))?;
         let read = if self.as_is { read_scene_as_is } else { read_scene };
-        let name = |error: splatstream_scene::SceneError| match self.spooled {
-            Some(_) => error.to_string().replace(&*path.to_string_lossy(), STANDARD_INPUT).into(),
-            None => Box::<dyn std::error::Error + Send + Sync>::from(error),
+        let name = |error: splatstream_files::SceneError| match self.spooled {
+            Some(_) => with_advice(&error).replace(&*path.to_string_lossy(), STANDARD_INPUT),
+            None => with_advice(&error),
         };
-        let frame = read(path, &ReadLimits::default()).map_err(name)?;
+        let frame = read(path, &self.reading.limits(path)).map_err(name)?;
         let (fewest, most) = self.counts.unwrap_or((frame.len(), frame.len()));
         self.counts = Some((fewest.min(frame.len()), most.max(frame.len())));
         self.last = Some((number, frame.clone()));

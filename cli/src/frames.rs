@@ -2,24 +2,25 @@
 
 use crate::failure::{Failure, StreamFault};
 use crate::frame_files::FrameFiles;
+use crate::input_args::InputArgs;
 use crate::output_file::STANDARD;
 use crate::stream_file::{StreamFile, is_stream};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
-use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream;
 use splatstream_encoder::FrameSource;
 use splatstream_format::payload::SceneDescription;
-use splatstream_format::unit::{Stream, Units};
 use splatstream_format::{Error, Limits};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
 
 /// Frames that a user named: a stream, or files.
 pub(crate) enum Opened {
     /// The bytes of a stream.
     Stream(StreamFile),
-    /// A scene file or a directory of frames.
-    Scene(PathBuf),
+    /// A scene file or a directory of frames, and how it is read.
+    Scene(PathBuf, InputArgs),
 }
 
 /// The frames, in order.
@@ -33,26 +34,25 @@ pub(crate) enum Frames<'a> {
 /// A stream that is decoded frame by frame; decoding goes on after errors.
 pub(crate) struct Decoding<'a> {
     file: &'a StreamFile,
-    units: Units<'a>,
-    decoder: Decoder<'a>,
+    frames: stream::Frames<'a>,
     expected: u32,
 }
 
 impl Opened {
     /// What a user named; its content decides what it is.
-    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn open(path: &Path, reading: InputArgs) -> Result<Self, Failure> {
         // Scenes come as files and directories; what comes by a pipe is a stream, or an error that says so.
         if path == Path::new(STANDARD) || is_stream(path) {
             return StreamFile::read(path).map(Self::Stream);
         }
-        Ok(Self::Scene(path.to_path_buf()))
+        Ok(Self::Scene(path.to_path_buf(), reading))
     }
 
     /// What a stream says about its scene.
     pub(crate) fn description(&self, limits: &Limits) -> Option<SceneDescription> {
         match self {
             Self::Stream(file) => file.description(limits),
-            Self::Scene(_) => None,
+            Self::Scene(..) => None,
         }
     }
 
@@ -64,20 +64,20 @@ impl Opened {
     ) -> Result<Frames<'_>, Failure> {
         match self {
             Self::Stream(file) => {
-                let stream = Stream::open(&file.bytes, limits).map_err(|error| file.fault(error))?;
                 let operating_point = point.unwrap_or(OperatingPoint::ALL);
                 file.check_point(operating_point, limits)?;
                 let options = Options { limits: *limits, operating_point, ..Options::default() };
                 let expected = file.sequence(limits).map_or(0, |sequence| sequence.frame_count);
-                let decoder = Decoder::new(stream.header(), options);
-                Ok(Frames::Stream(Box::new(Decoding { file, units: stream.units(), decoder, expected })))
+                let frames =
+                    stream::Frames::open(&file.bytes, &options).map_err(|error| file.fault(error))?;
+                Ok(Frames::Stream(Box::new(Decoding { file, frames, expected })))
             }
-            Self::Scene(path) if point.is_some() => Err(Failure::Usage(format!(
+            Self::Scene(path, _) if point.is_some() => Err(Failure::Usage(format!(
                 "{}: only a stream has operating points; leave --op out",
                 path.display()
             ))),
-            Self::Scene(path) => {
-                let files = Box::new(FrameFiles::find(std::slice::from_ref(path))?);
+            Self::Scene(path, reading) => {
+                let files = Box::new(FrameFiles::find(std::slice::from_ref(path), *reading)?);
                 Ok(Frames::Files { files, next: 0 })
             }
         }
@@ -111,21 +111,21 @@ impl Frames<'_> {
 
     /// What is wrong with the stream, as far as it has been decoded.
     pub(crate) fn faults(&self) -> Vec<StreamFault> {
-        self.errors().iter().copied().map(StreamFault::from).collect()
+        self.errors().into_iter().map(StreamFault::from).collect()
     }
 
     /// The verdict on the stream, as far as it has been decoded.
     pub(crate) fn verdict(&self) -> Result<(), Failure> {
-        match (self, self.errors().first()) {
-            (Self::Stream(decoding), Some(&error)) => Err(decoding.file.fault(error)),
+        match (self, self.errors().first().copied()) {
+            (Self::Stream(decoding), Some(error)) => Err(decoding.file.fault(error)),
             _ => Ok(()),
         }
     }
 
-    fn errors(&self) -> &[Error] {
+    fn errors(&self) -> Vec<Error> {
         match self {
-            Self::Stream(decoding) => decoding.decoder.errors(),
-            Self::Files { .. } => &[],
+            Self::Stream(decoding) => decoding.frames.summary().errors,
+            Self::Files { .. } => Vec::new(),
         }
     }
 }
@@ -133,28 +133,10 @@ impl Frames<'_> {
 impl Decoding<'_> {
     fn next(&mut self) -> Option<(u32, GaussianFrame)> {
         loop {
-            let frame = self.decoded()?;
-            if let (false, Some(sequence)) = (frame.is_lost, self.decoder.sequence()) {
+            let frame = self.frames.next_frame()?;
+            if let (false, Some(sequence)) = (frame.is_lost, self.frames.sequence()) {
                 return Some((frame.index, to_gaussians(frame.into_shown(), sequence)));
             }
         }
-    }
-
-    /// Feeds units until a frame is complete; where the end of a unit is not known, from the next intact gop_header on.
-    fn decoded(&mut self) -> Option<DecodedFrame> {
-        while let Some(unit) = self.units.next_unit() {
-            let frame = match unit {
-                Ok(unit) => self.decoder.unit(&unit),
-                Err(error) => {
-                    let frame = self.decoder.unreadable(error);
-                    self.units.scan_for(self.decoder.wanted());
-                    frame
-                }
-            };
-            if frame.is_some() {
-                return frame;
-            }
-        }
-        self.decoder.finish()
     }
 }

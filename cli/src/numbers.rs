@@ -1,19 +1,7 @@
 //! Numbers in words: for tables, and the arguments that hold numbers.
 
+use splatstream_chart::numbers::grouped;
 use std::num::ParseIntError;
-
-/// A count with its thousands apart: 1,234,567.
-pub(crate) fn grouped(count: u64) -> String {
-    let digits = count.to_string();
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
 
 /// A number of frames: 1 frame, 2 frames.
 pub(crate) fn frames(count: u32) -> String {
@@ -23,16 +11,6 @@ pub(crate) fn frames(count: u32) -> String {
 /// A digest as reports write it.
 pub(crate) fn hex_digest(digest: u64) -> String {
     format!("{digest:016x}")
-}
-
-/// Bits per Gaussian.
-pub(crate) fn bits_per_gaussian(bytes: u64, gaussians: u64) -> f64 {
-    bytes as f64 * 8.0 / gaussians.max(1) as f64
-}
-
-/// `part` of `whole` in percent.
-pub(crate) fn percent(part: u64, whole: u64) -> f64 {
-    part as f64 * 100.0 / whole.max(1) as f64
 }
 
 /// A span of frames, `A..B`: from A up to and without B.
@@ -95,11 +73,6 @@ pub(crate) fn parse_frame_rate(text: &str) -> Result<(u32, u32), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn thousands_are_apart() {
-        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
-    }
 
     #[test]
     fn a_span_of_frames_ends_before_its_end() {

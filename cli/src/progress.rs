@@ -67,18 +67,6 @@ impl Progress {
         self.bar.set_position(done.into());
     }
 
-    /// The step that is under way.
-    pub(crate) fn step(&self, name: String) {
-        self.tell(&name);
-        self.bar.set_message(name);
-    }
-
-    /// A step is done.
-    pub(crate) fn advance(&self) {
-        self.bar.inc(1);
-        self.tell("");
-    }
-
     /// Writes a line, if it is time for one.
     fn tell(&self, step: &str) {
         let Some(line) = &self.line else { return };
@@ -92,6 +80,18 @@ impl Progress {
             let step = if step.is_empty() { String::new() } else { format!(": {step}") };
             let _nobody_listens = writeln!(io::stderr().lock(), "{done}{step}");
         }
+    }
+}
+
+impl splatstream_chart::Progress for Progress {
+    fn step(&self, name: String) {
+        self.tell(&name);
+        self.bar.set_message(name);
+    }
+
+    fn advance(&self) {
+        self.bar.inc(1);
+        self.tell("");
     }
 }
 

@@ -4,16 +4,18 @@ use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::Opened;
-use crate::numbers::{FrameRange, frames, grouped};
+use crate::input_args::InputArgs;
+use crate::numbers::{FrameRange, frames};
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::Args;
 use serde::Serialize;
+use splatstream_chart::numbers::grouped;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::payload::{SceneDescription, UpAxis};
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, render};
-use splatstream_scene::GaussianFrame;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -51,6 +53,8 @@ pub(crate) struct Render {
     antialiased: bool,
     #[command(flatten)]
     limits: LimitArgs,
+    #[command(flatten)]
+    reading: InputArgs,
 }
 
 /// What `--json` prints.
@@ -86,7 +90,7 @@ impl Render {
     /// Draws every frame from every camera.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "pictures")?;
-        let opened = Opened::open(&self.input)?;
+        let opened = Opened::open(&self.input, self.reading)?;
         let limits = self.limits.limits();
         let description = opened.description(&limits).unwrap_or_default();
         let mut frames = opened.frames(&limits, self.op)?;

@@ -50,7 +50,7 @@ impl StreamFile {
 
     /// A failure of this stream.
     pub(crate) fn fault(&self, error: Error) -> Failure {
-        let is_scene = !self.bytes.starts_with(&SIGNATURE) && splatstream_scene::detect(&self.path).is_ok();
+        let is_scene = !self.bytes.starts_with(&SIGNATURE) && splatstream_files::detect(&self.path).is_ok();
         Failure::Stream { path: self.path.clone(), error, is_scene }
     }
 

@@ -2,11 +2,10 @@
 //! streams, in time linear in the number of units.
 
 use splatstream_decoder::operating_point::OperatingPoint;
-use splatstream_format::levels::Levels;
-use splatstream_format::payload::OperatingPoints;
+use splatstream_format::follower::{Content, Follower, Standing};
 use splatstream_format::syntax::{
-    CodebookHeader, FrameHeader, FrameRole, GopHeader, IncrementHeader, OperatingPointEntry, Profile,
-    SequenceParameters, TransformHeader, TransformKind, UnitHeader, UnitType,
+    FrameHeader, FrameRole, GopHeader, OperatingPointEntry, Profile, SequenceParameters, TransformKind,
+    UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Landmark, Stream, Unit};
 use splatstream_format::{Error, Limits, Result};
@@ -17,7 +16,7 @@ use std::collections::BTreeMap;
 pub(crate) struct Structure {
     /// The profile, if there is a file header.
     pub(crate) profile: Option<Profile>,
-    /// The sequence parameters, once they have come.
+    /// The sequence parameters, if they have come.
     pub(crate) sequence: Option<SequenceParameters>,
     /// The GOPs.
     pub(crate) gops: Vec<Gop>,
@@ -28,7 +27,6 @@ pub(crate) struct Structure {
     /// Whether units belong to the last GOP: not after a damaged gop_header.
     in_gop: bool,
     definitions: Definitions,
-    levels: Levels,
 }
 
 /// Where a unit is.
@@ -138,13 +136,15 @@ impl Structure {
             Ok(stream) => stream,
             Err(error) => return Self { error: Some(error), ..structure },
         };
-        structure.profile = Some(stream.header().profile());
+        let profile = stream.header().profile();
+        structure.profile = Some(profile);
+        let mut follower = Follower::new(profile);
         let mut units = stream.units();
         let mut number = 0;
         while let Some(unit) = units.next_unit() {
             match unit {
                 Ok(unit) => {
-                    structure.unit(&unit, number);
+                    structure.unit(&unit, number, &mut follower);
                     number += 1;
                 }
                 Err(error) => {
@@ -154,6 +154,7 @@ impl Structure {
                 }
             }
         }
+        structure.sequence = follower.sequence().copied();
         structure
     }
 
@@ -166,90 +167,79 @@ impl Structure {
         self.error = self.error.or(checked.err());
     }
 
-    fn unit(&mut self, unit: &Unit<'_>, number: usize) {
-        let profile = self.profile.unwrap_or(Profile::Intra);
-        // What decoders discard may hold anything.
-        let is_discarded = !self.levels.takes(&unit.header);
-        let checked = unit.check_header(profile).and_then(|()| match is_discarded {
-            true => Ok(()),
-            false => unit.check_payload(),
-        });
-        if checked.is_ok() {
-            self.levels.follow(unit, profile);
-        }
-        let taken = self.take(unit, UnitSpan::new(number, unit, checked.is_err()), profile);
-        self.note(checked.and(taken));
+    fn unit(&mut self, unit: &Unit<'_>, number: usize, follower: &mut Follower) {
+        let standing = follower.take(unit);
+        let span = UnitSpan::new(number, unit, standing.is_err());
+        let taken = match standing {
+            Ok(Standing::Taken) => self.take(unit, span, follower),
+            // What decoders discard may hold anything.
+            Ok(Standing::Discarded) => {
+                self.add_increment(unit.header, span, UsedTools::default());
+                Ok(())
+            }
+            Err(error) => {
+                self.damaged(unit, span);
+                Err(error)
+            }
+        };
+        self.note(taken);
     }
 
-    /// A unit; of one with a damaged payload only what its header says.
-    fn take(&mut self, unit: &Unit<'_>, span: UnitSpan, profile: Profile) -> Result<()> {
-        let (payload, at) = (unit.payload, unit.payload_at);
+    /// A unit that is intact.
+    fn take(&mut self, unit: &Unit<'_>, span: UnitSpan, follower: &Follower) -> Result<()> {
         match unit.header.unit_type() {
-            UnitType::SequenceParameters if !span.damaged => {
-                self.sequence = Some(SequenceParameters::parse_payload(payload, at, profile)?);
-            }
-            UnitType::GopHeader => {
-                self.in_gop = false;
-                if !span.damaged {
-                    let header = GopHeader::parse_payload(payload, at, profile)?;
-                    self.definitions = Definitions::default();
-                    self.gops.push(Gop::new(span, header, unit.header.frame));
-                    self.in_gop = true;
-                }
-            }
+            UnitType::GopHeader => self.in_gop = false,
             UnitType::Transform | UnitType::Codebook | UnitType::Weights => {
                 self.add_tool(&unit.header, span);
-                if !span.damaged {
-                    self.define(unit, span.unit)?;
+                if follower.sequence().is_none() {
+                    return Ok(());
                 }
             }
-            UnitType::FrameHeader => {
-                let header = (!span.damaged).then(|| FrameHeader::parse(payload, at)).transpose()?;
-                let transforms = header.map(|(header, _)| self.definitions.transforms(&header));
-                self.add_frame(&unit.header, span, transforms.unwrap_or_default());
+            // Payloads that say nothing about the structure are not looked at. That of an increment may be one that
+            // decoders discard.
+            UnitType::Increment => {
+                let content = follower.content(unit).ok();
+                let tools = content.map(|content| self.tools_of(&content)).unwrap_or_default();
+                self.add_increment(unit.header, span, tools);
+                return Ok(());
             }
-            UnitType::OperatingPoints if !span.damaged => {
+            UnitType::FrameHeader | UnitType::SequenceParameters | UnitType::OperatingPoints => {}
+            _ => return Ok(()),
+        }
+        match follower.content(unit)? {
+            Content::GopHeader(header) => {
+                self.definitions = Definitions::default();
+                self.gops.push(Gop::new(span, header, unit.header.frame));
+                self.in_gop = true;
+            }
+            Content::FrameHeader(header) => {
+                self.add_frame(&unit.header, span, self.definitions.transforms(&header));
+            }
+            Content::OperatingPoints(points) => {
                 let point = |entry: &OperatingPointEntry| {
                     let (spatial, temporal, refinement) = entry.key();
                     OperatingPoint { spatial, temporal, refinement }
                 };
-                self.points = OperatingPoints::parse(payload, at)?.entries.iter().map(point).collect();
+                self.points = points.entries.iter().map(point).collect();
             }
-            UnitType::Increment => {
-                let tools = if span.damaged { None } else { self.tools_of(unit, profile) };
-                self.add_increment(unit.header, span, tools.unwrap_or_default());
-            }
-            _ => {}
+            content => self.definitions.define(&content, span.unit),
         }
         Ok(())
+    }
+
+    /// A unit that is not intact: what its header says.
+    fn damaged(&mut self, unit: &Unit<'_>, span: UnitSpan) {
+        match unit.header.unit_type() {
+            UnitType::GopHeader => self.in_gop = false,
+            UnitType::Transform | UnitType::Codebook | UnitType::Weights => self.add_tool(&unit.header, span),
+            UnitType::FrameHeader => self.add_frame(&unit.header, span, Vec::new()),
+            UnitType::Increment => self.add_increment(unit.header, span, UsedTools::default()),
+            _ => {}
+        }
     }
 
     fn gop(&mut self) -> Option<&mut Gop> {
         self.gops.last_mut().filter(|_| self.in_gop)
-    }
-
-    /// Takes note of the identifier that a tool unit defines.
-    fn define(&mut self, unit: &Unit<'_>, number: usize) -> Result<()> {
-        let Some(sequence) = &self.sequence else { return Ok(()) };
-        let Definitions { dc, sh, codebooks, weights } = &mut self.definitions;
-        let (slots, id) = match unit.header.unit_type() {
-            UnitType::Weights => {
-                *weights = Some(number);
-                return Ok(());
-            }
-            UnitType::Transform => {
-                let (header, _) = TransformHeader::parse(unit.payload, unit.payload_at, sequence)?;
-                (if header.kind() == Some(TransformKind::Sh) { sh } else { dc }, header.transform_id)
-            }
-            _ => {
-                let (header, _) = CodebookHeader::parse(unit.payload, unit.payload_at)?;
-                (codebooks, header.codebook_id)
-            }
-        };
-        if let Some(slot) = slots.get_mut(usize::from(id)) {
-            *slot = Some(number);
-        }
-        Ok(())
     }
 
     fn add_tool(&mut self, header: &UnitHeader, span: UnitSpan) {
@@ -277,16 +267,14 @@ impl Structure {
         }
     }
 
-    /// The tools that an increment uses; none where its header cannot be read, which is no error in a unit that decoders
-    /// discard.
-    fn tools_of(&self, unit: &Unit<'_>, profile: Profile) -> Option<UsedTools> {
-        let sequence = self.sequence.as_ref()?;
-        let (header, _) = IncrementHeader::parse(unit.payload, unit.payload_at, sequence, profile).ok()?;
+    /// The tools that an increment uses.
+    fn tools_of(&self, content: &Content) -> UsedTools {
+        let Content::Increment(header) = content else { return UsedTools::default() };
         let defined = |id| self.definitions.codebooks.get(usize::from(id)).copied().flatten();
         let mut codebooks: Vec<usize> = header.sh().codebooks().filter_map(defined).collect();
         codebooks.dedup();
         let predicts = header.predictor_count() > 0;
-        Some(UsedTools { codebooks, weights: self.definitions.weights.filter(|_| predicts) })
+        UsedTools { codebooks, weights: self.definitions.weights.filter(|_| predicts) }
     }
 }
 
@@ -298,6 +286,20 @@ impl Gop {
 }
 
 impl Definitions {
+    /// Takes note of what a tool unit defines.
+    fn define(&mut self, content: &Content, unit: usize) {
+        let slot = match content {
+            Content::Transform(header) if header.kind() == Some(TransformKind::Sh) => {
+                self.sh.get_mut(usize::from(header.transform_id))
+            }
+            Content::Transform(header) => self.dc.get_mut(usize::from(header.transform_id)),
+            Content::Codebook(header) => self.codebooks.get_mut(usize::from(header.codebook_id)),
+            Content::Weights(_) => Some(&mut self.weights),
+            _ => None,
+        };
+        slot.into_iter().for_each(|slot| *slot = Some(unit));
+    }
+
     fn transforms(&self, header: &FrameHeader) -> Vec<usize> {
         let unit = |slots: &[Option<usize>; 16], id: u8| slots.get(usize::from(id)).copied().flatten();
         let sh = header.sh_transform().and_then(|id| unit(&self.sh, id));

@@ -3,19 +3,21 @@
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
-use crate::numbers::grouped;
+use crate::input_args::InputArgs;
 use crate::output_file::{OutputFile, refuse_standard};
 use crate::progress::Progress;
 use crate::setting_names::QualityName;
 use clap::Args;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use splatstream_chart::Progress as _;
+use splatstream_chart::numbers::grouped;
 use splatstream_encoder::transformer::{Architecture, Sample};
 use splatstream_encoder::{
     FrameSource, Quality, Settings, ShChoice, Structure, nearer, samples, train_network,
 };
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::{BuiltinScene, Tracking};
+use splatstream_files::builtin::{BuiltinScene, Tracking};
+use splatstream_gaussians::GaussianFrame;
 use std::path::PathBuf;
 
 /// Train a network that predicts new Gaussians, for encode --network.
@@ -41,6 +43,8 @@ pub(crate) struct Train {
     /// How close decoded scenes are to the source.
     #[arg(long, value_enum, default_value_t = QualityName::High)]
     quality: QualityName,
+    #[command(flatten)]
+    reading: InputArgs,
 }
 
 /// What `--json` prints.
@@ -111,10 +115,10 @@ impl Train {
             let found = samples(frames, &settings, architecture);
             all.extend(found.map_err(|error| Failure::other(format!("{name}: {error}")))?);
             progress.advance();
-            Ok(())
+            Ok::<(), Failure>(())
         };
         for path in &self.sequences {
-            let mut files = FrameFiles::find(std::slice::from_ref(path))?;
+            let mut files = FrameFiles::find(std::slice::from_ref(path), self.reading)?;
             let count = self.frames.min(files.len());
             let read = |number| files.frame(number).map_err(|error| Failure::other(error.to_string()));
             let mut frames: Vec<_> = (0..count).map(read).collect::<Result<_, _>>()?;

@@ -2,11 +2,12 @@
 
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
-use crate::numbers::{frames, grouped};
+use crate::numbers::frames;
 use crate::progress::Progress;
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
 use serde::Serialize;
+use splatstream_chart::numbers::grouped;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_format::Class;

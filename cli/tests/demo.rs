@@ -3,7 +3,7 @@
 mod common;
 
 use common::{directory, json, succeed, text};
-use splatstream_scene::{ReadLimits, read_scene};
+use splatstream_files::{ReadLimits, read_scene};
 
 #[test]
 fn the_demo_writes_stream_frames_and_report() {

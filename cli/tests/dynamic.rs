@@ -6,7 +6,7 @@ mod common;
 use common::{UNIT_HEADER, directory, fail, fixture, json, run, seal, succeed, text};
 use serde_json::Value;
 use splatstream_encoder::{Preset, Quality, Settings, Structure, encode};
-use splatstream_scene::builtin::BuiltinScene;
+use splatstream_files::builtin::BuiltinScene;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -24,7 +24,7 @@ fn dynamic() -> PathBuf {
 /// For a change of the bitstream `BLESS=1 cargo test -p splatstream-cli --test dynamic the_fixture` writes it again.
 #[test]
 fn the_fixture_is_a_stream_of_today() {
-    let mut scene = BuiltinScene { gaussians: 150, frames: 10, sh_degree: 1, ..BuiltinScene::default() };
+    let scene = BuiltinScene { gaussians: 150, frames: 10, sh_degree: 1, ..BuiltinScene::default() };
     let settings = Settings {
         steps: Quality::Medium.steps(),
         refinements: vec![25, 50, 100],
@@ -37,7 +37,8 @@ fn the_fixture_is_a_stream_of_today() {
     };
     if std::env::var_os("BLESS").is_some() {
         let mut stream = Vec::new();
-        encode(&mut scene, &settings, &mut stream, &mut |_, _| ()).unwrap();
+        let mut frames: Vec<_> = (0..scene.frames).map(|number| scene.frame(number)).collect();
+        encode(&mut frames, &settings, &mut stream, &mut |_, _| ()).unwrap();
         fs::write(dynamic(), stream).unwrap();
     }
     let verdict = json(&["validate", text(&dynamic())]);

@@ -4,14 +4,14 @@ mod common;
 
 use common::{directory, fail, fixture, json, run, succeed, text};
 use splatstream_encoder::{Preset, Quality, Settings, ShChoice, encode};
-use splatstream_scene::builtin::BuiltinScene;
+use splatstream_files::builtin::BuiltinScene;
 use std::fs;
 
 /// The committed stream is what the encoder wrote once; other encoders may write others. For a change of the
 /// bitstream `BLESS=1 cargo test -p splatstream-cli --test inspect the_fixture` writes it again.
 #[test]
 fn the_fixture_is_a_stream_of_today() {
-    let mut scene = BuiltinScene { gaussians: 120, frames: 2, sh_degree: 1, ..BuiltinScene::default() };
+    let scene = BuiltinScene { gaussians: 120, frames: 2, sh_degree: 1, ..BuiltinScene::default() };
     let settings = Settings {
         steps: Quality::Medium.steps(),
         refinements: vec![25, 50, 100],
@@ -23,7 +23,8 @@ fn the_fixture_is_a_stream_of_today() {
     };
     if std::env::var_os("BLESS").is_some() {
         let mut stream = Vec::new();
-        encode(&mut scene, &settings, &mut stream, &mut |_, _| ()).unwrap();
+        let mut frames: Vec<_> = (0..scene.frames).map(|number| scene.frame(number)).collect();
+        encode(&mut frames, &settings, &mut stream, &mut |_, _| ()).unwrap();
         fs::write(fixture(), stream).unwrap();
     }
     succeed(&["validate", text(&fixture())]);

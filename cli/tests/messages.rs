@@ -5,8 +5,8 @@ mod common;
 
 use common::{directory, fail, json, run, scene, succeed, text, write_frames, write_still};
 use serde_json::Value;
-use splatstream_scene::builtin::BuiltinScene;
-use splatstream_scene::ply;
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::ply;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -52,6 +52,18 @@ fn wrong_settings_are_usage() {
     let said = [["--refinements", "10,20"], ["--layers", "1080,540"], ["--refinements", "20,10,100"]]
         .map(|wrong| fail(2, &[&encode[..], &wrong].concat()));
     insta::assert_snapshot!(said.concat());
+}
+
+#[test]
+fn a_scene_that_takes_too_much_memory_names_the_option() {
+    let directory = directory();
+    let (still, out) = (write_still(directory.path()), directory.path().join("out.gss"));
+    let encode = ["encode", text(&still), "-o", text(&out), "--preset", "fast", "--psnr", "40"];
+    let said = fail(1, &[&encode[..], &["--max-input-memory", "100K"]].concat());
+    assert!(said.contains("at most 102400 are allowed (max_memory)"), "{said}");
+    assert!(said.contains("if you trust the file, give --max-input-memory 1G"), "{said}");
+    assert!(said.contains(text(&still)) && !out.exists(), "{said}");
+    succeed(&[&encode[..], &["--max-input-memory", "1G"]].concat());
 }
 
 #[test]

@@ -5,7 +5,8 @@ mod common;
 
 use common::{directory, fail, json, run, scene, text, write_frames, write_still};
 use serde_json::Value;
-use splatstream_scene::{GaussianFrame, ply};
+use splatstream_files::ply;
+use splatstream_gaussians::GaussianFrame;
 use std::fs;
 
 /// The codes of the warnings in a report.

@@ -9,9 +9,11 @@ use divan::{Bencher, black_box};
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::prediction::{Predicting, Prediction};
-use splatstream_decoder::increment::residual::{Attributes, Stage};
+use splatstream_decoder::increment::residual::Attributes;
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::predictor::Predictor;
+use splatstream_decoder::stage::Stage;
 use splatstream_format::payload::{Network, REGISTRY, Transform};
 use splatstream_format::syntax::{IncrementHeader, TransformHeader};
 
@@ -75,7 +77,13 @@ fn predicted(bencher: Bencher, predictor: Predictor) {
         bilateral_feature: 32,
         ..IncrementHeader::PLAIN
     };
-    let by = Predicting { header: &header, colour, network: Some(&network), feature_shift: 0 };
+    let by = Predicting {
+        header: &header,
+        colour,
+        network: Some(&network),
+        feature_shift: 0,
+        interrupt: Interrupt::NEVER,
+    };
     let predictors = vec![predictor; GAUSSIANS.div_ceil(64)];
     bencher
         .counter(ItemsCount::new(GAUSSIANS))

@@ -28,6 +28,8 @@ pub(crate) struct Carried {
 #[derive(Debug, Clone)]
 struct CarriedList {
     list: Arc<GaussianList>,
+    /// Of its Gaussians, if they are asked for.
+    identities: Arc<Vec<u32>>,
     done: usize,
 }
 
@@ -39,10 +41,14 @@ struct Motion {
 }
 
 impl Carried {
-    /// Those of an I frame that shows these lists.
-    pub(crate) fn new(lists: impl IntoIterator<Item = Arc<GaussianList>>) -> Self {
-        let lists = lists.into_iter().map(|list| CarriedList { list, done: 0 }).collect();
-        Self { lists, motions: Vec::new() }
+    /// Those of an I frame that shows these lists; `identities` are empty unless they are asked for.
+    pub(crate) fn new(
+        lists: impl IntoIterator<Item = Arc<GaussianList>>,
+        identities: &[Arc<Vec<u32>>],
+    ) -> Self {
+        let identities = identities.iter().cloned().chain(core::iter::repeat_with(Arc::default));
+        let carried = |(list, identities)| CarriedList { list, identities, done: 0 };
+        Self { lists: lists.into_iter().zip(identities).map(carried).collect(), motions: Vec::new() }
     }
 
     /// How many lists there are.
@@ -74,6 +80,11 @@ impl Carried {
         self.lists.get(h).map(|carried| Arc::clone(&carried.list)).unwrap_or_default()
     }
 
+    /// The identities of the Gaussians of list h, which has been computed; empty unless they are asked for.
+    pub(crate) fn identities(&self, h: usize) -> Arc<Vec<u32>> {
+        self.lists.get(h).map(|carried| Arc::clone(&carried.identities)).unwrap_or_default()
+    }
+
     /// The digest of all lists.
     pub(crate) fn digest(&mut self) -> u64 {
         let digests: Vec<_> = (0..self.len()).map(|h| self.list(h).digest()).collect();
@@ -87,10 +98,14 @@ impl Carried {
         if waiting.is_empty() {
             return;
         }
-        let list = waiting.iter().fold(carried.list.as_ref().clone(), |list, motion| {
-            list.carried(&motion.field, motion.drops_stale)
-        });
-        *carried = CarriedList { list: Arc::new(list), done: self.motions.len() };
+        let mut list = carried.list.as_ref().clone();
+        for motion in waiting {
+            let keep = list.carry(&motion.field, motion.drops_stale);
+            if !keep.is_empty() && !carried.identities.is_empty() {
+                crate::frame::retain(Arc::make_mut(&mut carried.identities), &keep);
+            }
+        }
+        (carried.list, carried.done) = (Arc::new(list), self.motions.len());
     }
 
     /// Forgets the motions that every list has made.
@@ -105,7 +120,7 @@ impl Carried {
 #[expect(clippy::arithmetic_side_effects, reason = "an overflow is a failed test")]
 mod tests {
     use super::*;
-    use crate::displacement::Cell;
+    use crate::cell::Cell;
     use crate::frame::QuantizedFrame;
 
     /// Shifts everything by eight steps along an axis; a part of the grid is stale.
@@ -126,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_list_that_waits_becomes_what_a_list_that_moves_at_once_is() {
-        let mut waiting = Carried::new([Arc::new(list(3)), Arc::new(list(90))]);
+        let mut waiting = Carried::new([Arc::new(list(3)), Arc::new(list(90))], &[]);
         let mut direct = [list(3), list(90)];
         for (axis, drops_stale, from) in [(0, false, 2), (1, false, 1), (2, true, 2), (0, true, 2)] {
             waiting = waiting.moved(&field(axis), drops_stale, from);
@@ -139,7 +154,7 @@ mod tests {
 
     #[test]
     fn few_motions_wait() {
-        let mut carried = Carried::new([Arc::new(list(3)), Arc::new(list(9))]);
+        let mut carried = Carried::new([Arc::new(list(3)), Arc::new(list(9))], &[]);
         for _ in 0..3 * MAX_WAITING_MOTIONS {
             carried = carried.moved(&field(0), false, 2);
             assert!(carried.motions.len() <= MAX_WAITING_MOTIONS);
@@ -148,7 +163,7 @@ mod tests {
 
     #[test]
     fn motions_that_all_lists_have_made_are_forgotten() {
-        let mut carried = Carried::new([Arc::new(list(3)), Arc::new(list(9))]);
+        let mut carried = Carried::new([Arc::new(list(3)), Arc::new(list(9))], &[]);
         for _ in 0..5 {
             carried = carried.moved(&field(0), false, 1);
         }

@@ -1,7 +1,7 @@
 //! Clause 8.5: the values that choose the context of a symbol.
 
-use crate::block::CodedBlock;
-use crate::increment::residual::Stage;
+use crate::coded_block::CodedBlock;
+use crate::stage::Stage;
 use crate::steps::Exponents;
 use splatstream_format::entropy::lanes::Segments;
 use splatstream_format::entropy::layout::PlaneInfo;

@@ -1,6 +1,7 @@
 //! Clause 7.9: the digests of lists of Gaussians.
 
 use crate::frame::QuantizedFrame;
+use crate::interrupt::Interrupt;
 use rayon::prelude::*;
 use xxhash_rust::xxh64::{Xxh64, xxh64};
 
@@ -10,6 +11,15 @@ pub struct ListDigest(Vec<u64>);
 
 /// The digest of the list that the Gaussians `range` of some planes are; plane p is hashed with seed p.
 pub fn list_digest(frame: &QuantizedFrame, range: core::ops::Range<usize>) -> ListDigest {
+    list_digest_unless(Interrupt::NEVER, frame, range)
+}
+
+/// The same; where an interrupt is requested, the digest means nothing.
+pub(crate) fn list_digest_unless(
+    interrupt: &Interrupt,
+    frame: &QuantizedFrame,
+    range: core::ops::Range<usize>,
+) -> ListDigest {
     let positions = frame.position.iter().map(|plane| {
         let part = plane.get(range.clone()).unwrap_or_default();
         Plane::Unsigned(part)
@@ -17,7 +27,11 @@ pub fn list_digest(frame: &QuantizedFrame, range: core::ops::Range<usize>) -> Li
     let others =
         frame.signed_planes().map(|plane| Plane::Signed(plane.get(range.clone()).unwrap_or_default()));
     let planes: Vec<(u64, Plane<'_>)> = (0_u64..).zip(positions.chain(others)).collect();
-    ListDigest(planes.par_iter().map(|(seed, plane)| plane.digest(*seed)).collect())
+    let digest = |(seed, plane): &(u64, Plane<'_>)| match interrupt.is_requested() {
+        true => 0,
+        false => plane.digest(*seed),
+    };
+    ListDigest(planes.par_iter().map(digest).collect())
 }
 
 enum Plane<'a> {

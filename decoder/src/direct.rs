@@ -4,10 +4,12 @@
 //! block, whichever unit it is of, and writes to the part of the planes that belongs to it. This is how frames decode
 //! whose units only add Gaussians: all frames of static content, and I frames of one spatial layer.
 
-use crate::block::{Buffers, UnitParameters, decode_block};
+use crate::block::{UnitParameters, decode_block};
+use crate::coded_block::Buffers;
 use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, blocks_of};
+use crate::interrupt::Interrupt;
 use rayon::prelude::*;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::SectionModels;
@@ -46,6 +48,7 @@ struct Task<'t, 'f, 'a> {
 pub(crate) fn decode(
     units: &[DirectUnit<'_, '_>],
     sequence: &SequenceParameters,
+    interrupt: &Interrupt,
 ) -> (QuantizedFrame, Vec<Result<usize>>) {
     let sections: Vec<Option<(&CodedSection<'_>, &SectionModels)>> =
         units.iter().map(|unit| unit.prepared.sections().next()).collect();
@@ -72,7 +75,7 @@ pub(crate) fn decode(
     let tasks: Vec<Task<'_, '_, '_>> =
         blocks.into_iter().zip(planes.slices(&lengths)).filter_map(task).collect();
     let decoded: Vec<(usize, Result<usize>)> =
-        tasks.into_par_iter().map_init(Buffers::default, run).collect();
+        tasks.into_par_iter().map_init(|| Buffers::new(interrupt), run).collect();
     let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (unit, block) in decoded {
         let Some(slot) = results.get_mut(unit) else { continue };
@@ -81,7 +84,7 @@ pub(crate) fn decode(
     (planes, results)
 }
 
-fn run(buffers: &mut Buffers, task: Task<'_, '_, '_>) -> (usize, Result<usize>) {
+fn run(buffers: &mut Buffers<'_>, task: Task<'_, '_, '_>) -> (usize, Result<usize>) {
     let Task { unit, parameters, decoders, bytes, at, mut out } = task;
     let count = out.planes.first().map_or(0, |plane| plane.len());
     (unit, decode_block(bytes, at, &parameters, decoders, buffers, &mut out).map(|()| count))

@@ -117,8 +117,8 @@ impl QuantizedFrame {
 
     /// Keeps the Gaussians whose flag is set.
     pub fn retain(&mut self, keep: &[bool]) {
-        self.position.iter_mut().for_each(|plane| crate::list::retain(plane, keep));
-        self.signed_planes_mut().for_each(|plane| crate::list::retain(plane, keep));
+        self.position.iter_mut().for_each(|plane| retain(plane, keep));
+        self.signed_planes_mut().for_each(|plane| retain(plane, keep));
     }
 
     /// Appends the Gaussians of another frame with as many SH planes.
@@ -145,4 +145,10 @@ impl QuantizedFrame {
             .chain(&mut self.dc)
             .chain(&mut self.sh)
     }
+}
+
+/// Keeps the values whose flag is set; values without a flag stay.
+pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut flags = keep.iter();
+    values.retain(|_| flags.next().copied().unwrap_or(true));
 }

@@ -23,6 +23,8 @@ pub(crate) struct FrameState {
     pub(crate) anchor: Option<Arc<[Arc<GaussianList>]>>,
     /// Whether the I frame is complete, and this frame and every P or B frame on the way from it has a level above 0.
     pub(crate) is_exact: bool,
+    /// The identities of the Gaussians of each exact list, if they are asked for.
+    pub(crate) identities: Vec<Arc<Vec<u32>>>,
     /// What compensated the I frame of the GOP, and compensates carried lists.
     pub(crate) carried_shift: Shift,
     /// The plane models in force in a frame that refers to this one: for its cells, and for its unit of refinement 0.

@@ -5,7 +5,7 @@
 
 use crate::digest::{ListDigest, list_digest};
 use crate::displacement::CellField;
-use crate::frame::QuantizedFrame;
+use crate::frame::{QuantizedFrame, retain};
 use rayon::prelude::*;
 
 /// Fraction bits of positions and rotations inside the prediction loop.
@@ -164,24 +164,25 @@ impl GaussianList {
     /// `drops_stale` is set, that is if the frame has units that replace them.
     #[must_use]
     pub fn carried(mut self, field: &CellField, drops_stale: bool) -> Self {
-        let stale = self.displace(field);
-        if drops_stale {
-            let keep: Vec<bool> = stale.par_iter().map(|&stale| !stale).collect();
-            self.retain(&keep);
-        }
+        self.carry(field, drops_stale);
         self
+    }
+
+    /// Carries the list in place; gives which Gaussians stay, nothing if all do.
+    pub(crate) fn carry(&mut self, field: &CellField, drops_stale: bool) -> Vec<bool> {
+        let stale = self.displace(field);
+        if !drops_stale {
+            return Vec::new();
+        }
+        let keep: Vec<bool> = stale.par_iter().map(|&stale| !stale).collect();
+        self.retain(&keep);
+        keep
     }
 
     /// The digest of the list (7.9.2).
     pub fn digest(&self) -> ListDigest {
         list_digest(&self.planes, 0..self.len())
     }
-}
-
-/// Keeps the values whose flag is set; values without a flag stay.
-pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
-    let mut flags = keep.iter();
-    values.retain(|_| flags.next().copied().unwrap_or(true));
 }
 
 #[cfg(test)]

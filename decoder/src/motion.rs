@@ -5,10 +5,7 @@
 //! 2^21, so that sums of products with it stay below 2^38. Values out of range, which a stream cannot have,
 //! wrap.
 
-use crate::displacement::{Cell, isqrt};
-
-/// The largest integer of a rotation component, and of the unit of rotations. Clause 7.6.3.
-pub(crate) const UNIT_MAX: i64 = 32_767;
+use crate::cell::{Cell, UNIT_MAX, isqrt};
 
 /// A cell made ready to move Gaussians.
 #[derive(Debug, Clone, Copy)]

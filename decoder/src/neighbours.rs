@@ -6,6 +6,7 @@
 //! index, are the neighbours. Sorting takes a time that grows with n, a search 2 * `WINDOW` distances.
 
 use crate::curve;
+use crate::interrupt::Interrupt;
 use crate::position::morton;
 use rayon::prelude::*;
 
@@ -73,6 +74,16 @@ impl NeighbourSearch {
 
     /// The neighbours of many points, min(count, [`len`](Self::len)) of each, one point after the other.
     pub fn nearest_to_all(&self, points: [&[u32]; 3], count: usize) -> Vec<Neighbour> {
+        self.nearest_unless(Interrupt::NEVER, points, count)
+    }
+
+    /// The same; where an interrupt is requested, the neighbours mean nothing.
+    pub(crate) fn nearest_unless(
+        &self,
+        interrupt: &Interrupt,
+        points: [&[u32]; 3],
+        count: usize,
+    ) -> Vec<Neighbour> {
         let [xs, ys, zs] = points;
         let wanted = count.min(self.len());
         let mut all = vec![Neighbour::default(); xs.len().wrapping_mul(wanted)];
@@ -81,6 +92,7 @@ impl NeighbourSearch {
         }
         all.par_chunks_mut(RUN.wrapping_mul(wanted))
             .zip(xs.par_chunks(RUN).zip(ys.par_chunks(RUN)).zip(zs.par_chunks(RUN)))
+            .filter(|_| !interrupt.is_requested())
             .for_each(|(run, ((xs, ys), zs))| {
                 let mut found = Vec::with_capacity(WINDOW.wrapping_mul(2));
                 for (slots, ((&x, &y), &z)) in run.chunks_mut(wanted).zip(xs.iter().zip(ys).zip(zs)) {

@@ -2,11 +2,11 @@
 
 mod tally;
 
-pub(crate) use tally::Belonging;
 pub use tally::{OperatingPointInfo, Tally, all_points, operating_points};
 
 use core::fmt;
 use core::str::FromStr;
+use splatstream_format::follower::Follower;
 use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{
     EndOfStream, FileHeader, IndexEntry, OperatingPointEntry, UnitHeader, UnitType,
@@ -28,6 +28,16 @@ pub struct OperatingPoint {
 impl OperatingPoint {
     /// Everything in the stream.
     pub const ALL: Self = Self { spatial: u8::MAX, temporal: u8::MAX, refinement: u8::MAX };
+
+    /// The lower of two on each axis.
+    #[must_use]
+    pub fn at_most(self, other: Self) -> Self {
+        Self {
+            spatial: self.spatial.min(other.spatial),
+            temporal: self.temporal.min(other.temporal),
+            refinement: self.refinement.min(other.refinement),
+        }
+    }
 
     /// Clause 7.2: whether a unit belongs to the operating point. `whole_anchor` is the number of spatial
     /// layers if the unit is an increment of a whole anchor: a receiver of all layers takes all of it.
@@ -90,21 +100,21 @@ pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatRe
     let stream = Stream::open(bytes, limits)?;
     let mut out = bytes.get(..FileHeader::SIZE).unwrap_or_default().to_vec();
     let (profile, mut reader) = (stream.header().profile(), stream.units());
-    let mut belonging = Belonging::new(profile);
+    let mut follower = Follower::new(profile);
     let mut units = 0_u32;
     let mut frames = 0_u32;
     let mut entries = Vec::new();
     let mut index_offset = 0;
     while let Some(unit) = reader.next_unit() {
         let unit = unit?;
-        if !belonging.takes(point, &unit.header) {
+        if !point.takes(&unit.header, follower.whole_anchor_layers(&unit.header)) {
             continue;
         }
         unit.check_header(profile)?;
         if unit.header.unit_type() != UnitType::Increment {
             unit.check_payload()?;
         }
-        belonging.follow(&unit);
+        follower.follow(&unit);
         let here = u64::try_from(out.len()).unwrap_or(u64::MAX);
         match unit.header.unit_type() {
             UnitType::Index => {

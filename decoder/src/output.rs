@@ -8,7 +8,7 @@ use crate::companding::Companding;
 use crate::frame::QuantizedFrame;
 use rayon::prelude::*;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::{GaussianFrame, Planes};
+use splatstream_gaussians::{GaussianFrame, Planes};
 
 /// dc and sh integers are on a grid 64 times finer than their step.
 const COLOUR_FRACTION: f32 = 1.0 / 64.0;

@@ -5,7 +5,9 @@
 //! What an error costs follows from the unit alone: its list, the unit, or the rest of the GOP. After the last kind units
 //! are discarded up to a gop_header from which decoding can go on.
 
+use crate::budget::{Budget, Spent};
 use crate::gop::Gop;
+use crate::interrupt::Interrupt;
 use crate::operating_point::{OperatingPoint, Tally};
 use core::ops::RangeInclusive;
 use frame::{Context, FrameInProgress, Refused};
@@ -20,6 +22,7 @@ use splatstream_format::unit::{Landmark, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
 
 mod closing;
+mod control;
 mod decoded;
 mod decoding;
 mod frame;
@@ -46,6 +49,10 @@ pub struct Options {
     pub subset: bool,
     /// Give the entropy states of units in [`DecodedFrame::entropy`].
     pub entropy: bool,
+    /// Give the identities of Gaussians in [`DecodedFrame::identities`].
+    pub identities: bool,
+    /// What decoding may take.
+    pub budget: Budget,
 }
 
 impl Default for Options {
@@ -57,6 +64,8 @@ impl Default for Options {
             stop_at_first_error: false,
             subset: false,
             entropy: false,
+            identities: false,
+            budget: Budget::UNLIMITED,
         }
     }
 }
@@ -72,15 +81,26 @@ struct Counted {
 }
 
 /// Decodes a stream unit by unit.
-pub struct Decoder<'a> {
+pub struct Decoder {
     options: Options,
+    /// The operating point that is wanted from the next GOP on, and in this one if it is lower.
+    wanted_point: OperatingPoint,
+    /// That of the frame that has ended last.
+    frame_point: OperatingPoint,
+    interrupt: Interrupt,
+    spent: Spent,
+    /// Whether the budget does not suffice.
+    is_exhausted: bool,
+    /// The identity of the next new Gaussian.
+    next_identity: u32,
     profile: Profile,
     /// Whether the units before the first gop_header are not known (B.3).
     starts_inside: bool,
     phase: Phase,
-    sequence: Option<(SequenceParameters, &'a [u8])>,
+    /// The first sequence parameters, and their bytes: copies are the same.
+    sequence: Option<(SequenceParameters, Vec<u8>)>,
     gop: Option<Gop>,
-    frame: Option<FrameInProgress<'a>>,
+    frame: Option<FrameInProgress>,
     references: References,
     /// The least `gop_index` of the next GOP.
     next_gop: u64,
@@ -98,13 +118,23 @@ pub struct Decoder<'a> {
     tally: Tally,
 }
 
-impl<'a> Decoder<'a> {
+impl Decoder {
     /// A decoder for the stream with this file header.
     pub fn new(file: &FileHeader, options: Options) -> Self {
         let limits = options.limits.at_most(Limits::of_level(file.level));
+        Self::with(file.profile(), Options { limits, ..options })
+    }
+
+    fn with(profile: Profile, options: Options) -> Self {
         Self {
-            options: Options { limits, ..options },
-            profile: file.profile(),
+            wanted_point: options.operating_point,
+            frame_point: options.operating_point,
+            interrupt: Interrupt::default(),
+            spent: Spent::default(),
+            is_exhausted: false,
+            next_identity: 0,
+            options,
+            profile,
             starts_inside: false,
             phase: Phase::Start,
             sequence: None,
@@ -119,7 +149,7 @@ impl<'a> Decoder<'a> {
             counted: Counted::default(),
             has_scene: false,
             has_discarded: false,
-            tally: Tally::new(file.profile()),
+            tally: Tally::new(profile),
         }
     }
 
@@ -149,9 +179,19 @@ impl<'a> Decoder<'a> {
         &self.report.lost
     }
 
+    /// Takes the errors and the lost frames since the last call: what a stream of any length leaves need not be kept.
+    pub fn take_report(&mut self) -> (Vec<Error>, Vec<RangeInclusive<u32>>) {
+        self.report.take()
+    }
+
     /// Whether units change nothing any more.
     pub fn has_stopped(&self) -> bool {
-        self.has_stopped || self.phase == Phase::Ended
+        self.has_stopped || self.interrupt.is_requested() || self.phase == Phase::Ended
+    }
+
+    /// Whether an error that ends decoding has been found: the first one of all if decoding stops there, or one of the budget.
+    pub const fn has_failed(&self) -> bool {
+        self.has_stopped
     }
 
     /// What to look for where the end of a unit is not known.
@@ -160,11 +200,12 @@ impl<'a> Decoder<'a> {
     }
 
     /// Takes the next unit; gives the frame that it ends, if it does.
-    pub fn unit(&mut self, unit: &Unit<'a>) -> Option<DecodedFrame> {
+    pub fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
         self.counted.units = self.counted.units.saturating_add(1);
         if self.has_stopped() || self.phase == Phase::Lost && !self.wants(unit) {
             return None;
         }
+        self.follow_point(unit.header.unit_type());
         let scope = unit.header.error_scope();
         if scope == ErrorScope::List {
             self.increment(unit);
@@ -197,7 +238,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// A unit that is no increment: the frame that it ends, and whether it took effect.
-    fn take(&mut self, unit: &Unit<'a>) -> (Option<DecodedFrame>, Result<()>) {
+    fn take(&mut self, unit: &Unit<'_>) -> (Option<DecodedFrame>, Result<()>) {
         let unit_type = unit.header.unit_type();
         let header = unit.check_header(self.profile);
         if header.is_err() || !unit_type.is_known() {
@@ -229,7 +270,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// The payload of a unit that may come.
-    fn content(&mut self, unit: &Unit<'a>, was_lost: bool) -> Result<()> {
+    fn content(&mut self, unit: &Unit<'_>, was_lost: bool) -> Result<()> {
         if let Some((sequence, _)) = &self.sequence {
             unit.header.validate_layers(unit.at, sequence)?;
         }
@@ -251,7 +292,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// An increment. An error costs its list, or nothing if it is not of the frame in progress.
-    fn increment(&mut self, unit: &Unit<'a>) {
+    fn increment(&mut self, unit: &Unit<'_>) {
         if let Some(frame) = self.frame.as_mut().filter(|frame| frame.index == unit.header.frame) {
             frame.seen = true;
         }
@@ -281,13 +322,15 @@ impl<'a> Decoder<'a> {
         }
     }
 
-    fn accept(&mut self, unit: &Unit<'a>) -> core::result::Result<(), Refused> {
+    fn accept(&mut self, unit: &Unit<'_>) -> core::result::Result<(), Refused> {
         let Some(mut frame) = self.frame.take() else { return Ok(()) };
         let accepted = match self.context(frame.reference) {
             Some(context) => frame.accept(unit, &context),
             None => Ok(None),
         };
-        let accepted = accepted.map(|pending| pending.into_iter().for_each(|unit| frame.push(unit)));
+        let accepted = accepted.and_then(|divided| self.spend(divided, frame.expected.limit));
+        let accepted =
+            accepted.map(|divided| divided.iter().for_each(|divided| frame.push(divided, unit.payload)));
         self.frame = Some(frame);
         accepted
     }
@@ -296,7 +339,8 @@ impl<'a> Decoder<'a> {
     fn context(&self, reference: Option<usize>) -> Option<Context<'_>> {
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };
         let reference = reference.and_then(|layer| self.references.get(layer));
-        Some(Context { options: &self.options, profile: self.profile, sequence, gop, reference })
+        let (options, interrupt) = (&self.options, &self.interrupt);
+        Some(Context { options, interrupt, profile: self.profile, sequence, gop, reference })
     }
 
     /// Whether a unit belongs to the operating point (7.2).
@@ -329,6 +373,7 @@ impl<'a> Decoder<'a> {
     }
 
     fn add(&mut self, error: Error) {
+        self.has_stopped |= self.interrupt.is_requested();
         if self.has_stopped {
             return;
         }
@@ -336,13 +381,17 @@ impl<'a> Decoder<'a> {
             frame.error.get_or_insert(error);
         }
         self.report.errors.push(error);
-        self.has_stopped = self.options.stop_at_first_error;
+        self.has_stopped = self.options.stop_at_first_error || self.is_exhausted;
     }
 
     /// Ends the frame in progress; `at` is the offset of the unit that ends it, if a unit that may do so does.
     fn close_frame(&mut self, at: Option<u64>) -> Option<DecodedFrame> {
         self.settle();
         let mut frame = self.frame.take()?;
+        if self.interrupt.is_requested() {
+            self.has_stopped = true;
+            return None;
+        }
         if let (Some(at), true) = (at, frame.is_intra() && !frame.seen) {
             let rule = "an I frame has an increment";
             let error = Error::new(at, "7.1.5", ErrorKind::Constraint { rule });
@@ -350,12 +399,21 @@ impl<'a> Decoder<'a> {
             frame.error.get_or_insert(error);
         }
         let (layer, reference) = (frame.role.temporal_layer, frame.reference);
+        self.frame_point = frame.point;
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };
-        let context =
-            Context { options: &self.options, profile: self.profile, sequence, gop, reference: None };
+        let context = Context {
+            options: &self.options,
+            interrupt: &self.interrupt,
+            profile: self.profile,
+            sequence,
+            gop,
+            reference: None,
+        };
         let is_kept = gop.header.is_predicted() && (layer == 0 || layer < gop.header.temporal_depth);
         let reference = reference.and_then(|layer| self.references.get_mut(layer));
         let closed = frame.close(&context, reference, at.is_some());
+        self.next_identity = closed.next_identity;
+        self.has_stopped |= self.interrupt.is_requested();
         if is_kept {
             self.references.store(layer, closed.state);
         }
@@ -379,7 +437,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// In the lost state: whether a unit is not discarded (7.1.6).
-    fn wants(&self, unit: &Unit<'a>) -> bool {
+    fn wants(&self, unit: &Unit<'_>) -> bool {
         let has_reserved = unit.header.unit_flags > 1 || unit.header.reserved_zero != 0;
         let is_intact = |size| !has_reserved && unit.payload.len() == size && unit.check_payload().is_ok();
         match (unit.header.unit_type(), self.sequence.is_some()) {
@@ -391,7 +449,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// Whether a gop_header starts nothing that was there before.
-    fn is_acceptable(&self, unit: &Unit<'a>) -> bool {
+    fn is_acceptable(&self, unit: &Unit<'_>) -> bool {
         let gop_index = unit.payload.first_chunk().copied().map_or(0, u32::from_le_bytes);
         u64::from(gop_index) >= self.next_gop && u64::from(unit.header.frame) >= self.next_frame
     }

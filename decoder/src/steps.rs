@@ -6,7 +6,7 @@
 //!
 //! Nothing overflows: sizes are below 2^34, weights below 2^13, so that a sum of three products stays below 2^49.
 
-use crate::increment::residual::Stage;
+use crate::stage::Stage;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, SequenceParameters};
 
 /// Exponents of steps, one more than the largest.

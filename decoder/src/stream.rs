@@ -1,9 +1,12 @@
-//! A whole stream through a [`Decoder`].
+//! A whole stream through a [`Decoder`]: from bytes that are all there, or that arrive in pieces.
 
+use crate::interrupt::Interrupt;
+use crate::operating_point::OperatingPoint;
 use crate::process::{DecodedFrame, Decoder, Options};
 use core::ops::{ControlFlow, RangeInclusive};
-use splatstream_format::syntax::{SequenceParameters, UnitType};
-use splatstream_format::unit::{Stream, Unit, Units};
+use splatstream_format::syntax::{FileHeader, SequenceParameters, UnitType};
+use splatstream_format::unit::Unit;
+use splatstream_format::unit_reader::{Event, UnitReader};
 use splatstream_format::{Error, Result};
 
 /// How decoding a stream went.
@@ -25,12 +28,209 @@ impl Summary {
     }
 }
 
-/// The frames of a stream, one after the other.
-pub struct Frames<'a> {
-    stream: Stream<'a>,
-    units: Units<'a>,
-    decoder: Decoder<'a>,
+/// What a [`StreamDecoder`] gives.
+#[derive(Debug)]
+pub enum Step {
+    /// A frame is complete.
+    Frame(Box<DecodedFrame>),
+    /// At least so many more bytes are needed, 1 or more.
+    NeedMoreData(u64),
+    /// No more frames will come.
+    End,
+}
+
+/// Decodes a stream whose bytes arrive in pieces. It holds none of them but those of the frame in progress.
+///
+/// ```
+/// use splatstream_decoder::process::Options;
+/// use splatstream_decoder::stream::{Step, StreamDecoder};
+///
+/// /// `received` are the bytes from `decoder.position()` on.
+/// fn show(decoder: &mut StreamDecoder, received: &[u8]) -> splatstream_format::Result<()> {
+///     if let Step::Frame(frame) = decoder.next_step(received, false)? {
+///         println!("frame {}: {} Gaussians", frame.index, frame.planes.len());
+///     }
+///     Ok(())
+/// }
+/// show(&mut StreamDecoder::new(&Options::default()), &[])?;
+/// # Ok::<(), splatstream_format::Error>(())
+/// ```
+pub struct StreamDecoder {
+    options: Options,
+    interrupt: Interrupt,
+    reader: UnitReader,
+    /// None before the file header.
+    decoder: Option<Decoder>,
+    /// Where decoding goes on once the sequence parameters have come.
+    inside: Option<u64>,
     frames: u32,
+}
+
+impl StreamDecoder {
+    /// A decoder of a stream from its first byte on.
+    pub fn new(options: &Options) -> Self {
+        let reader = UnitReader::new(&options.limits);
+        let interrupt = Interrupt::default();
+        let (decoder, inside) = (None, None);
+        Self { options: *options, interrupt, reader, decoder, inside, frames: 0 }
+    }
+
+    /// A decoder of the frames from the GOP on whose header stands at the absolute offset `gop`, as an index gives it
+    /// (B.3). What stands before it is not looked at, but for the units up to the first sequence parameters.
+    pub fn inside(gop: u64, options: &Options) -> Self {
+        Self { inside: Some(gop), ..Self::new(options) }
+    }
+
+    /// Goes on with the GOP whose header stands at an absolute offset. Errors of what came before are forgotten.
+    pub fn go_to(&mut self, gop: u64) {
+        match &mut self.decoder {
+            Some(decoder) if decoder.sequence().is_some() => {
+                decoder.restart();
+                self.reader = UnitReader::starting_at(gop, &self.options.limits);
+            }
+            _ => {
+                let interrupt = self.interrupt.clone();
+                *self = Self { interrupt, ..Self::inside(gop, &self.options) };
+            }
+        }
+    }
+
+    /// Absolute offset of the first byte that is needed next. Those before it are never needed again, unless
+    /// [`StreamDecoder::go_to`] goes back.
+    pub const fn position(&self) -> u64 {
+        self.reader.position()
+    }
+
+    /// Decodes until a frame is complete, or more bytes are needed. `bytes` are those of the stream from
+    /// [`StreamDecoder::position`] on, and `is_end` says that no more will come. The position moves on.
+    ///
+    /// # Errors
+    /// What clause 6.2 says of the file header; nothing can be decoded then. Other errors are in the
+    /// [`StreamDecoder::summary`].
+    pub fn next_step(&mut self, bytes: &[u8], is_end: bool) -> Result<Step> {
+        let start = self.position();
+        loop {
+            let used = self.position().checked_sub(start).and_then(|used| usize::try_from(used).ok());
+            let rest = match used.map(|used| bytes.get(used..)) {
+                Some(Some(rest)) => rest,
+                // After the last byte there is nothing.
+                Some(None) if is_end => &[],
+                // Another place asks for other bytes.
+                _ => return Ok(Step::NeedMoreData(1)),
+            };
+            match self.step(rest, is_end)? {
+                Some(Step::Frame(frame)) => {
+                    self.frames = self.frames.saturating_add(1);
+                    return Ok(Step::Frame(frame));
+                }
+                Some(step) => return Ok(step),
+                None => {}
+            }
+        }
+    }
+
+    /// Takes what stands at the position.
+    fn step(&mut self, bytes: &[u8], is_end: bool) -> Result<Option<Step>> {
+        let event = self.reader.read(bytes, is_end);
+        let Some(decoder) = &mut self.decoder else {
+            return match event? {
+                Event::FileHeader(file) => {
+                    self.start(&file);
+                    Ok(None)
+                }
+                Event::NeedMoreData(bytes) => Ok(Some(Step::NeedMoreData(bytes))),
+                _ => Ok(Some(Step::End)),
+            };
+        };
+        let frame = match event {
+            Ok(Event::Unit(unit)) => self.unit(&unit),
+            Err(error) => {
+                let frame = decoder.unreadable(error);
+                // Where there is nothing to go on with, the next unit is none.
+                if !decoder.has_stopped() {
+                    self.reader.scan_for(decoder.wanted());
+                }
+                frame
+            }
+            Ok(Event::NeedMoreData(bytes)) => return Ok(Some(Step::NeedMoreData(bytes))),
+            Ok(Event::End) if self.inside.is_some() => {
+                self.go_inside();
+                None
+            }
+            Ok(_) => return Ok(Some(Step::End)),
+        };
+        Ok(frame.map(|frame| Step::Frame(Box::new(frame))))
+    }
+
+    fn start(&mut self, file: &FileHeader) {
+        let mut decoder = match self.inside {
+            Some(_) => Decoder::starting_inside(file, self.options),
+            None => Decoder::new(file, self.options),
+        };
+        decoder.set_interrupt(self.interrupt.clone());
+        self.decoder = Some(decoder);
+    }
+
+    /// Takes the units of another operating point from the next GOP on. Where it is lower on some axis, it holds there from
+    /// the next frame on.
+    pub fn set_operating_point(&mut self, point: OperatingPoint) {
+        self.options.operating_point = point;
+        self.decoder.iter_mut().for_each(|decoder| decoder.set_operating_point(point));
+    }
+
+    /// Lets another thread end decoding: once it has been requested, no frame is given any more.
+    pub fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.decoder.iter_mut().for_each(|decoder| decoder.set_interrupt(interrupt.clone()));
+        self.interrupt = interrupt;
+    }
+
+    fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
+        let decoder = self.decoder.as_mut()?;
+        let frame = decoder.unit(unit);
+        match unit.header.unit_type() {
+            // An end unit with a fault is not the end.
+            UnitType::End if !decoder.has_stopped() => self.reader.reopen(),
+            UnitType::SequenceParameters => self.go_inside(),
+            _ => {}
+        }
+        frame
+    }
+
+    /// Goes to the GOP that decoding starts with, if there is one.
+    fn go_inside(&mut self) {
+        if let Some(gop) = self.inside.take() {
+            self.reader = UnitReader::starting_at(gop, &self.options.limits);
+        }
+    }
+
+    /// The state of decoding; none before the file header.
+    pub const fn decoder(&self) -> Option<&Decoder> {
+        self.decoder.as_ref()
+    }
+
+    /// The sequence parameters, once they have come: from the first frame on.
+    pub fn sequence(&self) -> Option<&SequenceParameters> {
+        self.decoder.as_ref().and_then(Decoder::sequence)
+    }
+
+    /// Takes the errors and the lost frames since the last call, in stream order. A [`StreamDecoder::summary`] does not
+    /// have them any more.
+    pub fn take_report(&mut self) -> (Vec<Error>, Vec<RangeInclusive<u32>>) {
+        self.decoder.as_mut().map(Decoder::take_report).unwrap_or_default()
+    }
+
+    /// How decoding went so far.
+    pub fn summary(&self) -> Summary {
+        let Some(decoder) = &self.decoder else { return Summary::default() };
+        let (errors, lost) = (decoder.errors().to_vec(), decoder.lost().to_vec());
+        Summary { frames: self.frames, errors, lost }
+    }
+}
+
+/// The frames of a stream that is there as a whole, one after the other.
+pub struct Frames<'a> {
+    bytes: &'a [u8],
+    decoder: StreamDecoder,
 }
 
 impl<'a> Frames<'a> {
@@ -39,61 +239,28 @@ impl<'a> Frames<'a> {
     /// # Errors
     /// What clause 6.2 says of the file header; nothing can be decoded then.
     pub fn open(bytes: &'a [u8], options: &Options) -> Result<Self> {
-        let stream = Stream::open(bytes, &options.limits)?;
-        let decoder = Decoder::new(stream.header(), *options);
-        Ok(Self { stream, units: stream.units(), decoder, frames: 0 })
+        FileHeader::parse(bytes)?;
+        Ok(Self { bytes, decoder: StreamDecoder::new(options) })
     }
 
-    /// The frames from the GOP on whose header stands at the absolute offset `gop`, as an index gives it (B.3). What stands
-    /// before it is not looked at, but for the units up to the first sequence parameters.
+    /// The frames from the GOP on whose header stands at the absolute offset `gop`, see [`StreamDecoder::inside`].
     ///
     /// # Errors
     /// As [`Frames::open`].
     pub fn open_inside(bytes: &'a [u8], gop: u64, options: &Options) -> Result<Self> {
-        let stream = Stream::open(bytes, &options.limits)?;
-        let decoder = Decoder::starting_inside(stream.header(), *options);
-        let mut frames = Self { stream, units: stream.units(), decoder, frames: 0 };
-        while let Some(unit) = frames.units.next_unit() {
-            let is_sequence = unit.is_ok_and(|unit| unit.header.unit_type() == UnitType::SequenceParameters);
-            frames.take(unit);
-            if is_sequence {
-                break;
-            }
-        }
-        frames.units = stream.units_from(gop);
-        Ok(frames)
+        FileHeader::parse(bytes)?;
+        let gop = gop.min(u64::try_from(bytes.len()).unwrap_or(u64::MAX));
+        Ok(Self { bytes, decoder: StreamDecoder::inside(gop, options) })
     }
 
     /// The next frame; none after the last.
     pub fn next_frame(&mut self) -> Option<DecodedFrame> {
         loop {
-            let unit = self.units.next_unit()?;
-            if let Some(frame) = self.take(unit) {
-                self.frames = self.frames.saturating_add(1);
-                return Some(frame);
-            }
-        }
-    }
-
-    /// Takes a unit, or looks for the next one after bytes that are none; gives the frame that this ends, if it does.
-    fn take(&mut self, unit: Result<Unit<'a>>) -> Option<DecodedFrame> {
-        match unit {
-            Ok(unit) => {
-                let frame = self.decoder.unit(&unit);
-                let is_end = unit.header.unit_type() == UnitType::End;
-                // An end unit with a fault is not the end.
-                if is_end && !self.decoder.has_stopped() {
-                    self.units = self.stream.units_from(self.units.position());
-                }
-                frame
-            }
-            Err(error) => {
-                let frame = self.decoder.unreadable(error);
-                // Where there is nothing to go on with, the next unit is none.
-                if !self.decoder.has_stopped() {
-                    self.units.scan_for(self.decoder.wanted());
-                }
-                frame
+            let at = usize::try_from(self.decoder.position()).unwrap_or(usize::MAX);
+            match self.decoder.next_step(self.bytes.get(at..).unwrap_or_default(), true) {
+                Ok(Step::Frame(frame)) => return Some(*frame),
+                Ok(Step::NeedMoreData(_)) => {}
+                Ok(Step::End) | Err(_) => return None,
             }
         }
     }
@@ -105,8 +272,7 @@ impl<'a> Frames<'a> {
 
     /// How decoding went so far.
     pub fn summary(&self) -> Summary {
-        let (errors, lost) = (self.decoder.errors().to_vec(), self.decoder.lost().to_vec());
-        Summary { frames: self.frames, errors, lost }
+        self.decoder.summary()
     }
 }
 

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 fn sequence() -> SequenceParameters {
     SequenceParameters { block_log2: 6, frame_count: 1, ..SequenceParameters::PLAIN }

@@ -9,8 +9,9 @@ use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Preset, Settings, encode};
-use splatstream_scene::builtin::BuiltinScene;
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::{ReadLimits, read_scene};
+use splatstream_gaussians::GaussianFrame;
 use std::ops::ControlFlow;
 use std::path::Path;
 

@@ -8,22 +8,24 @@ use crate::colour;
 use crate::entropy_cost::entropy_of;
 use crate::frame::unit::Grains;
 use crate::grid::{Geometry, geometry, nearest_integer};
-use crate::importance::{Ranked, parts};
+use crate::importance::Ranked;
 use crate::laws::Laws;
 use crate::pca::Components;
+use crate::refinements::parts;
 use crate::sequence::Scene;
-use crate::settings::{Preset, Settings, Steps};
+use crate::settings::{Preset, Settings};
 use crate::shape::{Shape, nearest_multiple};
+use crate::steps::Steps;
 use rayon::prelude::*;
 use splatstream_decoder::companding::Companding;
-use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::position::refine;
+use splatstream_decoder::stage::Stage;
 use splatstream_decoder::steps::{StepRule, step};
 use splatstream_format::syntax::{SequenceParameters, TransformKind};
+use splatstream_gaussians::{GaussianFrame, Planes};
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::metrics::psnr;
 use splatstream_render::{Camera, Rendering, render};
-use splatstream_scene::{GaussianFrame, Planes};
 
 /// Views made for the scene, and their height, where none are given.
 const VIEWS: (u32, u32) = (3, 540);
@@ -99,7 +101,10 @@ pub(crate) struct Fit {
 impl Fit {
     /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it.
     pub(crate) fn new(frame: GaussianFrame, ranked: &Ranked, settings: &Settings) -> Self {
-        let laws = Laws::of(&frame, &ranked.order, &ranked.energy, settings);
+        let laws = match settings.tools.adaptive_steps {
+            true => Laws::of(&frame, &ranked.order, &ranked.energy, &settings.refinements),
+            false => Laws::default(),
+        };
         let decibels = settings.psnr.unwrap_or(50.0);
         let steps = Steps::about(decibels);
         let cameras = match settings.cameras.as_slice() {

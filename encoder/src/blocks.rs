@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::models;
 use rayon::prelude::*;
-use splatstream_decoder::block::CodedBlock;
+use splatstream_decoder::coded_block::CodedBlock;
 use splatstream_decoder::layout::PlaneInfo;
 use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};

@@ -4,7 +4,7 @@
 //! no Gaussian that can never reach an alpha of 1/255.
 
 use rayon::prelude::*;
-use splatstream_scene::{GaussianFrame, Planes};
+use splatstream_gaussians::{GaussianFrame, PlanesMut};
 
 /// The logit below which opacity stays under 1/255: ln(1/254).
 pub const INVISIBLE_LOGIT: f32 = -5.537_334;
@@ -76,7 +76,8 @@ pub fn canonical(log_scale: [f32; 3], rotation: [f32; 4], sort: bool) -> ([f32; 
 
 /// The Gaussians `indices` of a frame in canonical form.
 pub fn canonicalise(frame: &GaussianFrame, indices: &[u32], sort: bool) -> GaussianFrame {
-    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = frame.select(indices).into_planes();
+    let mut selected = frame.select(indices);
+    let PlanesMut { mut log_scale, mut rotation, .. } = selected.planes_mut();
     let forms: Vec<([f32; 3], [f32; 4])> = (0..indices.len())
         .into_par_iter()
         .map(|row| {
@@ -85,11 +86,11 @@ pub fn canonicalise(frame: &GaussianFrame, indices: &[u32], sort: bool) -> Gauss
             canonical(scales, turn, sort)
         })
         .collect();
-    let log_scale = [0, 1, 2].map(|axis: usize| forms.iter().map(|(scales, _)| scales[axis]).collect());
-    let rotation = [0, 1, 2, 3].map(|part: usize| forms.iter().map(|(_, turn)| turn[part]).collect());
-    let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh };
-    let canonical = GaussianFrame::from_planes(frame.sh_degree(), planes).unwrap_or_default();
-    canonical.with_antialiased(frame.antialiased())
+    for (row, (scales, turn)) in forms.into_iter().enumerate() {
+        log_scale.iter_mut().zip(scales).for_each(|(plane, scale)| plane[row] = scale);
+        rotation.iter_mut().zip(turn).for_each(|(plane, part)| plane[row] = part);
+    }
+    selected
 }
 
 #[cfg(test)]

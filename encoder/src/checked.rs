@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::report::Dropped;
 use crate::source::FrameSource;
-use splatstream_scene::{Defects, GaussianFrame};
+use splatstream_gaussians::{Defects, GaussianFrame};
 use std::collections::BTreeMap;
 
 /// Refuses Gaussians with values that no frame may hold, or leaves them out.
@@ -69,11 +69,10 @@ pub(crate) fn named(error: Error) -> Error {
 
 /// A frame in which some rows hold nothing: their opacity is 0, that is, its logit is minus infinity, which
 /// [`visible`](crate::canonical::visible) leaves out. All other rows keep their places, by which frames are tracked.
-fn without(frame: GaussianFrame, rows: &[u32]) -> GaussianFrame {
-    let (degree, antialiased) = (frame.sh_degree(), frame.antialiased());
+fn without(mut frame: GaussianFrame, rows: &[u32]) -> GaussianFrame {
     // A row that is in the scene, so that nothing else is told apart from the rest.
     let model = (0..frame.len() as u32).find(|row| rows.binary_search(row).is_err());
-    let mut planes = frame.into_planes();
+    let mut planes = frame.planes_mut();
     for &row in rows {
         let row = row as usize;
         for plane in planes.position.iter_mut().chain(&mut planes.log_scale) {
@@ -85,5 +84,5 @@ fn without(frame: GaussianFrame, rows: &[u32]) -> GaussianFrame {
         planes.rotation[0][row] = 1.0;
         planes.opacity_logit[row] = f32::NEG_INFINITY;
     }
-    GaussianFrame::from_planes(degree, planes).unwrap_or_default().with_antialiased(antialiased)
+    frame
 }

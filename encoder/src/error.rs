@@ -1,6 +1,6 @@
 //! What an encoder can be given that it cannot encode.
 
-use splatstream_scene::Defect;
+use splatstream_gaussians::Defect;
 
 /// Errors of encoding. Those of reading a frame are the source's own.
 #[derive(Debug, thiserror::Error)]

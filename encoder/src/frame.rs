@@ -4,32 +4,33 @@
 //! their [new Gaussians](new_list) into lists, choose what these are [predicted](predictors) from, and hand each
 //! [unit](unit) over to be coded.
 
-mod align;
+mod axis_matching;
 pub(crate) mod cells;
 pub(crate) mod compensation;
 pub(crate) mod intra;
-mod judge;
 pub(crate) mod ladder;
 pub(crate) mod learning;
 mod moves;
 mod new_list;
 pub(crate) mod predicted;
 pub(crate) mod predictors;
-pub(crate) mod price;
+pub(crate) mod rate_distortion;
+pub(crate) mod recorder;
+pub(crate) mod residuals;
 pub(crate) mod steadiness;
 pub(crate) mod survivors;
 pub(crate) mod unit;
-pub(crate) mod wanted;
-mod worth;
+mod update_decision;
+mod visible_difference;
 
-pub(crate) use align::Namings;
+pub(crate) use axis_matching::Namings;
 
 use crate::matching::Cloud;
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::CellsBytes;
 use splatstream_format::syntax::IncrementHeader;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// A frame to be coded.
 pub(crate) struct Target {

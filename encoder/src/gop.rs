@@ -7,10 +7,10 @@ use crate::error::Error;
 use crate::frame::cells::CellPlan;
 use crate::frame::compensation::Compensator;
 use crate::frame::intra::{IntraTarget, code_intra};
-use crate::frame::learning::{self, Recorder};
 use crate::frame::predicted::{Predicted, PredictedTarget};
+use crate::frame::recorder::{Recorder, weights};
+use crate::frame::residuals::Wanted;
 use crate::frame::steadiness::Steadiness;
-use crate::frame::wanted::Wanted;
 use crate::frame::{CodedFrame, Reference, Target};
 use crate::gop_tools::GopTools;
 use crate::grid::PositionGrid;
@@ -18,10 +18,10 @@ use crate::importance::Ranking;
 use crate::isolated::{self, Isolated};
 use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
+use crate::progress::Progress;
 use crate::report::{FrameReport, Report};
 use crate::settings::{Preset, Settings};
 use crate::source::FrameSource;
-use crate::stream::Progress;
 use crate::writer::UnitWriter;
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::Limits;
@@ -284,7 +284,7 @@ impl SequenceCoder<'_, '_> {
             self.writer.gop(&gop.header, gop.first)?;
             if let Some(network) = self.network.as_ref().filter(|_| gop.has_learned) {
                 let id = UnitId::of_frame(UnitType::Weights, gop.first);
-                self.writer.unit(id, &learning::weights(network)?.to_bytes()?)?;
+                self.writer.unit(id, &weights(network)?.to_bytes()?)?;
             }
             gop.is_open = true;
         }

@@ -3,17 +3,17 @@
 use crate::colour::{self, ShPlan};
 use crate::error::Error;
 use crate::grid::{Geometry, geometry};
-use crate::importance::parts;
 use crate::pca::Components;
+use crate::refinements::parts;
 use crate::report::Report;
 use crate::settings::Settings;
 use crate::shape::Shape;
-use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::layout::ShCoding;
+use splatstream_decoder::stage::Stage;
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{Profile, SequenceParameters, TransformKind, UnitId, UnitType};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Transforms and codebooks, made for the first frame of a GOP.
 pub(crate) struct GopTools {

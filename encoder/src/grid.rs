@@ -3,7 +3,7 @@
 use crate::error::Error;
 use rayon::prelude::*;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// Parts of a step in which attributes are kept before they are coded, so that they are rounded once.
 pub(crate) const PARTS: f32 = 64.0;

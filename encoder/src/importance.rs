@@ -1,12 +1,11 @@
 //! Which Gaussians come first.
 
 use crate::settings::{Importance, Preset, Settings};
-use core::ops::Range;
 use splatstream_format::syntax::prefix_length;
+use splatstream_gaussians::{GaussianFrame, importance};
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::contribution::{Worth, worth};
-use splatstream_scene::{GaussianFrame, importance};
 
 /// The Gaussians of a frame, most important first, and what pictures show of them.
 #[derive(Debug, Clone, Default)]
@@ -170,15 +169,6 @@ fn rounds(refinements: &[u8], preset: Preset) -> Vec<u8> {
         rounds.push(low);
     }
     rounds
-}
-
-/// The parts of an order of so many Gaussians that the refinements up to these percentages bring, one after the other.
-pub(crate) fn parts(percents: &[u8], total: usize) -> impl Iterator<Item = Range<usize>> {
-    percents.iter().scan(0, move |start, &percent| {
-        let part = *start..(prefix_length(percent, total as u32) as usize).max(*start);
-        *start = part.end;
-        Some(part)
-    })
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Absurd values: taken for the nearest that are sensible, so that one Gaussian spoils nothing else, and reported.
 
 use crate::grid::{MAX_COLOUR, PositionGrid};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::{GaussianFrame, PlanesMut};
 
 /// Values of one attribute that were too far out and are coded as the nearest that are not.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +31,11 @@ impl Isolated {
 
 /// The frame with colours of which none is far beyond what a screen shows, and what they were; `rows`: the row of each
 /// Gaussian in the source.
-pub(crate) fn colours(frame: GaussianFrame, rows: &[u32], number: u32) -> (GaussianFrame, Option<Isolated>) {
+pub(crate) fn colours(
+    mut frame: GaussianFrame,
+    rows: &[u32],
+    number: u32,
+) -> (GaussianFrame, Option<Isolated>) {
     let is_out = |value: &f32| value.abs() > MAX_COLOUR;
     let far = |row: usize| {
         let planes = frame.dc().iter().chain(frame.sh());
@@ -56,13 +60,11 @@ pub(crate) fn colours(frame: GaussianFrame, rows: &[u32], number: u32) -> (Gauss
         row: rows[row],
         value,
     });
-    let (degree, antialiased) = (frame.sh_degree(), frame.antialiased());
-    let mut planes = frame.into_planes();
-    for value in planes.dc.iter_mut().chain(&mut planes.sh).flatten() {
+    let PlanesMut { dc, sh, .. } = frame.planes_mut();
+    for value in dc.into_iter().chain(sh).flatten() {
         *value = value.clamp(-MAX_COLOUR, MAX_COLOUR);
     }
-    let frame = GaussianFrame::from_planes(degree, planes).unwrap_or_default();
-    (frame.with_antialiased(antialiased), found)
+    (frame, found)
 }
 
 /// The Gaussians of a frame that the grid of positions does not reach.
@@ -85,7 +87,7 @@ pub(crate) fn positions(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     #[test]
     fn absurd_colours_are_counted_and_become_sensible() {

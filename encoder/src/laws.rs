@@ -7,11 +7,11 @@
 //! show cost least. A decoder knows sizes, opacities and shapes; what is hidden it learns from the refinements, which
 //! are in the order of importance and have steps of their own.
 
-use crate::importance::parts;
-use crate::settings::{Settings, Steps};
+use crate::refinements::parts;
+use crate::steps::Steps;
 use splatstream_decoder::steps::STEPS;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, MAX_REFINEMENTS, SequenceParameters};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// The exponent of the steps that are asked for: finer ones have room below it, coarser ones above.
 const NOMINAL: u8 = 5;
@@ -52,9 +52,10 @@ pub struct Laws {
 }
 
 impl Laws {
-    /// For a scene whose Gaussians have the order of importance `order`, and of which pictures show `energy`.
-    pub(crate) fn of(frame: &GaussianFrame, order: &[u32], energy: &[f64], settings: &Settings) -> Self {
-        if !settings.tools.adaptive_steps || frame.is_empty() {
+    /// For a scene whose Gaussians have the order of importance `order`, of which pictures show `energy`, and
+    /// refinements up to these percentages.
+    pub(crate) fn of(frame: &GaussianFrame, order: &[u32], energy: &[f64], refinements: &[u8]) -> Self {
+        if frame.is_empty() {
             return Self::default();
         }
         let shapes: Vec<(f32, f32)> = (0..frame.len()).map(|row| shape(frame, row)).collect();
@@ -69,7 +70,7 @@ impl Laws {
             anisotropy: ANISOTROPY_POWER,
             area_reference: mean as f32,
             anisotropy_reference: reference,
-            coarser: coarser(order, energy, &settings.refinements),
+            coarser: coarser(order, energy, refinements),
         }
     }
 

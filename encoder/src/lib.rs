@@ -27,8 +27,12 @@ mod matching;
 mod models;
 mod motion;
 mod parametric_fit;
+mod pass;
 mod pca;
+mod progress;
+mod random;
 mod reach;
+mod refinements;
 mod report;
 mod secant;
 mod section;
@@ -36,6 +40,7 @@ mod sequence;
 mod settings;
 mod shape;
 mod source;
+mod steps;
 mod stream;
 mod target;
 pub mod transformer;
@@ -47,10 +52,12 @@ pub use error::Error;
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;
+pub use progress::Progress;
 pub use report::{Dropped, FrameReport, GopReport, PictureReport, Report, TargetReport, VerifiedFrame};
 pub use settings::{
     Anchor, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings,
-    ShChoice, Size, Steps, Structure, Tools,
+    ShChoice, Size, Structure, Tools,
 };
 pub use source::FrameSource;
-pub use stream::{Progress, encode};
+pub use steps::Steps;
+pub use stream::encode;

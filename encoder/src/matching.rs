@@ -6,7 +6,7 @@
 mod nearest;
 mod order;
 
-use crate::settings::Steps;
+use crate::steps::Steps;
 pub(crate) use nearest::{CLOSE, LIMIT, Link, Reach, features, links};
 
 /// Rows that are looked at together: if most of them agree, those that do are no coincidence.

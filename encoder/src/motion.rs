@@ -5,14 +5,14 @@
 //! its bits, and the cell size with the fewest bits of cells and moves together is taken.
 //! [`follow`](follow::follow) puts this to use before there are pairs.
 
+mod cell_selection;
 pub(crate) mod follow;
-mod listing;
 mod registration;
 mod rigid;
-pub(crate) mod stale;
+pub(crate) mod stale_cells;
 mod tree;
 
-use listing::{Coded, Listing, list_bits, listing};
+use cell_selection::{Coded, Listing, list_bits, listing};
 use rigid::{Point, Vector};
 use splatstream_decoder::position::morton;
 use tree::{Tree, centre};

@@ -4,9 +4,9 @@
 //! step of the grid comes from the [core] of the scene, whatever lies outside. How far the grid is linear, and how its
 //! steps grow outside, is what costs the fewest bits at equal error in pictures.
 
-use crate::settings::Steps;
+use crate::steps::Steps;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// The most bits of an axis that the syntax carries.
 const MAX_POSITION_BITS: u8 = 20;

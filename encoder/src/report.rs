@@ -2,9 +2,10 @@
 
 use crate::isolated::Isolated;
 use crate::sequence::Analysis;
-use crate::settings::{Importance, Settings, Steps};
+use crate::settings::{Importance, Settings};
+use crate::steps::Steps;
 use splatstream_format::syntax::{FrameType, IncrementHeader};
-use splatstream_scene::Defect;
+use splatstream_gaussians::Defect;
 
 /// What was written, what was chosen, and why.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::models;
 use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
-use splatstream_decoder::block::CodedBlock;
+use splatstream_decoder::coded_block::CodedBlock;
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Layout, PlaneInfo, Section};
 use splatstream_decoder::steps::StepRule;

@@ -12,7 +12,7 @@ use splatstream_decoder::attribute::ROTATION_RANGE;
 use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_format::Limits;
 use splatstream_format::syntax::{Profile, SequenceParameters};
-use splatstream_scene::{GaussianFrame, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, sh_coefficients};
 
 /// Gaussians on which sorted and unsorted axes are compared.
 const TRIAL: usize = 1 << 14;

@@ -2,6 +2,7 @@
 
 use crate::frame::ladder::Ladder;
 use crate::laws::Laws;
+use crate::steps::Steps;
 use crate::transformer::Architecture;
 use splatstream_decoder::predictor::Predictor;
 use splatstream_format::payload::{Network, SceneDescription};
@@ -34,24 +35,20 @@ pub enum Quality {
     VisuallyLossless,
 }
 
-/// Quantiser steps. Attributes in PLY's domain.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Steps {
-    /// The position step is the side of the box that most of the scene is in divided by 2 to this, 1 to 20.
-    pub position_bits: f32,
-    /// Step of the natural log of the semi-axes.
-    pub log_scale: f32,
-    /// Step of a quaternion component.
-    pub rotation: f32,
-    /// Step of the opacity logit.
-    pub opacity: f32,
-    /// Step of a dc component.
-    pub dc: f32,
-    /// Step of an SH component.
-    pub sh: f32,
-}
-
 impl Quality {
+    /// All of them, coarsest first.
+    pub const ALL: [Self; 4] = [Self::Low, Self::Medium, Self::High, Self::VisuallyLossless];
+
+    /// Its name in reports and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Low => "low",
+            Self::Medium => "medium",
+            Self::High => "high",
+            Self::VisuallyLossless => "visually-lossless",
+        }
+    }
+
     /// The PSNR of pictures that a quality stands for, decibels.
     pub const fn decibels(self) -> f32 {
         match self {
@@ -65,22 +62,6 @@ impl Quality {
     /// Steps that give about this quality on an average scene: those from which a [fit](Settings::psnr) starts.
     pub fn steps(self) -> Steps {
         Steps::about(self.decibels())
-    }
-}
-
-impl Steps {
-    /// Steps that give about a PSNR on an average scene.
-    pub(crate) fn about(decibels: f32) -> Self {
-        // At 50 dB, between those that fit real scenes best.
-        let times = libm::exp2f((50.0 - decibels) / 6.02);
-        Self {
-            position_bits: (12.0 - libm::log2f(times)).clamp(1.0, 20.0),
-            log_scale: 0.2 * times,
-            rotation: 0.033 * times,
-            opacity: 0.26 * times,
-            dc: 0.13 * times,
-            sh: 0.125 * times,
-        }
     }
 }
 

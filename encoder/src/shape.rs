@@ -1,7 +1,7 @@
 //! What a decoder makes of the log-scales and the opacity of a Gaussian that is not predicted: the steps of its other
 //! attributes follow from that.
 
-use splatstream_decoder::increment::residual::Stage;
+use splatstream_decoder::stage::Stage;
 use splatstream_decoder::steps::{StepRule, step};
 
 /// Parts of a step in which attributes are kept, as an integer.

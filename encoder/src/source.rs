@@ -1,6 +1,6 @@
 //! Where frames come from.
 
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// A sequence of frames, each read when it is needed. The encoder asks for every frame twice, and for a few more often.
 pub trait FrameSource {
@@ -27,16 +27,5 @@ impl FrameSource for Vec<GaussianFrame> {
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
         self.get(number as usize).cloned().ok_or_else(|| format!("there is no frame {number}").into())
-    }
-}
-
-/// The built-in scenes are made frame by frame.
-impl FrameSource for splatstream_scene::builtin::BuiltinScene {
-    fn len(&self) -> u32 {
-        self.frames
-    }
-
-    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
-        Ok(splatstream_scene::builtin::BuiltinScene::frame(self, number))
     }
 }

@@ -9,14 +9,16 @@ use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
 use crate::importance::Ranking;
 use crate::isolated;
+use crate::pass::{encode_once, encode_smaller};
+use crate::progress::Progress;
 use crate::report::{Report, TargetReport};
 use crate::secant::Secant;
 use crate::sequence;
-use crate::settings::{Settings, Size, Steps};
+use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
-use crate::stream::{Progress, encode_once, encode_smaller};
+use crate::steps::Steps;
 use splatstream_format::syntax::FrameType;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
 
 /// A PSNR is near enough within so many decibels, and a size within this part of it.

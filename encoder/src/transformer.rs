@@ -26,7 +26,6 @@ mod loss;
 mod matrix;
 mod model;
 mod parameters;
-mod random;
 #[cfg(test)]
 mod tests;
 
@@ -34,11 +33,11 @@ pub use architecture::Architecture;
 pub use loss::Loss;
 
 use crate::Error;
+use crate::random::Random;
 use descent::Descent;
 use lane::Whole;
 use model::Model;
 use parameters::Layout;
-use random::Random;
 use splatstream_decoder::transformer::{Batch, LANES};
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::NetworkHeader;

@@ -13,10 +13,10 @@ use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
 use splatstream_format::Limits;
 use splatstream_format::syntax::{FrameType, GopHeader, UnitHeader};
 use splatstream_format::unit::Stream;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, held_out};
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
 use splatstream_render::{Camera, render};
-use splatstream_scene::GaussianFrame;
 
 /// Views of each frame, and their height: with other heights PSNR is another number.
 const VIEWS: (u32, u32) = (4, 540);

@@ -1,5 +1,6 @@
 //! Vector quantisation of SH components: k-means++ seeding, Lloyd iterations, empty cells seeded again.
 
+use crate::random::Random;
 use rayon::prelude::*;
 use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::CodebookHeader;
@@ -145,7 +146,7 @@ fn seeds(rows: &[f32], rank: usize, entries: usize) -> Vec<f32> {
     let count = rows.len() / rank;
     let pool: Vec<&[f32]> =
         rows.chunks_exact(rank).step_by(count.div_ceil(SEEDING.max(entries * 2)).max(1)).collect();
-    let mut state = 0x5EED_u64;
+    let mut random = Random(0x5EED);
     let mut centres = pool[0].to_vec();
     let mut distances = vec![f32::INFINITY; pool.len()];
     for _ in 1..entries.min(pool.len()) {
@@ -157,7 +158,7 @@ fn seeds(rows: &[f32], rank: usize, entries: usize) -> Vec<f32> {
         if total <= 0.0 {
             break;
         }
-        let mut left = uniform(&mut state) * total;
+        let mut left = random.unit() * total;
         let drawn = distances.iter().position(|&distance| {
             left -= f64::from(distance);
             left < 0.0
@@ -165,15 +166,6 @@ fn seeds(rows: &[f32], rank: usize, entries: usize) -> Vec<f32> {
         centres.extend_from_slice(pool[drawn.unwrap_or(pool.len() - 1)]);
     }
     centres
-}
-
-/// splitmix64, to [0, 1).
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut bits = *state;
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// Centres at the means of their cells; an empty cell goes to the row that is worst off.

@@ -6,9 +6,9 @@ mod common;
 
 use common::{builtin, encoded};
 use splatstream_encoder::{Error, Preset, Report, Settings, Size, Structure, encode};
+use splatstream_files::builtin::BuiltinScene;
 use splatstream_format::syntax::FrameType;
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::BuiltinScene;
+use splatstream_gaussians::GaussianFrame;
 
 fn fast() -> Settings {
     Settings { preset: Preset::Fast, ..Settings::default() }

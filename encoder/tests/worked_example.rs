@@ -16,7 +16,7 @@ use splatstream_encoder::{Preset, Settings, Steps, encode};
 use splatstream_format::Limits;
 use splatstream_format::inspect::{Element, inspect};
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::{GaussianFrame, Planes};
+use splatstream_gaussians::{GaussianFrame, Planes};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,7 @@
 //! Clause 9: what is wrong with a stream, where, and which clause says so.
 
+use core::fmt;
+
 /// The result of reading or writing syntax.
 pub type Result<T> = core::result::Result<T, Error>;
 
@@ -52,8 +54,7 @@ impl Class {
 }
 
 /// One error: absolute byte offset, clause, cause. `Copy`, no strings made at run time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("byte {at:#x}: {kind} (clause {clause})")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Error {
     /// Absolute offset in the stream of the first byte of the offending element.
     pub at: u64,
@@ -64,20 +65,17 @@ pub struct Error {
 }
 
 /// The causes; [`ErrorKind::code`] is stable, the wording is not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ErrorKind {
     /// The stream ends inside an element or before the end unit.
-    #[error("the stream ends in {element}")]
     Truncated {
         /// The syntax element that is cut.
         element: &'static str,
     },
     /// The eight signature bytes are wrong.
-    #[error("not a SplatStream file: the signature is wrong")]
     Signature,
     /// A checksum does not fit the bytes it covers.
-    #[error("{element} is {stored:#x}, the bytes it covers give {computed:#x}")]
     Checksum {
         /// The syntax element holding the checksum.
         element: &'static str,
@@ -87,13 +85,11 @@ pub enum ErrorKind {
         computed: u32,
     },
     /// A payload or section is shorter than the elements it must hold.
-    #[error("{element} does not fit in the bytes left for it")]
     ShortSection {
         /// The syntax element that does not fit.
         element: &'static str,
     },
     /// Bytes are left over where none may be.
-    #[error("{bytes} byte(s) after the end of {element}")]
     TrailingBytes {
         /// The structure that should have ended.
         element: &'static str,
@@ -101,22 +97,18 @@ pub enum ErrorKind {
         bytes: u64,
     },
     /// A number is not written in its shortest form, or is too long.
-    #[error("{element} is not a well-formed number")]
     Number {
         /// The syntax element.
         element: &'static str,
     },
     /// Padding bits that are not zero.
-    #[error("padding after {element} is not zero")]
     Padding {
         /// The structure that is padded.
         element: &'static str,
     },
     /// The entropy decoder did not end in its initial state with all words used.
-    #[error("the entropy decoder does not end where the block ends")]
     EntropyFinalState,
     /// Bits or bytes that shall be zero in this version.
-    #[error("reserved bits of {element} are set ({value:#x})")]
     ReservedBits {
         /// The syntax element.
         element: &'static str,
@@ -124,7 +116,6 @@ pub enum ErrorKind {
         value: u64,
     },
     /// A value kept for a later version or another profile.
-    #[error("{element} has the reserved value {value}")]
     Reserved {
         /// The syntax element.
         element: &'static str,
@@ -132,7 +123,6 @@ pub enum ErrorKind {
         value: u64,
     },
     /// A value outside the range its semantics allow.
-    #[error("{element} is {value}, allowed are {min} to {max}")]
     OutOfRange {
         /// The syntax element.
         element: &'static str,
@@ -144,7 +134,6 @@ pub enum ErrorKind {
         max: i64,
     },
     /// A value that contradicts another element.
-    #[error("{element} is {value}, {expected} follows from the elements before it")]
     Mismatch {
         /// The syntax element.
         element: &'static str,
@@ -154,19 +143,16 @@ pub enum ErrorKind {
         expected: u64,
     },
     /// A constraint that has no single number: the element names it.
-    #[error("constraint broken: {rule}")]
     Constraint {
         /// The rule in a few words.
         rule: &'static str,
     },
     /// A unit where it may not stand.
-    #[error("a {unit} unit may not stand here")]
     UnexpectedUnit {
         /// The kind of unit.
         unit: &'static str,
     },
     /// An identifier that no unit before has defined.
-    #[error("{element} {id} has not been defined")]
     Undefined {
         /// The syntax element that refers.
         element: &'static str,
@@ -174,7 +160,6 @@ pub enum ErrorKind {
         id: u64,
     },
     /// The reconstruction differs from the digest in the stream.
-    #[error("reconstruction digest is {computed:#018x}, the stream says {stored:#018x}")]
     Digest {
         /// The value in the stream.
         stored: u64,
@@ -182,7 +167,6 @@ pub enum ErrorKind {
         computed: u64,
     },
     /// More than the caller's [`Limits`](crate::Limits) allow.
-    #[error("{limit} is {asked}, at most {allowed} is allowed here")]
     OverLimit {
         /// The name of the limit.
         limit: &'static str,
@@ -192,6 +176,44 @@ pub enum ErrorKind {
         allowed: u64,
     },
 }
+
+impl fmt::Display for ErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { element } => write!(f, "the stream ends in {element}"),
+            Self::Signature => f.write_str("not a SplatStream file: the signature is wrong"),
+            Self::Checksum { element, stored, computed } => {
+                write!(f, "{element} is {stored:#x}, the bytes it covers give {computed:#x}")
+            }
+            Self::ShortSection { element } => write!(f, "{element} does not fit in the bytes left for it"),
+            Self::TrailingBytes { element, bytes } => write!(f, "{bytes} byte(s) after the end of {element}"),
+            Self::Number { element } => write!(f, "{element} is not a well-formed number"),
+            Self::Padding { element } => write!(f, "padding after {element} is not zero"),
+            Self::EntropyFinalState => f.write_str("the entropy decoder does not end where the block ends"),
+            Self::ReservedBits { element, value } => {
+                write!(f, "reserved bits of {element} are set ({value:#x})")
+            }
+            Self::Reserved { element, value } => write!(f, "{element} has the reserved value {value}"),
+            Self::OutOfRange { element, value, min, max } => {
+                write!(f, "{element} is {value}, allowed are {min} to {max}")
+            }
+            Self::Mismatch { element, value, expected } => {
+                write!(f, "{element} is {value}, {expected} follows from the elements before it")
+            }
+            Self::Constraint { rule } => write!(f, "constraint broken: {rule}"),
+            Self::UnexpectedUnit { unit } => write!(f, "a {unit} unit may not stand here"),
+            Self::Undefined { element, id } => write!(f, "{element} {id} has not been defined"),
+            Self::Digest { stored, computed } => {
+                write!(f, "reconstruction digest is {computed:#018x}, the stream says {stored:#018x}")
+            }
+            Self::OverLimit { limit, asked, allowed } => {
+                write!(f, "{limit} is {asked}, at most {allowed} is allowed here")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ErrorKind {}
 
 impl ErrorKind {
     /// The class a caller acts on (clause 9.1).
@@ -239,6 +261,15 @@ impl ErrorKind {
         }
     }
 }
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { at, clause, kind } = self;
+        write!(f, "byte {at:#x}: {kind} (clause {clause})")
+    }
+}
+
+impl core::error::Error for Error {}
 
 impl Error {
     /// An error at an absolute byte offset.

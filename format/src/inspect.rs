@@ -3,7 +3,7 @@
 //! The rows of the syntax tables give names, widths and meanings, so that what is printed cannot drift from
 //! what is read. A damaged stream gives the elements up to the damage, and the first error.
 
-use crate::levels::Levels;
+use crate::follower::{Follower, Standing};
 use crate::payload::{
     Codebook, FramePayload, Increment, Index, OperatingPoints, SceneDescription, Transform, VARIABLE_ROWS,
     VariableRow, Weights,
@@ -48,11 +48,9 @@ pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) ->
     let mut inspector = Inspector {
         visit,
         // The units of a damaged file header are shown whatever layers they name.
-        profile: Profile::Dynamic,
+        follower: Follower::new(Profile::Dynamic),
         limits: *limits,
-        sequence: None,
         coding: Coding::default(),
-        levels: Levels::default(),
         first: None,
     };
     inspector.stream(bytes);
@@ -61,11 +59,9 @@ pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) ->
 
 struct Inspector<'v> {
     visit: &'v mut dyn FnMut(Element),
-    profile: Profile,
+    follower: Follower,
     limits: Limits,
-    sequence: Option<SequenceParameters>,
     coding: Coding,
-    levels: Levels,
     first: Option<Error>,
 }
 
@@ -74,7 +70,7 @@ impl Inspector<'_> {
         self.fixed(&FileHeader::TABLE, bytes, 0);
         let header = FileHeader::parse(bytes);
         match header {
-            Ok((header, _)) => self.profile = header.profile(),
+            Ok((header, _)) => self.follower = Follower::new(header.profile()),
             Err(error) => {
                 self.note(Err(error));
                 // Units describe themselves, but not those of another file format.
@@ -83,7 +79,8 @@ impl Inspector<'_> {
                 }
             }
         }
-        let mut units = Units::starting_at(bytes, after(0, FileHeader::SIZE), self.profile, &self.limits);
+        let profile = self.follower.profile();
+        let mut units = Units::starting_at(bytes, after(0, FileHeader::SIZE), profile, &self.limits);
         loop {
             let at = units.position();
             if units.is_open() {
@@ -103,15 +100,13 @@ impl Inspector<'_> {
 
     /// Checks of a unit and the elements of its payload, if it is the one that was written.
     fn unit(&mut self, unit: &Unit<'_>) -> Result<()> {
-        unit.check_header(self.profile)?;
-        if !self.levels.takes(&unit.header) {
-            let meaning = "discarded: the reference frame has fewer refinements";
-            self.opaque(unit, meaning, "5.14");
-            return Ok(());
+        match self.follower.take(unit)? {
+            Standing::Taken => self.payload(unit),
+            Standing::Discarded => {
+                self.opaque(unit, "discarded: the reference frame has fewer refinements", "5.14");
+                Ok(())
+            }
         }
-        unit.check_payload()?;
-        self.levels.follow(unit, self.profile);
-        self.payload(unit)
     }
 
     /// The elements of a payload, and then the checks of its parser.
@@ -120,11 +115,11 @@ impl Inspector<'_> {
         match unit.header.unit_type() {
             UnitType::SequenceParameters => {
                 self.fixed(&SequenceParameters::TABLE, payload, at);
-                self.sequence = Some(SequenceParameters::parse_payload(payload, at, self.profile)?);
+                SequenceParameters::parse_payload(payload, at, self.follower.profile())?;
             }
             UnitType::GopHeader => {
                 self.fixed(&GopHeader::TABLE, payload, at);
-                let header = GopHeader::parse_payload(payload, at, self.profile)?;
+                let header = GopHeader::parse_payload(payload, at, self.follower.profile())?;
                 self.coding = Coding::of_gop(header, unit.header.frame);
                 header.validate_from(at, unit.header.frame)?;
             }
@@ -163,7 +158,7 @@ impl Inspector<'_> {
 
     fn transform(&mut self, payload: &[u8], at: u64) -> Result<()> {
         self.fixed(&TransformHeader::TABLE, payload, at);
-        let transform = Transform::parse(payload, at, &self.sequence_at(at)?)?;
+        let transform = Transform::parse(payload, at, self.follower.sequence_at(at)?)?;
         self.coding.define(&transform.header);
         let mean_at = after(at, TransformHeader::SIZE);
         let mean_bytes = size_of_val(transform.mean.as_slice());
@@ -209,9 +204,8 @@ impl Inspector<'_> {
     fn frame_header(&mut self, unit: &Unit<'_>) -> Result<()> {
         let mut trace = Vec::new();
         let mut reader = Reader::tracing(unit.payload, unit.payload_at, &mut trace);
-        let parsed = self
-            .sequence_at(unit.payload_at)
-            .and_then(|sequence| FramePayload::read(&mut reader, &sequence, &self.limits));
+        let sequence = self.follower.sequence_at(unit.payload_at);
+        let parsed = sequence.and_then(|sequence| FramePayload::read(&mut reader, sequence, &self.limits));
         let frame = match parsed {
             Ok(frame) => frame,
             Err(error) => return self.broken(&FrameHeader::TABLE, unit, &trace, error),
@@ -227,9 +221,10 @@ impl Inspector<'_> {
     fn increment(&mut self, unit: &Unit<'_>) -> Result<()> {
         let mut trace = Vec::new();
         let mut reader = Reader::tracing(unit.payload, unit.payload_at, &mut trace);
-        let parsed = self
-            .sequence_at(unit.payload_at)
-            .and_then(|sequence| Increment::read(&mut reader, &sequence, self.profile, &self.limits));
+        let profile = self.follower.profile();
+        let sequence = self.follower.sequence_at(unit.payload_at);
+        let parsed =
+            sequence.and_then(|sequence| Increment::read(&mut reader, sequence, profile, &self.limits));
         let Increment { header, sections } = match parsed {
             Ok(increment) => increment,
             Err(error) => return self.broken(&IncrementHeader::TABLE, unit, &trace, error),
@@ -346,11 +341,6 @@ impl Inspector<'_> {
     ) {
         let (at_bit, bits) = (at.saturating_mul(8), after(0, bytes).saturating_mul(8));
         (self.visit)(Element { at_bit, bits, record, name, value, meaning: meaning.into(), clause });
-    }
-
-    fn sequence_at(&self, at: u64) -> Result<SequenceParameters> {
-        let kind = ErrorKind::UnexpectedUnit { unit: "sequence-dependent" };
-        self.sequence.ok_or(Error::new(at, "7.1.2", kind))
     }
 
     fn note(&mut self, checked: Result<()>) {

@@ -1,6 +1,6 @@
 //! SplatStream bitstream syntax: bytes to syntax elements and back.
 //!
-//! A stream is a [`FileHeader`](syntax::FileHeader) followed by units ([`unit`], annex B). The payload of a
+//! A stream is a [`FileHeader`](syntax::FileHeader) followed by units ([`mod@unit`], annex B). The payload of a
 //! unit is a fixed record ([`syntax`], clause 5), and, where its extent depends on data, a division into
 //! byte sections ([`payload`]). Inside the sections stand plane models and entropy-coded symbols
 //! ([`entropy`], clause 8).
@@ -21,12 +21,14 @@ pub mod arbitrary_stream;
 pub mod bits;
 pub mod entropy;
 mod error;
+pub mod follower;
 pub mod inspect;
-pub mod levels;
 mod limits;
 pub mod payload;
+pub mod seek;
 pub mod syntax;
 pub mod unit;
+pub mod unit_reader;
 
 pub use error::{Class, Error, ErrorKind, Result};
 pub use limits::Limits;

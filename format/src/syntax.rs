@@ -1,11 +1,10 @@
 //! Clause 5: the fixed records, each written once.
 //!
-//! A record is declared with `table!`, which yields the struct, both directions (deku) and the rows that the
+//! A record is declared with `table!`, which yields the struct, both directions and the rows that the
 //! inspector prints and that a test compares with the tables of `spec/05-syntax.md`. A record that is refused
 //! when read is refused when written: both sides call the record's `validate`, clause 6.
 
 use crate::{Error, ErrorKind, Result};
-use deku::{DekuContainerRead, DekuContainerWrite};
 
 mod codebook;
 mod end;
@@ -16,6 +15,7 @@ mod increment;
 mod index;
 mod operating_points;
 pub(crate) mod reader;
+mod record;
 mod scene_description;
 mod sequence_parameters;
 mod sh_header;
@@ -31,6 +31,7 @@ pub use gop_header::{FrameRole, GopHeader};
 pub use increment::{IncrementHeader, ListSizes, MAX_ATTRIBUTE_STEP, MAX_NEIGHBOURS, NO_PREDICTOR};
 pub use index::{IndexEntry, IndexHeader};
 pub use operating_points::{OperatingPointEntry, OperatingPointsHeader};
+pub use record::FixedRecord;
 pub(crate) use scene_description::in_range;
 pub use scene_description::{Camera, SceneDescriptionHeader};
 pub use sequence_parameters::{
@@ -107,12 +108,23 @@ macro_rules! table {
         }
     ) => {
         $(#[doc = $doc])+
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, deku::DekuRead, deku::DekuWrite)]
-        #[deku(endian = "little")]
+        #[allow(unreachable_pub, reason = "records that are part of another type are private to its module")]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub struct $Record {
             $( #[doc = $meaning] pub $field: $crate::syntax::table!(@type $ty $($count)?), )+
         }
 
+        impl $crate::syntax::FixedRecord for $Record {
+            fn take(bytes: &mut &[u8]) -> Option<Self> {
+                Some(Self { $( $field: $crate::syntax::record::Element::take(bytes)?, )+ })
+            }
+
+            fn put(&self, out: &mut Vec<u8>) {
+                $( $crate::syntax::record::Element::put(&self.$field, out); )+
+            }
+        }
+
+        #[allow(unreachable_pub, reason = "records that are part of another type are private to its module")]
         impl $Record {
             /// The rows of the syntax table.
             pub const ROWS: &'static [$crate::syntax::Row] = &[ $( $crate::syntax::Row {
@@ -168,7 +180,7 @@ macro_rules! record_io {
             /// count from the start of the record.
             pub fn to_bytes(&self) -> $crate::Result<Vec<u8>> {
                 self.validate(0)?;
-                $crate::syntax::encode(&Self::TABLE, self)
+                Ok($crate::syntax::encode(self))
             }
         }
     };
@@ -206,31 +218,25 @@ macro_rules! record_io_in_profile {
             /// Offsets of errors count from the start of the record.
             pub fn to_bytes(&self) -> $crate::Result<Vec<u8>> {
                 self.validate(0, $crate::syntax::Profile::Dynamic)?;
-                $crate::syntax::encode(&Self::TABLE, self)
+                Ok($crate::syntax::encode(self))
             }
         }
     };
 }
 pub(crate) use record_io_in_profile;
 
-/// The bytes of a record without any check of its values, and the bytes after it.
-pub(crate) fn decode<'a, T: DekuContainerRead<'a>>(
-    table: &Table,
-    bytes: &'a [u8],
-    at: u64,
-) -> Result<(T, &'a [u8])> {
-    let cut = || table.cut(bytes.len(), at);
-    let (raw, rest) = bytes.split_at_checked(table.size()).ok_or_else(cut)?;
-    let (_, record) = T::from_bytes((raw, 0)).map_err(|_| cut())?;
+/// A record whose values are not checked, and the bytes after it.
+pub(crate) fn decode<'a, T: FixedRecord>(table: &Table, bytes: &'a [u8], at: u64) -> Result<(T, &'a [u8])> {
+    let mut rest = bytes;
+    let record = T::take(&mut rest).ok_or_else(|| table.cut(bytes.len(), at))?;
     Ok((record, rest))
 }
 
-/// The bytes of a record without any check of its values.
-pub(crate) fn encode<T: DekuContainerWrite>(table: &Table, record: &T) -> Result<Vec<u8>> {
-    // Records have no conditions, so deku has nothing to refuse; the error only keeps this total.
-    record
-        .to_bytes()
-        .map_err(|_| Error::new(0, table.syntax, ErrorKind::ShortSection { element: table.name }))
+/// The bytes of a record whose values are not checked.
+pub(crate) fn encode<T: FixedRecord>(record: &T) -> Vec<u8> {
+    let mut out = Vec::new();
+    record.put(&mut out);
+    out
 }
 
 /// The offset `bytes` after `at`. Saturates: no stream is near 2^64 bytes.

@@ -3,10 +3,11 @@
 use crate::syntax::{
     FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType, after,
 };
+use crate::unit_reader::{Event, UnitReader};
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// What a stream is made of.
-const CLAUSE: &str = "B.1";
+pub(crate) const CLAUSE: &str = "B.1";
 
 /// A stream whose file header has been accepted.
 #[derive(Debug, Clone, Copy)]
@@ -50,26 +51,10 @@ impl Unit<'_> {
 #[derive(Debug, Clone)]
 pub struct Units<'a> {
     bytes: &'a [u8],
-    /// The next unit.
-    at: usize,
-    /// The unit that was given out or refused last.
-    last: usize,
     profile: Profile,
-    limits: Limits,
-    unit_count: u32,
-    state: State,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
-    /// A unit is due.
-    Open,
-    /// The end unit has been read: nothing may follow.
-    Ended,
-    /// The end of a unit is not known: only a scan goes on.
-    Lost,
-    /// Nothing more is given out.
-    Done,
+    reader: UnitReader,
+    /// Absolute offset of the unit that was given out or refused last.
+    last: u64,
 }
 
 /// A unit from which reading can go on after damage, clause 9.
@@ -94,6 +79,11 @@ impl Landmark {
             Self::GopHeader => GopHeader::SIZE,
             Self::SequenceParameters => SequenceParameters::SIZE,
         }
+    }
+
+    /// Bytes of a unit of this kind, its header included.
+    pub(crate) const fn size(self) -> usize {
+        UnitHeader::SIZE.saturating_add(self.payload_size())
     }
 
     /// Whether `bytes` starts with an intact unit of this kind.
@@ -139,90 +129,40 @@ impl<'a> Stream<'a> {
 
 impl<'a> Units<'a> {
     pub(crate) fn starting_at(bytes: &'a [u8], at: u64, profile: Profile, limits: &Limits) -> Self {
-        let at = usize::try_from(at).unwrap_or(usize::MAX).min(bytes.len());
-        let (limits, state) = (*limits, State::Open);
-        Self { bytes, at, last: at, profile, limits, unit_count: 0, state }
+        let reader = UnitReader::starting_at(at.min(after(0, bytes.len())), limits);
+        Self { bytes, profile, last: reader.position(), reader }
     }
 
     /// Absolute offset of the next unit.
     pub fn position(&self) -> u64 {
-        after(0, self.at)
-    }
-
-    /// Units given out so far.
-    pub const fn unit_count(&self) -> u32 {
-        self.unit_count
+        self.reader.position()
     }
 
     /// Whether a unit is due: the end unit has not been met, and the end of every unit was known.
     pub fn is_open(&self) -> bool {
-        self.state == State::Open
+        self.reader.is_open()
     }
 
     /// The next unit. `None` after the end unit, and after a unit whose end is not known.
     pub fn next_unit(&mut self) -> Option<Result<Unit<'a>>> {
-        match self.state {
-            State::Open => {
-                self.last = self.at;
-                let unit = self.read();
-                if unit.is_err() && self.state == State::Open {
-                    self.state = State::Lost;
-                }
-                Some(unit)
-            }
-            State::Ended => {
-                self.state = State::Done;
-                self.nothing_follows().err().map(Err)
-            }
-            State::Lost | State::Done => None,
+        self.last = self.reader.position();
+        match self.reader.read(self.rest(), true) {
+            Ok(Event::Unit(unit)) => Some(Ok(unit)),
+            Ok(_) => None,
+            Err(error) => Some(Err(error)),
         }
     }
 
     /// Goes to the first intact unit of a kind that starts after the first byte of the unit that was given out or refused
     /// last. If there is none, nothing more is given out.
     pub fn scan_for(&mut self, landmark: Landmark) -> bool {
-        let from = self.last.saturating_add(1);
-        let found = if self.state == State::Done { None } else { landmark.find(self.bytes, from) };
-        self.state = if found.is_some() { State::Open } else { State::Done };
-        self.at = found.unwrap_or(self.bytes.len());
-        found.is_some()
+        self.reader.scan_from(self.last.saturating_add(1), landmark);
+        self.reader.scan(self.rest(), true);
+        self.reader.is_open()
     }
 
-    /// Delimits one unit.
-    fn read(&mut self) -> Result<Unit<'a>> {
-        let at = after(0, self.at);
-        let rest = self.bytes.get(self.at..).unwrap_or_default();
-        if rest.is_empty() {
-            return Err(Error::new(at, CLAUSE, ErrorKind::Truncated { element: "unit_header" }));
-        }
-        let (header, rest) = UnitHeader::delimit(rest, at)?;
-        let units = u64::from(self.unit_count).saturating_add(1);
-        if let Err(error) = Limits::check(at, "max_units", units, self.limits.max_units.into()) {
-            // No later unit is allowed either.
-            self.state = State::Done;
-            return Err(error);
-        }
-        header.within(at, &self.limits)?;
-        let payload_at = after(at, UnitHeader::SIZE);
-        let truncated = Error::new(payload_at, CLAUSE, ErrorKind::Truncated { element: "payload" });
-        let length = usize::try_from(header.payload_length).map_err(|_| truncated)?;
-        let payload = rest.get(..length).ok_or(truncated)?;
-        self.at = self.at.saturating_add(UnitHeader::SIZE).saturating_add(length);
-        self.unit_count = self.unit_count.saturating_add(1);
-        if header.unit_type() == UnitType::End {
-            self.state = State::Ended;
-        }
-        Ok(Unit { at, header, payload, payload_at })
-    }
-
-    /// 6.11: the stream ends with the last byte of the end unit.
-    fn nothing_follows(&self) -> Result<()> {
-        let left = self.bytes.len().saturating_sub(self.at);
-        if left == 0 {
-            return Ok(());
-        }
-        let kind = ErrorKind::TrailingBytes { element: "stream", bytes: after(0, left) };
-        Err(Error::new(after(0, self.at), CLAUSE, kind))
+    fn rest(&self) -> &'a [u8] {
+        usize::try_from(self.position()).ok().and_then(|at| self.bytes.get(at..)).unwrap_or_default()
     }
 }
 

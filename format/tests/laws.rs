@@ -5,7 +5,6 @@
 mod sample;
 
 use arbitrary::{Arbitrary, Unstructured};
-use deku::{DekuContainerRead, DekuContainerWrite};
 use proptest::prelude::{ProptestConfig, any};
 use proptest::{collection::vec, prop_assert, prop_assert_eq, proptest};
 use splatstream_format::arbitrary_stream::{self as random, ArbitraryIncrement, ArbitraryStream};
@@ -14,8 +13,8 @@ use splatstream_format::payload::{
     SceneDescription, SectionBytes, Transform, Weights, leb128, write_increment, write_leb128,
 };
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IncrementHeader, IndexEntry,
-    IndexHeader, ListSizes, NetworkHeader, Profile, SceneDescriptionHeader, SequenceParameters,
+    CodebookHeader, EndOfStream, FileHeader, FixedRecord, FrameHeader, GopHeader, IncrementHeader,
+    IndexEntry, IndexHeader, ListSizes, NetworkHeader, Profile, SceneDescriptionHeader, SequenceParameters,
     TransformKind, UnitHeader, UnitId, UnitType, WeightsHeader,
 };
 use splatstream_format::unit::{Landmark, Stream, Unit};
@@ -46,10 +45,12 @@ macro_rules! reading_and_writing_refuse_alike {
             let mut raw = if valid { near(&seed) } else { seed };
             raw.resize($Record::SIZE, 0);
             raw[changed] = value;
-            let (_, record) = $Record::from_bytes((&raw, 0)).unwrap();
+            let record = $Record::take(&mut &raw[..]).unwrap();
             let read: Result<$Record> = $parse(&raw);
             prop_assert_eq!(read.map(|_| raw.clone()), record.to_bytes());
-            prop_assert_eq!(DekuContainerWrite::to_bytes(&record).unwrap(), raw);
+            let mut written = Vec::new();
+            record.put(&mut written);
+            prop_assert_eq!(written, raw);
         }
     )+ } };
 }
@@ -188,7 +189,7 @@ proptest! {
         let Weights::Carried(network) = made(&seed, random::weights) else { return Ok(()) };
         let mut raw = network.to_bytes().unwrap()[..NetworkHeader::SIZE].to_vec();
         raw[changed] = value;
-        let (_, header) = NetworkHeader::from_bytes((&raw, 0)).unwrap();
+        let header = NetworkHeader::take(&mut &raw[..]).unwrap();
         // Sizes out of range are refused whatever is there: no need to have as much.
         let of = if header.validate(0).is_ok() { header } else { network.header };
         let layers = Part::ALL.map(|part| {

@@ -10,7 +10,7 @@ use splatstream_encoder::{
     Settings, ShChoice, Structure, Tools, encode,
 };
 use splatstream_format::arbitrary_stream;
-use splatstream_scene::{GaussianFrame, MAX_SH_DEGREE};
+use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE};
 
 /// The input is what scene and settings are made of.
 pub fn run(data: &[u8]) {

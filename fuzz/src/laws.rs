@@ -2,6 +2,7 @@
 
 use crate::LIMITS;
 use core::ops::{ControlFlow, RangeInclusive};
+use splatstream_decoder::budget::Budget;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::operating_point::{OperatingPoint, operating_points};
 use splatstream_decoder::output::to_gaussians;
@@ -24,6 +25,8 @@ pub const PLAIN: Options = Options {
     stop_at_first_error: false,
     subset: false,
     entropy: false,
+    identities: false,
+    budget: Budget::UNLIMITED,
 };
 /// The first error ends decoding.
 pub const STRICT: Options = Options { stop_at_first_error: true, ..PLAIN };

@@ -4,7 +4,6 @@ use crate::LIMITS;
 use crate::seal::seal;
 use arbitrary::Unstructured;
 use core::fmt::Debug;
-use deku::DekuContainerRead;
 use splatstream_format::arbitrary_stream::sequence_parameters;
 use splatstream_format::entropy::layout::{Layout, ShCoding};
 use splatstream_format::entropy::model::{PlaneModel, read_models, write_models};
@@ -13,7 +12,7 @@ use splatstream_format::payload::{
     SectionBytes, Transform, Weights, write_frame, write_increment,
 };
 use splatstream_format::syntax::{
-    CodebookHeader, EndOfStream, FileHeader, FrameHeader, GopHeader, IndexEntry, IndexHeader,
+    CodebookHeader, EndOfStream, FileHeader, FixedRecord, FrameHeader, GopHeader, IndexEntry, IndexHeader,
     OperatingPointEntry, OperatingPointsHeader, Profile, SequenceParameters, UnitHeader, WeightsHeader,
 };
 use splatstream_format::{Error, Result};
@@ -40,7 +39,7 @@ pub struct Case<'a> {
 }
 
 /// A record of clause 5 whose bytes stand by themselves.
-trait Record: Sized + Debug + PartialEq + for<'a> DekuContainerRead<'a> {
+trait Record: Sized + Debug + PartialEq + FixedRecord {
     const BYTES: usize;
 
     fn read(raw: &[u8], at: u64, profile: Profile, sequence: &SequenceParameters) -> Result<Self>;
@@ -61,8 +60,7 @@ fn law<R: Record>(case: &Case<'_>) {
         assert!(error.at <= at + raw.len() as u64, "{error} is outside the record");
         return;
     };
-    let (_, made) =
-        R::from_bytes((&raw, 0)).expect("any bytes are a record, before its values are looked at");
+    let made = R::take(&mut &raw[..]).expect("any bytes are a record, before its values are looked at");
     // Offsets of errors of a writer count from the record.
     let written = made.write(sequence).map_err(|error| Error { at: error.at + at, ..error });
     assert_eq!(read(&raw, Profile::Dynamic).map(|_| raw.clone()), written);

@@ -1,9 +1,10 @@
 //! The readers of scene files, on any bytes.
 
-use splatstream_scene::{GaussianFrame, ReadLimits, SceneError, compressed_ply, ply, sog, splat, spz};
+use splatstream_files::{ReadLimits, SceneError, compressed_ply, ply, sog, splat, spz};
+use splatstream_gaussians::GaussianFrame;
 
 /// Small, so that an input which keeps within them is cheap.
-pub const LIMITS: ReadLimits = ReadLimits { max_gaussians: 1 << 12, max_bytes: 1 << 20 };
+pub const LIMITS: ReadLimits = ReadLimits { max_memory: 1 << 21 };
 
 type Reader = fn(&[u8], &ReadLimits) -> Result<GaussianFrame, SceneError>;
 
@@ -16,7 +17,7 @@ pub fn run(data: &[u8]) {
     let Ok(frame) = READERS[usize::from(*choice) % READERS.len()](bytes, &LIMITS) else { return };
     assert_eq!(frame.validate(), Ok(()));
     // What is written may be longer than what was read.
-    let limits = ReadLimits { max_bytes: u64::MAX, ..LIMITS };
+    let limits = ReadLimits { max_memory: u64::MAX };
     let written = ply::write(&frame);
     let back = ply::read(&written, &limits).expect("a PLY file of our own reads");
     assert!(ply::write(&back) == written, "PLY changes a frame");

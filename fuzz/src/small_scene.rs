@@ -1,7 +1,7 @@
 //! A sequence of a few frames of a few Gaussians, made of bytes.
 
 use arbitrary::{Arbitrary, Result, Unstructured};
-use splatstream_scene::{GaussianFrame, MAX_SH_DEGREE, Planes, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, sh_coefficients};
 
 /// More add time, not depth.
 const MAX_GAUSSIANS: usize = 24;

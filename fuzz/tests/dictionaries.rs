@@ -1,6 +1,7 @@
 //! The dictionaries of libFuzzer: what stands in streams and in scene files, and is hard to hit byte by byte.
 //! `BLESS=1 cargo test --test dictionaries` writes them again; without it, they are checked to be up to date.
 
+use splatstream_files::ply;
 use splatstream_format::Limits;
 use splatstream_format::entropy::STATE_LOW;
 use splatstream_format::payload::write_leb128;
@@ -9,7 +10,7 @@ use splatstream_format::syntax::{
     UnitId, UnitType,
 };
 use splatstream_format::unit::{write_file_header, write_unit};
-use splatstream_scene::{GaussianFrame, Planes, ply};
+use splatstream_gaussians::{GaussianFrame, Planes};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -4,11 +4,12 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed benchmark")]
 
 use divan::{Bencher, black_box};
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::{ReadLimits, read_scene};
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, ring};
 use splatstream_render::contribution::{contribution, removal};
 use splatstream_render::{Camera, render};
-use splatstream_scene::builtin::BuiltinScene;
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
 use std::path::Path;
 
 fn main() {

@@ -12,10 +12,11 @@
 //! first. `views.json` says the rest.
 
 use serde_json::{Value, json};
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::{ReadLimits, read_scene};
+use splatstream_gaussians::Planes;
 use splatstream_render::camera::{Up, ring};
 use splatstream_render::{Camera, Rendering, render};
-use splatstream_scene::builtin::BuiltinScene;
-use splatstream_scene::{Planes, ReadLimits, read_scene};
 use std::error::Error;
 use std::path::Path;
 

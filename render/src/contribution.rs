@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::rasterise::{Blend, Ink, Lanes, Shapes, TILE, Tile, View, blend_tile};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// What each Gaussian gives to the pictures: transmittance times alpha, summed over the pixels of all views.
 /// At least 0, in pixels.

@@ -16,7 +16,7 @@ use project::{Splat, project};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::TileRows;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 pub(crate) use tile::{Blend, Lanes, Tile, blend_tile};
 
 /// Pixels on a side of a tile.
@@ -127,7 +127,7 @@ impl Blend for Ink {
 mod tests {
     use super::*;
     use crate::camera::{Up, ring};
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     #[test]
     fn vector_instructions_draw_the_same_bits_as_plain_ones() {

@@ -1,9 +1,9 @@
 //! Errors of attributes over pairs of Gaussians.
 
-use crate::table::Table;
 use rayon::prelude::*;
 use serde::Serialize;
-use splatstream_scene::GaussianFrame;
+use splatstream_chart::table::Table;
+use splatstream_gaussians::GaussianFrame;
 
 /// Pairs that one task adds up: sums in tasks of a fixed size are the same with any number of threads.
 const TASK: usize = 1 << 14;

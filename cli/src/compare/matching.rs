@@ -5,7 +5,7 @@ use super::errors::rotation_difference;
 use super::grid::{Grid, inner_box};
 use rayon::prelude::*;
 use serde::Serialize;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// How the Gaussians of a frame were matched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -106,7 +106,7 @@ fn median(values: &mut [f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use splatstream_scene::builtin::BuiltinScene;
+    use splatstream_files::builtin::BuiltinScene;
 
     fn scene() -> GaussianFrame {
         BuiltinScene { gaussians: 500, sh_degree: 0, ..BuiltinScene::default() }.frame(0)

@@ -3,13 +3,13 @@
 use super::flicker::{Flicker, FlickerSums};
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::failure::Failure;
-use crate::table::Table;
 use clap::Args;
 use serde::Serialize;
+use splatstream_chart::table::Table;
 use splatstream_format::payload::SceneDescription;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{Comparison, StLpips, compare};
 use splatstream_render::{Camera, Image, Rendering, render};
-use splatstream_scene::GaussianFrame;
 use std::path::{Path, PathBuf};
 
 /// What is drawn and compared.

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use clap::Args;
 use serde::Serialize;
 use splatstream_conformance::case::Case;
-use splatstream_conformance::report::summary::counted;
+use splatstream_conformance::counted::counted;
 
 /// List the vectors of the suite: what each is for, the right answer, its cases, clauses, features and requirements.
 #[derive(Args)]

@@ -6,9 +6,9 @@ use crate::failure::Failure;
 use crate::output_file::{OutputFile, refuse_standard};
 use clap::Args;
 use serde::Serialize;
+use splatstream_conformance::counted::counted;
 use splatstream_conformance::matrix;
 use splatstream_conformance::report::Report;
-use splatstream_conformance::report::summary::counted;
 use std::path::PathBuf;
 
 /// Make a page of features and decoders from reports of runs.

@@ -7,6 +7,7 @@ use crate::output_file::{OutputFile, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
 use crate::unfinished;
 use clap::Args;
+use splatstream_chart::Progress as _;
 use splatstream_conformance::cancel::Cancel;
 use splatstream_conformance::capabilities::Capabilities;
 use splatstream_conformance::command::{Template, shell_word, split_persistent};

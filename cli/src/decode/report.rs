@@ -2,9 +2,10 @@
 
 use super::loss::Loss;
 use crate::failure::{StreamFault, faults_text};
-use crate::numbers::{grouped, hex_digest};
+use crate::numbers::hex_digest;
 use crate::seek::Seek;
 use serde::Serialize;
+use splatstream_chart::numbers::grouped;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::DecodedFrame;
 use splatstream_format::Error;

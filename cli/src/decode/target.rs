@@ -5,7 +5,8 @@ use crate::output_file::{
     OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_inputs, refuse_terminal,
 };
 use clap::ValueEnum;
-use splatstream_scene::{GaussianFrame, SceneError, ply, splat, spz};
+use splatstream_files::{SceneError, ply, splat, spz};
+use splatstream_gaussians::GaussianFrame;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 

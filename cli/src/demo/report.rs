@@ -1,9 +1,9 @@
 //! What the demo tells.
 
 use crate::compare::errors::AttributeErrors;
-use crate::numbers::{bits_per_gaussian, grouped};
-use crate::table::Table;
 use serde::Serialize;
+use splatstream_chart::numbers::{bits_per_gaussian, grouped};
+use splatstream_chart::table::Table;
 use splatstream_decoder::operating_point::OperatingPointInfo;
 use std::path::PathBuf;
 

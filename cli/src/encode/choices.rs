@@ -1,7 +1,7 @@
 //! What the encoder chose, and why.
 
-use crate::numbers::{grouped, percent};
 use serde::Serialize;
+use splatstream_chart::numbers::{grouped, percent};
 use splatstream_encoder::{
     FrameReport, Importance, PredictorChoice, Predictors, Report, Settings, ShChoice, Steps, Structure, Tools,
 };

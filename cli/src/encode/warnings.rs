@@ -1,8 +1,8 @@
 //! What a user should know of a stream that was encoded without an error.
 
 use super::pictures::Goal;
-use crate::numbers::{bits_per_gaussian, grouped};
 use serde::Serialize;
+use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{Dropped, Isolated, Report, Settings, Size};
 use splatstream_format::syntax::FrameType;
 
@@ -38,6 +38,12 @@ impl Warning {
     /// For people.
     pub(super) fn text(&self) -> String {
         format!("warning: {}", self.message)
+    }
+}
+
+impl From<Warning> for splatstream_chart::stability::Warning {
+    fn from(Warning { code, message }: Warning) -> Self {
+        Self { code, message }
     }
 }
 

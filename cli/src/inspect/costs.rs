@@ -2,10 +2,10 @@
 
 use super::Shown;
 use crate::console::Console;
-use crate::costs::{Costs, OfAttribute};
-use crate::numbers::grouped;
 use crate::stream_file::StreamFile;
-use crate::table::Table;
+use splatstream_chart::costs::{Costs, OfAttribute};
+use splatstream_chart::numbers::grouped;
+use splatstream_chart::table::Table;
 use splatstream_format::Limits;
 use splatstream_format::entropy::layout::Section;
 

@@ -3,16 +3,13 @@
 use crate::cameras::of_stream;
 use crate::stream_file::StreamFile;
 use rayon::prelude::*;
+use splatstream_chart::first_frame::first_frame;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo};
-use splatstream_decoder::output::to_gaussians;
-use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream;
 use splatstream_format::Limits;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, held_out};
 use splatstream_render::metrics::psnr;
 use splatstream_render::{Camera, Image, render};
-use splatstream_scene::GaussianFrame;
-use std::ops::ControlFlow;
 
 /// Views of the first frame, and their height.
 const VIEWS: (u32, u32) = (3, 270);
@@ -59,20 +56,6 @@ pub(super) fn qualities(stream: &StreamFile, points: &[OperatingPointInfo], limi
         on_hull: decibels[index].is_some() && !is_beaten(index),
     };
     (0..points.len()).map(quality).collect()
-}
-
-/// The first frame of which something is shown.
-fn first_frame(bytes: &[u8], operating_point: OperatingPoint, limits: &Limits) -> Option<GaussianFrame> {
-    let options = Options { limits: *limits, operating_point, ..Options::default() };
-    let mut first = None;
-    let _faults = decode_stream(bytes, &options, |sequence, frame| {
-        if frame.is_lost {
-            return ControlFlow::Continue(());
-        }
-        first = Some(to_gaussians(frame.into_shown(), sequence));
-        ControlFlow::Break(())
-    });
-    first
 }
 
 fn pictures(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Image> {

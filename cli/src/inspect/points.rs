@@ -3,10 +3,11 @@
 use super::Shown;
 use super::hull::{Quality, qualities};
 use crate::console::Console;
-use crate::numbers::{bits_per_gaussian, grouped, hex_digest};
+use crate::numbers::hex_digest;
 use crate::stream_file::StreamFile;
-use crate::table::Table;
 use serde::Serialize;
+use splatstream_chart::numbers::{bits_per_gaussian, grouped};
+use splatstream_chart::table::Table;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;

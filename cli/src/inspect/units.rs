@@ -3,16 +3,14 @@
 use super::{Shown, span};
 use crate::console::Console;
 use crate::failure::StreamFault;
-use crate::numbers::grouped;
 use crate::stream_file::StreamFile;
-use crate::table::Table;
 use serde::Serialize;
+use splatstream_chart::numbers::grouped;
+use splatstream_chart::table::Table;
 use splatstream_format::entropy::layout::Section;
-use splatstream_format::levels::Levels;
+use splatstream_format::follower::{Content, Follower, Standing};
 use splatstream_format::payload::FramePayload;
-use splatstream_format::syntax::{
-    FrameType, IncrementHeader, Profile, SequenceParameters, UnitHeader, UnitType,
-};
+use splatstream_format::syntax::{FrameType, IncrementHeader, UnitHeader, UnitType};
 use splatstream_format::unit::{Landmark, Stream, Unit};
 use splatstream_format::{Error, Limits};
 
@@ -57,11 +55,9 @@ struct Counts {
 
 /// What lines need of the units before.
 struct Context {
-    profile: Profile,
+    follower: Follower,
     limits: Limits,
-    sequence: Option<SequenceParameters>,
     frame_type: Option<FrameType>,
-    levels: Levels,
 }
 
 /// Lists the units.
@@ -80,13 +76,8 @@ fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<E
         Ok(opened) => opened,
         Err(error) => return Some(error),
     };
-    let mut context = Context {
-        profile: opened.header().profile(),
-        limits: *limits,
-        sequence: None,
-        frame_type: None,
-        levels: Levels::default(),
-    };
+    let mut context =
+        Context { follower: Follower::new(opened.header().profile()), limits: *limits, frame_type: None };
     let mut units = opened.units();
     let mut first = None;
     while let Some(unit) = units.next_unit() {
@@ -155,37 +146,30 @@ impl Context {
     /// The line of a unit, and what is wrong with it.
     fn line(&mut self, number: usize, unit: &Unit<'_>) -> (Line, Option<Error>) {
         let mut line = Line::new(number, unit.at, &unit.header);
-        let mut error = unit.check_header(self.profile).err();
+        let standing = self.follower.take(unit);
+        line.damaged = standing.is_err();
         // What decoders discard may hold anything.
-        if self.levels.takes(&unit.header) {
-            error = error.or(unit.check_payload().err());
-            line.damaged = error.is_some();
+        if standing != Ok(Standing::Discarded) {
             self.take(unit, &mut line);
         }
         let of_frame = matches!(unit.header.unit_type(), UnitType::FrameHeader | UnitType::Increment);
         line.frame_type = self.frame_type.filter(|_| of_frame).map(FrameType::name);
-        (line, error)
+        (line, standing.err())
     }
 
-    /// Takes note of a unit that is not discarded, and of what it says into its line.
+    /// Takes note of what a unit that is not discarded says, and puts it into its line.
     fn take(&mut self, unit: &Unit<'_>, line: &mut Line) {
-        let (payload, at, profile) = (unit.payload, unit.payload_at, self.profile);
-        if !line.damaged {
-            self.levels.follow(unit, profile);
-        }
-        match (unit.header.unit_type(), &self.sequence) {
-            (UnitType::SequenceParameters, _) if !line.damaged => {
-                self.sequence = SequenceParameters::parse_payload(payload, at, profile).ok();
-            }
+        match (unit.header.unit_type(), self.follower.sequence()) {
             (UnitType::FrameHeader, Some(sequence)) => {
-                let parsed = FramePayload::parse(payload, at, sequence, &self.limits).ok();
+                let parsed = FramePayload::parse(unit.payload, unit.payload_at, sequence, &self.limits).ok();
                 let frame = parsed.filter(|_| !line.damaged);
                 self.frame_type = frame.as_ref().and_then(|frame| frame.header.kind());
                 line.cells = frame.and_then(|frame| Some(frame.cells?.coded.count));
             }
-            (UnitType::Increment, Some(sequence)) if !line.damaged => {
-                let parsed = IncrementHeader::parse(payload, at, sequence, profile).ok();
-                line.increment = parsed.map(|(header, _)| Counts::of(&header));
+            (UnitType::Increment, _) if !line.damaged => {
+                if let Ok(Content::Increment(header)) = self.follower.content(unit) {
+                    line.increment = Some(Counts::of(&header));
+                }
             }
             _ => {}
         }

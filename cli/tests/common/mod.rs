@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use serde_json::Value;
-use splatstream_scene::builtin::BuiltinScene;
-use splatstream_scene::ply;
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::ply;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

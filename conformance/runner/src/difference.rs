@@ -6,7 +6,7 @@
 use crate::attribute::{Attribute, from_bytes, to_bytes};
 use crate::case::{Case, states_of};
 use crate::digest;
-use crate::judge::Files;
+use crate::files::Files;
 use crate::output::Output;
 use crate::reference::Decoded;
 use crate::resemblance;

@@ -4,6 +4,7 @@ use crate::attribute::Attribute;
 use serde::{Deserialize, Serialize};
 use splatstream_decoder::process::DecodedFrame;
 use splatstream_format::Limits;
+use splatstream_format::follower::{Follower, Standing};
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{SequenceParameters, UnitType};
 use splatstream_format::unit::{Stream, Unit};
@@ -65,22 +66,16 @@ impl SourceUnits {
     pub(crate) fn of(bytes: &[u8]) -> Self {
         let mut found = Self::default();
         let Ok(stream) = Stream::open(bytes, &Limits::of_level(4)) else { return found };
-        let profile = stream.header().profile();
-        let mut sequence = None;
+        let mut follower = Follower::new(stream.header().profile());
         let mut units = stream.units();
         let mut index = 0_usize;
         while let Some(Ok(unit)) = units.next_unit() {
-            if unit.check_header(profile).is_ok() && unit.check_payload().is_ok() {
+            if follower.take(&unit) == Ok(Standing::Taken) {
                 match unit.header.unit_type() {
-                    UnitType::SequenceParameters => {
-                        let parsed =
-                            SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile);
-                        sequence = parsed.ok().or(sequence);
-                    }
                     UnitType::FrameHeader => found.frames.push(unit.header.frame),
                     UnitType::Increment => found
                         .increments
-                        .extend(sequence.as_ref().and_then(|sequence| Coded::of(index, &unit, sequence))),
+                        .extend(follower.sequence().and_then(|sequence| Coded::of(index, &unit, sequence))),
                     _ => {}
                 }
             }

@@ -1,8 +1,8 @@
 //! The vectors on disk.
 
+use crate::counted::counted;
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::report::summary::counted;
 use crate::vector::{Kind, Mode, SCHEMA, Vector};
 use splatstream_format::syntax::SPECIFICATION;
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Contexts while a plane is decoded, for all lanes of a block together.
 
 use super::{DeltaNeighbours, SourceValues, is_serial, term};
-use crate::block::CodedBlock;
+use crate::coded_block::CodedBlock;
 use splatstream_format::entropy::MAX_LANES;
 use splatstream_format::entropy::layout::PlaneInfo;
 use splatstream_format::entropy::model::{AxisLookup, Source};

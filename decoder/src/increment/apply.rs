@@ -5,15 +5,18 @@
 //! 3. Removed parents go, and the new Gaussians, predicted and corrected by their residuals, are appended.
 
 use super::prediction::{Predicting, Prediction};
-use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
+use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use super::values::{SectionValues, UnitValues};
 use crate::attribute::{ATTRIBUTE_RANGE, in_range};
-use crate::displacement::{Cell, CellField, rotation_unit};
+use crate::cell::{Cell, rotation_unit};
+use crate::displacement::CellField;
 use crate::frame::QuantizedFrame;
+use crate::interrupt::Interrupt;
 use crate::list::{Change, FINE, GaussianList};
 use crate::moves::{MovePredictor, MoveSpace, Moves, SpanRatio};
 use crate::position::{collect, positions};
 use crate::predictor::Predictor;
+use crate::stage::Stage;
 use core::ops::RangeInclusive;
 use rayon::prelude::*;
 use splatstream_format::entropy::layout::Section;
@@ -48,6 +51,8 @@ pub struct Unit<'a> {
     pub network: Option<&'a Network>,
     /// How many new Gaussians the network may predict (A.2).
     pub max_learned: u32,
+    /// Ends the work on the unit.
+    pub interrupt: &'a Interrupt,
     /// Absolute offset of the payload, for errors.
     pub at: u64,
 }
@@ -154,15 +159,18 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
         list.change = Change::between(temporal.reference, &list);
     }
     list.retain(&keep);
+    unit.interrupt.check()?;
     let set = match predictors.iter().any(|&predictor| predictor != Predictor::None) {
         true => reference_set(situation, before.as_ref().unwrap_or(&list.planes)),
         false => QuantizedFrame::default(),
     };
+    unit.interrupt.check()?;
     if !set.is_empty() {
         check_learned(unit, &predictors)?;
     }
     let position = new_positions(unit)?;
     let added = new_gaussians(unit, situation.temporal.is_none(), position, &predictors, &set)?;
+    unit.interrupt.check()?;
     list.append(&added);
     Ok(Applied { list, added: added.planes, keep })
 }
@@ -199,7 +207,10 @@ fn change_parents(
     if !updated.is_empty() {
         let mut attributes = Attributes::of_list(list, &updated);
         let values = AttributeValues(&unit.values.section(Section::Updates).planes);
-        attributes.add(values, &unit.coding, unit.at)?;
+        for stage in Stage::ALL {
+            unit.interrupt.check()?;
+            attributes.add_stage(stage, values, &unit.coding, unit.at)?;
+        }
         attributes.write_to(list, &updated);
     }
     if !moved.is_empty() || !updated.is_empty() {
@@ -275,6 +286,9 @@ fn move_predicted(unit: &Unit<'_>, list: &mut GaussianList, space: &MoveSpace, m
     };
     let mut moves: Moves<'_> = space.moves(modes, |number| predictor_of(number).has_neighbours());
     for number in 0..moves.rows().len() {
+        if number.is_multiple_of(RUN) {
+            unit.interrupt.check()?;
+        }
         let mut position = moves.predicted(number, predictor_of(number));
         for (axis, coordinate) in position.iter_mut().enumerate() {
             let value = unit.values.plane(Section::Moves, axis).get(number).copied().unwrap_or(0);
@@ -354,6 +368,7 @@ fn new_gaussians(
         colour: unit.coding.colour,
         network: unit.network,
         feature_shift: unit.sequence.feature_shift,
+        interrupt: unit.interrupt,
     };
     let prediction = Prediction::new(set, position.each_ref().map(Vec::as_slice), predictors, &by);
     let attributes = match prediction {
@@ -377,6 +392,7 @@ fn new_gaussians(
 /// reconstructed on all cores.
 fn unpredicted(count: usize, sh_planes: usize, values: &[Vec<i32>], unit: &Unit<'_>) -> Result<Attributes> {
     let run = |start: usize| {
+        unit.interrupt.check()?;
         let range = start..count.min(start.saturating_add(RUN));
         let part: Vec<Vec<i32>> =
             values.iter().map(|plane| plane.get(range.clone()).unwrap_or_default().to_vec()).collect();

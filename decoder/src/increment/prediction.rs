@@ -3,12 +3,14 @@
 //! Attributes are predicted in coding order, each just before its residual is added, because the bilateral
 //! predictor compares what is known of a Gaussian with its neighbours.
 
-use super::residual::{AttributeCoding, AttributeValues, Attributes, Stage};
+use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use crate::colour::Colour;
 use crate::frame::QuantizedFrame;
+use crate::interrupt::Interrupt;
 use crate::list::{FINE, canonical};
 use crate::neighbours::{Neighbour, NeighbourSearch};
 use crate::predictor::{NEIGHBOURS_MAX, Predictor, WeightedMean, bilateral_weights, knn_weights};
+use crate::stage::Stage;
 use crate::transformer::LaneNetwork;
 use core::ops::Range;
 use learned::{Learned, Target};
@@ -34,6 +36,8 @@ pub struct Predicting<'a> {
     pub network: Option<&'a Network>,
     /// `feature_shift` of the sequence.
     pub feature_shift: u8,
+    /// Ends the work: what is predicted means nothing then.
+    pub interrupt: &'a Interrupt,
 }
 
 /// Items, at least, that are worth another thread.
@@ -65,6 +69,7 @@ pub struct Prediction<'s> {
     feature_shift: u8,
     /// The network, if a Gaussian takes it.
     network: Option<LaneNetwork>,
+    interrupt: &'s Interrupt,
 }
 
 impl<'s> Prediction<'s> {
@@ -92,7 +97,7 @@ impl<'s> Prediction<'s> {
         let position = [pick(x), pick(y), pick(z)];
         let count = usize::from(header.neighbour_count).min(set.len());
         let search = NeighbourSearch::new(set.position.each_ref().map(Vec::as_slice));
-        let neighbours = search.nearest_to_all(position.each_ref().map(Vec::as_slice), count);
+        let neighbours = search.nearest_unless(by.interrupt, position.each_ref().map(Vec::as_slice), count);
         let features = vec![0; neighbours.len()];
         let falloff = [header.bilateral_spatial, header.bilateral_feature];
         let network = by.network.filter(|_| predictors.contains(&Predictor::Transformer));
@@ -110,6 +115,7 @@ impl<'s> Prediction<'s> {
             falloff,
             feature_shift,
             network,
+            interrupt: by.interrupt,
         })
     }
 
@@ -125,7 +131,9 @@ impl<'s> Prediction<'s> {
         at: u64,
     ) -> Result<()> {
         for stage in Stage::ALL {
+            self.interrupt.check()?;
             self.predict(stage, attributes);
+            self.interrupt.check()?;
             attributes.add_stage(stage, values, coding, at)?;
             self.learn(stage, attributes);
         }
@@ -158,10 +166,10 @@ impl<'s> Prediction<'s> {
 
     /// The network, if a Gaussian takes it.
     pub fn learned(&self) -> Option<Learned<'_>> {
-        let Self { network, set, rows, colour, feature_shift, .. } = self;
+        let Self { network, set, rows, colour, feature_shift, interrupt, .. } = self;
         network.as_ref().map(|network| {
             let projection = Projection::new(network.header(), colour.dc, colour.sh);
-            Learned { network, projection, set, rows, feature_shift: *feature_shift }
+            Learned { network, projection, set, rows, feature_shift: *feature_shift, interrupt }
         })
     }
 
@@ -221,7 +229,8 @@ impl<'s> Prediction<'s> {
         let mut means = vec![0; self.items.len().wrapping_mul(out.len())];
         let each = means.par_chunks_exact_mut(out.len().max(1)).zip(&self.items).enumerate();
         each.with_min_len(RUN).for_each(|(index, (means, item))| {
-            if !(colour && item.predictor == Predictor::Transformer) {
+            let is_learned = colour && item.predictor == Predictor::Transformer;
+            if !is_learned && !self.interrupt.is_requested() {
                 let rows = self.rows.of(self.range(index)).filter_map(|row| row.get(columns.clone()));
                 let weighted = WeightedMean::new(&self.weights(index, item.predictor));
                 weighted.of_rows(rows, means);
@@ -240,7 +249,7 @@ impl<'s> Prediction<'s> {
         let columns = self.rows.columns(stage);
         let mut mine = [0; 3];
         for (index, item) in self.items.iter().enumerate() {
-            if !self.is_compared(item) {
+            if !self.is_compared(item) || self.interrupt.is_requested() {
                 continue;
             }
             mine.iter_mut().zip(own).for_each(|(mine, plane)| *mine = grid(at(plane, item.row)));

@@ -2,8 +2,9 @@
 
 use crate::attribute::{ATTRIBUTE_RANGE, in_range, unsorted};
 use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
-use crate::layout::{Attribute, ShCoding};
+use crate::layout::ShCoding;
 use crate::list::{FINE, FRACTION_BITS, GaussianList};
+use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule, step};
 use core::ops::RangeInclusive;
 use splatstream_format::Result;
@@ -21,38 +22,6 @@ pub struct AttributeCoding<'a> {
     pub canonical_axes: bool,
     /// How components become colour.
     pub colour: Colour<'a>,
-}
-
-/// The attributes in the order in which they are reconstructed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// Log-scales.
-    LogScale,
-    /// Opacity.
-    Opacity,
-    /// Rotation.
-    Rotation,
-    /// dc.
-    Dc,
-    /// sh.
-    Sh,
-}
-
-impl Stage {
-    /// Every attribute, in order.
-    pub const ALL: [Self; 5] = [Self::LogScale, Self::Opacity, Self::Rotation, Self::Dc, Self::Sh];
-
-    /// That of the planes of an attribute, if it is one of those.
-    pub const fn of(attribute: Attribute) -> Option<Self> {
-        match attribute {
-            Attribute::LogScale => Some(Self::LogScale),
-            Attribute::Opacity => Some(Self::Opacity),
-            Attribute::Rotation => Some(Self::Rotation),
-            Attribute::Dc => Some(Self::Dc),
-            Attribute::Sh => Some(Self::Sh),
-            _ => None,
-        }
-    }
 }
 
 /// The attributes of a run of Gaussians: predictions at first, then what the residuals make of them.

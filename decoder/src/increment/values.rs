@@ -1,7 +1,9 @@
 //! Clauses 8.1 to 8.6 for increments: the sections of a unit to the values of its planes.
 
 use crate::attribute;
-use crate::block::{Buffers, CodedBlock, CodedPlanes, decode_coded};
+use crate::block::{CodedPlanes, decode_coded};
+use crate::coded_block::{Buffers, CodedBlock};
+use crate::interrupt::Interrupt;
 use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::Result;
@@ -118,10 +120,13 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
     ///
     /// # Errors
     /// Malformed; of several faults, that of the first block.
-    pub fn decode(&self, sequence: &SequenceParameters) -> Result<UnitValues> {
+    pub fn decode(&self, sequence: &SequenceParameters, interrupt: &Interrupt) -> Result<UnitValues> {
         let mut values = UnitValues::default();
         for (coded, models) in self.sections() {
-            values.set(coded.section, joined(self.blocks(coded, models, sequence)?, models, sequence));
+            values.set(
+                coded.section,
+                joined(self.blocks(coded, models, sequence, interrupt)?, models, sequence),
+            );
         }
         Ok(values)
     }
@@ -135,13 +140,14 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
         coded: &CodedSection<'a>,
         models: &SectionModels,
         sequence: &SequenceParameters,
+        interrupt: &Interrupt,
     ) -> Result<Vec<CodedBlock>> {
         let decoders: Vec<PlaneDecoder> = models.models.iter().map(PlaneDecoder::new).collect();
         let planes = CodedPlanes { lanes_log2: coded.lanes_log2, layout: &models.layout, steps: self.steps };
         let decoded: Vec<Result<CodedBlock>> = blocks_of(coded, sequence)
             .into_par_iter()
             .map(|(bytes, at, count)| {
-                decode_coded(bytes, at, count, &planes, &decoders, &mut Buffers::default())
+                decode_coded(bytes, at, count, &planes, &decoders, &mut Buffers::new(interrupt))
             })
             .collect();
         decoded.into_iter().collect()

@@ -5,10 +5,11 @@
 //! kept for each highest spatial layer.
 
 use super::OperatingPoint;
+use splatstream_format::follower::Follower;
 use splatstream_format::payload::OperatingPoints;
 use splatstream_format::syntax::{
-    FrameRole, GopHeader, IncrementHeader, OperatingPointEntry, OperatingPointsHeader, Profile,
-    SequenceParameters, UnitHeader, UnitType,
+    FrameRole, IncrementHeader, OperatingPointEntry, OperatingPointsHeader, Profile, SequenceParameters,
+    UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Stream, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
@@ -26,51 +27,6 @@ pub struct OperatingPointInfo {
     pub frames: u32,
     /// Share of the Gaussians of a frame up to its refinement, percent.
     pub percent: u8,
-}
-
-/// Whether units belong to operating points, as far as that depends on the units before.
-#[derive(Debug, Clone)]
-pub(crate) struct Belonging {
-    profile: Profile,
-    /// The first sequence parameters.
-    sequence: Option<SequenceParameters>,
-    /// The GOP in progress and its first frame.
-    gop: Option<(GopHeader, u32)>,
-}
-
-impl Belonging {
-    pub(crate) const fn new(profile: Profile) -> Self {
-        Self { profile, sequence: None, gop: None }
-    }
-
-    /// Takes note of sequence parameters and GOP headers.
-    pub(crate) fn follow(&mut self, unit: &Unit<'_>) {
-        match unit.header.unit_type() {
-            UnitType::SequenceParameters => {
-                let parsed = SequenceParameters::parse_payload(unit.payload, unit.payload_at, self.profile);
-                self.sequence = self.sequence.or(parsed.ok());
-            }
-            UnitType::GopHeader => {
-                let parsed = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile);
-                self.gop = parsed.ok().map(|gop| (gop, unit.header.frame));
-            }
-            _ => {}
-        }
-    }
-
-    /// The number of spatial layers, for an increment of a whole anchor: the I frame of a predicted GOP, if the sequence
-    /// says that a receiver of all spatial layers takes all of it.
-    fn whole_anchor_layers(&self, header: &UnitHeader) -> Option<u8> {
-        let sequence = self.sequence.filter(SequenceParameters::whole_anchor)?;
-        let (gop, first_frame) = self.gop?;
-        let is_anchor = gop.is_predicted() && header.frame == first_frame;
-        (header.unit_type() == UnitType::Increment && is_anchor).then_some(sequence.spatial_layer_count)
-    }
-
-    /// Whether a unit belongs to an operating point.
-    pub(crate) fn takes(&self, point: OperatingPoint, header: &UnitHeader) -> bool {
-        point.takes(header, self.whole_anchor_layers(header))
-    }
 }
 
 /// Sums by highest spatial layer, temporal layer and refinement.
@@ -91,7 +47,7 @@ struct TalliedFrame {
 /// The sums of a stream.
 #[derive(Debug, Clone)]
 pub struct Tally {
-    belonging: Belonging,
+    follower: Follower,
     bytes: Sums,
     gaussians: Sums,
     /// Frames of each temporal layer.
@@ -105,7 +61,7 @@ impl Tally {
     /// For a stream of a profile.
     pub const fn new(profile: Profile) -> Self {
         Self {
-            belonging: Belonging::new(profile),
+            follower: Follower::new(profile),
             bytes: [[[0; 10]; 4]; 4],
             gaussians: [[[0; 10]; 4]; 4],
             frames: [0; 4],
@@ -114,14 +70,19 @@ impl Tally {
         }
     }
 
+    /// Of the same sequence, without any unit.
+    pub(crate) fn restarted(&self) -> Self {
+        Self { follower: self.follower.restarted(), ..Self::new(self.follower.profile()) }
+    }
+
     /// Whether a unit, which need not be counted, belongs to an operating point.
     pub(crate) fn takes(&self, point: OperatingPoint, header: &UnitHeader) -> bool {
-        self.belonging.takes(point, header)
+        point.takes(header, self.follower.whole_anchor_layers(header))
     }
 
     /// Takes note of a unit.
     pub fn unit(&mut self, unit: &Unit<'_>) {
-        self.belonging.follow(unit);
+        self.follower.follow(unit);
         let header = &unit.header;
         match header.unit_type() {
             UnitType::FrameHeader => self.begin_frame(header),
@@ -131,13 +92,13 @@ impl Tally {
             _ => return,
         }
         let length = UnitHeader::SIZE.saturating_add(unit.payload.len());
-        let whole = self.belonging.whole_anchor_layers(header);
+        let whole = self.follower.whole_anchor_layers(header);
         add(&mut self.bytes, header, header.spatial_layer..4, whole, size(length), u64::saturating_add);
     }
 
     fn begin_frame(&mut self, header: &UnitHeader) {
         self.store_level();
-        let (Some(sequence), Some((gop, first))) = (self.belonging.sequence, self.belonging.gop) else {
+        let (Some(sequence), Some(&(gop, first))) = (self.follower.sequence(), self.follower.gop()) else {
             return;
         };
         let role = gop.role(header.frame.saturating_sub(first));
@@ -156,7 +117,7 @@ impl Tally {
 
     /// Keeps the level of the frame that ends.
     fn store_level(&mut self) {
-        let (Some(frame), Some(sequence)) = (self.frame.take(), self.belonging.sequence) else { return };
+        let (Some(frame), Some(sequence)) = (self.frame.take(), self.follower.sequence()) else { return };
         let layers = usize::from(sequence.spatial_layer_count);
         let complete = frame.counts.iter().take(layers).all(|&count| count == sequence.refinement_count);
         let count = frame.counts.get(layers.saturating_sub(1)).copied().unwrap_or(0);
@@ -170,14 +131,14 @@ impl Tally {
     /// The Gaussians of a unit, if it is decoded: they replace those of the spatial layer below.
     fn increment(&mut self, unit: &Unit<'_>) {
         let header = &unit.header;
-        let whole = self.belonging.whole_anchor_layers(header);
-        let (Some(frame), Some(sequence)) = (&mut self.frame, &self.belonging.sequence) else { return };
+        let whole = self.follower.whole_anchor_layers(header);
+        let (Some(frame), Some(sequence)) = (&mut self.frame, self.follower.sequence()) else { return };
         let (layer, refinement) = (usize::from(header.spatial_layer), usize::from(header.refinement));
         let (Some(count), Some(slot)) = (frame.counts.get_mut(layer), frame.sizes.get_mut(refinement)) else {
             return;
         };
         let is_next = header.refinement == *count && header.refinement < frame.limit;
-        let profile = self.belonging.profile;
+        let profile = self.follower.profile();
         let parsed = IncrementHeader::parse(unit.payload, unit.payload_at, sequence, profile);
         let (true, true, Ok((increment, _))) = (is_next, header.frame == frame.index, parsed) else { return };
         *count = count.saturating_add(1);
@@ -189,7 +150,7 @@ impl Tally {
 
     /// Every operating point of the sequence, lowest first.
     pub fn points(&self) -> Vec<OperatingPoint> {
-        self.belonging.sequence.as_ref().map(all_points).unwrap_or_default()
+        self.follower.sequence().map(all_points).unwrap_or_default()
     }
 
     /// What a point costs and shows.
@@ -210,7 +171,7 @@ impl Tally {
     }
 
     fn percent(&self, refinement: u8) -> u8 {
-        let percents = self.belonging.sequence.map_or([0; 10], |sequence| sequence.refinement_percent);
+        let percents = self.follower.sequence().map_or([0; 10], |sequence| sequence.refinement_percent);
         percents.get(usize::from(refinement)).copied().unwrap_or(100)
     }
 

@@ -7,6 +7,7 @@ use crate::carried::Carried;
 use crate::digest::lists_digest;
 use crate::frame::QuantizedFrame;
 use crate::frame_state::{FrameState, span_log2};
+use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
 use splatstream_format::{Error, ErrorKind};
 use std::sync::Arc;
@@ -18,9 +19,11 @@ pub(super) struct Closed {
     pub(super) state: FrameState,
     /// The carried lists are not those of their digest.
     pub(super) fault: Option<Error>,
+    /// The identity of the next new Gaussian.
+    pub(super) next_identity: u32,
 }
 
-impl FrameInProgress<'_> {
+impl FrameInProgress {
     /// Ends the frame, all units of which have been decoded. The digest of carried lists is compared if a unit ends the
     /// frame, not if an error does.
     pub(super) fn close(
@@ -63,15 +66,21 @@ impl FrameInProgress<'_> {
         let mut state =
             FrameState { index: self.index, level, carried_shift: shift, ..FrameState::default() };
         if context.gop.header.is_predicted() {
-            self.lists.divide();
-            state.carried = (decoded.level > 0).then(|| Carried::new(self.lists.lists.iter().cloned()));
+            self.lists.divide(context.options.identities);
+            state.identities = self.lists.identities.clone();
+            let lists = || self.lists.lists.iter().cloned();
+            state.carried = (decoded.level > 0).then(|| Carried::new(lists(), &self.lists.identities));
             state.anchor = sequence.whole_anchor().then(|| self.lists.lists.as_slice().into());
             state.is_exact = level == refinements;
         }
-        decoded.planes = self.lists.planes(sh_planes);
+        decoded.planes = self.lists.planes(sh_planes, context.interrupt);
+        if context.options.identities {
+            decoded.identities = self.lists.shown_identities(decoded.planes.len());
+        }
+        let next_identity = self.lists.next_identity;
         state.lists = self.lists.lists;
         state.models = self.lists.models.first;
-        Closed { decoded, state, fault: None }
+        Closed { decoded, state, fault: None, next_identity }
     }
 
     fn close_predicted(
@@ -84,7 +93,11 @@ impl FrameInProgress<'_> {
         let level = usize::from(decoded.level);
         let shows_subset = context.options.subset && level > 0;
         let mut fault = None;
-        decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()));
+        decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()), context.interrupt);
+        if context.options.identities {
+            decoded.identities = self.lists.shown_identities(decoded.planes.len());
+            state.identities = self.lists.identities.clone();
+        }
         if let Some(reference) = reference {
             state.span_log2 = span_log2(self.index, reference);
             state.anchor = reference.anchor.clone();
@@ -111,9 +124,10 @@ impl FrameInProgress<'_> {
         decoded.is_lost = level == 0 && decoded.carried_lists == 0;
         let refinements = context.sequence.refinement_count;
         decoded.compensation = self.lists.compensation(&decoded, refinements, state.carried_shift);
+        let next_identity = self.lists.next_identity;
         state.lists = self.lists.lists;
         state.models = self.lists.models.first;
-        Closed { decoded, state, fault }
+        Closed { decoded, state, fault, next_identity }
     }
 }
 
@@ -122,6 +136,7 @@ fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried) {
     let exact = decoded.planes.len();
     for h in usize::from(decoded.level)..carried.len() {
         decoded.planes.append(&carried.list(h).planes);
+        decoded.identities.extend_from_slice(&carried.identities(h));
         decoded.carried_lists = decoded.carried_lists.saturating_add(1);
     }
     decoded.carried = decoded.planes.len().saturating_sub(exact);
@@ -129,13 +144,22 @@ fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried) {
 
 impl Lists {
     /// The exact Gaussians, list by list.
-    fn planes(&mut self, sh_planes: usize) -> QuantizedFrame {
+    fn planes(&mut self, sh_planes: usize, interrupt: &Interrupt) -> QuantizedFrame {
         if self.lists.is_empty() && !self.planes.is_empty() {
             return core::mem::take(&mut self.planes);
         }
         let mut planes = QuantizedFrame::zeroed(0, sh_planes);
-        self.lists.iter().for_each(|list| planes.append(&list.planes));
+        let lists = self.lists.iter().take_while(|_| !interrupt.is_requested());
+        lists.for_each(|list| planes.append(&list.planes));
         planes
+    }
+
+    /// The identities of the exact Gaussians, of which there are so many.
+    fn shown_identities(&mut self, count: usize) -> Vec<u32> {
+        match self.identities.is_empty() {
+            true => self.identify(count).collect(),
+            false => self.identities.iter().flat_map(|identities| identities.iter().copied()).collect(),
+        }
     }
 
     /// What the last unit says of a frame that ends with it.

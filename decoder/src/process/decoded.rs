@@ -30,6 +30,9 @@ pub struct DecodedFrame {
     pub digest: Option<u64>,
     /// Digest of all carried lists of the frame, where it was compared.
     pub carried_digest: Option<u64>,
+    /// The identity of each Gaussian of `planes`, if they were asked for: in two frames the same for the same Gaussian, and
+    /// in one frame different for each. Gaussians of different GOPs are different.
+    pub identities: Vec<u32>,
     /// What is added before output.
     pub compensation: Compensation,
     /// Bytes of the units of the frame that were decoded, headers included.
@@ -74,6 +77,7 @@ impl DecodedFrame {
             is_lost: false,
             digest: None,
             carried_digest: None,
+            identities: Vec::new(),
             compensation: Compensation::default(),
             bytes: 0,
             entropy: Vec::new(),

@@ -7,8 +7,8 @@
 //! Where units only add Gaussians without predictors, steps 2 and 3 are one: see [`crate::direct`].
 
 use super::decoded::Shift;
-use super::frame::{Context, FrameInProgress, PendingUnit, Refused};
-use crate::digest::{ListDigest, list_digest, lists_digest};
+use super::frame::{Context, DividedUnit, FrameInProgress, Refused};
+use crate::digest::{ListDigest, list_digest_unless, lists_digest};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::frame::QuantizedFrame;
@@ -16,6 +16,7 @@ use crate::frame_state::{FrameState, span_log2};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, SectionCoding, UnitValues};
 use crate::increment::{Applied, Situation, Temporal, Unit, apply};
+use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::list::GaussianList;
 use crate::moves::{MoveSpace, SpanRatio};
@@ -49,7 +50,14 @@ pub(super) struct Lists {
     kept: Vec<Vec<bool>>,
     /// In a P or B frame: the parents of the first units, as far as moves were predicted from them.
     moves: Option<MoveSpace>,
+    /// The identities of the Gaussians of each list, if they are asked for.
+    pub(super) identities: Vec<Identities>,
+    /// The identity of the next new Gaussian.
+    pub(super) next_identity: u32,
 }
+
+/// The identities of the Gaussians of a list, in order.
+pub(crate) type Identities = Arc<Vec<u32>>;
 
 /// The last unit of a list.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +71,7 @@ pub(super) struct Head {
 
 /// A pending unit with its models read.
 struct Prepared<'r, 'a> {
-    unit: &'r PendingUnit<'a>,
+    unit: &'r DividedUnit<'a>,
     sections: PreparedSections<'r, 'a>,
     coding: AttributeCoding<'r>,
     /// The models in force after the unit.
@@ -71,19 +79,45 @@ struct Prepared<'r, 'a> {
 }
 
 impl Lists {
-    /// Of a frame with these models in force before its first unit.
-    pub(super) fn new(models: ModelsInForce) -> Self {
-        Self { models: ModelsOfFrame::starting_with(models), ..Self::default() }
+    /// Of a frame with these models in force before its first unit, whose new Gaussians have identities from this one on.
+    pub(super) fn new(models: ModelsInForce, next_identity: u32) -> Self {
+        Self { models: ModelsOfFrame::starting_with(models), next_identity, ..Self::default() }
     }
 
-    /// Makes lists of the planes.
-    pub(super) fn divide(&mut self) {
+    /// So many new identities.
+    pub(super) fn identify(&mut self, count: usize) -> impl Iterator<Item = u32> + use<> {
+        let first = self.next_identity;
+        self.next_identity = u32::try_from(count).unwrap_or(u32::MAX).wrapping_add(first);
+        (0..count).scan(first, |next, _| {
+            let identity = *next;
+            *next = next.wrapping_add(1);
+            Some(identity)
+        })
+    }
+
+    /// Takes note of what a unit made of the identities of its parents.
+    fn follow_identities(&mut self, r: usize, parents: Identities, keep: &[bool], added: usize) {
+        let mut identities = parents;
+        if added > 0 || !keep.iter().all(|&keep| keep) {
+            let changed = Arc::make_mut(&mut identities);
+            crate::frame::retain(changed, keep);
+            changed.extend(self.identify(added));
+        }
+        put(&mut self.identities, r, identities);
+    }
+
+    /// Makes lists of the planes; gives the Gaussians identities if `identifies` says so.
+    pub(super) fn divide(&mut self, identifies: bool) {
         if !self.lists.is_empty() {
             return;
         }
         let mut start = 0_usize;
-        for head in &self.heads {
+        for (r, head) in core::mem::take(&mut self.heads).into_iter().enumerate() {
             let end = start.saturating_add(head.size);
+            if identifies {
+                self.follow_identities(r, Arc::default(), &[], head.size);
+            }
+            self.heads.push(head);
             self.lists.push(Arc::new(GaussianList::of_planes(self.planes.part(start..end), true)));
             start = end;
         }
@@ -118,15 +152,24 @@ fn put<T>(values: &mut Vec<T>, index: usize, value: T) {
     }
 }
 
-impl<'a> FrameInProgress<'a> {
+impl FrameInProgress {
     /// Decodes the pending units; gives their errors in stream order.
     pub(super) fn decode(&mut self, context: &Context<'_>) -> Vec<Error> {
         let pending = core::mem::take(&mut self.pending);
+        let divided: Result<Vec<DividedUnit<'_>>> =
+            pending.iter().map(|unit| unit.divided(context)).collect();
+        match divided {
+            Ok(units) => self.decode_units(&units, context),
+            Err(error) => vec![error],
+        }
+    }
+
+    fn decode_units(&mut self, pending: &[DividedUnit<'_>], context: &Context<'_>) -> Vec<Error> {
         let mut errors = Vec::new();
-        let prepared = self.prepare(&pending, context);
-        let is_direct = self.is_direct(&pending, context);
+        let prepared = self.prepare(pending, context);
+        let is_direct = self.is_direct(pending, context);
         if !is_direct {
-            self.lists.divide();
+            self.lists.divide(context.options.identities);
         }
         let mut rest = prepared.as_slice();
         while !rest.is_empty() {
@@ -143,22 +186,22 @@ impl<'a> FrameInProgress<'a> {
 
     /// Reads the models of the units. A unit whose models are wrong is the last: those after it are of no use, or they are
     /// judged again once the error has been reported.
-    fn prepare<'r>(
+    fn prepare<'r, 'a>(
         &self,
-        units: &'r [PendingUnit<'a>],
+        units: &'r [DividedUnit<'a>],
         context: &Context<'r>,
-    ) -> Vec<(&'r PendingUnit<'a>, Result<Prepared<'r, 'a>>)> {
+    ) -> Vec<(&'r DividedUnit<'a>, Result<Prepared<'r, 'a>>)> {
         let mut in_force = self.lists.models.clone();
-        let prepare = |unit: &'r PendingUnit<'a>| {
+        let prepare = |unit: &'r DividedUnit<'a>| {
             let prepared = self.prepared(unit, context, &mut in_force);
             (unit, prepared)
         };
         units.iter().map(prepare).collect()
     }
 
-    fn prepared<'r>(
+    fn prepared<'r, 'a>(
         &self,
-        unit: &'r PendingUnit<'a>,
+        unit: &'r DividedUnit<'a>,
         context: &Context<'r>,
         in_force: &mut ModelsOfFrame,
     ) -> Result<Prepared<'r, 'a>> {
@@ -177,16 +220,16 @@ impl<'a> FrameInProgress<'a> {
     }
 
     /// Whether the units can be decoded straight into planes. Entropy states need the values by themselves.
-    fn is_direct(&self, units: &[PendingUnit<'a>], context: &Context<'_>) -> bool {
-        let of_lowest_layer = |unit: &PendingUnit<'_>| self.is_intra() && unit.spatial_layer == 0;
-        let is_direct = |unit: &PendingUnit<'_>| of_lowest_layer(unit) && direct::is_direct(&unit.increment);
+    fn is_direct(&self, units: &[DividedUnit<'_>], context: &Context<'_>) -> bool {
+        let of_lowest_layer = |unit: &DividedUnit<'_>| self.is_intra() && unit.spatial_layer == 0;
+        let is_direct = |unit: &DividedUnit<'_>| of_lowest_layer(unit) && direct::is_direct(&unit.increment);
         self.lists.lists.is_empty() && !context.options.entropy && units.iter().all(is_direct)
     }
 
     /// Decodes units whose blocks go straight into planes. They are of one layer: after one that fails none is accepted.
     fn decode_direct(
         &mut self,
-        group: &[(&PendingUnit<'a>, Result<Prepared<'_, 'a>>)],
+        group: &[(&DividedUnit<'_>, Result<Prepared<'_, '_>>)],
         context: &Context<'_>,
         errors: &mut Vec<Error>,
     ) {
@@ -199,7 +242,7 @@ impl<'a> FrameInProgress<'a> {
                 coding: *coding,
             })
             .collect();
-        let (mut planes, results) = direct::decode(&units, context.sequence);
+        let (mut planes, results) = direct::decode(&units, context.sequence, context.interrupt);
         let mut results = results.into_iter();
         let mut kept = 0_usize;
         for (unit, prepared) in group {
@@ -209,7 +252,8 @@ impl<'a> FrameInProgress<'a> {
             let taken = known(prepared).and_then(|prepared| {
                 let added = results.next().unwrap_or(Ok(0))?;
                 let end = kept.wrapping_add(added);
-                self.check_list(unit, context, || list_digest(&planes, kept..end))?;
+                let digest = || list_digest_unless(context.interrupt, &planes, kept..end);
+                self.check_list(unit, context, digest)?;
                 put(&mut self.lists.heads, unit.refinement.into(), Head::new(unit, added, added));
                 self.finish_unit(unit, added, prepared);
                 Ok(end)
@@ -229,13 +273,13 @@ impl<'a> FrameInProgress<'a> {
     /// Decodes units whose lists depend on others.
     fn decode_group(
         &mut self,
-        group: &[(&PendingUnit<'a>, Result<Prepared<'_, 'a>>)],
+        group: &[(&DividedUnit<'_>, Result<Prepared<'_, '_>>)],
         context: &Context<'_>,
         errors: &mut Vec<Error>,
     ) {
         let values: Vec<Result<UnitValues>> = group
             .par_iter()
-            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence))
+            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence, context.interrupt))
             .collect();
         for ((unit, prepared), values) in group.iter().zip(values) {
             if unit.refinement >= self.decoded.limit {
@@ -252,7 +296,7 @@ impl<'a> FrameInProgress<'a> {
     /// Applies a unit and checks its digest.
     fn unit(
         &mut self,
-        prepared: &Prepared<'_, 'a>,
+        prepared: &Prepared<'_, '_>,
         values: &UnitValues,
         context: &Context<'_>,
     ) -> Result<()> {
@@ -265,16 +309,26 @@ impl<'a> FrameInProgress<'a> {
             sequence: context.sequence,
             network: context.gop.network(),
             max_learned: context.options.limits.max_learned,
+            interrupt: context.interrupt,
             at: pending.payload_at,
         };
         let Applied { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
-        self.check_list(pending, context, || list.digest())?;
+        let digest = || list_digest_unless(context.interrupt, &list.planes, 0..list.len());
+        self.check_list(pending, context, digest)?;
         if context.options.entropy {
             let state = of_sections(&pending.increment.sections, values);
             let payload_at = pending.payload_at;
             self.entropy.extend(state.map(|state| UnitEntropy { payload_at, state }));
         }
         let (size, head) = (list.len(), Head::new(pending, list.len(), added.len()));
+        if context.options.identities {
+            let r = usize::from(pending.refinement);
+            let parents = match context.reference {
+                Some(reference) => reference.identities.get(r),
+                None => self.lists.identities.get(r),
+            };
+            self.lists.follow_identities(r, parents.cloned().unwrap_or_default(), &keep, added.len());
+        }
         self.lists.take(pending.refinement, list, head);
         put(&mut self.lists.kept, pending.refinement.into(), keep);
         self.finish_unit(pending, size, prepared);
@@ -282,6 +336,7 @@ impl<'a> FrameInProgress<'a> {
     }
 
     fn applied(&mut self, unit: &Unit<'_>, refinement: u8, context: &Context<'_>) -> Result<Applied> {
+        context.interrupt.check()?;
         let r = usize::from(refinement);
         let sh_planes = usize::from(context.sequence.sh_dimension());
         let empty = || GaussianList::empty(sh_planes);
@@ -298,7 +353,7 @@ impl<'a> FrameInProgress<'a> {
         let predicts_moves = unit.header.move_predictor_count() > 0;
         let predicts_new = unit.header.predictor_count() > 0;
         if predicts_moves || predicts_new {
-            self.displace_before(r, reference);
+            self.displace_before(r, reference, context.interrupt);
         }
         let mut moves = None;
         if predicts_moves {
@@ -322,8 +377,11 @@ impl<'a> FrameInProgress<'a> {
     }
 
     /// Displaces the lists before list r of the reference frame, unless units before have asked for them.
-    fn displace_before(&mut self, r: usize, reference: &FrameState) {
+    fn displace_before(&mut self, r: usize, reference: &FrameState, interrupt: &Interrupt) {
         for list in reference.lists.iter().take(r).skip(self.lists.displaced.len()) {
+            if interrupt.is_requested() {
+                return;
+            }
             let mut list = list.unchanged();
             list.displace(&self.field);
             self.lists.displaced.push(list);
@@ -359,7 +417,7 @@ impl<'a> FrameInProgress<'a> {
 
     fn check_list(
         &mut self,
-        unit: &PendingUnit<'_>,
+        unit: &DividedUnit<'_>,
         context: &Context<'_>,
         digest: impl FnOnce() -> ListDigest,
     ) -> Result<()> {
@@ -372,20 +430,20 @@ impl<'a> FrameInProgress<'a> {
     }
 
     /// Takes note of a unit that was decoded.
-    fn finish_unit(&mut self, unit: &PendingUnit<'_>, size: usize, prepared: &Prepared<'_, '_>) {
+    fn finish_unit(&mut self, unit: &DividedUnit<'_>, size: usize, prepared: &Prepared<'_, '_>) {
         self.bytes = self.bytes.saturating_add(unit.bytes);
         self.lists.models.follow(unit.refinement, prepared.models.clone());
         self.decoded.take(unit.spatial_layer, unit.refinement, u32::try_from(size).unwrap_or(u32::MAX));
     }
 
-    fn refuse(&mut self, unit: &PendingUnit<'_>, error: Error, errors: &mut Vec<Error>) {
+    fn refuse(&mut self, unit: &DividedUnit<'_>, error: Error, errors: &mut Vec<Error>) {
         self.fail(&Refused { error, limit: unit.refinement });
         errors.push(error);
     }
 }
 
 impl Head {
-    fn new(unit: &PendingUnit<'_>, size: usize, added: usize) -> Self {
+    fn new(unit: &DividedUnit<'_>, size: usize, added: usize) -> Self {
         let IncrementHeader { compensation_log_scale, compensation_opacity, .. } = unit.increment.header;
         let shift = Shift { log_scale: compensation_log_scale, opacity: compensation_opacity };
         Self { spatial_layer: unit.spatial_layer, shift, size, added }
@@ -398,9 +456,9 @@ fn known<'p, 'r, 'a>(prepared: &'p Result<Prepared<'r, 'a>>) -> Result<&'p Prepa
 }
 
 /// How many of the units, at least one, have their tables expanded and their values held at the same time.
-fn group_length(units: &[(&PendingUnit<'_>, Result<Prepared<'_, '_>>)], is_direct: bool) -> usize {
+fn group_length(units: &[(&DividedUnit<'_>, Result<Prepared<'_, '_>>)], is_direct: bool) -> usize {
     let (mut tables, mut values) = (0_usize, 0_u64);
-    let fits = |(_, prepared): &&(&PendingUnit<'_>, Result<Prepared<'_, '_>>)| {
+    let fits = |(_, prepared): &&(&DividedUnit<'_>, Result<Prepared<'_, '_>>)| {
         let more = prepared.as_ref().map_or(0, |prepared| prepared.sections.tables());
         tables = tables.saturating_add(more);
         values = values.saturating_add(prepared.as_ref().map_or(0, |prepared| prepared.sections.values()));

@@ -12,6 +12,8 @@ use crate::displacement::CellField;
 use crate::entropy_state::UnitEntropy;
 use crate::frame_state::FrameState;
 use crate::gop::{Gop, element_at};
+use crate::interrupt::Interrupt;
+use crate::operating_point::OperatingPoint;
 use splatstream_format::payload::Increment;
 use splatstream_format::syntax::{
     FrameHeader, FrameRole, IncrementHeader, ListSizes, Profile, SequenceParameters, UnitHeader,
@@ -24,6 +26,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy)]
 pub(super) struct Context<'d> {
     pub(super) options: &'d Options,
+    pub(super) interrupt: &'d Interrupt,
     pub(super) profile: Profile,
     pub(super) sequence: &'d SequenceParameters,
     pub(super) gop: &'d Gop,
@@ -32,9 +35,11 @@ pub(super) struct Context<'d> {
 }
 
 /// A frame whose units are arriving.
-pub(super) struct FrameInProgress<'a> {
+pub(super) struct FrameInProgress {
     /// Display index.
     pub(super) index: u32,
+    /// The operating point in force where it starts.
+    pub(super) point: OperatingPoint,
     /// Absolute offset of the payload of its header.
     pub(super) payload_at: u64,
     pub(super) header: FrameHeader,
@@ -48,7 +53,7 @@ pub(super) struct FrameInProgress<'a> {
     /// Whether an increment of the frame came, decoded or not.
     pub(super) seen: bool,
     /// Units that were accepted and are not yet decoded.
-    pub(super) pending: Vec<PendingUnit<'a>>,
+    pub(super) pending: Vec<PendingUnit>,
     /// The state if all pending units are good.
     pub(super) expected: Progress,
     /// The state after the units that were decoded.
@@ -74,8 +79,17 @@ pub(super) struct Progress {
     sizes: Vec<u32>,
 }
 
+/// An increment that has been accepted. It owns its payload: the bytes of a stream may come and go.
+pub(super) struct PendingUnit {
+    spatial_layer: u8,
+    refinement: u8,
+    payload: Vec<u8>,
+    payload_at: u64,
+    bytes: u64,
+}
+
 /// An increment that has been divided.
-pub(super) struct PendingUnit<'a> {
+pub(super) struct DividedUnit<'a> {
     pub(super) spatial_layer: u8,
     pub(super) refinement: u8,
     pub(super) increment: Increment<'a>,
@@ -133,17 +147,17 @@ impl Progress {
     }
 }
 
-impl<'a> FrameInProgress<'a> {
+impl FrameInProgress {
     pub(super) const fn is_intra(&self) -> bool {
         self.role.reference.is_none()
     }
 
     /// Accepts an increment that belongs to the operating point. `None` if it is discarded.
-    pub(super) fn accept(
+    pub(super) fn accept<'u>(
         &self,
-        unit: &Unit<'a>,
+        unit: &Unit<'u>,
         context: &Context<'_>,
-    ) -> core::result::Result<Option<PendingUnit<'a>>, Refused> {
+    ) -> core::result::Result<Option<DividedUnit<'u>>, Refused> {
         let header = &unit.header;
         let limit = self.expected.limit;
         let costs_nothing = |error| Refused { error, limit };
@@ -170,7 +184,7 @@ impl<'a> FrameInProgress<'a> {
         }
         unit.check_payload().map_err(costs_list)?;
         let increment = self.divided(unit, context).map_err(costs_list)?;
-        Ok(Some(PendingUnit {
+        Ok(Some(DividedUnit {
             spatial_layer: header.spatial_layer,
             refinement: header.refinement,
             increment,
@@ -180,14 +194,14 @@ impl<'a> FrameInProgress<'a> {
     }
 
     /// The layers of a unit are layers of the sequence and of the frame.
-    fn check_layers(&self, unit: &Unit<'a>, context: &Context<'_>) -> Result<()> {
+    fn check_layers(&self, unit: &Unit<'_>, context: &Context<'_>) -> Result<()> {
         unit.header.validate_layers(unit.at, context.sequence)?;
         let at = element_at(&UnitHeader::TABLE, unit.at, "temporal_layer");
         same(at, "7.3.1", "temporal_layer", unit.header.temporal_layer, self.role.temporal_layer)
     }
 
     /// Checks the elements of the payload, those that relate to the frame included, and divides it into sections.
-    fn divided(&self, unit: &Unit<'a>, context: &Context<'_>) -> Result<Increment<'a>> {
+    fn divided<'u>(&self, unit: &Unit<'u>, context: &Context<'_>) -> Result<Increment<'u>> {
         let Context { sequence, gop, options, .. } = context;
         let at = unit.payload_at;
         let (header, _) = IncrementHeader::parse(unit.payload, at, sequence, context.profile)?;
@@ -199,7 +213,7 @@ impl<'a> FrameInProgress<'a> {
     }
 
     /// What the frame says about the list of a unit.
-    fn sizes(&self, unit: &Unit<'a>, context: &Context<'_>) -> ListSizes {
+    fn sizes(&self, unit: &Unit<'_>, context: &Context<'_>) -> ListSizes {
         let (sequence, refinement) = (context.sequence, unit.header.refinement);
         let all = self.header.gaussian_count;
         let before = self.expected.size_before(refinement);
@@ -221,10 +235,12 @@ impl<'a> FrameInProgress<'a> {
         ListSizes { parents, intra: self.is_intra(), size, max_size }
     }
 
-    /// Puts an accepted unit to those that wait.
-    pub(super) fn push(&mut self, unit: PendingUnit<'a>) {
-        self.expected.take(unit.spatial_layer, unit.refinement, unit.increment.header.list_size());
-        self.pending.push(unit);
+    /// Puts an accepted unit with this payload to those that wait.
+    pub(super) fn push(&mut self, unit: &DividedUnit<'_>, payload: &[u8]) {
+        let &DividedUnit { spatial_layer, refinement, payload_at, bytes, .. } = unit;
+        self.expected.take(spatial_layer, refinement, unit.increment.header.list_size());
+        let payload = payload.to_vec();
+        self.pending.push(PendingUnit { spatial_layer, refinement, payload, payload_at, bytes });
     }
 
     /// Takes note of an error; units of refinements from `limit` on are discarded.
@@ -232,6 +248,19 @@ impl<'a> FrameInProgress<'a> {
         self.error.get_or_insert(*error);
         self.decoded.limit = self.decoded.limit.min(*limit);
         self.expected.limit = self.decoded.limit;
+    }
+}
+
+impl PendingUnit {
+    /// The unit, divided as when it was accepted.
+    ///
+    /// # Errors
+    /// None of a unit that was accepted.
+    pub(super) fn divided(&self, context: &Context<'_>) -> Result<DividedUnit<'_>> {
+        let Self { spatial_layer, refinement, ref payload, payload_at, bytes } = *self;
+        let Context { sequence, profile, options, .. } = *context;
+        let increment = Increment::parse(payload, payload_at, sequence, profile, &options.limits)?;
+        Ok(DividedUnit { spatial_layer, refinement, increment, payload_at, bytes })
     }
 }
 

@@ -5,6 +5,7 @@ use super::frame::{FrameInProgress, Progress, unit_bytes};
 use super::phase::{mismatch, same, unexpected};
 use super::references::References;
 use super::{Context, Decoder};
+use crate::budget::Shape;
 use crate::displacement::CellField;
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::gop::{Gop, element_at};
@@ -14,21 +15,21 @@ use crate::layout::{Section, ShCoding};
 use crate::steps::StepRule;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{Cells, FramePayload};
-use splatstream_format::syntax::{FrameRole, GopHeader, SequenceParameters, UnitHeader};
+use splatstream_format::syntax::{FrameHeader, FrameRole, GopHeader, SequenceParameters, UnitHeader};
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Result};
 use std::sync::Arc;
 
-impl<'a> Decoder<'a> {
+impl Decoder {
     /// The first sequence_parameters count; copies are the same, byte for byte.
-    pub(super) fn sequence_parameters(&mut self, unit: &Unit<'a>) -> Result<()> {
+    pub(super) fn sequence_parameters(&mut self, unit: &Unit<'_>) -> Result<()> {
         let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at, self.profile)?;
         match &self.sequence {
             None => {
-                self.sequence = Some((sequence, unit.payload));
+                self.sequence = Some((sequence, unit.payload.to_vec()));
                 Ok(())
             }
-            Some((_, first)) if *first == unit.payload => Ok(()),
+            Some((_, first)) if first == unit.payload => Ok(()),
             Some(_) => {
                 let rule = "a stream has one set of sequence parameters";
                 Err(Error::new(unit.payload_at, "6.4", ErrorKind::Constraint { rule }))
@@ -37,7 +38,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// `was_lost` says that GOPs may be missing for a reason that has been reported.
-    pub(super) fn gop_header(&mut self, unit: &Unit<'a>, was_lost: bool) -> Result<()> {
+    pub(super) fn gop_header(&mut self, unit: &Unit<'_>, was_lost: bool) -> Result<()> {
         let header = GopHeader::parse_payload(unit.payload, unit.payload_at, self.profile)?;
         let layers = self.sequence().map_or(1, |sequence| sequence.temporal_layer_count);
         header.validate_layers(unit.payload_at, layers)?;
@@ -62,6 +63,7 @@ impl<'a> Decoder<'a> {
         }
         self.report.lose(self.next_frame, frame);
         self.references = References::default();
+        self.spent.start_gop();
         self.next_gop = gop_index.saturating_add(1);
         self.next_frame = frame;
         self.frames_left = header.gop_frame_count.into();
@@ -87,7 +89,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// A transform, codebook or weights unit.
-    pub(super) fn gop_tool(&mut self, unit: &Unit<'a>) -> Result<()> {
+    pub(super) fn gop_tool(&mut self, unit: &Unit<'_>) -> Result<()> {
         let (Some(gop), Some((sequence, _))) = (&mut self.gop, &self.sequence) else {
             return Err(unexpected(unit));
         };
@@ -96,7 +98,7 @@ impl<'a> Decoder<'a> {
         gop.tool(unit, sequence, &self.options.limits)
     }
 
-    pub(super) fn frame_header(&mut self, unit: &Unit<'a>) -> Result<()> {
+    pub(super) fn frame_header(&mut self, unit: &Unit<'_>) -> Result<()> {
         let role = self.role(unit)?;
         let (Some(gop), Some((sequence, _))) = (&self.gop, &self.sequence) else {
             return Err(unexpected(unit));
@@ -105,6 +107,11 @@ impl<'a> Decoder<'a> {
         let FramePayload { header, carried_digest, carried_digest_at, cells } =
             FramePayload::parse(unit.payload, at, sequence, &self.options.limits)?;
         header.validate_role(at, &role)?;
+        let of_count = element_at(&FrameHeader::TABLE, at, "gaussian_count");
+        let shape = Shape::new(sequence, &gop.header);
+        let spent = self.spent.frame(header.gaussian_count, &shape, &self.options.budget, of_count);
+        self.is_exhausted = spent.is_err();
+        spent?;
         gop.transforms(&header, at)?;
         let reference = role.reference.map(|reference| gop.first_frame.saturating_add(reference));
         let kept = reference.and_then(|reference| self.references.find(reference));
@@ -118,6 +125,7 @@ impl<'a> Decoder<'a> {
         self.skip_to(unit);
         self.frame = Some(FrameInProgress {
             index: unit.header.frame,
+            point: self.options.operating_point,
             payload_at: at,
             header,
             role,
@@ -128,7 +136,7 @@ impl<'a> Decoder<'a> {
             pending: Vec::new(),
             expected: Progress::new(limit),
             decoded: Progress::new(limit),
-            lists: Lists::new(moved.models),
+            lists: Lists::new(moved.models, self.next_identity),
             bytes: unit_bytes(unit),
             entropy: moved.entropy.into_iter().collect(),
             error: absent,
@@ -138,7 +146,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// The type, temporal layer and reference of the frame that a frame_header starts: one of those still to come.
-    fn role(&self, unit: &Unit<'a>) -> Result<FrameRole> {
+    fn role(&self, unit: &Unit<'_>) -> Result<FrameRole> {
         let Some(gop) = &self.gop else { return Err(unexpected(unit)) };
         let to_come = self.next_frame..self.next_frame.saturating_add(self.frames_left);
         if !to_come.contains(&unit.header.frame.into()) {
@@ -150,14 +158,14 @@ impl<'a> Decoder<'a> {
         Ok(role)
     }
 
-    fn unexpected_frame(&self, unit: &Unit<'a>) -> Error {
+    fn unexpected_frame(&self, unit: &Unit<'_>) -> Error {
         let at = element_at(&UnitHeader::TABLE, unit.at, "frame");
         mismatch(at, "7.3.2", "frame", unit.header.frame.into(), self.next_frame)
     }
 
     /// Takes the frame that a frame_header starts, and those before it, from the frames that are to come. In an all-intra
     /// GOP none may be missing before it.
-    fn skip_to(&mut self, unit: &Unit<'a>) {
+    fn skip_to(&mut self, unit: &Unit<'_>) {
         let index = u64::from(unit.header.frame);
         let is_all_intra = self.gop.as_ref().is_some_and(|gop| !gop.header.is_predicted());
         if is_all_intra && index > self.next_frame {
@@ -194,7 +202,7 @@ impl Context<'_> {
         let steps = StepRule::new(self.sequence, [0; 5]);
         let coding = SectionCoding { dc_rank: 0, sh: ShCoding::None, steps };
         let prepared = PreparedSections::new(sections, &coding, &mut moved.models, &mut ())?;
-        let values = prepared.decode(self.sequence)?;
+        let values = prepared.decode(self.sequence, self.interrupt)?;
         moved.field = field(values.section(Section::Cells), cells.cell_log2, self.sequence, at)?;
         if self.options.entropy {
             moved.entropy = of_sections(sections, &values).map(|state| UnitEntropy { payload_at: at, state });

@@ -9,9 +9,22 @@ pub(super) struct Report {
     pub(super) errors: Vec<Error>,
     /// Display indices, increasing; ranges that touch are joined.
     pub(super) lost: Vec<RangeInclusive<u32>>,
+    /// Whether there have been errors that are no longer here.
+    pub(super) had_errors: bool,
 }
 
 impl Report {
+    /// Whether no error has been found.
+    pub(super) fn is_clean(&self) -> bool {
+        self.errors.is_empty() && !self.had_errors
+    }
+
+    /// Takes what has been found since the last call.
+    pub(super) fn take(&mut self) -> (Vec<Error>, Vec<RangeInclusive<u32>>) {
+        self.had_errors |= !self.errors.is_empty();
+        (core::mem::take(&mut self.errors), core::mem::take(&mut self.lost))
+    }
+
     /// The frames with display indices from `first` up to, but without, `end` will not be output.
     pub(super) fn lose(&mut self, first: u64, end: u64) {
         let (Ok(start), Some(Ok(last))) = (u32::try_from(first), end.checked_sub(1).map(u32::try_from))

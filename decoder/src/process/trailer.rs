@@ -8,10 +8,10 @@ use splatstream_format::payload::{Index, OperatingPoints};
 use splatstream_format::syntax::{EndOfStream, IndexEntry, IndexHeader};
 use splatstream_format::unit::Unit;
 
-impl Decoder<'_> {
+impl Decoder {
     /// Whether what the units say about the whole stream can be compared: it was decoded from its start, without errors.
     fn is_whole(&self) -> bool {
-        !self.starts_inside && self.report.errors.is_empty()
+        !self.starts_inside && self.report.is_clean()
     }
 
     pub(super) fn operating_points(&self, unit: &Unit<'_>) -> Result<()> {

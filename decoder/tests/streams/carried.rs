@@ -4,6 +4,7 @@ use crate::write::{Plan, decoded};
 use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::increment::field;
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -34,7 +35,7 @@ fn fields(plan: &Plan) -> Vec<CellField> {
         let coding =
             SectionCoding { dc_rank: 0, sh: ShCoding::None, steps: StepRule::new(&sequence, [0; 5]) };
         let prepared = PreparedSections::new(sections, &coding, &mut models, &mut ()).unwrap();
-        let values = prepared.decode(&sequence).unwrap();
+        let values = prepared.decode(&sequence, Interrupt::NEVER).unwrap();
         fields.push(field(values.section(Section::Cells), cells.cell_log2, &sequence, 0).unwrap());
     }
     fields

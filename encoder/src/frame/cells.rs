@@ -6,7 +6,7 @@ use super::{Reference, Target};
 use crate::error::Error;
 use crate::matching::{Cloud, Matching, Measure};
 use crate::motion::follow::follow;
-use crate::motion::stale::{Held, stale_cells};
+use crate::motion::stale_cells::{Held, stale_cells};
 use crate::motion::{CellMotion, Pair, cell_motion};
 use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::increment::field;

@@ -3,9 +3,9 @@
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::{Camera, Image, metrics, render};
-use splatstream_scene::GaussianFrame;
 
 /// Views that a prefix is judged in, and their lines: holes are large. Fuzzing wants streams, not pictures.
 const VIEWS: u32 = 2;

@@ -1,6 +1,6 @@
 //! The network of a sequence: where it comes from, and what it is trained with.
 
-use super::wanted::Wanted;
+use super::recorder::Recorder;
 use crate::error::Error;
 use crate::gop::SequenceCoder;
 use crate::importance::Ranking;
@@ -10,64 +10,17 @@ use crate::settings::{NetworkSource, Preset, Settings};
 use crate::source::FrameSource;
 use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, TrainingReport, train};
 use crate::writer::UnitWriter;
-use core::cell::RefCell;
 use core::ops::ControlFlow;
-use splatstream_decoder::increment::prediction::Prediction;
-use splatstream_decoder::increment::residual::Attributes;
 use splatstream_decoder::predictor::Predictor;
-use splatstream_decoder::transformer::{Batch, LANES};
 use splatstream_format::Limits;
-use splatstream_format::payload::{Layer, Network, Part, REGISTRY, Weights};
+use splatstream_format::payload::{Layer, Network, Part, REGISTRY};
 use splatstream_format::syntax::{Profile, SequenceParameters};
-
-/// Batches that a unit gives, at most: a network is trained on many frames.
-const OF_A_UNIT: usize = 1 << 9;
-
-/// Batches that a network is trained with, at most.
-const MOST: usize = 1 << 13;
 
 /// Batches below which there is nothing to train with.
 const LEAST: usize = 1 << 6;
 
 /// One batch of so many is kept to judge the network by.
 const HELD_OUT: usize = 8;
-
-/// Collects what a network is trained with, while a sequence is encoded.
-#[derive(Default)]
-pub(crate) struct Recorder {
-    samples: RefCell<Vec<Sample>>,
-}
-
-impl Recorder {
-    /// Takes some of the Gaussians that a unit predicts.
-    pub(crate) fn take(&self, prediction: &Prediction<'_>, now: &Attributes, wanted: &Wanted) {
-        let Some(learned) = prediction.learned() else { return };
-        let targets = prediction.targets();
-        let stride = targets.len().div_ceil(LANES).div_ceil(OF_A_UNIT).max(1);
-        let some: Vec<_> = targets.chunks_exact(LANES).step_by(stride).flatten().copied().collect();
-        let batches = learned.batches(&some, now);
-        let outputs = learned.wanted(&some, &wanted.dc, &wanted.sh);
-        let mut samples = self.samples.borrow_mut();
-        samples
-            .extend(batches.into_iter().zip(outputs.chunks(LANES)).map(|(batch, rows)| sample(batch, rows)));
-    }
-
-    /// Whether that is enough.
-    pub(crate) fn is_full(&self) -> bool {
-        self.samples.borrow().len() >= MOST
-    }
-}
-
-/// The payload of the weights unit of a network: its name, if it is registered.
-///
-/// # Errors
-/// A network that a decoder would refuse.
-pub(crate) fn weights(network: &Network) -> Result<Weights, Error> {
-    let bytes = network.to_bytes()?;
-    let registered = REGISTRY.iter().find(|(_, known)| **known == bytes[..]);
-    Ok(registered
-        .map_or_else(|| Weights::Carried(Box::new(network.clone())), |(name, _)| Weights::Registered(*name)))
-}
 
 /// The network that the GOPs of a sequence may use.
 ///
@@ -140,7 +93,7 @@ fn recorded(
         looked_at: 0,
     };
     coder.run(&mut |_, _| {})?;
-    Ok(recorder.samples.into_inner())
+    Ok(recorder.into_samples())
 }
 
 /// What the new Gaussians of a sequence can be predicted from: a network is trained with it.
@@ -196,14 +149,4 @@ fn zero(architecture: &Architecture) -> Result<Network, Error> {
         Layer { weights: vec![0; weights], bias: vec![0; biases] }
     });
     Ok(Network::new(header, layers)?)
-}
-
-/// A batch, and for each of its Gaussians the outputs that would leave nothing to code.
-fn sample(batch: Batch, rows: &[Vec<i32>]) -> Sample {
-    let outputs = rows.first().map_or(0, Vec::len);
-    let mut wanted = vec![[0; LANES]; outputs];
-    for (lane, row) in rows.iter().enumerate() {
-        wanted.iter_mut().zip(row).for_each(|(wanted, &value)| wanted[lane] = value);
-    }
-    Sample { batch, wanted, used: rows.len() }
 }

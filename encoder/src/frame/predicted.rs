@@ -4,10 +4,10 @@ use super::cells::{CellPlan, code_cells};
 use super::moves::{self, Aim, MovePlan};
 use super::new_list::{NewList, unpredicted};
 use super::predictors::{Chooser, used};
-use super::price::Goal;
+use super::rate_distortion::Goal;
+use super::residuals::Wanted;
 use super::survivors::{Fate, Parents, REMOVED, Survivors};
 use super::unit::{Draft, Grain, UnitCoder};
-use super::wanted::Wanted;
 use super::{CodedFrame, CodedUnit, Reference, Target};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
@@ -22,7 +22,7 @@ use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::moves::{MoveSpace, SpanRatio};
 use splatstream_format::entropy::in_force::ModelsOfFrame;
 use splatstream_format::payload::CellsBytes;
-use splatstream_scene::importance;
+use splatstream_gaussians::importance;
 use std::ops::Range;
 
 /// The row of a Gaussian that no file has any more.

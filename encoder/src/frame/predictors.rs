@@ -1,20 +1,22 @@
 //! Which predictor new Gaussians take: by estimated bits, or by the paper's sum of absolute residuals.
 
-use super::learning::Recorder;
 use super::new_list::NewList;
+use super::recorder::Recorder;
+use super::residuals::Wanted;
 use super::unit::{Draft, UnitCoder};
-use super::wanted::Wanted;
 use crate::error::Error;
 use crate::settings::{PredictorChoice, Predictors};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::prediction::{Predicting, Prediction};
-use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
+use splatstream_decoder::increment::residual::{AttributeValues, Attributes};
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::increment::{Situation, reference_set};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::position::refine;
 use splatstream_decoder::predictor::Predictor;
+use splatstream_decoder::stage::Stage;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::entropy::token::zigzag;
 use splatstream_format::syntax::IncrementHeader;
@@ -224,6 +226,7 @@ fn predicted(
     let slices = position.each_ref().map(Vec::as_slice);
     let mut planes = Vec::new();
     let by = Predicting {
+        interrupt: Interrupt::NEVER,
         header,
         colour: coder.colour,
         network: coder.network,

@@ -4,7 +4,7 @@
 //! they show depends on the scene. So the pictures of each predicted frame are compared with its source, as those of the I
 //! frame were, and the price of the next frame follows: nothing is coded twice.
 
-use super::price::{Pictures, shown};
+use super::rate_distortion::{Pictures, shown};
 use super::survivors::BitPrice;
 use super::{CodedFrame, Target};
 use splatstream_format::syntax::SequenceParameters;

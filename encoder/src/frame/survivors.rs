@@ -1,15 +1,15 @@
 //! Predicted frames: what becomes of each Gaussian of the reference.
 
 use super::Target;
-use super::align::{Namings, Pose};
-use super::judge::Judge;
+use super::axis_matching::{Namings, Pose};
 use super::moves::Aim;
+use super::update_decision::Judge;
 use crate::grid::nearest_integer;
 use crate::vq;
 use rayon::prelude::*;
 use splatstream_decoder::colour::COMPONENT_RANGE;
-use splatstream_decoder::increment::residual::Stage;
 use splatstream_decoder::list::{FINE, GaussianList};
+use splatstream_decoder::stage::Stage;
 use splatstream_decoder::steps::{StepRule, step};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::SequenceParameters;

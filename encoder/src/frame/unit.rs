@@ -8,6 +8,7 @@ use splatstream_decoder::colour::Colour;
 use splatstream_decoder::increment::residual::AttributeCoding;
 use splatstream_decoder::increment::values::{SectionValues, UnitValues};
 use splatstream_decoder::increment::{Applied, Situation, Unit, apply};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::{Layout, Section};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::steps::StepRule;
@@ -143,6 +144,7 @@ impl UnitCoder<'_> {
         situation: &Situation<'_>,
     ) -> Result<Applied, Error> {
         let unit = Unit {
+            interrupt: Interrupt::NEVER,
             header: &draft.header,
             values: &draft.values,
             coding: self.coding(draft.header.attribute_step),

@@ -4,7 +4,7 @@ use super::{Gop, SequenceCoder};
 use crate::colour;
 use crate::frame::cells::ReferenceCloud;
 use crate::frame::predictors::Chooser;
-use crate::frame::price::{Goal, Pictures};
+use crate::frame::rate_distortion::{Goal, Pictures};
 use crate::frame::steadiness::Steadiness;
 use crate::frame::survivors::{BitPrice, Survivors};
 use crate::frame::unit::{Grains, UnitCoder};

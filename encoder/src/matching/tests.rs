@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
 
 use super::*;
+use crate::random::Random;
 use crate::settings::Quality;
 
 /// A frame for tests: 1,000 grid steps wide, sizes of 4 steps and more, one grid step to the scene unit.
@@ -13,36 +14,13 @@ pub(crate) struct Scene {
     pub(crate) row: Vec<u32>,
 }
 
-/// SplitMix64.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Below 1, at least 0.
-    pub(crate) fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / 16_777_216.0
-    }
-
-    /// Between -1 and 1.
-    pub(crate) fn signed(&mut self) -> f32 {
-        2.0 * self.unit() - 1.0
-    }
-}
-
 impl Scene {
     pub(crate) fn random(count: usize, seed: u64) -> Self {
         let mut random = Random(seed);
         let mut scene = Self::default();
         for _ in 0..count {
-            scene.position.iter_mut().for_each(|plane| plane.push(1000.0 + 1000.0 * random.unit()));
-            scene.log_scale.iter_mut().for_each(|plane| plane.push(1.5 + 1.5 * random.unit()));
+            scene.position.iter_mut().for_each(|plane| plane.push(1000.0 + 1000.0 * random.unit() as f32));
+            scene.log_scale.iter_mut().for_each(|plane| plane.push(1.5 + 1.5 * random.unit() as f32));
             scene.opacity.push(4.0 * random.signed());
             scene.dc.iter_mut().for_each(|plane| plane.push(random.signed()));
         }

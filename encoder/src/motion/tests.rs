@@ -1,13 +1,15 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a panic is a failed test")]
 
 use super::follow::follow;
-use super::stale::{Held, stale_cells};
+use super::stale_cells::{Held, stale_cells};
 use super::*;
 use crate::grid::PositionGrid;
-use crate::matching::tests::{Random, Scene, measure, shuffled};
+use crate::matching::tests::{Scene, measure, shuffled};
 use crate::matching::{Cloud, Kind, Matching, Measure, shares_little};
+use crate::random::Random;
 use crate::settings::{Quality, Settings};
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
+use splatstream_files::{ReadLimits, read_scene};
+use splatstream_gaussians::GaussianFrame;
 use std::path::Path;
 
 const BITS: u8 = 12;

@@ -1,6 +1,6 @@
 //! The parameters of a network, one after the other in the order of 6.17.2, as numbers that can change a little.
 
-use super::random::Random;
+use crate::random::Random;
 use splatstream_decoder::transformer::sine;
 use splatstream_format::Result;
 use splatstream_format::payload::{Layer, Network, Part};

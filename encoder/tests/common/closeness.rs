@@ -3,7 +3,7 @@
 use splatstream_decoder::companding::Companding;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 
 /// The largest errors, steps.
 #[derive(Debug, Clone, Copy)]

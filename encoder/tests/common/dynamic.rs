@@ -5,11 +5,11 @@ use splatstream_decoder::operating_point::{OperatingPoint, operating_points};
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::Summary;
 use splatstream_encoder::{FrameReport, Preset, Report, Settings, Steps, Structure};
+use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_format::Limits;
 use splatstream_format::syntax::{GopHeader, Profile, SequenceParameters, UnitHeader, UnitType};
 use splatstream_format::unit::{Stream, Unit};
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::{BuiltinScene, Tracking};
+use splatstream_gaussians::GaussianFrame;
 use std::collections::BTreeMap;
 
 /// Frames of the built-in scene; fewer than 100 Gaussians are the first of 100.

@@ -8,9 +8,9 @@ use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_encoder::{Report, Settings, encode};
+use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_format::Limits;
-use splatstream_scene::builtin::{BuiltinScene, Tracking};
-use splatstream_scene::{GaussianFrame, Planes, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
 use std::ops::ControlFlow;
 
 /// A frame of the built-in scene.

@@ -5,9 +5,9 @@ use crate::common::dynamic::{Whole, coded, predicted, scene};
 use splatstream_decoder::companding::Companding;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_encoder::{Settings, Tools};
+use splatstream_files::builtin::Tracking;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::Tracking;
+use splatstream_gaussians::GaussianFrame;
 
 const FRAMES: u32 = 300;
 

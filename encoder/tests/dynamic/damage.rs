@@ -4,9 +4,9 @@ use crate::common::dynamic::{Whole, predicted, range, scene};
 use crate::common::{Random, decoded, encoded, strict};
 use splatstream_decoder::process::Options;
 use splatstream_encoder::{Settings, ShChoice, Steps};
+use splatstream_files::builtin::Tracking;
 use splatstream_format::Limits;
 use splatstream_format::syntax::UnitHeader;
-use splatstream_scene::builtin::Tracking;
 
 /// A small stream with every kind of unit: two GOPs, three temporal layers, codebooks.
 fn small_stream(spatial_layers: u8) -> Vec<u8> {

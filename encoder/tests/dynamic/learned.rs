@@ -7,12 +7,12 @@ use splatstream_decoder::predictor::Predictor;
 use splatstream_decoder::process::Options;
 use splatstream_encoder::transformer::Architecture;
 use splatstream_encoder::{NetworkSource, PredictorChoice, Predictors, Preset, Settings, ShChoice};
+use splatstream_files::builtin::Tracking;
 use splatstream_format::Limits;
 use splatstream_format::payload::Weights;
 use splatstream_format::syntax::UnitType;
 use splatstream_format::unit::Stream;
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::Tracking;
+use splatstream_gaussians::GaussianFrame;
 
 /// A network for every new Gaussian, trained on the frames.
 fn settings() -> Settings {

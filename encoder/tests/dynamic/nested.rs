@@ -5,11 +5,11 @@ use crate::common::{decoded, encoded, strict};
 use splatstream_decoder::operating_point::{OperatingPoint, operating_points};
 use splatstream_decoder::process::Options;
 use splatstream_encoder::{Anchor, Preset, Quality, Settings};
+use splatstream_files::builtin::Tracking;
 use splatstream_format::Limits;
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_format::syntax::{Camera, UnitType};
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::Tracking;
+use splatstream_gaussians::GaussianFrame;
 
 /// The first refinement of a predicted sequence has 10 % of its Gaussians and at most a quarter of its bytes.
 #[test]

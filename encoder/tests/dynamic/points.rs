@@ -6,10 +6,10 @@ use crate::common::encoded;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::process::DecodedFrame;
 use splatstream_encoder::{Anchor, Settings, Structure};
+use splatstream_files::builtin::Tracking;
 use splatstream_format::Limits;
 use splatstream_format::payload::OperatingPoints;
 use splatstream_format::syntax::UnitType;
-use splatstream_scene::builtin::Tracking;
 
 /// Streams of every structure, in GOPs of five frames.
 fn streams() -> Vec<(String, Vec<u8>)> {

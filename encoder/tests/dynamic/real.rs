@@ -2,8 +2,8 @@
 
 use crate::common::dynamic::{coded, predicted};
 use splatstream_encoder::{Quality, Settings};
+use splatstream_files::{ReadLimits, read_scene};
 use splatstream_format::syntax::FrameType;
-use splatstream_scene::{ReadLimits, read_scene};
 use std::path::Path;
 
 /// A head that speaks: rows keep their meaning from frame to frame.

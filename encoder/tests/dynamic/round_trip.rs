@@ -9,10 +9,10 @@ use splatstream_encoder::transformer::Architecture;
 use splatstream_encoder::{
     NetworkSource, PredictorChoice, Predictors, Preset, Settings, ShChoice, Steps, Structure, Tools,
 };
+use splatstream_files::builtin::Tracking;
 use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::FrameType;
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::Tracking;
+use splatstream_gaussians::GaussianFrame;
 
 fn structures() -> impl Iterator<Item = Structure> {
     [Structure::Intra].into_iter().chain((1..=4).map(|layers| Structure::Predicted { layers }))

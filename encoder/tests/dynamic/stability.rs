@@ -6,9 +6,9 @@ use crate::common::{encoded, frame_of};
 use splatstream_encoder::{
     Error, PredictorChoice, Predictors, Quality, Report, Settings, ShChoice, Steps, Tools, encode,
 };
+use splatstream_files::builtin::Tracking;
 use splatstream_format::syntax::FrameType;
-use splatstream_scene::builtin::Tracking;
-use splatstream_scene::{GaussianFrame, Planes, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
 
 /// Encodes with one temporal layer and looks at every decoded frame.
 fn close(frames: &[GaussianFrame], what: &str) -> Report {
@@ -323,7 +323,7 @@ fn frames_of_which_pruning_leaves_nothing_are_empty() {
 
 #[test]
 fn what_stands_alone_is_in_the_lowest_spatial_layer() {
-    let seeds = (0..3_u64).map(|seed| splatstream_scene::builtin::BuiltinScene {
+    let seeds = (0..3_u64).map(|seed| splatstream_files::builtin::BuiltinScene {
         gaussians: 300,
         seed,
         ..Default::default()

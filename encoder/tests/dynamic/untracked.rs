@@ -5,12 +5,12 @@ use crate::common::{decoded, encoded, frame_of, strict};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Fidelity, Quality, Report, Settings, Steps, Structure};
+use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_format::syntax::FrameType;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, ring, spiral};
 use splatstream_render::metrics::{psnr, psnr_masked, still};
 use splatstream_render::{Camera, Rendering, render};
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::{BuiltinScene, Tracking};
 use std::ops::ControlFlow;
 
 /// Views and their lines: few, so that tests are quick.

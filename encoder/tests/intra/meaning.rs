@@ -4,7 +4,8 @@ use crate::common::{encoded, strict};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Settings, Steps, Tools};
-use splatstream_scene::{GaussianFrame, ReadLimits, ply};
+use splatstream_files::{ReadLimits, ply};
+use splatstream_gaussians::GaussianFrame;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 

@@ -2,7 +2,8 @@
 
 use crate::common::{Random, decoded, encoded, strict};
 use splatstream_encoder::Settings;
-use splatstream_scene::{GaussianFrame, ReadLimits, read_scene};
+use splatstream_files::{ReadLimits, read_scene};
+use splatstream_gaussians::GaussianFrame;
 use std::path::Path;
 
 fn scene(file: &str) -> Option<GaussianFrame> {

@@ -11,8 +11,8 @@ use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice, Steps
 use splatstream_format::Limits;
 use splatstream_format::syntax::UnitHeader;
 use splatstream_format::unit::Stream;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::Up;
-use splatstream_scene::GaussianFrame;
 use std::ops::ControlFlow;
 
 fn settings() -> impl Strategy<Value = Settings> {

@@ -2,6 +2,7 @@
 
 use splatstream_decoder::context::{delta_contexts, plane_contexts};
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::Limits;
 use splatstream_format::bits::BitReader;
@@ -38,7 +39,7 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
                 let prepared =
                     PreparedSections::new(&increment.sections, &coding, &mut in_force, &mut ()).unwrap();
                 let (coded, models) = prepared.sections().next().unwrap();
-                let fast = prepared.blocks(coded, models, sequence).unwrap();
+                let fast = prepared.blocks(coded, models, sequence, Interrupt::NEVER).unwrap();
                 let ([fast], [(block, _)]) = (fast.as_slice(), coded.blocks.as_slice()) else {
                     panic!("one block")
                 };
@@ -69,7 +70,7 @@ fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, s
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
     let (mut deltas, mut planes) = (Vec::new(), vec![Vec::new()]);
-    let mut known = splatstream_decoder::block::CodedBlock::new(vec![0; count], 0, steps);
+    let mut known = splatstream_decoder::coded_block::CodedBlock::new(vec![0; count], 0, steps);
     for (plane, (&info, model)) in section.layout.planes().iter().zip(&section.models).enumerate() {
         for i in 0..count {
             let context = context(model, plane, info, &known, &deltas, &planes[plane]);
@@ -116,7 +117,7 @@ fn context(
     model: &PlaneModel,
     plane: usize,
     info: PlaneInfo,
-    known: &splatstream_decoder::block::CodedBlock,
+    known: &splatstream_decoder::coded_block::CodedBlock,
     deltas: &[u64],
     values: &[i32],
 ) -> usize {

@@ -42,7 +42,7 @@ impl Codebook {
             let rule = "there are as many entries as the header says";
             return Err(Error::new(0, CodebookHeader::TABLE.semantics, ErrorKind::Constraint { rule }));
         }
-        let mut bytes = encode(&CodebookHeader::TABLE, &self.header)?;
+        let mut bytes = encode(&self.header);
         for &entry in &self.entries {
             if self.header.value_bytes == 1 {
                 bytes.extend(Self::narrow(entry, bytes.len())?.to_le_bytes());

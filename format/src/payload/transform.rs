@@ -48,7 +48,7 @@ impl Transform {
     pub fn to_bytes(&self, sequence: &SequenceParameters) -> Result<Vec<u8>> {
         self.header.validate(0, sequence)?;
         self.validate_values(0)?;
-        let mut bytes = encode(&TransformHeader::TABLE, &self.header)?;
+        let mut bytes = encode(&self.header);
         bytes.extend(self.mean.iter().flat_map(|value| value.to_le_bytes()));
         bytes.extend(self.basis.iter().flat_map(|value| value.to_le_bytes()));
         Ok(bytes)

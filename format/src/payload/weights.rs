@@ -131,7 +131,7 @@ impl Network {
     /// The bytes of the network.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.header.validate(0)?;
-        let mut bytes = encode(&NetworkHeader::TABLE, &self.header)?;
+        let mut bytes = encode(&self.header);
         for layer in &self.layers {
             bytes.extend(layer.weights.iter().flat_map(|weight| weight.to_le_bytes()));
             bytes.extend(layer.bias.iter().flat_map(|bias| bias.to_le_bytes()));

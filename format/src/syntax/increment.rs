@@ -279,8 +279,7 @@ impl IncrementHeader {
         let complete = self.needed_flags() & !self.increment_flags == 0;
         self.spot(0, "increment_flags", 0).rule(complete, "every value has its flag")?;
         let Self { increment_flags, refinement_digest, .. } = *self;
-        let mut bytes =
-            encode(&IncrementStart::TABLE, &IncrementStart { increment_flags, refinement_digest })?;
+        let mut bytes = encode(&IncrementStart { increment_flags, refinement_digest });
         for (flag, count) in self.counts() {
             if increment_flags & flag != 0 {
                 write_leb128(count, &mut bytes);

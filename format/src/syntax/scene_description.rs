@@ -103,7 +103,7 @@ impl Camera {
             rotation: self.rotation.map(f32::to_bits),
             vertical_field_of_view: self.vertical_field_of_view.to_bits(),
         };
-        super::encode(&CameraRecord::TABLE, &record)
+        Ok(super::encode(&record))
     }
 
     /// 6.9.

@@ -5,8 +5,9 @@ use flate2::write::GzEncoder;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
-use splatstream_scene::builtin::BuiltinScene;
-use splatstream_scene::{GaussianFrame, ply, splat, spz};
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::{ply, splat, spz};
+use splatstream_gaussians::GaussianFrame;
 use std::io::{Cursor, Read, Write};
 use zip::write::SimpleFileOptions;
 

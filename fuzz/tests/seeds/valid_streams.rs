@@ -4,12 +4,12 @@ use crate::{contexts, learned};
 use splatstream_encoder::{
     Anchor, PredictorChoice, Preset, Quality, Settings, ShChoice, Steps, Structure, encode,
 };
+use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_format::Limits;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::payload::{Increment, Transform};
 use splatstream_format::syntax::{Profile, SequenceParameters, ShMode, UnitType};
 use splatstream_format::unit::Stream;
-use splatstream_scene::builtin::{BuiltinScene, Tracking};
 
 /// Name and bytes; each uses other parts of the syntax.
 pub(crate) fn all() -> Vec<(String, Vec<u8>)> {
@@ -59,9 +59,10 @@ fn dynamic() -> Vec<(String, Vec<u8>)> {
 }
 
 fn stream(sh_degree: u8, frames: u32, settings: &Settings) -> Vec<u8> {
-    let mut scene = BuiltinScene { gaussians: 100, frames, seed: 7, tracking: Tracking::Tracked, sh_degree };
+    let scene = BuiltinScene { gaussians: 100, frames, seed: 7, tracking: Tracking::Tracked, sh_degree };
     let mut bytes = Vec::new();
-    encode(&mut scene, settings, &mut bytes, &mut |_, _| {}).unwrap();
+    let mut frames: Vec<_> = (0..scene.frames).map(|number| scene.frame(number)).collect();
+    encode(&mut frames, settings, &mut bytes, &mut |_, _| {}).unwrap();
     bytes
 }
 

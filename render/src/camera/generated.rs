@@ -2,7 +2,7 @@
 
 use super::Camera;
 use glam::{Quat, Vec3};
-use splatstream_scene::GaussianFrame;
+use splatstream_gaussians::GaussianFrame;
 use std::f32::consts::{PI, TAU};
 
 /// Vertical angle of view, radians: 40 degrees.

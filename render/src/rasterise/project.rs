@@ -3,7 +3,7 @@
 use crate::camera::Camera;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
-use splatstream_scene::{GaussianFrame, sh_basis, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, sh_basis, sh_coefficients};
 use std::f32::consts::LOG2_E;
 
 /// Gaussians nearer to the camera's plane than this share of the mean depth are not drawn: see [`near`].

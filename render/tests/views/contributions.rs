@@ -3,13 +3,13 @@
 use crate::gaussian::{BALL, Gaussian, any_gaussian, any_gaussians, camera, frame};
 use proptest::prelude::*;
 use rayon::ThreadPoolBuilder;
+use splatstream_files::builtin::BuiltinScene;
 use splatstream_render::contribution::{contribution, removal};
 use splatstream_render::render;
-use splatstream_scene::builtin::BuiltinScene;
 
 const BLACK: [f32; 3] = [0.0; 3];
 
-fn all_but(frame: &splatstream_scene::GaussianFrame, row: u32) -> splatstream_scene::GaussianFrame {
+fn all_but(frame: &splatstream_gaussians::GaussianFrame, row: u32) -> splatstream_gaussians::GaussianFrame {
     let others: Vec<u32> = (0..frame.len() as u32).filter(|&other| other != row).collect();
     frame.select(&others)
 }

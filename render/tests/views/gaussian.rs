@@ -1,8 +1,8 @@
 //! Frames and cameras for the tests.
 
 use proptest::prelude::*;
+use splatstream_gaussians::{GaussianFrame, Planes};
 use splatstream_render::Camera;
-use splatstream_scene::{GaussianFrame, Planes};
 
 /// One Gaussian without view dependence.
 #[derive(Clone, Copy, Debug)]

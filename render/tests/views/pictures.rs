@@ -4,9 +4,9 @@ use crate::exact;
 use crate::gaussian::{BALL, Gaussian, any_gaussian, any_gaussians, camera, frame};
 use proptest::prelude::*;
 use rayon::ThreadPoolBuilder;
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, Rendering, render};
-use splatstream_scene::GaussianFrame;
-use splatstream_scene::builtin::BuiltinScene;
 
 const BLACK: [f32; 3] = [0.0; 3];
 

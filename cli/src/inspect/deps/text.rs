@@ -1,7 +1,7 @@
 //! Dependencies as an indented list.
 
 use super::{Dependencies, FrameRow, GopRow, Need, ToolRow, UnitRow};
-use crate::numbers::grouped;
+use splatstream_chart::numbers::grouped;
 
 /// Every GOP with its frames and units.
 pub(super) fn list(dependencies: &Dependencies) -> String {

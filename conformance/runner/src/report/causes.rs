@@ -56,7 +56,7 @@ impl Cause<'_> {
         (!names.is_empty()).then(|| {
             format!(
                 "likewise {}: {}{rest}",
-                super::summary::counted(self.others.len(), "case"),
+                crate::counted::counted(self.others.len(), "case"),
                 names.join(", ")
             )
         })

@@ -1,8 +1,9 @@
 //! A report as Markdown, to be published with a decoder.
 
 use super::causes::{Cause, causes};
-use super::summary::{contrast, counted, explanation};
+use super::summary::{contrast, explanation};
 use super::{Report, Tally};
+use crate::counted::counted;
 use crate::result::Outcome;
 
 /// The page.

@@ -3,6 +3,7 @@
 use super::Report;
 use super::causes::{Cause, causes};
 use crate::SourceUnit;
+use crate::counted::counted;
 use crate::difference::Difference;
 use crate::result::{CaseResult, Outcome};
 use std::fmt::Write;
@@ -106,9 +107,4 @@ fn last_line(report: &Report) -> String {
     };
     let (cases, vectors) = (counted(report.cases.len(), "case"), counted(vectors, "vector"));
     format!("{}: {verdict}; {cases} of {vectors}: {}\n", report.decoder.name, counts.join(", "))
-}
-
-/// A number with its noun.
-pub fn counted(number: usize, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }

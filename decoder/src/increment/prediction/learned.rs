@@ -4,10 +4,11 @@ use super::projection::{COLOURS_MAX, Colour, Components, Projection};
 use super::rows::Rows;
 use super::{Attributes, RUN, at, set_row};
 use crate::frame::QuantizedFrame;
-use crate::increment::residual::Stage;
+use crate::interrupt::Interrupt;
 use crate::list::canonical;
 use crate::neighbours::Neighbour;
 use crate::predictor::{NEIGHBOURS_MAX, WeightedMean};
+use crate::stage::Stage;
 use crate::transformer::batch::Seen;
 use crate::transformer::{Batch, LANES, LaneNetwork, OUTPUTS_MAX};
 use rayon::prelude::*;
@@ -21,6 +22,7 @@ pub struct Learned<'s> {
     pub(super) rows: &'s Rows,
     /// Low bits of differences that are ignored.
     pub(super) feature_shift: u8,
+    pub(super) interrupt: &'s Interrupt,
 }
 
 /// A new Gaussian that the network predicts.
@@ -45,7 +47,10 @@ impl Learned<'_> {
     /// log-scales, opacities and rotations have been reconstructed.
     pub fn predict(&self, targets: &[Target<'_>], attributes: &mut Attributes) {
         let components = self.components(targets);
-        let of_run = |run: &[Target<'_>]| self.colours(run, attributes, &components);
+        let of_run = |run: &[Target<'_>]| match self.interrupt.is_requested() {
+            true => Vec::new(),
+            false => self.colours(run, attributes, &components),
+        };
         let predicted: Vec<Vec<Colour>> = targets.par_chunks(LANES).map(of_run).collect();
         for (target, colour) in targets.iter().zip(predicted.into_iter().flatten()) {
             let (dc, sh) = colour.split_at(3);

@@ -2,8 +2,8 @@
 
 use super::at;
 use crate::frame::QuantizedFrame;
-use crate::increment::residual::Stage;
 use crate::neighbours::Neighbour;
+use crate::stage::Stage;
 use core::ops::Range;
 use rayon::prelude::*;
 

@@ -4,11 +4,13 @@ use super::walk::{Common, Step};
 use super::{list, of};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::prediction::{Predicting, Prediction};
-use splatstream_decoder::increment::residual::{AttributeValues, Attributes, Stage};
+use splatstream_decoder::increment::residual::{AttributeValues, Attributes};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::Section;
 use splatstream_decoder::list::{FINE, canonical};
 use splatstream_decoder::neighbours::{Neighbour, NeighbourSearch};
 use splatstream_decoder::predictor::{Predictor, WeightedMean, bilateral_weights, knn_weights};
+use splatstream_decoder::stage::Stage;
 use std::fmt::Write as _;
 
 /// The new Gaussian and its neighbours.
@@ -82,7 +84,13 @@ impl Case<'_> {
         let at: [Vec<u32>; 3] =
             step.list.planes.position.each_ref().map(|plane| vec![*plane.last().unwrap()]);
         let position = at.each_ref().map(Vec::as_slice);
-        let by = Predicting { header: &step.header, colour: coding.colour, network: None, feature_shift: 0 };
+        let by = Predicting {
+            header: &step.header,
+            colour: coding.colour,
+            network: None,
+            feature_shift: 0,
+            interrupt: Interrupt::NEVER,
+        };
         let mut decoder = Prediction::new(&step.set, position, &[self.predictor], &by).unwrap();
         let mut known = Attributes::unpredicted(1, &coding.colour, 0);
         let values = AttributeValues(&step.values.section(Section::New).planes);

@@ -81,6 +81,7 @@ impl Common {
     ) {
         let intra = frame.reference.is_none();
         let unit = Unit {
+            interrupt: splatstream_decoder::interrupt::Interrupt::NEVER,
             header: &header,
             values: &values,
             coding: self.coding(&header),

@@ -1,0 +1,23 @@
+//! The first frame that a stream shows at an operating point.
+
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_format::Limits;
+use splatstream_gaussians::GaussianFrame;
+use std::ops::ControlFlow;
+
+/// The first frame at an operating point of which something is shown; none if there is none.
+pub fn first_frame(stream: &[u8], operating_point: OperatingPoint, limits: &Limits) -> Option<GaussianFrame> {
+    let options = Options { limits: *limits, operating_point, ..Options::default() };
+    let mut first = None;
+    let _faults = decode_stream(stream, &options, |sequence, frame| {
+        if frame.is_lost {
+            return ControlFlow::Continue(());
+        }
+        first = Some(to_gaussians(frame.into_shown(), sequence));
+        ControlFlow::Break(())
+    });
+    first
+}

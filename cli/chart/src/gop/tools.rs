@@ -1,0 +1,72 @@
+//! What the tools of predicted frames are worth: the GOP without each.
+
+use super::decoded::shown;
+use crate::Error;
+use crate::picture_comparison::Judge;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_encoder::{PredictorChoice, Predictors, Settings, Tools, encode};
+use splatstream_format::syntax::FrameType;
+use splatstream_gaussians::GaussianFrame;
+use splatstream_render::metrics::Comparison;
+
+/// A GOP with some tools.
+#[derive(Debug, Clone)]
+pub(crate) struct ToolRow {
+    /// What it is with or without.
+    pub(crate) name: &'static str,
+    /// Bytes of predicted frames.
+    pub(crate) bytes: u64,
+    /// Gaussians of predicted frames.
+    pub(crate) gaussians: u64,
+    /// Means over predicted frames, everything decoded.
+    pub(crate) figures: Comparison,
+}
+
+impl ToolRow {
+    /// Bytes per Gaussian of predicted frames.
+    pub(crate) fn bytes_per_gaussian(&self) -> f64 {
+        self.bytes as f64 / self.gaussians.max(1) as f64
+    }
+
+    /// Bytes more than another row takes, percent.
+    pub(crate) fn more_than(&self, other: &Self) -> f64 {
+        100.0 * (self.bytes_per_gaussian() / other.bytes_per_gaussian().max(f64::MIN_POSITIVE) - 1.0)
+    }
+}
+
+/// Everything first.
+pub(super) fn rows(
+    frames: &mut Vec<GaussianFrame>,
+    settings: &Settings,
+    judge: &mut Judge<'_>,
+) -> Result<Vec<ToolRow>, Error> {
+    let with = |tools: Tools| Settings { tools, ..settings.clone() };
+    let by = |predictor_choice| Settings { predictor_choice, ..settings.clone() };
+    let variants = [
+        ("everything", by(PredictorChoice::Bits)),
+        ("without cell-motion", with(Tools { cell_motion: false, ..settings.tools })),
+        ("without survivors", with(Tools { survivors: false, ..settings.tools })),
+        ("predictor none", Settings { predictors: Predictors::NONE, ..settings.clone() }),
+        ("chosen by l1", by(PredictorChoice::Difference)),
+    ];
+    variants.iter().map(|(name, settings)| row(name, frames, settings, judge)).collect()
+}
+
+fn row(
+    name: &'static str,
+    frames: &mut Vec<GaussianFrame>,
+    settings: &Settings,
+    judge: &mut Judge<'_>,
+) -> Result<ToolRow, Error> {
+    let mut stream = Vec::new();
+    let report = encode(frames, settings, &mut stream, &mut |_, _| {})
+        .map_err(|error| Error::other(error.to_string()))?;
+    let inter = report.coded.iter().filter(|frame| frame.frame_type != FrameType::Intra);
+    let figures = shown(&stream, OperatingPoint::ALL, judge)?.figures(|frame| !frame.is_intra())?;
+    Ok(ToolRow {
+        name,
+        bytes: inter.clone().map(|frame| frame.bytes).sum(),
+        gaussians: inter.map(|frame| u64::from(frame.gaussians)).sum(),
+        figures,
+    })
+}

@@ -1,0 +1,41 @@
+//! What streams and codecs cost and what they look like: measured, tabled, drawn.
+//!
+//! * [`charting`] measures scenes over a [`sweep`] of settings: rate and speed against quality, operating points, what
+//!   tools are worth. [`stability`] measures where codecs fail. Both give a page, tables and figures in memory: this
+//!   crate prints nothing and writes no file.
+//! * [`costs`] says where the bits of a stream go; [`table`] and [`numbers`] set reports for people.
+//!
+//! The command line parses what is asked for, reads scenes, and writes what comes out.
+
+pub mod charting;
+pub mod costs;
+pub mod numbers;
+pub mod peers;
+pub mod scenes;
+pub mod stability;
+pub mod statistics;
+pub mod summary;
+pub mod sweep;
+pub mod table;
+
+mod csv_files;
+mod error;
+mod figures;
+pub mod first_frame;
+mod gop;
+mod gop_files;
+mod gop_text;
+mod measure;
+mod page;
+mod picture_comparison;
+mod pictures;
+mod progress;
+mod report;
+mod scene_chart;
+mod svg;
+mod tables;
+mod variant_comparison;
+
+pub use error::Error;
+pub use progress::Progress;
+pub use report::{File, Report};

@@ -1,0 +1,229 @@
+//! One run: a scene encoded with a variant at a quality, timed, decoded, judged.
+
+use super::picture_comparison::Judge;
+use super::scenes::Scene;
+use super::sweep::{Group, Sweep, Variant};
+use crate::Error;
+use crate::Progress;
+use crate::costs::Costs;
+use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_encoder::{Quality, Settings, encode};
+use splatstream_format::Limits;
+use splatstream_format::syntax::{UnitHeader, UnitType};
+use splatstream_format::unit::Stream;
+use splatstream_render::metrics::Comparison;
+use std::hint::black_box;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// Seconds of several measurements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Timing {
+    /// The one in the middle.
+    pub(crate) median: f64,
+    /// The shortest.
+    pub(crate) least: f64,
+    /// The longest.
+    pub(crate) most: f64,
+}
+
+impl Timing {
+    fn of(mut seconds: Vec<f64>) -> Self {
+        seconds.sort_by(f64::total_cmp);
+        let at = |index: usize| seconds.get(index).copied().unwrap_or(f64::NAN);
+        let middle = seconds.len() / 2;
+        let low = if seconds.len().is_multiple_of(2) { middle.saturating_sub(1) } else { middle };
+        Self { median: 0.5 * (at(low) + at(middle)), least: at(0), most: at(seconds.len().saturating_sub(1)) }
+    }
+}
+
+/// A frame at an operating point.
+#[derive(Debug, Clone)]
+pub(crate) struct FramePoint {
+    /// Gaussians shown.
+    pub(crate) gaussians: u64,
+    /// Bytes of its increments up to the point, headers included.
+    pub(crate) increment_bytes: u64,
+    /// Bytes of all its units up to the point, headers included.
+    pub(crate) bytes: u64,
+    /// Figures of each camera.
+    pub(crate) views: Vec<Comparison>,
+}
+
+/// An operating point of a run.
+#[derive(Debug, Clone)]
+pub(crate) struct Point {
+    /// Its name, share and size.
+    pub(crate) info: OperatingPointInfo,
+    /// Its frames.
+    pub(crate) frames: Vec<FramePoint>,
+    /// Means over cameras and frames.
+    pub(crate) figures: Comparison,
+}
+
+/// A variant at a quality.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    /// Name of the variant.
+    pub(crate) variant: String,
+    /// Group of the variant.
+    pub(crate) group: Group,
+    /// The quality as the command line spells it.
+    pub(crate) quality: String,
+    /// The stream.
+    pub(crate) stream: Vec<u8>,
+    /// GOPs of the stream.
+    pub(crate) gops: u32,
+    /// Gaussians coded, over all frames.
+    pub(crate) gaussians: u64,
+    /// Seconds to encode, from Gaussians in memory to bytes in memory.
+    pub(crate) encode: Timing,
+    /// Seconds to decode, from bytes in memory to Gaussians in memory.
+    pub(crate) decode: Timing,
+    /// Operating points, everything last; of a variant that is not the baseline, only that.
+    pub(crate) points: Vec<Point>,
+    /// Where the bits go.
+    pub(crate) costs: Costs,
+}
+
+impl Run {
+    /// The point with everything in it.
+    pub(crate) fn full(&self) -> Option<&Point> {
+        self.points.last()
+    }
+}
+
+/// All runs of a scene.
+pub(crate) fn measure(
+    scene: &mut Scene,
+    sweep: &Sweep,
+    judge: &mut Judge<'_>,
+    progress: &dyn Progress,
+) -> Result<Vec<Run>, Error> {
+    sweep.runs().map(|(variant, quality)| run(scene, sweep, variant, quality, judge, progress)).collect()
+}
+
+/// Steps of progress that [`measure`] takes.
+pub(crate) fn steps(sweep: &Sweep) -> u32 {
+    let of_run = |(variant, quality): (&Variant, Quality)| 1 + sweep.points(variant, quality);
+    sweep.runs().map(of_run).sum::<usize>() as u32
+}
+
+fn run(
+    scene: &mut Scene,
+    sweep: &Sweep,
+    variant: &Variant,
+    quality: Quality,
+    judge: &mut Judge<'_>,
+    progress: &dyn Progress,
+) -> Result<Run, Error> {
+    let what = format!("{}: {}, {}", scene.name, variant.name, quality.name().to_owned());
+    progress.step(format!("{what}: encoding and decoding"));
+    let settings = variant.at(quality);
+    let (stream, gaussians, encode) = encoded(scene, &settings, sweep.repeat)?;
+    let decode = decoded(&stream, sweep.repeat)?;
+    progress.advance();
+    let limits = Limits::default();
+    let infos = operating_points(&stream, &limits)?;
+    let passed = infos.len().saturating_sub(sweep.points(variant, quality));
+    let mut points = Vec::new();
+    for &info in infos.iter().skip(passed) {
+        progress.step(format!("{what}: pictures of {} %", info.percent));
+        points.push(point(&stream, info, judge)?);
+        progress.advance();
+    }
+    Ok(Run {
+        variant: variant.name.clone(),
+        group: variant.group,
+        quality: quality.name().to_owned(),
+        gops: (scene.frames.len() as u32).div_ceil(settings.gop),
+        gaussians,
+        encode,
+        decode,
+        points,
+        costs: Costs::of(&stream, &limits)?,
+        stream,
+    })
+}
+
+fn encoded(scene: &mut Scene, settings: &Settings, repeat: u32) -> Result<(Vec<u8>, u64, Timing), Error> {
+    let mut seconds = Vec::new();
+    let mut result = (Vec::new(), 0);
+    for _ in 0..repeat {
+        let mut stream = Vec::new();
+        let start = Instant::now();
+        let report = encode(&mut scene.frames, settings, &mut stream, &mut |_, _| {})
+            .map_err(|error| Error::other(format!("{}: {error}", scene.name)))?;
+        seconds.push(start.elapsed().as_secs_f64());
+        result = (stream, report.gaussians);
+    }
+    Ok((result.0, result.1, Timing::of(seconds)))
+}
+
+fn decoded(stream: &[u8], repeat: u32) -> Result<Timing, Error> {
+    let mut seconds = Vec::new();
+    for _ in 0..repeat {
+        let start = Instant::now();
+        let summary = decode_stream(stream, &Options::default(), |sequence, frame| {
+            black_box(to_gaussians(frame.into_shown(), sequence));
+            ControlFlow::Continue(())
+        });
+        seconds.push(start.elapsed().as_secs_f64());
+        summary.verdict().map_or(Ok(()), |error| Err(Error::Stream(error)))?;
+    }
+    Ok(Timing::of(seconds))
+}
+
+/// Decodes an operating point and judges its frames.
+fn point(stream: &[u8], info: OperatingPointInfo, judge: &mut Judge<'_>) -> Result<Point, Error> {
+    let mut frames = Vec::new();
+    let options = Options { operating_point: info.point, ..Options::default() };
+    let summary = decode_stream(stream, &options, |sequence, frame| {
+        let parameters = sequence.to_bytes().unwrap_or_default();
+        let key = (parameters, frame.index, frame.digest.unwrap_or_default());
+        let gaussians = to_gaussians(frame.into_shown(), sequence);
+        let views = judge.views_of(key, &gaussians);
+        let shown = gaussians.len() as u64;
+        frames.push(FramePoint { gaussians: shown, increment_bytes: 0, bytes: 0, views });
+        ControlFlow::Continue(())
+    });
+    summary.verdict().map_or(Ok(()), |error| Err(Error::Stream(error)))?;
+    add_bytes(stream, info.point, &mut frames)?;
+    let views: Vec<Comparison> = frames.iter().flat_map(|frame| frame.views.iter().copied()).collect();
+    let figures = Comparison::mean(&views).ok_or_else(|| Error::other("there is no camera to look from"))?;
+    Ok(Point { info, frames, figures })
+}
+
+/// What the units of each frame take.
+fn add_bytes(stream: &[u8], point: OperatingPoint, frames: &mut [FramePoint]) -> Result<(), Error> {
+    for unit in Stream::open(stream, &Limits::default())?.units() {
+        let unit = unit?;
+        let Some(frame) = frames.get_mut(unit.header.frame as usize) else { continue };
+        let bytes = (UnitHeader::SIZE + unit.payload.len()) as u64;
+        match unit.header.unit_type() {
+            _ if !point.takes(&unit.header, None) => {}
+            UnitType::FrameHeader => frame.bytes += bytes,
+            UnitType::Increment => {
+                frame.bytes += bytes;
+                frame.increment_bytes += bytes;
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_an_even_number_is_between_the_two_in_the_middle() {
+        assert_eq!(Timing::of(vec![3.0, 1.0, 2.0]), Timing { median: 2.0, least: 1.0, most: 3.0 });
+        assert_eq!(Timing::of(vec![4.0, 1.0, 2.0, 3.0]).median, 2.5);
+        assert_eq!(Timing::of(vec![7.0]).median, 7.0);
+    }
+}

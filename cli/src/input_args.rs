@@ -1,0 +1,70 @@
+//! How much memory a scene file may ask for.
+
+use clap::Args;
+use splatstream_files::{ReadLimits, SceneError, SceneErrorKind};
+use std::path::Path;
+
+/// Memory that a scene may take for each byte of its file, whatever the default: packed scenes of any format take less.
+const PER_BYTE: u64 = 32;
+
+/// The option of all commands that read scenes.
+#[derive(Args, Debug, Clone, Copy, Default)]
+pub(crate) struct InputArgs {
+    /// Most memory that reading one scene may take, as in 512M or 4G [default: 1G, or 32 times the file if that is more].
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    max_input_memory: Option<u64>,
+}
+
+impl InputArgs {
+    /// The limits for the scene at a path.
+    pub(crate) fn limits(&self, path: &Path) -> ReadLimits {
+        let of_file = || size_of(path).saturating_mul(PER_BYTE).max(ReadLimits::default().max_memory);
+        ReadLimits { max_memory: self.max_input_memory.unwrap_or_else(of_file) }
+    }
+}
+
+/// An error of a reader, with the option that helps where one does.
+pub(crate) fn with_advice(error: &SceneError) -> String {
+    match error.kind {
+        SceneErrorKind::OverLimit { asked, .. } => {
+            let gibibytes = asked.div_ceil(1 << 30);
+            format!("{error}\n  if you trust the file, give --max-input-memory {gibibytes}G")
+        }
+        _ => error.to_string(),
+    }
+}
+
+/// Bytes of a file, or of the files in a directory; 0 if they cannot be had, which reading will say.
+fn size_of(path: &Path) -> u64 {
+    let of_file = |path: &Path| path.metadata().map_or(0, |metadata| metadata.len());
+    match std::fs::read_dir(path) {
+        Ok(entries) => entries.filter_map(Result::ok).map(|entry| of_file(&entry.path())).sum(),
+        Err(_) => of_file(path),
+    }
+}
+
+/// Bytes, with K, M or G for 2 to the 10, 20 or 30 of them.
+fn parse_size(text: &str) -> Result<u64, String> {
+    let wrong = || format!("'{text}' is no size; write 512M, 4G or a number of bytes");
+    let digits = text.trim_end_matches(|last: char| last.is_ascii_alphabetic());
+    let shift = match text[digits.len()..].to_ascii_uppercase().as_str() {
+        "" => 0,
+        "K" => 10,
+        "M" => 20,
+        "G" => 30,
+        _ => return Err(wrong()),
+    };
+    let number: u64 = digits.parse().map_err(|_| wrong())?;
+    number.checked_mul(1 << shift).filter(|&size| size > 0).ok_or_else(wrong)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(["7", "512K", "3m", "4G"].map(parse_size), [7, 512 << 10, 3 << 20, 4 << 30].map(Ok));
+        assert!(["", "G", "-1G", "4GB", "0", "99999999999G"].iter().all(|text| parse_size(text).is_err()));
+    }
+}

@@ -1,0 +1,205 @@
+//! Clause 7.3: the values of a block as they are coded, and the memory that blocks hand on.
+
+use crate::attribute::{self};
+use crate::interrupt::Interrupt;
+use crate::layout::{Attribute, PlaneInfo, Section};
+use crate::stage::Stage;
+use crate::steps::{Exponents, StepRule};
+use splatstream_format::entropy::lanes::Segments;
+
+/// The values of a block as they are coded, and what contexts need of the reconstruction.
+///
+/// The decoder fills it plane by plane, the encoder before it chooses models.
+#[derive(Debug, Clone)]
+pub struct CodedBlock {
+    /// Morton deltas, the first from 0.
+    pub deltas: Vec<u64>,
+    /// Coded values (bias not added) by plane; the position plane is empty.
+    pub coded: Vec<Vec<i32>>,
+    /// Log-scales without predictions, of new Gaussians: the largest first if the axes are canonical.
+    pub log_scale: [Vec<i32>; 3],
+    /// Opacity without predictions, of new Gaussians.
+    pub opacity: Vec<i32>,
+    lanes_log2: u8,
+    steps: StepRule,
+    /// The exponents of the steps of each attribute, as soon as what they follow from is there.
+    pub(crate) exponents: [Exponents; 5],
+    /// For each plane the sum of the magnitudes of the attribute's planes up to it; kept as planes are added,
+    /// so that a group of n planes costs n additions and not n squared.
+    magnitudes: Vec<Vec<i32>>,
+}
+
+impl CodedBlock {
+    /// A block of 2^`lanes_log2` lanes with these deltas, and no planes yet. A block without positions has as many
+    /// deltas of 0.
+    pub fn new(deltas: Vec<u64>, lanes_log2: u8, steps: StepRule) -> Self {
+        Self {
+            deltas,
+            coded: Vec::new(),
+            log_scale: [const { Vec::new() }; 3],
+            opacity: Vec::new(),
+            lanes_log2,
+            steps,
+            exponents: [const { Exponents::Same(0) }; 5],
+            magnitudes: Vec::new(),
+        }
+    }
+
+    /// The segments of its lanes.
+    pub fn segments(&self) -> Segments {
+        Segments::new(self.len(), self.lanes_log2)
+    }
+
+    /// The exponents of the steps of an attribute of new Gaussians; the planes that they follow from have been added.
+    pub fn exponents(&self, stage: Stage) -> &Exponents {
+        const ABSENT: &Exponents = &Exponents::Same(0);
+        self.exponents.get(stage as usize).unwrap_or(ABSENT)
+    }
+
+    /// Adds the next plane in coding order; `bias` is that of its model.
+    pub fn push(&mut self, info: PlaneInfo, coded: Vec<i32>, bias: i32) {
+        let before = if info.index > 0 { self.magnitudes.last().cloned() } else { None };
+        self.push_with(before, info, coded, bias);
+    }
+
+    /// The same where no plane but the next needs what is known of the planes before; `has_sums` says whether a later one
+    /// of the attribute needs sums of magnitudes.
+    pub(crate) fn push_decoded(
+        &mut self,
+        info: PlaneInfo,
+        coded: Vec<i32>,
+        bias: i32,
+        has_sums: bool,
+        buffers: &mut Buffers<'_>,
+    ) {
+        let last = self.magnitudes.last_mut().map(core::mem::take).unwrap_or_default();
+        let is_first = info.index == 0;
+        match (has_sums, is_first) {
+            (true, false) => self.push_with(Some(last), info, coded, bias),
+            (true, true) => {
+                let mut sums = if last.is_empty() { buffers.plane(self.len()) } else { last };
+                sums.fill(0);
+                self.push_with(Some(sums), info, coded, bias);
+            }
+            (false, _) => {
+                buffers.planes.extend((last.capacity() > 0).then_some(last));
+                self.push_with(Some(Vec::new()), info, coded, bias);
+            }
+        }
+    }
+
+    /// Takes memory for what contexts need of the reconstruction.
+    pub(crate) fn reserve(&mut self, buffers: &mut Buffers<'_>) {
+        for plane in self.log_scale.iter_mut().chain([&mut self.opacity]) {
+            *plane = buffers.planes.pop().unwrap_or_default();
+            plane.clear();
+        }
+    }
+
+    /// Adds a plane and the sums of magnitudes up to it; `before` are those up to the plane before, if it is of the same
+    /// attribute.
+    fn push_with(&mut self, before: Option<Vec<i32>>, info: PlaneInfo, coded: Vec<i32>, bias: i32) {
+        if info.section == Section::New {
+            self.reconstruct(info, &coded, bias);
+        }
+        let sums = match before {
+            Some(mut sums) => {
+                let each = sums.iter_mut().zip(&coded);
+                each.for_each(|(sum, &value)| *sum = sum.wrapping_add(value.wrapping_abs()));
+                sums
+            }
+            None => coded.iter().map(|&value| value.wrapping_abs()).collect(),
+        };
+        self.magnitudes.push(sums);
+        self.coded.push(coded);
+    }
+
+    /// Reconstructs what later planes take contexts and steps from; ranges are checked later.
+    ///
+    /// Values are below 98,304 and steps at most 6144, so that a sum of three products stays below 2^31.
+    fn reconstruct(&mut self, info: PlaneInfo, coded: &[i32], bias: i32) {
+        let copy = |exponents: &Exponents, plane: &mut Vec<i32>| {
+            plane.extend_from_slice(coded);
+            exponents.scale(plane, bias);
+        };
+        let [largest, middle, smallest] = &mut self.log_scale;
+        let [of_log_scale, of_opacity, ..] = &self.exponents;
+        match (info.attribute, info.index) {
+            (Attribute::LogScale, 0) => {
+                copy(&Exponents::Same(self.steps.of_largest()), largest);
+                self.prepare(&[Stage::LogScale]);
+            }
+            (Attribute::LogScale, 1) => {
+                copy(of_log_scale, middle);
+                attribute::next_log_scale(largest, middle);
+            }
+            (Attribute::LogScale, _) => {
+                copy(of_log_scale, smallest);
+                attribute::next_log_scale(middle, smallest);
+                self.prepare(&[Stage::Opacity]);
+            }
+            (Attribute::Opacity, _) => {
+                copy(of_opacity, &mut self.opacity);
+                self.prepare(&[Stage::Rotation, Stage::Dc, Stage::Sh]);
+            }
+            _ => {}
+        }
+    }
+
+    /// Computes the exponents of some attributes.
+    fn prepare(&mut self, stages: &[Stage]) {
+        for &stage in stages {
+            let log_scale = self.log_scale.each_ref().map(Vec::as_slice);
+            let exponents = self.steps.exponents(stage, log_scale, &self.opacity);
+            if let Some(slot) = self.exponents.get_mut(stage as usize) {
+                *slot = exponents;
+            }
+        }
+    }
+
+    /// The sums of the magnitudes of the attribute's planes before `plane`, which is not its first.
+    pub fn magnitudes_before(&self, plane: usize) -> &[i32] {
+        self.magnitudes.get(plane.wrapping_sub(1)).map(Vec::as_slice).unwrap_or_default()
+    }
+
+    /// Gaussians in the block.
+    pub fn len(&self) -> usize {
+        self.deltas.len()
+    }
+
+    /// True if there is no Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.deltas.is_empty()
+    }
+}
+
+/// Memory that blocks leave to the blocks after them: fresh memory costs more than what is done with it.
+#[derive(Debug)]
+pub struct Buffers<'i> {
+    planes: Vec<Vec<i32>>,
+    pub(crate) deltas: Vec<u64>,
+    /// Ends the work on these blocks.
+    pub(crate) interrupt: &'i Interrupt,
+}
+
+impl<'i> Buffers<'i> {
+    /// No memory yet, for blocks on which the work ends where an interrupt is requested.
+    pub const fn new(interrupt: &'i Interrupt) -> Self {
+        Self { planes: Vec::new(), deltas: Vec::new(), interrupt }
+    }
+
+    /// A plane of so many values, which mean nothing.
+    pub(crate) fn plane(&mut self, count: usize) -> Vec<i32> {
+        let mut plane = self.planes.pop().unwrap_or_default();
+        plane.resize(count, 0);
+        plane
+    }
+
+    /// Takes the memory of a block.
+    pub(crate) fn recycle(&mut self, block: CodedBlock) {
+        let CodedBlock { deltas, coded, log_scale, opacity, magnitudes, .. } = block;
+        self.deltas = deltas;
+        let planes = coded.into_iter().chain(log_scale).chain([opacity]).chain(magnitudes);
+        self.planes.extend(planes.filter(|plane| plane.capacity() > 0));
+    }
+}

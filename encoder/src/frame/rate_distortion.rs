@@ -1,0 +1,145 @@
+//! What a bit may cost in pictures, so that a frame is as good as it must be and no better.
+
+use super::predicted::Predicted;
+use super::update_decision::Judge;
+use crate::error::Error;
+use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::list::GaussianList;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_gaussians::GaussianFrame;
+use splatstream_render::{Camera, Image, metrics, render};
+
+const BACKGROUND: [f32; 3] = [0.0; 3];
+
+/// The levels of prices: each is the square root of two times the one before. At the lowest nothing is left that
+/// shows; at the highest nothing is sent.
+const LEVELS: core::ops::RangeInclusive<i32> = -16..=16;
+
+/// Bits per Gaussian that the error allowed in all views buys at level 0.
+const BITS: f32 = 10.0;
+
+/// The search ends where pictures are better than they must be by less than this, dB.
+const NEAR: f64 = 0.1;
+
+/// The first step of the search, levels.
+const STRIDE: i32 = 4;
+
+/// Source pictures of a frame.
+pub(crate) struct Pictures {
+    views: Vec<(Camera, Image)>,
+}
+
+impl Pictures {
+    /// As the cameras see a frame.
+    pub(crate) fn new(frame: &GaussianFrame, cameras: Vec<Camera>) -> Self {
+        let view = |camera: Camera| {
+            let colour = render(frame, &camera, BACKGROUND).colour;
+            (camera, colour)
+        };
+        Self { views: cameras.into_iter().map(view).collect() }
+    }
+
+    /// PSNR of each of a frame's pictures, dB, at most [`metrics::LOSSLESS_DB`].
+    pub(crate) fn psnr(&self, frame: &GaussianFrame) -> Vec<f64> {
+        let of_view = |(camera, source): &(Camera, Image)| {
+            metrics::psnr(source, &render(frame, camera, BACKGROUND).colour).min(metrics::LOSSLESS_DB)
+        };
+        self.views.iter().map(of_view).collect()
+    }
+
+    /// The cameras.
+    pub(crate) fn cameras(&self) -> Vec<Camera> {
+        self.views.iter().map(|(camera, _)| camera.clone()).collect()
+    }
+}
+
+/// All Gaussians of some lists, as they are output.
+pub(crate) fn shown(lists: &[GaussianList], sequence: &SequenceParameters) -> GaussianFrame {
+    let mut planes = QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
+    lists.iter().for_each(|list| planes.append(&list.planes));
+    to_gaussians(planes, sequence)
+}
+
+/// How good pictures must be.
+pub(crate) struct Goal {
+    /// Those of the source.
+    pub(crate) pictures: Pictures,
+    /// How far they may be below those of a frame of which every difference is sent, dB.
+    pub(crate) tolerance: f64,
+    /// PSNR of each view, dB; from the tolerance.
+    pub(crate) least: Vec<f64>,
+    /// The level of the price that the last frame was coded at.
+    pub(crate) level: i32,
+}
+
+impl Goal {
+    /// The share of the error of a view that a bit is worth at a level, of a frame of so many Gaussians.
+    fn price(&self, level: i32, gaussians: usize) -> f32 {
+        let at_zero = self.least.len() as f32 / (BITS * gaussians.max(1) as f32);
+        at_zero * libm::exp2f(0.5 * level as f32)
+    }
+
+    /// By how much pictures are better than they must be, dB, on average over the views.
+    fn margin(&self, frame: &GaussianFrame) -> f64 {
+        let margins =
+            self.pictures.psnr(frame).into_iter().zip(&self.least).map(|(psnr, least)| psnr - least);
+        margins.sum::<f64>() / self.least.len().max(1) as f64
+    }
+}
+
+impl Predicted<'_> {
+    /// Sets the judge, at the highest price at which pictures are good enough, or the lowest.
+    ///
+    /// # Errors
+    /// What the decoder's own checks refuse.
+    pub(crate) fn set_judge(&mut self, goal: &mut Goal) -> Result<(), Error> {
+        self.from.survivors.judge = Some(Judge::default());
+        let everything = self.shown()?;
+        goal.least = goal.pictures.psnr(&everything).iter().map(|psnr| psnr - goal.tolerance).collect();
+        let carried = shown(&self.displaced, self.from.coder.sequence);
+        self.from.survivors.judge = Some(Judge::new(&self.from.target.frame, &carried, goal));
+        goal.level = self.level(goal)?;
+        self.price_at(goal, goal.level);
+        Ok(())
+    }
+
+    /// The highest level at which pictures are good enough, nearly; or the lowest.
+    fn level(&mut self, goal: &Goal) -> Result<i32, Error> {
+        let (low, high) = (*LEVELS.start(), *LEVELS.end());
+        let (mut best, mut worst) = (low - 1, high + 1);
+        let mut level = goal.level.clamp(low, high);
+        let mut stride = STRIDE;
+        while worst - best > 1 {
+            self.price_at(goal, level);
+            let margin = goal.margin(&self.shown()?);
+            match margin >= 0.0 {
+                true => best = level,
+                false => worst = level,
+            }
+            if (0.0..NEAR).contains(&margin) {
+                break;
+            }
+            // Outwards until the goal is between two levels, then halving what is between.
+            level = match (best >= low, worst <= high) {
+                (true, false) => (best + stride).min(high),
+                (false, true) => (worst - stride).max(low),
+                _ => best + (worst - best) / 2,
+            };
+            stride *= 2;
+        }
+        Ok(best.max(low))
+    }
+
+    fn price_at(&mut self, goal: &Goal, level: i32) {
+        let gaussians = self.from.target.frame.len();
+        if let Some(judge) = &mut self.from.survivors.judge {
+            judge.price = goal.price(level, gaussians);
+        }
+    }
+
+    /// The frame as the judge would have it.
+    fn shown(&self) -> Result<GaussianFrame, Error> {
+        Ok(shown(&self.lists()?, self.from.coder.sequence))
+    }
+}

@@ -1,0 +1,84 @@
+//! Finite values of any size are coded or refused by name; the encoder does not panic.
+#![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
+
+use proptest::prelude::*;
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::decode_stream;
+use splatstream_encoder::{Error, Preset, Quality, Settings, Structure, encode};
+use splatstream_gaussians::{GaussianFrame, Planes};
+use std::ops::ControlFlow;
+
+/// Gaussians of a frame.
+const COUNT: usize = 12;
+/// Planes of a frame of degree 1.
+const PLANES: usize = 14 + 9;
+
+/// A value as scenes have it, or one at an end of what is finite.
+fn value() -> impl Strategy<Value = f32> {
+    const ENDS: &[f32] =
+        &[1e9, -1e9, f32::MAX, f32::MIN, f32::MIN_POSITIVE, 1e-45, 0.0, -0.0, 1e20, 88.0, -104.0];
+    prop_oneof![12 => -2.0..2.0_f32, 1 => prop::sample::select(ENDS)]
+}
+
+fn frame_of(values: &[f32]) -> GaussianFrame {
+    let mut planes = values.chunks_exact(COUNT).map(<[f32]>::to_vec);
+    let mut next = || planes.next().unwrap();
+    let planes = Planes {
+        position: [(); 3].map(|()| next()),
+        log_scale: [(); 3].map(|()| next()),
+        // A rotation has a direction.
+        rotation: [vec![1.0; COUNT], next(), next(), next()],
+        opacity_logit: next(),
+        dc: [(); 3].map(|()| next()),
+        sh: (0..9).map(|_| next()).collect(),
+    };
+    GaussianFrame::from_planes(1, planes).unwrap().with_unit_rotations()
+}
+
+/// Encodes frames; what comes out decodes, what is refused is refused for what is in a frame.
+fn check(mut frames: Vec<GaussianFrame>, settings: &Settings) {
+    let mut stream = Vec::new();
+    match encode(&mut frames, settings, &mut stream, &mut |_, _| {}) {
+        Ok(_) => {
+            let summary = decode_stream(&stream, &Options::default(), |_, _| ControlFlow::Continue(()));
+            assert_eq!(summary.verdict(), None);
+        }
+        Err(error) => {
+            let is_named = matches!(error, Error::OutOfGrid { .. } | Error::Invalid { .. });
+            assert!(is_named, "{error}");
+        }
+    }
+}
+
+fn settings() -> Settings {
+    Settings { preset: Preset::Fast, steps: Quality::Medium.steps(), block_log2: 6, ..Settings::default() }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    #[test]
+    fn one_frame_of_any_finite_values(values in prop::collection::vec(value(), PLANES * COUNT)) {
+        check(vec![frame_of(&values)], &settings());
+    }
+
+    #[test]
+    fn a_sequence_of_any_finite_values(
+        values in prop::collection::vec(value(), PLANES * COUNT),
+        changes in prop::collection::vec((0..PLANES * COUNT, value()), 0..6),
+    ) {
+        let mut later = values.clone();
+        changes.into_iter().for_each(|(at, value)| later[at] = value);
+        let structure = Structure::Predicted { layers: 1 };
+        let settings = Settings { structure, spatial_layers: 2, gop: 2, ..settings() };
+        check(vec![frame_of(&values), frame_of(&later)], &settings);
+    }
+}
+
+#[test]
+fn the_largest_and_the_smallest_log_scale_stand_together() {
+    let mut values = vec![0.25; PLANES * COUNT];
+    values[3 * COUNT..6 * COUNT].iter_mut().step_by(2).for_each(|log| *log = 1e9);
+    values[3 * COUNT + 1..6 * COUNT].iter_mut().step_by(2).for_each(|log| *log = -1e9);
+    check(vec![frame_of(&values)], &settings());
+}

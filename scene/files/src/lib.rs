@@ -1,0 +1,45 @@
+//! Files of 3D Gaussians in and out, and scenes made from a seed.
+//!
+//! * [`read_scene`] reads any supported file or directory; [`ply`], [`compressed_ply`], [`splat`], [`spz`]
+//!   and [`sog`] read one format each, and the first, third and fourth write.
+//! * [`builtin`] makes scenes from a seed, so that everything can be tried and tested without any input file.
+//!
+//! All of them give and take [`splatstream_gaussians::GaussianFrame`], whose axes are PLY's: x right, y down,
+//! z forward. Readers of formats with other axes convert.
+//!
+//! No function here panics on any bytes: a count in a header is compared with the bytes that follow it and
+//! with [`ReadLimits`] before anything is allocated. All maths that is not a single IEEE operation goes
+//! through `libm`, so the same input gives the same frame on every machine.
+
+#![deny(
+    clippy::arithmetic_side_effects,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used
+)]
+
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::indexing_slicing,
+    reason = "scenes are made from a few numbers that are clamped, not from input"
+)]
+pub mod builtin;
+pub mod compressed_ply;
+pub mod ply;
+pub mod sog;
+pub mod splat;
+pub mod spz;
+
+mod byte_values;
+mod cursor;
+mod decompress;
+mod error;
+mod format;
+mod limits;
+mod reading;
+mod smallest_three;
+
+pub use error::{SceneError, SceneErrorKind};
+pub use format::{SceneFormat, detect, read_scene, read_scene_as_is};
+pub use limits::ReadLimits;

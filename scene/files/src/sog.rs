@@ -1,0 +1,83 @@
+//! SOG: attributes as lossless WebP images with a `meta.json`, in a directory or a ZIP archive.
+//!
+//! One pixel a Gaussian, row by row. Version 2 has codebooks for scales, colours and spherical harmonics;
+//! version 1 has ranges instead.
+//!
+//! | image | channels | value |
+//! |---|---|---|
+//! | `means` low, high | 3 + 3 | 16 bits over `mins`–`maxs`, then sign(e) (exp(abs e) − 1) |
+//! | `quats` | 3 + 1 | the smallest three of w, x, y, z over ±1/√2; 252 + the place of the largest |
+//! | `scales` | 3 | log scale by codebook or range |
+//! | `sh0` | 3 + 1 | DC by codebook or range; opacity, or in version 1 its logit by range |
+//! | `shN` labels | 2 | low and high byte of a row of the palette |
+//! | `shN` centroids | 3 | the palette: 64 entries a row, 3, 8 or 15 pixels each; by codebook or range |
+
+mod image;
+mod meta;
+mod planes;
+
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+use zip::ZipArchive;
+
+use crate::error::SceneError;
+use crate::limits::{Budget, ReadLimits};
+use crate::reading::{checked, read_file};
+use splatstream_gaussians::GaussianFrame;
+
+/// The name of the file that describes the others.
+pub(crate) const META: &str = "meta.json";
+
+/// Reads the SOG scene in a directory, which holds a `meta.json`. Opacity 0 and 255 become finite logits.
+///
+/// # Errors
+/// Files that are missing or not what `meta.json` says, more than `limits` allow, or a value that no frame
+/// may hold. The error carries the path of the file at fault.
+pub fn read_dir(directory: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    let checked = checked(read_dir_as_is(directory, &mut Budget::new(limits))?);
+    checked.map_err(|error| error.in_file(directory))
+}
+
+/// As [`read_dir`], with values as they are: none is checked.
+pub(crate) fn read_dir_as_is(directory: &Path, budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
+    let fetch = |name: &str, budget: &mut Budget| {
+        // A name that leads elsewhere would let a scene read any file.
+        if Path::new(name).file_name().is_none_or(|file| file != name) {
+            let what = format!("{META} names \"{name}\", which is no plain file name");
+            return Err(SceneError::inconsistent(what, "export the scene again").in_file(directory));
+        }
+        read_file(&directory.join(name), budget)
+    };
+    planes::read(fetch, budget).map_err(|error| error.in_file(directory))
+}
+
+/// Reads a SOG scene bundled as a ZIP archive. Opacity 0 and 255 become finite logits.
+///
+/// # Errors
+/// Those of [`read_dir`]; the message names the member at fault.
+pub fn read_zip(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    checked(read_zip_as_is(bytes, &mut Budget::new(limits))?)
+}
+
+/// As [`read_zip`], with values as they are: none is checked.
+pub(crate) fn read_zip_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
+    let refuse = |what: String| SceneError::inconsistent(what, "this is no SOG archive, or it is damaged");
+    let mut archive =
+        ZipArchive::new(Cursor::new(bytes)).map_err(|error| refuse(format!("cannot list it: {error}")))?;
+    let fetch = |name: &str, budget: &mut Budget| {
+        let mut member = archive.by_name(name).map_err(|error| refuse(format!("{name}: {error}")))?;
+        let mut content = Vec::new();
+        // One byte more than allowed tells a member that is too large from one that just fits.
+        let read = (&mut member).take(budget.left().saturating_add(1)).read_to_end(&mut content);
+        read.map_err(|error| refuse(format!("{name}: {error}")))?;
+        budget.take(content.len() as u64, "a member of the archive")?;
+        Ok(content)
+    };
+    planes::read(fetch, budget)
+}
+
+/// Whether `bytes` begin as a ZIP archive does.
+pub(crate) fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
+}

@@ -1,0 +1,311 @@
+//! One frame of Gaussians in PLY's domain.
+
+use crate::rotation::normalise_rows;
+use crate::sh::{MAX_SH_DEGREE, rest_index, sh_planes};
+use std::collections::TryReserveError;
+use std::fmt;
+
+/// The attributes of a frame, one vector a scalar; row `i` of every vector belongs to Gaussian `i`.
+///
+/// Plain data for building a [`GaussianFrame`], which checks that the lengths agree.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Planes {
+    /// Centre: x right, y down, z forward; the scene's length unit, metres where the source has any.
+    pub position: [Vec<f32>; 3],
+    /// Natural log of the three semi-axes (standard deviations), same unit as `position`.
+    pub log_scale: [Vec<f32>; 3],
+    /// Unit quaternion, order w, x, y, z. Columns of its matrix are the axes that `log_scale` measures.
+    pub rotation: [Vec<f32>; 4],
+    /// Opacity before the sigmoid.
+    pub opacity_logit: Vec<f32>,
+    /// DC coefficient of red, green, blue: colour = 0.5 + 0.2821 × dc.
+    pub dc: [Vec<f32>; 3],
+    /// Bands 1 and up. Plane = coefficient × 3 + channel; coefficient 0 is the first of band 1.
+    pub sh: Vec<Vec<f32>>,
+}
+
+/// The values of a [`GaussianFrame`], to be changed in place; the planes are those of [`Planes`].
+#[derive(Debug)]
+pub struct PlanesMut<'a> {
+    /// Centres.
+    pub position: [&'a mut [f32]; 3],
+    /// Natural log of the semi-axes.
+    pub log_scale: [&'a mut [f32]; 3],
+    /// Quaternions w, x, y, z.
+    pub rotation: [&'a mut [f32]; 4],
+    /// Opacity before the sigmoid.
+    pub opacity_logit: &'a mut [f32],
+    /// DC coefficients.
+    pub dc: [&'a mut [f32]; 3],
+    /// Bands 1 and up.
+    pub sh: Vec<&'a mut [f32]>,
+}
+
+/// A frame of Gaussians: structure of arrays, equal lengths by construction, `f32`, PLY's domain.
+///
+/// Values are not checked by construction: see [`GaussianFrame::validate`]. Readers call it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GaussianFrame {
+    sh_degree: u8,
+    antialiased: bool,
+    planes: Planes,
+}
+
+/// Why planes do not make a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// No such SH degree.
+    ShDegree(u8),
+    /// The number of SH planes does not fit the degree.
+    ShPlanes {
+        /// The degree asked for.
+        degree: u8,
+        /// Planes that degree has.
+        expected: usize,
+        /// Planes given.
+        found: usize,
+    },
+    /// A plane of another length than the first, which is `x`.
+    Length {
+        /// PLY name of the plane.
+        property: String,
+        /// Rows of the first plane.
+        expected: usize,
+        /// Rows of this one.
+        found: usize,
+    },
+}
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ShDegree(degree) => write!(f, "SH degree {degree} is outside 0 to {MAX_SH_DEGREE}"),
+            Self::ShPlanes { degree, expected, found } => {
+                write!(f, "SH degree {degree} has {expected} planes, {found} given")
+            }
+            Self::Length { property, expected, found } => {
+                write!(f, "{property} has {found} rows, x has {expected}")
+            }
+        }
+    }
+}
+
+impl std::error::Error for FrameError {}
+
+impl Planes {
+    /// Empty planes with as many SH planes as `sh_degree` has, and room for `rows`.
+    pub fn with_capacity(sh_degree: u8, rows: usize) -> Self {
+        let mut planes = Self::of_degree(sh_degree);
+        planes.each_mut().for_each(|plane| plane.reserve_exact(rows));
+        planes
+    }
+
+    /// As [`Planes::with_capacity`], and memory that there is not is an error.
+    ///
+    /// # Errors
+    /// The machine refuses the memory.
+    pub fn try_with_capacity(sh_degree: u8, rows: usize) -> Result<Self, TryReserveError> {
+        let mut planes = Self::of_degree(sh_degree);
+        planes.each_mut().try_for_each(|plane| plane.try_reserve_exact(rows))?;
+        Ok(planes)
+    }
+
+    /// Empty planes, as many as `sh_degree` has.
+    fn of_degree(sh_degree: u8) -> Self {
+        Self { sh: vec![Vec::new(); sh_planes(sh_degree)], ..Self::default() }
+    }
+
+    /// Every plane.
+    fn each_mut(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
+        let first = position.iter_mut().chain(log_scale).chain(rotation);
+        first.chain(std::iter::once(opacity_logit)).chain(dc).chain(sh)
+    }
+
+    /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.
+    pub(crate) fn named(&self, sh_degree: u8) -> impl Iterator<Item = (String, &Vec<f32>)> {
+        let numbered =
+            |prefix: &'static str| move |(at, plane)| (format!("{prefix}{at}"), plane) as (String, &Vec<f32>);
+        let rest = move |(plane, values)| (format!("f_rest_{}", rest_index(plane, sh_degree)), values);
+        ["x", "y", "z"]
+            .into_iter()
+            .map(str::to_owned)
+            .zip(&self.position)
+            .chain(self.dc.iter().enumerate().map(numbered("f_dc_")))
+            .chain(self.sh.iter().enumerate().map(rest))
+            .chain(std::iter::once(("opacity".to_owned(), &self.opacity_logit)))
+            .chain(self.log_scale.iter().enumerate().map(numbered("scale_")))
+            .chain(self.rotation.iter().enumerate().map(numbered("rot_")))
+    }
+
+    fn gather(&self, indices: &[u32]) -> Self {
+        let pick = |plane: &Vec<f32>| indices.iter().map(|&row| plane[row as usize]).collect();
+        Self {
+            position: self.position.each_ref().map(pick),
+            log_scale: self.log_scale.each_ref().map(pick),
+            rotation: self.rotation.each_ref().map(pick),
+            opacity_logit: pick(&self.opacity_logit),
+            dc: self.dc.each_ref().map(pick),
+            sh: self.sh.iter().map(pick).collect(),
+        }
+    }
+}
+
+impl GaussianFrame {
+    /// A frame of `planes`.
+    ///
+    /// # Errors
+    /// A degree above 3, a number of SH planes that does not fit it, or planes of different lengths.
+    pub fn from_planes(sh_degree: u8, planes: Planes) -> Result<Self, FrameError> {
+        if sh_degree > MAX_SH_DEGREE {
+            return Err(FrameError::ShDegree(sh_degree));
+        }
+        let (expected, found) = (sh_planes(sh_degree), planes.sh.len());
+        if found != expected {
+            return Err(FrameError::ShPlanes { degree: sh_degree, expected, found });
+        }
+        let rows = planes.position[0].len();
+        if let Some((property, plane)) = planes.named(sh_degree).find(|(_, plane)| plane.len() != rows) {
+            return Err(FrameError::Length { property, expected: rows, found: plane.len() });
+        }
+        Ok(Self { sh_degree, antialiased: false, planes })
+    }
+
+    /// The same Gaussians, rotations at unit length; those without direction stay as they are.
+    #[must_use]
+    pub fn with_unit_rotations(mut self) -> Self {
+        normalise_rows(&mut self.planes.rotation);
+        self
+    }
+
+    /// How many Gaussians.
+    pub fn len(&self) -> usize {
+        self.planes.opacity_logit.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Degree of the spherical harmonics, 0 to 3.
+    pub fn sh_degree(&self) -> u8 {
+        self.sh_degree
+    }
+
+    /// Whether opacities were fitted for a renderer that makes up for its low-pass filter.
+    pub fn antialiased(&self) -> bool {
+        self.antialiased
+    }
+
+    /// The same Gaussians, for a renderer that makes up for its low-pass filter, or for one that does not.
+    #[must_use]
+    pub fn with_antialiased(self, antialiased: bool) -> Self {
+        Self { antialiased, ..self }
+    }
+
+    /// Centres: x right, y down, z forward.
+    pub fn position(&self) -> &[Vec<f32>; 3] {
+        &self.planes.position
+    }
+
+    /// Natural log of the three semi-axes.
+    pub fn log_scale(&self) -> &[Vec<f32>; 3] {
+        &self.planes.log_scale
+    }
+
+    /// Unit quaternions: w, x, y, z.
+    pub fn rotation(&self) -> &[Vec<f32>; 4] {
+        &self.planes.rotation
+    }
+
+    /// Opacity before the sigmoid.
+    pub fn opacity_logit(&self) -> &[f32] {
+        &self.planes.opacity_logit
+    }
+
+    /// DC coefficients of red, green, blue.
+    pub fn dc(&self) -> &[Vec<f32>; 3] {
+        &self.planes.dc
+    }
+
+    /// Planes of bands 1 and up: plane = coefficient × 3 + channel.
+    pub fn sh(&self) -> &[Vec<f32>] {
+        &self.planes.sh
+    }
+
+    /// All the planes.
+    pub fn planes(&self) -> &Planes {
+        &self.planes
+    }
+
+    /// The values, to be changed; planes keep their number and their length, so that the frame stays one.
+    pub fn planes_mut(&mut self) -> PlanesMut<'_> {
+        let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = &mut self.planes;
+        PlanesMut {
+            position: position.each_mut().map(Vec::as_mut_slice),
+            log_scale: log_scale.each_mut().map(Vec::as_mut_slice),
+            rotation: rotation.each_mut().map(Vec::as_mut_slice),
+            opacity_logit,
+            dc: dc.each_mut().map(Vec::as_mut_slice),
+            sh: sh.iter_mut().map(Vec::as_mut_slice).collect(),
+        }
+    }
+
+    /// The planes themselves.
+    pub fn into_planes(self) -> Planes {
+        self.planes
+    }
+
+    /// The Gaussians at `indices`, in that order; an index may come more than once.
+    ///
+    /// # Panics
+    /// If an index is not below [`GaussianFrame::len`].
+    #[must_use]
+    pub fn select(&self, indices: &[u32]) -> Self {
+        Self { planes: self.planes.gather(indices), ..*self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(sh_degree: u8) -> Planes {
+        let mut planes = Planes::with_capacity(sh_degree, 1);
+        let plain = planes.position.iter_mut().chain(&mut planes.log_scale).chain(&mut planes.rotation);
+        for plane in plain.chain(&mut planes.dc).chain(&mut planes.sh) {
+            plane.push(0.5);
+        }
+        planes.opacity_logit.push(0.5);
+        planes
+    }
+
+    #[test]
+    fn planes_of_different_lengths_make_no_frame() {
+        let mut planes = one(0);
+        planes.log_scale[2].push(1.0);
+        let error = GaussianFrame::from_planes(0, planes).unwrap_err();
+        assert_eq!(error.to_string(), "scale_2 has 2 rows, x has 1");
+    }
+
+    #[test]
+    fn the_degree_fixes_the_number_of_planes() {
+        assert!(GaussianFrame::from_planes(1, one(0)).is_err());
+        assert!(GaussianFrame::from_planes(4, one(0)).is_err());
+    }
+
+    #[test]
+    fn selecting_gathers_in_the_order_asked() {
+        let mut planes = one(0);
+        for plane in planes.position.iter_mut().chain(&mut planes.log_scale) {
+            plane.push(2.0);
+        }
+        for plane in planes.rotation.iter_mut().chain(&mut planes.dc) {
+            plane.push(3.0);
+        }
+        planes.opacity_logit.push(4.0);
+        let frame = GaussianFrame::from_planes(0, planes).unwrap();
+        assert_eq!(frame.select(&[1, 0, 1]).opacity_logit(), [4.0, 0.5, 4.0]);
+    }
+}

@@ -1,0 +1,140 @@
+//! A decoded frame.
+
+use crate::error::Warning;
+use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::DecodedFrame;
+use splatstream_format::syntax::{FrameType, SequenceParameters};
+use splatstream_gaussians::GaussianFrame;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+/// One frame: Gaussians as structure of arrays, most important first within each refinement.
+///
+/// ```
+/// # let stream = include_bytes!("../examples/talk.gss").to_vec();
+/// let mut frames = splatstream::Decoder::from_bytes(stream);
+/// let frame = frames.next_frame()?.expect("the stream has frames");
+/// assert_eq!((frame.index(), frame.is_keyframe()), (0, true));
+/// let [x, y, z] = frame.gaussians().position();
+/// println!("the first Gaussian stands at {}, {}, {}", x[0], y[0], z[0]);
+/// assert!(frame.warnings().is_empty());
+/// # Ok::<(), splatstream::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Frame {
+    index: u32,
+    kind: FrameType,
+    point: OperatingPoint,
+    refinements: u8,
+    carried: usize,
+    sequence: SequenceParameters,
+    integers: QuantizedFrame,
+    identities: Vec<u32>,
+    gaussians: OnceLock<GaussianFrame>,
+    warnings: Vec<Warning>,
+}
+
+impl Frame {
+    pub(crate) fn new(
+        mut decoded: DecodedFrame,
+        point: OperatingPoint,
+        sequence: SequenceParameters,
+        warnings: Vec<Warning>,
+    ) -> Self {
+        Self {
+            index: decoded.index,
+            kind: decoded.frame_type,
+            point: point.at_most(OperatingPoint {
+                spatial: sequence.spatial_layer_count.saturating_sub(1),
+                temporal: sequence.temporal_layer_count.saturating_sub(1),
+                refinement: sequence.refinement_count.saturating_sub(1),
+            }),
+            refinements: decoded.level,
+            carried: decoded.carried,
+            sequence,
+            identities: core::mem::take(&mut decoded.identities),
+            integers: decoded.into_shown(),
+            gaussians: OnceLock::new(),
+            warnings,
+        }
+    }
+
+    /// Its number in the order in which frames are shown, from 0.
+    pub fn index(&self) -> u32 {
+        self.index
+    }
+
+    /// When it is shown, from the start of the stream.
+    pub fn time(&self) -> Duration {
+        let ticks = u64::from(self.index) * u64::from(self.sequence.ticks_per_frame);
+        let per_second = u64::from(self.sequence.ticks_per_second.max(1));
+        let nanoseconds = u128::from(ticks % per_second) * 1_000_000_000 / u128::from(per_second);
+        Duration::new(ticks / per_second, nanoseconds as u32)
+    }
+
+    /// Whether it refers to no other frame.
+    pub fn is_keyframe(&self) -> bool {
+        self.kind == FrameType::Intra
+    }
+
+    /// The operating point that it was decoded at.
+    pub fn operating_point(&self) -> OperatingPoint {
+        self.point
+    }
+
+    /// How many refinements it shows exactly. Fewer than the operating point asks for if some are missing.
+    pub fn refinements(&self) -> u8 {
+        self.refinements
+    }
+
+    /// How many of its Gaussians, the last ones, are those of an earlier frame, moved: they stand in for refinements that
+    /// are not there.
+    pub fn carried(&self) -> usize {
+        self.carried
+    }
+
+    /// How many Gaussians it has.
+    pub fn len(&self) -> usize {
+        self.integers.len()
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.integers.is_empty()
+    }
+
+    /// The Gaussians as f32. The first call computes them, beside the integers; [`Frame::into_gaussians`] needs no second
+    /// copy.
+    pub fn gaussians(&self) -> &GaussianFrame {
+        self.gaussians.get_or_init(|| to_gaussians(self.integers.clone(), &self.sequence))
+    }
+
+    /// The Gaussians as f32.
+    pub fn into_gaussians(self) -> GaussianFrame {
+        let Self { gaussians, integers, sequence, .. } = self;
+        gaussians.into_inner().unwrap_or_else(|| to_gaussians(integers, &sequence))
+    }
+
+    /// The Gaussians as integers on the grids of the stream.
+    pub fn integers(&self) -> &QuantizedFrame {
+        &self.integers
+    }
+
+    /// The Gaussians as integers on the grids of the stream.
+    pub fn into_integers(self) -> QuantizedFrame {
+        self.integers
+    }
+
+    /// The identity of each Gaussian: the same in two frames for the same Gaussian. [`Slots`](crate::Slots) uses them.
+    pub fn identities(&self) -> &[u32] {
+        &self.identities
+    }
+
+    /// What was lost since the frame before: damage, and frames that are missing. This is the only place where it is told,
+    /// but for what follows the last frame, which is [`Error::Incomplete`](crate::Error::Incomplete).
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+}

@@ -1,0 +1,84 @@
+//! SplatStream: scalable, dynamic 3D Gaussian splatting in one stream. This crate is the way in for engines, players and
+//! servers.
+//!
+//! A file, frame by frame:
+//!
+//! ```no_run
+//! for frame in splatstream::Decoder::open("talk.gss")? {
+//!     let frame = frame?;
+//!     println!("frame {}: {} Gaussians", frame.index(), frame.gaussians().len());
+//! }
+//! # Ok::<(), splatstream::Error>(())
+//! ```
+//!
+//! Bytes as they arrive, from a network for example. The decoder keeps those that it still needs:
+//!
+//! ```
+//! # let stream = include_bytes!("../examples/talk.gss").to_vec();
+//! let mut decoder = splatstream::Decoder::new();
+//! for chunk in stream.chunks(1000) {
+//!     decoder.push(chunk)?;
+//!     while let Some(frame) = decoder.next_frame()? {
+//!         println!("frame {}: {} Gaussians", frame.index(), frame.len());
+//!     }
+//! }
+//! decoder.end();
+//! while let Some(frame) = decoder.next_frame()? {
+//!     println!("frame {}: the last", frame.index());
+//! }
+//! # Ok::<(), splatstream::Error>(())
+//! ```
+//!
+//! * [`Decoder`] takes a file, bytes in memory, or chunks; it [seeks](Decoder::seek), and changes its
+//!   [operating point](Decoder::set_operating_point).
+//! * [`Frame`] has the Gaussians as planes of f32 or of integers, and [what was lost](Frame::warnings).
+//! * [`Slots`] keeps each Gaussian at its place from frame to frame, and says what has changed: what a renderer uploads.
+//! * [`Limits`] bound memory, work and output before anything is allocated; [`Cancel`] ends the work on a frame. The
+//!   defaults are safe for a server that decodes what strangers send.
+//! * [`Encoder`] takes frames and writes a stream.
+//!
+//! No input panics or aborts. A damaged stream gives the frames that are left, with warnings; damage costs at most the GOP
+//! (group of pictures) that it is in.
+//!
+//! The format is specified in the `spec/` folder of the repository. The crates below this one are its parts, for
+//! inspectors and for other encoders; their interfaces change more often.
+
+mod decoder;
+#[cfg(feature = "encode")]
+mod encoder;
+mod error;
+mod extract;
+mod frame;
+mod limits;
+mod slots;
+mod source;
+
+pub use decoder::{Decoder, Position};
+#[cfg(feature = "encode")]
+pub use encoder::{EncodeError, Encoder, Report, Settings};
+pub use error::{Error, Result, Warning};
+pub use extract::extract;
+pub use frame::Frame;
+pub use limits::Limits;
+pub use slots::{Slots, Update};
+
+/// A frame as planes of integers on the grids of the stream: what decoders compare.
+pub use splatstream_decoder::frame::QuantizedFrame as Integers;
+/// Ends the work of a [`Decoder`] from another thread: see [`Decoder::set_cancel`].
+pub use splatstream_decoder::interrupt::Interrupt as Cancel;
+pub use splatstream_decoder::operating_point::{OperatingPoint, ParseOperatingPointError};
+#[cfg(feature = "encode")]
+pub use splatstream_encoder::{FrameSource, encode};
+/// What is wrong with the bytes of a stream: where, by which clause, and what.
+pub use splatstream_format::Error as StreamError;
+pub use splatstream_gaussians::{GaussianFrame, Planes};
+
+/// What the fields of [`Settings`] hold.
+#[cfg(feature = "encode")]
+pub mod settings {
+    pub use splatstream_encoder::{
+        Anchor, Fidelity, Importance, Laws, NetworkSource, PredictorChoice, Predictors, Preset, Quality,
+        ShChoice, Size, Steps, Structure, Tools,
+    };
+    pub use splatstream_format::payload::SceneDescription;
+}

@@ -1,0 +1,205 @@
+//! Frames for renderers: every Gaussian keeps its place, and what has changed is told.
+
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use core::hash::{BuildHasherDefault, Hasher};
+use core::ops::Range;
+use splatstream_gaussians::{Planes, sh_coefficients};
+use std::collections::HashMap;
+
+/// Planes of a fixed number of slots. A Gaussian has the same slot in every frame from the one that it appears in to the
+/// one that it disappears in; a slot without a Gaussian has opacity 0 (its logit is minus infinity) and is 0 otherwise.
+///
+/// ```
+/// # let stream = include_bytes!("../examples/talk.gss").to_vec();
+/// let mut slots = splatstream::Slots::new(1000);
+/// for frame in splatstream::Decoder::from_bytes(stream) {
+///     let update = slots.update(&frame?)?;
+///     for range in update.dirty {
+///         // What a renderer copies to its buffers.
+///         let x = &slots.planes().position[0][range];
+///         assert!(x.iter().all(|x| x.is_finite()));
+///     }
+/// }
+/// assert_eq!(slots.planes().opacity_logit.len(), 1000);
+/// # Ok::<(), splatstream::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Slots {
+    capacity: usize,
+    sh_degree: u8,
+    planes: Planes,
+    /// The slot of each identity in the last frame.
+    slot_of: HashMap<u32, usize, BuildHasherDefault<Spread>>,
+    /// Slots of Gaussians whose identity another one of the last frame has: identities are numbers of 32 bits.
+    doubled: Vec<usize>,
+    /// Slots without a Gaussian; the lowest is taken first.
+    free: Vec<usize>,
+    is_dirty: Vec<bool>,
+}
+
+/// What a frame has changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[must_use]
+#[non_exhaustive]
+pub struct Update {
+    /// Runs of slots of which some plane has another value than before, increasing.
+    pub dirty: Vec<Range<usize>>,
+    /// Gaussians that keep their slot.
+    pub kept: usize,
+    /// Gaussians that have appeared.
+    pub appeared: usize,
+    /// Gaussians that have disappeared.
+    pub disappeared: usize,
+    /// The degree of the spherical harmonics has changed: there are more or fewer planes.
+    pub has_new_planes: bool,
+}
+
+/// Opacity before the sigmoid of a slot without a Gaussian.
+const ABSENT: f32 = f32::NEG_INFINITY;
+
+impl Slots {
+    /// Slots for frames of at most so many Gaussians.
+    pub fn new(capacity: usize) -> Self {
+        Self {
+            capacity,
+            sh_degree: 0,
+            planes: empty(capacity, 0),
+            slot_of: HashMap::default(),
+            doubled: Vec::new(),
+            free: (0..capacity).rev().collect(),
+            is_dirty: vec![false; capacity],
+        }
+    }
+
+    /// How many slots there are.
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// The planes, each of which has as many values as there are slots.
+    pub fn planes(&self) -> &Planes {
+        &self.planes
+    }
+
+    /// The slot of the Gaussian with an identity, if it is in the last frame.
+    pub fn slot(&self, identity: u32) -> Option<usize> {
+        self.slot_of.get(&identity).copied()
+    }
+
+    /// Shows a frame.
+    ///
+    /// # Errors
+    /// [`Error::TooFewSlots`] if the frame has more Gaussians than there are slots. The slots are as they were.
+    pub fn update(&mut self, frame: &Frame) -> Result<Update> {
+        if frame.len() > self.capacity {
+            return Err(Error::TooFewSlots { needed: frame.len(), capacity: self.capacity });
+        }
+        let gaussians = frame.gaussians();
+        let has_new_planes = self.sh_degree != gaussians.sh_degree();
+        if has_new_planes {
+            self.sh_degree = gaussians.sh_degree();
+            let count = 3 * sh_coefficients(self.sh_degree);
+            self.planes.sh.resize_with(count, || vec![0.0; self.capacity]);
+        }
+        let mut before = core::mem::take(&mut self.slot_of);
+        let slots: Vec<Option<usize>> =
+            frame.identities().iter().map(|identity| before.remove(identity)).collect();
+        let kept = slots.iter().flatten().count();
+        let gone: Vec<usize> = before.into_values().chain(core::mem::take(&mut self.doubled)).collect();
+        gone.iter().for_each(|&slot| self.clear(slot));
+        self.free.sort_unstable_by(|a, b| b.cmp(a));
+        let slots = self.place(frame.identities(), slots);
+        write(&mut self.planes, gaussians.planes(), &slots, &mut self.is_dirty);
+        let (appeared, disappeared) = (frame.len() - kept, gone.len());
+        Ok(Update { dirty: self.take_dirty(), kept, appeared, disappeared, has_new_planes })
+    }
+
+    /// Gives the Gaussians that have none a slot.
+    fn place(&mut self, identities: &[u32], slots: Vec<Option<usize>>) -> Vec<usize> {
+        self.slot_of.reserve(identities.len());
+        let mut placed = Vec::with_capacity(slots.len());
+        for (&identity, slot) in identities.iter().zip(slots) {
+            // There are as many as are needed: the frame fits.
+            let slot = slot.or_else(|| self.free.pop()).unwrap_or(usize::MAX);
+            self.doubled.extend(self.slot_of.insert(identity, slot));
+            placed.push(slot);
+        }
+        placed
+    }
+
+    fn clear(&mut self, slot: usize) {
+        self.free.push(slot);
+        let set = |plane: &mut Vec<f32>, value| plane.get_mut(slot).into_iter().for_each(|to| *to = value);
+        planes_mut(&mut self.planes).for_each(|plane| set(plane, 0.0));
+        set(&mut self.planes.opacity_logit, ABSENT);
+        self.is_dirty.get_mut(slot).into_iter().for_each(|dirty| *dirty = true);
+    }
+
+    fn take_dirty(&mut self) -> Vec<Range<usize>> {
+        let mut ranges: Vec<Range<usize>> = Vec::new();
+        for (slot, is_dirty) in self.is_dirty.iter_mut().enumerate() {
+            if !core::mem::take(is_dirty) {
+                continue;
+            }
+            match ranges.last_mut() {
+                Some(last) if last.end == slot => last.end = slot + 1,
+                _ => ranges.push(slot..slot + 1),
+            }
+        }
+        ranges
+    }
+}
+
+/// Writes Gaussians to their slots, and takes note of those that change.
+fn write(to: &mut Planes, from: &Planes, slots: &[usize], is_dirty: &mut [bool]) {
+    for (to, from) in planes_mut(to).zip(planes(from)) {
+        for (&slot, value) in slots.iter().zip(from) {
+            if let (Some(to), Some(is_dirty)) = (to.get_mut(slot), is_dirty.get_mut(slot)) {
+                *is_dirty |= to.to_bits() != value.to_bits();
+                *to = *value;
+            }
+        }
+    }
+}
+
+fn empty(capacity: usize, sh_degree: u8) -> Planes {
+    let plane = || vec![0.0; capacity];
+    Planes {
+        position: core::array::from_fn(|_| plane()),
+        log_scale: core::array::from_fn(|_| plane()),
+        rotation: core::array::from_fn(|_| plane()),
+        opacity_logit: vec![ABSENT; capacity],
+        dc: core::array::from_fn(|_| plane()),
+        sh: (0..3 * sh_coefficients(sh_degree)).map(|_| plane()).collect(),
+    }
+}
+
+fn planes(planes: &Planes) -> impl Iterator<Item = &Vec<f32>> {
+    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
+    position.iter().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
+}
+
+fn planes_mut(planes: &mut Planes) -> impl Iterator<Item = &mut Vec<f32>> {
+    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
+    position.iter_mut().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
+}
+
+/// Spreads identities, which are consecutive numbers, over a table.
+#[derive(Debug, Default)]
+struct Spread(u64);
+
+impl Hasher for Spread {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u32(byte.into()));
+    }
+
+    fn write_u32(&mut self, value: u32) {
+        // The golden ratio in 64 bits.
+        self.0 = (self.0 ^ u64::from(value)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+}

@@ -1,0 +1,185 @@
+//! However bytes arrive, the frames are the same, and so is what is said of damage.
+
+use super::vectors;
+use proptest::prelude::*;
+use splatstream::{Decoder, Error, Frame, Limits, Position};
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::Frames;
+use splatstream_format::Class;
+use std::io::Cursor;
+use std::sync::Arc;
+
+/// Everything that a decoder says.
+#[derive(Debug, PartialEq)]
+struct Said {
+    frames: Vec<(u32, splatstream::Integers, Vec<u32>, Vec<String>)>,
+    end: Option<String>,
+}
+
+impl Said {
+    fn frame(&mut self, frame: Frame) {
+        let warnings = frame.warnings().iter().map(ToString::to_string).collect();
+        let identities = frame.identities().to_vec();
+        self.frames.push((frame.index(), frame.into_integers(), identities, warnings));
+    }
+
+    fn of(decoder: Decoder) -> Self {
+        let mut said = Self { frames: Vec::new(), end: None };
+        for frame in decoder.with_limits(Limits::UNLIMITED) {
+            match frame {
+                Ok(frame) => said.frame(frame),
+                Err(error) => said.end = Some(error.to_string()),
+            }
+        }
+        said
+    }
+
+    /// The same of bytes that come in chunks, whose sizes repeat.
+    fn of_chunks(bytes: &[u8], sizes: &[usize]) -> Self {
+        let mut said = Self { frames: Vec::new(), end: None };
+        let mut decoder = Decoder::new().with_limits(Limits::UNLIMITED);
+        let mut rest = bytes;
+        for &size in sizes.iter().cycle() {
+            let (chunk, after) = rest.split_at(size.clamp(1, rest.len().max(1)).min(rest.len()));
+            rest = after;
+            decoder.push(chunk).unwrap();
+            if rest.is_empty() {
+                decoder.end();
+            }
+            loop {
+                match decoder.next_frame() {
+                    Ok(Some(frame)) => said.frame(frame),
+                    Ok(None) => break,
+                    Err(error) => {
+                        said.end = Some(error.to_string());
+                        break;
+                    }
+                }
+            }
+            if rest.is_empty() || decoder.is_finished() {
+                return said;
+            }
+        }
+        said
+    }
+}
+
+fn expected(bytes: &Arc<[u8]>) -> Said {
+    Said::of(Decoder::from_bytes(bytes.clone()))
+}
+
+#[test]
+fn pieces_of_every_vector_give_the_frames_of_the_whole() {
+    for (number, (path, bytes)) in vectors::all().into_iter().enumerate() {
+        let whole = expected(&bytes);
+        let sizes = [1 + number % 37, 1 + number % 1009, 1 + number % 5];
+        assert_eq!(Said::of_chunks(&bytes, &sizes), whole, "{}", path.display());
+        let read = Decoder::from_reader(Cursor::new(bytes.to_vec()));
+        assert_eq!(Said::of(read), whole, "{}", path.display());
+    }
+}
+
+#[test]
+fn every_vector_gives_the_frames_and_the_errors_of_the_decoder_below() {
+    let limits = splatstream_format::Limits::of_level(4);
+    for (path, bytes) in vectors::all() {
+        let said = expected(&bytes);
+        let Ok(mut frames) = Frames::open(&bytes, &Options { limits, ..Options::default() }) else {
+            assert!(said.frames.is_empty() && said.end.is_some(), "{}", path.display());
+            continue;
+        };
+        let below: Vec<_> = std::iter::from_fn(|| frames.next_frame()).collect();
+        let shown: Vec<_> =
+            below.into_iter().filter(|frame| !frame.is_lost).map(|frame| frame.index).collect();
+        let given: Vec<u32> = said.frames.iter().map(|frame| frame.0).collect();
+        let errors = frames.summary().errors;
+        // A stream that breaks a limit is not decoded further.
+        if errors.iter().any(|error| error.class() == Class::OverLimit) {
+            assert!(shown.starts_with(&given) && said.end.is_some(), "{}", path.display());
+            continue;
+        }
+        assert_eq!(given, shown, "{}", path.display());
+        let warnings: Vec<&String> = said.frames.iter().flat_map(|frame| &frame.3).collect();
+        for error in errors {
+            let text = error.to_string();
+            let is_said =
+                warnings.contains(&&text) || said.end.as_ref().is_some_and(|end| end.contains(&text));
+            assert!(is_said, "{}: {text}", path.display());
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn pieces_of_a_damaged_stream_give_the_frames_of_the_whole(
+        damage in prop::collection::vec((any::<prop::sample::Index>(), 1_u8..), 0..4),
+        sizes in prop::collection::vec(1_usize..3000, 1..8),
+        cut in any::<prop::sample::Index>(),
+        is_cut in any::<bool>(),
+    ) {
+        let mut bytes = vectors::talk().to_vec();
+        for (at, change) in damage {
+            let at = at.index(bytes.len());
+            bytes[at] ^= change;
+        }
+        if is_cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        let whole = expected(&bytes.clone().into());
+        prop_assert_eq!(Said::of_chunks(&bytes, &sizes), whole);
+    }
+
+    #[test]
+    fn a_seek_gives_the_frames_from_there_on(to in 0_u32..14, before in 0_usize..14) {
+        let bytes = vectors::talk();
+        let all: Vec<_> = Decoder::from_bytes(bytes.clone()).map(|frame| frame.unwrap().into_integers()).collect();
+        for mut decoder in [Decoder::from_bytes(bytes.clone()), Decoder::from_reader(Cursor::new(bytes.to_vec()))] {
+            decoder.by_ref().take(before).for_each(|frame| drop(frame.unwrap()));
+            decoder.seek(Position::Frame(to)).unwrap();
+            let rest: Vec<_> = decoder.map(|frame| frame.unwrap().into_integers()).collect();
+            prop_assert_eq!(&rest, &all[all.len().min(to as usize)..]);
+        }
+    }
+}
+
+#[test]
+fn a_time_is_the_frame_that_is_shown_then() {
+    let mut decoder = Decoder::from_bytes(vectors::talk());
+    decoder.seek(Position::Time(std::time::Duration::from_millis(170))).unwrap();
+    let frame = decoder.next_frame().unwrap().unwrap();
+    assert_eq!(frame.index(), 5);
+    assert!(frame.time() <= std::time::Duration::from_millis(170));
+}
+
+#[test]
+fn what_follows_the_last_frame_is_told_once() {
+    let bytes = vectors::talk();
+    let mut decoder = Decoder::from_bytes(&bytes[..bytes.len() - 5]);
+    let given: Vec<_> = decoder.by_ref().collect();
+    assert_eq!(given.iter().filter(|frame| frame.is_ok()).count(), 12);
+    assert!(matches!(given.last(), Some(Err(Error::Incomplete(warnings))) if warnings.len() == 1));
+    assert!(decoder.next_frame().unwrap().is_none() && decoder.is_finished());
+}
+
+#[test]
+fn other_files_are_refused_with_their_first_bytes() {
+    let mut decoder = Decoder::new();
+    decoder.push(b"ply\n").unwrap();
+    let error = decoder.next_frame().unwrap_err();
+    assert!(matches!(error, Error::Stream(_)), "{error}");
+    assert!(decoder.is_finished());
+}
+
+#[test]
+fn bytes_go_only_where_they_are_expected() {
+    let mut decoder = Decoder::from_bytes(vectors::talk());
+    assert!(matches!(decoder.push(&[1]), Err(Error::NotPushed)));
+    let mut decoder = Decoder::new();
+    assert!(matches!(decoder.seek(Position::Frame(1)), Err(Error::NotSeekable)));
+    decoder.end();
+    assert!(matches!(decoder.push(&[1]), Err(Error::NotPushed)));
+    let mut decoder = Decoder::new().with_limits(Limits { max_memory: 10, ..Limits::default() });
+    assert!(matches!(decoder.push(&[0; 11]), Err(Error::TooMuchInput { waiting: 11, allowed: 10 })));
+}

@@ -1,0 +1,9 @@
+//! Streams of the conformance suite through every way into the decoder.
+
+#![cfg(test)]
+
+mod arrival;
+mod bounds;
+mod operating_points;
+mod slots;
+mod vectors;
