@@ -40,6 +40,9 @@
 //! No input panics or aborts. A damaged stream gives the frames that are left, with warnings; damage costs at most the GOP
 //! (group of pictures) that it is in.
 //!
+//! Programs in C and C++ use the same decoder through `bindings/c` of the repository: a static or shared library, and the
+//! header `splatstream.h`. Compiled for wasm32-unknown-unknown it imports nothing.
+//!
 //! The format is specified in the `spec/` folder of the repository. The crates below this one are its parts, for
 //! inspectors and for other encoders; their interfaces change more often.
 

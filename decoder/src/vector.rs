@@ -1,6 +1,6 @@
 //! Loops compiled for the vectors of the machine. What they compute is the same everywhere.
 
-use pulp::{Simd, WithSimd};
+use pulp::{Scalar, Simd, WithSimd};
 
 /// A loop. What it calls is compiled for each kind of machine as far as it is inlined.
 pub(crate) trait Task {
@@ -26,5 +26,5 @@ pub(crate) fn vectorized(task: impl Task) {
     if let Some(v3) = pulp::x86::V3::try_new() {
         return Simd::vectorize(v3, OnMachine(task));
     }
-    task.run();
+    Scalar::new().vectorize(OnMachine(task));
 }

@@ -1,6 +1,8 @@
 //! A matrix for one vector at a time: its rows are the lanes.
 
-use super::products::{self, Portable, Products};
+#[cfg(target_arch = "x86_64")]
+use super::products;
+use super::products::{Portable, Products};
 use super::{LANES, Lane, Machine, ZERO, packed};
 use pulp::{Simd, WithSimd};
 
