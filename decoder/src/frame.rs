@@ -64,7 +64,7 @@ impl QuantizedFrame {
 
     /// Divides the frame in runs of the given lengths, so that each can be written by itself.
     pub fn slices(&mut self, lengths: &[usize]) -> Vec<FrameSlice<'_>> {
-        let planes = 10_usize.wrapping_add(self.sh.len());
+        let planes = 10_usize.saturating_add(self.sh.len());
         let mut slices: Vec<FrameSlice<'_>> = lengths
             .iter()
             .map(|_| FrameSlice { position: Vec::with_capacity(3), planes: Vec::with_capacity(planes) })

@@ -133,12 +133,12 @@ pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatRe
                 if kind == UnitType::GopHeader {
                     entries.push(IndexEntry { frame: unit.header.frame, reserved_zero: 0, offset: here });
                 }
-                frames = frames.wrapping_add(u32::from(kind == UnitType::FrameHeader));
+                frames = frames.saturating_add(u32::from(kind == UnitType::FrameHeader));
                 out.extend(unit.header.to_bytes()?);
                 out.extend_from_slice(unit.payload);
             }
         }
-        units = units.wrapping_add(1);
+        units = units.saturating_add(1);
     }
     Ok(out)
 }
