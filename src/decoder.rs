@@ -198,7 +198,7 @@ impl Decoder {
             match step.map_err(Error::Stream)? {
                 Step::Frame(frame) => {
                     self.collect()?;
-                    if let Some(frame) = self.frame(*frame) {
+                    if let Some(frame) = self.frame(*frame)? {
                         return Ok(Some(frame));
                     }
                 }
@@ -240,18 +240,20 @@ impl Decoder {
     }
 
     /// A frame as it is given out; none if nothing is known of it, or if another one is sought.
-    fn frame(&mut self, decoded: DecodedFrame) -> Option<Frame> {
-        let sequence = *self.stream.sequence()?;
-        if decoded.index < self.from {
-            return None;
-        }
+    ///
+    /// # Errors
+    /// Planes that do not fit together.
+    fn frame(&mut self, decoded: DecodedFrame) -> Result<Option<Frame>> {
+        let Some(&sequence) = self.stream.sequence().filter(|_| decoded.index >= self.from) else {
+            return Ok(None);
+        };
         if decoded.is_lost {
             self.warnings.push(Warning::Lost(decoded.index..=decoded.index));
-            return None;
+            return Ok(None);
         }
+        let Some(point) = self.stream.decoder().map(|decoder| decoder.frame_point()) else { return Ok(None) };
         let warnings = core::mem::take(&mut self.warnings);
-        let point = self.stream.decoder()?.frame_point();
-        Some(Frame::new(decoded, point, sequence, warnings))
+        Frame::new(decoded, point, sequence, warnings).map(Some)
     }
 
     fn finish(&mut self) -> Result<Option<Frame>> {

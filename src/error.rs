@@ -20,6 +20,8 @@ pub enum Error {
     Incomplete(Vec<Warning>),
     /// A file cannot be opened or read.
     Io(std::io::Error),
+    /// The planes of a frame do not fit together, in words: a defect of this library, which its authors want to hear of.
+    Broken(String),
     /// [`Cancel`](crate::Cancel) was requested. A [seek](crate::Decoder::seek) starts again.
     Cancelled,
     /// Bytes wait in the decoder, and these are more than the limits let it keep: take frames first.
@@ -51,6 +53,9 @@ impl fmt::Display for Error {
                 write!(formatter, "the stream is not whole: {}", lines.join("; "))
             }
             Self::Io(error) => error.fmt(formatter),
+            Self::Broken(what) => {
+                write!(formatter, "the decoder gave a broken frame: {what}; please report this")
+            }
             Self::Cancelled => formatter.write_str("decoding was cancelled"),
             Self::TooMuchInput { waiting, allowed } => {
                 write!(formatter, "{waiting} bytes wait to be decoded, at most {allowed} may")

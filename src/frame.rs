@@ -1,6 +1,6 @@
 //! A decoded frame.
 
-use crate::error::Warning;
+use crate::error::{Error, Result, Warning};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
@@ -42,8 +42,9 @@ impl Frame {
         point: OperatingPoint,
         sequence: SequenceParameters,
         warnings: Vec<Warning>,
-    ) -> Self {
-        Self {
+    ) -> Result<Self> {
+        decoded.planes.check(sequence.sh_degree).map_err(|error| Error::Broken(error.to_string()))?;
+        Ok(Self {
             index: decoded.index,
             kind: decoded.frame_type,
             point: point.at_most(OperatingPoint {
@@ -58,7 +59,7 @@ impl Frame {
             integers: decoded.into_shown(),
             gaussians: OnceLock::new(),
             warnings,
-        }
+        })
     }
 
     /// Its number in the order in which frames are shown, from 0.
@@ -108,13 +109,13 @@ impl Frame {
     /// The Gaussians as f32. The first call computes them, beside the integers; [`Frame::into_gaussians`] needs no second
     /// copy.
     pub fn gaussians(&self) -> &GaussianFrame {
-        self.gaussians.get_or_init(|| to_gaussians(self.integers.clone(), &self.sequence))
+        self.gaussians.get_or_init(|| computed(self.integers.clone(), &self.sequence))
     }
 
     /// The Gaussians as f32.
     pub fn into_gaussians(self) -> GaussianFrame {
         let Self { gaussians, integers, sequence, .. } = self;
-        gaussians.into_inner().unwrap_or_else(|| to_gaussians(integers, &sequence))
+        gaussians.into_inner().unwrap_or_else(|| computed(integers, &sequence))
     }
 
     /// The Gaussians as integers on the grids of the stream.
@@ -137,4 +138,9 @@ impl Frame {
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
+}
+
+/// The output of 7.10 of planes that [`Frame::new`] has checked.
+fn computed(integers: QuantizedFrame, sequence: &SequenceParameters) -> GaussianFrame {
+    to_gaussians(integers, sequence).expect("a frame has planes that fit together")
 }

@@ -196,10 +196,7 @@ impl<'a> Decoding<'a> {
         let number = frame.index;
         if self.frames.contains(number) {
             self.count(sequence, &frame);
-            let gaussians = to_gaussians(frame.into_shown(), sequence);
-            let start = Instant::now();
-            self.failed = self.target.as_mut().and_then(|target| target.write(number, &gaussians).err());
-            self.writing += start.elapsed();
+            self.failed = self.write(sequence, frame).err();
         } else {
             self.passed += frame.planes.len() as u64;
         }
@@ -208,6 +205,16 @@ impl<'a> Decoding<'a> {
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())
+    }
+
+    /// Writes a frame where frames go.
+    fn write(&mut self, sequence: &SequenceParameters, frame: DecodedFrame) -> Result<(), Failure> {
+        let number = frame.index;
+        let gaussians = to_gaussians(frame.into_shown(), sequence)?;
+        let start = Instant::now();
+        let written = self.target.as_mut().map_or(Ok(()), |target| target.write(number, &gaussians));
+        self.writing += start.elapsed();
+        written
     }
 
     fn count(&mut self, sequence: &SequenceParameters, frame: &DecodedFrame) {

@@ -119,10 +119,14 @@ impl Demo {
         let start = Instant::now();
         let summary = decode_stream(stream, &options, |sequence, frame| {
             let path = frame_path(&directory, frame.index as usize);
-            let gaussians = to_gaussians(frame.into_shown(), sequence);
-            let start = Instant::now();
-            failed = OutputFile::write(&path, &ply::write(&gaussians)).err();
-            writing += start.elapsed();
+            let write = || {
+                let gaussians = to_gaussians(frame.into_shown(), sequence)?;
+                let start = Instant::now();
+                let written = OutputFile::write(&path, &ply::write(&gaussians));
+                writing += start.elapsed();
+                written
+            };
+            failed = write().err();
             if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         let seconds = start.elapsed().saturating_sub(writing).as_secs_f64();
@@ -141,7 +145,7 @@ impl Demo {
         digests: &[u64],
     ) -> Result<AttributeErrors, Failure> {
         let mut sums = ErrorSums::default();
-        let mut decoded = Vec::new();
+        let (mut decoded, mut broken) = (Vec::new(), None);
         let options = Options { operating_point: OperatingPoint::ALL, ..Options::default() };
         let summary = decode_stream(stream, &options, |sequence, frame| {
             decoded.extend(frame.digest);
@@ -149,10 +153,18 @@ impl Demo {
             if frame.index == 0
                 && let Some(original) = source.first()
             {
-                compare_frames(original, &to_gaussians(frame.into_shown(), sequence), Match::Auto, &mut sums);
+                match to_gaussians(frame.into_shown(), sequence) {
+                    Ok(shown) => {
+                        compare_frames(original, &shown, Match::Auto, &mut sums);
+                    }
+                    Err(error) => broken = Some(error),
+                }
             }
             ControlFlow::Continue(())
         });
+        if let Some(error) = broken {
+            return Err(error.into());
+        }
         match summary.verdict() {
             Some(error) => Err(self.fault(error)),
             None if decoded != digests => {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use splatstream_format::{Class, Error};
+use splatstream_gaussians::FrameError;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -127,6 +128,12 @@ pub(crate) struct FailureWords {
     /// Of a stream, its file and what is wrong there.
     file: Option<PathBuf>,
     fault: Option<StreamFault>,
+}
+
+impl From<FrameError> for Failure {
+    fn from(error: FrameError) -> Self {
+        Self::Other(format!("the decoder gave a broken frame: {error}; please report this, with the stream"))
+    }
 }
 
 impl From<&Failure> for FailureReport {

@@ -97,7 +97,7 @@ impl Frames<'_> {
     /// nothing is known are left out.
     pub(crate) fn next(&mut self) -> Result<Option<(u32, GaussianFrame)>, Failure> {
         match self {
-            Self::Stream(decoding) => Ok(decoding.next()),
+            Self::Stream(decoding) => decoding.next(),
             Self::Files { files, next } => {
                 if *next >= files.len() {
                     return Ok(None);
@@ -131,12 +131,12 @@ impl Frames<'_> {
 }
 
 impl Decoding<'_> {
-    fn next(&mut self) -> Option<(u32, GaussianFrame)> {
-        loop {
-            let frame = self.frames.next_frame()?;
+    fn next(&mut self) -> Result<Option<(u32, GaussianFrame)>, Failure> {
+        while let Some(frame) = self.frames.next_frame() {
             if let (false, Some(sequence)) = (frame.is_lost, self.frames.sequence()) {
-                return Some((frame.index, to_gaussians(frame.into_shown(), sequence)));
+                return Ok(Some((frame.index, to_gaussians(frame.into_shown(), sequence)?)));
             }
         }
+        Ok(None)
     }
 }

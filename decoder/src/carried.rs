@@ -74,20 +74,16 @@ impl Carried {
         moved
     }
 
-    /// List h.
-    pub(crate) fn list(&mut self, h: usize) -> Arc<GaussianList> {
-        self.compute(h);
-        self.lists.get(h).map(|carried| Arc::clone(&carried.list)).unwrap_or_default()
-    }
-
-    /// The identities of the Gaussians of list h, which has been computed; empty unless they are asked for.
-    pub(crate) fn identities(&self, h: usize) -> Arc<Vec<u32>> {
-        self.lists.get(h).map(|carried| Arc::clone(&carried.identities)).unwrap_or_default()
+    /// The lists from `first` on, each with the identities of its Gaussians, which are empty unless they are asked for.
+    pub(crate) fn lists_from(&mut self, first: usize) -> impl Iterator<Item = (&GaussianList, &[u32])> {
+        (first..self.len()).for_each(|h| self.compute(h));
+        let lists = self.lists.iter().skip(first);
+        lists.map(|carried| (carried.list.as_ref(), carried.identities.as_slice()))
     }
 
     /// The digest of all lists.
     pub(crate) fn digest(&mut self) -> u64 {
-        let digests: Vec<_> = (0..self.len()).map(|h| self.list(h).digest()).collect();
+        let digests: Vec<_> = self.lists_from(0).map(|(list, _)| list.digest()).collect();
         lists_digest(&digests)
     }
 
@@ -147,7 +143,7 @@ mod tests {
             waiting = waiting.moved(&field(axis), drops_stale, from);
             direct = direct.map(|list| list.carried(&field(axis), drops_stale));
         }
-        assert_eq!([0, 1].map(|h| waiting.list(h).as_ref().clone()), direct);
+        assert!(waiting.lists_from(0).map(|(list, _)| list).eq(&direct));
         assert_eq!(waiting.digest(), lists_digest(&direct.each_ref().map(GaussianList::digest)));
         assert_eq!(direct.map(|list| list.len()), [1, 1], "what was stale is gone");
     }

@@ -159,7 +159,8 @@ impl CodedBlock {
 
     /// The sums of the magnitudes of the attribute's planes before `plane`, which is not its first.
     pub fn magnitudes_before(&self, plane: usize) -> &[i32] {
-        self.magnitudes.get(plane.wrapping_sub(1)).map(Vec::as_slice).unwrap_or_default()
+        let before = plane.checked_sub(1).and_then(|before| self.magnitudes.get(before));
+        before.map(Vec::as_slice).unwrap_or_default()
     }
 
     /// Gaussians in the block.

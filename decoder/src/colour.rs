@@ -94,7 +94,7 @@ fn in_entries(stage: &[i32], largest: usize, at: u64) -> Result<()> {
     }
 }
 
-/// out_j = mean_j + Round(sum over k of basis[k][j] * component_k, 6).
+/// `out_j = mean_j + Round(sum over k of basis[k][j] * component_k, 6)`.
 ///
 /// # Errors
 /// Invalid if a component leaves -8191..=8191 or a colour its range. With |basis| at most 4096 and at most 45 components
@@ -112,7 +112,7 @@ pub fn inverse(
     planes.try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "colour", "7.6", at))
 }
 
-/// out_j += Round(sum over k of basis[k][j] * component_k, 6): a residual on top of what `out` holds.
+/// `out_j += Round(sum over k of basis[k][j] * component_k, 6)`: a residual on top of what `out` holds.
 ///
 /// # Errors
 /// As [`inverse`].

@@ -67,7 +67,7 @@ impl<'b> SourceValues<'b> {
         match source {
             Source::None | Source::NeighbourSum | Source::NeighbourMagnitude => Self::Same(0),
             Source::PreviousPlane => {
-                let before = block.coded.get(plane.wrapping_sub(1));
+                let before = plane.checked_sub(1).and_then(|before| block.coded.get(before));
                 Self::Plane(before.map(Vec::as_slice).unwrap_or_default())
             }
             Source::GroupMagnitude => Self::Plane(block.magnitudes_before(plane)),

@@ -2,6 +2,8 @@
 //!
 //! A radix sort, digit by digit from the lowest: its time grows with the number of points alone, whatever a stream makes
 //! of their codes.
+//!
+//! What is added here counts points or is an index of one, so that no sum is above the number of points.
 
 /// Bits of a digit.
 const DIGIT: u32 = 11;

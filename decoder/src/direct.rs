@@ -65,7 +65,7 @@ pub(crate) fn decode(
         })
         .collect();
     let lengths: Vec<usize> = blocks.iter().map(|&(.., count)| count).collect();
-    let total = lengths.iter().copied().fold(0, usize::wrapping_add);
+    let total = lengths.iter().copied().fold(0, usize::saturating_add);
     let mut planes = QuantizedFrame::zeroed(total, usize::from(sequence.sh_dimension()));
     let task = |((unit, bytes, at, _), out)| {
         let (coded, models) = sections.get(unit).copied().flatten()?;
@@ -79,7 +79,7 @@ pub(crate) fn decode(
     let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (unit, block) in decoded {
         let Some(slot) = results.get_mut(unit) else { continue };
-        *slot = slot.and_then(|gaussians| block.map(|count| gaussians.wrapping_add(count)));
+        *slot = slot.and_then(|gaussians| block.map(|count| gaussians.saturating_add(count)));
     }
     (planes, results)
 }

@@ -24,7 +24,8 @@ pub struct CellField {
 impl CellField {
     /// A field of cells, each with the Morton code of its coordinates, codes strictly increasing.
     ///
-    /// `cell_log2` is 0 to position_bits, `position_bits` at most 20, `unit` that of [`rotation_unit`].
+    /// `cell_log2` is 0 to position_bits, `position_bits` at most 20, `unit` that of
+    /// [`rotation_unit`](crate::cell::rotation_unit).
     pub fn new(cell_log2: u8, position_bits: u8, unit: i64, cells: Vec<(u64, Cell)>) -> Self {
         let (codes, cells) = cells.into_iter().unzip();
         Self { cell_log2, position_bits, unit, codes, cells }

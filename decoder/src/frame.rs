@@ -1,5 +1,7 @@
 //! Clause 7.9: the canonical integer planes of a frame.
 
+use splatstream_gaussians::{FrameError, MAX_SH_DEGREE, sh_planes};
+
 /// A reconstructed frame: integers on the grids of the sequence, Gaussians in coded order.
 ///
 /// All planes have the same length.
@@ -62,7 +64,7 @@ impl QuantizedFrame {
 
     /// Divides the frame in runs of the given lengths, so that each can be written by itself.
     pub fn slices(&mut self, lengths: &[usize]) -> Vec<FrameSlice<'_>> {
-        let planes = 10_usize.wrapping_add(self.sh.len());
+        let planes = 10_usize.saturating_add(self.sh.len());
         let mut slices: Vec<FrameSlice<'_>> = lengths
             .iter()
             .map(|_| FrameSlice { position: Vec::with_capacity(3), planes: Vec::with_capacity(planes) })
@@ -82,6 +84,28 @@ impl QuantizedFrame {
             }
         }
         slices
+    }
+
+    /// Checks what clause 7.10 builds on: all planes have one length, and there are the SH planes of a degree.
+    ///
+    /// # Errors
+    /// The first plane that is of another length than x, other SH planes, or no such degree.
+    pub fn check(&self, sh_degree: u8) -> Result<(), FrameError> {
+        if sh_degree > MAX_SH_DEGREE {
+            return Err(FrameError::ShDegree(sh_degree));
+        }
+        let (expected, found) = (sh_planes(sh_degree), self.sh.len());
+        if found != expected {
+            return Err(FrameError::ShPlanes { degree: sh_degree, expected, found });
+        }
+        let [x, y, z] = self.position.each_ref().map(Vec::len);
+        let lengths = [x, y, z].into_iter().chain(self.signed_planes().map(Vec::len));
+        match lengths.enumerate().find(|&(_, length)| length != x) {
+            Some((plane, found)) => {
+                Err(FrameError::Length { property: format!("canonical plane {plane}"), expected: x, found })
+            }
+            None => Ok(()),
+        }
     }
 
     /// Gaussians in the frame.

@@ -20,14 +20,14 @@
 //! ```
 //! use splatstream_decoder::{output::to_gaussians, process::Options, stream::Frames};
 //!
-//! fn count(bytes: &[u8]) -> splatstream_format::Result<usize> {
+//! fn count(bytes: &[u8]) -> Result<usize, Box<dyn core::error::Error>> {
 //!     let mut frames = Frames::open(bytes, &Options::default())?;
 //!     let mut gaussians = 0;
 //!     while let Some(frame) = frames.next_frame() {
 //!         let Some(sequence) = frames.sequence() else { break };
-//!         gaussians += to_gaussians(frame.into_shown(), sequence).len();
+//!         gaussians += to_gaussians(frame.into_shown(), sequence)?.len();
 //!     }
-//!     frames.summary().verdict().map_or(Ok(gaussians), Err)
+//!     frames.summary().verdict().map_or(Ok(gaussians), |error| Err(error.into()))
 //! }
 //! ```
 #![deny(

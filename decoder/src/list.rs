@@ -50,13 +50,10 @@ impl Change {
         let difference = |before: &Vec<i32>, after: &Vec<i32>| -> Vec<i32> {
             after.iter().zip(before).map(|(after, before)| after.wrapping_sub(*before)).collect()
         };
-        let mut motion = before
-            .position_fine
-            .iter()
-            .zip(&after.position_fine)
-            .map(|(before, after)| difference(before, after));
+        let [x, y, z] = &before.position_fine;
+        let [to_x, to_y, to_z] = &after.position_fine;
         Self {
-            motion: [(); 3].map(|()| motion.next().unwrap_or_default()),
+            motion: [difference(x, to_x), difference(y, to_y), difference(z, to_z)],
             fade: difference(&before.planes.opacity, &after.planes.opacity),
         }
     }

@@ -1,7 +1,7 @@
 //! The neighbours of a new Gaussian: the nearest among those next to it on the Morton curve.
 //!
 //! An exact search can be made to look at every point (a sphere of points around the one that seeks), so the
-//! definition itself is bounded: the points are [sorted](curve) along the Morton curve, and only [`WINDOW`] points on either
+//! definition itself is bounded: the points are sorted along the Morton curve, and only [`WINDOW`] points on either
 //! side of the index at which the seeking point would stand are candidates. The nearest candidates, ties to the lower
 //! index, are the neighbours. Sorting takes a time that grows with n, a search 2 * `WINDOW` distances.
 

@@ -8,10 +8,8 @@ use core::fmt;
 use core::str::FromStr;
 use splatstream_format::follower::Follower;
 use splatstream_format::payload::{Index, OperatingPoints};
-use splatstream_format::syntax::{
-    EndOfStream, FileHeader, IndexEntry, OperatingPointEntry, UnitHeader, UnitType,
-};
-use splatstream_format::unit::{Stream, Unit};
+use splatstream_format::syntax::{EndOfStream, IndexEntry, OperatingPointEntry, UnitHeader, UnitType};
+use splatstream_format::unit::Stream;
 use splatstream_format::{Limits, Result as FormatResult};
 
 /// The layers a client takes: every unit up to these indices on each axis.
@@ -98,7 +96,7 @@ impl FromStr for OperatingPoint {
 /// decoders discard some of them, whose payload may be anything.
 pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatResult<Vec<u8>> {
     let stream = Stream::open(bytes, limits)?;
-    let mut out = bytes.get(..FileHeader::SIZE).unwrap_or_default().to_vec();
+    let mut out = stream.header().to_bytes()?;
     let (profile, mut reader) = (stream.header().profile(), stream.units());
     let mut follower = Follower::new(profile);
     let mut units = 0_u32;
@@ -135,20 +133,14 @@ pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> FormatRe
                 if kind == UnitType::GopHeader {
                     entries.push(IndexEntry { frame: unit.header.frame, reserved_zero: 0, offset: here });
                 }
-                frames = frames.wrapping_add(u32::from(kind == UnitType::FrameHeader));
-                copy(&mut out, &unit, bytes);
+                frames = frames.saturating_add(u32::from(kind == UnitType::FrameHeader));
+                out.extend(unit.header.to_bytes()?);
+                out.extend_from_slice(unit.payload);
             }
         }
-        units = units.wrapping_add(1);
+        units = units.saturating_add(1);
     }
     Ok(out)
-}
-
-/// Appends the bytes of a unit as they are.
-fn copy(out: &mut Vec<u8>, unit: &Unit<'_>, stream: &[u8]) {
-    let start = usize::try_from(unit.at).unwrap_or(usize::MAX);
-    let length = UnitHeader::SIZE.saturating_add(unit.payload.len());
-    out.extend_from_slice(stream.get(start..start.saturating_add(length)).unwrap_or_default());
 }
 
 /// Appends a unit with a new payload. All elements of its header that do not follow from that are as they were.

@@ -8,14 +8,20 @@ use crate::companding::Companding;
 use crate::frame::QuantizedFrame;
 use rayon::prelude::*;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_gaussians::{GaussianFrame, Planes};
+use splatstream_gaussians::{FrameError, GaussianFrame, Planes};
 
 /// dc and sh integers are on a grid 64 times finer than their step.
 const COLOUR_FRACTION: f32 = 1.0 / 64.0;
 
 /// The frame as Gaussians in PLY's domain. The planes of integers become the planes of f32: no third copy of a
 /// frame is ever held.
-pub fn to_gaussians(frame: QuantizedFrame, sequence: &SequenceParameters) -> GaussianFrame {
+///
+/// # Errors
+/// Planes of different lengths, or other SH planes than the degree of the sequence has. A decoded frame has neither.
+pub fn to_gaussians(
+    frame: QuantizedFrame,
+    sequence: &SequenceParameters,
+) -> Result<GaussianFrame, FrameError> {
     let QuantizedFrame { position, log_scale, opacity, rotation, dc, sh } = frame;
     let [log_scale_offset, opacity_offset] = [sequence.log_scale_offset(), sequence.opacity_offset()];
     let [log_scale_step, opacity_step] = [sequence.log_scale_step(), sequence.opacity_step()];
@@ -32,19 +38,17 @@ pub fn to_gaussians(frame: QuantizedFrame, sequence: &SequenceParameters) -> Gau
     };
     let [x, y, z] = rotation.map(|plane| scaled(plane, rotation_step));
     planes.rotation = [unit_w(&x, &y, &z), x, y, z];
-    let frame = GaussianFrame::from_planes(sequence.sh_degree, planes).unwrap_or_default();
-    frame.with_antialiased(sequence.antialiased())
+    let frame = GaussianFrame::from_planes(sequence.sh_degree, planes)?;
+    Ok(frame.with_antialiased(sequence.antialiased()))
 }
 
 fn scene_positions(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {
     let (step, companding) = (sequence.position_step(), Companding::new(sequence));
-    let mut offsets = sequence.position_offset().into_iter();
-    position.map(|plane| {
-        let offset = offsets.next().unwrap_or_default();
-        match companding.is_linear() {
-            true => plane.into_iter().map(|q| offset + step * q as f32).collect(),
-            false => plane.into_iter().map(|q| offset + step * companding.expand(q) as f32).collect(),
-        }
+    let [x, y, z] = position;
+    let [of_x, of_y, of_z] = sequence.position_offset();
+    [(x, of_x), (y, of_y), (z, of_z)].map(|(plane, offset)| match companding.is_linear() {
+        true => plane.into_iter().map(|q| offset + step * q as f32).collect(),
+        false => plane.into_iter().map(|q| offset + step * companding.expand(q) as f32).collect(),
     })
 }
 

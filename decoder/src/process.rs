@@ -1,7 +1,7 @@
 //! Clause 7.1: the state of a decoder and what each unit does to it; clause 9: what errors cost.
 //!
 //! For each unit: its header is checked; a unit that does not belong to the operating point is discarded; the table of
-//! [`phase`] says whether it may come now; it may end the frame and the GOP in progress; then its payload takes effect.
+//! `phase` says whether it may come now; it may end the frame and the GOP in progress; then its payload takes effect.
 //! What an error costs follows from the unit alone: its list, the unit, or the rest of the GOP. After the last kind units
 //! are discarded up to a gop_header from which decoding can go on.
 

@@ -15,7 +15,7 @@ fn sequence() -> SequenceParameters {
 fn output(edit: impl Fn(&mut QuantizedFrame, &mut SequenceParameters)) -> GaussianFrame {
     let (mut frame, mut sequence) = (QuantizedFrame::zeroed(1, 0), sequence());
     edit(&mut frame, &mut sequence);
-    to_gaussians(frame, &sequence)
+    to_gaussians(frame, &sequence).unwrap()
 }
 
 fn bits<const N: usize>(planes: &[Vec<f32>; N]) -> [u32; N] {
@@ -118,4 +118,24 @@ proptest! {
         let w = if rest > 0.0 { f64::from(rest).sqrt() as f32 } else { 0.0 };
         prop_assert_eq!(bits(out.rotation()), [w, x, y, z].map(f32::to_bits));
     }
+}
+
+#[test]
+fn planes_that_do_not_fit_together_are_an_error() {
+    let longer = |edit: fn(&mut QuantizedFrame)| {
+        let mut frame = QuantizedFrame::zeroed(2, 0);
+        edit(&mut frame);
+        frame
+    };
+    for frame in [
+        longer(|frame| frame.position[1].push(0)),
+        longer(|frame| frame.rotation[2].clear()),
+        longer(|frame| frame.dc[0].truncate(1)),
+        longer(|frame| frame.sh.push(vec![0; 2])),
+    ] {
+        assert!(frame.check(0).is_err());
+        assert!(to_gaussians(frame, &sequence()).is_err());
+    }
+    let frame = QuantizedFrame::zeroed(2, 0);
+    assert_eq!((frame.check(0), to_gaussians(frame, &sequence()).map(|frame| frame.len())), (Ok(()), Ok(2)));
 }

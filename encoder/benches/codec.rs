@@ -57,7 +57,7 @@ fn decode_verify<const VERIFY: usize>(bencher: Bencher, name: &str) {
     let options = Options { verify: VERIFY == 1, ..Options::default() };
     bencher.counter(ItemsCount::new(frame.len())).bench(|| {
         let summary = decode_stream(black_box(&bytes), &options, |sequence, frame| {
-            black_box(to_gaussians(frame.into_shown(), sequence));
+            black_box(to_gaussians(frame.into_shown(), sequence).unwrap());
             ControlFlow::Continue(())
         });
         assert_eq!(summary.verdict(), None);

@@ -1,6 +1,6 @@
 //! What an encoder can be given that it cannot encode.
 
-use splatstream_gaussians::Defect;
+use splatstream_gaussians::{Defect, FrameError};
 
 /// Errors of encoding. Those of reading a frame are the source's own.
 #[derive(Debug, thiserror::Error)]
@@ -84,6 +84,9 @@ pub enum Error {
         "the stream was written and then decoded for a check, which failed: {0}; please report this, with the scene"
     )]
     Verification(splatstream_format::Error),
+    /// The planes that were reconstructed make no frame: the encoder is at fault.
+    #[error("reconstruction failed: {0}; please report this, with the scene")]
+    Reconstruction(#[from] FrameError),
     /// The syntax refuses what the encoder wants to write.
     #[error("the bitstream cannot carry this: {0}")]
     Syntax(#[from] splatstream_format::Error),

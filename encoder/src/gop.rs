@@ -344,7 +344,7 @@ impl SequenceCoder<'_, '_> {
         gop.intra_bytes = coded.bytes() / f64::from(coded.gaussians().max(1));
         if is_predicted && self.recorder.is_none() && !target.frame.is_empty() {
             let cameras = self.ranking.cameras(&target.frame);
-            gop.steadiness = Some(Steadiness::new(cameras, target, &coded, &self.sequence));
+            gop.steadiness = Some(Steadiness::new(cameras, target, &coded, &self.sequence)?);
         }
         if is_predicted {
             gop.start_with(number, coded, self.sequence.whole_anchor());
@@ -407,7 +407,11 @@ impl SequenceCoder<'_, '_> {
                 gop.price_level = goal.level;
                 self.report.coded.last_mut().into_iter().for_each(|frame| frame.by_pictures = true);
             }
-            None => gop.steadiness.iter_mut().for_each(|s| s.follow(target, &coded, &self.sequence)),
+            None => {
+                if let Some(steadiness) = &mut gop.steadiness {
+                    steadiness.follow(target, &coded, &self.sequence)?;
+                }
+            }
         }
         if role.temporal_layer + 1 < self.settings.temporal_layers().max(2) {
             gop.keep(role.temporal_layer, number, coded.reference);

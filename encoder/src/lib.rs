@@ -1,12 +1,12 @@
 //! The SplatStream encoder (informative: any stream that the specification accepts is a stream).
 //!
-//! Read it from the top: [`encode`](fn@encode) in [stream](mod@stream) finds steps for the quality or the size that is
-//! asked for ([target](mod@target)), looks at every frame once ([sequence](mod@sequence)), writes the beginning of the stream, its GOPs and its end ([writer](mod@writer)).
-//! [gop](mod@gop) goes from frame to frame: each GOP gets its colour transforms and codebooks
-//! ([gop_tools](mod@gop_tools)), each [frame](mod@frame) its units, and each unit its sections
-//! ([section](mod@section), [models](mod@models), [blocks](mod@blocks)). An I frame of one layer and a predicted frame
-//! take the same way. The result is decoded and looked at ([verification](mod@verification)). Prediction, contexts and reconstruction are the decoder's own functions. Same frames and
-//! settings, same bytes, on every machine and with any number of threads.
+//! Read it from the top: [`encode`](fn@encode) in `stream` finds steps for the quality or the size that is asked for
+//! (`target`), looks at every frame once (`sequence`), writes the beginning of the stream, its GOPs and its end
+//! (`writer`). `gop` goes from frame to frame: each GOP gets its colour transforms and codebooks (`gop_tools`), each frame
+//! (`frame`) its units, and each unit its sections (`section`, `models`, `blocks`). An I frame of one layer and a
+//! predicted frame take the same way. The result is decoded and looked at (`verification`). Prediction, contexts and
+//! reconstruction are the decoder's own functions. Same frames and settings, same bytes, on every machine and with any
+//! number of threads.
 
 mod allocation;
 mod blocks;

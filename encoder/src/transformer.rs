@@ -10,12 +10,12 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`parameters`] | where the parameters of a network stand, and those to start from |
-//! | [`model`], [`attention`] | the pass forwards |
-//! | [`backward`] | the slopes of the parameters |
-//! | [`descent`] | steps against the slopes |
-//! | [`loss`] | how far outputs are from those wanted |
-//! | [`lane`], [`matrix`] | arithmetic on 16 Gaussians |
+//! | `parameters` | where the parameters of a network stand, and those to start from |
+//! | `model`, `attention` | the pass forwards |
+//! | `backward` | the slopes of the parameters |
+//! | `descent` | steps against the slopes |
+//! | `loss` | how far outputs are from those wanted |
+//! | `lane`, `matrix` | arithmetic on 16 Gaussians |
 
 mod architecture;
 mod attention;

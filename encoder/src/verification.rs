@@ -119,11 +119,11 @@ impl Verifier {
             return Err(Error::Verification(error));
         }
         let Some(sequence) = decoder.sequence() else { return Ok(()) };
-        self.frames.extend(found.into_iter().flatten().map(|frame| Decoded {
-            number: frame.index,
-            frame_type: frame.frame_type,
-            frame: to_gaussians(frame.into_shown(), sequence),
-        }));
+        for frame in found.into_iter().flatten() {
+            let (number, frame_type) = (frame.index, frame.frame_type);
+            let frame = to_gaussians(frame.into_shown(), sequence)?;
+            self.frames.push(Decoded { number, frame_type, frame });
+        }
         Ok(())
     }
 

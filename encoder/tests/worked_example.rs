@@ -192,7 +192,7 @@ fn elements(
 
 fn planes(text: &mut String, bytes: &[u8]) {
     let (sequence, frame) = decoded(bytes);
-    let gaussians = to_gaussians(frame.planes.clone(), &sequence);
+    let gaussians = to_gaussians(frame.planes.clone(), &sequence).unwrap();
     let columns: String = (0..gaussians.len()).map(|i| format!(" Gaussian {i} |")).collect();
     let rule = "---|".repeat(gaussians.len());
     text.push_str("\n## D.5 Canonical planes and output\n\nGaussians in coded order.\n\n");

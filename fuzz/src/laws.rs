@@ -180,7 +180,7 @@ fn shown(decoded: &Decoded) {
     let Some(sequence) = &decoded.sequence else { return };
     for frame in &decoded.frames {
         let count = frame.planes.len();
-        let gaussians = to_gaussians(frame.clone().into_shown(), sequence);
+        let gaussians = to_gaussians(frame.clone().into_shown(), sequence).unwrap();
         assert_eq!(gaussians.len(), count);
         assert_eq!(gaussians.validate(), Ok(()));
     }

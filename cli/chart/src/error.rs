@@ -1,5 +1,6 @@
 //! Why a measurement failed.
 
+use splatstream_gaussians::FrameError;
 use std::fmt;
 
 /// Why a measurement failed.
@@ -21,6 +22,12 @@ impl Error {
 impl From<splatstream_format::Error> for Error {
     fn from(error: splatstream_format::Error) -> Self {
         Self::Stream(error)
+    }
+}
+
+impl From<FrameError> for Error {
+    fn from(error: FrameError) -> Self {
+        Self::other(format!("a frame just decoded is broken: {error}; please report this"))
     }
 }
 

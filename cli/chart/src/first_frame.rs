@@ -5,11 +5,18 @@ use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::Limits;
-use splatstream_gaussians::GaussianFrame;
+use splatstream_gaussians::{FrameError, GaussianFrame};
 use std::ops::ControlFlow;
 
 /// The first frame at an operating point of which something is shown; none if there is none.
-pub fn first_frame(stream: &[u8], operating_point: OperatingPoint, limits: &Limits) -> Option<GaussianFrame> {
+///
+/// # Errors
+/// Planes that make no frame: the decoder is at fault.
+pub fn first_frame(
+    stream: &[u8],
+    operating_point: OperatingPoint,
+    limits: &Limits,
+) -> Result<Option<GaussianFrame>, FrameError> {
     let options = Options { limits: *limits, operating_point, ..Options::default() };
     let mut first = None;
     let _faults = decode_stream(stream, &options, |sequence, frame| {
@@ -19,5 +26,5 @@ pub fn first_frame(stream: &[u8], operating_point: OperatingPoint, limits: &Limi
         first = Some(to_gaussians(frame.into_shown(), sequence));
         ControlFlow::Break(())
     });
-    first
+    first.transpose()
 }

@@ -19,6 +19,7 @@ pub mod sweep;
 pub mod table;
 
 mod csv_files;
+mod decoding;
 mod error;
 mod figures;
 pub mod first_frame;

@@ -6,17 +6,16 @@ use super::sweep::{Group, Sweep, Variant};
 use crate::Error;
 use crate::Progress;
 use crate::costs::Costs;
+use crate::decoding::each_frame;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Quality, Settings, encode};
 use splatstream_format::Limits;
 use splatstream_format::syntax::{UnitHeader, UnitType};
 use splatstream_format::unit::Stream;
 use splatstream_render::metrics::Comparison;
 use std::hint::black_box;
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Seconds of several measurements.
@@ -167,12 +166,11 @@ fn decoded(stream: &[u8], repeat: u32) -> Result<Timing, Error> {
     let mut seconds = Vec::new();
     for _ in 0..repeat {
         let start = Instant::now();
-        let summary = decode_stream(stream, &Options::default(), |sequence, frame| {
-            black_box(to_gaussians(frame.into_shown(), sequence));
-            ControlFlow::Continue(())
-        });
+        each_frame(stream, &Options::default(), |sequence, frame| {
+            black_box(to_gaussians(frame.into_shown(), sequence)?);
+            Ok(())
+        })?;
         seconds.push(start.elapsed().as_secs_f64());
-        summary.verdict().map_or(Ok(()), |error| Err(Error::Stream(error)))?;
     }
     Ok(Timing::of(seconds))
 }
@@ -181,16 +179,15 @@ fn decoded(stream: &[u8], repeat: u32) -> Result<Timing, Error> {
 fn point(stream: &[u8], info: OperatingPointInfo, judge: &mut Judge<'_>) -> Result<Point, Error> {
     let mut frames = Vec::new();
     let options = Options { operating_point: info.point, ..Options::default() };
-    let summary = decode_stream(stream, &options, |sequence, frame| {
-        let parameters = sequence.to_bytes().unwrap_or_default();
+    each_frame(stream, &options, |sequence, frame| {
+        let parameters = sequence.to_bytes()?;
         let key = (parameters, frame.index, frame.digest.unwrap_or_default());
-        let gaussians = to_gaussians(frame.into_shown(), sequence);
+        let gaussians = to_gaussians(frame.into_shown(), sequence)?;
         let views = judge.views_of(key, &gaussians);
         let shown = gaussians.len() as u64;
         frames.push(FramePoint { gaussians: shown, increment_bytes: 0, bytes: 0, views });
-        ControlFlow::Continue(())
-    });
-    summary.verdict().map_or(Ok(()), |error| Err(Error::Stream(error)))?;
+        Ok(())
+    })?;
     add_bytes(stream, info.point, &mut frames)?;
     let views: Vec<Comparison> = frames.iter().flat_map(|frame| frame.views.iter().copied()).collect();
     let figures = Comparison::mean(&views).ok_or_else(|| Error::other("there is no camera to look from"))?;

@@ -60,7 +60,7 @@ pub(crate) fn pictures(
     let source = keep(&reference.colour, "source.png")?;
     let mut levels = Vec::new();
     for point in &run.points {
-        let Some(frame) = first_frame(&run.stream, point.info.point, &Limits::default()) else { continue };
+        let Some(frame) = first_frame(&run.stream, point.info.point, &Limits::default())? else { continue };
         let image = render(&frame, camera, BACKGROUND).colour;
         let percent = point.info.percent;
         let view = point.frames.first().and_then(|frame| frame.views.get(place));

@@ -1,7 +1,7 @@
 //! Scenes and sequences made to break codecs, and where each tool fails.
 //!
-//! A [case](cases) turns a [base](base) into a [sample](sample) of a strength; each [tool](tools) codes it; the result is
-//! judged by its pictures from cameras around the inner scene, against what the same tool gives for the base itself.
+//! A case (`cases`) turns a base (`base`) into a sample (`sample`) of a strength; each tool (`tools`) codes it; the
+//! result is judged by its pictures from cameras around the inner scene, against what the same tool gives for the base itself.
 //! What is missed without a word of the tool is a silent failure.
 
 mod base;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use splatstream_chart::first_frame::first_frame;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo};
 use splatstream_format::Limits;
-use splatstream_gaussians::GaussianFrame;
+use splatstream_gaussians::{FrameError, GaussianFrame};
 use splatstream_render::camera::{Up, held_out};
 use splatstream_render::metrics::psnr;
 use splatstream_render::{Camera, Image, render};
@@ -25,23 +25,31 @@ pub(super) struct Quality {
 }
 
 /// The quality of each point, the pictures of the highest one being right.
-pub(super) fn qualities(stream: &StreamFile, points: &[OperatingPointInfo], limits: &Limits) -> Vec<Quality> {
+///
+/// # Errors
+/// A frame whose planes are broken: the decoder is at fault.
+pub(super) fn qualities(
+    stream: &StreamFile,
+    points: &[OperatingPointInfo],
+    limits: &Limits,
+) -> Result<Vec<Quality>, FrameError> {
     let bytes = stream.bytes.as_slice();
     let highest = points.iter().max_by_key(|info| {
         let OperatingPoint { spatial, temporal, refinement } = info.point;
         (spatial, refinement, temporal)
     });
-    let Some(reference) = highest.and_then(|info| first_frame(bytes, info.point, limits)) else {
-        return vec![Quality::default(); points.len()];
+    let first = |info: &OperatingPointInfo| first_frame(bytes, info.point, limits);
+    let Some(reference) = highest.map(first).transpose()?.flatten() else {
+        return Ok(vec![Quality::default(); points.len()]);
     };
     let given = of_stream(&stream.description(limits).unwrap_or_default(), VIEWS.1);
     let cameras = held_out(&reference, Up::default(), &given, VIEWS.0, VIEWS.1);
     let right = pictures(&reference, &cameras);
     let seen = |info: &OperatingPointInfo| {
-        let frame = first_frame(bytes, info.point, limits)?;
-        Some(mean_psnr(&right, &pictures(&frame, &cameras)))
+        let frame = first(info)?;
+        Ok(frame.map(|frame| mean_psnr(&right, &pictures(&frame, &cameras))))
     };
-    let decibels: Vec<Option<f64>> = points.par_iter().map(seen).collect();
+    let decibels: Vec<Option<f64>> = points.par_iter().map(seen).collect::<Result<_, FrameError>>()?;
     let is_beaten = |index: usize| {
         let (info, own) = (&points[index], decibels[index].unwrap_or(0.0));
         points.iter().zip(&decibels).enumerate().any(|(other, (rival, decibels))| {
@@ -55,7 +63,7 @@ pub(super) fn qualities(stream: &StreamFile, points: &[OperatingPointInfo], limi
         psnr_db: decibels[index].filter(|decibels| decibels.is_finite()),
         on_hull: decibels[index].is_some() && !is_beaten(index),
     };
-    (0..points.len()).map(quality).collect()
+    Ok((0..points.len()).map(quality).collect())
 }
 
 fn pictures(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Image> {

@@ -65,7 +65,7 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
         Ok(found) => found,
         Err(error) => return Ok(Some(error)),
     };
-    let qualities = qualities(stream, &infos, limits);
+    let qualities = qualities(stream, &infos, limits)?;
     let point = |(info, quality)| Point::new(info, list.as_ref(), quality);
     let mut points: Vec<Point> = infos.iter().zip(qualities).map(point).collect();
     let mut error = None;

@@ -60,7 +60,7 @@ impl Decoded {
     /// Writes the files of the protocol: planes, output of 7.10 and entropy states.
     ///
     /// # Errors
-    /// A file cannot be written.
+    /// A file cannot be written, or the planes of a frame are broken.
     pub fn write(self, folder: &Path) -> io::Result<()> {
         for (unit, state) in &self.entropy {
             fs::write(folder.join(entropy_name(*unit)), format!("{state:016x}"))?;
@@ -76,7 +76,7 @@ impl Decoded {
             {
                 fs::write(folder.join(attribute.file_name(index)), to_bytes(&attribute.values(&shown)))?;
             }
-            let gaussians = to_gaussians(shown, &sequence);
+            let gaussians = to_gaussians(shown, &sequence).map_err(io::Error::other)?;
             let planes = gaussians.planes();
             let opacity = std::slice::from_ref(&planes.opacity_logit);
             let planes =

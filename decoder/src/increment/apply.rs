@@ -345,9 +345,9 @@ fn check_learned(unit: &Unit<'_>, predictors: &[Predictor]) -> Result<()> {
     let mut learned = 0_u64;
     for predictor in predictors {
         let count = run.min(left);
-        left = left.wrapping_sub(count);
+        left = left.saturating_sub(count);
         if *predictor == Predictor::Transformer {
-            learned = learned.wrapping_add(count);
+            learned = learned.saturating_add(count);
         }
     }
     Limits::check(unit.at, "max_learned", learned, unit.max_learned.into())

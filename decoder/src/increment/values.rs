@@ -104,7 +104,7 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
     /// Distinct tables of all planes.
     pub fn tables(&self) -> usize {
         let models = self.models.iter().flat_map(|section| &section.models);
-        models.map(|model| model.tables.len()).fold(0, usize::wrapping_add)
+        models.map(|model| model.tables.len()).fold(0, usize::saturating_add)
     }
 
     /// Values of all sections.
@@ -163,7 +163,7 @@ pub(crate) fn blocks_of<'a>(
     let size = block_size(sequence);
     let with_count = |&(bytes, at): &(&'a [u8], u64)| {
         let count = left.min(size);
-        left = left.wrapping_sub(count);
+        left = left.saturating_sub(count);
         (bytes, at, count)
     };
     coded.blocks.iter().map(with_count).collect()

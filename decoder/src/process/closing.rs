@@ -134,9 +134,9 @@ impl FrameInProgress {
 /// Shows the carried lists from the level of the frame on.
 fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried) {
     let exact = decoded.planes.len();
-    for h in usize::from(decoded.level)..carried.len() {
-        decoded.planes.append(&carried.list(h).planes);
-        decoded.identities.extend_from_slice(&carried.identities(h));
+    for (list, identities) in carried.lists_from(decoded.level.into()) {
+        decoded.planes.append(&list.planes);
+        decoded.identities.extend_from_slice(identities);
         decoded.carried_lists = decoded.carried_lists.saturating_add(1);
     }
     decoded.carried = decoded.planes.len().saturating_sub(exact);

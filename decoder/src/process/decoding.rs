@@ -251,7 +251,7 @@ impl FrameInProgress {
             }
             let taken = known(prepared).and_then(|prepared| {
                 let added = results.next().unwrap_or(Ok(0))?;
-                let end = kept.wrapping_add(added);
+                let end = kept.saturating_add(added);
                 let digest = || list_digest_unless(context.interrupt, &planes, kept..end);
                 self.check_list(unit, context, digest)?;
                 put(&mut self.lists.heads, unit.refinement.into(), Head::new(unit, added, added));
@@ -365,7 +365,7 @@ impl FrameInProgress {
         let added = if predicts_new { self.added_before(r) } else { Vec::new() };
         let lower: Vec<&QuantizedFrame> =
             self.lists.displaced.iter().take(r).map(|list| &list.planes).collect();
-        let anchor = reference.anchor.iter().flat_map(|lists| lists.iter().skip(r.wrapping_add(1)));
+        let anchor = reference.anchor.iter().flat_map(|lists| lists.iter().skip(r.saturating_add(1)));
         let after: Vec<&QuantizedFrame> = anchor.map(|list| &list.planes).chain(&added).collect();
         let applied =
             apply(unit, parents, &Situation { around: [&lower, &after], temporal: Some(temporal) })?;

@@ -1,7 +1,7 @@
 //! SS-TR-003 to SS-TR-008 for all Gaussians of a batch at once.
 //!
 //! Activations and weights have 8 bits. Two of them, of neighbouring rows, share an `i32` of each lane as 16-bit
-//! [halves](packed): machines multiply such pairs and add both products in one instruction. No sum overflows (7.12),
+//! halves (`packed`): machines multiply such pairs and add both products in one instruction. No sum overflows (7.12),
 //! so the order of its terms means nothing.
 
 use super::{Batch, INPUTS_MAX, LANES, OUTPUTS_MAX, RANKS, act, round};

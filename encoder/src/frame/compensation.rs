@@ -1,5 +1,7 @@
 //! What fills the holes of a prefix: log-scales and opacities raised where later refinements are missing (7.8.3).
 
+use crate::error::Error;
+use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
@@ -32,23 +34,30 @@ impl Compensator {
 
     /// Offsets of log-scale and opacity for the Gaussians of some lists: as far as each step up brings the pictures
     /// nearer to those of the whole frame, first of the scale, then of the opacity.
-    pub(crate) fn offsets(&self, lists: &[GaussianList], sequence: &SequenceParameters) -> (i8, i8) {
+    ///
+    /// # Errors
+    /// Lists whose planes make no frame.
+    pub(crate) fn offsets(
+        &self,
+        lists: &[GaussianList],
+        sequence: &SequenceParameters,
+    ) -> Result<(i8, i8), Error> {
         let steps = [sequence.log_scale_step(), sequence.opacity_step()];
         let [scale, opacity] = [0, 1].map(|which: usize| {
             libm::roundf(UNITS[which] / steps[which]).clamp(1.0, f32::from(i8::MAX / MOST)) as i8
         });
-        let mut best = (self.error(lists, (0, 0), sequence), (0, 0));
+        let mut best = (self.error(lists, (0, 0), sequence)?, (0, 0));
         for (scale, opacity) in [(scale, 0), (0, opacity)] {
             for _ in 0..MOST {
                 let tried = (best.1.0 + scale, best.1.1 + opacity);
-                let error = self.error(lists, tried, sequence);
+                let error = self.error(lists, tried, sequence)?;
                 if error >= best.0 {
                     break;
                 }
                 best = (error, tried);
             }
         }
-        best.1
+        Ok(best.1)
     }
 
     /// Decibels below the whole frame, so that less is better.
@@ -57,16 +66,15 @@ impl Compensator {
         lists: &[GaussianList],
         (scale, opacity): (i8, i8),
         sequence: &SequenceParameters,
-    ) -> f64 {
-        let mut planes =
-            splatstream_decoder::frame::QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
+    ) -> Result<f64, Error> {
+        let mut planes = QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
         lists.iter().for_each(|list| planes.append(&list.planes));
         planes.log_scale.iter_mut().flatten().for_each(|value| *value += i32::from(scale));
         planes.opacity.iter_mut().for_each(|value| *value += i32::from(opacity));
-        let shown = to_gaussians(planes, sequence);
+        let shown = to_gaussians(planes, sequence)?;
         let psnr = |(camera, whole): &(Camera, Image)| {
             metrics::psnr(&render(&shown, camera, BACKGROUND).colour, whole)
         };
-        -self.views.iter().map(psnr).sum::<f64>()
+        Ok(-self.views.iter().map(psnr).sum::<f64>())
     }
 }

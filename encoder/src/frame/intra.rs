@@ -133,7 +133,7 @@ impl Intra<'_> {
         digests.push(applied.list.digest());
         draft.header.refinement_digest = lists_digest(digests);
         self.lists[list] = applied.list;
-        self.compensate(&mut draft, layer, refinement);
+        self.compensate(&mut draft, layer, refinement)?;
         let payload = self.coder.code(&draft, &new, &mut models)?;
         self.models.follow(refinement, models);
         self.units.push(CodedUnit {
@@ -148,15 +148,16 @@ impl Intra<'_> {
     }
 
     /// Fills the holes of a prefix that can be shown.
-    fn compensate(&self, draft: &mut Draft, layer: u8, refinement: u8) {
+    fn compensate(&self, draft: &mut Draft, layer: u8, refinement: u8) -> Result<(), Error> {
         let sequence = self.coder.sequence;
         let is_top = layer + 1 == sequence.spatial_layer_count;
         let is_shown = !is_top || self.target.shows_top_prefixes;
         let is_prefix = refinement + 1 < sequence.refinement_count && is_shown;
-        let Some(compensator) = self.target.compensator.filter(|_| is_prefix) else { return };
+        let Some(compensator) = self.target.compensator.filter(|_| is_prefix) else { return Ok(()) };
         let lists = &self.lists[..=usize::from(refinement)];
-        let (log_scale, opacity) = compensator.offsets(lists, sequence);
+        let (log_scale, opacity) = compensator.offsets(lists, sequence)?;
         (draft.header.compensation_log_scale, draft.header.compensation_opacity) = (log_scale, opacity);
+        Ok(())
     }
 
     /// How finely a unit is coded.

@@ -55,10 +55,13 @@ impl Pictures {
 }
 
 /// All Gaussians of some lists, as they are output.
-pub(crate) fn shown(lists: &[GaussianList], sequence: &SequenceParameters) -> GaussianFrame {
+///
+/// # Errors
+/// Lists whose planes make no frame.
+pub(crate) fn shown(lists: &[GaussianList], sequence: &SequenceParameters) -> Result<GaussianFrame, Error> {
     let mut planes = QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
     lists.iter().for_each(|list| planes.append(&list.planes));
-    to_gaussians(planes, sequence)
+    Ok(to_gaussians(planes, sequence)?)
 }
 
 /// How good pictures must be.
@@ -97,7 +100,7 @@ impl Predicted<'_> {
         self.from.survivors.judge = Some(Judge::default());
         let everything = self.shown()?;
         goal.least = goal.pictures.psnr(&everything).iter().map(|psnr| psnr - goal.tolerance).collect();
-        let carried = shown(&self.displaced, self.from.coder.sequence);
+        let carried = shown(&self.displaced, self.from.coder.sequence)?;
         self.from.survivors.judge = Some(Judge::new(&self.from.target.frame, &carried, goal));
         goal.level = self.level(goal)?;
         self.price_at(goal, goal.level);
@@ -140,6 +143,6 @@ impl Predicted<'_> {
 
     /// The frame as the judge would have it.
     fn shown(&self) -> Result<GaussianFrame, Error> {
-        Ok(shown(&self.lists()?, self.from.coder.sequence))
+        shown(&self.lists()?, self.from.coder.sequence)
     }
 }

@@ -7,6 +7,7 @@
 use super::rate_distortion::{Pictures, shown};
 use super::survivors::BitPrice;
 use super::{CodedFrame, Target};
+use crate::error::Error;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_render::Camera;
 
@@ -41,18 +42,21 @@ pub(crate) struct Steadiness {
 
 impl Steadiness {
     /// Of a GOP that starts with this I frame, seen by some of the cameras.
+    ///
+    /// # Errors
+    /// Lists whose planes make no frame.
     pub(crate) fn new(
         cameras: &[Camera],
         target: &Target,
         coded: &CodedFrame,
         sequence: &SequenceParameters,
-    ) -> Self {
+    ) -> Result<Self, Error> {
         let stride = cameras.len().div_ceil(VIEWS).max(1);
         let small = |camera: &Camera| camera.scaled_to_height(LINES.min(camera.height));
         let cameras = cameras.iter().step_by(stride).map(small).collect();
         let mut steadiness = Self { cameras, of_intra: 0.0, below: None, level: FIRST };
-        steadiness.of_intra = steadiness.psnr(target, coded, sequence);
-        steadiness
+        steadiness.of_intra = steadiness.psnr(target, coded, sequence)?;
+        Ok(steadiness)
     }
 
     /// What a bit is worth in the next frame.
@@ -61,8 +65,16 @@ impl Steadiness {
     }
 
     /// Looks at a predicted frame.
-    pub(crate) fn follow(&mut self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) {
-        let now = self.of_intra - self.psnr(target, coded, sequence);
+    ///
+    /// # Errors
+    /// Lists whose planes make no frame.
+    pub(crate) fn follow(
+        &mut self,
+        target: &Target,
+        coded: &CodedFrame,
+        sequence: &SequenceParameters,
+    ) -> Result<(), Error> {
+        let now = self.of_intra - self.psnr(target, coded, sequence)?;
         let below = self.below.map_or(now, |before| before + FRESH * (now - before));
         self.below = Some(below);
         if below > FAR {
@@ -71,12 +83,13 @@ impl Steadiness {
             self.level *= DEARER;
         }
         self.level = self.level.clamp(*LEVELS.start(), *LEVELS.end());
+        Ok(())
     }
 
     /// PSNR of the pictures of a frame, mean of the views, dB.
-    fn psnr(&self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) -> f64 {
+    fn psnr(&self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) -> Result<f64, Error> {
         let views = Pictures::new(&target.frame, self.cameras.clone());
-        let all = views.psnr(&shown(&coded.reference.lists, sequence));
-        all.iter().sum::<f64>() / all.len().max(1) as f64
+        let all = views.psnr(&shown(&coded.reference.lists, sequence)?);
+        Ok(all.iter().sum::<f64>() / all.len().max(1) as f64)
     }
 }

@@ -35,7 +35,7 @@ fn untracked(gaussians: u32, frames: u32) -> Vec<GaussianFrame> {
 fn shown(bytes: &[u8]) -> Vec<GaussianFrame> {
     let mut frames = Vec::new();
     let summary = decode_stream(bytes, &strict(), |sequence, frame| {
-        frames.push(to_gaussians(frame.into_shown(), sequence));
+        frames.push(to_gaussians(frame.into_shown(), sequence).unwrap());
         ControlFlow::Continue(())
     });
     assert_eq!(summary.verdict(), None);

@@ -117,7 +117,7 @@ fn check(
     let (bytes, report) = encoded(vec![source.clone()], settings);
     let mut output = None;
     let summary = decode_stream(&bytes, &strict(), |sequence, frame| {
-        output = Some((*sequence, frame.digest, to_gaussians(frame.planes, sequence)));
+        output = Some((*sequence, frame.digest, to_gaussians(frame.planes, sequence).unwrap()));
         ControlFlow::Continue(())
     });
     prop_assert_eq!(summary.verdict(), None);

@@ -87,7 +87,7 @@ fn through_a_stream(rows: &[Row]) -> (GaussianFrame, Vec<Row>) {
     let (bytes, _) = encoded(vec![frame], &settings);
     let mut output = None;
     let summary = decode_stream(&bytes, &strict(), |sequence, frame| {
-        output = Some(to_gaussians(frame.planes, sequence));
+        output = Some(to_gaussians(frame.planes, sequence).unwrap());
         ControlFlow::Continue(())
     });
     assert_eq!(summary.verdict(), None);

@@ -130,7 +130,7 @@ fn every_attribute_is_within_half_a_step_of_the_source() {
     let mut output = None;
     let summary = decode_stream(&bytes, &strict(), |sequence, frame| {
         let codes = frame.planes.position.clone();
-        output = Some((codes, Companding::new(sequence), to_gaussians(frame.planes, sequence)));
+        output = Some((codes, Companding::new(sequence), to_gaussians(frame.planes, sequence).unwrap()));
         ControlFlow::Continue(())
     });
     assert_eq!(summary.verdict(), None);

@@ -60,6 +60,7 @@ impl Default for BuiltinScene {
 
 impl BuiltinScene {
     /// Frame `t`, at `t` / 30 seconds. Random access: no other frame is made.
+    #[expect(clippy::expect_used, reason = "the planes are made for the degree and filled a row at a time")]
     pub fn frame(&self, t: u32) -> GaussianFrame {
         let stage = Stage::new(self);
         let sh_degree = self.sh_degree.min(MAX_SH_DEGREE);
@@ -74,8 +75,8 @@ impl BuiltinScene {
                 }
             }
         }
-        // The planes were made for this degree and filled a row at a time.
-        GaussianFrame::from_planes(sh_degree, planes).unwrap_or_default()
+        GaussianFrame::from_planes(sh_degree, planes)
+            .expect("planes of one length, as many as the degree has")
     }
 }
 

@@ -1,17 +1,16 @@
 //! The frames of an operating point: what they take, what they show.
 
 use crate::Error;
+use crate::decoding::each_frame;
 use crate::picture_comparison::Judge;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream;
 use splatstream_format::Limits;
 use splatstream_format::syntax::{FrameType, UnitHeader, UnitType};
 use splatstream_format::unit::Stream;
 use splatstream_render::metrics::Comparison;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 
 /// A GOP at an operating point.
 pub(super) struct Shown {
@@ -96,20 +95,19 @@ pub(super) fn shown(stream: &[u8], point: OperatingPoint, judge: &mut Judge<'_>)
     let sizes = sizes(stream, point)?;
     let mut frames = Vec::new();
     let options = Options { operating_point: point, ..Options::default() };
-    let summary = decode_stream(stream, &options, |sequence, frame| {
+    each_frame(stream, &options, |sequence, frame| {
         let (number, frame_type) = (frame.index, frame.frame_type);
         let (gaussians, carried) = ((frame.planes.len() - frame.carried) as u64, frame.carried);
-        let mut key = sequence.to_bytes().unwrap_or_default();
+        let mut key = sequence.to_bytes()?;
         key.extend(format!("{:?}", frame.compensation.exact).bytes());
         let key = (key, number, frame.digest.unwrap_or_default());
-        let shown = to_gaussians(frame.into_shown(), sequence);
+        let shown = to_gaussians(frame.into_shown(), sequence)?;
         // Digests know nothing of carried Gaussians.
         let views = if carried > 0 { judge.views(number, &shown) } else { judge.views_of(key, &shown) };
         let bytes = sizes.get(&number).copied().unwrap_or_default();
         frames.push(ShownFrame { number, frame_type, bytes, gaussians, views });
-        ControlFlow::Continue(())
-    });
-    summary.verdict().map_or(Ok(()), |error| Err(Error::Stream(error)))?;
+        Ok(())
+    })?;
     frames.sort_by_key(|frame| frame.number);
     Ok(Shown { frames })
 }

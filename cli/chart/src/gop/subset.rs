@@ -3,16 +3,15 @@
 use super::decoded::mean;
 use super::encoded;
 use crate::Error;
+use crate::decoding::each_frame;
 use crate::picture_comparison::Judge;
 use splatstream_decoder::operating_point::{OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Importance, Settings, Structure};
 use splatstream_format::Limits;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::Comparison;
-use std::ops::ControlFlow;
 
 /// The frames after the first, each by itself.
 #[derive(Debug, Clone)]
@@ -43,12 +42,11 @@ pub(super) fn subsets(
 fn subset(stream: &[u8], info: OperatingPointInfo, judge: &Judge<'_>) -> Result<Subset, Error> {
     let mut views = Vec::new();
     let options = Options { operating_point: info.point, ..Options::default() };
-    let summary = decode_stream(stream, &options, |sequence, frame| {
+    each_frame(stream, &options, |sequence, frame| {
         // The stream lacks the first frame of the sequence.
         let number = frame.index + 1;
-        views.extend(judge.views(number, &to_gaussians(frame.into_shown(), sequence)));
-        ControlFlow::Continue(())
-    });
-    summary.verdict().map_or(Ok(()), |error| Err(Error::Stream(error)))?;
+        views.extend(judge.views(number, &to_gaussians(frame.into_shown(), sequence)?));
+        Ok(())
+    })?;
     Ok(Subset { bytes: info.bytes, gaussians: info.gaussians, figures: mean(views.into_iter())? })
 }

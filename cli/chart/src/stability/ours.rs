@@ -30,7 +30,7 @@ pub(super) fn attempt(sample: &Sample, intra: bool, plain: Option<&Report>, said
     match encode(&mut sample.frames.clone(), &settings, &mut stream, &mut |_, _| {}) {
         Err(error) => Attempt { detected: vec![format!("encoder refuses: {error}")], ..Attempt::default() },
         Ok(report) => {
-            let (shown, summary) = decoded(&stream, sample.frames.len());
+            let (shown, detected) = decoded(&stream, sample.frames.len());
             let (remarks, serious): (Vec<Warning>, Vec<Warning>) =
                 said(&report, &settings).into_iter().partition(|warning| REMARKS.contains(&warning.code));
             let of_encoder = |warning: Warning| format!("encoder: {}", warning.message);
@@ -39,7 +39,7 @@ pub(super) fn attempt(sample: &Sample, intra: bool, plain: Option<&Report>, said
             Attempt {
                 shown,
                 bytes: Some(report.bytes),
-                detected: serious.into_iter().map(of_encoder).chain(detected(&summary)).collect(),
+                detected: serious.into_iter().map(of_encoder).chain(detected).collect(),
                 fallback,
                 coded: Some((stream, report)),
             }
@@ -58,20 +58,23 @@ fn settings(sample: &Sample, intra: bool) -> Settings {
     Settings { structure: Structure::Predicted { layers }, spatial_layers: SPATIAL, gop, ..whole }
 }
 
-/// The frames of a stream by their numbers, and how decoding went.
-pub(super) fn decoded(stream: &[u8], frames: usize) -> (Vec<Option<GaussianFrame>>, Summary) {
-    let mut shown = vec![None; frames];
+/// The frames of a stream by their numbers, and what the decoder says of damage.
+pub(super) fn decoded(stream: &[u8], frames: usize) -> (Vec<Option<GaussianFrame>>, Option<String>) {
+    let (mut shown, mut broken) = (vec![None; frames], None);
     let summary = decode_stream(stream, &Options::default(), |sequence, frame| {
         if let Some(place) = shown.get_mut(frame.index as usize) {
-            *place = Some(to_gaussians(frame.into_shown(), sequence));
+            match to_gaussians(frame.into_shown(), sequence) {
+                Ok(frame) => *place = Some(frame),
+                Err(error) => broken = Some(format!("decoder: {error}")),
+            }
         }
         ControlFlow::Continue(())
     });
-    (shown, summary)
+    (shown, broken.or_else(|| detected(&summary)))
 }
 
-/// What the decoder says of damage.
-pub(super) fn detected(summary: &Summary) -> Option<String> {
+/// The verdict of the decoder and what it costs; none of a whole stream.
+fn detected(summary: &Summary) -> Option<String> {
     let first = summary.verdict()?;
     let lost: u32 = summary.lost.iter().map(|range| range.end() - range.start() + 1).sum();
     let (errors, code) = (summary.errors.len(), first.kind.code());

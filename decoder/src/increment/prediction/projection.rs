@@ -35,11 +35,11 @@ impl Projection {
     /// The components that `header` counts and the transforms have.
     pub(super) fn new(header: &NetworkHeader, dc: &Transform, sh: Option<&Transform>) -> Self {
         let mut rows = vec![[0; COLOURS_MAX]; header.outputs()];
-        let (of_dc, of_sh) = rows.split_at_mut_checked(header.dc_count.into()).unwrap_or_default();
-        for (row, weights) in of_dc.iter_mut().zip(dc.rows()) {
+        let dc_count = usize::from(header.dc_count);
+        for (row, weights) in rows.iter_mut().take(dc_count).zip(dc.rows()) {
             row.iter_mut().zip(weights).for_each(|(slot, &weight)| *slot = weight);
         }
-        for (row, weights) in of_sh.iter_mut().zip(sh.into_iter().flat_map(Transform::rows)) {
+        for (row, weights) in rows.iter_mut().skip(dc_count).zip(sh.into_iter().flat_map(Transform::rows)) {
             row.iter_mut().skip(DC_PLANES).zip(weights).for_each(|(slot, &weight)| *slot = weight);
         }
         let reach = |row: &[i16; COLOURS_MAX]| -> u32 {
