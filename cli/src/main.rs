@@ -5,6 +5,7 @@
 mod cameras;
 mod chart;
 mod compare;
+mod completions;
 mod conformance;
 mod console;
 mod decode;
@@ -16,6 +17,7 @@ mod frame_files;
 mod frames;
 mod input_args;
 mod inspect;
+mod manual;
 mod numbers;
 mod output_file;
 mod progress;
@@ -70,6 +72,8 @@ enum Command {
     Chart(chart::Chart),
     Train(train::Train),
     Conformance(conformance::Conformance),
+    Completions(completions::Completions),
+    Manual(manual::Manual),
 }
 
 fn main() -> ExitCode {
@@ -128,6 +132,8 @@ impl Command {
             Self::Chart(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
+            Self::Completions(command) => command.run(console),
+            Self::Manual(command) => command.run(console),
         }
     }
 }
