@@ -2,7 +2,7 @@
 
 use splatstream_encoder::FrameSource;
 pub use splatstream_encoder::{Error as EncodeError, Report, Settings};
-use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, Planes};
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 
@@ -97,11 +97,11 @@ impl Waiting {
         head[..2].copy_from_slice(&[frame.sh_degree(), frame.antialiased().into()]);
         head[2..].copy_from_slice(&(frame.len() as u64).to_le_bytes());
         self.file.write_all(&head)?;
-        for value in planes(frame.planes()).flatten() {
+        for value in frame.planes().iter().flatten() {
             self.file.write_all(&value.to_le_bytes())?;
         }
         self.starts.push(self.end);
-        self.end += (HEAD + 4 * frame.len() * planes(frame.planes()).count()) as u64;
+        self.end += (HEAD + 4 * frame.len() * frame.planes().iter().count()) as u64;
         Ok(())
     }
 
@@ -113,29 +113,16 @@ impl Waiting {
         file.read_exact(&mut head)?;
         let [degree, antialiased, count @ ..] = head;
         let count = u64::from_le_bytes(count) as usize;
-        let mut plane = || -> std::io::Result<Vec<f32>> {
-            let mut bytes = vec![0; 4 * count];
+        let mut planes = Planes::with_capacity(degree, count);
+        let mut bytes = vec![0; 4 * count];
+        for plane in planes.iter_mut() {
             file.read_exact(&mut bytes)?;
             let (values, _) = bytes.as_chunks::<4>();
-            Ok(values.iter().map(|value| f32::from_le_bytes(*value)).collect())
-        };
-        let planes = Planes {
-            position: [plane()?, plane()?, plane()?],
-            log_scale: [plane()?, plane()?, plane()?],
-            rotation: [plane()?, plane()?, plane()?, plane()?],
-            opacity_logit: plane()?,
-            dc: [plane()?, plane()?, plane()?],
-            sh: (0..3 * sh_coefficients(degree)).map(|_| plane()).collect::<Result<_, _>>()?,
-        };
+            plane.extend(values.iter().map(|value| f32::from_le_bytes(*value)));
+        }
         let frame = GaussianFrame::from_planes(degree, planes).map_err(std::io::Error::other)?;
         Ok(frame.with_antialiased(antialiased != 0))
     }
-}
-
-/// The planes in the order in which they wait.
-fn planes(planes: &Planes) -> impl Iterator<Item = &Vec<f32>> {
-    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
-    position.iter().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
 }
 
 impl FrameSource for Waiting {

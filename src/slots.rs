@@ -64,7 +64,7 @@ impl Slots {
         Self {
             capacity,
             sh_degree: 0,
-            planes: empty(capacity, 0),
+            planes: empty(capacity),
             slot_of: HashMap::default(),
             doubled: Vec::new(),
             free: (0..capacity).rev().collect(),
@@ -131,7 +131,7 @@ impl Slots {
     fn clear(&mut self, slot: usize) {
         self.free.push(slot);
         let set = |plane: &mut Vec<f32>, value| plane.get_mut(slot).into_iter().for_each(|to| *to = value);
-        planes_mut(&mut self.planes).for_each(|plane| set(plane, 0.0));
+        self.planes.iter_mut().for_each(|plane| set(plane, 0.0));
         set(&mut self.planes.opacity_logit, ABSENT);
         self.is_dirty.get_mut(slot).into_iter().for_each(|dirty| *dirty = true);
     }
@@ -153,7 +153,7 @@ impl Slots {
 
 /// Writes Gaussians to their slots, and takes note of those that change.
 fn write(to: &mut Planes, from: &Planes, slots: &[usize], is_dirty: &mut [bool]) {
-    for (to, from) in planes_mut(to).zip(planes(from)) {
+    for (to, from) in to.iter_mut().zip(from.iter()) {
         for (&slot, value) in slots.iter().zip(from) {
             if let (Some(to), Some(is_dirty)) = (to.get_mut(slot), is_dirty.get_mut(slot)) {
                 *is_dirty |= to.to_bits() != value.to_bits();
@@ -163,26 +163,11 @@ fn write(to: &mut Planes, from: &Planes, slots: &[usize], is_dirty: &mut [bool])
     }
 }
 
-fn empty(capacity: usize, sh_degree: u8) -> Planes {
-    let plane = || vec![0.0; capacity];
-    Planes {
-        position: core::array::from_fn(|_| plane()),
-        log_scale: core::array::from_fn(|_| plane()),
-        rotation: core::array::from_fn(|_| plane()),
-        opacity_logit: vec![ABSENT; capacity],
-        dc: core::array::from_fn(|_| plane()),
-        sh: (0..3 * sh_coefficients(sh_degree)).map(|_| plane()).collect(),
-    }
-}
-
-fn planes(planes: &Planes) -> impl Iterator<Item = &Vec<f32>> {
-    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
-    position.iter().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
-}
-
-fn planes_mut(planes: &mut Planes) -> impl Iterator<Item = &mut Vec<f32>> {
-    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
-    position.iter_mut().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
+fn empty(capacity: usize) -> Planes {
+    let mut planes = Planes::default();
+    planes.iter_mut().for_each(|plane| plane.resize(capacity, 0.0));
+    planes.opacity_logit.fill(ABSENT);
+    planes
 }
 
 /// Spreads identities, which are consecutive numbers, over a table.

@@ -14,7 +14,6 @@
 use serde_json::{Value, json};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::{ReadLimits, read_scene};
-use splatstream_gaussians::Planes;
 use splatstream_render::camera::{Up, ring};
 use splatstream_render::{Camera, Rendering, render};
 use std::error::Error;
@@ -37,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "views": cameras.iter().map(describe).collect::<Vec<Value>>(),
     });
     std::fs::write(folder.join("views.json"), description.to_string())?;
-    std::fs::write(folder.join("scene.f32"), planes(frame.planes()))?;
+    std::fs::write(folder.join("scene.f32"), bytes(frame.planes().iter().flatten()))?;
     for (variant, antialiased) in [("classic", false), ("antialiased", true)] {
         let frame = frame.clone().with_antialiased(antialiased);
         for (number, camera) in cameras.iter().enumerate() {
@@ -56,12 +55,6 @@ fn describe(camera: &Camera) -> Value {
         "rotation": camera.rotation,
         "position": camera.position,
     })
-}
-
-fn planes(planes: &Planes) -> Vec<u8> {
-    let geometry = planes.position.iter().chain(&planes.log_scale).chain(&planes.rotation);
-    let opacity = std::iter::once(&planes.opacity_logit);
-    bytes(geometry.chain(opacity).chain(&planes.dc).chain(&planes.sh).flatten())
 }
 
 fn pixels(rendering: &Rendering) -> Vec<u8> {

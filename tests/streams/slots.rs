@@ -1,18 +1,12 @@
 //! Slots hold the frame, whatever order its Gaussians have.
 
 use super::vectors;
-use splatstream::{Decoder, Error, Frame, Planes, Slots};
+use splatstream::{Decoder, Error, Frame, Slots};
 use std::collections::HashMap;
-
-fn planes(planes: &Planes) -> Vec<&Vec<f32>> {
-    let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
-    let front = position.iter().chain(log_scale).chain(rotation).chain([opacity_logit]);
-    front.chain(dc).chain(sh).collect()
-}
 
 /// Shows a frame and checks everything that is promised. `before` are the planes before.
 fn check(slots: &mut Slots, frame: &Frame, name: &str) {
-    let before: Vec<Vec<f32>> = planes(slots.planes()).into_iter().cloned().collect();
+    let before: Vec<Vec<f32>> = slots.planes().iter().cloned().collect();
     let known: HashMap<u32, usize> =
         frame.identities().iter().filter_map(|&identity| Some((identity, slots.slot(identity)?))).collect();
     let update = slots.update(frame).unwrap();
@@ -25,7 +19,7 @@ fn check(slots: &mut Slots, frame: &Frame, name: &str) {
             known.get(&identity).is_none_or(|&before| before == slot),
             "{name}: a Gaussian keeps its slot"
         );
-        for (mine, theirs) in planes(slots.planes()).into_iter().zip(planes(frame.gaussians().planes())) {
+        for (mine, theirs) in slots.planes().iter().zip(frame.gaussians().planes().iter()) {
             assert_eq!(mine[slot].to_bits(), theirs[gaussian].to_bits(), "{name}");
         }
     }
@@ -33,7 +27,7 @@ fn check(slots: &mut Slots, frame: &Frame, name: &str) {
     for (slot, used) in used.into_iter().enumerate() {
         let opacity = slots.planes().opacity_logit[slot];
         assert!(used || opacity == f32::NEG_INFINITY, "{name}: a slot without a Gaussian is not seen");
-        let mut pairs = planes(slots.planes()).into_iter().zip(&before);
+        let mut pairs = slots.planes().iter().zip(&before);
         let is_same = pairs.all(|(now, before)| now[slot].to_bits() == before[slot].to_bits());
         assert!(is_same || is_dirty(slot), "{name}: what changes is told");
     }

@@ -116,9 +116,7 @@ mod tests {
     /// A frame of three Gaussians, all values 0.5.
     fn planes(sh_degree: u8) -> Planes {
         let mut planes = Planes::with_capacity(sh_degree, 3);
-        let plain = planes.position.iter_mut().chain(&mut planes.log_scale).chain(&mut planes.rotation);
-        plain.chain(&mut planes.dc).chain(&mut planes.sh).for_each(|plane| plane.extend([0.5; 3]));
-        planes.opacity_logit.extend([0.5; 3]);
+        planes.iter_mut().for_each(|plane| plane.extend([0.5; 3]));
         planes
     }
 

@@ -96,7 +96,7 @@ impl Planes {
     /// Empty planes with as many SH planes as `sh_degree` has, and room for `rows`.
     pub fn with_capacity(sh_degree: u8, rows: usize) -> Self {
         let mut planes = Self::of_degree(sh_degree);
-        planes.each_mut().for_each(|plane| plane.reserve_exact(rows));
+        planes.iter_mut().for_each(|plane| plane.reserve_exact(rows));
         planes
     }
 
@@ -106,7 +106,7 @@ impl Planes {
     /// The machine refuses the memory.
     pub fn try_with_capacity(sh_degree: u8, rows: usize) -> Result<Self, TryReserveError> {
         let mut planes = Self::of_degree(sh_degree);
-        planes.each_mut().try_for_each(|plane| plane.try_reserve_exact(rows))?;
+        planes.iter_mut().try_for_each(|plane| plane.try_reserve_exact(rows))?;
         Ok(planes)
     }
 
@@ -115,11 +115,16 @@ impl Planes {
         Self { sh: vec![Vec::new(); sh_planes(sh_degree)], ..Self::default() }
     }
 
-    /// Every plane.
-    fn each_mut(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+    /// Every plane, in the order of the fields.
+    pub fn iter(&self) -> impl Iterator<Item = &Vec<f32>> {
         let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
-        let first = position.iter_mut().chain(log_scale).chain(rotation);
-        first.chain(std::iter::once(opacity_logit)).chain(dc).chain(sh)
+        position.iter().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
+    }
+
+    /// Every plane to change, in the order of the fields.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
+        position.iter_mut().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
     }
 
     /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.
@@ -273,11 +278,7 @@ mod tests {
 
     fn one(sh_degree: u8) -> Planes {
         let mut planes = Planes::with_capacity(sh_degree, 1);
-        let plain = planes.position.iter_mut().chain(&mut planes.log_scale).chain(&mut planes.rotation);
-        for plane in plain.chain(&mut planes.dc).chain(&mut planes.sh) {
-            plane.push(0.5);
-        }
-        planes.opacity_logit.push(0.5);
+        planes.iter_mut().for_each(|plane| plane.push(0.5));
         planes
     }
 
