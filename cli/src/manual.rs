@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, make_directory};
 use clap::{Args, Command, CommandFactory};
 use clap_mangen::Man;
 use serde::Serialize;
@@ -27,7 +27,7 @@ struct Report {
 impl Manual {
     /// Makes the pages from the options themselves.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
-        std::fs::create_dir_all(&self.out).map_err(|error| Failure::file("write", &self.out, &error))?;
+        make_directory(&self.out)?;
         let mut command = crate::Cli::command().disable_help_subcommand(true);
         command.build();
         let mut pages = Vec::new();
