@@ -191,7 +191,7 @@ impl Decoder {
             let (bytes, is_end) = self.source.bytes(at);
             let step = self.stream.next_step(bytes, is_end);
             // What has been taken need not be kept while the next bytes are awaited.
-            let _ = self.source.bytes(self.stream.position());
+            self.source.go_to(self.stream.position());
             if self.cancel.is_requested() {
                 return Err(Error::Cancelled);
             }

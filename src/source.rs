@@ -67,19 +67,24 @@ impl Window {
 }
 
 impl Source {
+    /// Forgets the bytes before an absolute offset, which are no longer needed.
+    pub(crate) fn go_to(&mut self, at: u64) {
+        if let Self::Reader(_, window) | Self::Pushed(window) = self
+            && window.at != at
+        {
+            window.go_to(at);
+        }
+    }
+
     /// The bytes from an absolute offset on, and whether they are the last.
     pub(crate) fn bytes(&mut self, at: u64) -> (&[u8], bool) {
+        self.go_to(at);
         match self {
             Self::Shared(bytes) => {
                 let rest = usize::try_from(at).ok().and_then(|at| bytes.get(at..));
                 (rest.unwrap_or_default(), true)
             }
-            Self::Reader(_, window) | Self::Pushed(window) => {
-                if window.at != at {
-                    window.go_to(at);
-                }
-                (window.rest(), window.is_end)
-            }
+            Self::Reader(_, window) | Self::Pushed(window) => (window.rest(), window.is_end),
         }
     }
 
