@@ -1,6 +1,6 @@
-//! Clause 7.3: the values of a block as they are coded, and the memory that blocks hand on.
+//! The values of a block as they are coded, and the memory that blocks hand on.
 
-use crate::attribute::{self};
+use crate::attribute;
 use crate::interrupt::Interrupt;
 use crate::layout::{Attribute, PlaneInfo, Section};
 use crate::stage::Stage;

@@ -186,7 +186,7 @@ impl UnitReader {
         }
     }
 
-    /// Goes on looking for a landmark, if one is looked for; how many bytes were passed over.
+    /// Goes on looking for a landmark, if one is looked for; how many bytes were skipped.
     pub(crate) fn scan(&mut self, bytes: &[u8], is_end: bool) -> usize {
         let State::Scanning(landmark) = self.state else { return 0 };
         let found = landmark.find(bytes, 0);

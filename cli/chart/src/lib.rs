@@ -9,6 +9,7 @@
 
 pub mod charting;
 pub mod costs;
+pub mod first_frame;
 pub mod numbers;
 pub mod peers;
 pub mod scenes;
@@ -22,7 +23,6 @@ mod csv_files;
 mod decoding;
 mod error;
 mod figures;
-pub mod first_frame;
 mod gop;
 mod gop_files;
 mod gop_text;
