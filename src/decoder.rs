@@ -163,7 +163,7 @@ impl Decoder {
         }
     }
 
-    /// No more bytes will be pushed: the last frame can be given out.
+    /// No more bytes will be pushed: a frame that lacks some is given out.
     pub fn end(&mut self) {
         self.source.end();
     }

@@ -16,7 +16,7 @@ use references::References;
 use report::Report;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::syntax::{
-    ErrorScope, FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitType,
+    ErrorScope, FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
 };
 use splatstream_format::unit::{Landmark, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
@@ -68,6 +68,17 @@ impl Default for Options {
             budget: Budget::UNLIMITED,
         }
     }
+}
+
+/// What ends a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FrameEnd {
+    /// A unit that may end it, at this offset.
+    Unit(u64),
+    /// Its last unit.
+    Complete,
+    /// An error, or the end of the bytes.
+    Cut,
 }
 
 /// What has been counted of the stream, to be compared with what it says about itself.
@@ -232,9 +243,24 @@ impl Decoder {
         }
     }
 
+    /// Ends the frame in progress if it has all units that belong to the operating point, so that it need not wait for
+    /// the unit after it.
+    pub fn finish_complete(&mut self) -> Option<DecodedFrame> {
+        let (frame, (sequence, _)) = (self.frame.as_ref()?, self.sequence.as_ref()?);
+        let takes = |spatial_layer, refinement| {
+            let id = UnitId::of_increment(frame.index, refinement);
+            UnitHeader::new(id.on_layers(spatial_layer, frame.role.temporal_layer), &[])
+                .is_ok_and(|header| self.belongs(&header))
+        };
+        let rest = frame.is_complete(sequence, takes).then(|| frame.without_content())?;
+        let frame = self.close_frame(FrameEnd::Complete);
+        self.frame = Some(rest);
+        frame
+    }
+
     /// Ends the frame in progress: no more units will come.
     pub fn finish(&mut self) -> Option<DecodedFrame> {
-        self.close_frame(None)
+        self.close_frame(FrameEnd::Cut)
     }
 
     /// A unit that is no increment: the frame that it ends, and whether it took effect.
@@ -256,7 +282,7 @@ impl Decoder {
         if is_surplus || !self.phase.allows(unit_type) {
             return (None, Err(unexpected(unit)));
         }
-        let done = if ends_frame(unit_type) { self.close_frame(Some(unit.at)) } else { None };
+        let done = if ends_frame(unit_type) { self.close_frame(FrameEnd::Unit(unit.at)) } else { None };
         if ends_gop(unit_type) {
             self.close_gop(unit.at);
         }
@@ -384,15 +410,15 @@ impl Decoder {
         self.has_stopped = self.options.stop_at_first_error || self.is_exhausted;
     }
 
-    /// Ends the frame in progress; `at` is the offset of the unit that ends it, if a unit that may do so does.
-    fn close_frame(&mut self, at: Option<u64>) -> Option<DecodedFrame> {
+    /// Ends the frame in progress.
+    fn close_frame(&mut self, end: FrameEnd) -> Option<DecodedFrame> {
         self.settle();
-        let mut frame = self.frame.take()?;
+        let mut frame = self.frame.take().filter(|frame| !frame.is_given)?;
         if self.interrupt.is_requested() {
             self.has_stopped = true;
             return None;
         }
-        if let (Some(at), true) = (at, frame.is_intra() && !frame.seen) {
+        if let (FrameEnd::Unit(at), true) = (end, frame.is_intra() && !frame.seen) {
             let rule = "an I frame has an increment";
             let error = Error::new(at, "7.1.5", ErrorKind::Constraint { rule });
             self.add(error);
@@ -411,7 +437,7 @@ impl Decoder {
         };
         let is_kept = gop.header.is_predicted() && (layer == 0 || layer < gop.header.temporal_depth);
         let reference = reference.and_then(|layer| self.references.get_mut(layer));
-        let closed = frame.close(&context, reference, at.is_some());
+        let closed = frame.close(&context, reference, end != FrameEnd::Cut);
         self.next_identity = closed.next_identity;
         self.has_stopped |= self.interrupt.is_requested();
         if is_kept {
@@ -427,7 +453,7 @@ impl Decoder {
             self.report(error);
             return None;
         }
-        let frame = self.close_frame(None);
+        let frame = self.close_frame(FrameEnd::Cut);
         self.add(error);
         let end = self.next_frame.saturating_add(self.frames_left);
         self.report.lose(self.next_frame, end);

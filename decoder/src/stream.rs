@@ -31,7 +31,7 @@ impl Summary {
 /// What a [`StreamDecoder`] gives.
 #[derive(Debug)]
 pub enum Step {
-    /// A frame is complete.
+    /// A frame, as soon as the last of its units that belong to the operating point has come.
     Frame(Box<DecodedFrame>),
     /// At least so many more bytes are needed, 1 or more.
     NeedMoreData(u64),
@@ -187,6 +187,8 @@ impl StreamDecoder {
     fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
         let decoder = self.decoder.as_mut()?;
         let frame = decoder.unit(unit);
+        // It never ends a frame by itself and completes another.
+        let frame = frame.or_else(|| decoder.finish_complete());
         match unit.header.unit_type() {
             // An end unit with a fault is not the end.
             UnitType::End if !decoder.has_stopped() => self.reader.reopen(),

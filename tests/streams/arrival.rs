@@ -79,6 +79,34 @@ fn pieces_of_every_vector_give_the_frames_of_the_whole() {
     }
 }
 
+/// A frame is shown as soon as its last unit has come, not when the next frame begins.
+#[test]
+fn a_frame_is_given_with_the_last_byte_that_it_needs() {
+    let bytes = vectors::talk();
+    let limits = splatstream_format::Limits::of_level(4);
+    let units: Vec<_> = splatstream_format::unit::Stream::open(&bytes, &limits)
+        .unwrap()
+        .units()
+        .map(Result::unwrap)
+        .collect();
+    for refinements in 1..=3 {
+        let point = format!("s3,t3,r{}", refinements - 1).parse().unwrap();
+        let mut decoder = Decoder::new().with_operating_point(point);
+        let (mut given, mut pushed) = (0, 0);
+        for unit in &units {
+            let end = unit.payload_at as usize + unit.payload.len();
+            decoder.push(&bytes[pushed..end]).unwrap();
+            pushed = end;
+            let is_last = unit.header.unit_type() == splatstream_format::syntax::UnitType::Increment
+                && u32::from(unit.header.refinement) + 1 == refinements;
+            let frame = decoder.next_frame().unwrap();
+            assert_eq!(frame.map(|frame| frame.index()), is_last.then_some(unit.header.frame));
+            given += u32::from(is_last);
+        }
+        assert_eq!(given, 12);
+    }
+}
+
 #[test]
 fn every_vector_gives_the_frames_and_the_errors_of_the_decoder_below() {
     let limits = splatstream_format::Limits::of_level(4);

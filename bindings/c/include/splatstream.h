@@ -225,7 +225,7 @@ enum SplatstreamStatus splatstream_decoder_push(struct SplatstreamDecoder *decod
                                                 const uint8_t *bytes,
                                                 size_t length);
 
-// No more bytes will be pushed: the last frame can be given.
+// No more bytes will be pushed: a frame that lacks some is given.
 enum SplatstreamStatus splatstream_decoder_end(struct SplatstreamDecoder *decoder);
 
 // Decodes the next frame. SPLATSTREAM_STATUS_OK: it is described in `frame`, unless that is null, and stays in the decoder

@@ -271,7 +271,7 @@ pub unsafe extern "C" fn splatstream_decoder_push(
     }
 }
 
-/// No more bytes will be pushed: the last frame can be given.
+/// No more bytes will be pushed: a frame that lacks some is given.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn splatstream_decoder_end(decoder: *mut SplatstreamDecoder) -> SplatstreamStatus {
     // SAFETY: the contract of the header.

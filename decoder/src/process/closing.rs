@@ -24,15 +24,15 @@ pub(super) struct Closed {
 }
 
 impl FrameInProgress {
-    /// Ends the frame, all units of which have been decoded. The digest of carried lists is compared if a unit ends the
-    /// frame, not if an error does.
+    /// Ends the frame, all units of which have been decoded. The digest of carried lists is compared if the frame
+    /// is not cut short.
     pub(super) fn close(
         mut self,
         context: &Context<'_>,
         reference: Option<&mut FrameState>,
-        ends_by_unit: bool,
+        is_whole: bool,
     ) -> Closed {
-        self.carried_digest = self.carried_digest.filter(|_| ends_by_unit);
+        self.carried_digest = self.carried_digest.filter(|_| is_whole);
         let mut decoded = DecodedFrame::empty(self.index, self.role.frame_type);
         decoded.level = u8::try_from(self.lists.heads.len()).unwrap_or(u8::MAX);
         decoded.spatial_layer = self.lists.heads.last().map_or(0, |head| head.spatial_layer);

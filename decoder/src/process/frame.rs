@@ -64,6 +64,8 @@ pub(super) struct FrameInProgress {
     pub(super) entropy: Vec<UnitEntropy>,
     /// The first error of the frame.
     pub(super) error: Option<Error>,
+    /// Whether it has ended with its last unit: no increment is accepted any more.
+    pub(super) is_given: bool,
 }
 
 /// Which units of a frame there are.
@@ -124,6 +126,13 @@ impl Progress {
         self.sizes.iter().take(h.into()).copied().fold(0, u32::saturating_add)
     }
 
+    /// Whether there is each unit that `takes` tells by spatial layer and refinement.
+    fn has_all(&self, sequence: &SequenceParameters, intra: bool, takes: impl Fn(u8, u8) -> bool) -> bool {
+        let top = sequence.spatial_layer_count.saturating_sub(1);
+        let mut layers = if intra { 0..=top } else { top..=top };
+        layers.all(|layer| (self.count(layer)..sequence.refinement_count).all(|r| !takes(layer, r)))
+    }
+
     /// Whether unit (s, r) is the next: the units of an I frame come layer by layer, and a layer has no list that the layer
     /// below lacks.
     fn expects(&self, layer: u8, refinement: u8, intra: bool) -> bool {
@@ -150,6 +159,34 @@ impl Progress {
 impl FrameInProgress {
     pub(super) const fn is_intra(&self) -> bool {
         self.role.reference.is_none()
+    }
+
+    /// Whether all of its units have been accepted that `takes` tells by spatial layer and refinement.
+    pub(super) fn is_complete(&self, sequence: &SequenceParameters, takes: impl Fn(u8, u8) -> bool) -> bool {
+        self.seen && !self.is_given && self.expected.has_all(sequence, self.is_intra(), takes)
+    }
+
+    /// What tells why a frame that is complete takes no further increment.
+    pub(super) fn without_content(&self) -> Self {
+        Self {
+            point: self.point,
+            index: self.index,
+            payload_at: self.payload_at,
+            header: self.header,
+            role: self.role,
+            carried_digest: None,
+            reference: self.reference,
+            field: self.field.clone(),
+            seen: true,
+            pending: Vec::new(),
+            expected: self.expected.clone(),
+            decoded: self.decoded.clone(),
+            lists: Lists::default(),
+            bytes: 0,
+            entropy: Vec::new(),
+            error: None,
+            is_given: true,
+        }
     }
 
     /// Accepts an increment that belongs to the operating point. `None` if it is discarded.
