@@ -16,9 +16,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         refinements: vec![20, 50, 100],
         ..Settings::default()
     };
-    let mut encoder = Encoder::new(BufWriter::new(File::create(&path)?), settings)?;
+    let mut encoder = Encoder::new(BufWriter::new(File::create(&path)?), settings);
     for number in 0..scene.frames {
-        encoder.push(&scene.frame(number))?;
+        encoder.push(scene.frame(number))?;
     }
     let report = encoder.finish()?;
     println!("{path}: {} frames, {} Gaussians, {} bytes", report.frames, report.gaussians, report.bytes);

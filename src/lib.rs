@@ -35,7 +35,7 @@
 //! * [`Slots`] keeps each Gaussian at its place from frame to frame, and says what has changed: what a renderer uploads.
 //! * [`Limits`] bound memory, work and output before anything is allocated; [`Cancel`] ends the work on a frame. The
 //!   defaults are safe for a server that decodes what strangers send.
-//! * [`Encoder`] takes frames and writes a stream.
+//! * [`Encoder`] takes frames as they come and writes a stream, GOP by GOP.
 //!
 //! No input panics or aborts. A damaged stream gives the frames that are left, with warnings; damage costs at most the GOP
 //! (group of pictures) that it is in.
@@ -47,8 +47,6 @@
 //! inspectors and for other encoders; their interfaces change more often.
 
 mod decoder;
-#[cfg(feature = "encode")]
-mod encoder;
 mod error;
 mod extract;
 mod frame;
@@ -57,8 +55,6 @@ mod slots;
 mod source;
 
 pub use decoder::{Decoder, Position};
-#[cfg(feature = "encode")]
-pub use encoder::{EncodeError, Encoder, Report, Settings};
 pub use error::{Error, Result, Warning};
 pub use extract::extract;
 pub use frame::Frame;
@@ -71,7 +67,7 @@ pub use splatstream_decoder::frame::QuantizedFrame as Integers;
 pub use splatstream_decoder::interrupt::Interrupt as Cancel;
 pub use splatstream_decoder::operating_point::{OperatingPoint, ParseOperatingPointError};
 #[cfg(feature = "encode")]
-pub use splatstream_encoder::{FrameSource, encode};
+pub use splatstream_encoder::{Encoder, Error as EncodeError, FrameSource, Report, Settings, encode};
 /// What is wrong with the bytes of a stream: where, by which clause, and what.
 pub use splatstream_format::Error as StreamError;
 pub use splatstream_gaussians::{GaussianFrame, Planes};

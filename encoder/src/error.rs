@@ -68,6 +68,20 @@ pub enum Error {
         /// The step of the grid.
         step: f32,
     },
+    /// A pushed frame is not what the frames before it have announced.
+    #[error(
+        "frame {frame}: {property} is {value}, and {announced} was announced by the first frames; give the first frames as much"
+    )]
+    NotAnnounced {
+        /// The frame.
+        frame: u32,
+        /// What differs.
+        property: &'static str,
+        /// What it is.
+        value: String,
+        /// What was announced.
+        announced: String,
+    },
     /// A frame could not be read.
     #[error("frame {frame}: {source}")]
     Source {

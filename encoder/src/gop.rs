@@ -30,9 +30,6 @@ use splatstream_format::syntax::{
     FrameHeader, FrameRole, FrameType, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
 };
 
-/// Frames of a predicted GOP, at most (6.5).
-const MAX_FRAMES: u32 = 1024;
-
 /// A predicted frame that takes more than this part of what an I frame would is not worth it: it is no easier to decode,
 /// and an I frame is where decoding can start.
 const DEAR: f64 = 0.97;
@@ -110,8 +107,7 @@ impl SequenceCoder<'_, '_> {
     /// # Errors
     /// As [`encode`](crate::encode).
     pub(crate) fn run(mut self, progress: Progress<'_>) -> Result<(), Error> {
-        let most = if self.settings.temporal_layers() > 0 { MAX_FRAMES } else { u32::MAX };
-        let length = self.settings.gop.min(most);
+        let length = self.settings.gop_length();
         let frames = self.source.len();
         let mut first = 0;
         while first < frames && !self.recorder.is_some_and(Recorder::is_full) {
@@ -122,7 +118,7 @@ impl SequenceCoder<'_, '_> {
 
     /// Codes a GOP of the frames from `first` up to `last` at most, and gives the frame after it: it ends where a
     /// frame shares little with the one it would refer to.
-    fn gop(&mut self, first: u32, last: u32, progress: Progress<'_>) -> Result<u32, Error> {
+    pub(crate) fn gop(&mut self, first: u32, last: u32, progress: Progress<'_>) -> Result<u32, Error> {
         let before = (self.report.clone(), self.looked_at);
         let intra = self.intra_target(first)?;
         let mut gop = self.start(first, last - first, &intra)?;

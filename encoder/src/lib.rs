@@ -30,10 +30,12 @@ mod parametric_fit;
 mod pass;
 mod pca;
 mod progress;
+mod push;
 mod random;
 mod reach;
 mod refinements;
 mod report;
+mod room;
 mod secant;
 mod section;
 mod sequence;
@@ -53,6 +55,7 @@ pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;
 pub use progress::Progress;
+pub use push::Encoder;
 pub use report::{Dropped, FrameReport, GopReport, PictureReport, Report, TargetReport, VerifiedFrame};
 pub use settings::{
     Anchor, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings,

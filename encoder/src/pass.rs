@@ -7,7 +7,7 @@ use crate::importance::Ranking;
 use crate::progress::Progress;
 use crate::report::Report;
 use crate::sequence::analyse;
-use crate::settings::{Settings, Structure};
+use crate::settings::Settings;
 use crate::source::FrameSource;
 use crate::verification::Verifier;
 use crate::writer::{UnitWriter, Written};
@@ -38,9 +38,8 @@ pub(crate) fn encode_smaller(
     if !is_doubtful(&report, settings) {
         return Ok((bytes, report));
     }
-    let alone = Settings { structure: Structure::Intra, spatial_layers: 1, ..settings.clone() };
     let mut smaller = Vec::new();
-    let mut report_alone = encode_once(source, &alone, ranking, &mut smaller, progress)?;
+    let mut report_alone = encode_once(source, &settings.clone().alone(), ranking, &mut smaller, progress)?;
     if bytes.len() as f64 <= LARGER * smaller.len() as f64 {
         return Ok((bytes, report));
     }

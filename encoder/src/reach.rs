@@ -43,6 +43,15 @@ impl Extent {
         self
     }
 
+    /// As large as so many boxes side by side on each axis, around the same middle.
+    pub(crate) fn widened(mut self, boxes: f32) -> Self {
+        let side = self.largest_side() as f32;
+        for (low, high) in self.low.iter_mut().zip(&mut self.high) {
+            (*low, *high) = (*low - 0.5 * (boxes - 1.0) * side, *high + 0.5 * (boxes - 1.0) * side);
+        }
+        self
+    }
+
     /// The two corners, if there is a Gaussian.
     pub(crate) fn bounds(&self) -> Option<[[f32; 3]; 2]> {
         (self.low[0] <= self.high[0]).then_some([self.low, self.high])

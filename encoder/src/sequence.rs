@@ -36,47 +36,83 @@ pub(crate) struct Analysis {
 /// # Errors
 /// A source that cannot be read or has no frame, settings and frames the bitstream cannot carry.
 pub(crate) fn analyse(source: &mut dyn FrameSource, settings: &Settings) -> Result<Analysis, Error> {
-    check(settings)?;
-    let frames = source.len();
-    if frames == 0 {
-        return Err(Error::NoFrames);
-    }
-    let mut scene = Scene::new();
-    let mut largest = (0, 0);
-    let mut degree = 0;
-    let mut antialiased = false;
-    let mut source_degree = 0;
-    let mut axes_trial = [0.0; 2];
-    for number in 0..frames {
-        let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
-        let shown = visible(&frame, settings.keep_invisible);
-        check_reach(&frame, &shown, (settings.steps.log_scale, settings.steps.opacity), number)?;
-        if shown.len() > largest.1 {
-            largest = (number, shown.len());
+    Survey::of(source, settings)?.analysis(settings, source.len())
+}
+
+/// What was seen of the frames of a sequence.
+pub(crate) struct Survey {
+    pub(crate) scene: Scene,
+    /// The frame with the most Gaussians that can be seen, and their number.
+    pub(crate) largest: (u32, usize),
+    /// The SH degree that the frames need, and the one that they have.
+    pub(crate) degree: u8,
+    pub(crate) source_degree: u8,
+    pub(crate) antialiased: bool,
+    axes_trial: [f64; 2],
+}
+
+impl Survey {
+    /// Looks at every frame once.
+    ///
+    /// # Errors
+    /// As [`analyse`].
+    pub(crate) fn of(source: &mut dyn FrameSource, settings: &Settings) -> Result<Self, Error> {
+        check(settings)?;
+        if source.is_empty() {
+            return Err(Error::NoFrames);
         }
-        scene.add(&frame, &shown);
-        source_degree = source_degree.max(frame.sh_degree());
-        degree = degree.max(needed_degree(&frame, settings.steps.sh));
-        antialiased |= frame.antialiased();
+        let mut survey = Self {
+            scene: Scene::new(),
+            largest: (0, 0),
+            degree: 0,
+            source_degree: 0,
+            antialiased: false,
+            axes_trial: [0.0; 2],
+        };
+        for number in 0..source.len() {
+            let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
+            survey.add(&frame, number, settings)?;
+        }
+        Ok(survey)
+    }
+
+    fn add(&mut self, frame: &GaussianFrame, number: u32, settings: &Settings) -> Result<(), Error> {
+        let shown = visible(frame, settings.keep_invisible);
+        check_reach(frame, &shown, (settings.steps.log_scale, settings.steps.opacity), number)?;
+        if shown.len() > self.largest.1 {
+            self.largest = (number, shown.len());
+        }
+        self.scene.add(frame, &shown);
+        self.source_degree = self.source_degree.max(frame.sh_degree());
+        self.degree = self.degree.max(needed_degree(frame, settings.steps.sh));
+        self.antialiased |= frame.antialiased();
         if number == 0 {
-            axes_trial = try_axes(&frame, &shown, settings);
+            self.axes_trial = try_axes(frame, &shown, settings);
         }
+        Ok(())
     }
-    let degree = settings.sh_degree.unwrap_or(degree).min(source_degree);
-    let [sorted, unsorted] = axes_trial;
-    // A Gaussian that changes keeps the names of its axes, so that predicted frames are not sorted.
-    let sorts = settings.tools.axis_sort && settings.profile() == Profile::Intra;
-    let canonical_axes = sorts && sorted <= unsorted;
-    let flags = SequenceParameters::flags(canonical_axes, antialiased, settings.whole_anchor());
-    let parameters = scene.parameters(settings, frames, degree, flags);
-    let level = level(&parameters, largest)?;
-    Ok(Analysis {
-        parameters,
-        level,
-        source_sh_degree: source_degree,
-        axes_trial,
-        bounds: scene.extent.bounds(),
-    })
+
+    /// What holds for so many frames like these; 0: the number is not known.
+    ///
+    /// # Errors
+    /// More Gaussians than a stream can carry.
+    pub(crate) fn analysis(&self, settings: &Settings, frames: u32) -> Result<Analysis, Error> {
+        let degree = settings.sh_degree.unwrap_or(self.degree).min(self.source_degree);
+        let [sorted, unsorted] = self.axes_trial;
+        // A Gaussian that changes keeps the names of its axes, so that predicted frames are not sorted.
+        let sorts = settings.tools.axis_sort && settings.profile() == Profile::Intra;
+        let canonical_axes = sorts && sorted <= unsorted;
+        let flags = SequenceParameters::flags(canonical_axes, self.antialiased, settings.whole_anchor());
+        let parameters = self.scene.parameters(settings, frames, degree, flags);
+        let level = level(&parameters, self.largest)?;
+        Ok(Analysis {
+            parameters,
+            level,
+            source_sh_degree: self.source_degree,
+            axes_trial: self.axes_trial,
+            bounds: self.scene.extent.bounds(),
+        })
+    }
 }
 
 /// The lowest level for frames of which the largest has so many Gaussians.
@@ -172,14 +208,14 @@ fn try_axes(frame: &GaussianFrame, shown: &[u32], settings: &Settings) -> [f64; 
 
 /// What the parameters of a sequence follow from.
 pub(crate) struct Scene {
-    extent: Extent,
+    pub(crate) extent: Extent,
     cores: Vec<Core>,
     /// Positions and squared opacities of some Gaussians of the first frame that has any.
     sample: Vec<([f32; 3], f32)>,
     /// Means of the largest log-scale and of the opacity in that frame.
-    means: [f32; 2],
+    pub(crate) means: [f32; 2],
     /// Farthest values from them, and the largest colours: log-scale, opacity, dc, sh.
-    reach: [f32; 4],
+    pub(crate) reach: [f32; 4],
 }
 
 impl Scene {

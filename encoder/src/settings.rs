@@ -228,6 +228,9 @@ impl Default for Tools {
     }
 }
 
+/// Frames of a predicted GOP, at most (6.5).
+const MAX_PREDICTED_FRAMES: u32 = 1024;
+
 /// Everything a user may choose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -308,6 +311,11 @@ impl Settings {
         }
     }
 
+    /// The same for frames that each stand for themselves, in one layer.
+    pub(crate) fn alone(self) -> Self {
+        Self { structure: Structure::Intra, spatial_layers: 1, ..self }
+    }
+
     /// Temporal layers; 0 where no frame refers to another.
     pub(crate) fn temporal_layers(&self) -> u8 {
         match self.structure {
@@ -319,6 +327,11 @@ impl Settings {
     /// Spatial layers of the stream: no more than have something to add.
     pub fn spatial_layer_count(&self) -> u8 {
         self.spatial_layers.min(Ladder::most_layers(self.refinements.len()))
+    }
+
+    /// Frames of a GOP, at most.
+    pub(crate) fn gop_length(&self) -> u32 {
+        self.gop.min(if self.temporal_layers() > 0 { MAX_PREDICTED_FRAMES } else { u32::MAX })
     }
 
     /// Whether predicted GOPs have whole anchors.

@@ -59,11 +59,28 @@ pub(crate) fn reach(
     // Before anything is fitted to what no stream can carry.
     sequence::check(settings)?;
     let fitting = Fitting::new(source, settings)?;
-    let seeker = Seeker { source, fitting, progress, encodings: 0, trials: 0 };
-    match (settings.size, settings.psnr) {
-        (Some(size), _) => seeker.size(size, sink),
-        (None, decibels) => seeker.quality(decibels.unwrap_or_default().into(), sink),
+    let mut seeker = Seeker { source, fitting, progress, encodings: 0, trials: 0 };
+    let encoded = seeker.encode()?;
+    sink.write_all(&encoded.bytes)?;
+    Ok(encoded.report)
+}
+
+/// Settings that reach what is asked for on the frames of `source`, the order of the first frame, and how they were found.
+///
+/// # Errors
+/// As [`encode`](crate::encode).
+pub(crate) fn settle(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+) -> Result<(Settings, Ranking, Report), Error> {
+    let fitting = Fitting::new(source, settings)?;
+    let mut seeker = Seeker { source, fitting, progress: &mut |_, _| (), encodings: 0, trials: 0 };
+    let Encoded { fitted, report, .. } = seeker.encode()?;
+    let mut settled = Settings { psnr: None, size: None, ..seeker.fitting.at(fitted) };
+    if report.stands_alone {
+        settled = settled.alone();
     }
+    Ok((settled, seeker.fitting.ranking, report))
 }
 
 /// Fits steps to the first frame.
@@ -134,8 +151,19 @@ struct Encoded {
 }
 
 impl Seeker<'_> {
+    /// A stream with what the settings ask for.
+    fn encode(&mut self) -> Result<Encoded, Error> {
+        let mut encoded = match (self.fitting.settings.size, self.fitting.settings.psnr) {
+            (Some(size), _) => self.size(size)?,
+            (None, decibels) => self.quality(decibels.unwrap_or_default().into())?,
+        };
+        let (fitted, encodings, trials) = (encoded.fitted as f32, self.encodings, self.trials);
+        encoded.report.target = Some(TargetReport { fitted, encodings, trials });
+        Ok(encoded)
+    }
+
     /// A stream with pictures of a PSNR. Of a sequence its first frames are tried: one of each type.
-    fn quality(mut self, wanted: f64, sink: &mut dyn Write) -> Result<Report, Error> {
+    fn quality(&mut self, wanted: f64) -> Result<Encoded, Error> {
         let mut secant = Secant::new(wanted, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
         let frames_of_part = match self.fitting.settings.temporal_layers() {
             0 => 1,
@@ -162,12 +190,11 @@ impl Seeker<'_> {
             next = secant.next();
         }
         let Some(best) = best else { return Err(Error::NoFrames) };
-        let best = if is_sequence { self.whole(best.fitted)? } else { best };
-        self.written(best, sink)
+        if is_sequence { self.whole(best.fitted) } else { Ok(best) }
     }
 
     /// A stream of a size. Of a long sequence a part is tried first.
-    fn size(mut self, size: Size, sink: &mut dyn Write) -> Result<Report, Error> {
+    fn size(&mut self, size: Size) -> Result<Encoded, Error> {
         let goal = libm::log(match size {
             Size::BitsPerGaussian(bits) => bits,
             Size::Bytes(bytes) => bytes as f64,
@@ -195,7 +222,7 @@ impl Seeker<'_> {
             }
             next = secant.next();
         }
-        self.written(best.ok_or(Error::NoFrames)?, sink)
+        best.ok_or(Error::NoFrames)
     }
 
     fn frames_of_part(&self) -> u32 {
@@ -241,14 +268,6 @@ impl Seeker<'_> {
         let mut part = FirstFrames { source: self.source, frames };
         let report = encode_once(&mut part, &settings, ranking, &mut bytes, &mut |_, _| ())?;
         Ok(Encoded { fitted, bytes, report })
-    }
-
-    fn written(self, encoded: Encoded, sink: &mut dyn Write) -> Result<Report, Error> {
-        let Encoded { fitted, bytes, mut report } = encoded;
-        sink.write_all(&bytes)?;
-        let (encodings, trials) = (self.encodings, self.trials);
-        report.target = Some(TargetReport { fitted: fitted as f32, encodings, trials });
-        Ok(report)
     }
 }
 

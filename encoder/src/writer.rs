@@ -15,6 +15,11 @@ use std::io::Write;
 /// Writes units, and keeps what the end of the stream says about them.
 pub(crate) struct UnitWriter<'a> {
     sink: &'a mut dyn Write,
+    record: Record,
+}
+
+/// What is known of the units that have been written. A stream that is written GOP by GOP goes on with it.
+pub(crate) struct Record {
     profile: Profile,
     sequence: SequenceParameters,
     /// Bytes written.
@@ -39,10 +44,10 @@ pub(crate) struct Written {
     pub(crate) verifier: Option<Verifier>,
 }
 
-impl<'a> UnitWriter<'a> {
-    pub(crate) fn new(sink: &'a mut dyn Write, profile: Profile, sequence: &SequenceParameters) -> Self {
+impl Record {
+    /// Of nothing.
+    pub(crate) fn new(profile: Profile, sequence: &SequenceParameters) -> Self {
         Self {
-            sink,
             profile,
             sequence: *sequence,
             offset: 0,
@@ -53,19 +58,36 @@ impl<'a> UnitWriter<'a> {
             verifier: None,
         }
     }
+}
+
+impl<'a> UnitWriter<'a> {
+    pub(crate) fn new(sink: &'a mut dyn Write, profile: Profile, sequence: &SequenceParameters) -> Self {
+        Self { sink, record: Record::new(profile, sequence) }
+    }
+
+    /// Goes on with a stream.
+    pub(crate) fn resume(sink: &'a mut dyn Write, record: Record) -> Self {
+        Self { sink, record }
+    }
+
+    /// What a writer goes on with that [resumes](UnitWriter::resume).
+    pub(crate) fn pause(self) -> Record {
+        self.record
+    }
 
     /// Shows everything that is written to a verifier too.
-    pub(crate) fn with(self, verifier: Option<Verifier>) -> Self {
-        Self { verifier, ..self }
+    pub(crate) fn with(mut self, verifier: Option<Verifier>) -> Self {
+        self.record.verifier = verifier;
+        self
     }
 
     /// What stands before the first GOP.
     pub(crate) fn start(&mut self, analysis: &Analysis, description: &SceneDescription) -> Result<(), Error> {
-        let mut head = write_file_header(self.profile, analysis.level)?;
+        let mut head = write_file_header(self.record.profile, analysis.level)?;
         self.bytes(&head)?;
-        let (id, sequence) = (UnitId::stream(UnitType::SequenceParameters), self.sequence.to_bytes()?);
+        let (id, sequence) = (UnitId::stream(UnitType::SequenceParameters), self.record.sequence.to_bytes()?);
         self.unit(id, &sequence)?;
-        if let Some(verifier) = &mut self.verifier {
+        if let Some(verifier) = &mut self.record.verifier {
             write_unit(&mut head, id, &sequence)?;
             verifier.head(&head);
         }
@@ -75,18 +97,18 @@ impl<'a> UnitWriter<'a> {
 
     /// GOPs that have been started.
     pub(crate) fn gops(&self) -> u32 {
-        self.index.len() as u32
+        self.record.index.len() as u32
     }
 
     /// Starts a GOP. The sequence parameters are repeated before each but the first: a stream of which the beginning is
     /// lost or damaged can still be decoded.
     pub(crate) fn gop(&mut self, header: &GopHeader, frame: u32) -> Result<(), Error> {
-        if !self.index.is_empty() {
-            self.unit(UnitId::stream(UnitType::SequenceParameters), &self.sequence.to_bytes()?)?;
+        if !self.record.index.is_empty() {
+            self.unit(UnitId::stream(UnitType::SequenceParameters), &self.record.sequence.to_bytes()?)?;
         }
-        self.index.push(IndexEntry { frame, reserved_zero: 0, offset: self.offset });
-        self.gops.push(GopReport { first: frame, frames: header.gop_frame_count });
-        if let Some(verifier) = &mut self.verifier {
+        self.record.index.push(IndexEntry { frame, reserved_zero: 0, offset: self.record.offset });
+        self.record.gops.push(GopReport { first: frame, frames: header.gop_frame_count });
+        if let Some(verifier) = &mut self.record.verifier {
             verifier.start_gop(header, frame)?;
         }
         self.unit(UnitId::of_frame(UnitType::GopHeader, frame), &header.to_bytes()?)
@@ -94,28 +116,28 @@ impl<'a> UnitWriter<'a> {
 
     /// What stands after the last GOP.
     pub(crate) fn finish(mut self) -> Result<Written, Error> {
-        if let Some(verifier) = &mut self.verifier {
+        if let Some(verifier) = &mut self.record.verifier {
             verifier.end_gop()?;
         }
-        if self.profile == Profile::Dynamic {
-            let points = self.tally.list().to_bytes()?;
+        if self.record.profile == Profile::Dynamic {
+            let points = self.record.tally.list().to_bytes()?;
             self.unit(UnitId::stream(UnitType::OperatingPoints), &points)?;
         }
-        let index_offset = self.offset;
-        let index = Index { entries: core::mem::take(&mut self.index) };
+        let index_offset = self.record.offset;
+        let index = Index { entries: core::mem::take(&mut self.record.index) };
         self.unit(UnitId::stream(UnitType::Index), &index.to_bytes()?)?;
-        let end =
-            EndOfStream { frame_count: self.sequence.frame_count, unit_count: self.units, index_offset };
+        let frame_count = self.record.gops.iter().map(|gop| gop.frames).sum();
+        let end = EndOfStream { frame_count, unit_count: self.record.units, index_offset };
         self.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)?;
-        Ok(Written { bytes: self.offset, gops: self.gops, verifier: self.verifier })
+        Ok(Written { bytes: self.record.offset, gops: self.record.gops, verifier: self.record.verifier })
     }
 
     /// Writes a unit.
     pub(crate) fn unit(&mut self, id: UnitId, payload: &[u8]) -> Result<(), Error> {
         let header = UnitHeader::new(id, payload)?;
-        self.units += 1;
-        self.tally.unit(&Unit { at: 0, header, payload, payload_at: 0 });
-        if let Some(verifier) = &mut self.verifier {
+        self.record.units += 1;
+        self.record.tally.unit(&Unit { at: 0, header, payload, payload_at: 0 });
+        if let Some(verifier) = &mut self.record.verifier {
             verifier.unit(&header, payload)?;
         }
         self.bytes(&header.to_bytes()?)?;
@@ -124,7 +146,7 @@ impl<'a> UnitWriter<'a> {
 
     fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.sink.write_all(bytes)?;
-        self.offset += bytes.len() as u64;
+        self.record.offset += bytes.len() as u64;
         Ok(())
     }
 }

@@ -3,6 +3,9 @@
 //! `cargo run --release -p splatstream-fuzz --example bounds -- [LEVEL]... [CASE]...` makes every case, or those named, at
 //! the levels named (1), decodes each in a process of its own, and prints a table. Processor time is that of decoding with
 //! all digests compared, of all threads together.
+//!
+//! `... --example bounds -- --interrupt [LEVEL]... [CASE]...` interrupts the decoder of each at many places, and prints for
+//! how long it goes on, on one thread.
 
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
@@ -12,50 +15,86 @@ use std::process::{Command, Stdio};
 
 mod cases;
 mod healing;
+mod interrupted;
 mod stream;
 
 /// Ticks of processor time in a second, as /proc gives them.
 const TICKS: f64 = 100.0;
 /// What the process that decodes a stream is told, before its file and its level.
 const DECODE: &str = "--decode";
+/// The same of the process that is interrupted; and what asks for it.
+const INTERRUPT: &str = "--interrupt";
+
+const HEAD: &str = "\
+| Case | Level | Bytes | Frames | CPU s | CPU ms a frame | A.3 counts in a frame | ns each | Peak MB | A.3 MB |
+|---|--:|--:|--:|--:|--:|---|--:|--:|--:|";
 
 type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    if let [decode, path, level] = words.as_slice()
-        && decode == DECODE
-    {
-        return measured(path, level.parse()?);
+    match words.as_slice() {
+        [decode, path, level] if decode == DECODE => return measured(path, level.parse()?),
+        [interrupt, path, level] if interrupt == INTERRUPT && path.ends_with(".gss") => {
+            let found = interrupted::milliseconds(path, level.parse()?)?;
+            found.iter().for_each(|one| println!("{one}"));
+            return Ok(());
+        }
+        _ => {}
     }
-    let (levels, names): (Vec<String>, Vec<String>) =
-        words.into_iter().partition(|word| word.parse::<u8>().is_ok());
+    let is_interrupted = words.first().is_some_and(|word| word == INTERRUPT);
+    let words = words.into_iter().skip(usize::from(is_interrupted));
+    let (levels, names): (Vec<String>, Vec<String>) = words.partition(|word| word.parse::<u8>().is_ok());
     let levels = if levels.is_empty() { vec!["1".to_owned()] } else { levels };
-    println!(
-        "| Case | Level | Bytes | Frames | CPU s | CPU ms a frame | A.3 counts in a frame | ns each | Peak MB | A.3 MB |"
-    );
-    println!("|---|--:|--:|--:|--:|--:|---|--:|--:|--:|");
+    match is_interrupted {
+        true => println!("| Case | Level | Median ms | Largest ms |\n|---|--:|--:|--:|"),
+        false => println!("{HEAD}"),
+    }
     for level in &levels {
         for (name, make) in cases::ALL {
             if names.is_empty() || names.iter().any(|wanted| wanted == name) {
                 let level = level.parse()?;
-                print(name, level, &make(level, &Limits::of_level(level)))?;
+                let case = make(level, &Limits::of_level(level));
+                match is_interrupted {
+                    true => print_interrupted(name, level, &case)?,
+                    false => print(name, level, &case)?,
+                }
             }
         }
     }
     Ok(())
 }
 
-/// Has a case decoded by a process of its own, and prints its line.
-fn print(name: &str, level: u8, case: &cases::Case) -> Result<()> {
+/// What a process of its own says of a case.
+fn told_by_process(what: &str, level: u8, case: &cases::Case) -> Result<String> {
     let path = std::env::temp_dir().join(format!("bounds-{}.gss", std::process::id()));
     std::fs::write(&path, &case.bytes)?;
-    let mut decoder = Command::new(std::env::current_exe()?);
-    let output = decoder.arg(DECODE).arg(&path).arg(level.to_string()).stderr(Stdio::inherit()).output()?;
+    let mut process = Command::new(std::env::current_exe()?);
+    if what == INTERRUPT {
+        process.env("RAYON_NUM_THREADS", "1");
+    }
+    let output = process.arg(what).arg(&path).arg(level.to_string()).stderr(Stdio::inherit()).output()?;
     std::fs::remove_file(&path)?;
-    let line = String::from_utf8(output.stdout)?;
+    match output.status.success() {
+        true => Ok(String::from_utf8(output.stdout)?),
+        false => Err(format!("the decoder: {}", output.status).into()),
+    }
+}
+
+/// Has a case decoded and interrupted, and prints its line.
+fn print_interrupted(name: &str, level: u8, case: &cases::Case) -> Result<()> {
+    let told = told_by_process(INTERRUPT, level, case)?;
+    let found = told.lines().map(str::parse).collect::<core::result::Result<Vec<f64>, _>>()?;
+    let [median, largest] = [found.get(found.len() / 2), found.last()].map(|one| one.copied().unwrap_or(0.0));
+    println!("| {name} | {level} | {median:.1} | {largest:.1} |");
+    Ok(())
+}
+
+/// Has a case decoded, and prints its line.
+fn print(name: &str, level: u8, case: &cases::Case) -> Result<()> {
+    let line = told_by_process(DECODE, level, case)?;
     let [frames, seconds, peak, errors] = line.split_whitespace().collect::<Vec<_>>()[..] else {
-        return Err(format!("{name}: {}", output.status).into());
+        return Err(format!("{name}: {line}").into());
     };
     let (seconds, peak, errors) = (seconds.parse::<f64>()?, peak.parse::<f64>()?, errors.parse::<u32>()?);
     if errors > 0 && !case.is_damaged {

@@ -1,0 +1,249 @@
+//! Frames in, bytes out as they are ready.
+
+use crate::checked::{CheckedSource, named};
+use crate::error::Error;
+use crate::frame::learning;
+use crate::gop::SequenceCoder;
+use crate::importance::Ranking;
+use crate::isolated::Isolated;
+use crate::report::{Dropped, Report};
+use crate::room::{Announced, announce};
+use crate::sequence::Survey;
+use crate::settings::{Settings, Size};
+use crate::source::FrameSource;
+use crate::target;
+use crate::writer::{Record, UnitWriter, Written};
+use splatstream_format::Limits;
+use splatstream_format::payload::Network;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_gaussians::GaussianFrame;
+use std::collections::VecDeque;
+use std::io::Write;
+
+/// Encodes frames as they come: each GOP is written once its frames are there, and one more.
+///
+/// A stream begins with the ranges of all its frames. They are taken from the frames of the first GOP, with room for
+/// later ones, and so are the steps where the [settings](Settings) ask for a PSNR or for bits per Gaussian. What leaves
+/// these ranges is coded as the nearest that does not, and [reported](Report::isolated). A sequence of one GOP is
+/// encoded as [`encode`](crate::encode()) does, which looks at all frames first and writes a slightly smaller stream.
+///
+/// Memory is that of the frames of a GOP and of coding them, whatever the number of frames; the report takes some 150
+/// bytes for each.
+///
+/// ```
+/// use splatstream_encoder::{Encoder, Settings};
+/// use splatstream_files::builtin::BuiltinScene;
+///
+/// let scene = BuiltinScene { gaussians: 100, frames: 5, ..BuiltinScene::default() };
+/// let mut bytes = Vec::new();
+/// let mut encoder = Encoder::new(&mut bytes, Settings { gop: 2, ..Settings::default() });
+/// for number in 0..scene.frames {
+///     encoder.push(scene.frame(number))?;
+/// }
+/// let report = encoder.finish()?;
+/// assert_eq!((report.frames, report.bytes), (5, bytes.len() as u64));
+/// # Ok::<(), splatstream_encoder::Error>(())
+/// ```
+pub struct Encoder<W> {
+    sink: W,
+    settings: Settings,
+    window: Window,
+    /// None until there are more frames than the first GOP may have.
+    stream: Option<Stream>,
+}
+
+/// The frames that are not coded yet.
+#[derive(Default)]
+struct Window {
+    /// The number of the first.
+    first: u32,
+    frames: VecDeque<GaussianFrame>,
+}
+
+impl FrameSource for Window {
+    fn len(&self) -> u32 {
+        self.first + self.frames.len() as u32
+    }
+
+    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        let at = number.checked_sub(self.first).and_then(|at| self.frames.get(at as usize));
+        at.cloned().ok_or_else(|| format!("frame {number} is not there any more").into())
+    }
+}
+
+impl Window {
+    /// Forgets the frames before one.
+    fn drop_before(&mut self, number: u32) {
+        self.frames.drain(..(number - self.first) as usize);
+        self.first = number;
+    }
+}
+
+/// A stream of which some GOPs have been written.
+struct Stream {
+    /// With steps that are settled.
+    settings: Settings,
+    sequence: SequenceParameters,
+    announced: Announced,
+    limits: Limits,
+    ranking: Ranking,
+    network: Option<Network>,
+    record: Record,
+    report: Report,
+    looked_at: u32,
+}
+
+impl<W: Write> Encoder<W> {
+    /// An encoder that writes to `sink`.
+    pub fn new(sink: W, settings: Settings) -> Self {
+        Self { sink, settings, window: Window::default(), stream: None }
+    }
+
+    /// Takes the next frame, and writes the GOP that it completes.
+    ///
+    /// # Errors
+    /// Settings or frames that cannot be coded, a sink that cannot be written. No stream comes of what was written then.
+    pub fn push(&mut self, frame: GaussianFrame) -> Result<(), Error> {
+        let number = self.window.len();
+        let frame = match &mut self.stream {
+            Some(stream) => stream.hold(frame, number)?,
+            None => frame,
+        };
+        self.window.frames.push_back(frame);
+        // With one frame more, what would be left of the sequence is known not to be one frame.
+        if self.window.frames.len() as u64 > u64::from(self.settings.gop_length()) {
+            self.gop()?;
+        }
+        Ok(())
+    }
+
+    /// Writes the rest of the stream.
+    ///
+    /// # Errors
+    /// As [`Encoder::push`]; no frame at all.
+    pub fn finish(mut self) -> Result<Report, Error> {
+        if self.stream.is_none() {
+            let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut |_, _| ())?;
+            self.sink.flush()?;
+            return Ok(report);
+        }
+        while !self.window.frames.is_empty() {
+            self.gop()?;
+        }
+        let Some(Stream { record, mut report, .. }) = self.stream else { return Err(Error::NoFrames) };
+        let Written { bytes, gops, .. } = UnitWriter::resume(&mut self.sink, record).finish()?;
+        self.sink.flush()?;
+        (report.bytes, report.frames, report.gops) = (bytes, self.window.first, gops);
+        report.invisible -= report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum::<u64>();
+        Ok(report)
+    }
+
+    /// Codes the first GOP of the frames that are there.
+    fn gop(&mut self) -> Result<(), Error> {
+        if self.stream.is_none() {
+            let mut source = CheckedSource::new(&mut self.window, self.settings.drop_invalid);
+            self.stream = Some(Stream::start(&mut source, &self.settings, &mut self.sink).map_err(named)?);
+        }
+        let Some(stream) = &mut self.stream else { return Ok(()) };
+        let first = self.window.first;
+        let last = self.window.len().min(first.saturating_add(stream.settings.gop_length()));
+        let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
+        let end = stream.gop(&mut source, (first, last), &mut self.sink).map_err(named)?;
+        let coded = |dropped: &Dropped| dropped.frame < end;
+        stream.report.dropped.extend(source.into_dropped().into_iter().filter(coded));
+        self.window.drop_before(end);
+        Ok(())
+    }
+}
+
+impl Stream {
+    /// Settles what holds for all frames, and writes what stands before the first GOP.
+    fn start(source: &mut dyn FrameSource, settings: &Settings, sink: &mut dyn Write) -> Result<Self, Error> {
+        let (settings, ranking, tried) = settled(source, settings)?;
+        let (analysis, announced) = announce(Survey::of(source, &settings)?, &settings)?;
+        let mut report = Report::new(&analysis, &settings, ranking.importance());
+        if let Some(tried) = tried {
+            report.pictures = tried.pictures;
+            report.target = tried.target;
+            report.stands_alone = tried.stands_alone;
+        }
+        let mut writer = UnitWriter::new(sink, settings.profile(), &analysis.parameters);
+        writer.start(&analysis, &settings.description)?;
+        let network = learning::network(source, &settings, &analysis)?;
+        Ok(Self {
+            sequence: analysis.parameters,
+            announced,
+            limits: Limits::of_level(analysis.level),
+            settings,
+            ranking,
+            network,
+            record: writer.pause(),
+            report,
+            looked_at: 0,
+        })
+    }
+
+    /// A frame within what was announced.
+    fn hold(&mut self, frame: GaussianFrame, number: u32) -> Result<GaussianFrame, Error> {
+        let (frame, found) = self.announced.hold(frame, number)?;
+        found.into_iter().for_each(|found| Isolated::add(Some(found), &mut self.report.isolated));
+        Ok(frame)
+    }
+
+    /// Codes a GOP of the frames from `first` to `last` at most, and gives the frame after it.
+    fn gop(
+        &mut self,
+        source: &mut dyn FrameSource,
+        (first, last): (u32, u32),
+        sink: &mut dyn Write,
+    ) -> Result<u32, Error> {
+        let record =
+            core::mem::replace(&mut self.record, Record::new(self.settings.profile(), &self.sequence));
+        let mut writer = UnitWriter::resume(sink, record);
+        let mut coder = SequenceCoder {
+            source,
+            settings: &self.settings,
+            sequence: self.sequence,
+            ranking: &mut self.ranking,
+            writer: &mut writer,
+            report: &mut self.report,
+            network: self.network.take(),
+            limits: self.limits,
+            recorder: None,
+            looked_at: self.looked_at,
+        };
+        let end = coder.gop(first, last, &mut |_, _| ())?;
+        (self.network, self.looked_at) = (coder.network, coder.looked_at);
+        self.record = writer.pause();
+        Ok(end)
+    }
+}
+
+/// Settings with steps for the frames that are there, and what trying them has shown, if it was done.
+///
+/// # Errors
+/// A size of the whole stream, of which the number of frames is not known.
+fn settled(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+) -> Result<(Settings, Ranking, Option<Report>), Error> {
+    if let Some(Size::Bytes(bytes)) = settings.size {
+        let allowed = "bits per Gaussian where frames are pushed, whose number is not known";
+        return Err(Error::Setting { name: "size", value: format!("{bytes} bytes"), allowed });
+    }
+    if settings.psnr.is_some() || settings.size.is_some() {
+        let (settled, ranking, report) = target::settle(source, settings)?;
+        return Ok((settled, ranking, Some(report)));
+    }
+    let tried = match settings.verify {
+        true => Some(crate::pass::encode_once(
+            source,
+            settings,
+            Ranking::new(settings),
+            &mut std::io::sink(),
+            &mut |_, _| (),
+        )?),
+        false => None,
+    };
+    Ok((Settings { verify: false, ..settings.clone() }, Ranking::new(settings), tried))
+}
