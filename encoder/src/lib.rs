@@ -30,7 +30,6 @@ mod parametric_fit;
 mod pass;
 mod pca;
 mod progress;
-mod random;
 mod reach;
 mod refinements;
 mod report;

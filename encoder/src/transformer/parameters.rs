@@ -1,10 +1,10 @@
 //! The parameters of a network, one after the other in the order of 6.17.2, as numbers that can change a little.
 
-use crate::random::Random;
 use splatstream_decoder::transformer::sine;
 use splatstream_format::Result;
 use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::NetworkHeader;
+use splatstream_gaussians::random::SplitMix64;
 use std::ops::Range;
 
 /// Differences of relative positions: -254 to 254.
@@ -89,7 +89,7 @@ impl Layout {
     /// room to become larger and steps enough to be fine. The head is zero: an untrained network is its
     /// base.
     pub(super) fn initial(&self, seed: u64) -> Vec<f32> {
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         let mut values = vec![0.0; self.length];
         let root = libm::sqrtf(self.header.width() as f32);
         for (part, range) in Part::ALL.into_iter().zip(&self.weights) {

@@ -5,6 +5,7 @@
 //! * [`Defects`] are the values that no frame may hold: see [`GaussianFrame::validate`].
 //! * [`activation`], [`rotation`] and [`sh_basis`] say what the values stand for; [`importance`] scores
 //!   Gaussians and orders them.
+//! * [`random`] gives numbers from a seed, for whatever makes or chooses Gaussians.
 //!
 //! Axes are PLY's: x right, y down, z forward.
 //!
@@ -13,6 +14,7 @@
 
 pub mod activation;
 pub mod importance;
+pub mod random;
 pub mod rotation;
 
 mod defect;
