@@ -2,6 +2,7 @@
 //!
 //! * [`camera`]: pinhole cameras, read from the JSON files in use or made for a scene that has none;
 //! * [`rasterise`]: a frame of Gaussians to a picture, as 3D Gaussian splatting defines it;
+//! * [`ReferencePictures`]: a frame as cameras see it, to compare other frames with;
 //! * [`contribution`]: how much each Gaussian shows in a set of views;
 //! * [`metrics`]: PSNR, SSIM, a learned metric, and the mean difference of two rate-distortion curves.
 //!
@@ -13,7 +14,9 @@ pub mod contribution;
 pub mod image;
 pub mod metrics;
 pub mod rasterise;
+mod reference;
 
 pub use camera::Camera;
 pub use image::Image;
 pub use rasterise::{Rendering, render};
+pub use reference::ReferencePictures;

@@ -58,7 +58,7 @@ impl Judge {
     /// For a source frame and what the cells bring into it. The errors of each view count as shares of the error that
     /// it may have: so many decibels are worth as much in any view.
     pub(crate) fn new(frame: &GaussianFrame, displaced: &GaussianFrame, goal: &Goal) -> Self {
-        let cameras = goal.pictures.cameras();
+        let cameras = goal.pictures.cameras().cloned().collect::<Vec<_>>();
         let mut seen: Vec<Seen> = (0..frame.len())
             .map(|row| Seen { loss: 0.0, energy: 0.0, pixel: pixel(frame, row, &cameras) })
             .collect();
