@@ -12,6 +12,10 @@
 //! All maths that is not a single IEEE operation goes through `libm`, so the same input gives the same frame
 //! on every machine. There is no I/O here, no file format and no thread.
 
+// In tests, an overflow is a failed test.
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects))]
+#![deny(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
+
 pub mod activation;
 pub mod importance;
 pub mod random;

@@ -47,12 +47,14 @@ impl SplitMix64 {
     }
 
     /// Uniform, 0 to `bound` - 1; 0 if `bound` is 0. The bias is below `bound` / 2⁶⁴.
+    #[expect(clippy::arithmetic_side_effects, reason = "128 bits hold the product of two numbers of 64")]
     pub const fn below(&mut self, bound: usize) -> usize {
         // The product is below bound * 2^64: its upper half fits.
         ((self.bits() as u128 * bound as u128) >> 64) as usize
     }
 
     /// Brings things into any order.
+    #[expect(clippy::arithmetic_side_effects, reason = "`last` is below a length")]
     pub fn shuffle<T>(&mut self, things: &mut [T]) {
         for last in (1..things.len()).rev() {
             things.swap(last, self.below(last + 1));
