@@ -8,6 +8,12 @@
 //!
 //! Pictures are equal for any number of threads and on every machine: single IEEE operations in a stated
 //! order, `libm` for the rest, and sums in a fixed order.
+//!
+//! Kernels of numbers index what they have counted themselves; each says at its head why that cannot fail.
+
+// In tests, an overflow is a failed test.
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects))]
+#![deny(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
 pub mod camera;
 pub mod contribution;
