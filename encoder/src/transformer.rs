@@ -115,6 +115,7 @@ pub struct TrainingReport {
 /// # Errors
 /// An architecture that 6.17.1 does not allow; samples, weights or a start that are not of its header; a schedule
 /// without steps.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of epochs")]
 pub fn train(
     architecture: &Architecture,
     training: &[Sample],

@@ -1,4 +1,9 @@
 //! Vector quantisation of SH components: k-means++ seeding, Lloyd iterations, empty cells seeded again.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "products of entries and rank of what is in memory; a rank is 1 or more"
+)]
+#![expect(clippy::indexing_slicing, reason = "entries have `rank` values, and owners are entries")]
 
 use rayon::prelude::*;
 use splatstream_format::payload::Codebook;

@@ -111,6 +111,7 @@ impl<'a> UnitWriter<'a> {
     }
 
     /// Writes a unit.
+    #[expect(clippy::arithmetic_side_effects, reason = "units and bytes that were written")]
     pub(crate) fn unit(&mut self, id: UnitId, payload: &[u8]) -> Result<(), Error> {
         let header = UnitHeader::new(id, payload)?;
         self.units += 1;
@@ -122,6 +123,7 @@ impl<'a> UnitWriter<'a> {
         self.bytes(payload)
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "units and bytes that were written")]
     fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.sink.write_all(bytes)?;
         self.offset += bytes.len() as u64;

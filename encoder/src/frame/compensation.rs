@@ -32,6 +32,11 @@ impl Compensator {
     ///
     /// # Errors
     /// Lists whose planes make no frame.
+    #[expect(clippy::indexing_slicing, reason = "both arrays have two entries")]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "offsets are below 6 times the largest single one, values on the grid far below 2^31"
+    )]
     pub(crate) fn offsets(
         &self,
         lists: &[GaussianList],
@@ -56,6 +61,10 @@ impl Compensator {
     }
 
     /// Decibels below the whole frame, so that less is better.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "offsets are below 6 times the largest single one, values on the grid far below 2^31"
+    )]
     fn error(
         &self,
         lists: &[GaussianList],

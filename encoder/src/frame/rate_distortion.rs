@@ -82,6 +82,10 @@ impl Predicted<'_> {
     }
 
     /// The highest level at which pictures are good enough, nearly; or the lowest.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "levels are -17 to 17, and a stride doubles at most as often as it takes to leave them"
+    )]
     fn level(&mut self, goal: &Goal) -> Result<i32, Error> {
         let (low, high) = (*LEVELS.start(), *LEVELS.end());
         let (mut best, mut worst) = (low - 1, high + 1);

@@ -100,6 +100,14 @@ impl SequenceCoder<'_, '_> {
 
     /// The codebook of the SH residuals of a frame, where a codebook serves them better than coefficients. Only a
     /// GOP whose I frame has a codebook has them: a new Gaussian takes an entry of each.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "an entry of a codebook has `rank` values, and there is one or more"
+    )]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "lengths of what is in memory; a rank is 1 or more, temporal layers are at most 3"
+    )]
     pub(super) fn residual_book(
         &self,
         gop: &Gop,

@@ -1,4 +1,5 @@
 //! The parameters of a network, one after the other in the order of 6.17.2, as numbers that can change a little.
+#![expect(clippy::indexing_slicing, reason = "ranges are those of the layout that the values were made with")]
 
 use splatstream_decoder::transformer::sine;
 use splatstream_format::Result;
@@ -25,6 +26,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
+    #[expect(clippy::arithmetic_side_effects, reason = "sums of counts of the header")]
     pub(super) fn new(header: NetworkHeader) -> Self {
         let mut length = 0;
         let mut next = |count: usize| {
@@ -155,6 +157,7 @@ impl Layout {
 /// clamp at four times as much is rare and rounding is a small part.
 const ACTIVE: f32 = 32.0;
 
+#[expect(clippy::arithmetic_side_effects, reason = "sums of counts of the header")]
 fn sines(difference: i32) -> Sines {
     let mut out = [0.0; 8];
     for (frequency, pair) in out.chunks_exact_mut(2).enumerate() {
