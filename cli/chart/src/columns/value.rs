@@ -121,7 +121,8 @@ fn size(bytes: u64) -> String {
 /// Gaussians per second.
 fn speed(speed: f64) -> String {
     match speed {
-        0.0..1e6 => format!("{:.0} k/s", speed / 1e3),
+        0.0..1e4 => format!("{:.1} k/s", speed / 1e3),
+        1e4..1e6 => format!("{:.0} k/s", speed / 1e3),
         _ => format!("{:.2} M/s", speed / 1e6),
     }
 }
@@ -152,7 +153,7 @@ mod tests {
     #[test]
     fn sizes_and_speeds_have_three_digits_or_so() {
         assert_eq!([999, 1500, 2_340_000].map(size), ["999 B", "1.5 kB", "2.34 MB"]);
-        assert_eq!([21_700.0, 3.0e6].map(speed), ["22 k/s", "3.00 M/s"]);
+        assert_eq!([650.0, 21_700.0, 3.0e6].map(speed), ["0.7 k/s", "22 k/s", "3.00 M/s"]);
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub(super) fn facts(chart: &SceneChart) -> Markup {
     html! {
         (chart.source) ": " (frames) (of) @if frames == 1 && of_source == 1 { " frame, " } @else { " frames, " }
         (grouped(per_frame)) " Gaussians per frame, spherical harmonics of degree " (chart.sh_degree) "; "
-        (cameras) " cameras, " (width) " × " (height) " pixels" @if let Some(fps) = chart.frame_rate() { "; " (fps) " frames per second" } "."
+        (cameras) @if cameras == 1 { " camera, " } @else { " cameras, " } (width) " × " (height) " pixels" @if let Some(fps) = chart.frame_rate() { "; " (fps) " frames per second" } "."
     }
 }
 
@@ -67,10 +67,15 @@ fn speeds(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
         h3 { "Speed against accuracy" }
         (how_to_read(
             "each row is a variant of the encoder, compared at the rate of the baseline; – where its rates do not reach \
-             there. Figures, if there are variants enough to draw, have a point for each: further right is faster; higher \
-             PSNR or lower BD-rate is better; the broad band is the Pareto front, and what lies off it is beaten in both."
+             there."
         ))
-        (figures(&drawn.speeds))
+        @if !drawn.speeds.is_empty() {
+            (how_to_read(
+                "each point of a figure is a variant: further right is faster; higher PSNR or lower BD-rate is better; the \
+                 broad band is the Pareto front, and what lies off it is beaten in both."
+            ))
+            (figures(&drawn.speeds))
+        }
         (columns::html(&chart.standings()))
     }
 }
