@@ -53,7 +53,9 @@ fn figures_are_well_formed_and_say_what_they_show() {
     let report = json(&["chart", "--builtin", "--quick", "-o", text(&out)]);
     let files = report["files"].as_array().unwrap().iter().filter_map(|file| file.as_str());
     let figures: Vec<&str> = files.filter(|file| file.ends_with(".svg")).collect();
-    assert_eq!(figures.len(), 8, "{figures:?}");
+    // Two points are no figure of speeds; where the bits go is always drawn.
+    assert!(figures.iter().any(|figure| figure.ends_with("-cost-units.svg")), "{figures:?}");
+    assert!(!figures.iter().any(|figure| figure.contains("speed")), "{figures:?}");
     for figure in figures {
         let drawing = read(&out.join(figure));
         let document = roxmltree::Document::parse(&drawing).expect(figure);

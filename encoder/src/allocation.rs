@@ -3,9 +3,14 @@
 //! Quantising one attribute with step s costs a squared error of about k·s², and a halved step about n bits
 //! more. The sum of errors that is allowed then costs least where every attribute's share of it is in proportion
 //! to its n. k is measured by rendering, n by counting symbols, both on the scene at hand.
+#![expect(
+    clippy::indexing_slicing,
+    reason = "rows are those of the frame that all planes are of; parts and axes are constants"
+)]
 
 use crate::colour;
 use crate::entropy_cost::entropy_of;
+use crate::error::Error;
 use crate::frame::unit::Grains;
 use crate::grid::{Geometry, geometry, nearest_integer};
 use crate::importance::Ranked;
@@ -100,7 +105,10 @@ pub(crate) struct Fit {
 
 impl Fit {
     /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it.
-    pub(crate) fn new(frame: GaussianFrame, ranked: &Ranked, settings: &Settings) -> Self {
+    ///
+    /// # Errors
+    /// Planes that make no frame.
+    pub(crate) fn new(frame: GaussianFrame, ranked: &Ranked, settings: &Settings) -> Result<Self, Error> {
         let laws = match settings.tools.adaptive_steps {
             true => Laws::of(&frame, &ranked.order, &ranked.energy, &settings.refinements),
             false => Laws::default(),
@@ -133,13 +141,14 @@ impl Fit {
         for round in 0..rounds {
             let steps = if round == 0 { steps } else { fit.allocated(decibels) };
             let sample = fit.sample();
-            let of = |attribute| {
+            let mut measured = [(0.0, 0.0); 6];
+            for (of_one, attribute) in measured.iter_mut().zip(ATTRIBUTES) {
                 let slope = fit.bits_an_octave(&sample, attribute, &steps);
-                (fit.error(&[attribute], &steps, &fit.alone), slope.max(0.0))
-            };
-            fit.measured = (steps, ATTRIBUTES.map(of));
+                *of_one = (fit.error(&[attribute], &steps, &fit.alone)?, slope.max(0.0));
+            }
+            fit.measured = (steps, measured);
         }
-        fit
+        Ok(fit)
     }
 
     /// How steps follow from what is known of a Gaussian.
@@ -148,13 +157,16 @@ impl Fit {
     }
 
     /// The steps with which renderings have a PSNR of about `decibels`.
-    pub(crate) fn at(&self, decibels: f32) -> Steps {
+    ///
+    /// # Errors
+    /// Planes that make no frame.
+    pub(crate) fn at(&self, decibels: f32) -> Result<Steps, Error> {
         let mut steps = self.allocated(decibels);
         // log2 of the last factor of all steps, and the PSNR before it.
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..CORRECTIONS {
-            let now =
-                -10.0 * libm::log10(self.error(&ATTRIBUTES, &steps, &self.together).max(f64::MIN_POSITIVE));
+            let error = self.error(&ATTRIBUTES, &steps, &self.together)?;
+            let now = -10.0 * libm::log10(error.max(f64::MIN_POSITIVE));
             let missing = f64::from(decibels) - now;
             if missing.abs() < NEAR {
                 break;
@@ -168,7 +180,7 @@ impl Fit {
             before = Some((log, now));
             ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, libm::exp2(log)));
         }
-        steps
+        Ok(steps)
     }
 
     /// Steps that share the error that is allowed.
@@ -186,13 +198,13 @@ impl Fit {
     }
 
     /// Mean squared error of pictures with these attributes on their grids, by the mean of decibels.
-    fn error(&self, attributes: &[Attribute], steps: &Steps, views: &[View]) -> f64 {
-        let frame = Trial::new(self, &self.frame, None, steps).decoded(attributes);
+    fn error(&self, attributes: &[Attribute], steps: &Steps, views: &[View]) -> Result<f64, Error> {
+        let frame = Trial::new(self, &self.frame, None, steps).decoded(attributes)?;
         let decibels = |(camera, picture): &View| {
             psnr(&picture.colour, &render(&frame, camera, [0.0; 3]).colour).min(120.0)
         };
         let sum: f64 = views.iter().map(decibels).sum();
-        libm::pow(10.0, -0.1 * sum / views.len().max(1) as f64)
+        Ok(libm::pow(10.0, -0.1 * sum / views.len().max(1) as f64))
     }
 
     /// Some of the Gaussians.
@@ -272,7 +284,7 @@ impl<'a> Trial<'a> {
     }
 
     /// The frame with some attributes as a decoder would have them.
-    fn decoded(&self, attributes: &[Attribute]) -> GaussianFrame {
+    fn decoded(&self, attributes: &[Attribute]) -> Result<GaussianFrame, Error> {
         let mut planes = self.frame.planes().clone();
         for attribute in attributes {
             match attribute {
@@ -298,8 +310,8 @@ impl<'a> Trial<'a> {
                 Attribute::Sh => planes.sh = self.colours(1),
             }
         }
-        let frame = GaussianFrame::from_planes(self.frame.sh_degree(), planes).unwrap_or_default();
-        frame.with_antialiased(self.frame.antialiased())
+        let frame = GaussianFrame::from_planes(self.frame.sh_degree(), planes)?;
+        Ok(frame.with_antialiased(self.frame.antialiased()))
     }
 
     fn positions(&self, planes: &mut Planes) {
@@ -314,6 +326,7 @@ impl<'a> Trial<'a> {
         }
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "values on a grid times its steps, both clamped")]
     fn rotations(&self, planes: &mut Planes) {
         let finest = self.sequence.rotation_step();
         let [w, parts @ ..] = &mut planes.rotation;
@@ -340,6 +353,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Coded values of dc, 0, or sh, 1.
+    #[expect(clippy::arithmetic_side_effects, reason = "values on a grid times its steps, both clamped")]
     fn components(&self, which: usize) -> Vec<Vec<i32>> {
         let step_of = self.colour_step(which);
         let kind = [TransformKind::Dc, TransformKind::Sh][which];
@@ -357,6 +371,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Planes of dc, 0, or sh, 1, from their coded values.
+    #[expect(clippy::arithmetic_side_effects, reason = "values on a grid times its steps, both clamped")]
     fn colours(&self, which: usize) -> Vec<Vec<f32>> {
         let (basis, finest) = (&self.bases[which], self.colour_step(which));
         let components = self.components(which);

@@ -21,8 +21,8 @@ pub(crate) fn code_blocks(
     let encoders: Vec<PlaneEncoder> = models.iter().map(PlaneEncoder::new).collect();
     let code_block = |block: &CodedBlock| -> Result<Vec<u8>, Error> {
         let mut writer = BlockWriter::new(lanes_log2);
-        for (plane, (&info, encoder)) in planes.iter().zip(&encoders).enumerate() {
-            let contexts = models::contexts(&models[plane], info, plane, block);
+        for (plane, ((&info, model), encoder)) in planes.iter().zip(models).zip(&encoders).enumerate() {
+            let contexts = models::contexts(model, info, plane, block);
             writer.plane(encoder, &contexts, models::unsigned_values(info, plane, block))?;
         }
         Ok(writer.finish())

@@ -53,16 +53,21 @@ fn smallest_turn(q: [f32; 4]) -> [f32; 4] {
 }
 
 fn largest(values: [f32; 4]) -> usize {
-    let mut best = 0;
-    for index in 1..4 {
-        if values[index] > values[best] {
-            best = index;
+    let [first, ..] = values;
+    let mut best = (0, first);
+    for (index, value) in values.into_iter().enumerate() {
+        if value > best.1 {
+            best = (index, value);
         }
     }
-    best
+    best.0
 }
 
 /// One Gaussian's axes and rotation in canonical form. `sort` is the sequence's canonical_axes.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "axes and parts are constants or a permutation of them; rows are those of the planes"
+)]
 pub fn canonical(log_scale: [f32; 3], rotation: [f32; 4], sort: bool) -> ([f32; 3], [f32; 4]) {
     let mut order = [0, 1, 2];
     if sort {
@@ -75,6 +80,10 @@ pub fn canonical(log_scale: [f32; 3], rotation: [f32; 4], sort: bool) -> ([f32; 
 }
 
 /// The Gaussians `indices` of a frame in canonical form.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "axes and parts are constants or a permutation of them; rows are those of the planes"
+)]
 pub fn canonicalise(frame: &GaussianFrame, indices: &[u32], sort: bool) -> GaussianFrame {
     let mut selected = frame.select(indices);
     let PlanesMut { mut log_scale, mut rotation, .. } = selected.planes_mut();

@@ -15,6 +15,11 @@ pub(crate) struct Clustering {
 
 /// Merges neighbouring contexts while that saves bits. Context `c` has `c + 1` (same row) and `c + width` as
 /// neighbours.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "contexts, tables and rows are numbers below the lengths that they come from"
+)]
+#[expect(clippy::arithmetic_side_effects, reason = "numbers of contexts and tables, which are below 256")]
 pub(crate) fn cluster(histograms: Vec<Histogram>, width: usize) -> Clustering {
     let contexts = histograms.len();
     let mut owner: Vec<usize> = (0..contexts).collect();
@@ -56,6 +61,7 @@ pub(crate) fn cluster(histograms: Vec<Histogram>, width: usize) -> Clustering {
 }
 
 /// Numbers owners in the order in which contexts first use them.
+#[expect(clippy::arithmetic_side_effects, reason = "numbers of contexts and tables, which are below 256")]
 fn renumbered<T: PartialEq + Copy>(owner: &[T]) -> Vec<u8> {
     let mut seen: Vec<T> = Vec::new();
     owner
@@ -72,6 +78,11 @@ fn renumbered<T: PartialEq + Copy>(owner: &[T]) -> Vec<u8> {
 
 impl Clustering {
     /// Drops the thresholds between contexts that share their tables everywhere.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "contexts, tables and rows are numbers below the lengths that they come from"
+    )]
+    #[expect(clippy::arithmetic_side_effects, reason = "numbers of contexts and tables, which are below 256")]
     pub(crate) fn simplified(self, axes: [ContextAxis; 2]) -> ([ContextAxis; 2], Vec<u8>) {
         let [first, second] = axes;
         let rows: Vec<&[u8]> = self.table_of_context.chunks(self.width).collect();

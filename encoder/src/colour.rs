@@ -1,4 +1,8 @@
 //! Colour on its way in: transforms, components, and the choice between coefficients and codebooks.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "lengths of what is in memory; a rank of a transform is 1 or more"
+)]
 
 use crate::entropy_cost::entropy_of;
 use crate::grid::nearest_integer;
@@ -43,6 +47,7 @@ pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32)
 const TILE: usize = 1 << 12;
 
 /// Components in units of the step; one plane per component.
+#[expect(clippy::indexing_slicing, reason = "tiles and rows lie within the planes that they are cut from")]
 pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<f32>> {
     let means: Vec<f32> =
         transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
@@ -139,6 +144,7 @@ pub(crate) fn compare(
 }
 
 /// The components of every `stride`-th Gaussian in its own steps, one after the other.
+#[expect(clippy::indexing_slicing, reason = "tiles and rows lie within the planes that they are cut from")]
 fn sampled_rows(components: &[Vec<f32>], exponents: &[u8], stride: usize) -> Vec<f32> {
     let of_row = |row: usize| {
         let step = step(exponents[row]) as f32;

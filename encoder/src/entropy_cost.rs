@@ -29,11 +29,14 @@ impl Default for Histogram {
 impl Histogram {
     /// Counts one token.
     #[inline]
+    #[expect(clippy::indexing_slicing, reason = "a token has eight bits, and there are 256 counts")]
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of values that are in memory")]
     pub(crate) fn add(&mut self, token: u8) {
         self.counts[usize::from(token)] += 1;
     }
 
     /// Both together.
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of values that are in memory")]
     pub(crate) fn merged(&self, other: &Self) -> Self {
         Self { counts: self.counts.iter().zip(&other.counts).map(|(a, b)| a + b).collect() }
     }

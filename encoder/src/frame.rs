@@ -92,6 +92,7 @@ pub(crate) struct CodedFrame {
 
 impl CodedFrame {
     /// Bytes of its units, without their headers.
+    #[expect(clippy::arithmetic_side_effects, reason = "lengths of what is in memory")]
     pub(crate) fn bytes(&self) -> f64 {
         let units: usize = self.units.iter().map(|unit| unit.payload.len()).sum();
         let cells = self.cells.as_ref().map_or(0, |cells| {

@@ -1,4 +1,8 @@
 //! GOPs, frame by frame: I frames, and frames that refer to others.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers of frames rise from the first of a GOP to the end of the sequence, and sizes are of what is in memory"
+)]
 
 mod means;
 
@@ -288,6 +292,7 @@ impl SequenceCoder<'_, '_> {
     }
 
     /// A frame in canonical form.
+    #[expect(clippy::indexing_slicing, reason = "units are counted by what they index, axes are constants")]
     fn target(&mut self, number: u32) -> Result<Target, Error> {
         let frame = self.source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
         let rows = visible(&frame, self.settings.keep_invisible);
@@ -424,6 +429,7 @@ impl SequenceCoder<'_, '_> {
     }
 
     /// Adds the units of a coded frame to its GOP, and what they are to the report.
+    #[expect(clippy::indexing_slicing, reason = "units are counted by what they index, axes are constants")]
     fn add(
         &mut self,
         gop: &mut Gop,
@@ -477,6 +483,7 @@ impl Gop {
     }
 
     /// Keeps a frame that others refer to, and no frame of a higher temporal layer.
+    #[expect(clippy::indexing_slicing, reason = "units are counted by what they index, axes are constants")]
     fn keep(&mut self, layer: u8, number: u32, reference: Reference) {
         let layer = usize::from(layer);
         self.references.iter_mut().skip(layer).for_each(|slot| *slot = None);

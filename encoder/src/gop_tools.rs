@@ -34,8 +34,8 @@ pub(crate) fn sh_planes<'a>(
         .collect()
 }
 
-pub(crate) fn dc_planes(frame: &GaussianFrame) -> Vec<&[f32]> {
-    frame.dc().iter().map(Vec::as_slice).collect()
+pub(crate) fn dc_planes(frame: &GaussianFrame) -> [&[f32]; 3] {
+    frame.dc().each_ref().map(Vec::as_slice)
 }
 
 impl GopTools {
@@ -65,7 +65,7 @@ impl GopTools {
             if frames == 1 {
                 colour::drop_unused(&mut transform, &mut components, &exponents);
             }
-            let gaussians = frame.len() * frames as usize;
+            let gaussians = frame.len().saturating_mul(frames as usize);
             let mut plan = colour::plan_sh(&components, &exponents, gaussians, settings.sh, settings.preset);
             if settings.profile() == Profile::Dynamic {
                 keep_zero(&mut plan.codebooks, usize::from(transform.header.rank));
@@ -123,6 +123,10 @@ impl GopTools {
 }
 
 /// The exponents of the steps of SH of an I frame.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "rows are those of the frame; an entry of a codebook has `rank` values"
+)]
 fn sh_exponents(
     frame: &GaussianFrame,
     order: &[u32],
@@ -145,6 +149,10 @@ fn sh_exponents(
 }
 
 /// Makes entry 0 of every codebook zero, so that it can stand for "as before".
+#[expect(
+    clippy::indexing_slicing,
+    reason = "rows are those of the frame; an entry of a codebook has `rank` values"
+)]
 fn keep_zero(books: &mut [Codebook], rank: usize) {
     books.iter_mut().for_each(|book| book.entries[..rank].fill(0));
 }

@@ -47,6 +47,7 @@ pub(crate) struct PositionGrid {
 
 impl PositionGrid {
     /// That of a sequence.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions have 1 bit or more")]
     pub(crate) fn of(sequence: &SequenceParameters) -> Self {
         let power = |exponent: u8| (1_u64 << exponent) as f64;
         Self {
@@ -64,6 +65,7 @@ impl PositionGrid {
         self.exact(axis, value) as f32
     }
 
+    #[expect(clippy::indexing_slicing, reason = "axes are 0, 1 and 2; rows are those of the frame")]
     fn exact(&self, axis: usize, value: f32) -> f64 {
         let apart = (f64::from(value) - self.offset[axis]) / self.step - self.middle;
         self.middle + compressed(apart.abs(), self.linear, self.segment).copysign(apart)
@@ -141,6 +143,7 @@ fn parts(values: &[f32], offset: f32, step: f32) -> Vec<i32> {
 ///
 /// # Errors
 /// The first value of an attribute that is too far out.
+#[expect(clippy::indexing_slicing, reason = "axes are 0, 1 and 2; rows are those of the frame")]
 pub(crate) fn check_reach(
     frame: &GaussianFrame,
     rows: &[u32],

@@ -145,6 +145,7 @@ fn all(frame: &GaussianFrame) -> Vec<u32> {
 
 /// `gaussians` by falling score; those that no view tells apart by opacity times volume. `scores` go with
 /// `gaussians`, `volume` with the frame.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the frame; windows have two entries")]
 fn ranked(scores: &[f64], volume: &[f64], gaussians: &[u32]) -> Vec<u32> {
     let mut rows: Vec<(f64, u32)> = scores.iter().copied().zip(gaussians.iter().copied()).collect();
     rows.sort_unstable_by(|a, b| {
@@ -156,6 +157,7 @@ fn ranked(scores: &[f64], volume: &[f64], gaussians: &[u32]) -> Vec<u32> {
 
 /// The refinements from the last but one down; where time is no matter, with steps between them so that no
 /// more than a quarter goes at once.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the frame; windows have two entries")]
 fn rounds(refinements: &[u8], preset: Preset) -> Vec<u8> {
     let mut rounds = Vec::new();
     for pair in refinements.windows(2).rev() {

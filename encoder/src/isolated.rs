@@ -20,6 +20,7 @@ pub struct Isolated {
 
 impl Isolated {
     /// Adds what was found in a frame to what was found before.
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians")]
     pub(crate) fn add(found: Option<Self>, all: &mut Vec<Self>) {
         let Some(found) = found else { return };
         match all.iter_mut().find(|known| known.attribute == found.attribute) {
@@ -31,6 +32,11 @@ impl Isolated {
 
 /// The frame with colours of which none is far beyond what a screen shows, and what they were; `rows`: the row of each
 /// Gaussian in the source.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "axes are constants; rows are those of the frame, of which `rows` has as many"
+)]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians")]
 pub(crate) fn colours(
     mut frame: GaussianFrame,
     rows: &[u32],
@@ -68,6 +74,11 @@ pub(crate) fn colours(
 }
 
 /// The Gaussians of a frame that the grid of positions does not reach.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "axes are constants; rows are those of the frame, of which `rows` has as many"
+)]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians")]
 pub(crate) fn positions(
     frame: &GaussianFrame,
     rows: &[u32],

@@ -6,6 +6,10 @@
 //! its attribute saves nothing more. Measured on real scenes, steps that go with the inverse fourth root of what pictures
 //! show cost least. A decoder knows sizes, opacities and shapes; what is hidden it learns from the refinements, which
 //! are in the order of importance and have steps of their own.
+#![expect(
+    clippy::indexing_slicing,
+    reason = "exponents are those of the tables; parts are cut from the order"
+)]
 
 use crate::refinements::parts;
 use crate::steps::Steps;
@@ -54,6 +58,10 @@ pub struct Laws {
 impl Laws {
     /// For a scene whose Gaussians have the order of importance `order`, of which pictures show `energy`, and
     /// refinements up to these percentages.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "counts in memory; exponents are at most 13 and positions have 1 bit or more"
+    )]
     pub(crate) fn of(frame: &GaussianFrame, order: &[u32], energy: &[f64], refinements: &[u8]) -> Self {
         if frame.is_empty() {
             return Self::default();
@@ -95,6 +103,10 @@ impl Laws {
     }
 
     /// The exponents of the steps of a refinement.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "counts in memory; exponents are at most 13 and positions have 1 bit or more"
+    )]
     pub(crate) fn attribute_step(
         &self,
         steps: &Steps,
@@ -118,6 +130,10 @@ impl Laws {
 
     /// Low bits of positions that a refinement leaves out: fewer than half octaves say, as views from nearby show
     /// positions best.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "counts in memory; exponents are at most 13 and positions have 1 bit or more"
+    )]
     pub(crate) fn position_shift(&self, sequence: &SequenceParameters, refinement: u8) -> u8 {
         let coarser = self.coarser.get(usize::from(refinement)).copied().unwrap_or(0);
         (coarser / 3).min(sequence.position_bits - 1)

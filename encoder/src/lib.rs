@@ -7,6 +7,12 @@
 //! predicted frame take the same way. The result is decoded and looked at (`verification`). Prediction, contexts and
 //! reconstruction are the decoder's own functions. Same frames and settings, same bytes, on every machine and with any
 //! number of threads.
+//!
+//! Kernels of numbers index what they have counted themselves; each says at its head why that cannot fail.
+
+// In tests, an overflow is a failed test.
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects))]
+#![deny(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
 mod allocation;
 mod blocks;
@@ -31,7 +37,6 @@ mod pass;
 mod pca;
 mod progress;
 mod push;
-mod random;
 mod reach;
 mod refinements;
 mod report;

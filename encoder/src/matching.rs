@@ -2,6 +2,10 @@
 //!
 //! Files whose rows keep their meaning are matched [by row](by_index). Of what is left, each Gaussian is compared
 //! with those [near it](nearest), cheapest pair first. Nothing depends on threads or on the order of a hash table.
+#![expect(
+    clippy::indexing_slicing,
+    reason = "rows are those of the clouds and of the matching; axes are constants"
+)]
 
 mod nearest;
 mod order;
@@ -150,6 +154,7 @@ pub(crate) fn shares_much(matching: &Matching) -> bool {
 /// Such rows agree in opacity, colour and volume, whatever moves. If nearly all of two files of equal length do,
 /// so are those that changed the same Gaussians; else only runs of rows that agree are trusted. Unrelated Gaussians
 /// that look alike are told apart by how they move.
+#[expect(clippy::arithmetic_side_effects, reason = "counts of pairs of one frame")]
 pub(crate) fn by_index(reference: &Cloud<'_>, target: &Cloud<'_>, measure: &Measure) -> Matching {
     let common = common_rows(reference, target);
     let agree: Vec<bool> = common.iter().map(|&pair| agrees(reference, target, measure, pair)).collect();
@@ -201,6 +206,7 @@ fn agrees(reference: &Cloud<'_>, target: &Cloud<'_>, measure: &Measure, (from, t
 }
 
 /// The pairs that agree, of runs in which most do and move alike.
+#[expect(clippy::arithmetic_side_effects, reason = "counts of pairs of one frame")]
 fn runs(reference: &Cloud<'_>, target: &Cloud<'_>, common: &[(u32, u32)], agree: &[bool]) -> Vec<(u32, u32)> {
     let mut trusted = Vec::new();
     for (pairs, agree) in common.chunks_exact(RUN).zip(agree.chunks_exact(RUN)) {

@@ -1,4 +1,9 @@
 //! Chooses the model of a plane: token split, contexts, tables. The decoder's functions give the contexts.
+#![expect(clippy::arithmetic_side_effects, reason = "counts of values in memory")]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "contexts, tables and tokens are numbers below the lengths that the model was made with"
+)]
 
 use crate::clusters::{Clustering, cluster};
 use crate::entropy_cost::Histogram;

@@ -79,6 +79,10 @@ fn grid_position(fine: [i32; 3]) -> Vector {
 /// The cells that bring the Gaussians of a reference nearest to their pairs, for the fewest bits.
 ///
 /// `unmatched` are those without a pair: who has nothing newer is shown them where these cells bring them.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "counts of pairs and nodes; positions on the grid have at most 26 bits"
+)]
 pub(crate) fn cell_motion(pairs: &[Pair], unmatched: &[[i32; 3]], position_bits: u8) -> CellMotion {
     let point = |pair: &Pair| Point { from: grid_position(pair.from), to: pair.to.map(f64::from) };
     let points: Vec<Point> = pairs.iter().map(point).collect();
@@ -105,12 +109,17 @@ pub(crate) fn cell_motion(pairs: &[Pair], unmatched: &[[i32; 3]], position_bits:
 
 impl CellMotion {
     /// The coordinates, in cells, of the cell that holds a fine position, and their Morton code.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "counts of pairs and nodes; positions on the grid have at most 26 bits"
+    )]
     fn cell(&self, fine: [i32; 3]) -> ([u32; 3], u64) {
         let index = fine.map(|value| ((value + 32) >> 6 >> self.cell_log2).max(0) as u32);
         (index, morton(index[0], index[1], index[2]))
     }
 
     /// Where a Gaussian of the reference is carried, grid steps: the decoder's within its rounding.
+    #[expect(clippy::indexing_slicing, reason = "cells are found by their codes")]
     pub(crate) fn displaced(&self, fine: [i32; 3]) -> [f32; 3] {
         let (index, code) = self.cell(fine);
         let coded = match self.cells.binary_search_by_key(&code, |cell| cell.code) {
@@ -124,6 +133,7 @@ impl CellMotion {
     }
 
     /// With these cells, by code, marked stale; cells that were not listed are added and do not move.
+    #[expect(clippy::indexing_slicing, reason = "cells are found by their codes")]
     pub(crate) fn with_stale(mut self, codes: &[u64]) -> Self {
         for &code in codes {
             match self.cells.binary_search_by_key(&code, |cell| cell.code) {

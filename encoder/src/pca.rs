@@ -22,6 +22,7 @@ impl Components {
     }
 
     /// The components of the vectors whose coordinates stand in `planes`.
+    #[expect(clippy::indexing_slicing, reason = "the matrix is square, and so are its eigenvectors")]
     pub(crate) fn of(planes: &[&[f32]]) -> Self {
         let dimension = planes.len();
         let count = planes.first().map_or(0, |plane| plane.len());
@@ -63,6 +64,8 @@ fn dot(a: &[f32], b: &[f32]) -> f64 {
 }
 
 /// Cyclic Jacobi: rows are eigenvectors by decreasing eigenvalue, the largest entry of each positive.
+#[expect(clippy::indexing_slicing, reason = "the matrix is square, and so are its eigenvectors")]
+#[expect(clippy::arithmetic_side_effects, reason = "an index of a dimension")]
 fn eigenvectors(mut matrix: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     const SWEEPS: usize = 30;
     let dimension = matrix.len();
@@ -88,6 +91,7 @@ fn eigenvectors(mut matrix: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
 }
 
 /// One Jacobi rotation in the plane of axes `p` and `q`; rows of `vectors` turn along.
+#[expect(clippy::indexing_slicing, reason = "the matrix is square, and so are its eigenvectors")]
 fn rotate(matrix: &mut [Vec<f64>], vectors: &mut [Vec<f64>], p: usize, q: usize) {
     let coupling = matrix[p][q];
     if coupling == 0.0 {

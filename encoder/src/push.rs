@@ -62,7 +62,7 @@ struct Window {
 
 impl FrameSource for Window {
     fn len(&self) -> u32 {
-        self.first + self.frames.len() as u32
+        self.first.saturating_add(u32::try_from(self.frames.len()).unwrap_or(u32::MAX))
     }
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
@@ -74,7 +74,7 @@ impl FrameSource for Window {
 impl Window {
     /// Forgets the frames before one.
     fn drop_before(&mut self, number: u32) {
-        self.frames.drain(..(number - self.first) as usize);
+        self.frames.drain(..(number.saturating_sub(self.first) as usize).min(self.frames.len()));
         self.first = number;
     }
 }
@@ -134,7 +134,8 @@ impl<W: Write> Encoder<W> {
         let Written { bytes, gops, .. } = UnitWriter::resume(&mut self.sink, record).finish()?;
         self.sink.flush()?;
         (report.bytes, report.frames, report.gops) = (bytes, self.window.first, gops);
-        report.invisible -= report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum::<u64>();
+        let dropped = report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum();
+        report.invisible = report.invisible.saturating_sub(dropped);
         Ok(report)
     }
 

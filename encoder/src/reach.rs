@@ -3,6 +3,11 @@
 //! Captures have no bounds: most of a scene is near, a part is far, and a few Gaussians are where training left them. The
 //! step of the grid comes from the [core] of the scene, whatever lies outside. How far the grid is linear, and how its
 //! steps grow outside, is what costs the fewest bits at equal error in pictures.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "exponents of two between 1 and MAX_POSITION_BITS; percentages of lengths of what is in memory"
+)]
+#![expect(clippy::indexing_slicing, reason = "axes are constants, and rows are those of the frame")]
 
 use crate::steps::Steps;
 use splatstream_format::syntax::SequenceParameters;

@@ -116,6 +116,7 @@ impl PictureReport {
         self.mean(|frame| frame.frame_type == frame_type)
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of what is in memory")]
     fn mean(&self, counts: impl Fn(&VerifiedFrame) -> bool) -> Option<f64> {
         let values = self.frames.iter().filter(|frame| counts(frame)).filter_map(|frame| frame.psnr);
         let (sum, count) = values.fold((0.0, 0), |(sum, count), decibels| (sum + decibels, count + 1));
@@ -193,6 +194,7 @@ impl FrameReport {
     }
 
     /// Adds a unit.
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of what is in memory")]
     pub(crate) fn add(&mut self, header: &IncrementHeader, predicted: [u64; 4]) {
         self.parents += header.parent_count;
         self.moved += header.move_count;

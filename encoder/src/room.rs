@@ -115,7 +115,7 @@ fn clamp(plane: &mut [f32], [low, high]: [f32; 2]) -> (u64, Option<(usize, f32)>
     for (row, value) in plane.iter_mut().enumerate() {
         let within = value.clamp(low, high);
         if within != *value {
-            count += 1;
+            count = u64::saturating_add(count, 1);
             first.get_or_insert((row, *value));
             *value = within;
         }
@@ -138,7 +138,7 @@ fn shorten(mut planes: Vec<&mut [f32]>, most: f32) -> (u64, Option<(usize, f32)>
     for (row, square) in squares.into_iter().enumerate() {
         let length = square.sqrt();
         if length > most {
-            count += 1;
+            count = u64::saturating_add(count, 1);
             first.get_or_insert((row, length));
             for value in planes.iter_mut().filter_map(|plane| plane.get_mut(row)) {
                 *value = value.clamp(-MAX_COLOUR, MAX_COLOUR) * (most / length);

@@ -116,6 +116,7 @@ fn known<'m>(
 
 /// What is taken off each plane of a section of which `parts` are coded one after the other: the biases of the models
 /// in force, so that these can be used again; else the mean of whole Gaussians, and nothing of residuals.
+#[expect(clippy::arithmetic_side_effects, reason = "counts and sums of values of 32 bits")]
 pub(crate) fn biases(
     section: Section,
     layout: &Layout,
@@ -154,6 +155,8 @@ fn count(layout: &Layout, values: &SectionValues) -> usize {
 }
 
 /// Blocks of `size` values a plane; `empty` makes one without planes from its deltas.
+#[expect(clippy::indexing_slicing, reason = "blocks are cut from planes of equal lengths")]
+#[expect(clippy::arithmetic_side_effects, reason = "counts and sums of values of 32 bits")]
 fn blocks(
     layout: &Layout,
     values: &SectionValues,

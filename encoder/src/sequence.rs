@@ -11,7 +11,7 @@ use crate::source::FrameSource;
 use splatstream_decoder::attribute::ROTATION_RANGE;
 use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_format::Limits;
-use splatstream_format::syntax::{Profile, SequenceParameters};
+use splatstream_format::syntax::{MAX_REFINEMENTS, Profile, SequenceParameters};
 use splatstream_gaussians::{GaussianFrame, sh_coefficients};
 
 /// Gaussians on which sorted and unsorted axes are compared.
@@ -177,6 +177,7 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
 }
 
 /// The highest band of which some coefficient may not round to 0; steps of large Gaussians are finer than the usual one.
+#[expect(clippy::arithmetic_side_effects, reason = "a degree is 1 to 3; values on a grid are clamped")]
 fn needed_degree(frame: &GaussianFrame, step: f32) -> u8 {
     let needed = |degree: &u8| {
         let planes = 3 * sh_coefficients(degree - 1)..3 * sh_coefficients(*degree);
@@ -187,6 +188,8 @@ fn needed_degree(frame: &GaussianFrame, step: f32) -> u8 {
 }
 
 /// Zero-order bits of scale and rotation with sorted axes and as they come, on a sample.
+#[expect(clippy::indexing_slicing, reason = "axes are constants, and rows are those of the frame")]
+#[expect(clippy::arithmetic_side_effects, reason = "a degree is 1 to 3; values on a grid are clamped")]
 fn try_axes(frame: &GaussianFrame, shown: &[u32], settings: &Settings) -> [f64; 2] {
     let sample: Vec<u32> = shown.iter().step_by(shown.len().div_ceil(TRIAL).max(1)).copied().collect();
     [true, false].map(|sort| {
@@ -225,6 +228,7 @@ impl Scene {
     }
 
     /// Adds the Gaussians of a frame that can be seen.
+    #[expect(clippy::indexing_slicing, reason = "axes are constants, and rows are those of the frame")]
     pub(crate) fn add(&mut self, frame: &GaussianFrame, shown: &[u32]) {
         if shown.is_empty() {
             return;
@@ -265,8 +269,9 @@ impl Scene {
         sh_degree: u8,
         sequence_flags: u8,
     ) -> SequenceParameters {
-        let mut refinement_percent = [0; 10];
-        refinement_percent[..settings.refinements.len()].copy_from_slice(&settings.refinements);
+        let mut refinement_percent = [0; MAX_REFINEMENTS as usize];
+        // There are no more: `check` has counted them.
+        refinement_percent.iter_mut().zip(&settings.refinements).for_each(|(to, &percent)| *to = percent);
         let steps = &settings.steps;
         let [scale, opacity, dc, sh] = self.reach;
         // What lies beside the mean of colours adds a little.
@@ -302,6 +307,7 @@ impl Scene {
 }
 
 /// Means of the largest log-scale and of the opacity, so that what is coded is near 0.
+#[expect(clippy::indexing_slicing, reason = "axes are constants, and rows are those of the frame")]
 fn means(frame: &GaussianFrame, shown: &[u32]) -> [f32; 2] {
     let mean = |value: &dyn Fn(usize) -> f32| {
         let sum: f64 = shown.iter().map(|&row| f64::from(value(row as usize))).sum();

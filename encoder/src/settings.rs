@@ -147,7 +147,13 @@ impl Predictors {
 
     /// Whether new Gaussians may take a predictor.
     pub fn allows(self, predictor: Predictor) -> bool {
-        self.allowed[predictor.code() as usize]
+        let [none, knn, bilateral, transformer] = self.allowed;
+        match predictor {
+            Predictor::None => none,
+            Predictor::Knn => knn,
+            Predictor::Bilateral => bilateral,
+            Predictor::Transformer => transformer,
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a decoder makes of the log-scales and the opacity of a Gaussian that is not predicted: the steps of its other
 //! attributes follow from that.
+#![expect(clippy::arithmetic_side_effects, reason = "values on the grid are below 2^26, units are 1 or more")]
 
 use splatstream_decoder::stage::Stage;
 use splatstream_decoder::steps::{StepRule, step};
@@ -49,6 +50,7 @@ impl Shape {
 }
 
 /// What brings log-scales near those wanted, parts of a step: of the largest, and of the two differences (7.6.2).
+#[expect(clippy::indexing_slicing, reason = "axes are constants")]
 pub(crate) fn scale_residuals(now: [i32; 3], wanted: [i32; 3], rule: &StepRule, sorted: bool) -> [i32; 3] {
     let exponent = rule.of_largest();
     let first = nearest_multiple(wanted[0] - PARTS * now[0], exponent);
@@ -69,6 +71,7 @@ pub(crate) fn scale_residuals(now: [i32; 3], wanted: [i32; 3], rule: &StepRule, 
 
 /// What brings the log-scales of a parent near those wanted, parts of a step (7.6.2). `sorted`: none becomes larger than
 /// the one before it.
+#[expect(clippy::indexing_slicing, reason = "axes are constants")]
 pub(crate) fn scale_updates(now: [i32; 3], wanted: [i32; 3], rule: &StepRule, sorted: bool) -> [i32; 3] {
     let of_others = rule.of_log_scale(now[0]);
     let exponents = [rule.of_largest(), of_others, of_others];

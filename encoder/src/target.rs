@@ -3,6 +3,7 @@
 //! The [fit](Fit) makes steps for a PSNR out of models of errors and bits. What comes out is measured: the PSNR
 //! of the [verification](crate::verification), or the size of the stream. Where that misses, the fit is asked for more
 //! or less, by the [secant](crate::secant) through what is known.
+#![expect(clippy::arithmetic_side_effects, reason = "counts of encodings and frames; layers are at most 4")]
 
 use crate::allocation::Fit;
 use crate::canonical::{canonicalise, visible};
@@ -76,7 +77,7 @@ pub(crate) fn settle(
     let fitting = Fitting::new(source, settings)?;
     let mut seeker = Seeker { source, fitting, progress: &mut |_, _| (), encodings: 0, trials: 0 };
     let Encoded { fitted, report, .. } = seeker.encode()?;
-    let mut settled = Settings { psnr: None, size: None, ..seeker.fitting.at(fitted) };
+    let mut settled = Settings { psnr: None, size: None, ..seeker.fitting.at(fitted)? };
     if report.stands_alone {
         settled = settled.alone();
     }
@@ -101,23 +102,23 @@ impl<'a> Fitting<'a> {
         let (frame, _) = isolated::colours(frame, &shown, 0);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
-        Ok(Self { settings, fit: Fit::new(frame, &ranked, settings), ranking, known: Vec::new() })
+        Ok(Self { settings, fit: Fit::new(frame, &ranked, settings)?, ranking, known: Vec::new() })
     }
 
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
     /// ones.
-    fn at(&mut self, decibels: f64) -> Settings {
+    fn at(&mut self, decibels: f64) -> Result<Settings, Error> {
         let apart = |known: &&(f64, Steps)| (known.0 - decibels).abs();
         let nearest = self.known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
             Some((from, steps)) => finer(*steps, ((decibels - from) / DECIBELS_AN_OCTAVE) as f32),
             None => {
-                let steps = self.fit.at(decibels as f32);
+                let steps = self.fit.at(decibels as f32)?;
                 self.known.push((decibels, steps));
                 steps
             }
         };
-        Settings { steps, laws: self.fit.laws(), ..self.settings.clone() }
+        Ok(Settings { steps, laws: self.fit.laws(), ..self.settings.clone() })
     }
 }
 
@@ -255,7 +256,7 @@ impl Seeker<'_> {
     /// All frames, with the steps for a PSNR.
     fn whole(&mut self, fitted: f64) -> Result<Encoded, Error> {
         self.encodings += 1;
-        let (settings, ranking) = (self.fitting.at(fitted), self.fitting.ranking.clone());
+        let (settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
         let (bytes, report) = encode_smaller(self.source, &settings, ranking, self.progress)?;
         Ok(Encoded { fitted, bytes, report })
     }
@@ -263,7 +264,7 @@ impl Seeker<'_> {
     /// The first frames.
     fn part(&mut self, fitted: f64, frames: u32) -> Result<Encoded, Error> {
         self.trials += 1;
-        let (settings, ranking) = (self.fitting.at(fitted), self.fitting.ranking.clone());
+        let (settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
         let mut bytes = Vec::new();
         let mut part = FirstFrames { source: self.source, frames };
         let report = encode_once(&mut part, &settings, ranking, &mut bytes, &mut |_, _| ())?;

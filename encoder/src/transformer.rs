@@ -33,7 +33,6 @@ pub use architecture::Architecture;
 pub use loss::Loss;
 
 use crate::Error;
-use crate::random::Random;
 use descent::Descent;
 use lane::Whole;
 use model::Model;
@@ -41,6 +40,7 @@ use parameters::Layout;
 use splatstream_decoder::transformer::{Batch, LANES};
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::NetworkHeader;
+use splatstream_gaussians::random::SplitMix64;
 use std::ops::ControlFlow;
 
 /// What a network is to learn from, or to be judged by: new Gaussians, at most [`LANES`], with equally many neighbours.
@@ -115,6 +115,7 @@ pub struct TrainingReport {
 /// # Errors
 /// An architecture that 6.17.1 does not allow; samples, weights or a start that are not of its header; a schedule
 /// without steps.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of epochs")]
 pub fn train(
     architecture: &Architecture,
     training: &[Sample],
@@ -128,7 +129,7 @@ pub fn train(
     let layout = Layout::new(header);
     let mut trainer = Trainer::new(&layout, validation, schedule)?;
     let mut order: Vec<&Sample> = training.iter().collect();
-    let mut random = Random(schedule.seed);
+    let mut random = SplitMix64::new(schedule.seed);
     let mut descent = Descent::new(&layout, schedule, training.len());
     let mut without = 0;
     for epoch in 1..=schedule.epochs {

@@ -104,8 +104,13 @@ impl Verifier {
         let mut found: [Option<DecodedFrame>; 3] = [const { None }; 3];
         let mut take = |frame: DecodedFrame| {
             if matches!(taken, Taken::OfEachType) || matches!(taken, Taken::Only(one) if one == frame.index) {
-                let slot = usize::from(frame.frame_type.code());
-                found[slot] = Some(frame);
+                let [intra, predicted, enhancement] = &mut found;
+                let slot = match frame.frame_type {
+                    FrameType::Intra => intra,
+                    FrameType::Predicted => predicted,
+                    FrameType::Enhancement => enhancement,
+                };
+                *slot = Some(frame);
             }
         };
         let mut units = stream.units();

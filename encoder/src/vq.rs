@@ -1,9 +1,14 @@
 //! Vector quantisation of SH components: k-means++ seeding, Lloyd iterations, empty cells seeded again.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "products of entries and rank of what is in memory; a rank is 1 or more"
+)]
+#![expect(clippy::indexing_slicing, reason = "entries have `rank` values, and owners are entries")]
 
-use crate::random::Random;
 use rayon::prelude::*;
 use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::CodebookHeader;
+use splatstream_gaussians::random::SplitMix64;
 
 /// Vectors used for training, for each entry.
 pub(crate) const TRAINING_PER_ENTRY: usize = 16;
@@ -146,7 +151,7 @@ fn seeds(rows: &[f32], rank: usize, entries: usize) -> Vec<f32> {
     let count = rows.len() / rank;
     let pool: Vec<&[f32]> =
         rows.chunks_exact(rank).step_by(count.div_ceil(SEEDING.max(entries * 2)).max(1)).collect();
-    let mut random = Random(0x5EED);
+    let mut random = SplitMix64::new(0x5EED);
     let mut centres = pool[0].to_vec();
     let mut distances = vec![f32::INFINITY; pool.len()];
     for _ in 1..entries.min(pool.len()) {

@@ -133,6 +133,7 @@ impl<'a> UnitWriter<'a> {
     }
 
     /// Writes a unit.
+    #[expect(clippy::arithmetic_side_effects, reason = "units and bytes that were written")]
     pub(crate) fn unit(&mut self, id: UnitId, payload: &[u8]) -> Result<(), Error> {
         let header = UnitHeader::new(id, payload)?;
         self.record.units += 1;
@@ -144,6 +145,7 @@ impl<'a> UnitWriter<'a> {
         self.bytes(payload)
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "units and bytes that were written")]
     fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.sink.write_all(bytes)?;
         self.record.offset += bytes.len() as u64;

@@ -61,7 +61,7 @@ fn every_single_byte_corruption_is_detected_or_harmless() {
 fn a_thousand_random_damages_are_detected_or_harmless() {
     let bytes = small_stream();
     let original = planes(&bytes);
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     for round in 0..1000 {
         let mut damaged = random.mutated(&bytes);
         if round % 2 == 1 && !damaged.is_empty() {
@@ -76,7 +76,7 @@ fn a_thousand_random_damages_are_detected_or_harmless() {
 fn payloads_made_wrong_on_purpose_are_refused_within_bounded_memory() {
     let bytes = small_stream();
     let options = Options { limits: Limits { max_gaussians: 1 << 12, ..Limits::default() }, ..strict() };
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     MEMORY.reset_peak_usage();
     let before = MEMORY.current_usage();
     for _ in 0..3000 {

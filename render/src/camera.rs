@@ -31,6 +31,10 @@ impl Camera {
     /// A camera at `position` that sees `target` in the middle of a picture of `[width, height]` pixels. `down`
     /// is the direction that shall point down in the picture; `field` is the vertical angle of view, radians.
     #[must_use]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "products and sums of vectors of floats, which do not overflow"
+    )]
     pub fn look_at(
         name: String,
         position: Vec3,
@@ -57,6 +61,10 @@ impl Camera {
     /// A camera with a pose as scene descriptions have it: `rotation` is a quaternion w, x, y, z from the camera to the
     /// scene, of any length; `field` is the vertical angle of view, radians.
     #[must_use]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "products and sums of vectors of floats, which do not overflow"
+    )]
     pub fn of_pose(name: String, position: [f32; 3], rotation: [f32; 4], field: f32, size: [u32; 2]) -> Self {
         let [w, x, y, z] = rotation;
         let length = Quat::from_xyzw(x, y, z, w).length();
@@ -81,6 +89,7 @@ impl Camera {
 
     /// The same view in a picture of `height` rows; the width follows, rounded to the nearest pixel.
     #[must_use]
+    #[expect(clippy::indexing_slicing, reason = "axes are 0 and 1")]
     pub fn scaled_to_height(&self, height: u32) -> Self {
         let width = (f64::from(self.width) * f64::from(height) / f64::from(self.height)).round().max(1.0);
         let scale = [width as f32 / self.width as f32, height as f32 / self.height as f32];

@@ -41,6 +41,10 @@ pub fn worth(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
 }
 
 /// `loss` and `energy` stay 0 without `REMOVAL`.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "lanes and lines are counted by the tile; places and Gaussians are those that it was made from"
+)]
 fn sums<const REMOVAL: bool>(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     let mut sums = vec![Worth::default(); frame.len()];
     let shapes = Shapes::of(frame);
@@ -120,6 +124,10 @@ struct Counter<'a, const REMOVAL: bool> {
 
 impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
     #[inline(always)]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "lanes and lines are counted by the tile; places and Gaussians are those that it was made from"
+    )]
     fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes) {
         for (sum, visible) in self.given.iter_mut().zip(visible) {
             *sum += visible;
@@ -143,6 +151,10 @@ impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
     }
 
     #[inline(always)]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "lanes and lines are counted by the tile; places and Gaussians are those that it was made from"
+    )]
     fn done(&mut self, entry: usize) {
         let contribution: f32 = self.given.iter().sum();
         if contribution > 0.0 {

@@ -38,6 +38,7 @@ impl Image {
     }
 
     /// Rows.
+    #[expect(clippy::arithmetic_side_effects, reason = "a picture has a width of 1 or more")]
     pub fn height(&self) -> usize {
         self.pixels.len() / self.width
     }

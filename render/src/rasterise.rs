@@ -42,6 +42,7 @@ pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> R
 }
 
 /// Draws with the instructions of `arch`, which change nothing but the time.
+#[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
 fn draw(frame: &GaussianFrame, camera: &Camera, background: [f32; 3], arch: pulp::Arch) -> Rendering {
     let view = View::new(frame, &Shapes::of(frame), camera);
     let (width, height) = (camera.width as usize, camera.height as usize);
@@ -84,6 +85,8 @@ impl WithSimd for DrawRow<'_> {
     type Output = ();
 
     #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "tiles lie within the picture, lanes and lines within tiles")]
+    #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
     fn with_simd<S: Simd>(self, _: S) {
         let View { splats, rows } = self.view;
         let entries = rows.entries(self.row, splats);
@@ -114,6 +117,7 @@ pub(crate) struct Ink {
 
 impl Blend for Ink {
     #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "tiles lie within the picture, lanes and lines within tiles")]
     fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, _passing: &Lanes) {
         for (light, colour) in self.light[line].iter_mut().zip(colour) {
             for (light, visible) in light.iter_mut().zip(visible) {

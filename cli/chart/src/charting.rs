@@ -11,6 +11,7 @@ use crate::scenes::Scene;
 use crate::summary::Summary;
 use crate::svg::Figure;
 use crate::sweep::Sweep;
+use crate::variant_comparison::bytes_for_the_same;
 use crate::{Error, csv_files, figures, measure, pictures};
 use splatstream_render::Camera;
 use splatstream_render::metrics::StLpips;
@@ -94,6 +95,10 @@ impl Charting<'_> {
         if let Some(peers) = &self.peers {
             progress.step(format!("{}: pictures of other codecs", scene.name));
             (chart.peers, chart.missing) = peers.judged(&scene, &judge, || progress.advance());
+            let anchor = chart.anchor();
+            for peer in &mut chart.peers {
+                peer.ours_percent = bytes_for_the_same(&anchor, peer.rate_point());
+            }
         }
         if let Some(run) = chart.headline() {
             chart.pictures = pictures::pictures(&scene.name, run, &judge, kept)?;

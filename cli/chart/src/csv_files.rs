@@ -1,39 +1,35 @@
 //! The numbers behind every figure and table, as CSV: one file a kind, all scenes in it.
 
-use super::gop_files;
 use super::measure::{Point, Run};
 use super::scene_chart::SceneChart;
-use super::tables::Mode;
 use crate::Error;
+use crate::columns::{Column, Row, Value, csv, metrics};
+use crate::gop::Gop;
 use crate::numbers::bits_per_gaussian;
 use crate::report::File;
+use splatstream_decoder::operating_point::OperatingPointInfo;
 use splatstream_render::metrics::Comparison;
 
-pub(super) const FIGURES: [&str; 6] =
-    ["psnr_db", "psnr_masked_db", "yuv_psnr_db", "ssim", "ssim_masked", "st_lpips"];
-
-/// Columns of a mode of playback, which figures follow.
-pub(super) const MODE: [&str; 10] =
-    ["scene", "mode", "units", "frames", "playback", "percent", "gop_bytes", "mbit_s", "fps", "gaussians"];
-
 /// A file and how it is made.
-type CsvFile = (&'static str, fn(&[SceneChart]) -> Vec<Vec<String>>);
+type CsvFile = (&'static str, fn(&[SceneChart]) -> Result<Vec<u8>, Error>);
 
 const FILES: [CsvFile; 9] = [
-    ("points.csv", points),
-    ("speed.csv", speed),
-    ("operating_points.csv", gop_files::modes),
-    ("refinements.csv", refinements),
-    ("tools.csv", gop_files::tools),
-    ("predictors.csv", gop_files::predictors),
-    ("bandwidth.csv", bandwidth),
-    ("costs.csv", costs),
-    ("peers.csv", peers),
+    ("points.csv", |scenes| table(scenes, points)),
+    ("speed.csv", |scenes| table(scenes, SceneChart::runs_compared)),
+    ("operating_points.csv", |scenes| table(scenes, |scene| of_gop(scene, |gop| gop.modes.clone()))),
+    ("refinements.csv", |scenes| {
+        table(scenes, |scene| [of_gop(scene, |gop| gop.levels.clone()), scene.intra_levels()].concat())
+    }),
+    ("tools.csv", |scenes| table(scenes, |scene| of_gop(scene, |gop| gop.tools.clone()))),
+    ("predictors.csv", |scenes| table(scenes, |scene| of_gop(scene, |gop| gop.ablation.clone()))),
+    ("bandwidth.csv", |scenes| table(scenes, SceneChart::intra_modes)),
+    ("costs.csv", |scenes| table(scenes, costs)),
+    ("peers.csv", |scenes| table(scenes, |scene| scene.peers.clone())),
 ];
 
 /// All files.
 pub(super) fn files(scenes: &[SceneChart]) -> Result<Vec<File>, Error> {
-    let file = |(name, rows): CsvFile| Ok(File { name: name.to_owned(), bytes: csv(&rows(scenes))? });
+    let file = |(name, bytes): CsvFile| Ok(File { name: name.to_owned(), bytes: bytes(scenes)? });
     FILES.into_iter().map(file).collect()
 }
 
@@ -42,210 +38,91 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-/// Rows as a file.
-pub(super) fn csv(rows: &[Vec<String>]) -> Result<Vec<u8>, Error> {
-    let failed = |error: String| Error::other(format!("a table cannot be written as CSV: {error}"));
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.write_record(row).map_err(|error| failed(error.to_string()))?;
+fn table<R: Row>(scenes: &[SceneChart], rows: fn(&SceneChart) -> Vec<R>) -> Result<Vec<u8>, Error> {
+    csv(scenes.iter().map(|scene| (scene.name.as_str(), rows(scene))))
+}
+
+/// Rows of the first GOP; none if the scene has one frame.
+fn of_gop<R>(scene: &SceneChart, rows: fn(&Gop) -> Vec<R>) -> Vec<R> {
+    scene.gop.as_ref().map_or_else(Vec::new, rows)
+}
+
+/// An operating point of a run.
+struct PointRow {
+    group: &'static str,
+    variant: String,
+    quality: String,
+    info: OperatingPointInfo,
+    /// Gaussians of the source over the frames measured, and bits per one of them.
+    gaussians_source: u64,
+    bpg_source: f64,
+    /// None if the scene stands still.
+    mbit_s: Option<f64>,
+    figures: Comparison,
+}
+
+impl Row for PointRow {
+    fn columns(_: &[Self]) -> Vec<Column<Self>> {
+        let shown = |row: &Self| Value::number(bits_per_gaussian(row.info.bytes, row.info.gaussians), 2);
+        let mut columns = vec![
+            Column::of_file("group", |row: &Self| Value::words(row.group)),
+            Column::of_file("variant", |row: &Self| Value::words(&row.variant)),
+            Column::of_file("quality", |row: &Self| Value::words(&row.quality)),
+            Column::of_file("op", |row: &Self| Value::words(row.info.point.to_string())),
+            Column::of_file("percent", |row: &Self| Value::Percent(row.info.percent)),
+            Column::of_file("frames", |row: &Self| Value::Count(row.info.frames.into())),
+            Column::of_file("bytes", |row: &Self| Value::Bytes(row.info.bytes)),
+            Column::of_file("gaussians_source", |row: &Self| Value::Count(row.gaussians_source)),
+            Column::of_file("gaussians_shown", |row: &Self| Value::Count(row.info.gaussians)),
+            Column::of_file("bpg_source", |row: &Self| Value::number(row.bpg_source, 2)),
+            Column::of_file("bpg_shown", shown),
+            Column::of_file("mbit_s", |row: &Self| Value::number(row.mbit_s, 2)),
+        ];
+        columns.extend(metrics(|row: &Self| &row.figures));
+        columns
     }
-    writer.into_inner().map_err(|error| failed(error.to_string()))
 }
 
-pub(super) fn headings(first: &[&str], last: &[&str]) -> Vec<String> {
-    first.iter().chain(last).map(|&name| name.to_owned()).collect()
+fn points(scene: &SceneChart) -> Vec<PointRow> {
+    let row = |run: &Run, point: &Point| PointRow {
+        group: run.group.name(),
+        variant: run.variant.clone(),
+        quality: run.quality.clone(),
+        info: point.info,
+        gaussians_source: scene.gaussians,
+        bpg_source: scene.rate(point),
+        mbit_s: scene.bandwidth(point),
+        figures: point.figures,
+    };
+    scene.runs.iter().flat_map(|run| run.points.iter().map(move |point| row(run, point))).collect()
 }
 
-/// A number, or nothing.
-pub(super) fn cell(value: Option<f64>) -> String {
-    value.filter(|value| value.is_finite()).map(|value| format!("{value:.6}")).unwrap_or_default()
+/// What an attribute or a kind of unit costs.
+struct CostRow {
+    quality: String,
+    kind: &'static str,
+    part: &'static str,
+    /// Bits per coded Gaussian.
+    bpg: f64,
 }
 
-pub(super) fn figures(figures: &Comparison) -> [String; 6] {
-    [
-        cell(Some(figures.psnr_db)),
-        cell(figures.psnr_masked_db),
-        cell(Some(figures.yuv_psnr_db)),
-        cell(figures.ssim),
-        cell(figures.ssim_masked),
-        cell(figures.st_lpips),
-    ]
-}
-
-fn points(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let first = [
-        "scene",
-        "group",
-        "variant",
-        "quality",
-        "op",
-        "percent",
-        "frames",
-        "bytes",
-        "gaussians_source",
-        "gaussians_shown",
-        "bpg_source",
-        "bpg_shown",
-        "mbit_s",
-    ];
-    let mut rows = vec![headings(&first, &FIGURES)];
-    for scene in scenes {
-        for run in &scene.runs {
-            rows.extend(run.points.iter().map(|point| point_row(scene, run, point)));
-        }
+impl Row for CostRow {
+    fn columns(_: &[Self]) -> Vec<Column<Self>> {
+        vec![
+            Column::of_file("quality", |row: &Self| Value::words(&row.quality)),
+            Column::of_file("kind", |row: &Self| Value::words(row.kind)),
+            Column::of_file("part", |row: &Self| Value::words(row.part)),
+            Column::of_file("bpg_coded", |row: &Self| Value::number(row.bpg, 3)),
+        ]
     }
-    rows
 }
 
-fn point_row(scene: &SceneChart, run: &Run, point: &Point) -> Vec<String> {
-    let info = &point.info;
-    let mut row = vec![
-        scene.name.clone(),
-        run.group.name().to_owned(),
-        run.variant.clone(),
-        run.quality.clone(),
-        info.point.to_string(),
-        info.percent.to_string(),
-        info.frames.to_string(),
-        info.bytes.to_string(),
-        scene.gaussians.to_string(),
-        info.gaussians.to_string(),
-        cell(Some(scene.rate(point))),
-        cell(Some(bits_per_gaussian(info.bytes, info.gaussians))),
-        cell(Some(scene.bandwidth(point))),
-    ];
-    row.extend(figures(&point.figures));
-    row
-}
-
-fn speed(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let last = [
-        "gaussians",
-        "encode_s",
-        "encode_s_min",
-        "encode_s_max",
-        "decode_s",
-        "decode_s_min",
-        "decode_s_max",
-        "psnr_db_at_baseline_rate",
-        "bd_rate_percent",
-    ];
-    let mut rows = vec![headings(&["scene", "group", "variant", "quality"], &last)];
-    for scene in scenes {
-        let standings = scene.standings();
-        for run in &scene.runs {
-            // Comparisons are of variants: they stand beside the quality at which they were made.
-            let at_quality = standings.iter().filter(|_| run.quality == scene.quality);
-            let standing = at_quality.into_iter().find(|standing| standing.name == run.variant);
-            let mut row = vec![
-                scene.name.clone(),
-                run.group.name().to_owned(),
-                run.variant.clone(),
-                run.quality.clone(),
-            ];
-            row.push(run.gaussians.to_string());
-            for timing in [run.encode, run.decode] {
-                row.extend([timing.median, timing.least, timing.most].map(|seconds| cell(Some(seconds))));
-            }
-            row.push(cell(standing.and_then(|standing| standing.psnr_at_rate)));
-            row.push(cell(standing.and_then(|standing| standing.bd_rate)));
-            rows.push(row);
-        }
-    }
-    rows
-}
-
-fn refinements(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let first = [
-        "scene",
-        "frames_coded",
-        "percent",
-        "units",
-        "unit_bytes",
-        "added_bytes",
-        "total_bytes",
-        "gaussians",
-        "bpg_shown",
-    ];
-    let last = [&FIGURES[..], &gop_files::OF_PREDICTED].concat();
-    let mut rows = vec![headings(&first, &last)];
-    for scene in scenes {
-        rows.extend(gop_files::levels(scene));
-        for row in scene.refinement_rows() {
-            let frames: Vec<String> = (0..row.unit_bytes.len()).map(|frame| format!("I{frame}")).collect();
-            let units: Vec<String> = row.unit_bytes.iter().map(u64::to_string).collect();
-            let mut cells = headings(&[&scene.name, "intra"], &[]);
-            cells.extend([row.percent.to_string(), frames.join(" "), units.join(" ")]);
-            cells.extend([row.added_bytes, row.total_bytes, row.gaussians].map(|count| count.to_string()));
-            cells.push(cell(Some(row.bpg)));
-            cells.extend(figures(&row.figures));
-            cells.extend(gop_files::OF_PREDICTED.map(|_| String::new()));
-            rows.push(cells);
-        }
-    }
-    rows
-}
-
-fn bandwidth(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let mut rows = vec![headings(&MODE, &FIGURES)];
-    for scene in scenes {
-        for mode in scene.bandwidth_rows() {
-            let mut cells = mode_cells(scene, &mode);
-            cells.extend(figures(&mode.figures));
-            rows.push(cells);
-        }
-    }
-    rows
-}
-
-/// The cells of [`MODE`].
-pub(super) fn mode_cells(scene: &SceneChart, mode: &Mode) -> Vec<String> {
-    let mut cells = headings(&[&scene.name, &mode.name, &mode.units, &mode.frames, mode.playback], &[]);
-    cells.push(mode.percent.map(|percent| percent.to_string()).unwrap_or_default());
-    cells.extend([mode.bytes.to_string(), cell(Some(mode.mbit_s)), cell(Some(scene.fps))]);
-    cells.push(mode.gaussians.to_string());
-    cells
-}
-
-fn costs(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let mut rows = vec![headings(&["scene", "quality", "kind", "part"], &["bpg_coded"])];
-    for scene in scenes {
-        for run in scene.baseline() {
-            let attributes = run.costs.attributes.iter().map(|cost| ("attribute", cost.attribute, cost.bpg));
-            let units = run.costs.units.iter().map(|cost| ("unit", cost.kind, cost.bpg));
-            rows.extend(attributes.chain(units).map(|(kind, part, bpg)| {
-                let names = [scene.name.as_str(), &run.quality, kind, part];
-                headings(&names, &[&cell(Some(bpg))])
-            }));
-        }
-    }
-    rows
-}
-
-fn peers(scenes: &[SceneChart]) -> Vec<Vec<String>> {
-    let first = [
-        "scene",
-        "peer",
-        "details",
-        "bytes",
-        "frames",
-        "frames_judged",
-        "bpg_source",
-        "encode_gaussians_per_s",
-        "decode_gaussians_per_s",
-        "timing",
-        "command",
-    ];
-    let mut rows = vec![headings(&first, &FIGURES)];
-    for scene in scenes {
-        for peer in &scene.peers {
-            let mut cells = vec![scene.name.clone(), peer.peer.clone(), peer.details.clone()];
-            cells.extend([peer.bytes.to_string(), peer.frames.to_string(), peer.judged.to_string()]);
-            cells.extend([Some(peer.bpg), peer.encode_speed, peer.decode_speed].map(cell));
-            cells.extend([peer.timing.clone(), peer.command.clone()]);
-            cells.extend(figures(&peer.figures));
-            rows.push(cells);
-        }
-    }
-    rows
+fn costs(scene: &SceneChart) -> Vec<CostRow> {
+    let of_run = |run: &Run| {
+        let attributes = run.costs.attributes.iter().map(|cost| ("attribute", cost.attribute, cost.bpg));
+        let units = run.costs.units.iter().map(|cost| ("unit", cost.kind, cost.bpg));
+        let row = |(kind, part, bpg)| CostRow { quality: run.quality.clone(), kind, part, bpg };
+        attributes.chain(units).map(row).collect::<Vec<_>>()
+    };
+    scene.baseline().flat_map(of_run).collect()
 }

@@ -42,12 +42,14 @@ fn rate_plot(scene: &SceneChart, metric: &Metric) -> Plot {
         title: format!("{}: {} against rate", scene.name, metric.name),
         description: format!(
             "{} of the decoded scene for each quality and refinement level against bits per Gaussian of the \
-             source and Mbit/s; {} is better.",
+             source; {} is better.",
             metric.name, metric.better
         ),
         x: "bits per Gaussian of the source".to_owned(),
         y: metric.axis.to_owned(),
-        top: Some((scene.mbit_per_bpg(), format!("Mbit/s at {} frames per second", scene.fps))),
+        top: scene
+            .mbit_per_bpg()
+            .map(|factor| (factor, format!("Mbit/s at {} frames per second", scene.fps))),
         series,
     }
 }
@@ -118,7 +120,7 @@ type Accuracy = (&'static str, &'static str, fn(&Standing) -> Option<f64>, bool)
 /// Speed of encoding and decoding against PSNR at equal rate and against BD-rate.
 pub(super) fn speed_figures(scene: &SceneChart) -> Vec<Figure> {
     let speeds: [Speed; 2] =
-        [("encode", |standing| standing.encode_speed), ("decode", |standing| standing.decode_speed)];
+        [("encode", |standing| standing.encode_speed()), ("decode", |standing| standing.decode_speed())];
     let accuracies: [Accuracy; 2] = [
         ("PSNR", "PSNR at the baseline's rate, dB", |standing| standing.psnr_at_rate, false),
         ("BD-rate", "BD-rate against the baseline, % (less is better)", |standing| standing.bd_rate, true),
@@ -127,19 +129,26 @@ pub(super) fn speed_figures(scene: &SceneChart) -> Vec<Figure> {
     let plots = accuracies
         .iter()
         .flat_map(|accuracy| speeds.iter().map(|speed| speed_plot(scene, &standings, speed, accuracy)));
-    plots.filter_map(|plot| plot.figure()).collect()
+    plots.flatten().filter_map(|plot| plot.figure()).collect()
 }
 
+/// Variants that a figure of speeds has at least: over two points, axes make a great difference of any.
+const FEWEST: usize = 3;
+
+/// None of fewer variants than make a figure.
 fn speed_plot(
     scene: &SceneChart,
     standings: &[Standing],
     (verb, speed): &Speed,
     (name, axis, accuracy, less_is_better): &Accuracy,
-) -> Plot {
+) -> Option<Plot> {
     let placed: Vec<(&Standing, (f64, f64))> = standings
         .iter()
         .filter_map(|standing| Some((standing, (speed(standing) / 1e6, accuracy(standing)?))))
         .collect();
+    if placed.len() < FEWEST {
+        return None;
+    }
     let better = |&(_, (x, y)): &(&Standing, (f64, f64))| (x, if *less_is_better { -y } else { y });
     let front = pareto_front(&placed.iter().map(better).collect::<Vec<_>>());
     let on_front = front.iter().map(|&place| Dot { at: placed[place].1, label: None, hint: String::new() });
@@ -153,7 +162,7 @@ fn speed_plot(
         };
         series.push(Series { style, line: Line::None, dots: of_group.map(dot).collect() });
     }
-    Plot {
+    Some(Plot {
         id: format!("{}-{verb}-speed-{}", scene.name, name.to_lowercase()),
         title: format!("{}: speed to {verb} and {name}", scene.name),
         description: format!(
@@ -164,7 +173,7 @@ fn speed_plot(
         y: (*axis).to_owned(),
         top: None,
         series,
-    }
+    })
 }
 
 /// What attributes cost, and what units cost.

@@ -8,17 +8,15 @@ mod tools;
 
 use super::picture_comparison::Judge;
 use super::scenes::Scene;
-use super::tables::{Mode, mbit_per_second};
 use crate::Error;
 use crate::Progress;
-use crate::numbers::bits_per_gaussian;
+use crate::levels::{Level, PredictedLevel, Subset};
+use crate::modes::{Mode, Playback};
 pub(crate) use ablation::AblationRow;
 use decoded::{Shown, label, shown};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{Anchor, Settings, Structure, encode};
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::metrics::Comparison;
-use subset::Subset;
 pub(crate) use tools::ToolRow;
 
 /// Spatial layers: the paper's 540, 720 and 1080 lines.
@@ -45,29 +43,6 @@ pub(crate) struct Gop {
     pub(crate) tools: Vec<ToolRow>,
     /// What each predictor and each part of the network is worth, if that was asked for.
     pub(crate) ablation: Vec<AblationRow>,
-}
-
-/// A refinement level.
-#[derive(Debug, Clone)]
-pub(crate) struct Level {
-    /// Share of the Gaussians of predicted frames, percent.
-    pub(crate) percent: u8,
-    /// Each predicted frame in the order of the stream, and the bytes of its units up to the level.
-    pub(crate) units: Vec<(String, u64)>,
-    /// Their sum.
-    pub(crate) added: u64,
-    /// Bytes of the GOP.
-    pub(crate) total: u64,
-    /// Gaussians received.
-    pub(crate) gaussians: u64,
-    /// Bits per Gaussian received.
-    pub(crate) bpg: f64,
-    /// Means over all frames.
-    pub(crate) all: Comparison,
-    /// Means over predicted frames.
-    pub(crate) inter: Comparison,
-    /// The same frames without anything that is carried.
-    pub(crate) subset: Subset,
 }
 
 /// The settings of the GOP: those of the baseline, with the structure of the paper's experiment, whatever would be
@@ -160,7 +135,6 @@ fn mode(
     shown: &Shown,
     (frames, fps): (usize, f64),
 ) -> Result<Mode, Error> {
-    let numbers: Vec<String> = shown.frames.iter().map(|frame| frame.number.to_string()).collect();
     let playback = match shown.frames.len() {
         1 => "intra only",
         some if some < frames => "base temporal layer",
@@ -170,12 +144,12 @@ fn mode(
     Ok(Mode {
         name,
         units,
-        frames: numbers.join(" "),
+        frames: shown.frames.iter().map(|frame| frame.number).collect(),
         playback,
         percent,
         bytes,
         // However few frames are shown, they last as long as the GOP.
-        mbit_s: mbit_per_second(bytes, frames, fps),
+        sequence: Some(Playback::new(bytes, frames, (frames, fps))),
         gaussians,
         figures: shown.figures(|_| true)?,
     })
@@ -185,17 +159,12 @@ fn level(percent: u8, shown: &Shown, subset: Subset) -> Result<Level, Error> {
     let mut predicted: Vec<_> = shown.frames.iter().filter(|frame| !frame.is_intra()).collect();
     // P before B: the order of the stream, and of the paper's columns.
     predicted.sort_by_key(|frame| (frame.frame_type.code(), frame.number));
-    let units: Vec<(String, u64)> = predicted.iter().map(|frame| (label(frame), frame.bytes)).collect();
-    let (total, gaussians) = (shown.bytes(), shown.gaussians());
     Ok(Level {
         percent,
-        added: units.iter().map(|(_, bytes)| bytes).sum(),
-        units,
-        total,
-        gaussians,
-        bpg: bits_per_gaussian(total, gaussians),
-        all: shown.figures(|_| true)?,
-        inter: shown.figures(|frame| !frame.is_intra())?,
-        subset,
+        units: predicted.iter().map(|frame| (label(frame), frame.bytes)).collect(),
+        total_bytes: shown.bytes(),
+        gaussians: shown.gaussians(),
+        figures: shown.figures(|_| true)?,
+        predicted: Some(PredictedLevel { figures: shown.figures(|frame| !frame.is_intra())?, subset }),
     })
 }

@@ -19,14 +19,15 @@ pub mod summary;
 pub mod sweep;
 pub mod table;
 
+mod columns;
 mod csv_files;
 mod decoding;
 mod error;
 mod figures;
 mod gop;
-mod gop_files;
-mod gop_text;
+mod levels;
 mod measure;
+mod modes;
 mod page;
 mod picture_comparison;
 mod pictures;
@@ -34,7 +35,6 @@ mod progress;
 mod report;
 mod scene_chart;
 mod svg;
-mod tables;
 mod variant_comparison;
 
 pub use error::Error;

@@ -213,6 +213,69 @@ fn add_bytes(stream: &[u8], point: OperatingPoint, frames: &mut [FramePoint]) ->
     Ok(())
 }
 
+/// A run for the tests of tables.
+#[cfg(test)]
+pub(crate) mod samples {
+    use super::*;
+
+    fn figures(psnr_db: f64) -> Comparison {
+        Comparison {
+            psnr_db,
+            psnr_masked_db: None,
+            yuv_psnr_db: psnr_db,
+            ssim: Some(0.9),
+            ssim_masked: None,
+            st_lpips: None,
+        }
+    }
+
+    fn point(refinement: u8, percent: u8, bytes: u64) -> Point {
+        let frame = |psnr| FramePoint {
+            gaussians: 100,
+            increment_bytes: bytes / 4,
+            bytes: bytes / 4 + 10,
+            views: vec![figures(psnr)],
+        };
+        Point {
+            info: OperatingPointInfo {
+                point: OperatingPoint { spatial: 0, temporal: 0, refinement },
+                bytes,
+                gaussians: 200,
+                frames: 2,
+                percent,
+            },
+            frames: vec![frame(30.0), frame(20.0)],
+            figures: figures(25.0),
+        }
+    }
+
+    /// Two frames at 20 and 100 %.
+    pub(crate) fn run() -> Run {
+        let costs = Costs {
+            bytes: 0,
+            gaussians: 0,
+            bpg: 0.0,
+            attributes: Vec::new(),
+            sections: Vec::new(),
+            frame_types: Vec::new(),
+            units: Vec::new(),
+        };
+        let timing = Timing { median: 1.0, least: 1.0, most: 1.0 };
+        Run {
+            variant: "balanced".to_owned(),
+            group: Group::Baseline,
+            quality: "high".to_owned(),
+            stream: Vec::new(),
+            gops: 1,
+            gaussians: 200,
+            encode: timing,
+            decode: timing,
+            points: vec![point(0, 20, 1000), point(1, 100, 4000)],
+            costs,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

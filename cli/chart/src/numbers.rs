@@ -13,6 +13,15 @@ pub fn grouped(count: u64) -> String {
     text
 }
 
+/// A number with so many decimals, without the sign of a zero.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.bytes().all(|byte| b"0.".contains(&byte)) => zero.to_owned(),
+        _ => text,
+    }
+}
+
 /// Bits per Gaussian.
 pub fn bits_per_gaussian(bytes: u64, gaussians: u64) -> f64 {
     bytes as f64 * 8.0 / gaussians.max(1) as f64
@@ -26,6 +35,12 @@ pub fn percent(part: u64, whole: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_zero_has_no_sign() {
+        let numbers = [-0.0, -0.0004, -0.0006, 1.5].map(|value| fixed(value, 3));
+        assert_eq!(numbers, ["0.000", "0.000", "-0.001", "1.500"]);
+    }
 
     #[test]
     fn thousands_are_apart() {

@@ -6,14 +6,14 @@ mod gop;
 mod peers;
 mod pictures;
 mod scene;
-mod tables;
 
 use super::csv_files;
-use super::scene_chart::{METRICS, SceneChart};
+use super::scene_chart::SceneChart;
 use super::svg::{Figure, STYLE as FIGURE_STYLE};
 use super::sweep::{Group, Sweep};
-use crate::numbers::grouped;
-use elements::{Heading, NOT_MEASURED, figure, size};
+use crate::columns;
+use crate::summary::Baseline;
+use elements::NOT_MEASURED;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page/style.css");
@@ -75,7 +75,7 @@ impl Page<'_> {
                 (self.summary())
                 (self.conditions())
                 @for (chart, figures) in self.charts.iter().zip(self.figures) {
-                    (scene::section(chart, figures, self.command))
+                    (scene::section(chart, figures))
                 }
                 (glossary::section())
             }
@@ -104,20 +104,7 @@ impl Page<'_> {
     }
 
     fn summary(&self) -> Markup {
-        let numbers = [
-            "Frames",
-            "Gaussians per frame",
-            "Size",
-            "Bits per Gaussian",
-            "Mbit/s",
-            "PSNR, dB",
-            "SSIM",
-            "ST-LPIPS",
-            "Encoding",
-            "Decoding",
-        ];
-        let mut headings = vec![Heading::Words("Scene")];
-        headings.extend(numbers.map(Heading::Numbers));
+        let rows: Vec<Baseline> = self.charts.iter().filter_map(Baseline::new).collect();
         html! {
             section {
                 h2 { "In short" }
@@ -125,11 +112,10 @@ impl Page<'_> {
                     "each row is one scene with the baseline settings and all Gaussians sent: fewer bits and \
                      more dB are better; speeds are thousands (k) or millions (M) of Gaussians per second."
                 ))
-                (elements::table(&headings, &html! { @for chart in self.charts { (summary_row(chart)) } }))
+                (columns::html(&rows))
                 @if !self.charts.iter().any(SceneChart::has_learned) {
                     p.note { "ST-LPIPS, the learned metric: " (NOT_MEASURED) "." }
                 }
-                (elements::made_by(self.command))
             }
         }
     }
@@ -151,6 +137,7 @@ impl Page<'_> {
             section #conditions {
                 h2 { "Conditions" }
                 dl.facts {
+                    dt { "Command" } dd { (elements::command_line(self.command)) }
                     dt { "Program" } dd { "splatstream " (env!("CARGO_PKG_VERSION")) (build) }
                     dt { "Machine" } dd { (cores) " processors (" (system) ", " (processor) "), " (threads) " threads used" }
                     dt { "Timing" } dd {
@@ -181,27 +168,6 @@ impl Page<'_> {
                     }
                 }
             }
-        }
-    }
-}
-
-fn summary_row(chart: &SceneChart) -> Markup {
-    let Some((run, point)) = chart.headline().and_then(|run| Some((run, run.full()?))) else {
-        return html! {};
-    };
-    let frames = chart.frames.0.max(1) as u64;
-    let speed = |seconds: f64| elements::speed(run.gaussians as f64 / seconds.max(f64::MIN_POSITIVE));
-    html! {
-        tr {
-            th scope="row" { a href=(format!("#{}", chart.name)) { (chart.name) } }
-            td { (chart.frames.0) }
-            td { (grouped(chart.gaussians / frames)) }
-            td { (size(point.info.bytes)) }
-            td { (format!("{:.2}", chart.rate(point))) }
-            td { (format!("{:.1}", chart.bandwidth(point))) }
-            @for metric in &METRICS { td { (figure(metric, &point.figures)) } }
-            td { (speed(run.encode.median)) }
-            td { (speed(run.decode.median)) }
         }
     }
 }

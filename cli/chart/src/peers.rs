@@ -3,6 +3,7 @@
 use super::picture_comparison::Judge;
 use super::scenes::Scene;
 use crate::Error;
+use crate::columns::{Column, Row, Value, metrics};
 use serde::Deserialize;
 use splatstream_encoder::FrameSource;
 use splatstream_render::metrics::{Comparison, LOSSLESS_DB, RatePoint};
@@ -93,6 +94,8 @@ pub(crate) struct PeerPoint {
     pub(crate) decode_speed: Option<f64>,
     /// How it was timed.
     pub(crate) timing: String,
+    /// Bytes that SplatStream's baseline needs for the same PSNR, percent of its own; none outside our range.
+    pub(crate) ours_percent: Option<f64>,
     /// Means over cameras and frames.
     pub(crate) figures: Comparison,
 }
@@ -106,6 +109,31 @@ impl PeerPoint {
     /// Its place among curves.
     pub(crate) fn rate_point(&self) -> RatePoint {
         RatePoint { rate: self.bpg, quality: self.figures.psnr_db }
+    }
+}
+
+impl Row for PeerPoint {
+    fn columns(_: &[Self]) -> Vec<Column<Self>> {
+        let of_frame = |row: &Self| Value::Bytes(row.bytes / u64::from(row.frames.max(1)));
+        let ours = |row: &Self| row.ours_percent.map_or(Value::None, |share| Value::Number(share, 0, " %"));
+        let mut columns = vec![
+            Column::new("peer", "Codec", |row: &Self| Value::words(&row.peer)),
+            Column::new("details", "Options", |row: &Self| Value::words(&row.details)),
+            Column::of_people("Size per frame", of_frame),
+            Column::of_file("bytes", |row: &Self| Value::Bytes(row.bytes)),
+            Column::of_file("frames", |row: &Self| Value::Count(row.frames.into())),
+            Column::of_file("frames_judged", |row: &Self| Value::Count(row.judged as u64)),
+            Column::new("bpg_source", "Bits per Gaussian of the source", |row: &Self| {
+                Value::number(row.bpg, 2)
+            }),
+            Column::new("encode_gaussians_per_s", "Encoding", |row: &Self| Value::speed(row.encode_speed)),
+            Column::new("decode_gaussians_per_s", "Decoding", |row: &Self| Value::speed(row.decode_speed)),
+            Column::of_file("timing", |row: &Self| Value::words(&row.timing)),
+            Column::of_file("command", |row: &Self| Value::words(&row.command)),
+        ];
+        columns.extend(metrics(|row: &Self| &row.figures));
+        columns.push(Column::of_people("Our size at its PSNR", ours));
+        columns
     }
 }
 
@@ -198,6 +226,7 @@ impl<'a> Peers<'a> {
             encode_speed: speed(result.encode_s),
             decode_speed: speed(result.decode_s),
             timing: result.timing.clone(),
+            ours_percent: None,
             figures,
         })
     }

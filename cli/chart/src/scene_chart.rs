@@ -1,12 +1,13 @@
 //! Everything that was found out about a scene.
 
 use super::gop::Gop;
+use super::levels::{Level, intra_levels};
 use super::measure::{Point, Run};
+use super::modes::{Mode, intra_modes, mbit_per_second};
 use super::peers::{MissingPeer, PeerPoint};
 use super::pictures::Pictures;
 use super::scenes::Scene;
 use super::sweep::Group;
-use super::tables::{Mode, RefinementRow, bandwidth_rows, mbit_per_second, refinement_rows};
 use super::variant_comparison::{Standing, curve, standings};
 use crate::numbers::bits_per_gaussian;
 use splatstream_render::Camera;
@@ -82,14 +83,19 @@ impl SceneChart {
         bits_per_gaussian(point.info.bytes, self.gaussians)
     }
 
+    /// Frames per second; none if the scene stands still.
+    pub(crate) fn frame_rate(&self) -> Option<f64> {
+        (self.frames.1 > 1).then_some(self.fps)
+    }
+
     /// Mbit/s at the frame rate.
-    pub(crate) fn bandwidth(&self, point: &Point) -> f64 {
-        mbit_per_second(point.info.bytes, self.frames.0, self.fps)
+    pub(crate) fn bandwidth(&self, point: &Point) -> Option<f64> {
+        self.frame_rate().map(|fps| mbit_per_second(point.info.bytes, self.frames.0, fps))
     }
 
     /// Mbit/s of one bit per Gaussian of the source.
-    pub(crate) fn mbit_per_bpg(&self) -> f64 {
-        self.gaussians as f64 * self.fps / self.frames.0.max(1) as f64 / 1e6
+    pub(crate) fn mbit_per_bpg(&self) -> Option<f64> {
+        self.frame_rate().map(|fps| self.gaussians as f64 * fps / self.frames.0.max(1) as f64 / 1e6)
     }
 
     /// Whether the learned metric was measured.
@@ -97,9 +103,14 @@ impl SceneChart {
         self.runs.iter().filter_map(Run::full).any(|point| point.figures.st_lpips.is_some())
     }
 
-    /// Variants beside the baseline.
-    pub(crate) fn standings(&self) -> Vec<Standing> {
+    /// All runs beside the baseline.
+    pub(crate) fn runs_compared(&self) -> Vec<Standing> {
         standings(&self.runs, &self.quality, self.gaussians)
+    }
+
+    /// Variants beside the baseline at the quality of comparison, the baseline first.
+    pub(crate) fn standings(&self) -> Vec<Standing> {
+        self.runs_compared().into_iter().filter(|run| run.quality == self.quality).collect()
     }
 
     /// The baseline over its qualities.
@@ -108,13 +119,13 @@ impl SceneChart {
     }
 
     /// The refinement levels of intra frames.
-    pub(crate) fn refinement_rows(&self) -> Vec<RefinementRow> {
-        self.headline().map_or_else(Vec::new, refinement_rows)
+    pub(crate) fn intra_levels(&self) -> Vec<Level> {
+        self.headline().map_or_else(Vec::new, intra_levels)
     }
 
     /// Ways to play intra frames.
-    pub(crate) fn bandwidth_rows(&self) -> Vec<Mode> {
-        self.headline().map_or_else(Vec::new, |run| bandwidth_rows(run, self.fps))
+    pub(crate) fn intra_modes(&self) -> Vec<Mode> {
+        self.headline().map_or_else(Vec::new, |run| intra_modes(run, self.frame_rate()))
     }
 }
 

@@ -9,7 +9,6 @@ mod cases;
 mod dice;
 mod edits;
 mod figures;
-mod files;
 mod loss;
 mod measure;
 mod ours;
@@ -23,15 +22,19 @@ mod sog;
 mod summary;
 mod tools;
 
-use crate::report::Report;
+use crate::columns::csv;
+use crate::report::{File, Report};
 use crate::scenes::Scene;
 use crate::svg::Figure;
 use crate::{Error, Progress};
 use base::Base;
 pub use base::{Size, builtin};
-use rows::BaseReport;
+use rows::{BaseReport, Row};
 use splatstream_encoder::{Report as Encoded, Settings};
 pub use summary::Summary;
+
+/// The file of all rows.
+const FILE: &str = "stability.csv";
 
 /// Rows of a picture, unless the user says otherwise.
 const HEIGHT: u32 = 120;
@@ -74,7 +77,8 @@ impl Stability<'_> {
         let reports: Vec<BaseReport> =
             bases.iter().map(|base| measure::measure(base, self, &progress)).collect();
         let figures = figures::figures(&reports);
-        let mut files = vec![files::file(&reports)?];
+        let rows = reports.iter().map(|report| (report.name.as_str(), report.rows().cloned().collect()));
+        let mut files = vec![File { name: FILE.to_owned(), bytes: csv::<Row>(rows)? }];
         files.extend(figures.iter().map(Figure::file));
         let page = page::html(&reports, &figures, &self.command);
         Ok(Report { files, pictures: Vec::new(), page, summary: Summary::new(&reports) })

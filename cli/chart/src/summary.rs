@@ -1,10 +1,11 @@
 //! What `chart` says on the terminal.
 
-use super::gop_text;
 use super::peers::MissingPeer;
 use super::scene_chart::SceneChart;
-use crate::table::Table;
+use crate::columns::{Column, PROGRAMS, Row, Value, metrics, object, objects, text};
+use crate::variant_comparison::Standing;
 use serde::Serialize;
+use splatstream_render::metrics::Comparison;
 
 /// What is said of a chart: the baseline of each scene. As JSON it is what `chart --json` says of scenes.
 #[derive(Serialize)]
@@ -15,86 +16,45 @@ pub struct Summary {
     sequences: String,
 }
 
-/// The baseline of a scene.
+/// A scene.
 #[derive(Serialize)]
 struct SceneSummary {
-    scene: String,
-    variant: String,
-    quality: String,
-    frames: usize,
-    gaussians: u64,
-    bytes: u64,
-    bpg: f64,
-    mbit_s: f64,
-    psnr_db: f64,
-    ssim: Option<f64>,
-    st_lpips: Option<f64>,
-    encode_gaussians_per_second: f64,
-    decode_gaussians_per_second: f64,
-    variants: Vec<VariantSummary>,
+    #[serde(flatten, serialize_with = "object")]
+    baseline: Baseline,
+    #[serde(serialize_with = "objects")]
+    variants: Vec<Standing>,
     peers: Vec<String>,
     peers_missing: Vec<String>,
 }
 
-/// A variant beside the baseline.
-#[derive(Serialize)]
-struct VariantSummary {
+/// The baseline of a scene at the quality of comparison, everything decoded.
+#[derive(Debug, Clone)]
+pub(crate) struct Baseline {
+    scene: String,
     variant: String,
-    group: &'static str,
-    psnr_db_at_baseline_rate: Option<f64>,
-    bd_rate_percent: Option<f64>,
-    encode_gaussians_per_second: f64,
-    decode_gaussians_per_second: f64,
+    quality: String,
+    /// Frames measured.
+    frames: usize,
+    /// Gaussians of the source over these frames.
+    gaussians: u64,
+    bytes: u64,
+    /// Bits per Gaussian of the source.
+    bpg: f64,
+    /// At the frame rate; none if the scene stands still.
+    mbit_s: Option<f64>,
+    /// Gaussians per second.
+    encode_speed: f64,
+    decode_speed: f64,
+    figures: Comparison,
 }
 
-impl Summary {
-    pub(super) fn new(charts: &[SceneChart]) -> Self {
-        let scenes = charts.iter().filter_map(SceneSummary::new).collect();
-        let sequences = charts.iter().map(gop_text::text).collect();
-        Self { scenes, sequences }
-    }
-
-    /// For people.
-    pub fn text(&self) -> String {
-        let mut table = Table::new([
-            "scene",
-            "bits per Gaussian",
-            "Mbit/s",
-            "PSNR dB",
-            "SSIM",
-            "encoded M/s",
-            "decoded M/s",
-        ]);
-        for scene in &self.scenes {
-            let speed = |speed: f64| format!("{:.2}", speed / 1e6);
-            table.row([
-                scene.scene.clone(),
-                format!("{:.2}", scene.bpg),
-                format!("{:.2}", scene.mbit_s),
-                format!("{:.2}", scene.psnr_db),
-                scene.ssim.map_or_else(|| "none".to_owned(), |ssim| format!("{ssim:.4}")),
-                speed(scene.encode_gaussians_per_second),
-                speed(scene.decode_gaussians_per_second),
-            ]);
-        }
-        format!("{}\n{}", table.text(), self.sequences)
-    }
-}
-
-impl SceneSummary {
-    fn new(chart: &SceneChart) -> Option<Self> {
+impl Baseline {
+    /// Of a scene; none if it was not measured.
+    pub(crate) fn new(chart: &SceneChart) -> Option<Self> {
         let run = chart.headline()?;
         let point = run.full()?;
         let standings = chart.standings();
         let own = standings.first()?;
-        let variants = standings.iter().skip(1).map(|standing| VariantSummary {
-            variant: standing.name.clone(),
-            group: standing.group.name(),
-            psnr_db_at_baseline_rate: standing.psnr_at_rate,
-            bd_rate_percent: standing.bd_rate,
-            encode_gaussians_per_second: standing.encode_speed,
-            decode_gaussians_per_second: standing.decode_speed,
-        });
         Some(Self {
             scene: chart.name.clone(),
             variant: run.variant.clone(),
@@ -104,12 +64,61 @@ impl SceneSummary {
             bytes: point.info.bytes,
             bpg: chart.rate(point),
             mbit_s: chart.bandwidth(point),
-            psnr_db: point.figures.psnr_db,
-            ssim: point.figures.ssim,
-            st_lpips: point.figures.st_lpips,
-            encode_gaussians_per_second: own.encode_speed,
-            decode_gaussians_per_second: own.decode_speed,
-            variants: variants.collect(),
+            encode_speed: own.encode_speed(),
+            decode_speed: own.decode_speed(),
+            figures: point.figures,
+        })
+    }
+}
+
+impl Row for Baseline {
+    fn columns(_: &[Self]) -> Vec<Column<Self>> {
+        let per_frame = |row: &Self| Value::Count(row.gaussians / row.frames.max(1) as u64);
+        let encoding = |row: &Self| Value::Speed(row.encode_speed);
+        let decoding = |row: &Self| Value::Speed(row.decode_speed);
+        let mut columns = vec![
+            Column::new("scene", "Scene", |row: &Self| Value::words(&row.scene)),
+            Column::new("variant", "", |row: &Self| Value::words(&row.variant)).on(PROGRAMS),
+            Column::new("quality", "", |row: &Self| Value::words(&row.quality)).on(PROGRAMS),
+            Column::new("frames", "Frames", |row: &Self| Value::Count(row.frames as u64)),
+            Column::new("gaussians", "", |row: &Self| Value::Count(row.gaussians)).on(PROGRAMS),
+            Column::of_people("Gaussians per frame", per_frame),
+            Column::new("bytes", "Size", |row: &Self| Value::Bytes(row.bytes)),
+            Column::new("bpg", "Bits per Gaussian", |row: &Self| Value::number(row.bpg, 2)),
+            Column::new("mbit_s", "Mbit/s", |row: &Self| Value::number(row.mbit_s, 2)).if_measured(),
+        ];
+        columns.extend(metrics(|row: &Self| &row.figures));
+        columns.extend([
+            Column::new("encode_gaussians_per_second", "Encoding", encoding),
+            Column::new("decode_gaussians_per_second", "Decoding", decoding),
+        ]);
+        columns
+    }
+
+    fn part_of_page(&self) -> Option<&str> {
+        Some(&self.scene)
+    }
+}
+
+impl Summary {
+    pub(super) fn new(charts: &[SceneChart]) -> Self {
+        let scenes = charts.iter().filter_map(SceneSummary::new).collect();
+        let sequences = charts.iter().map(sequence).collect();
+        Self { scenes, sequences }
+    }
+
+    /// For people.
+    pub fn text(&self) -> String {
+        let rows: Vec<Baseline> = self.scenes.iter().map(|scene| scene.baseline.clone()).collect();
+        format!("{}\n{}", text(&rows), self.sequences)
+    }
+}
+
+impl SceneSummary {
+    fn new(chart: &SceneChart) -> Option<Self> {
+        Some(Self {
+            baseline: Baseline::new(chart)?,
+            variants: chart.standings().into_iter().skip(1).collect(),
             peers: chart.peers.iter().map(|peer| peer.peer.clone()).collect(),
             peers_missing: chart.missing.iter().map(missing_text).collect(),
         })
@@ -118,4 +127,27 @@ impl SceneSummary {
 
 fn missing_text(missing: &MissingPeer) -> String {
     format!("{}: {}", missing.peer, missing.why)
+}
+
+/// The tables of the first GOP; nothing if the scene has one frame.
+fn sequence(chart: &SceneChart) -> String {
+    let Some(gop) = &chart.gop else { return String::new() };
+    let name = &chart.name;
+    let ablation = match gop.ablation.as_slice() {
+        [] => String::new(),
+        rows => {
+            format!("{name}: predictors of new Gaussians; bits are per new Gaussian\n{}\n", text(rows))
+        }
+    };
+    format!(
+        "{name}: operating points of the first GOP, {frames} frames at {fps} frames per second\n{modes}\n\
+         {name}: refinement levels of its predicted frames; carried: what is missing comes from the intra frame; \
+         subset: it stays away\n{levels}\n\
+         {name}: predicted frames with and without tools\n{tools}\n{ablation}",
+        frames = gop.frames,
+        fps = chart.fps,
+        modes = text(&gop.modes),
+        levels = text(&gop.levels),
+        tools = text(&gop.tools),
+    )
 }

@@ -8,12 +8,22 @@ pub struct Table {
 impl Table {
     /// A table with these headings.
     pub fn new<const N: usize>(headings: [&str; N]) -> Self {
-        Self { rows: vec![headings.map(str::to_owned).to_vec()] }
+        Self::of(headings.map(str::to_owned).to_vec())
+    }
+
+    /// As [`Table::new`], of any number of headings.
+    pub(crate) fn of(headings: Vec<String>) -> Self {
+        Self { rows: vec![headings] }
     }
 
     /// Adds a row.
     pub fn row<const N: usize>(&mut self, cells: [String; N]) {
-        self.rows.push(cells.to_vec());
+        self.add(cells.to_vec());
+    }
+
+    /// As [`Table::row`], of any number of cells.
+    pub(crate) fn add(&mut self, cells: Vec<String>) {
+        self.rows.push(cells);
     }
 
     /// The lines of the table, each with its end of line.
@@ -45,7 +55,8 @@ impl Table {
     /// Whether every cell below the heading starts like a number.
     fn is_numeric(&self, column: usize) -> bool {
         let mut cells = self.rows.iter().skip(1).filter_map(|row| row.get(column)).peekable();
-        let numeric = |cell: &String| cell.starts_with(|first: char| first.is_ascii_digit() || first == '-');
+        let numeric =
+            |cell: &String| cell.starts_with(|first: char| first.is_ascii_digit() || "+-".contains(first));
         cells.peek().is_some() && cells.all(|cell| numeric(cell) && !cell.starts_with("0x"))
     }
 }

@@ -1,24 +1,94 @@
 //! How variants stand: speed, and quality at the rate of the baseline.
 
-use super::measure::{Point, Run};
+use super::measure::{Point, Run, Timing};
 use super::sweep::Group;
+use crate::columns::{Column, Medium, PROGRAMS, Row, Value};
 use splatstream_render::metrics::{RatePoint, bd_rate, quality_at_rate, rate_at_quality};
 
-/// A variant beside the baseline.
+/// All media but files, which have seconds.
+const NOT_IN_FILES: &[Medium] = &[Medium::Json, Medium::Terminal, Medium::Page];
+
+/// A run of a variant, beside the baseline.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Standing {
     /// Its name.
     pub(crate) name: String,
     /// What it is one of.
     pub(crate) group: Group,
-    /// Gaussians per second.
-    pub(crate) encode_speed: f64,
-    /// Gaussians per second.
-    pub(crate) decode_speed: f64,
-    /// PSNR at the rate of the baseline, dB; none if its rates do not reach there.
+    /// The quality as the command line spells it.
+    pub(crate) quality: String,
+    /// Gaussians coded, over all frames.
+    pub(crate) gaussians: u64,
+    /// Seconds to encode and to decode.
+    pub(crate) encode: Timing,
+    pub(crate) decode: Timing,
+    /// PSNR at the rate of the baseline, dB; none if its rates do not reach there, or at another quality.
     pub(crate) psnr_at_rate: Option<f64>,
-    /// Rate against the baseline at equal PSNR, per cent; none if the curves share no quality.
+    /// PSNR at that rate above that of the baseline, dB.
+    pub(crate) gain_db: Option<f64>,
+    /// Rate against the baseline at equal PSNR, percent; none if the curves share no quality, or at another quality.
     pub(crate) bd_rate: Option<f64>,
+}
+
+impl Standing {
+    /// Gaussians per second.
+    pub(crate) fn encode_speed(&self) -> f64 {
+        self.speed(self.encode)
+    }
+
+    /// Gaussians per second.
+    pub(crate) fn decode_speed(&self) -> f64 {
+        self.speed(self.decode)
+    }
+
+    fn speed(&self, timing: Timing) -> f64 {
+        self.gaussians as f64 / timing.median.max(f64::MIN_POSITIVE)
+    }
+
+    fn is_baseline(&self) -> bool {
+        self.group == Group::Baseline
+    }
+
+    fn label(&self) -> String {
+        if self.is_baseline() { format!("{} (baseline)", self.name) } else { self.name.clone() }
+    }
+}
+
+impl Row for Standing {
+    fn columns(_: &[Self]) -> Vec<Column<Self>> {
+        let seconds = |name, value: fn(&Self) -> f64| {
+            Column::of_file(name, move |row: &Self| Value::number(value(row), 6))
+        };
+        let psnr = |row: &Self| Value::number(row.psnr_at_rate, 2);
+        vec![
+            Column::of_people("Variant", |row: &Self| Value::words(row.label())),
+            Column::new("group", "", |row: &Self| Value::words(row.group.name())).on(PROGRAMS),
+            Column::new("variant", "", |row: &Self| Value::words(&row.name)).on(PROGRAMS),
+            Column::of_file("quality", |row: &Self| Value::words(&row.quality)),
+            Column::of_file("gaussians", |row: &Self| Value::Count(row.gaussians)),
+            seconds("encode_s", |row| row.encode.median),
+            seconds("encode_s_min", |row| row.encode.least),
+            seconds("encode_s_max", |row| row.encode.most),
+            seconds("decode_s", |row| row.decode.median),
+            seconds("decode_s_min", |row| row.decode.least),
+            seconds("decode_s_max", |row| row.decode.most),
+            Column::new("encode_gaussians_per_second", "Encoding", |row: &Self| {
+                Value::Speed(row.encode_speed())
+            })
+            .on(NOT_IN_FILES),
+            Column::new("decode_gaussians_per_second", "Decoding", |row: &Self| {
+                Value::Speed(row.decode_speed())
+            })
+            .on(NOT_IN_FILES),
+            Column::new("psnr_db_at_baseline_rate", "PSNR at the baseline's rate, dB", psnr),
+            Column::of_people("Against the baseline", |row: &Self| Value::difference(row.gain_db, " dB")),
+            Column::new("bd_rate_percent", "BD-rate", |row: &Self| Value::difference(row.bd_rate, " %")),
+        ]
+    }
+
+    fn stands_out(&self) -> bool {
+        self.is_baseline()
+    }
 }
 
 /// A rate in bits per Gaussian of the source and a PSNR.
@@ -33,28 +103,33 @@ pub(crate) fn curve(runs: &[Run], variant: &str, source_gaussians: u64) -> Vec<R
     of_variant.filter_map(Run::full).map(|point| rate_point(point, source_gaussians)).collect()
 }
 
-/// Every variant at `quality`, the baseline first.
+/// Every run, in its order. Those at `quality` are compared with the baseline at that quality.
 pub(crate) fn standings(runs: &[Run], quality: &str, source_gaussians: u64) -> Vec<Standing> {
-    let Some(baseline) = runs.iter().find(|run| run.group == Group::Baseline && run.quality == quality)
-    else {
-        return Vec::new();
-    };
-    let anchor = curve(runs, &baseline.variant, source_gaussians);
-    let rate = baseline.full().map_or(0.0, |point| rate_point(point, source_gaussians).rate);
-    let at_quality = runs.iter().filter(|run| run.quality == quality);
+    let baseline = runs.iter().find(|run| run.group == Group::Baseline && run.quality == quality);
+    let anchor = baseline.map_or_else(Vec::new, |run| curve(runs, &run.variant, source_gaussians));
+    let rate = baseline.and_then(Run::full).map_or(0.0, |point| rate_point(point, source_gaussians).rate);
+    let of_baseline = quality_at_rate(&anchor, rate);
     let standing = |run: &Run| {
-        let test = curve(runs, &run.variant, source_gaussians);
-        let speed = |seconds: f64| run.gaussians as f64 / seconds.max(f64::MIN_POSITIVE);
+        let is_compared = baseline.is_some() && run.quality == quality;
+        let test = if is_compared { curve(runs, &run.variant, source_gaussians) } else { Vec::new() };
+        let psnr_at_rate = if is_compared { quality_at_rate(&test, rate) } else { None };
         Standing {
             name: run.variant.clone(),
             group: run.group,
-            encode_speed: speed(run.encode.median),
-            decode_speed: speed(run.decode.median),
-            psnr_at_rate: quality_at_rate(&test, rate),
-            bd_rate: if run.group == Group::Baseline { Some(0.0) } else { bd_rate(&anchor, &test) },
+            quality: run.quality.clone(),
+            gaussians: run.gaussians,
+            encode: run.encode,
+            decode: run.decode,
+            psnr_at_rate,
+            gain_db: psnr_at_rate.zip(of_baseline).map(|(own, other)| own - other),
+            bd_rate: match run.group {
+                _ if !is_compared => None,
+                Group::Baseline => Some(0.0),
+                Group::Preset | Group::Without => bd_rate(&anchor, &test),
+            },
         }
     };
-    at_quality.map(standing).collect()
+    runs.iter().map(standing).collect()
 }
 
 /// Bytes that the baseline needs for the PSNR of a point, in per cent of the point's bytes.

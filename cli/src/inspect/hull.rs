@@ -6,10 +6,9 @@ use rayon::prelude::*;
 use splatstream_chart::first_frame::first_frame;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo};
 use splatstream_format::Limits;
-use splatstream_gaussians::{FrameError, GaussianFrame};
+use splatstream_gaussians::FrameError;
+use splatstream_render::ReferencePictures;
 use splatstream_render::camera::{Up, held_out};
-use splatstream_render::metrics::psnr;
-use splatstream_render::{Camera, Image, render};
 
 /// Views of the first frame, and their height.
 const VIEWS: (u32, u32) = (3, 270);
@@ -44,10 +43,10 @@ pub(super) fn qualities(
     };
     let given = of_stream(&stream.description(limits).unwrap_or_default(), VIEWS.1);
     let cameras = held_out(&reference, Up::default(), &given, VIEWS.0, VIEWS.1);
-    let right = pictures(&reference, &cameras);
+    let right = ReferencePictures::new(&reference, cameras);
     let seen = |info: &OperatingPointInfo| {
         let frame = first(info)?;
-        Ok(frame.map(|frame| mean_psnr(&right, &pictures(&frame, &cameras))))
+        Ok(frame.map(|frame| right.psnr(&frame).sum::<f64>() / right.len().max(1) as f64))
     };
     let decibels: Vec<Option<f64>> = points.par_iter().map(seen).collect::<Result<_, FrameError>>()?;
     let is_beaten = |index: usize| {
@@ -64,14 +63,4 @@ pub(super) fn qualities(
         on_hull: decibels[index].is_some() && !is_beaten(index),
     };
     Ok((0..points.len()).map(quality).collect())
-}
-
-fn pictures(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Image> {
-    cameras.iter().map(|camera| render(frame, camera, [0.0; 3]).colour).collect()
-}
-
-/// The mean over the views.
-fn mean_psnr(right: &[Image], pictures: &[Image]) -> f64 {
-    right.iter().zip(pictures).map(|(right, picture)| psnr(right, picture)).sum::<f64>()
-        / right.len().max(1) as f64
 }

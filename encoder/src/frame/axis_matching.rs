@@ -30,6 +30,7 @@ impl Namings {
 
     /// The pose among those that render like `target` which differs least from `reference`, differences counted in
     /// `steps` of log-scales and of quaternion components. Its w is not negative.
+    #[expect(clippy::indexing_slicing, reason = "axes and parts are constants or a permutation of them")]
     pub(crate) fn nearest(&self, target: Pose, reference: Pose, steps: (f32, f32)) -> Pose {
         let mut best = (f32::INFINITY, target);
         for &(order, turn) in &self.0 {

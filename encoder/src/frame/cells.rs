@@ -33,6 +33,10 @@ pub(crate) struct ReferenceCloud {
 }
 
 impl ReferenceCloud {
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "axes are constants; cells and Gaussians are counted by what they index"
+    )]
     pub(crate) fn new(reference: &Reference, sequence: &SequenceParameters) -> Self {
         let lists = &reference.lists;
         let joined = |plane: &dyn Fn(&GaussianList) -> Vec<f32>| -> Vec<f32> {
@@ -82,6 +86,10 @@ impl ReferenceCloud {
     }
 
     /// How cells move, and which are stale.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "axes are constants; cells and Gaussians are counted by what they index"
+    )]
     fn motion(
         &self,
         target: &Target,
@@ -153,6 +161,11 @@ pub(crate) fn code_cells(
     Ok((field, Some(CellsBytes { cell_count, cell_log2, section })))
 }
 
+#[expect(
+    clippy::indexing_slicing,
+    reason = "axes are constants; cells and Gaussians are counted by what they index"
+)]
+#[expect(clippy::arithmetic_side_effects, reason = "values of cells are within the ranges of clause 6")]
 fn cell_values(motion: &CellMotion, block: usize) -> SectionValues {
     let codes: Vec<u64> = motion.cells.iter().map(|cell| cell.code).collect();
     let stale = motion.cells.iter().map(|cell| i32::from(cell.stale)).collect();

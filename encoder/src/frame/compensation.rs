@@ -6,8 +6,8 @@ use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::ReferencePictures;
 use splatstream_render::camera::{Up, spiral};
-use splatstream_render::{Camera, Image, metrics, render};
 
 /// Views that a prefix is judged in, and their lines: holes are large. Fuzzing wants streams, not pictures.
 const VIEWS: u32 = 2;
@@ -15,21 +15,16 @@ const LINES: u32 = if cfg!(fuzzing) { 12 } else { 120 };
 /// Offsets of log-scale and of opacity that are tried, and up to so many of them.
 const UNITS: [f32; 2] = [0.12, 0.15];
 const MOST: i8 = 6;
-const BACKGROUND: [f32; 3] = [0.0; 3];
 
 /// Judges prefixes of one frame.
 pub(crate) struct Compensator {
-    views: Vec<(Camera, Image)>,
+    views: ReferencePictures,
 }
 
 impl Compensator {
     /// For prefixes of a frame that all of its Gaussians make.
     pub(crate) fn new(frame: &GaussianFrame) -> Self {
-        let view = |camera: Camera| {
-            let colour = render(frame, &camera, BACKGROUND).colour;
-            (camera, colour)
-        };
-        Self { views: spiral(frame, Up::default(), VIEWS, LINES).into_iter().map(view).collect() }
+        Self { views: ReferencePictures::new(frame, spiral(frame, Up::default(), VIEWS, LINES)) }
     }
 
     /// Offsets of log-scale and opacity for the Gaussians of some lists: as far as each step up brings the pictures
@@ -37,6 +32,11 @@ impl Compensator {
     ///
     /// # Errors
     /// Lists whose planes make no frame.
+    #[expect(clippy::indexing_slicing, reason = "both arrays have two entries")]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "offsets are below 6 times the largest single one, values on the grid far below 2^31"
+    )]
     pub(crate) fn offsets(
         &self,
         lists: &[GaussianList],
@@ -61,6 +61,10 @@ impl Compensator {
     }
 
     /// Decibels below the whole frame, so that less is better.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "offsets are below 6 times the largest single one, values on the grid far below 2^31"
+    )]
     fn error(
         &self,
         lists: &[GaussianList],
@@ -72,9 +76,6 @@ impl Compensator {
         planes.log_scale.iter_mut().flatten().for_each(|value| *value += i32::from(scale));
         planes.opacity.iter_mut().for_each(|value| *value += i32::from(opacity));
         let shown = to_gaussians(planes, sequence)?;
-        let psnr = |(camera, whole): &(Camera, Image)| {
-            metrics::psnr(&render(&shown, camera, BACKGROUND).colour, whole)
-        };
-        Ok(-self.views.iter().map(psnr).sum::<f64>())
+        Ok(-self.views.psnr(&shown).sum::<f64>())
     }
 }

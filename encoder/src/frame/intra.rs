@@ -1,6 +1,7 @@
 //! I frames: the lowest spatial layer has all Gaussians, and the layers above refine them ([`super::ladder`]).
 //!
 //! A static frame is the simplest case: one layer, so that no unit has parents, and nothing that is predicted.
+#![expect(clippy::indexing_slicing, reason = "lists are counted by refinement_count, rows by the frame")]
 
 use super::compensation::Compensator;
 use super::ladder::Ladder;
@@ -148,6 +149,10 @@ impl Intra<'_> {
     }
 
     /// Fills the holes of a prefix that can be shown.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "refinement_count and layers are 1 or more and at most 10; positions have at most 20 bits"
+    )]
     fn compensate(&self, draft: &mut Draft, layer: u8, refinement: u8) -> Result<(), Error> {
         let sequence = self.coder.sequence;
         let is_top = layer + 1 == sequence.spatial_layer_count;
@@ -168,6 +173,10 @@ impl Intra<'_> {
     }
 
     /// Brings what the lowest layer has coded to its final steps.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "refinement_count and layers are 1 or more and at most 10; positions have at most 20 bits"
+    )]
     fn refine(&self, draft: &mut Draft, parents: &GaussianList, list: usize) -> Result<(), Error> {
         let members = &self.members[list];
         if members.is_empty() {

@@ -27,6 +27,8 @@ pub(crate) struct Ladder {
 
 impl Ladder {
     /// Of so many spatial layers, for lists up to these shares of the Gaussians, percent, of which the last is 100.
+    #[expect(clippy::indexing_slicing, reason = "lists are below the number of shares; stages are constants")]
+    #[expect(clippy::arithmetic_side_effects, reason = "layers, rungs and shares are at most 100")]
     pub(crate) fn new(layers: u8, percents: &[u8]) -> Self {
         let rungs = layers.saturating_sub(1);
         let last = percents.len().saturating_sub(1);
@@ -57,6 +59,8 @@ impl Ladder {
 
     /// How finely a layer codes a list whose final steps are `last`. Entries of codebooks keep their step: no layer
     /// refines them.
+    #[expect(clippy::indexing_slicing, reason = "lists are below the number of shares; stages are constants")]
+    #[expect(clippy::arithmetic_side_effects, reason = "layers, rungs and shares are at most 100")]
     pub(crate) fn grain(
         &self,
         layer: u8,

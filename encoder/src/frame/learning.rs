@@ -110,6 +110,7 @@ pub fn samples(
 }
 
 /// The architecture whose base leaves least, and its samples; of equal ones the first.
+#[expect(clippy::arithmetic_side_effects, reason = "two counts of eight bits")]
 pub fn nearer(found: Vec<(Architecture, Vec<Sample>)>) -> (Architecture, Vec<Sample>) {
     let left = |(architecture, samples): &(Architecture, Vec<Sample>)| -> u64 {
         let outputs = usize::from(architecture.dc_count) + usize::from(architecture.sh_count);

@@ -3,6 +3,10 @@
 //! Runs of parents in which most have to move are moved as a whole: a zero among moves costs less than saying which of
 //! them stay. Each block of moves takes the predictor that leaves the fewest bits. As in a decoder, the motion of a
 //! parent is predicted from what is known of those before it, so that the blocks follow one after the other.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "positions on the grid have at most 26 bits, steps are powers of two"
+)]
 
 use super::survivors::{MOST, REMOVED};
 use splatstream_decoder::list::{FINE, GaussianList, canonical};
@@ -151,6 +155,7 @@ impl MovePlan {
 }
 
 /// The residual of a move under a predictor; its parent goes where that brings it.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the list; axes are constants")]
 fn residual(
     moves: &mut Moves<'_>,
     number: usize,
@@ -190,6 +195,7 @@ fn moving(displaced: &GaussianList, aims: &[Option<Aim>], grid: MoveGrid, predic
 }
 
 /// What a move of a parent is worth, in bits, beyond those that it takes. What is far off is moved in any case.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the list; axes are constants")]
 fn bargain(displaced: &GaussianList, row: usize, aim: Aim, grid: MoveGrid) -> f32 {
     if !aim.moves {
         return f32::MIN;

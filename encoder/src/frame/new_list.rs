@@ -71,6 +71,8 @@ pub(crate) fn unpredicted(
 }
 
 /// Differences of rising codes; they start again in each block.
+#[expect(clippy::indexing_slicing, reason = "every entry that starts no block has one before it")]
+#[expect(clippy::arithmetic_side_effects, reason = "codes rise")]
 pub(crate) fn deltas(codes: &[u64], block: usize) -> Vec<u64> {
     let before = |index: usize| if index.is_multiple_of(block) { 0 } else { codes[index - 1] };
     codes.iter().enumerate().map(|(index, &code)| code - before(index)).collect()

@@ -1,4 +1,9 @@
 //! Predicted frames: Gaussians of the reference that go on, and new ones.
+#![expect(clippy::arithmetic_side_effects, reason = "counts of lists and Gaussians; layers are 1 or more")]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "there are as many lists as refinements, and rows are those of the matching"
+)]
 
 use super::cells::{CellPlan, code_cells};
 use super::moves::{self, Aim, MovePlan};

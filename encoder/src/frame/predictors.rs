@@ -1,4 +1,9 @@
 //! Which predictor new Gaussians take: by estimated bits, or by the paper's sum of absolute residuals.
+#![expect(clippy::arithmetic_side_effects, reason = "counts of bits, runs and rows of one list")]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "candidates, planes and rows are counted by what they index; tokens are below the number of symbols"
+)]
 
 use super::new_list::NewList;
 use super::recorder::Recorder;

@@ -8,9 +8,7 @@ use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::{Camera, Image, metrics, render};
-
-const BACKGROUND: [f32; 3] = [0.0; 3];
+use splatstream_render::{ReferencePictures, metrics};
 
 /// The levels of prices: each is the square root of two times the one before. At the lowest nothing is left that
 /// shows; at the highest nothing is sent.
@@ -25,33 +23,9 @@ const NEAR: f64 = 0.1;
 /// The first step of the search, levels.
 const STRIDE: i32 = 4;
 
-/// Source pictures of a frame.
-pub(crate) struct Pictures {
-    views: Vec<(Camera, Image)>,
-}
-
-impl Pictures {
-    /// As the cameras see a frame.
-    pub(crate) fn new(frame: &GaussianFrame, cameras: Vec<Camera>) -> Self {
-        let view = |camera: Camera| {
-            let colour = render(frame, &camera, BACKGROUND).colour;
-            (camera, colour)
-        };
-        Self { views: cameras.into_iter().map(view).collect() }
-    }
-
-    /// PSNR of each of a frame's pictures, dB, at most [`metrics::LOSSLESS_DB`].
-    pub(crate) fn psnr(&self, frame: &GaussianFrame) -> Vec<f64> {
-        let of_view = |(camera, source): &(Camera, Image)| {
-            metrics::psnr(source, &render(frame, camera, BACKGROUND).colour).min(metrics::LOSSLESS_DB)
-        };
-        self.views.iter().map(of_view).collect()
-    }
-
-    /// The cameras.
-    pub(crate) fn cameras(&self) -> Vec<Camera> {
-        self.views.iter().map(|(camera, _)| camera.clone()).collect()
-    }
+/// PSNR of each picture of a frame, dB, at most [`metrics::LOSSLESS_DB`].
+pub(crate) fn finite_psnr(pictures: &ReferencePictures, frame: &GaussianFrame) -> impl Iterator<Item = f64> {
+    pictures.psnr(frame).map(|decibels| decibels.min(metrics::LOSSLESS_DB))
 }
 
 /// All Gaussians of some lists, as they are output.
@@ -67,7 +41,7 @@ pub(crate) fn shown(lists: &[GaussianList], sequence: &SequenceParameters) -> Re
 /// How good pictures must be.
 pub(crate) struct Goal {
     /// Those of the source.
-    pub(crate) pictures: Pictures,
+    pub(crate) pictures: ReferencePictures,
     /// How far they may be below those of a frame of which every difference is sent, dB.
     pub(crate) tolerance: f64,
     /// PSNR of each view, dB; from the tolerance.
@@ -85,8 +59,7 @@ impl Goal {
 
     /// By how much pictures are better than they must be, dB, on average over the views.
     fn margin(&self, frame: &GaussianFrame) -> f64 {
-        let margins =
-            self.pictures.psnr(frame).into_iter().zip(&self.least).map(|(psnr, least)| psnr - least);
+        let margins = finite_psnr(&self.pictures, frame).zip(&self.least).map(|(psnr, least)| psnr - least);
         margins.sum::<f64>() / self.least.len().max(1) as f64
     }
 }
@@ -99,7 +72,8 @@ impl Predicted<'_> {
     pub(crate) fn set_judge(&mut self, goal: &mut Goal) -> Result<(), Error> {
         self.from.survivors.judge = Some(Judge::default());
         let everything = self.shown()?;
-        goal.least = goal.pictures.psnr(&everything).iter().map(|psnr| psnr - goal.tolerance).collect();
+        let decibels = finite_psnr(&goal.pictures, &everything);
+        goal.least = decibels.map(|psnr| psnr - goal.tolerance).collect();
         let carried = shown(&self.displaced, self.from.coder.sequence)?;
         self.from.survivors.judge = Some(Judge::new(&self.from.target.frame, &carried, goal));
         goal.level = self.level(goal)?;
@@ -108,6 +82,10 @@ impl Predicted<'_> {
     }
 
     /// The highest level at which pictures are good enough, nearly; or the lowest.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "levels are -17 to 17, and a stride doubles at most as often as it takes to leave them"
+    )]
     fn level(&mut self, goal: &Goal) -> Result<i32, Error> {
         let (low, high) = (*LEVELS.start(), *LEVELS.end());
         let (mut best, mut worst) = (low - 1, high + 1);

@@ -58,6 +58,7 @@ pub(crate) fn weights(network: &Network) -> Result<Weights, Error> {
 }
 
 /// A batch, and for each of its Gaussians the outputs that would leave nothing to code.
+#[expect(clippy::indexing_slicing, reason = "a batch has at most LANES rows")]
 fn sample(batch: Batch, rows: &[Vec<i32>]) -> Sample {
     let outputs = rows.first().map_or(0, Vec::len);
     let mut wanted = vec![[0; LANES]; outputs];

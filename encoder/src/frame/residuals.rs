@@ -1,4 +1,12 @@
 //! What a run of Gaussians shall become, on the output grids, and the residuals that bring it there.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "values and differences on the grid are below 2^26, steps are 1 or more"
+)]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "rows are those of the frame that all planes are of; axes are constants"
+)]
 
 use super::unit::UnitCoder;
 use crate::colour;
@@ -53,9 +61,8 @@ impl Wanted {
         let Geometry { position, log_scale, opacity, rotation } = geometry(frame, sequence);
         let mut wanted = Self { position, log_scale, opacity, rotation, ..Self::default() };
         if coder.has_differences {
-            let mut red_green_blue = fine(&dc_planes, dc_step).into_iter();
-            wanted.dc = [(); 3].map(|()| red_green_blue.next().unwrap_or_default());
-            wanted.sh = fine(&sh_planes, sh_step);
+            wanted.dc = dc_planes.map(|plane| fine(plane, dc_step));
+            wanted.sh = sh_planes.par_iter().map(|plane| fine(plane, sh_step)).collect();
         }
         wanted.components = [dc, sh];
         wanted
@@ -236,12 +243,11 @@ fn scaled_rows(components: &[Vec<f32>], rows: &[u32], exponents: &[u8]) -> Vec<f
     rows.iter().zip(exponents).flat_map(of_row).collect()
 }
 
-/// Planes of colour in parts of a step.
-fn fine(planes: &[&[f32]], step: f32) -> Vec<Vec<i32>> {
+/// A plane of colour in parts of a step.
+fn fine(plane: &[f32], step: f32) -> Vec<i32> {
     let scale = crate::grid::PARTS / step;
     let most = (COMPONENT_RANGE.end() * crate::shape::PARTS) as f32;
-    let value = |&value: &f32| nearest_integer((value * scale).clamp(-most, most));
-    planes.par_iter().map(|plane| plane.iter().map(value).collect()).collect()
+    plane.par_iter().map(|&value| nearest_integer((value * scale).clamp(-most, most))).collect()
 }
 
 /// x / 2^shift to the nearest integer, halves up.

@@ -4,12 +4,12 @@
 //! they show depends on the scene. So the pictures of each predicted frame are compared with its source, as those of the I
 //! frame were, and the price of the next frame follows: nothing is coded twice.
 
-use super::rate_distortion::{Pictures, shown};
+use super::rate_distortion::{finite_psnr, shown};
 use super::survivors::BitPrice;
 use super::{CodedFrame, Target};
 use crate::error::Error;
 use splatstream_format::syntax::SequenceParameters;
-use splatstream_render::Camera;
+use splatstream_render::{Camera, ReferencePictures};
 
 /// Views that are looked at, and their lines: the mean of a few small ones is steady.
 const VIEWS: usize = 3;
@@ -88,8 +88,8 @@ impl Steadiness {
 
     /// PSNR of the pictures of a frame, mean of the views, dB.
     fn psnr(&self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) -> Result<f64, Error> {
-        let views = Pictures::new(&target.frame, self.cameras.clone());
-        let all = views.psnr(&shown(&coded.reference.lists, sequence)?);
-        Ok(all.iter().sum::<f64>() / all.len().max(1) as f64)
+        let views = ReferencePictures::new(&target.frame, self.cameras.clone());
+        let frame = shown(&coded.reference.lists, sequence)?;
+        Ok(finite_psnr(&views, &frame).sum::<f64>() / views.len().max(1) as f64)
     }
 }

@@ -1,4 +1,8 @@
 //! Predicted frames: what becomes of each Gaussian of the reference.
+#![expect(
+    clippy::indexing_slicing,
+    reason = "rows are those of the parents and of the target; attributes and axes are constants"
+)]
 
 use super::Target;
 use super::axis_matching::{Namings, Pose};
@@ -159,6 +163,7 @@ pub(crate) struct Survivors<'a> {
 
 impl Survivors<'_> {
     /// The fates of parents, of which the first is that with index `start` of the reference.
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of attributes; steps are 1 or more")]
     pub(crate) fn fates(&self, parents: Parents<'_>, start: usize, partner: &[Option<u32>]) -> Vec<Fate> {
         let fate = |(row, partner): (usize, &Option<u32>)| match *partner {
             Some(index) => self.fate(parents, row, index),
@@ -226,6 +231,7 @@ impl Survivors<'_> {
 
     /// How far a Gaussian is from its partner. Pictures show what fractions are rounded to; who goes by attributes
     /// lets a fraction be, which motion has brought.
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of attributes; steps are 1 or more")]
     fn apart(&self, parents: Parents<'_>, row: usize, index: usize) -> Apart {
         let (scale_step, turn_step) = (self.sequence.log_scale_step(), self.sequence.rotation_step());
         let Parents { list, rule, position_shift, .. } = parents;
@@ -363,6 +369,7 @@ struct Update {
 
 impl Update {
     /// Adds the residual of a difference in steps of the sequence.
+    #[expect(clippy::arithmetic_side_effects, reason = "counts of attributes; steps are 1 or more")]
     fn add(&mut self, change: f32, exponent: u8) {
         let step = step(exponent);
         let apart = change / step as f32;

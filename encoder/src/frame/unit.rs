@@ -161,6 +161,10 @@ impl UnitCoder<'_> {
     ///
     /// # Errors
     /// A value that no token codes, a header that a decoder would refuse.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "lengths of what is in memory; NEW_PER_BYTE is a small constant"
+    )]
     pub(crate) fn code(
         &self,
         draft: &Draft,
@@ -243,6 +247,10 @@ impl UnitCoder<'_> {
 }
 
 /// Bytes of the models and blocks of sections.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "lengths of what is in memory; NEW_PER_BYTE is a small constant"
+)]
 fn length(sections: &[SectionBytes]) -> usize {
     let bytes =
         |section: &SectionBytes| section.model.len() + section.blocks.iter().map(Vec::len).sum::<usize>();

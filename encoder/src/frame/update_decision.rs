@@ -3,6 +3,7 @@
 //! Each difference has an error that pictures show if it is left, [estimated](super::visible_difference) from the source frame as
 //! the cameras in use see it, and a number of bits that it takes. It is sent where the error is above the price of the
 //! bits. The [price](super::rate_distortion) is as high as the pictures of the frame allow.
+#![expect(clippy::arithmetic_side_effects, reason = "lengths of what is in memory; steps are clamped")]
 
 use super::rate_distortion::Goal;
 use super::survivors::{Apart, Kept, Survivors};
@@ -58,7 +59,7 @@ impl Judge {
     /// For a source frame and what the cells bring into it. The errors of each view count as shares of the error that
     /// it may have: so many decibels are worth as much in any view.
     pub(crate) fn new(frame: &GaussianFrame, displaced: &GaussianFrame, goal: &Goal) -> Self {
-        let cameras = goal.pictures.cameras();
+        let cameras = goal.pictures.cameras().cloned().collect::<Vec<_>>();
         let mut seen: Vec<Seen> = (0..frame.len())
             .map(|row| Seen { loss: 0.0, energy: 0.0, pixel: pixel(frame, row, &cameras) })
             .collect();
@@ -113,6 +114,10 @@ impl Judge {
     }
 
     /// The entry of the codebook of SH residuals that is the best bargain, and what it wins over none, which is entry 0.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "attributes and axes are constants; rows and entries are counted by what they index"
+    )]
     fn entry(&self, book: &Codebook, apart: &Apart, terms: &[Term]) -> (i32, f32) {
         let entry = Survivors::nearest_entry(book, apart);
         let values = book.entries[entry as usize * terms.len()..].iter().map(|&value| f32::from(value));
@@ -161,6 +166,10 @@ fn spread(steps: &[f32; 3], error: f32) -> [Term; 3] {
 }
 
 /// All differences of attributes, in the steps that they are coded with.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "attributes and axes are constants; rows and entries are counted by what they index"
+)]
 fn terms(survivors: &Survivors<'_>, apart: &Apart, shown: &Shown) -> Vec<Term> {
     let sequence = survivors.sequence;
     let changes = &apart.attributes;
@@ -192,6 +201,10 @@ fn bits(steps: i32) -> f32 {
 }
 
 /// The side of a pixel at the place of a Gaussian, scene units; the mean of the cameras.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "attributes and axes are constants; rows and entries are counted by what they index"
+)]
 fn pixel(frame: &GaussianFrame, row: usize, cameras: &[Camera]) -> f32 {
     let side = |camera: &Camera| {
         let apart = [0, 1, 2].map(|axis: usize| frame.position()[axis][row] - camera.position[axis]);

@@ -3,6 +3,7 @@
 //! A Gaussian that is taken away changes the pictures by its [loss](splatstream_render::contribution::Worth::loss). One that moves, grows or turns a
 //! little changes them by a part of that: the part of its own square that the difference of two bells has. Its colour
 //! changes them by the square of the change times its [energy](splatstream_render::contribution::Worth::energy).
+#![expect(clippy::indexing_slicing, reason = "axes are 0, 1 and 2")]
 
 use super::axis_matching::Pose;
 use crate::canonical::product;
@@ -73,6 +74,7 @@ impl Shown {
     }
 
     /// Of another rotation.
+    #[expect(clippy::arithmetic_side_effects, reason = "axes are 0, 1 and 2")]
     pub(crate) fn turned(&self, rotation: [f32; 4]) -> f32 {
         let [w, x, y, z] = self.rotation;
         let [_, x, y, z] = product([w, -x, -y, -z], rotation);

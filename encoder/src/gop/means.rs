@@ -4,7 +4,7 @@ use super::{Gop, SequenceCoder};
 use crate::colour;
 use crate::frame::cells::ReferenceCloud;
 use crate::frame::predictors::Chooser;
-use crate::frame::rate_distortion::{Goal, Pictures};
+use crate::frame::rate_distortion::Goal;
 use crate::frame::steadiness::Steadiness;
 use crate::frame::survivors::{BitPrice, Survivors};
 use crate::frame::unit::{Grains, UnitCoder};
@@ -18,6 +18,7 @@ use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::Profile;
+use splatstream_render::ReferencePictures;
 
 /// Pairs on which coefficients and a codebook of SH residuals are compared, and on which the codebook is trained.
 const TRIAL: usize = 1 << 13;
@@ -90,7 +91,7 @@ impl SequenceCoder<'_, '_> {
         }
         let cameras = self.ranking.cameras(&target.frame).to_vec();
         Some(Goal {
-            pictures: Pictures::new(&target.frame, cameras),
+            pictures: ReferencePictures::new(&target.frame, cameras),
             tolerance: f64::from(self.settings.tolerance),
             least: Vec::new(),
             level: gop.price_level,
@@ -99,6 +100,14 @@ impl SequenceCoder<'_, '_> {
 
     /// The codebook of the SH residuals of a frame, where a codebook serves them better than coefficients. Only a
     /// GOP whose I frame has a codebook has them: a new Gaussian takes an entry of each.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "an entry of a codebook has `rank` values, and there is one or more"
+    )]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "lengths of what is in memory; a rank is 1 or more, temporal layers are at most 3"
+    )]
     pub(super) fn residual_book(
         &self,
         gop: &Gop,

@@ -1,4 +1,9 @@
 //! Pairs by place and attributes.
+#![expect(clippy::arithmetic_side_effects, reason = "positions in lists in memory and levels of 0 to 20")]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "rows are those of the clouds; cells are found by their codes in sorted lists"
+)]
 
 use super::{Cloud, Measure};
 use rayon::prelude::*;

@@ -4,6 +4,11 @@
 //! keeps its number. Whether a file is of that kind is seen from pairs that are hardly mistaken: the longest run of
 //! them whose rows grow in both files holds nearly all of them, while of rows in another order it holds few. What lies
 //! between two of the run is then aligned as texts are: in order, for the fewest bits.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "places in the two lists, whose product is at most MOST_PAIRS"
+)]
+#![expect(clippy::indexing_slicing, reason = "places in the two lists and in the table of their lengths")]
 
 use super::nearest::{Feature, apart_bits, features};
 use super::{Cloud, Kind, Matching, Measure};

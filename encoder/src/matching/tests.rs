@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
 
 use super::*;
-use crate::random::Random;
 use crate::settings::Quality;
+use splatstream_gaussians::random::SplitMix64;
 
 /// A frame for tests: 1,000 grid steps wide, sizes of 4 steps and more, one grid step to the scene unit.
 #[derive(Clone, Default)]
@@ -16,7 +16,7 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn random(count: usize, seed: u64) -> Self {
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         let mut scene = Self::default();
         for _ in 0..count {
             scene.position.iter_mut().for_each(|plane| plane.push(1000.0 + 1000.0 * random.unit() as f32));
@@ -54,7 +54,7 @@ impl Scene {
 
     /// Everything a little different, from a row on.
     pub(crate) fn noisy(mut self, first: usize, seed: u64) -> Self {
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         let noise = [0.2, 0.2, 0.2, 0.05, 0.05, 0.05, 0.08, 0.04, 0.04, 0.04];
         for (plane, noise) in self.planes().into_iter().zip(noise) {
             plane[first..].iter_mut().for_each(|value| *value += noise * random.signed());
@@ -76,8 +76,8 @@ pub(crate) fn measure() -> Measure {
 
 /// 0 to `count` in an order that has nothing to do with it; the prefix keeps its place.
 pub(crate) fn shuffled(prefix: usize, count: usize, seed: u64) -> Vec<usize> {
-    let mut random = Random(seed);
-    let mut keyed: Vec<(u64, usize)> = (prefix..count).map(|row| (random.next(), row)).collect();
+    let mut random = SplitMix64::new(seed);
+    let mut keyed: Vec<(u64, usize)> = (prefix..count).map(|row| (random.bits(), row)).collect();
     keyed.sort_unstable();
     (0..prefix).chain(keyed.into_iter().map(|(_, row)| row)).collect()
 }

@@ -1,4 +1,8 @@
 //! The cells worth listing at one size, and what they cost.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "values of cells are clamped to the ranges of clause 6, codes rise"
+)]
 
 use super::rigid::{Point, Vector, minus, plus, rotated};
 use super::tree::{Node, Tree, centre};
@@ -61,6 +65,10 @@ impl Coded {
     }
 
     /// Components that are nearly those of the cell before become them.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "ranges of nodes lie in the list of points; axes are constants"
+    )]
     fn snapped(&self, before: &Self, size: f64) -> Self {
         let rotation_tolerance = (UNSEEN * ROTATION / size) as i32;
         let translation_tolerance = (UNSEEN * TRANSLATION) as i32;
@@ -132,6 +140,7 @@ pub(super) fn listing(tree: &Tree) -> Listing {
 }
 
 /// The cheapest of: standing still, shifting, rotating and shifting, each also nearly or wholly as the cell before.
+#[expect(clippy::indexing_slicing, reason = "ranges of nodes lie in the list of points; axes are constants")]
 fn chosen(tree: &Tree, node: &Node, before: &Coded) -> Coded {
     let centre = centre(node.index, tree.cell_log2);
     let size = (1_u64 << tree.cell_log2) as f64;
@@ -226,6 +235,7 @@ pub(super) fn list_bits(cells: &[Cell]) -> f64 {
 }
 
 /// Bits of modes and moves that bring all points to their places, estimated from some.
+#[expect(clippy::indexing_slicing, reason = "ranges of nodes lie in the list of points; axes are constants")]
 fn all_move_bits(tree: &Tree, moves: &[Coded]) -> f64 {
     let step = tree.points.len().div_ceil(ESTIMATED).max(1);
     let mut tallies: [Tally; 3] = core::array::from_fn(|_| Tally::default());

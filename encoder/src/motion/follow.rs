@@ -70,6 +70,8 @@ pub(super) fn points(reference: &Cloud<'_>, target: &Cloud<'_>, links: &[Link]) 
 }
 
 /// Where the reference's Gaussians are if they move as the points about them.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the cloud; ranges of nodes lie in the list")]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of points; parts are constants")]
 fn expected_places(reference: &Cloud<'_>, points: &[Point], position_bits: u8) -> [Vec<f32>; 3] {
     let all: Vec<Vector> =
         (0..reference.len() as u32).map(|index| reference.at(index).map(f64::from)).collect();
@@ -90,6 +92,8 @@ fn expected_places(reference: &Cloud<'_>, points: &[Point], position_bits: u8) -
 }
 
 /// One in `part` of these, those that cover most.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the cloud; ranges of nodes lie in the list")]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of points; parts are constants")]
 pub(super) fn largest(cloud: &Cloud<'_>, indices: &[u32], part: usize) -> Vec<u32> {
     let mut ranked: Vec<(f32, u32)> = indices.iter().map(|&index| (-cloud.coverage(index), index)).collect();
     ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -98,6 +102,7 @@ pub(super) fn largest(cloud: &Cloud<'_>, indices: &[u32], part: usize) -> Vec<u3
 }
 
 /// The largest side of the box that holds the inner 90 % on each axis, grid steps.
+#[expect(clippy::arithmetic_side_effects, reason = "counts of points; parts are constants")]
 fn side(cloud: &Cloud<'_>) -> f32 {
     let of_axis = |plane: &[f32]| {
         let mut values = plane.to_vec();

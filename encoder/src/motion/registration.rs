@@ -56,6 +56,7 @@ pub(super) fn registered(
 }
 
 /// A reference shifted and scaled so that median and spread of these of its Gaussians are those of the target's.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the clouds; axes are constants")]
 fn overlaid(mut places: Places, target: &Cloud<'_>, (from, to): (&[u32], &[u32])) -> Places {
     let shape = |planes: [&[f32]; 3], indices: &[u32]| -> (Vector, f64) {
         let at = |index: u32| planes.map(|plane| f64::from(plane[index as usize]));
@@ -72,6 +73,7 @@ fn overlaid(mut places: Places, target: &Cloud<'_>, (from, to): (&[u32], &[u32])
 }
 
 /// Corrects places by a similarity that brings points to where they went.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the clouds; axes are constants")]
 fn correct(places: &mut Places, points: &[Point], side: f64) {
     let motion = Rigid::STILL.refined(points, side);
     let middle = [0, 1, 2].map(|axis: usize| median(points.iter().map(|point| point.from[axis]).collect()));

@@ -118,6 +118,7 @@ impl Rigid {
 }
 
 /// Weights by the distance from the median: 1, down to 1/25 at four times the median distance.
+#[expect(clippy::indexing_slicing, reason = "rows, columns and axes are 0, 1 and 2")]
 fn weighted(left: &[(Vector, Vector)]) -> Vec<(f64, Vector, Vector)> {
     let step = left.len().div_ceil(MEDIAN);
     let middle = [0, 1, 2].map(|axis: usize| median(left.iter().step_by(step).map(|(_, rest)| rest[axis])));
@@ -140,6 +141,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The rotation about `pivot` that leaves least, half its angle as the vector part of a quaternion.
+#[expect(clippy::indexing_slicing, reason = "rows, columns and axes are 0, 1 and 2")]
 fn small_turn(weighted: &[(f64, Vector, Vector)], pivot: Vector, shift: Vector, prior: f64) -> Vector {
     let mut inertia = [[prior, 0.0, 0.0], [0.0, prior, 0.0], [0.0, 0.0, prior]];
     let mut moment = [0.0; 3];

@@ -26,6 +26,7 @@ pub(crate) struct Held<'a> {
 }
 
 /// Codes of the cells, increasing, in which most of what is carried has no partner in the target, or one elsewhere.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the matching; axes are constants")]
 pub(crate) fn stale_cells(
     motion: &CellMotion,
     held: &Held<'_>,

@@ -6,17 +6,17 @@ use super::*;
 use crate::grid::PositionGrid;
 use crate::matching::tests::{Scene, measure, shuffled};
 use crate::matching::{Cloud, Kind, Matching, Measure, shares_little};
-use crate::random::Random;
 use crate::settings::{Quality, Settings};
 use splatstream_files::{ReadLimits, read_scene};
 use splatstream_gaussians::GaussianFrame;
+use splatstream_gaussians::random::SplitMix64;
 use std::path::Path;
 
 const BITS: u8 = 12;
 
 /// Pairs on the walls of a box of 2,000 steps, moved by `motion`.
 fn pairs(count: usize, motion: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<Pair> {
-    let mut random = Random(1);
+    let mut random = SplitMix64::new(1);
     (0..count)
         .map(|index| {
             let mut from = [0; 3].map(|_: i32| ((1000.0 + 2000.0 * random.unit()) * 64.0) as i32);
@@ -81,7 +81,7 @@ fn what_stands_still_is_not_listed() {
 
 #[test]
 fn noise_is_no_motion() {
-    let mut random = Random(2);
+    let mut random = SplitMix64::new(2);
     let mut pairs = pairs(10_000, |index| index);
     pairs.iter_mut().flat_map(|pair| &mut pair.to).for_each(|value| *value += 0.4 * random.signed());
     assert_eq!(cell_motion(&pairs, &[], BITS).cells, []);
@@ -89,7 +89,7 @@ fn noise_is_no_motion() {
 
 #[test]
 fn mistaken_pairs_do_not_pull() {
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     let mut pairs = pairs(10_000, |[x, y, z]| [x + 12.0, y, z]);
     for pair in pairs.iter_mut().step_by(10) {
         pair.to = pair.to.map(|value| value + 100.0 * random.signed());

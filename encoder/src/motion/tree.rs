@@ -44,6 +44,10 @@ fn sorted(positions: impl Iterator<Item = Vector>) -> Vec<(u64, u32)> {
 
 impl Tree {
     /// One cell that holds everything.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "ranges of nodes lie in the lists of points and codes; axes are constants"
+    )]
     pub(super) fn new(points: &[Point], others: &[Vector], position_bits: u8) -> Self {
         let [first, second] = [sorted(points.iter().map(|point| point.from)), sorted(others.iter().copied())];
         let points: Vec<Point> = first.iter().map(|&(_, index)| points[index as usize]).collect();
@@ -71,6 +75,14 @@ impl Tree {
         self.fit();
     }
 
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "ranges of nodes lie in the lists of points and codes; axes are constants"
+    )]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "places in lists in memory; indices of cells have at most 20 bits"
+    )]
     fn parts(&self, node: &Node) -> Vec<Node> {
         let end = |list: usize, range: &Range<usize>, part: u64| {
             let codes = &self.codes[list][range.clone()];
@@ -93,6 +105,10 @@ impl Tree {
         parts
     }
 
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "ranges of nodes lie in the lists of points and codes; axes are constants"
+    )]
     fn fit(&mut self) {
         let size = (1_u64 << self.cell_log2) as f64;
         for node in &mut self.nodes {

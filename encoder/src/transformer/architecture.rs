@@ -72,6 +72,7 @@ impl Architecture {
     ///
     /// # Errors
     /// What 6.17.1 does not allow.
+    #[expect(clippy::arithmetic_side_effects, reason = "constants of a few bits")]
     pub fn header(&self) -> Result<NetworkHeader> {
         let logit = 5 + self.width_log2.min(6) / 2;
         let header = NetworkHeader {

@@ -1,4 +1,8 @@
 //! SS-TR-005, forwards and backwards.
+#![expect(
+    clippy::indexing_slicing,
+    reason = "rows and neighbours are counted by the trace; tables have an entry for each index that is made"
+)]
 
 use super::backward::Gradient;
 use super::lane::{
@@ -17,6 +21,10 @@ const ALL: f32 = 256.0;
 
 impl Model<'_> {
     #[inline(always)]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "products of counts that the trace was made with; attention is below 2^26"
+    )]
     pub(super) fn attend<A: Arithmetic>(&self, trace: &mut Trace<'_>) {
         let (width, neighbours) = (self.width(), trace.batch.neighbours());
         self.layer(Part::Attention, &trace.row, &mut trace.u, trace.rows);
@@ -161,6 +169,10 @@ pub(super) fn indices(trace: &Trace<'_>, (m, j): (usize, usize), axis: usize) ->
 
 /// Logits become shares, Q8.
 #[inline(always)]
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "products of counts that the trace was made with; attention is below 2^26"
+)]
 fn softmax<A: Arithmetic>(logits: &mut [Lane]) {
     let mut largest = [f32::NEG_INFINITY; LANES];
     for logit in logits.iter() {

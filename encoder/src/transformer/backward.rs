@@ -2,6 +2,8 @@
 //!
 //! Rounding passes slopes on as if it were not there, and a clamp that acts passes none. The softmax has the slope of
 //! its exponential.
+#![expect(clippy::arithmetic_side_effects, reason = "products of counts that the trace was made with")]
+#![expect(clippy::indexing_slicing, reason = "ranges are those of the layout that the lanes were made with")]
 
 use super::attention::indices;
 use super::lane::{

@@ -63,6 +63,7 @@ impl Descent {
         }
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of steps")]
     fn next_rate(&mut self) -> f32 {
         let part = self.done as f64 / self.steps as f64;
         self.done += 1;

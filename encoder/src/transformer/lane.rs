@@ -118,12 +118,22 @@ pub(super) fn total(lane: &Lane) -> f32 {
 
 /// Place `at` of values in rows of `width`.
 #[inline(always)]
+#[expect(
+    clippy::arithmetic_side_effects,
+    clippy::indexing_slicing,
+    reason = "rows are counted by what they are cut from"
+)]
 pub(super) fn row(values: &[Lane], width: usize, at: usize) -> &[Lane] {
     &values[at * width..(at + 1) * width]
 }
 
 /// As [`row`].
 #[inline(always)]
+#[expect(
+    clippy::arithmetic_side_effects,
+    clippy::indexing_slicing,
+    reason = "rows are counted by what they are cut from"
+)]
 pub(super) fn row_mut(values: &mut [Lane], width: usize, at: usize) -> &mut [Lane] {
     &mut values[at * width..(at + 1) * width]
 }

@@ -60,6 +60,7 @@ impl Loss {
     }
 
     /// Adds another.
+    #[expect(clippy::arithmetic_side_effects, reason = "sums of outputs of 32 bits over samples in memory")]
     pub(super) fn add(&mut self, other: &Self) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| *sum += other);
         self.count += other.count;
@@ -71,6 +72,7 @@ impl Loss {
     }
 
     /// Adds the distances of the outputs of a sample.
+    #[expect(clippy::arithmetic_side_effects, reason = "sums of outputs of 32 bits over samples in memory")]
     fn compare<'o>(&mut self, sample: &Sample, outputs: impl Iterator<Item = &'o [i32]>) {
         for ((sum, wanted), outputs) in self.sums.iter_mut().zip(&sample.wanted).zip(outputs) {
             let apart = wanted.iter().zip(outputs).take(sample.used);

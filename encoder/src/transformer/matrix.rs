@@ -2,6 +2,10 @@
 //!
 //! Each product is compiled for the vectors of the machine on its own. No product of numbers is fused with a sum:
 //! every machine gives the same slopes.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "products of rows, columns and vectors of what is in memory"
+)]
 
 use super::lane::Lane;
 use pulp::{Arch, Simd, WithSimd};
@@ -52,6 +56,10 @@ impl WithSimd for Product<'_> {
     type Output = ();
 
     #[inline(always)]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "a matrix has rows times columns weights, and lanes are whole vectors"
+    )]
     fn with_simd<S: Simd>(self, simd: S) {
         let vectors = LANES / S::F32_LANES;
         let (x, _) = S::as_simd_f32s(self.x.as_flattened());
@@ -117,6 +125,10 @@ impl WithSimd for Outer<'_> {
 impl Outer<'_> {
     /// The weights of `N` rows from `first` on.
     #[inline(always)]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "a matrix has rows times columns weights, and lanes are whole vectors"
+    )]
     fn block<S: Simd, const N: usize>(&mut self, simd: S, first: usize) {
         let vectors = LANES / S::F32_LANES;
         let (slopes, _) = S::as_simd_f32s(self.slopes.as_flattened());

@@ -1,4 +1,6 @@
 //! SS-TR-003 to SS-TR-008 for the Gaussians of a batch, with everything on the way kept for the slopes.
+#![expect(clippy::arithmetic_side_effects, reason = "products of counts of the header, each of eight bits")]
+#![expect(clippy::indexing_slicing, reason = "ranges are those of the layout that the values were made with")]
 
 use super::lane::{
     Arithmetic, Lane, ZERO, act, add_product, add_rows, clamp, join, mean, round, row, row_mut,

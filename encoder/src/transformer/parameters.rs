@@ -1,10 +1,11 @@
 //! The parameters of a network, one after the other in the order of 6.17.2, as numbers that can change a little.
+#![expect(clippy::indexing_slicing, reason = "ranges are those of the layout that the values were made with")]
 
-use crate::random::Random;
 use splatstream_decoder::transformer::sine;
 use splatstream_format::Result;
 use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::NetworkHeader;
+use splatstream_gaussians::random::SplitMix64;
 use std::ops::Range;
 
 /// Differences of relative positions: -254 to 254.
@@ -25,6 +26,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
+    #[expect(clippy::arithmetic_side_effects, reason = "sums of counts of the header")]
     pub(super) fn new(header: NetworkHeader) -> Self {
         let mut length = 0;
         let mut next = |count: usize| {
@@ -89,7 +91,7 @@ impl Layout {
     /// room to become larger and steps enough to be fine. The head is zero: an untrained network is its
     /// base.
     pub(super) fn initial(&self, seed: u64) -> Vec<f32> {
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         let mut values = vec![0.0; self.length];
         let root = libm::sqrtf(self.header.width() as f32);
         for (part, range) in Part::ALL.into_iter().zip(&self.weights) {
@@ -155,6 +157,7 @@ impl Layout {
 /// clamp at four times as much is rare and rounding is a small part.
 const ACTIVE: f32 = 32.0;
 
+#[expect(clippy::arithmetic_side_effects, reason = "sums of counts of the header")]
 fn sines(difference: i32) -> Sines {
     let mut out = [0.0; 8];
     for (frequency, pair) in out.chunks_exact_mut(2).enumerate() {

@@ -8,10 +8,10 @@ use super::lane::Whole;
 use super::model::Model;
 use super::parameters::Layout;
 use super::{Architecture, Sample};
-use crate::random::Random;
 use splatstream_decoder::transformer::batch::Seen;
 use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, scalar};
 use splatstream_format::syntax::NetworkHeader;
+use splatstream_gaussians::random::SplitMix64;
 
 /// Nothing that can be left out.
 const BARE: Architecture = Architecture {
@@ -59,35 +59,34 @@ fn variants() -> Vec<(&'static str, Architecture)> {
     ]
 }
 
-impl Random {
-    /// From `-reach` to `reach`.
-    fn within(&mut self, reach: i32) -> i32 {
-        self.below(2 * reach as usize + 1) as i32 - reach
-    }
+/// From `-reach` to `reach`.
+fn within(random: &mut SplitMix64, reach: i32) -> i32 {
+    random.below(2 * reach as usize + 1) as i32 - reach
 }
 
 /// A batch of anything.
-fn any_batch(header: &NetworkHeader, neighbours: usize, random: &mut Random) -> Batch {
+fn any_batch(header: &NetworkHeader, neighbours: usize, random: &mut SplitMix64) -> Batch {
     let mut batch = Batch::new(header, neighbours);
     for lane in 0..LANES {
         for neighbour in 0..neighbours {
             let components: Vec<i64> = (0..header.outputs())
-                .map(|_| i64::from(random.within(90)) << (12 + header.token_shift))
+                .map(|_| i64::from(within(random, 90)) << (12 + header.token_shift))
                 .collect();
-            let geometry = [(); 7].map(|()| random.within(40));
+            let geometry = [(); 7].map(|()| within(random, 40));
             let (affinity, distance) = (4096 - random.below(2000) as i64, 10 * neighbour as u64 + 5);
             let seen = Seen { components: &components, geometry, affinity, distance, ..Seen::default() };
             batch.set_token(header, (lane, neighbour), &seen, 10 * neighbours as u64);
         }
-        let offsets: Vec<[i32; 3]> = (0..neighbours).map(|_| [(); 3].map(|()| random.within(1000))).collect();
+        let offsets: Vec<[i32; 3]> =
+            (0..neighbours).map(|_| [(); 3].map(|()| within(random, 1000))).collect();
         batch.set_near(lane, &offsets);
     }
     batch
 }
 
 /// Parameters of about the size that training gives them; `spread` times as much.
-fn any_parameters(layout: &Layout, spread: f32, random: &mut Random) -> Vec<f32> {
-    let mut parameters = layout.initial(random.next());
+fn any_parameters(layout: &Layout, spread: f32, random: &mut SplitMix64) -> Vec<f32> {
+    let mut parameters = layout.initial(random.bits());
     for (value, scale) in parameters.iter_mut().zip(layout.scales()) {
         *value = spread * (*value + 12.0 * scale * random.signed());
     }
@@ -97,7 +96,7 @@ fn any_parameters(layout: &Layout, spread: f32, random: &mut Random) -> Vec<f32>
 
 #[test]
 fn the_pass_forwards_is_the_network_of_the_decoder() {
-    let mut random = Random(1);
+    let mut random = SplitMix64::new(1);
     for (name, architecture) in variants() {
         let layout = Layout::new(architecture.header().unwrap());
         for (spread, neighbours) in [(1.0, 8), (4.0, 3), (1.0, 1), (0.5, 16)] {
@@ -121,7 +120,7 @@ fn the_pass_forwards_is_the_network_of_the_decoder() {
 fn parameters_of_a_network_are_those_it_was_made_of() {
     for (name, architecture) in variants() {
         let layout = Layout::new(architecture.header().unwrap());
-        let network = layout.network(&any_parameters(&layout, 2.0, &mut Random(3))).unwrap();
+        let network = layout.network(&any_parameters(&layout, 2.0, &mut SplitMix64::new(3))).unwrap();
         assert_eq!(layout.network(&layout.of(&network)).unwrap(), network, "{name}");
         assert_eq!(Architecture::from(network.header), architecture);
     }

@@ -10,6 +10,7 @@ use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_encoder::{Report, Settings, encode};
 use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_format::Limits;
+use splatstream_gaussians::random::SplitMix64;
 use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
 use std::ops::ControlFlow;
 
@@ -64,16 +65,16 @@ pub(crate) fn planes(bytes: &[u8]) -> Vec<QuantizedFrame> {
     frames.into_iter().map(|frame| frame.planes).collect()
 }
 
-/// splitmix64: the same mutations on every machine.
-pub(crate) struct Random(pub(crate) u64);
+/// The same mutations on every machine.
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
+    }
+
     pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        bits ^ (bits >> 31)
+        self.0.bits()
     }
 
     pub(crate) fn below(&mut self, bound: usize) -> usize {

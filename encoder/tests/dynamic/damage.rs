@@ -39,7 +39,7 @@ fn random_damages_are_detected_or_harmless() {
     for (spatial_layers, seed) in [(1, 11), (2, 12)] {
         let bytes = small_stream(spatial_layers);
         let whole = Whole::new(&bytes);
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         for round in 0..250 {
             let mut damaged = random.mutated(&bytes);
             if round % 2 == 1 && !damaged.is_empty() {
@@ -54,7 +54,7 @@ fn random_damages_are_detected_or_harmless() {
 #[test]
 fn units_made_wrong_on_purpose_never_panic() {
     let limits = Limits { max_gaussians: 1 << 12, ..Limits::default() };
-    let mut random = Random(13);
+    let mut random = Random::new(13);
     for spatial_layers in [1, 2] {
         let bytes = small_stream(spatial_layers);
         let whole = Whole::new(&bytes);

@@ -188,7 +188,7 @@ fn predicted_frames_are_within_one_and_a_half_steps_of_the_source() {
 /// A network that nobody has trained: whatever it says, residuals make up for it.
 fn any_network() -> Network {
     let header = Architecture { dc_count: 3, sh_count: 9, ..Architecture::default() }.header().unwrap();
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let layers = Part::ALL.map(|part| {
         let (weights, biases) = part.lengths(&header);
         Layer {

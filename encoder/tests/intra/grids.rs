@@ -30,7 +30,7 @@ enum Kind {
 }
 
 fn frame(kind: Kind, count: usize, sh_degree: u8, seed: u64) -> GaussianFrame {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut unit = || (random.next() >> 40) as f32 / (1 << 24) as f32;
     let mut plane =
         |low: f32, high: f32| -> Vec<f32> { (0..count).map(|_| low + (high - low) * unit()).collect() };

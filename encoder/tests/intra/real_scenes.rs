@@ -32,7 +32,7 @@ fn survives(file: &str, most_bpg: f64) {
     for pool in &pools {
         assert_eq!(pool.install(|| digests(&bytes)), (report.digests.clone(), None), "{file}");
     }
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for round in 0..130 {
         let damaged = random.mutated(&bytes);
         if let (found, None) = digests(&damaged) {

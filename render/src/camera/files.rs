@@ -169,6 +169,7 @@ fn stem(path: &str) -> Option<String> {
     Some(Path::new(path).file_stem()?.to_str()?.to_owned())
 }
 
+#[expect(clippy::indexing_slicing, reason = "columns are 0, 1 and 2")]
 fn transposed(rows: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
     [0, 1, 2].map(|column| rows.map(|row| row[column]))
 }

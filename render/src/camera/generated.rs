@@ -1,4 +1,8 @@
 //! Cameras for a scene that comes without.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "vectors of floats; counts of cameras and of Gaussians in memory"
+)]
 
 use super::Camera;
 use glam::{Quat, Vec3};
@@ -123,6 +127,7 @@ impl Subject {
     /// The box of what is visible, less 3 % at either end of each axis: stray Gaussians do not push the cameras
     /// away. Where that box is more than four times as large as that of the inner 60 %, the scene has
     /// surroundings, and the inner box is the subject; and so on to the inner 30 %.
+    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
     fn of(frame: &GaussianFrame, up: Up) -> Self {
         let shown = |row: &usize| frame.opacity_logit()[*row] > VISIBLE_LOGIT;
         let mut rows: Vec<usize> = (0..frame.len()).filter(shown).collect();

@@ -45,6 +45,7 @@ impl Mask {
 /// # Panics
 /// If the sizes differ.
 #[must_use]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of pixels of a picture in memory")]
 pub fn psnr(reference: &Image, image: &Image) -> f64 {
     let sum = total(reference, image, |difference, _| squares(difference).iter().sum());
     decibel(sum / (3 * reference.pixels().len()) as f64)
@@ -55,6 +56,8 @@ pub fn psnr(reference: &Image, image: &Image) -> f64 {
 /// # Panics
 /// If the sizes differ.
 #[must_use]
+#[expect(clippy::indexing_slicing, reason = "components are 0, 1 and 2; a mask is as large as its picture")]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of pixels of a picture in memory")]
 pub fn psnr_masked(reference: &Image, image: &Image, mask: &Mask) -> Option<f64> {
     assert_eq!(
         mask.included.len(),
@@ -130,6 +133,8 @@ fn total(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> f6
 }
 
 /// Three sums at once.
+#[expect(clippy::indexing_slicing, reason = "components are 0, 1 and 2; a mask is as large as its picture")]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of pixels of a picture in memory")]
 fn totals(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> [f64; 3] + Sync) -> [f64; 3] {
     assert_same_size(reference, image);
     let width = reference.width();
@@ -149,6 +154,7 @@ fn totals(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> [
     add(sums.into_iter())
 }
 
+#[expect(clippy::indexing_slicing, reason = "components are 0, 1 and 2; a mask is as large as its picture")]
 fn add(terms: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
     terms.fold([0.0; 3], |sum, term| [0, 1, 2].map(|component| sum[component] + term[component]))
 }

@@ -2,6 +2,14 @@
 //!
 //! Source: Wang, Bovik, Sheikh, Simoncelli, "Image quality assessment: from error visibility to structural
 //! similarity", 2004.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "sizes of a picture in memory, which is larger than a window"
+)]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "rows and columns lie within the picture, and windows within rows"
+)]
 
 use super::{Mask, assert_same_size, shown};
 use crate::image::Image;

@@ -101,6 +101,7 @@ impl StLpips {
     }
 
     /// The picture in -1..1, then shifted and scaled as the network was trained.
+    #[expect(clippy::indexing_slicing, reason = "rows and channels lie within the maps")]
     fn input(&self, image: &Image) -> Maps {
         Maps::zero(3, image.height(), image.width()).fill(|channel, map| {
             for (value, &pixel) in map.iter_mut().zip(image.pixels()) {
@@ -111,6 +112,8 @@ impl StLpips {
 }
 
 /// The mean over the pixels of the weighted square distance of features of length 1.
+#[expect(clippy::indexing_slicing, reason = "rows and channels lie within the maps")]
+#[expect(clippy::arithmetic_side_effects, reason = "sizes of maps in memory")]
 fn layer_distance(reference: &Maps, image: &Maps, weights: &[f32]) -> f64 {
     assert_eq!(reference.size(), image.size(), "features of pictures of different sizes are compared");
     let [_, height, width] = reference.size();

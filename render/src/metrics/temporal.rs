@@ -33,6 +33,8 @@ impl Block {
 /// # Panics
 /// If the sizes differ.
 #[must_use]
+#[expect(clippy::indexing_slicing, reason = "blocks cover the picture")]
+#[expect(clippy::arithmetic_side_effects, reason = "pixels and blocks of a picture in memory")]
 pub fn still(before: &Rendering, after: &Rendering) -> Mask {
     let (a, b) = (&before.colour, &after.colour);
     assert_same_size(a, b);

@@ -1,4 +1,6 @@
 //! Gaussians to ellipses in the picture, nearest first.
+#![expect(clippy::arithmetic_side_effects, reason = "vectors of floats; counts of Gaussians in memory")]
+#![expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
 
 use crate::camera::Camera;
 use glam::{Mat3, Vec3};

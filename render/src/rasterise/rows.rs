@@ -1,4 +1,8 @@
 //! Which ellipses touch which tiles.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "rows and tiles of a picture, and counts of what is in memory"
+)]
 
 use super::TILE;
 use super::project::{LOG2_255, Splat};
@@ -21,6 +25,10 @@ pub(crate) struct RowEntries {
 
 impl TileRows {
     /// Sorts the ellipses of a view into rows.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "rows and tiles are cut to the picture before, and entries are counted before they are placed"
+    )]
     pub(crate) fn new(splats: &[Splat], camera: &Camera) -> Self {
         let count = (camera.height as usize).div_ceil(TILE);
         let mut rows = vec![Vec::new(); count];
@@ -51,6 +59,10 @@ impl TileRows {
 
     /// Sorts the ellipses of a row into its tiles.
     #[inline(always)]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "rows and tiles are cut to the picture before, and entries are counted before they are placed"
+    )]
     pub(crate) fn entries(&self, row: usize, splats: &[Splat]) -> RowEntries {
         let tiles = self.size[0].div_ceil(TILE);
         let top = (row * TILE) as f32 + 0.5;
@@ -116,6 +128,10 @@ impl RowEntries {
     }
 
     /// The ellipses of a tile, nearest first.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "rows and tiles are cut to the picture before, and entries are counted before they are placed"
+    )]
     pub(crate) fn of_tile(&self, column: usize) -> &[u32] {
         &self.entries[self.starts[column] as usize..self.starts[column + 1] as usize]
     }

@@ -33,6 +33,7 @@ pub(crate) struct Tile {
 
 impl Tile {
     /// The tile at a row and column, with all light passing where the picture is and none outside.
+    #[expect(clippy::arithmetic_side_effects, reason = "places within a picture in memory")]
     pub(crate) fn new(row: usize, column: usize, [width, height]: [usize; 2]) -> Self {
         let (left, top) = (column * TILE, row * TILE);
         let light = |inside: bool| if inside { 1.0 } else { 0.0 };
@@ -60,6 +61,10 @@ impl Tile {
 
 /// Blends the ellipses at `entries`, nearest first, until no light passes.
 #[inline(always)]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "lines and lanes are those of a tile; places are those of the splats"
+)]
 pub(crate) fn blend_tile(splats: &[Splat], entries: &[u32], tile: &mut Tile, blend: &mut impl Blend) {
     for (entry, &place) in entries.iter().enumerate() {
         if entry % TILE == TILE - 1 && tile.finished() {
@@ -85,6 +90,10 @@ pub(crate) fn blend_tile(splats: &[Splat], entries: &[u32], tile: &mut Tile, ble
 
 /// Takes the light that a Gaussian stops on one line; returns transmittance times alpha.
 #[inline(always)]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "lines and lanes are those of a tile; places are those of the splats"
+)]
 fn blend_line(splat: &Splat, origin: [f32; 2], line: usize, passing: &mut Lanes) -> Lanes {
     let dy = origin[1] + line as f32 - splat.centre[1];
     let along = origin[0] - splat.centre[0] + splat.skew * dy;

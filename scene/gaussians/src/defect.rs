@@ -65,8 +65,8 @@ impl GaussianFrame {
     /// The first bad value of the first bad plane: position, DC, SH, opacity, scale, rotation.
     pub fn validate(&self) -> Result<(), Defect> {
         for (property, plane) in self.planes().named(self.sh_degree()) {
-            if let Some(row) = plane.iter().position(|value| !value.is_finite()) {
-                return Err(Defect { row, property, kind: DefectKind::NotFinite, value: plane[row] });
+            if let Some((row, &value)) = plane.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+                return Err(Defect { row, property, kind: DefectKind::NotFinite, value });
             }
         }
         match self.zero_rotations().next() {
@@ -84,10 +84,10 @@ impl GaussianFrame {
         let mut is_bad = vec![false; self.len()];
         let mut properties = Vec::new();
         let mut count = |property: String, rows: &mut dyn Iterator<Item = usize>| {
-            let mut found = 0;
+            let mut found = 0_u32;
             for row in rows {
-                is_bad[row] = true;
-                found += 1;
+                is_bad.get_mut(row).into_iter().for_each(|is_bad| *is_bad = true);
+                found = found.saturating_add(1);
             }
             if found > 0 {
                 properties.push((property, found));
@@ -104,7 +104,11 @@ impl GaussianFrame {
 
     /// Gaussians whose quaternion has no direction.
     fn zero_rotations(&self) -> impl Iterator<Item = usize> {
-        (0..self.len()).filter(|&row| self.rotation().iter().all(|plane| plane[row] == 0.0))
+        let [w, x, y, z] = self.rotation();
+        let rotations = w.iter().zip(x).zip(y).zip(z).enumerate();
+        rotations
+            .filter(|(_, (((w, x), y), z))| [*w, *x, *y, *z].iter().all(|part| **part == 0.0))
+            .map(|(row, _)| row)
     }
 }
 

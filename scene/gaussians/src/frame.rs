@@ -143,6 +143,10 @@ impl Planes {
             .chain(self.rotation.iter().enumerate().map(numbered("rot_")))
     }
 
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "a row that is not there is a fault of the caller, as `select` says"
+    )]
     fn gather(&self, indices: &[u32]) -> Self {
         let pick = |plane: &Vec<f32>| indices.iter().map(|&row| plane[row as usize]).collect();
         Self {

@@ -20,6 +20,7 @@ pub fn opacity_volume(frame: &GaussianFrame) -> Vec<f64> {
 
 /// The indices of `scores`, highest score first; equal scores in index order. A total order: NaN counts as
 /// lowest.
+#[expect(clippy::indexing_slicing, reason = "the indices are those of the scores")]
 pub fn order(scores: &[f64]) -> Vec<u32> {
     let key = |index: u32| {
         let score = scores[index as usize];

@@ -4,18 +4,27 @@
 pub const MAX_SH_DEGREE: u8 = 3;
 
 /// Coefficients per colour channel without DC: 0, 3, 8, 15 for degrees 0 to 3; `(degree + 1)² − 1`.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "a degree has eight bits, the square of one more has seventeen"
+)]
 pub fn sh_coefficients(degree: u8) -> usize {
     let side = usize::from(degree) + 1;
     side * side - 1
 }
 
 /// Planes of bands 1 and up, one a coefficient and channel: 0, 9, 24, 45 for degrees 0 to 3.
+#[expect(clippy::arithmetic_side_effects, reason = "three times a number of seventeen bits")]
 pub fn sh_planes(degree: u8) -> usize {
     sh_coefficients(degree) * 3
 }
 
 /// The number in PLY's name for an SH plane, `f_rest_*`: planes interleave channels, PLY holds one channel after
 /// another.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "a channel is at most 2, and `plane` / 3 is added to a number of eighteen bits"
+)]
 pub fn rest_index(plane: usize, degree: u8) -> usize {
     let (coefficient, channel) = (plane / 3, plane % 3);
     channel * sh_coefficients(degree) + coefficient

@@ -3,6 +3,7 @@
 use super::decoded::shown;
 use crate::Error;
 use crate::Progress;
+use crate::columns::{Column, Row, Value, metrics};
 use crate::picture_comparison::Judge;
 use crate::statistics::stream_statistics;
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -42,6 +43,24 @@ pub(crate) struct AblationRow {
     pub(crate) decode_ms: f64,
     /// Means over predicted frames.
     pub(crate) figures: Comparison,
+}
+
+impl Row for AblationRow {
+    fn columns(_: &[Self]) -> Vec<Column<Self>> {
+        let learned = |row: &Self| Value::Number(row.learned_percent, 1, " %");
+        let mut columns = vec![
+            Column::new("predictors", "Predictors", |row: &Self| Value::words(row.name)),
+            Column::new("inter_bytes", "Size", |row: &Self| Value::Bytes(row.bytes)),
+            Column::new("network_bytes", "Network", |row: &Self| Value::Bytes(row.network_bytes)),
+            Column::of_file("new_gaussians", |row: &Self| Value::Count(row.new)),
+            Column::new("learned_percent", "Learned", learned),
+            Column::new("dc_bits", "Bits of dc", |row: &Self| Value::number(row.dc_bits, 3)),
+            Column::new("sh_bits", "Bits of sh", |row: &Self| Value::number(row.sh_bits, 3)),
+            Column::new("decode_ms", "Decoding", |row: &Self| Value::Number(row.decode_ms, 1, " ms")),
+        ];
+        columns.extend(metrics(|row: &Self| &row.figures));
+        columns
+    }
 }
 
 /// A name, and how it changes the settings.

@@ -4,6 +4,7 @@ use super::decoded::mean;
 use super::encoded;
 use crate::Error;
 use crate::decoding::each_frame;
+use crate::levels::Subset;
 use crate::picture_comparison::Judge;
 use splatstream_decoder::operating_point::{OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
@@ -11,18 +12,6 @@ use splatstream_decoder::process::Options;
 use splatstream_encoder::{Importance, Settings, Structure};
 use splatstream_format::Limits;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::metrics::Comparison;
-
-/// The frames after the first, each by itself.
-#[derive(Debug, Clone)]
-pub(crate) struct Subset {
-    /// Bytes of these frames coded so, up to the level.
-    pub(crate) bytes: u64,
-    /// Their Gaussians up to the level.
-    pub(crate) gaussians: u64,
-    /// Means over these frames.
-    pub(crate) figures: Comparison,
-}
 
 /// The subset at each refinement level: every frame intra, ordered by opacity times volume.
 pub(super) fn subsets(

@@ -2,6 +2,7 @@
 
 use super::decoded::shown;
 use crate::Error;
+use crate::columns::{Column, Row, Value, metrics};
 use crate::picture_comparison::Judge;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{PredictorChoice, Predictors, Settings, Tools, encode};
@@ -18,19 +19,38 @@ pub(crate) struct ToolRow {
     pub(crate) bytes: u64,
     /// Gaussians of predicted frames.
     pub(crate) gaussians: u64,
+    /// Bytes per Gaussian more than with all tools, percent.
+    pub(crate) more_percent: f64,
     /// Means over predicted frames, everything decoded.
     pub(crate) figures: Comparison,
 }
+
+/// The row with all tools.
+const EVERYTHING: &str = "everything";
 
 impl ToolRow {
     /// Bytes per Gaussian of predicted frames.
     pub(crate) fn bytes_per_gaussian(&self) -> f64 {
         self.bytes as f64 / self.gaussians.max(1) as f64
     }
+}
 
-    /// Bytes more than another row takes, percent.
-    pub(crate) fn more_than(&self, other: &Self) -> f64 {
-        100.0 * (self.bytes_per_gaussian() / other.bytes_per_gaussian().max(f64::MIN_POSITIVE) - 1.0)
+impl Row for ToolRow {
+    fn columns(_: &[Self]) -> Vec<Column<Self>> {
+        let per_gaussian = |row: &Self| Value::number(row.bytes_per_gaussian(), 3);
+        let mut columns = vec![
+            Column::new("tools", "Tools", |row: &Self| Value::words(row.name)),
+            Column::new("inter_bytes", "Size", |row: &Self| Value::Bytes(row.bytes)),
+            Column::of_file("inter_gaussians", |row: &Self| Value::Count(row.gaussians)),
+            Column::new("bytes_per_gaussian", "Bytes per Gaussian", per_gaussian),
+            Column::new("more_percent", "More", |row: &Self| Value::difference(row.more_percent, " %")),
+        ];
+        columns.extend(metrics(|row: &Self| &row.figures));
+        columns
+    }
+
+    fn stands_out(&self) -> bool {
+        self.name == EVERYTHING
     }
 }
 
@@ -43,13 +63,19 @@ pub(super) fn rows(
     let with = |tools: Tools| Settings { tools, ..settings.clone() };
     let by = |predictor_choice| Settings { predictor_choice, ..settings.clone() };
     let variants = [
-        ("everything", by(PredictorChoice::Bits)),
+        (EVERYTHING, by(PredictorChoice::Bits)),
         ("without cell-motion", with(Tools { cell_motion: false, ..settings.tools })),
         ("without survivors", with(Tools { survivors: false, ..settings.tools })),
         ("predictor none", Settings { predictors: Predictors::NONE, ..settings.clone() }),
         ("chosen by l1", by(PredictorChoice::Difference)),
     ];
-    variants.iter().map(|(name, settings)| row(name, frames, settings, judge)).collect()
+    let rows = variants.iter().map(|(name, settings)| row(name, frames, settings, judge));
+    let mut rows: Vec<ToolRow> = rows.collect::<Result<_, _>>()?;
+    let everything = rows.first().map_or(0.0, ToolRow::bytes_per_gaussian).max(f64::MIN_POSITIVE);
+    for row in &mut rows {
+        row.more_percent = 100.0 * (row.bytes_per_gaussian() / everything - 1.0);
+    }
+    Ok(rows)
 }
 
 fn row(
@@ -67,6 +93,7 @@ fn row(
         name,
         bytes: inter.clone().map(|frame| frame.bytes).sum(),
         gaussians: inter.map(|frame| u64::from(frame.gaussians)).sum(),
+        more_percent: 0.0,
         figures,
     })
 }

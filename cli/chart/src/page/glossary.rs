@@ -10,7 +10,7 @@ const TERMS: [(&str, &str); 18] = [
     ),
     (
         "Mbit/s",
-        "what a network must carry to play at the frame rate: 8 × bytes per frame × frames per second, in millions. For a still scene: if every frame cost as much.",
+        "what a network must carry to play at the frame rate: 8 × bytes per frame × frames per second, in millions. Not of a scene that stands still.",
     ),
     (
         "PSNR",

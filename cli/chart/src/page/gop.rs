@@ -1,24 +1,21 @@
 //! The first GOP of a sequence, with predicted frames: the two tables of the paper, and what tools are worth.
 
-use super::elements::{Heading, figure, how_to_read, made_by, signed, size, table};
-use super::tables::{METRIC_HEADINGS, metric_cells, mode_cells};
-use crate::gop::{Gop, Level, ToolRow};
-use crate::numbers::grouped;
-use crate::scene_chart::{METRICS, SceneChart};
-use crate::tables::Mode;
+use super::elements::how_to_read;
+use crate::columns;
+use crate::gop::Gop;
+use crate::levels::COLUMNS;
 use maud::{Markup, html};
 
-/// All three tables.
-pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
+/// All tables of a GOP.
+pub(super) fn part(gop: &Gop) -> Markup {
     html! {
         h3 { "Operating points of the first GOP" }
         (how_to_read(
             "each row is a way to play the stream: a client starts with the first spatial layer of the intra frame (I0), \
              completes that frame, then adds predicted frames (P, B), first at half the frame rate, then all of them \
-             at ever more refinements; the bandwidth is 8 × the size over the duration of the GOP."
+             at ever more refinements; Mbit/s are 8 × the size over the duration of the GOP."
         ))
-        (modes(chart, gop))
-        (made_by(command))
+        (columns::html(&gop.modes))
         h3 { "Refinement levels of predicted frames" }
         (how_to_read(
             "each row adds Gaussians to the row above: sizes are of all units up to the level; bits are per Gaussian \
@@ -26,15 +23,14 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
              them. Subset: each of these frames by itself, its largest and most opaque Gaussians and nothing else, \
              as the paper shows them."
         ))
-        (levels(chart, gop))
-        (made_by(command))
+        (columns::html(&gop.levels))
+        @if gop.frames > COLUMNS + 1 { p.note { "Frames after these are in refinements.csv." } }
         h3 { "What the tools of predicted frames are worth" }
         (how_to_read(
             "each row codes the same GOP with one tool left out or another choice of predictors; sizes and metrics \
              are of predicted frames, everything decoded."
         ))
-        (tools(chart, gop))
-        (made_by(command))
+        (columns::html(&gop.tools))
         @if !gop.ablation.is_empty() {
             h3 { "What predictors of new Gaussians are worth" }
             (how_to_read(
@@ -42,102 +38,7 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
                  saves bits (auto); below, the network with one of its parts changed or left out, trained again. Bits of \
                  dc and sh are per new Gaussian, the intra frame included; the network itself is counted apart."
             ))
-            (ablation(chart, gop))
-            (made_by(command))
+            (columns::html(&gop.ablation))
         }
     }
-}
-
-fn modes(chart: &SceneChart, gop: &Gop) -> Markup {
-    let mut headings: Vec<Heading<'_>> = ["Mode", "Units"].map(Heading::Words).to_vec();
-    headings.extend([Heading::Numbers("Frames shown"), Heading::Words("Playback")]);
-    let numbers = ["Refine\u{ad}ment", "Size", "Required bandwidth", "Gaussians", "Bits per Gaussian"];
-    headings.extend(numbers.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
-    let row = |place: usize, mode: &Mode| {
-        html! {
-            tr {
-                (mode_cells(mode))
-                td { (format!("{:.2}", mode.bpg())) }
-                (metric_cells(chart, &mode.figures, place, gop.modes.len()))
-            }
-        }
-    };
-    table(&headings, &html! { @for (place, mode) in gop.modes.iter().enumerate() { (row(place, mode)) } })
-}
-
-fn levels(chart: &SceneChart, gop: &Gop) -> Markup {
-    let names = gop.levels.first().map_or(&[][..], |level| level.units.as_slice());
-    let frames: Vec<String> = names.iter().map(|(name, _)| format!("{name} size")).collect();
-    let mut headings = vec![Heading::Words("Level")];
-    headings.extend(frames.iter().map(|name| Heading::Numbers(name)));
-    let rest = ["Added size", "Total size", "Gaussians", "Cumulative bits per Gaussian"];
-    headings.extend(rest.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
-    let predicted = ["PSNR, predicted, carried", "SSIM", "PSNR, predicted, subset", "SSIM"];
-    headings.extend(predicted.map(Heading::Numbers));
-    let [psnr, ssim, _] = &METRICS;
-    let row = |place: usize, level: &Level| {
-        html! {
-            tr {
-                th scope="row" { (level.percent) " %" }
-                @for (_, bytes) in &level.units { td { (size(*bytes)) } }
-                td { (size(level.added)) }
-                td { (size(level.total)) }
-                td { (grouped(level.gaussians)) }
-                td { (format!("{:.2}", level.bpg)) }
-                (metric_cells(chart, &level.all, place, gop.levels.len()))
-                @for figures in [&level.inter, &level.subset.figures] {
-                    td { (figure(psnr, figures)) }
-                    td { (figure(ssim, figures)) }
-                }
-            }
-        }
-    };
-    table(&headings, &html! { @for (place, level) in gop.levels.iter().enumerate() { (row(place, level)) } })
-}
-
-fn tools(chart: &SceneChart, gop: &Gop) -> Markup {
-    let mut headings = vec![Heading::Words("Tools")];
-    headings.extend(["Size", "Bytes per Gaussian", "More"].map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
-    let more = |tool: &ToolRow| gop.tools.first().map(|everything| tool.more_than(everything));
-    table(
-        &headings,
-        &html! {
-            @for (place, tool) in gop.tools.iter().enumerate() {
-                tr.baseline[place == 0] {
-                    th scope="row" { (tool.name) }
-                    td { (size(tool.bytes)) }
-                    td { (format!("{:.3}", tool.bytes_per_gaussian())) }
-                    td { (signed(more(tool), " %")) }
-                    (metric_cells(chart, &tool.figures, place, gop.tools.len()))
-                }
-            }
-        },
-    )
-}
-
-fn ablation(chart: &SceneChart, gop: &Gop) -> Markup {
-    let mut headings = vec![Heading::Words("Predictors")];
-    let numbers = ["Size", "Network", "Learned", "Bits of dc", "Bits of sh", "Decoding"];
-    headings.extend(numbers.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
-    table(
-        &headings,
-        &html! {
-            @for (place, row) in gop.ablation.iter().enumerate() {
-                tr {
-                    th scope="row" { (row.name) }
-                    td { (size(row.bytes)) }
-                    td { (size(row.network_bytes)) }
-                    td { (format!("{:.1} %", row.learned_percent)) }
-                    td { (format!("{:.3}", row.dc_bits)) }
-                    td { (format!("{:.3}", row.sh_bits)) }
-                    td { (format!("{:.0} ms", row.decode_ms)) }
-                    (metric_cells(chart, &row.figures, place, gop.ablation.len()))
-                }
-            }
-        },
-    )
 }

@@ -1,31 +1,32 @@
 //! The part of a scene.
 
-use super::elements::{NOT_MEASURED, figures, how_to_read, made_by};
-use super::{SceneFigures, gop, peers, pictures, tables};
+use super::elements::{NOT_MEASURED, figures, how_to_read};
+use super::{SceneFigures, gop, peers, pictures};
+use crate::columns;
+use crate::levels::COLUMNS;
 use crate::numbers::grouped;
 use crate::scene_chart::SceneChart;
 use maud::{Markup, html};
 
 /// Everything about a scene.
-pub(super) fn section(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
+pub(super) fn section(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
     html! {
         section.scene #(chart.name) {
             h2 { (chart.name) }
             p { (facts(chart)) }
-            (rates(chart, drawn, command))
-            @if let Some(shown) = &chart.pictures { (pictures::part(shown, command)) }
-            (speeds(chart, drawn, command))
-            @if let Some(measured) = &chart.gop { (gop::part(chart, measured, command)) }
-            (tables::refinements(chart, command))
-            (tables::bandwidth(chart, command))
+            (rates(chart, drawn))
+            @if let Some(shown) = &chart.pictures { (pictures::part(shown)) }
+            (speeds(chart, drawn))
+            @if let Some(measured) = &chart.gop { (gop::part(measured)) }
+            (refinements(chart))
+            (bandwidth(chart))
             h3 { "Where the bits go" }
             (how_to_read(
                 "each bar is one quality, its length the bits that a coded Gaussian takes on average; the parts are \
                  attributes on one side and kinds of units on the other."
             ))
             (figures(&drawn.costs))
-            (made_by(command))
-            (peers::part(chart, command))
+            (peers::part(chart))
         }
     }
 }
@@ -40,11 +41,11 @@ pub(super) fn facts(chart: &SceneChart) -> Markup {
     html! {
         (chart.source) ": " (frames) (of) @if frames == 1 && of_source == 1 { " frame, " } @else { " frames, " }
         (grouped(per_frame)) " Gaussians per frame, spherical harmonics of degree " (chart.sh_degree) "; "
-        (cameras) " cameras, " (width) " × " (height) " pixels; " (chart.fps) " frames per second."
+        (cameras) @if cameras == 1 { " camera, " } @else { " cameras, " } (width) " × " (height) " pixels" @if let Some(fps) = chart.frame_rate() { "; " (fps) " frames per second" } "."
     }
 }
 
-fn rates(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
+fn rates(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
     html! {
         h3 { "Quality against rate" }
         (how_to_read(
@@ -58,19 +59,53 @@ fn rates(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
             p.note { (peer.peer) " gives the pictures of the source; it is in the table of other codecs, not in the figures." }
         }
         @if !chart.has_learned() { p.note { "ST-LPIPS: " (NOT_MEASURED) "." } }
-        (made_by(command))
     }
 }
 
-fn speeds(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
+fn speeds(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
     html! {
         h3 { "Speed against accuracy" }
         (how_to_read(
-            "each point is a variant of the encoder at equal rate: further right is faster; higher PSNR or lower \
-             BD-rate is better; the broad band is the Pareto front, and what lies off it is beaten in both."
+            "each row is a variant of the encoder, compared at the rate of the baseline; – where its rates do not reach \
+             there."
         ))
-        (figures(&drawn.speeds))
-        (tables::variants(chart))
-        (made_by(command))
+        @if !drawn.speeds.is_empty() {
+            (how_to_read(
+                "each point of a figure is a variant: further right is faster; higher PSNR or lower BD-rate is better; the \
+                 broad band is the Pareto front, and what lies off it is beaten in both."
+            ))
+            (figures(&drawn.speeds))
+        }
+        (columns::html(&chart.standings()))
+    }
+}
+
+/// Refinement levels of intra frames.
+fn refinements(chart: &SceneChart) -> Markup {
+    html! {
+        h3 { "Refinement levels" @if chart.gop.is_some() { ", every frame by itself" } }
+        (how_to_read(
+            "each row adds Gaussians to the row above: sizes are of all units up to the level, by frame (I0 is the first), \
+             then together, then with headers and tables; bits are per Gaussian shown at the level."
+        ))
+        (columns::html(&chart.intra_levels()))
+        @if chart.frames.0 > COLUMNS { p.note { "Frames after the first " (COLUMNS) " are in refinements.csv." } }
+    }
+}
+
+/// Operating points of intra frames.
+fn bandwidth(chart: &SceneChart) -> Markup {
+    html! {
+        @if chart.frame_rate().is_some() {
+            h3 { "Operating points by bandwidth" @if chart.gop.is_some() { ", every frame by itself" } }
+            (how_to_read(
+                "each row is a way to play the stream, least bandwidth first: find the last row that your network \
+                 carries; Mbit/s are 8 × the size of a GOP over its duration."
+            ))
+        } @else {
+            h3 { "Operating points by size" }
+            (how_to_read("each row is a way to show the scene, smallest first."))
+        }
+        (columns::html(&chart.intra_modes()))
     }
 }

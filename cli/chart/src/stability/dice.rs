@@ -1,25 +1,19 @@
 //! Random numbers that are the same in every run.
 
-/// The generator SplitMix64.
-pub(super) struct Dice(u64);
+use splatstream_gaussians::random::SplitMix64;
+
+/// Dice over the generator that everything here uses.
+pub(super) struct Dice(SplitMix64);
 
 impl Dice {
-    /// A generator; equal seeds give equal numbers.
+    /// Dice; equal seeds give equal numbers.
     pub(super) fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
+        Self(SplitMix64::new(seed))
     }
 
     /// From 0 up to and without 1.
     pub(super) fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+        self.0.unit()
     }
 
     /// Nearly normal, mean 0, deviation 1: the sum of twelve even numbers.
@@ -31,7 +25,7 @@ impl Dice {
     pub(super) fn order(&mut self, count: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..count as u32).collect();
         for last in (1..count).rev() {
-            order.swap(last, (self.next() % (last as u64 + 1)) as usize);
+            order.swap(last, (self.0.bits() % (last as u64 + 1)) as usize);
         }
         order
     }

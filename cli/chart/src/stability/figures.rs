@@ -1,7 +1,8 @@
 //! PSNR against strength, one figure a case, one line a tool.
 
-use super::rows::{BaseReport, CaseReport, Row, strength};
+use super::rows::{BaseReport, CaseReport, Row};
 use super::tools::Tool;
+use crate::columns::short;
 use crate::svg::Figure;
 use crate::svg::plot::{Dot, Line, Plot, Series};
 
@@ -45,7 +46,7 @@ fn series(tool: Tool, report: &CaseReport) -> Option<Series> {
         .collect();
     let last = rows.len().checked_sub(1)?;
     let dot = |(place, (row, psnr)): (usize, &(&Row, f64))| {
-        let (at, words) = (strength(row.strength), row.verdict.name());
+        let (at, words) = (short(row.strength), row.verdict.name());
         Dot {
             at: (row.strength, *psnr),
             label: (place == last).then(|| tool.name().to_owned()),

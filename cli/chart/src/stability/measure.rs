@@ -69,9 +69,13 @@ impl Bench<'_> {
         for strength in case.strengths(self.size) {
             progress.step(format!("{}: {}, {} {strength}", self.base.name, case.title, case.axis));
             rows.extend(match case.make {
-                Make::Scene(make) => self.coded(&make(&self.base.scene, strength), strength, &self.scene),
-                Make::Sequence(make) => self.coded(&make(self.base, strength), strength, &self.sequence),
-                Make::Loss => self.lost(strength),
+                Make::Scene(make) => {
+                    self.coded(case, &make(&self.base.scene, strength), strength, &self.scene)
+                }
+                Make::Sequence(make) => {
+                    self.coded(case, &make(self.base, strength), strength, &self.sequence)
+                }
+                Make::Loss => self.lost(case, strength),
             });
             progress.advance();
         }
@@ -79,13 +83,15 @@ impl Bench<'_> {
     }
 
     /// A sample by all tools.
-    fn coded(&self, sample: &Sample, strength: f64, plains: &[Plain]) -> Vec<Row> {
+    fn coded(&self, case: &'static Case, sample: &Sample, strength: f64, plains: &[Plain]) -> Vec<Row> {
         let views = self.views(sample);
         let one = |plain: &Plain| {
             let report = plain.attempt.coded.as_ref().map(|(_, report)| report);
             let attempt = plain.tool.attempt(sample, report, self.warnings);
             let quality = views.judged(&attempt.shown);
             Row {
+                scene: self.base.name.clone(),
+                case,
                 tool: plain.tool,
                 strength,
                 quality,
@@ -100,13 +106,15 @@ impl Bench<'_> {
     }
 
     /// The streams of the sequence with units missing.
-    fn lost(&self, share: f64) -> Vec<Row> {
+    fn lost(&self, case: &'static Case, share: f64) -> Vec<Row> {
         let sample = sequences::plain(self.base);
         let views = self.views(&sample);
         let one = |plain: &Plain| {
             let (stream, report) = plain.attempt.coded.as_ref()?;
             let remains = loss::remains(stream, share, sample.frames.len(), &views);
             Some(Row {
+                scene: self.base.name.clone(),
+                case,
                 tool: plain.tool,
                 strength: share,
                 quality: remains.quality,

@@ -1,11 +1,11 @@
 //! The page: where each tool fails.
 
+use super::FILE;
 use super::figures::id;
-use super::files::FILE;
-use super::rows::{BaseReport, CaseReport, Row, Verdict, count, strength};
-use super::tools::Tool;
+use super::rows::{BaseReport, CaseReport, Count};
+use crate::columns;
 use crate::page::document;
-use crate::page::elements::{self, Heading, how_to_read, made_by, table};
+use crate::page::elements::{self, how_to_read};
 use crate::svg::Figure;
 use maud::{Markup, html};
 
@@ -48,7 +48,7 @@ pub(super) fn html(reports: &[BaseReport], figures: &[Figure], command: &str) ->
         }
         main {
             (summary(reports, command))
-            @for report in reports { (base(report, figures, command)) }
+            @for report in reports { (base(report, figures)) }
             (terms())
         }
     };
@@ -56,36 +56,25 @@ pub(super) fn html(reports: &[BaseReport], figures: &[Figure], command: &str) ->
 }
 
 fn summary(reports: &[BaseReport], command: &str) -> Markup {
-    let mut headings = vec![Heading::Words("Tool")];
-    headings.extend(Verdict::ALL.map(|verdict| Heading::Numbers(verdict.name())));
-    let rows = html! {
-        @for tool in Tool::ALL {
-            tr {
-                th scope="row" { (tool.name()) }
-                @for verdict in Verdict::ALL { td { (count(reports, tool, verdict)) } }
-            }
-        }
-    };
     html! {
         section {
             h2 { "In short" }
             (how_to_read(
                 "each number counts cases and strengths; a silent failure is worse than a warning, as nobody looks again."
             ))
-            (table(&headings, &rows))
+            (columns::html(&Count::of_all(reports)))
             p.note { "All numbers are in " a href=(FILE) { (FILE) } "." }
-            (made_by(command))
+            p.note { "The command: " (elements::command_line(command)) }
         }
     }
 }
 
-fn base(report: &BaseReport, figures: &[Figure], command: &str) -> Markup {
+fn base(report: &BaseReport, figures: &[Figure]) -> Markup {
     html! {
         section.scene #(report.name) {
             h2 { (report.name) }
             p { (report.facts) }
             @for case in &report.cases { (part(report, case, figures)) }
-            (made_by(command))
         }
     }
 }
@@ -97,42 +86,7 @@ fn part(report: &BaseReport, case: &CaseReport, figures: &[Figure]) -> Markup {
         h3 { (case.case.title) }
         p { "The case: " (case.case.what) "." }
         @if let Some(drawing) = drawn.and_then(|at| figures.get(at..=at)) { (elements::figures(drawing)) }
-        (rows(case))
-    }
-}
-
-fn rows(report: &CaseReport) -> Markup {
-    let mut axis = report.case.axis.to_owned();
-    if let Some(first) = axis.get_mut(..1) {
-        first.make_ascii_uppercase();
-    }
-    let headings = [
-        Heading::Words("Tool"),
-        Heading::Numbers(&axis),
-        Heading::Numbers("PSNR, dB"),
-        Heading::Numbers("Without the case"),
-        Heading::Numbers("Bits per Gaussian"),
-        Heading::Words("Detected"),
-        Heading::Words("Fallback"),
-        Heading::Words("Verdict"),
-    ];
-    table(&headings, &html! { @for row in &report.rows { (line(row)) } })
-}
-
-fn line(row: &Row) -> Markup {
-    let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}"));
-    let words = |words: &str| if words.is_empty() { "–".to_owned() } else { words.to_owned() };
-    html! {
-        tr.baseline[row.verdict != Verdict::Ok] {
-            th scope="row" { (row.tool.name()) }
-            td { (strength(row.strength)) }
-            td { (number(row.quality.map(|quality| quality.psnr))) }
-            td { (number(Some(row.wanted.psnr))) }
-            td { (number(row.bpg)) }
-            td.text { (words(&row.detected)) }
-            td.text { (words(&row.fallback)) }
-            td.text { @if row.verdict == Verdict::Ok { (row.verdict.name()) } @else { strong { (row.verdict.name()) } } }
-        }
+        (columns::html(&case.rows))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::scale::Scale;
 use super::{Figure, coordinate};
+use crate::numbers::fixed;
 use maud::{Markup, html};
 
 const WIDTH: f64 = 560.0;
@@ -102,7 +103,7 @@ impl Bars {
             text.name x=(LEFT - 8.0) y=(base) text-anchor="end" { (bar.name) }
             @for (style, value, start, width) in parts {
                 rect class=(format!("fill c{style}")) x=(coordinate(start)) y=(coordinate(top)) width=(coordinate((width - 1.0).max(0.3))) height=(BAR) {
-                    title { (format!("{}: {value:.3}", self.parts.get(style).map_or("", String::as_str))) }
+                    title { (format!("{}: {}", self.parts.get(style).map_or("", String::as_str), fixed(value, 3))) }
                 }
                 @if width > 30.0 {
                     text.share x=(coordinate(start + width / 2.0)) y=(base) text-anchor="middle" { (format!("{value:.1}")) }

@@ -10,6 +10,14 @@ const HEIGHT: f64 = 400.0;
 /// Colours of `figure.css`.
 const COLOURS: usize = 8;
 
+/// Numbers along the ordinate, at most.
+const Y_TICKS: usize = 7;
+/// Room for the name of the ordinate, and for a digit of its numbers.
+const NAME: f64 = 31.0;
+const DIGIT: f64 = 7.2;
+/// The least room left of the ordinate.
+const LEFT: f64 = 64.0;
+
 /// How points are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Line {
@@ -77,12 +85,11 @@ impl Plot {
         let dots = || self.series.iter().flat_map(|series| &series.dots).map(|dot| dot.at);
         dots().next()?;
         let top = if self.top.is_some() { 46.0 } else { 14.0 };
-        let frame = Area(64.0, top, WIDTH - 14.0, HEIGHT - 50.0);
-        let axes = Axes {
-            x: Scale::over(dots().map(|(x, _)| x), true, (frame.0, frame.2)),
-            y: Scale::over(dots().map(|(_, y)| y), false, (frame.3, frame.1)),
-            frame,
-        };
+        let bottom = HEIGHT - 50.0;
+        let y = Scale::over(dots().map(|(_, y)| y), false, (bottom, top));
+        let frame = Area(left(&y), top, WIDTH - 14.0, bottom);
+        let x = Scale::over(dots().map(|(x, _)| x), true, (frame.0, frame.2));
+        let axes = Axes { x, y, frame };
         let body = html! {
             (self.grid(&axes))
             @for series in &self.series { (curve(series, &axes)) }
@@ -97,7 +104,7 @@ impl Plot {
         let Area(left, top, right, bottom) = axes.frame;
         let middle = ((left + right) / 2.0, (top + bottom) / 2.0);
         html! {
-            @for (value, text) in axes.y.ticks(7) {
+            @for (value, text) in axes.y.ticks(Y_TICKS) {
                 @let y = coordinate(axes.y.place(value));
                 path.grid d=(format!("M{left} {y}H{right}")) {}
                 text.tick x=(left - 7.0) y=(y) dy="4" text-anchor="end" { (text) }
@@ -148,6 +155,12 @@ impl Plot {
             }
         }
     }
+}
+
+/// Where the ordinate stands, so that its name does not touch its numbers.
+fn left(y: &Scale) -> f64 {
+    let letters = y.ticks(Y_TICKS).into_iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0);
+    LEFT.max(NAME + DIGIT * letters as f64)
 }
 
 impl Axes {

@@ -5,7 +5,7 @@ use super::super::matrix::{Matrix, add_outer};
 use super::*;
 use pulp::Arch;
 
-fn any(count: usize, random: &mut Random) -> Vec<Lane> {
+fn any(count: usize, random: &mut SplitMix64) -> Vec<Lane> {
     (0..count).map(|_| [(); LANES].map(|()| random.signed())).collect()
 }
 
@@ -16,7 +16,7 @@ fn bits(lanes: &[Lane]) -> Vec<u32> {
 
 #[test]
 fn products_are_the_same_in_vectors_and_without() {
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     for (rows, columns) in [(1, 1), (8, 3), (13, 8), (19, 16), (16, 27), (5, 0), (0, 5)] {
         let weights: Vec<f32> = (0..rows * columns).map(|_| random.signed()).collect();
         let (x, start) = (any(columns, &mut random), any(rows, &mut random));
@@ -37,7 +37,7 @@ fn products_are_the_same_in_vectors_and_without() {
 
 #[test]
 fn slopes_of_matrices_are_the_same_in_vectors_and_without() {
-    let mut random = Random(12);
+    let mut random = SplitMix64::new(12);
     for (rows, columns, times) in [(1, 1, 1), (8, 3, 5), (13, 8, 2), (19, 16, 1), (5, 0, 3), (0, 5, 3)] {
         let (slopes, x) = (any(rows * times, &mut random), any(columns * times, &mut random));
         let mut wanted = vec![ZERO; rows * columns];

@@ -6,7 +6,7 @@ use super::*;
 use splatstream_format::payload::Part;
 
 /// Any slope of the outputs.
-fn any_slope(layout: &Layout, random: &mut Random) -> Vec<Lane> {
+fn any_slope(layout: &Layout, random: &mut SplitMix64) -> Vec<Lane> {
     (0..layout.header.outputs()).map(|_| [(); LANES].map(|()| random.signed())).collect()
 }
 
@@ -27,7 +27,7 @@ fn error(pairs: &[(f64, f64)]) -> Option<f64> {
 
 #[test]
 fn slopes_are_those_of_every_part() {
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     for (name, architecture) in variants() {
         let layout = Layout::new(architecture.header().unwrap());
         let parameters = any_parameters(&layout, 0.7, &mut random);

@@ -10,7 +10,7 @@ const NEIGHBOURS: usize = 4;
 
 /// Gaussians that have the colour of the one neighbour that is as opaque as they are.
 fn problem(header: &NetworkHeader, samples: usize, seed: u64) -> Vec<Sample> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let mut sample = |_| {
         let mut batch = any_batch(header, NEIGHBOURS, &mut random);
         let mut wanted = vec![[0; LANES]; header.outputs()];
@@ -18,10 +18,11 @@ fn problem(header: &NetworkHeader, samples: usize, seed: u64) -> Vec<Sample> {
             let alike = random.below(NEIGHBOURS);
             for neighbour in 0..NEIGHBOURS {
                 let shift = header.token_shift;
-                let colour: Vec<i32> = (0..header.outputs()).map(|_| random.within(90) << shift).collect();
+                let colour: Vec<i32> =
+                    (0..header.outputs()).map(|_| within(&mut random, 90) << shift).collect();
                 let components: Vec<i64> = colour.iter().map(|&value| i64::from(value) << 12).collect();
                 let opacity = if neighbour == alike { 0 } else { 60 };
-                let geometry = [random.within(9), 0, 0, opacity, 0, random.within(9), 0];
+                let geometry = [within(&mut random, 9), 0, 0, opacity, 0, within(&mut random, 9), 0];
                 let seen = Seen {
                     components: &components,
                     geometry,

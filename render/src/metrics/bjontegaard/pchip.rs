@@ -21,6 +21,11 @@ struct Piece {
 
 impl Pchip {
     /// The curve through `points`, abscissae strictly rising. None if they are fewer than two; a line if two.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "windows have two points, and there is a slope for each point"
+    )]
+    #[expect(clippy::arithmetic_side_effects, reason = "there are two points or more")]
     pub(super) fn through(points: &[(f64, f64)]) -> Option<Self> {
         if points.len() < 2 {
             return None;
@@ -85,6 +90,8 @@ impl Piece {
 }
 
 /// The slope at each point.
+#[expect(clippy::indexing_slicing, reason = "windows have two points, and there is a slope for each point")]
+#[expect(clippy::arithmetic_side_effects, reason = "there are two points or more")]
 fn slopes(widths: &[f64], secants: &[f64]) -> Vec<f64> {
     let last = secants.len() - 1;
     if last == 0 {

@@ -1,4 +1,9 @@
 //! Convolutions as products of matrices.
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "sizes of maps and kernels in memory, none of which is 0"
+)]
+#![expect(clippy::indexing_slicing, reason = "rows, columns and depths are cut from maps that are as large")]
 
 use super::maps::{Maps, blur_taps};
 use rayon::prelude::*;

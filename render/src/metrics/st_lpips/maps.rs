@@ -1,4 +1,6 @@
 //! The channels between two layers.
+#![expect(clippy::arithmetic_side_effects, reason = "sizes of maps in memory, which are larger than a tap")]
+#![expect(clippy::indexing_slicing, reason = "rows and columns lie within the map")]
 
 use rayon::prelude::*;
 

@@ -54,6 +54,7 @@ pub(super) fn read(path: &Path) -> Result<StLpips, WeightsError> {
     read_archive(File::open(path)?)
 }
 
+#[expect(clippy::indexing_slicing, reason = "an array of known length")]
 fn read_archive(file: File) -> Result<StLpips, WeightsError> {
     let mut archive = ZipArchive::new(file)?;
     let mut three = |name: &str| -> Result<[f32; 3], WeightsError> {
@@ -74,6 +75,7 @@ fn read_archive(file: File) -> Result<StLpips, WeightsError> {
 }
 
 /// The values of an array, as many as its shape says.
+#[expect(clippy::arithmetic_side_effects, reason = "sizes of the arrays of one network")]
 fn array(archive: &mut ZipArchive<File>, name: String, shape: &[usize]) -> Result<Vec<f32>, WeightsError> {
     let mut entry = match archive.by_name(&format!("{name}.npy")) {
         Err(ZipError::FileNotFound) => return Err(WeightsError::Missing(name)),

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::random::mix;
+use splatstream_gaussians::random::mix;
 
 /// Value noise: random numbers on the integer lattice, smoothly interpolated; 0 to 1, one feature a unit.
 /// `layer` chooses among unrelated noises.

@@ -1,35 +1,20 @@
 //! Random numbers from integers: the same on every machine, and any stream of them at once.
 
-/// SplitMix64: a counter and a mixing function. Source: Steele, Lea and Flood, "Fast splittable
-/// pseudorandom number generators", 2014.
-pub(super) struct Random(u64);
+use splatstream_gaussians::random::{STEP, SplitMix64, mix};
 
-/// The golden ratio as a 64-bit fraction: the counter's step.
-const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
-
-pub(super) fn mix(mut bits: u64) -> u64 {
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^ (bits >> 31)
-}
+/// A generator that a key chooses among many.
+pub(super) struct Random(SplitMix64);
 
 impl Random {
     /// The stream that `key` names; streams of different keys are unrelated.
     pub(super) fn new(key: [u64; 4]) -> Self {
-        Self(
-            key.iter()
-                .fold(0, |state: u64, &part| mix(state.wrapping_add(STEP) ^ mix(part.wrapping_add(STEP)))),
-        )
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(STEP);
-        mix(self.0)
+        let with = |state: u64, part: u64| mix(state.wrapping_add(STEP) ^ mix(part.wrapping_add(STEP)));
+        Self(SplitMix64::new(key.into_iter().fold(0, with)))
     }
 
     /// Uniform, at least 0 and below 1, in steps of 2⁻⁵³.
     pub(super) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+        self.0.unit()
     }
 
     /// Uniform between the two.
@@ -39,7 +24,7 @@ impl Random {
 
     /// Uniform, 0 to `count` − 1. The bias is below `count` / 2³².
     pub(super) fn below(&mut self, count: u64) -> u64 {
-        ((self.bits() >> 32) * count) >> 32
+        ((self.0.bits() >> 32) * count) >> 32
     }
 
     pub(super) fn chance(&mut self, probability: f64) -> bool {
@@ -48,7 +33,7 @@ impl Random {
 
     /// Nearly normal with mean 0 and deviation 1: the sum of four uniform numbers, so within ±3.47.
     pub(super) fn normal(&mut self) -> f64 {
-        let bits = self.bits();
+        let bits = self.0.bits();
         let sum: u64 = [0, 16, 32, 48].iter().map(|shift| bits >> shift & 0xffff).sum();
         // Four uniform numbers of 0 to 65535 have mean 131070 and deviation 65536 / √3.
         (sum as f64 - 131_070.0) / 65_536.0 * 3.0_f64.sqrt()
