@@ -153,11 +153,14 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
     if let Some(temporal) = situation.temporal.as_ref().filter(|_| unit.header.extrapolates_opacity) {
         extrapolate(&mut list, temporal);
     }
+    unit.interrupt.check()?;
     let keep = change_parents(unit, &mut list, situation.temporal.as_ref())?;
+    unit.interrupt.check()?;
     let predictors = predictors(unit)?;
     if let Some(temporal) = &situation.temporal {
         list.change = Change::between(temporal.reference, &list);
     }
+    unit.interrupt.check()?;
     list.retain(&keep);
     unit.interrupt.check()?;
     let set = match predictors.iter().any(|&predictor| predictor != Predictor::None) {
@@ -211,8 +214,10 @@ fn change_parents(
             unit.interrupt.check()?;
             attributes.add_stage(stage, values, &unit.coding, unit.at)?;
         }
+        unit.interrupt.check()?;
         attributes.write_to(list, &updated);
     }
+    unit.interrupt.check()?;
     if !moved.is_empty() || !updated.is_empty() {
         list.settle();
     }
@@ -384,6 +389,7 @@ fn new_gaussians(
     let mut list =
         GaussianList::of_planes(QuantizedFrame { position, log_scale, opacity, rotation, dc, sh }, anchor);
     list.rotation_fine = rotation_fine;
+    unit.interrupt.check()?;
     list.settle();
     Ok(list)
 }
@@ -405,6 +411,7 @@ fn unpredicted(count: usize, sh_planes: usize, values: &[Vec<i32>], unit: &Unit<
     let mut all = Attributes::unpredicted(0, &unit.coding.colour, sh_planes);
     for attributes in runs {
         let attributes = attributes?;
+        unit.interrupt.check()?;
         for stage in Stage::ALL {
             for (plane, part) in all.stage_mut(stage).iter_mut().zip(attributes.stage(stage)) {
                 plane.extend_from_slice(part);

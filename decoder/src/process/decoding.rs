@@ -348,7 +348,9 @@ impl FrameInProgress {
         };
         let before = reference.lists.get(r).map_or_else(|| Arc::new(empty()), Arc::clone);
         let mut parents = before.unchanged();
+        context.interrupt.check()?;
         parents.displace(&self.field);
+        context.interrupt.check()?;
         let ratio = SpanRatio::new(span_log2(self.index, reference), reference.span_log2);
         let predicts_moves = unit.header.move_predictor_count() > 0;
         let predicts_new = unit.header.predictor_count() > 0;
@@ -357,7 +359,9 @@ impl FrameInProgress {
         }
         let mut moves = None;
         if predicts_moves {
+            context.interrupt.check()?;
             let mut space = self.moves_before(r, reference, ratio, unit.sequence.position_bits);
+            context.interrupt.check()?;
             space.push(&before, &parents);
             moves = Some(space);
         }
@@ -369,6 +373,7 @@ impl FrameInProgress {
         let after: Vec<&QuantizedFrame> = anchor.map(|list| &list.planes).chain(&added).collect();
         let applied =
             apply(unit, parents, &Situation { around: [&lower, &after], temporal: Some(temporal) })?;
+        context.interrupt.check()?;
         if let Some(mut space) = moves {
             space.settle(&applied.list, &applied.keep);
             self.lists.moves = Some(space);
