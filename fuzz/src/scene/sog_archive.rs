@@ -24,13 +24,16 @@ struct Wrong {
     value: u32,
 }
 
-/// What is wrong, seven bytes; the length of `meta.json`, its text, and for each image: flags, width, height, the length
-/// of its pixels, the pixels.
+/// What is wrong, six bytes; of `meta.json` flags, version, count, and the length of its text, and this, unless it is one
+/// of the usual ones; for each image: flags, width, height, the length of its pixels, the pixels.
 pub fn pack(input: &[u8]) -> Vec<u8> {
     let mut input = Bytes(input);
     let wrong = Wrong { file: input.u8().into(), what: input.u8(), value: u32::from_le_bytes(input.array()) };
-    let (flags, length) = (input.u8(), input.u16());
-    let meta = expanded(input.take(length.into()));
+    let (flags, version, count, length) = (input.u8(), input.u8(), input.u16(), input.u16());
+    let meta = match length {
+        0 => expanded(usual(version, count).as_bytes()),
+        _ => expanded(input.take(length.into())),
+    };
     let mut files = vec![("meta.json", flags, meta)];
     for name in IMAGES {
         let flags = input.u8();
@@ -39,6 +42,21 @@ pub fn pack(input: &[u8]) -> Vec<u8> {
         files.push((name, flags, image(width, height, coding, input.take(length.into()))));
     }
     archive(&files, wrong)
+}
+
+/// What `meta.json` is where an input does not have it: with codebooks of all, or ranges, or without spherical harmonics.
+fn usual(version: u8, count: u16) -> String {
+    let ranges = r#""mins":[-1,-1,-1,-4],"maxs":[1,1,1,4]"#;
+    let codes = ["\"codebook\":#", ranges, "\"codebook\":~"][usize::from(version / 4 % 3)];
+    let rest = match version / 16 % 2 {
+        0 => format!(r#","shN":{{{codes},"files":["labels.webp","centroids.webp"]}}"#),
+        _ => String::new(),
+    };
+    format!(
+        r#"{{"version":{},"count":{count},"means":{{"mins":[-1,-1,-1],"maxs":[1,1,1],"files":["l.webp","u.webp"]}},
+"scales":{{{codes},"files":["s.webp"]}},"quats":{{"files":["q.webp"]}},"sh0":{{{codes},"files":["c.webp"]}}{rest}}}"#,
+        version % 4
+    )
 }
 
 /// The text with a codebook of 256 numbers for each `#`, and one of 255 for each `~`.

@@ -29,31 +29,49 @@ pub(crate) fn spz_zstd() -> Vec<u8> {
     [&[FITS], &header[..], &contents_at, &EXTENSION, &wrong, &window, &attributes()].concat()
 }
 
-/// The same scene in codebooks or, as version 1 has it, in ranges.
-pub(crate) fn sog(has_ranges: bool) -> Vec<u8> {
+/// The same scene with `meta.json` as text, in codebooks or, as version 1 has it, in ranges; or with a usual one.
+pub(crate) fn sog(meta: Option<&str>) -> Vec<u8> {
     let nothing_wrong = [0, 255, 0, 0, 0, 0];
-    let meta = if has_ranges { RANGES } else { CODEBOOKS };
-    let mut out = [&nothing_wrong[..], &[0], &(meta.len() as u16).to_le_bytes(), meta.as_bytes()].concat();
+    let (flags, version, count) = (0, 2, u16::from(ROWS));
+    let meta = meta.unwrap_or_default();
+    let [count, length] = [count, meta.len() as u16].map(u16::to_le_bytes);
+    let mut out = [&nothing_wrong[..], &[flags, version], &count, &length, meta.as_bytes()].concat();
     let rows =
         |last: u8| (0..ROWS).flat_map(move |row| [row * 50, row * 40, row * 30, last]).collect::<Vec<u8>>();
     let labels: Vec<u8> = (0..ROWS).flat_map(|row| [row, 0, 0, 255]).collect();
-    let palette: Vec<u8> = (0..64 * 3_u8).flat_map(|pixel| [pixel; 4]).collect();
-    let images =
-        [(2, 2, rows(255)), (2, 2, rows(255)), (2, 2, rows(255)), (2, 2, rows(253)), (2, 2, rows(200))];
-    for (width, height, pixels) in images.into_iter().chain([(2, 2, labels), (64 * 3, 1, palette)]) {
-        out.push(0);
-        // An image of n pixels says n - 1.
-        out.extend([width - 1, height - 1, pixels.len() as u16].map(u16::to_le_bytes).concat());
-        out.extend(pixels);
+    let literal = [rows(255), rows(255), rows(255), rows(253), rows(200), labels];
+    for pixels in literal {
+        image(0, [2, 2], &pixels, &mut out);
     }
+    // A palette of degree 1 whose entries are all alike takes one pixel.
+    image(1, [64 * 3, 1], &[100, 120, 140, 255], &mut out);
     out
 }
 
-const CODEBOOKS: &str = r#"{"version":2,"count":4,"means":{"mins":[-1,-1,-1],"maxs":[1,1,1],"files":["l.webp","u.webp"]},
+fn image(flags: u8, [width, height]: [u16; 2], pixels: &[u8], out: &mut Vec<u8>) {
+    out.push(flags);
+    // An image of n pixels says n - 1.
+    out.extend([width - 1, height - 1, pixels.len() as u16].map(u16::to_le_bytes).concat());
+    out.extend(pixels);
+}
+
+/// A camera, and vertices of degree 0.
+pub(crate) fn ply(flags: u8) -> Vec<u8> {
+    let elements = [[4, 1, 0, 0], [0, 2, 0, 0]];
+    [&[flags, 2], elements.as_flattened(), &[0x3c; 16]].concat()
+}
+
+/// A chunk, vertices, and coefficients of degree 1.
+pub(crate) fn compressed_ply() -> Vec<u8> {
+    let elements = [[2, 1, 0, 0], [1, 2, 0, 0], [3, 2, 0, 1]];
+    [&[0, 3], elements.as_flattened(), &[0x3c; 16]].concat()
+}
+
+pub(crate) const CODEBOOKS: &str = r#"{"version":2,"count":4,"means":{"mins":[-1,-1,-1],"maxs":[1,1,1],"files":["l.webp","u.webp"]},
 "scales":{"codebook":#,"files":["s.webp"]},"quats":{"files":["q.webp"]},
 "sh0":{"codebook":#,"files":["c.webp"]},"shN":{"codebook":#,"files":["labels.webp","centroids.webp"]}}"#;
 
-const RANGES: &str = r#"{"means":{"shape":[4,3],"mins":[-1,-1,-1],"maxs":[1,1,1],"files":["l.webp","u.webp"]},
+pub(crate) const RANGES: &str = r#"{"means":{"shape":[4,3],"mins":[-1,-1,-1],"maxs":[1,1,1],"files":["l.webp","u.webp"]},
 "scales":{"mins":-8,"maxs":-1,"files":["s.webp"]},"quats":{"files":["q.webp"]},
 "sh0":{"mins":[-1,-1,-1,-4],"maxs":[1,1,1,4],"files":["c.webp"]},
 "shN":{"mins":-1,"maxs":1,"files":["labels.webp","centroids.webp"]}}"#;

@@ -35,8 +35,12 @@ pub(crate) fn all() -> Vec<(String, Vec<u8>)> {
         ("packed-spz-version-1", 5, packed::spz_gzip(1)),
         ("packed-spz-version-3", 5, packed::spz_gzip(3)),
         ("packed-spz-version-4", 6, packed::spz_zstd()),
-        ("packed-sog", 7, packed::sog(false)),
-        ("packed-sog-version-1", 7, packed::sog(true)),
+        ("packed-sog", 7, packed::sog(None)),
+        ("packed-sog-of-text", 7, packed::sog(Some(packed::CODEBOOKS))),
+        ("packed-sog-version-1", 7, packed::sog(Some(packed::RANGES))),
+        ("packed-ply", 8, packed::ply(0)),
+        ("packed-ply-of-text", 8, packed::ply(1)),
+        ("packed-compressed-ply", 9, packed::compressed_ply()),
     ];
     files.into_iter().map(|(name, choice, file)| (name.to_owned(), [vec![choice], file].concat())).collect()
 }
