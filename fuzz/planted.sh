@@ -43,7 +43,7 @@ plant() {
         (cd "$new" && GIT_CEILING_DIRECTORIES=$built git apply "fuzz/planted/$fault.patch")
     done
     (cd "$new" && find . -type f -print0) | while IFS= read -r -d '' file; do
-        if cmp -s "$old/$file" "$new/$file"; then touch -r "$old/$file" "$new/$file"; fi
+        if cmp -s "$old/$file" "$new/$file"; then touch -r "$old/$file" "$new/$file"; else touch "$new/$file"; fi
     done
     rm -rf "$old"
     mv "$new" "$old"
