@@ -20,6 +20,8 @@ pub const WIDE_LIMITS: ReadLimits = ReadLimits { max_memory: 1 << 23 };
 
 type Reader = fn(&[u8], &ReadLimits) -> Result<GaussianFrame, SceneError>;
 
+type Pack = fn(&[u8]) -> Vec<u8>;
+
 /// How an input becomes a file, and who reads it.
 #[derive(Debug, Clone, Copy)]
 pub struct Form {
@@ -28,7 +30,7 @@ pub struct Form {
     /// The reader.
     pub read: Reader,
     /// What makes a file of the input; none if the input is one.
-    pub pack: Option<fn(&[u8]) -> Vec<u8>>,
+    pub pack: Option<Pack>,
 }
 
 /// The first byte of the input chooses one, and limits.

@@ -19,8 +19,9 @@ struct Element {
     kind: u8,
     /// Rows as a number of the input and a power of two, so that a few bits say a great many.
     rows: u64,
-    /// The type of its properties, beside the usual one; the property that lacks; coefficients of spherical harmonics.
+    /// Another type of its properties than the usual one, and the property that lacks.
     change: u8,
+    /// Degree of the spherical harmonics.
     degree: u8,
 }
 
@@ -77,7 +78,7 @@ fn describe(element: &Element, index: usize, text: &mut String) -> u64 {
     }
     let kind = if element.change & 0x80 == 0 { usual } else { usize::from(element.change % 8) };
     let missing = if element.change & 0x40 == 0 { usize::MAX } else { usize::from(element.change % 32) };
-    let rest = if element.kind % 3 == 0 { [0, 9, 24, 45][usize::from(element.degree)] } else { 0 };
+    let rest = if matches!(element.kind, 0 | 3) { [0, 9, 24, 45][usize::from(element.degree)] } else { 0 };
     let names =
         properties.split_whitespace().map(str::to_owned).chain((0..rest).map(|at| format!("f_rest_{at}")));
     let mut size = 0;
