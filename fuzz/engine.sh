@@ -2,7 +2,7 @@
 # libFuzzer is run with it. Sourced with the working directory in fuzz/.
 
 # As in src/targets.rs.
-targets=(units records entropy scene decode synthetic encode oracle)
+targets=(units records entropy scene decode cost synthetic encode oracle)
 
 # Options of every run. The limit on single allocations is in src/ceiling.rs: -malloc_limit_mb needs a sanitizer,
 # which stable lacks.
@@ -65,7 +65,7 @@ side_by_side() {
 starts_of() {
     local folder
     case $1 in
-        units | records | decode | oracle) starts=(-dict=dictionaries/stream.dict) ;;
+        units | records | decode | cost | oracle) starts=(-dict=dictionaries/stream.dict) ;;
         scene) starts=(-dict=dictionaries/scene.dict) ;;
         *) starts=() ;;
     esac

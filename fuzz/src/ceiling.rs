@@ -1,9 +1,10 @@
 //! A heap that ends: a request that was sized by a count in the input is refused, and so is what many small
 //! ones add up to. libFuzzer's own limits need a sanitizer's heap, which stable toolchains lack, or look at pages
-//! in use, which zeroed ones are not.
+//! in use, which zeroed ones are not. It also measures what a thread has in use: see [`peak_of`].
 #![expect(unsafe_code, reason = "GlobalAlloc is an unsafe trait; each request goes to the system as it came")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -11,6 +12,34 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 pub const MAX_REQUEST: usize = 64 << 20;
 /// Most bytes of all requests together.
 pub const MAX_IN_USE: usize = 2 * MAX_REQUEST;
+
+/// What the requests of a thread add up to, less what it has released; memory of one thread may be released by another.
+#[derive(Clone, Copy)]
+struct Held {
+    now: isize,
+    peak: isize,
+}
+
+thread_local! {
+    static HELD: Cell<Held> = const { Cell::new(Held { now: 0, peak: 0 }) };
+}
+
+/// Does some work, and says how many bytes more than before this thread had in use at the same time, at most.
+pub fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
+    let before = HELD.get().now;
+    HELD.set(Held { now: before, peak: before });
+    let result = work();
+    (result, HELD.get().peak.saturating_sub(before).cast_unsigned())
+}
+
+/// Counts a request or, if negative, a release of the calling thread.
+fn count(bytes: isize) {
+    // A thread that ends releases what it has after its counter is gone.
+    let _ = HELD.try_with(|held| {
+        let now = held.get().now.saturating_add(bytes);
+        held.set(Held { now, peak: held.get().peak.max(now) });
+    });
+}
 
 struct Ceiling {
     in_use: AtomicUsize,
@@ -26,6 +55,7 @@ impl Ceiling {
             return false;
         }
         let has_room = self.in_use.fetch_add(size, Relaxed) <= MAX_IN_USE - size;
+        count(size.cast_signed());
         if !has_room {
             self.release(size);
         }
@@ -34,6 +64,7 @@ impl Ceiling {
 
     fn release(&self, size: usize) {
         self.in_use.fetch_sub(size, Relaxed);
+        count(-size.cast_signed());
     }
 
     fn claimed(&self, size: usize, request: impl FnOnce() -> *mut u8) -> *mut u8 {

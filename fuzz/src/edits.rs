@@ -24,6 +24,20 @@ pub fn edited(data: &[u8]) -> Vec<u8> {
     out
 }
 
+/// The stream with a unit, of those that can be told apart, so many times more behind itself, as long as its payloads
+/// have no more than so many bytes together.
+pub fn repeated(stream: &[u8], unit: usize, times: usize, max_payload: usize) -> Vec<u8> {
+    let units = units(stream);
+    let mut out = stream.to_vec();
+    let index = unit % units.len().max(1);
+    if let Some(unit) = units.get(index) {
+        let end = FileHeader::SIZE + units.iter().take(index + 1).map(Vec::len).sum::<usize>();
+        let payload = unit.len() - UnitHeader::SIZE;
+        out.splice(end..end, unit.repeat(times.min(max_payload / payload.max(1))));
+    }
+    out
+}
+
 /// Header and payload of each unit.
 fn units(stream: &[u8]) -> Vec<Vec<u8>> {
     let limits = Limits::default();

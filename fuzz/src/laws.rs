@@ -148,7 +148,7 @@ fn lies_in_order(decoded: &Decoded) {
 }
 
 /// The Gaussians of a frame that were decoded, not carried over.
-fn exact(frame: &DecodedFrame) -> QuantizedFrame {
+pub fn exact(frame: &DecodedFrame) -> QuantizedFrame {
     let mut planes = frame.planes.clone();
     planes.truncate(frame.planes.len() - frame.carried);
     planes

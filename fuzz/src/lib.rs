@@ -5,11 +5,13 @@
 //! [`ceiling`] allows and an input that takes seconds.
 
 pub mod ceiling;
+pub mod cost;
 pub mod decode;
 pub mod edits;
 pub mod encode;
 pub mod entropy;
 pub mod laws;
+pub mod measured;
 pub mod oracle;
 pub mod records;
 pub mod scene;

@@ -1,31 +1,106 @@
-//! The readers of scene files, on any bytes.
+//! The readers of scene files: on any bytes, and on files that are packed from what an input says, so that what lies
+//! behind compression and checksums is read.
 
+use crate::measured::{Allowance, within};
 use splatstream_files::{ReadLimits, SceneError, compressed_ply, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
+use std::borrow::Cow;
+use std::time::Duration;
+
+mod bytes;
+pub mod ply_file;
+pub mod sog_archive;
+pub mod spz_file;
+mod webp;
 
 /// Small, so that an input which keeps within them is cheap.
 pub const LIMITS: ReadLimits = ReadLimits { max_memory: 1 << 21 };
+/// Larger, so that what a reader takes beyond its limit shows, and what it takes for each byte.
+pub const WIDE_LIMITS: ReadLimits = ReadLimits { max_memory: 1 << 23 };
 
 type Reader = fn(&[u8], &ReadLimits) -> Result<GaussianFrame, SceneError>;
 
-/// The first byte of the input chooses one.
-pub const READERS: [Reader; 5] = [ply::read, spz::read, splat::read, sog::read_zip, compressed_ply::read];
+type Pack = fn(&[u8]) -> Vec<u8>;
 
-/// A reader refuses, or gives a frame that passes the checks of frames; what is then written reads again.
+/// How an input becomes a file, and who reads it.
+#[derive(Debug, Clone, Copy)]
+pub struct Form {
+    /// The word for it.
+    pub name: &'static str,
+    /// The reader.
+    pub read: Reader,
+    /// What makes a file of the input; none if the input is one.
+    pub pack: Option<Pack>,
+}
+
+/// The first byte of the input chooses one, and limits.
+pub const FORMS: [Form; 10] = [
+    Form { name: "ply", read: ply::read, pack: None },
+    Form { name: "spz", read: spz::read, pack: None },
+    Form { name: "splat", read: splat::read, pack: None },
+    Form { name: "sog", read: sog::read_zip, pack: None },
+    Form { name: "compressed-ply", read: compressed_ply::read, pack: None },
+    Form { name: "packed-spz-gzip", read: spz::read, pack: Some(spz_file::gzip) },
+    Form { name: "packed-spz-zstd", read: spz::read, pack: Some(spz_file::zstd) },
+    Form { name: "packed-sog", read: sog::read_zip, pack: Some(sog_archive::pack) },
+    Form { name: "packed-ply", read: ply::read, pack: Some(ply_file::pack) },
+    Form { name: "packed-compressed-ply", read: compressed_ply::read, pack: Some(ply_file::pack) },
+];
+
+impl Form {
+    /// The file that an input stands for, without its first byte.
+    pub fn file(self, input: &[u8]) -> Cow<'_, [u8]> {
+        self.pack.map_or(Cow::Borrowed(input), |pack| Cow::Owned(pack(input)))
+    }
+}
+
+/// A reader refuses, or gives a frame that passes the checks of frames, within its limits; what is then written reads
+/// again.
 pub fn run(data: &[u8]) {
-    let Some((choice, bytes)) = data.split_first() else { return };
-    let Ok(frame) = READERS[usize::from(*choice) % READERS.len()](bytes, &LIMITS) else { return };
+    let Some((&choice, input)) = data.split_first() else { return };
+    let choice = usize::from(choice);
+    let (form, choice) = (FORMS[choice % FORMS.len()], choice / FORMS.len());
+    let limits = if choice % 2 == 0 { LIMITS } else { WIDE_LIMITS };
+    let file = form.file(input);
+    let read = within(form.name, &allowance(file.len(), &limits), || (form.read)(&file, &limits));
+    let Ok(frame) = read else { return };
     assert_eq!(frame.validate(), Ok(()));
+    // Writing takes longer than reading: not every time.
+    if choice % 4 == 0 {
+        reads_again(&frame);
+    }
+}
+
+/// What reading a file of so many bytes may take.
+pub fn allowance(length: usize, limits: &ReadLimits) -> Allowance {
+    let length = length as u64;
+    Allowance {
+        peak: limits.max_memory + FIXED + length * BYTES_PER_BYTE,
+        time: Duration::from_millis(100)
+            + Duration::from_nanos(length * NANOSECONDS_PER_BYTE + limits.max_memory * NANOSECONDS_OF_LIMIT),
+    }
+}
+
+/// Tables of decompression and of messages, which do not grow with a file.
+const FIXED: u64 = 1 << 19;
+/// What is kept of each byte of the file without being counted.
+const BYTES_PER_BYTE: u64 = 4;
+/// Time for each byte of a file, and for each byte of memory that it may become.
+const NANOSECONDS_PER_BYTE: u64 = 5_000;
+const NANOSECONDS_OF_LIMIT: u64 = 50;
+
+/// A frame that was read can be written in each format, and reads again.
+fn reads_again(frame: &GaussianFrame) {
     // What is written may be longer than what was read.
     let limits = ReadLimits { max_memory: u64::MAX };
-    let written = ply::write(&frame);
+    let written = ply::write(frame);
     let back = ply::read(&written, &limits).expect("a PLY file of our own reads");
     assert!(ply::write(&back) == written, "PLY changes a frame");
-    if let Ok(written) = splat::write(&frame) {
+    if let Ok(written) = splat::write(frame) {
         let back = splat::read(&written, &limits).expect("a .splat file of our own reads");
         assert_eq!(back.len(), frame.len());
     }
-    if let Ok(written) = spz::write(&frame) {
+    if let Ok(written) = spz::write(frame) {
         let back = spz::read(&written, &limits).expect("an SPZ file of our own reads");
         assert_eq!((back.len(), back.sh_degree()), (frame.len(), frame.sh_degree()));
     }

@@ -61,6 +61,11 @@ fn streams_decode_or_are_refused() {
 }
 
 #[test]
+fn streams_cost_what_their_bytes_and_limits_allow() {
+    replay("cost", false);
+}
+
+#[test]
 fn what_is_made_comes_back_and_decodes_or_is_refused() {
     replay("synthetic", false);
 }

@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 mod contexts;
 #[path = "seeds/learned.rs"]
 mod learned;
+#[path = "seeds/packed.rs"]
+mod packed;
 #[path = "seeds/scenes.rs"]
 mod scenes;
 #[path = "seeds/valid_streams.rs"]
@@ -89,6 +91,13 @@ fn edits_are_seeds_of_decode() {
     assert_eq!(saved("decode").len(), 3 * streams::ALL.len());
 }
 
+#[test]
+fn streams_and_repetitions_are_seeds_of_cost() {
+    let seeds = (0..streams::ALL.len() as u8).map(|stream| (format!("{stream}"), vec![stream, 0, stream]));
+    bless("cost", &seeds.collect::<Vec<_>>());
+    assert_eq!(saved("cost").len(), streams::ALL.len());
+}
+
 /// Noise is a seed of targets that make something of any bytes: long enough that they have what they want.
 fn noise_is_seed_of(target: &str, lengths: impl Iterator<Item = usize>) {
     let seeds: Vec<_> =
@@ -109,8 +118,9 @@ fn noise_is_coded_and_encoded() {
 fn scene_files_read() {
     bless("scene", &scenes::all());
     for (path, bytes) in saved("scene") {
-        let (choice, file) = bytes.split_first().unwrap();
-        let read = scene::READERS[usize::from(*choice)](file, &scene::LIMITS);
+        let (choice, input) = bytes.split_first().unwrap();
+        let form = scene::FORMS[usize::from(*choice)];
+        let read = (form.read)(&form.file(input), &scene::LIMITS);
         assert!(!read.unwrap_or_else(|error| panic!("{}: {error}", path.display())).is_empty());
     }
 }

@@ -1,5 +1,6 @@
 //! A scene file of every format, in front of it the byte that chooses the reader.
 
+use crate::packed;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use image::codecs::webp::WebPEncoder;
@@ -31,6 +32,15 @@ pub(crate) fn all() -> Vec<(String, Vec<u8>)> {
         ("sog", 3, sog(&codebooks())),
         ("sog-version-1", 3, sog(RANGES)),
         ("compressed-ply", 4, compressed_ply()),
+        ("packed-spz-version-1", 5, packed::spz_gzip(1)),
+        ("packed-spz-version-3", 5, packed::spz_gzip(3)),
+        ("packed-spz-version-4", 6, packed::spz_zstd()),
+        ("packed-sog", 7, packed::sog(None)),
+        ("packed-sog-of-text", 7, packed::sog(Some(packed::CODEBOOKS))),
+        ("packed-sog-version-1", 7, packed::sog(Some(packed::RANGES))),
+        ("packed-ply", 8, packed::ply(0)),
+        ("packed-ply-of-text", 8, packed::ply(1)),
+        ("packed-compressed-ply", 9, packed::compressed_ply()),
     ];
     files.into_iter().map(|(name, choice, file)| (name.to_owned(), [vec![choice], file].concat())).collect()
 }

@@ -67,11 +67,14 @@ pub(crate) fn read_zip_as_is(bytes: &[u8], budget: &mut Budget) -> Result<Gaussi
         ZipArchive::new(Cursor::new(bytes)).map_err(|error| refuse(format!("cannot list it: {error}")))?;
     let fetch = |name: &str, budget: &mut Budget| {
         let mut member = archive.by_name(name).map_err(|error| refuse(format!("{name}: {error}")))?;
-        let mut content = Vec::new();
-        // One byte more than allowed tells a member that is too large from one that just fits.
-        let read = (&mut member).take(budget.left().saturating_add(1)).read_to_end(&mut content);
-        read.map_err(|error| refuse(format!("{name}: {error}")))?;
-        budget.take(content.len() as u64, "a member of the archive")?;
+        let size = member.size();
+        let mut content = budget.room(size, "a member of the archive")?;
+        let read = (&mut member).take(size).read_to_end(&mut content);
+        // The checksum is compared when the member ends.
+        let over = read.and_then(|_| member.read(&mut [0]));
+        if over.map_err(|error| refuse(format!("{name}: {error}")))? > 0 || (content.len() as u64) < size {
+            return Err(refuse(format!("{name} is not as long as the archive says, {size} bytes")));
+        }
         Ok(content)
     };
     planes::read(fetch, budget)
