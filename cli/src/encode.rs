@@ -402,9 +402,14 @@ fn failed(source: &FrameFiles, out: &Path, error: &splatstream_encoder::Error) -
                  repair the file, or leave such Gaussians out with --drop-invalid"
             ))
         }
-        Error::TooManyGaussians { frame, .. }
-        | Error::TooManyPerSecond { frame, .. }
-        | Error::OutOfGrid { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
+        Error::OutOfGrid { frame, farthest_row, .. } => Failure::other(format!(
+            "{}: {error}\n  repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from \
+             all others can put the rest out of reach",
+            source.name(*frame)
+        )),
+        Error::TooManyGaussians { frame, .. } | Error::TooManyPerSecond { frame, .. } => {
+            Failure::other(format!("{}: {error}", source.name(*frame)))
+        }
         Error::Output(cause) => Failure::file("write", out, cause),
         Error::Setting { .. } => Failure::Usage(error.to_string()),
         _ => Failure::other(error.to_string()),
