@@ -31,12 +31,12 @@ pub(crate) struct Warning {
 }
 
 impl Warning {
-    fn new(code: &'static str, message: String) -> Self {
+    pub(crate) fn new(code: &'static str, message: String) -> Self {
         Self { code, message }
     }
 
     /// For people.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         format!("warning: {}", self.message)
     }
 }
