@@ -28,6 +28,7 @@ mod stream_file;
 mod structure;
 mod train;
 mod unfinished;
+mod up_guess;
 mod validate;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
