@@ -42,12 +42,15 @@ fn rate_plot(scene: &SceneChart, metric: &Metric) -> Plot {
         title: format!("{}: {} against rate", scene.name, metric.name),
         description: format!(
             "{} of the decoded scene for each quality and refinement level against bits per Gaussian of the \
-             source and Mbit/s; {} is better.",
-            metric.name, metric.better
+             source{}; {} is better.",
+            metric.name,
+            if scene.is_still() { "" } else { " and Mbit/s" },
+            metric.better
         ),
         x: "bits per Gaussian of the source".to_owned(),
         y: metric.axis.to_owned(),
-        top: Some((scene.mbit_per_bpg(), format!("Mbit/s at {} frames per second", scene.fps))),
+        top: (!scene.is_still())
+            .then(|| (scene.mbit_per_bpg(), format!("Mbit/s at {} frames per second", scene.fps))),
         series,
     }
 }

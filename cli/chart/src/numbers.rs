@@ -18,6 +18,15 @@ pub fn bits_per_gaussian(bytes: u64, gaussians: u64) -> f64 {
     bytes as f64 * 8.0 / gaussians.max(1) as f64
 }
 
+/// A number with so many decimals; one that is rounded to 0 has no sign.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().all(|digit| matches!(digit, b'0' | b'.')) => digits.to_owned(),
+        _ => text,
+    }
+}
+
 /// `part` of `whole` in percent.
 pub fn percent(part: u64, whole: u64) -> f64 {
     part as f64 * 100.0 / whole.max(1) as f64
@@ -26,6 +35,11 @@ pub fn percent(part: u64, whole: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_has_no_sign() {
+        assert_eq!([-0.0004, 0.0, -0.0006].map(|value| rounded(value, 3)), ["0.000", "0.000", "-0.001"]);
+    }
 
     #[test]
     fn thousands_are_apart() {

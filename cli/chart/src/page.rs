@@ -75,7 +75,7 @@ impl Page<'_> {
                 (self.summary())
                 (self.conditions())
                 @for (chart, figures) in self.charts.iter().zip(self.figures) {
-                    (scene::section(chart, figures, self.command))
+                    (scene::section(chart, figures))
                 }
                 (glossary::section())
             }
@@ -129,7 +129,6 @@ impl Page<'_> {
                 @if !self.charts.iter().any(SceneChart::has_learned) {
                     p.note { "ST-LPIPS, the learned metric: " (NOT_MEASURED) "." }
                 }
-                (elements::made_by(self.command))
             }
         }
     }
@@ -151,6 +150,7 @@ impl Page<'_> {
             section #conditions {
                 h2 { "Conditions" }
                 dl.facts {
+                    dt { "Command" } dd { (elements::made_by(self.command)) }
                     dt { "Program" } dd { "splatstream " (env!("CARGO_PKG_VERSION")) (build) }
                     dt { "Machine" } dd { (cores) " processors (" (system) ", " (processor) "), " (threads) " threads used" }
                     dt { "Timing" } dd {
@@ -198,7 +198,7 @@ fn summary_row(chart: &SceneChart) -> Markup {
             td { (grouped(chart.gaussians / frames)) }
             td { (size(point.info.bytes)) }
             td { (format!("{:.2}", chart.rate(point))) }
-            td { (format!("{:.1}", chart.bandwidth(point))) }
+            td { @if chart.is_still() { "–" } @else { (format!("{:.1}", chart.bandwidth(point))) } }
             @for metric in &METRICS { td { (figure(metric, &point.figures)) } }
             td { (speed(run.encode.median)) }
             td { (speed(run.decode.median)) }

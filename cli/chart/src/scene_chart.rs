@@ -87,6 +87,11 @@ impl SceneChart {
         mbit_per_second(point.info.bytes, self.frames.0, self.fps)
     }
 
+    /// Whether the source has one frame: nothing is played, and no rate per second is one.
+    pub(crate) fn is_still(&self) -> bool {
+        self.frames.1 == 1
+    }
+
     /// Mbit/s of one bit per Gaussian of the source.
     pub(crate) fn mbit_per_bpg(&self) -> f64 {
         self.gaussians as f64 * self.fps / self.frames.0.max(1) as f64 / 1e6
@@ -133,6 +138,13 @@ pub(crate) struct Metric {
     pub(crate) of: fn(&Comparison) -> Option<f64>,
     /// Decimals.
     pub(crate) decimals: usize,
+}
+
+impl Metric {
+    /// Whether it needs weights, and is measured only where they are given.
+    pub(crate) fn is_learned(&self) -> bool {
+        self.id == "st-lpips"
+    }
 }
 
 /// PSNR, SSIM and the learned metric.

@@ -26,6 +26,9 @@ struct SceneSummary {
     bytes: u64,
     bpg: f64,
     mbit_s: f64,
+    /// A still has no bandwidth; the key is of a sequence of such frames.
+    #[serde(skip)]
+    is_still: bool,
     psnr_db: f64,
     ssim: Option<f64>,
     st_lpips: Option<f64>,
@@ -70,7 +73,7 @@ impl Summary {
             table.row([
                 scene.scene.clone(),
                 format!("{:.2}", scene.bpg),
-                format!("{:.2}", scene.mbit_s),
+                if scene.is_still { "-".to_owned() } else { format!("{:.2}", scene.mbit_s) },
                 format!("{:.2}", scene.psnr_db),
                 scene.ssim.map_or_else(|| "none".to_owned(), |ssim| format!("{ssim:.4}")),
                 speed(scene.encode_gaussians_per_second),
@@ -104,6 +107,7 @@ impl SceneSummary {
             bytes: point.info.bytes,
             bpg: chart.rate(point),
             mbit_s: chart.bandwidth(point),
+            is_still: chart.is_still(),
             psnr_db: point.figures.psnr_db,
             ssim: point.figures.ssim,
             st_lpips: point.figures.st_lpips,

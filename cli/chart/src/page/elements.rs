@@ -1,5 +1,6 @@
 //! Pieces that every part of the page uses.
 
+use crate::numbers::rounded;
 use crate::scene_chart::Metric;
 use crate::svg::Figure;
 use maud::{Markup, html};
@@ -64,7 +65,7 @@ pub(crate) fn figures(figures: &[Figure]) -> Markup {
 
 /// A metric with its decimals, or a dash.
 pub(super) fn figure(metric: &Metric, figures: &Comparison) -> String {
-    (metric.of)(figures).map_or_else(|| "–".to_owned(), |value| format!("{value:.*}", metric.decimals))
+    (metric.of)(figures).map_or_else(|| "–".to_owned(), |value| rounded(value, metric.decimals))
 }
 
 /// Bytes in kB or MB.

@@ -1,7 +1,7 @@
 //! The first GOP of a sequence, with predicted frames: the two tables of the paper, and what tools are worth.
 
-use super::elements::{Heading, figure, how_to_read, made_by, signed, size, table};
-use super::tables::{METRIC_HEADINGS, metric_cells, mode_cells};
+use super::elements::{Heading, figure, how_to_read, signed, size, table};
+use super::tables::{metric_cells, metric_headings, mode_cells};
 use crate::gop::{Gop, Level, ToolRow};
 use crate::numbers::grouped;
 use crate::scene_chart::{METRICS, SceneChart};
@@ -9,7 +9,7 @@ use crate::tables::Mode;
 use maud::{Markup, html};
 
 /// All three tables.
-pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
+pub(super) fn part(chart: &SceneChart, gop: &Gop) -> Markup {
     html! {
         h3 { "Operating points of the first GOP" }
         (how_to_read(
@@ -18,7 +18,6 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
              at ever more refinements; the bandwidth is 8 × the size over the duration of the GOP."
         ))
         (modes(chart, gop))
-        (made_by(command))
         h3 { "Refinement levels of predicted frames" }
         (how_to_read(
             "each row adds Gaussians to the row above: sizes are of all units up to the level; bits are per Gaussian \
@@ -27,14 +26,12 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
              as the paper shows them."
         ))
         (levels(chart, gop))
-        (made_by(command))
         h3 { "What the tools of predicted frames are worth" }
         (how_to_read(
             "each row codes the same GOP with one tool left out or another choice of predictors; sizes and metrics \
              are of predicted frames, everything decoded."
         ))
         (tools(chart, gop))
-        (made_by(command))
         @if !gop.ablation.is_empty() {
             h3 { "What predictors of new Gaussians are worth" }
             (how_to_read(
@@ -43,7 +40,6 @@ pub(super) fn part(chart: &SceneChart, gop: &Gop, command: &str) -> Markup {
                  dc and sh are per new Gaussian, the intra frame included; the network itself is counted apart."
             ))
             (ablation(chart, gop))
-            (made_by(command))
         }
     }
 }
@@ -53,17 +49,17 @@ fn modes(chart: &SceneChart, gop: &Gop) -> Markup {
     headings.extend([Heading::Numbers("Frames shown"), Heading::Words("Playback")]);
     let numbers = ["Refine\u{ad}ment", "Size", "Required bandwidth", "Gaussians", "Bits per Gaussian"];
     headings.extend(numbers.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
-    let row = |place: usize, mode: &Mode| {
+    headings.extend(metric_headings(chart.has_learned()));
+    let row = |mode: &Mode| {
         html! {
             tr {
-                (mode_cells(mode))
+                (mode_cells(mode, false))
                 td { (format!("{:.2}", mode.bpg())) }
-                (metric_cells(chart, &mode.figures, place, gop.modes.len()))
+                (metric_cells(chart.has_learned(), &mode.figures))
             }
         }
     };
-    table(&headings, &html! { @for (place, mode) in gop.modes.iter().enumerate() { (row(place, mode)) } })
+    table(&headings, &html! { @for mode in &gop.modes { (row(mode)) } })
 }
 
 fn levels(chart: &SceneChart, gop: &Gop) -> Markup {
@@ -73,11 +69,11 @@ fn levels(chart: &SceneChart, gop: &Gop) -> Markup {
     headings.extend(frames.iter().map(|name| Heading::Numbers(name)));
     let rest = ["Added size", "Total size", "Gaussians", "Cumulative bits per Gaussian"];
     headings.extend(rest.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
+    headings.extend(metric_headings(chart.has_learned()));
     let predicted = ["PSNR, predicted, carried", "SSIM", "PSNR, predicted, subset", "SSIM"];
     headings.extend(predicted.map(Heading::Numbers));
     let [psnr, ssim, _] = &METRICS;
-    let row = |place: usize, level: &Level| {
+    let row = |level: &Level| {
         html! {
             tr {
                 th scope="row" { (level.percent) " %" }
@@ -86,7 +82,7 @@ fn levels(chart: &SceneChart, gop: &Gop) -> Markup {
                 td { (size(level.total)) }
                 td { (grouped(level.gaussians)) }
                 td { (format!("{:.2}", level.bpg)) }
-                (metric_cells(chart, &level.all, place, gop.levels.len()))
+                (metric_cells(chart.has_learned(), &level.all))
                 @for figures in [&level.inter, &level.subset.figures] {
                     td { (figure(psnr, figures)) }
                     td { (figure(ssim, figures)) }
@@ -94,13 +90,13 @@ fn levels(chart: &SceneChart, gop: &Gop) -> Markup {
             }
         }
     };
-    table(&headings, &html! { @for (place, level) in gop.levels.iter().enumerate() { (row(place, level)) } })
+    table(&headings, &html! { @for level in &gop.levels { (row(level)) } })
 }
 
 fn tools(chart: &SceneChart, gop: &Gop) -> Markup {
     let mut headings = vec![Heading::Words("Tools")];
     headings.extend(["Size", "Bytes per Gaussian", "More"].map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
+    headings.extend(metric_headings(chart.has_learned()));
     let more = |tool: &ToolRow| gop.tools.first().map(|everything| tool.more_than(everything));
     table(
         &headings,
@@ -111,7 +107,7 @@ fn tools(chart: &SceneChart, gop: &Gop) -> Markup {
                     td { (size(tool.bytes)) }
                     td { (format!("{:.3}", tool.bytes_per_gaussian())) }
                     td { (signed(more(tool), " %")) }
-                    (metric_cells(chart, &tool.figures, place, gop.tools.len()))
+                    (metric_cells(chart.has_learned(), &tool.figures))
                 }
             }
         },
@@ -122,11 +118,11 @@ fn ablation(chart: &SceneChart, gop: &Gop) -> Markup {
     let mut headings = vec![Heading::Words("Predictors")];
     let numbers = ["Size", "Network", "Learned", "Bits of dc", "Bits of sh", "Decoding"];
     headings.extend(numbers.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
+    headings.extend(metric_headings(chart.has_learned()));
     table(
         &headings,
         &html! {
-            @for (place, row) in gop.ablation.iter().enumerate() {
+            @for row in &gop.ablation {
                 tr {
                     th scope="row" { (row.name) }
                     td { (size(row.bytes)) }
@@ -135,7 +131,7 @@ fn ablation(chart: &SceneChart, gop: &Gop) -> Markup {
                     td { (format!("{:.3}", row.dc_bits)) }
                     td { (format!("{:.3}", row.sh_bits)) }
                     td { (format!("{:.0} ms", row.decode_ms)) }
-                    (metric_cells(chart, &row.figures, place, gop.ablation.len()))
+                    (metric_cells(chart.has_learned(), &row.figures))
                 }
             }
         },

@@ -1,14 +1,14 @@
 //! Other codecs on the same scene.
 
-use super::elements::{Heading, how_to_read, made_by, size, speed, table};
-use super::tables::{METRIC_HEADINGS, metric_cells};
+use super::elements::{Heading, how_to_read, size, speed, table};
+use super::tables::{metric_cells, metric_headings};
 use crate::peers::PeerPoint;
 use crate::scene_chart::SceneChart;
 use crate::variant_comparison::bytes_for_the_same;
 use maud::{Markup, html};
 
 /// What others did, and who is missing; nothing without either.
-pub(super) fn part(chart: &SceneChart, command: &str) -> Markup {
+pub(super) fn part(chart: &SceneChart) -> Markup {
     html! {
         @if !chart.peers.is_empty() {
             h3 { "Other codecs" }
@@ -18,7 +18,6 @@ pub(super) fn part(chart: &SceneChart, command: &str) -> Markup {
             ))
             (results(chart))
             (commands(chart))
-            (made_by(command))
         }
         @if !chart.missing.is_empty() {
             h4 { "Not measured" }
@@ -30,7 +29,7 @@ pub(super) fn part(chart: &SceneChart, command: &str) -> Markup {
 fn results(chart: &SceneChart) -> Markup {
     let mut headings: Vec<Heading<'_>> = ["Codec", "Options"].map(Heading::Words).to_vec();
     headings.extend(["Size per frame", "Bits per Gaussian of the source"].map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
+    headings.extend(metric_headings(chart.has_learned()));
     headings.extend(["Our size at its PSNR", "Encoding", "Decoding"].map(Heading::Numbers));
     let anchor = chart.anchor();
     let ours = |peer: &PeerPoint| match bytes_for_the_same(&anchor, peer.rate_point()) {
@@ -39,13 +38,13 @@ fn results(chart: &SceneChart) -> Markup {
     };
     let measured = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), speed);
     let body = html! {
-        @for (place, peer) in chart.peers.iter().enumerate() {
+        @for peer in &chart.peers {
             tr {
                 th scope="row" { (peer.peer) }
                 td.text { (peer.details) }
                 td { (size(peer.bytes / u64::from(peer.frames.max(1)))) }
                 td { (format!("{:.2}", peer.bpg)) }
-                (metric_cells(chart, &peer.figures, place, chart.peers.len()))
+                (metric_cells(chart.has_learned(), &peer.figures))
                 td { (ours(peer)) }
                 td { (measured(peer.encode_speed)) }
                 td { (measured(peer.decode_speed)) }

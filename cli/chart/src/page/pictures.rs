@@ -1,13 +1,13 @@
 //! The pictures of a scene.
 
-use super::elements::{how_to_read, made_by};
+use super::elements::how_to_read;
 use crate::pictures::{AMPLIFICATION, Picture, Pictures, heat};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 
 /// Source, decoded and difference at each level.
-pub(super) fn part(shown: &Pictures, command: &str) -> Markup {
+pub(super) fn part(shown: &Pictures) -> Markup {
     html! {
         h3 { "What it looks like" }
         (how_to_read(&format!(
@@ -24,7 +24,6 @@ pub(super) fn part(shown: &Pictures, command: &str) -> Markup {
                 (picture(&level.difference, "difference", &format!("difference at {} %", level.percent)))
             }
         }
-        (made_by(command))
     }
 }
 

@@ -1,31 +1,30 @@
 //! The part of a scene.
 
-use super::elements::{NOT_MEASURED, figures, how_to_read, made_by};
+use super::elements::{NOT_MEASURED, figures, how_to_read};
 use super::{SceneFigures, gop, peers, pictures, tables};
 use crate::numbers::grouped;
 use crate::scene_chart::SceneChart;
 use maud::{Markup, html};
 
 /// Everything about a scene.
-pub(super) fn section(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
+pub(super) fn section(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
     html! {
         section.scene #(chart.name) {
             h2 { (chart.name) }
             p { (facts(chart)) }
-            (rates(chart, drawn, command))
-            @if let Some(shown) = &chart.pictures { (pictures::part(shown, command)) }
-            (speeds(chart, drawn, command))
-            @if let Some(measured) = &chart.gop { (gop::part(chart, measured, command)) }
-            (tables::refinements(chart, command))
-            (tables::bandwidth(chart, command))
+            (rates(chart, drawn))
+            @if let Some(shown) = &chart.pictures { (pictures::part(shown)) }
+            (speeds(chart, drawn))
+            @if let Some(measured) = &chart.gop { (gop::part(chart, measured)) }
+            (tables::refinements(chart))
+            (tables::bandwidth(chart))
             h3 { "Where the bits go" }
             (how_to_read(
                 "each bar is one quality, its length the bits that a coded Gaussian takes on average; the parts are \
                  attributes on one side and kinds of units on the other."
             ))
             (figures(&drawn.costs))
-            (made_by(command))
-            (peers::part(chart, command))
+            (peers::part(chart))
         }
     }
 }
@@ -40,11 +39,12 @@ pub(super) fn facts(chart: &SceneChart) -> Markup {
     html! {
         (chart.source) ": " (frames) (of) @if frames == 1 && of_source == 1 { " frame, " } @else { " frames, " }
         (grouped(per_frame)) " Gaussians per frame, spherical harmonics of degree " (chart.sh_degree) "; "
-        (cameras) " cameras, " (width) " × " (height) " pixels; " (chart.fps) " frames per second."
+        (cameras) " cameras, " (width) " × " (height) " pixels"
+        @if chart.is_still() { "." } @else { "; " (chart.fps) " frames per second." }
     }
 }
 
-fn rates(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
+fn rates(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
     html! {
         h3 { "Quality against rate" }
         (how_to_read(
@@ -58,11 +58,10 @@ fn rates(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
             p.note { (peer.peer) " gives the pictures of the source; it is in the table of other codecs, not in the figures." }
         }
         @if !chart.has_learned() { p.note { "ST-LPIPS: " (NOT_MEASURED) "." } }
-        (made_by(command))
     }
 }
 
-fn speeds(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
+fn speeds(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
     html! {
         h3 { "Speed against accuracy" }
         (how_to_read(
@@ -71,6 +70,5 @@ fn speeds(chart: &SceneChart, drawn: &SceneFigures, command: &str) -> Markup {
         ))
         (figures(&drawn.speeds))
         (tables::variants(chart))
-        (made_by(command))
     }
 }

@@ -1,6 +1,6 @@
 //! The tables of a scene.
 
-use super::elements::{Heading, NOT_MEASURED, figure, how_to_read, made_by, signed, size, speed, table};
+use super::elements::{Heading, figure, how_to_read, signed, size, speed, table};
 use crate::numbers::grouped;
 use crate::scene_chart::{METRICS, SceneChart};
 use crate::sweep::Group;
@@ -12,26 +12,25 @@ use splatstream_render::metrics::Comparison;
 /// Frames whose units have columns of their own.
 const COLUMNS: usize = 4;
 
-/// Headings of the metrics.
-pub(super) const METRIC_HEADINGS: [Heading<'_>; 3] =
-    [Heading::Numbers("PSNR, dB"), Heading::Numbers("SSIM"), Heading::Numbers("ST-LPIPS")];
+/// Headings of the metrics that were measured.
+pub(super) fn metric_headings<'a>(has_learned: bool) -> impl Iterator<Item = Heading<'a>> {
+    let measured = METRICS.iter().zip(["PSNR, dB", "SSIM", "ST-LPIPS"]);
+    measured
+        .filter(move |(metric, _)| has_learned || !metric.is_learned())
+        .map(|(_, name)| Heading::Numbers(name))
+}
 
-/// The metrics of row `row` of `rows`; one cell for all rows says why there is no learned metric.
-pub(super) fn metric_cells(chart: &SceneChart, figures: &Comparison, row: usize, rows: usize) -> Markup {
-    let [psnr, ssim, learned] = &METRICS;
+/// The cells under them.
+pub(super) fn metric_cells(has_learned: bool, figures: &Comparison) -> Markup {
     html! {
-        td { (figure(psnr, figures)) }
-        td { (figure(ssim, figures)) }
-        @if chart.has_learned() {
-            td { (figure(learned, figures)) }
-        } @else if row == 0 {
-            td.absent rowspan=(rows) { (NOT_MEASURED) }
+        @for metric in METRICS.iter().filter(|metric| has_learned || !metric.is_learned()) {
+            td { (figure(metric, figures)) }
         }
     }
 }
 
 /// Refinement levels of intra frames.
-pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
+pub(super) fn refinements(chart: &SceneChart) -> Markup {
     let rows = chart.refinement_rows();
     let columns = rows.first().map_or(0, |row| row.unit_bytes.len()).min(COLUMNS);
     let frames: Vec<String> = (0..columns).map(|frame| format!("I{frame} size")).collect();
@@ -39,9 +38,9 @@ pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
     headings.extend(frames.iter().map(|name| Heading::Numbers(name)));
     let rest = ["Added size", "Total size", "Gaussians", "Cumulative bits per Gaussian"];
     headings.extend(rest.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
+    headings.extend(metric_headings(chart.has_learned()));
     let body = html! {
-        @for (place, row) in rows.iter().enumerate() {
+        @for row in &rows {
             tr {
                 th scope="row" { (row.percent) " %" }
                 @for bytes in row.unit_bytes.iter().take(columns) { td { (size(*bytes)) } }
@@ -49,7 +48,7 @@ pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
                 td { (size(row.total_bytes)) }
                 td { (grouped(row.gaussians)) }
                 td { (format!("{:.2}", row.bpg)) }
-                (metric_cells(chart, &row.figures, place, rows.len()))
+                (metric_cells(chart.has_learned(), &row.figures))
             }
         }
     };
@@ -61,47 +60,60 @@ pub(super) fn refinements(chart: &SceneChart, command: &str) -> Markup {
         ))
         (table(&headings, &body))
         @if chart.frames.0 > COLUMNS { p.note { "Frames after the first " (COLUMNS) " are in refinements.csv." } }
-        (made_by(command))
     }
 }
 
-/// Operating points of intra frames.
-pub(super) fn bandwidth(chart: &SceneChart, command: &str) -> Markup {
-    let rows = chart.bandwidth_rows();
+/// Operating points of intra frames; those of a still take no bandwidth.
+pub(super) fn bandwidth(chart: &SceneChart) -> Markup {
+    let is_still = chart.is_still();
     let mut headings: Vec<Heading<'_>> = ["Mode", "Units"].map(Heading::Words).to_vec();
-    headings.extend([Heading::Numbers("Frames shown"), Heading::Words("Playback")]);
-    let numbers = ["Refine\u{ad}ment", "Size per GOP", "Required bandwidth", "Gaussians"];
-    headings.extend(numbers.map(Heading::Numbers));
-    headings.extend(METRIC_HEADINGS);
+    if !is_still {
+        headings.extend([Heading::Numbers("Frames shown"), Heading::Words("Playback")]);
+    }
+    headings
+        .extend(["Refine\u{ad}ment", if is_still { "Size" } else { "Size per GOP" }].map(Heading::Numbers));
+    if !is_still {
+        headings.push(Heading::Numbers("Required bandwidth"));
+    }
+    headings.push(Heading::Numbers("Gaussians"));
+    headings.extend(metric_headings(chart.has_learned()));
     let body = html! {
-        @for (place, row) in rows.iter().enumerate() {
+        @for row in &chart.bandwidth_rows() {
             tr {
-                (mode_cells(row))
-                (metric_cells(chart, &row.figures, place, rows.len()))
+                (mode_cells(row, is_still))
+                (metric_cells(chart.has_learned(), &row.figures))
             }
         }
     };
     html! {
-        h3 { "Operating points by bandwidth" @if chart.gop.is_some() { ", every frame by itself" } }
-        (how_to_read(
-            "each row is a way to play the stream, least bandwidth first: find the last row that your network carries; \
-             the bandwidth is 8 × the size of a GOP over its duration."
-        ))
+        h3 {
+            "Operating points by " (if is_still { "size" } else { "bandwidth" })
+            @if chart.gop.is_some() { ", every frame by itself" }
+        }
+        @if is_still {
+            (how_to_read("each row is a part of the stream that shows the scene, the smallest first."))
+        } @else {
+            (how_to_read(
+                "each row is a way to play the stream, least bandwidth first: find the last row that your network \
+                 carries; the bandwidth is 8 × the size of a GOP over its duration."
+            ))
+        }
         (table(&headings, &body))
-        (made_by(command))
     }
 }
 
 /// What a mode of playback is, and what it takes.
-pub(super) fn mode_cells(mode: &Mode) -> Markup {
+pub(super) fn mode_cells(mode: &Mode, is_still: bool) -> Markup {
     html! {
         th scope="row" { (mode.name) }
         td.text { (mode.units) }
-        td { (mode.frames) }
-        td.text { (mode.playback) }
+        @if !is_still {
+            td { (mode.frames) }
+            td.text { (mode.playback) }
+        }
         td { @if let Some(percent) = mode.percent { (percent) " %" } @else { "–" } }
         td { (size(mode.bytes)) }
-        td { (format!("{:.1} Mbit/s", mode.mbit_s)) }
+        @if !is_still { td { (format!("{:.1} Mbit/s", mode.mbit_s)) } }
         td { (grouped(mode.gaussians)) }
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn html(reports: &[BaseReport], figures: &[Figure], command: &str) ->
         }
         main {
             (summary(reports, command))
-            @for report in reports { (base(report, figures, command)) }
+            @for report in reports { (base(report, figures)) }
             (terms())
         }
     };
@@ -79,13 +79,12 @@ fn summary(reports: &[BaseReport], command: &str) -> Markup {
     }
 }
 
-fn base(report: &BaseReport, figures: &[Figure], command: &str) -> Markup {
+fn base(report: &BaseReport, figures: &[Figure]) -> Markup {
     html! {
         section.scene #(report.name) {
             h2 { (report.name) }
             p { (report.facts) }
             @for case in &report.cases { (part(report, case, figures)) }
-            (made_by(command))
         }
     }
 }

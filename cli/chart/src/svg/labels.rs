@@ -3,7 +3,7 @@
 /// Height of a line of text.
 const HEIGHT: f64 = 14.0;
 /// Width of a letter, on the safe side: fonts differ.
-const LETTER: f64 = 7.5;
+pub(super) const LETTER: f64 = 7.5;
 
 /// A rectangle: left, top, right, bottom.
 #[derive(Debug, Clone, Copy, PartialEq)]

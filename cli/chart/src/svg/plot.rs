@@ -1,12 +1,14 @@
 //! Curves and points over two axes.
 
-use super::labels::{Area, Placer};
+use super::labels::{Area, LETTER, Placer};
 use super::scale::Scale;
 use super::{Figure, coordinate};
 use maud::{Markup, html};
 
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 400.0;
+/// Most numbers on the ordinate.
+const Y_TICKS: usize = 7;
 /// Colours of `figure.css`.
 const COLOURS: usize = 8;
 
@@ -77,12 +79,12 @@ impl Plot {
         let dots = || self.series.iter().flat_map(|series| &series.dots).map(|dot| dot.at);
         dots().next()?;
         let top = if self.top.is_some() { 46.0 } else { 14.0 };
-        let frame = Area(64.0, top, WIDTH - 14.0, HEIGHT - 50.0);
-        let axes = Axes {
-            x: Scale::over(dots().map(|(x, _)| x), true, (frame.0, frame.2)),
-            y: Scale::over(dots().map(|(_, y)| y), false, (frame.3, frame.1)),
-            frame,
-        };
+        let y = Scale::over(dots().map(|(_, y)| y), false, (HEIGHT - 50.0, top));
+        let widest = y.ticks(Y_TICKS).iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0);
+        // The name of the axis, a gap, and the numbers.
+        let left = (widest as f64).mul_add(LETTER, 36.0).max(64.0);
+        let frame = Area(left, top, WIDTH - 14.0, HEIGHT - 50.0);
+        let axes = Axes { x: Scale::over(dots().map(|(x, _)| x), true, (frame.0, frame.2)), y, frame };
         let body = html! {
             (self.grid(&axes))
             @for series in &self.series { (curve(series, &axes)) }
@@ -97,7 +99,7 @@ impl Plot {
         let Area(left, top, right, bottom) = axes.frame;
         let middle = ((left + right) / 2.0, (top + bottom) / 2.0);
         html! {
-            @for (value, text) in axes.y.ticks(7) {
+            @for (value, text) in axes.y.ticks(Y_TICKS) {
                 @let y = coordinate(axes.y.place(value));
                 path.grid d=(format!("M{left} {y}H{right}")) {}
                 text.tick x=(left - 7.0) y=(y) dy="4" text-anchor="end" { (text) }

@@ -1,6 +1,6 @@
 //! From values to places on an axis, and the numbers beside it.
 
-use crate::numbers::grouped;
+use crate::numbers::{grouped, rounded};
 
 /// Ratio of the largest to the smallest value from which an axis of rates or speeds is logarithmic.
 const WIDE: f64 = 6.0;
@@ -75,7 +75,7 @@ impl Scale {
         let decimals =
             if (step * libm::exp10(decimals as f64)).fract() > 1e-6 { decimals + 1 } else { decimals };
         let written = |value: f64| {
-            if decimals == 0 && value.abs() >= 1000.0 { number(value) } else { format!("{value:.decimals$}") }
+            if decimals == 0 && value.abs() >= 1000.0 { number(value) } else { rounded(value, decimals) }
         };
         (first..=last).map(|count| count as f64 * step).map(|value| (value, written(value))).collect()
     }
@@ -102,7 +102,7 @@ fn number(value: f64) -> String {
     if value >= 1000.0 {
         return grouped(libm::round(value) as u64);
     }
-    let text = format!("{value:.4}");
+    let text = rounded(value, 4);
     let text = text.trim_end_matches('0').trim_end_matches('.');
     text.to_owned()
 }
