@@ -126,7 +126,7 @@ fn is_directory(path: &Path) -> Result<bool, Failure> {
     if path.extension().is_some() || path.exists() {
         let path = path.display();
         return Err(Failure::Usage(format!(
-            "{path}: no format that decode writes: end the name of a file in .ply, .spz or .splat, \
+            "{path}: decode cannot write this format; end the name of a file in .ply, .spz or .splat, \
              and that of a directory in /; {STANDARD} is standard output"
         )));
     }
@@ -140,9 +140,9 @@ fn stale(wanted: &Wanted<'_>) -> Result<Vec<PathBuf>, Failure> {
     stale.retain(|path| is_frame(path) && !path.is_dir());
     if !stale.is_empty() && !wanted.force {
         let (path, count) = (wanted.path.display(), stale.len());
-        let frames = if count == 1 { "1 file has" } else { &format!("{count} files have") };
+        let files = if count == 1 { "1 file" } else { &format!("{count} files") };
         return Err(Failure::Usage(format!(
-            "{path}: {frames} the names of frames, as from an earlier run; \
+            "{path}: the directory has {files} with names of frames, probably from an earlier run; \
              give another directory, or --force to remove them"
         )));
     }
