@@ -7,6 +7,7 @@ use serde_json::Value;
 use splatstream_encoder::{Preset, Quality, Settings, ShChoice, encode};
 use splatstream_files::builtin::BuiltinScene;
 use std::fs;
+use std::io::Write;
 
 /// The committed stream is what the encoder wrote once; other encoders may write others. For a change of the
 /// bitstream `BLESS=1 cargo test -p splatstream-cli --test inspect the_fixture` writes it again.
@@ -102,6 +103,26 @@ fn a_stream_of_any_length_comes_by_a_pipe() {
         let shown: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(shown["units"].as_array().unwrap().len(), count);
         assert_eq!(shown["error"]["code"], "TRUNCATED");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn nothing_is_read_that_nobody_sees() {
+    for view in ["--tree", "--units"] {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_splatstream"))
+            .args(["inspect", "-", view, "--json"])
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let mut endless = child.stdin.take().expect("a pipe");
+        drop(child.stdout.take());
+        let units = empty_units(10_000);
+        endless.write_all(&units[..16]).expect("it reads the file header");
+        // The command ends, and nobody takes the bytes any more.
+        while endless.write_all(&units[16..]).is_ok() {}
+        assert!(child.wait().expect("it ends").code().is_some(), "{view}");
     }
 }
 

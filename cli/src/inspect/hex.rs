@@ -10,6 +10,7 @@ use serde::{Serialize, Serializer};
 use splatstream_format::Limits;
 use splatstream_format::inspect::Element;
 use std::fmt::Write;
+use std::ops::ControlFlow;
 
 /// Bytes a line.
 const WIDTH: usize = 16;
@@ -40,11 +41,11 @@ fn with_bytes<S: Serializer>(elements: &[Bytes], serializer: S) -> Result<S::Ok,
 pub(super) fn show(stream: &StreamFile, number: usize, limits: &Limits, console: &Console) -> Shown {
     let (mut found, mut count) = (None, 0);
     let visited = each_part(&mut stream.bytes.as_slice(), limits, &mut |part| {
-        let Part::Unit(unit) = part else { return };
-        count += 1;
-        if unit.unit == number {
-            found = Some(unit);
+        if let Part::Unit(unit) = part {
+            count += 1;
+            found = found.take().or((unit.unit == number).then_some(unit));
         }
+        ControlFlow::Continue(())
     });
     let Some(Branch { unit, kind, at, bytes, header, elements }) = found else {
         if visited.error.is_some() {

@@ -11,8 +11,9 @@ use serde::{Serialize, Serializer};
 use splatstream_format::inspect::{Element, Inspector, Value};
 use splatstream_format::syntax::UnitHeader;
 use splatstream_format::{Error, Limits};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::io::{self, Read, Write};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// What `--json` prints: `file`, `records`, `units`, `file_header`, `bytes`, `error`.
@@ -81,8 +82,14 @@ pub(super) fn show(path: &Path, limits: &Limits, console: &Console) -> Shown {
     }
 }
 
-/// Visits the file header and the units of a stream.
-pub(super) fn each_part(reader: &mut dyn Read, limits: &Limits, visit: &mut dyn FnMut(Part)) -> Visited {
+/// Visits the file header and the units of a stream, until somebody has seen enough.
+pub(super) fn each_part(
+    reader: &mut dyn Read,
+    limits: &Limits,
+    visit: &mut dyn FnMut(Part) -> ControlFlow<()>,
+) -> Visited {
+    let is_over = Cell::new(false);
+    let mut visit = |part| is_over.set(is_over.get() || visit(part).is_break());
     let mut current = Part::FileHeader(Vec::new());
     let mut take = |element: Element| {
         if is_start_of_unit(&element) {
@@ -94,7 +101,10 @@ pub(super) fn each_part(reader: &mut dyn Read, limits: &Limits, visit: &mut dyn 
         current.push(element);
     };
     let mut inspector = Inspector::new(limits, &mut take);
-    let fed = feed(reader, &mut |bytes, is_end| inspector.read(bytes, is_end).then(|| inspector.position()));
+    let fed = feed(reader, &mut |bytes, is_end| {
+        let is_more = inspector.read(bytes, is_end) && !is_over.get();
+        is_more.then(|| inspector.position())
+    });
     let error = inspector.error();
     visit(current);
     let (bytes, failed) = fed.map_or_else(|error| (0, Some(error)), |bytes| (bytes, None));
@@ -144,12 +154,12 @@ impl Serialize for Branches<'_> {
         let Self(tree) = self;
         let mut units = serializer.serialize_seq(None)?;
         let mut written = Ok(());
-        tree.visit(&mut |part| match part {
-            Part::FileHeader(elements) => drop(tree.file_header.replace(elements)),
-            Part::Unit(branch) if written.is_ok() => {
-                written = units.serialize_element(&BranchJson(&branch, &tree.records));
+        tree.visit(&mut |part| {
+            match part {
+                Part::FileHeader(elements) => drop(tree.file_header.replace(elements)),
+                Part::Unit(branch) => written = units.serialize_element(&BranchJson(&branch, &tree.records)),
             }
-            Part::Unit(_) => {}
+            go_on_if(written.is_ok())
         });
         written?;
         units.end()
@@ -171,7 +181,7 @@ impl Serialize for BranchJson<'_> {
 }
 
 impl Tree<'_> {
-    fn visit(&self, visit: &mut dyn FnMut(Part)) {
+    fn visit(&self, visit: &mut dyn FnMut(Part) -> ControlFlow<()>) {
         let visited = each_part(&mut **self.reader.borrow_mut(), self.limits, visit);
         self.visited.replace(visited);
     }
@@ -180,9 +190,8 @@ impl Tree<'_> {
     fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let mut written = Ok(());
         self.visit(&mut |part| {
-            if written.is_ok() {
-                written = write_part(out, &part);
-            }
+            written = write_part(out, &part);
+            go_on_if(written.is_ok())
         });
         written?;
         match self.visited.borrow().error {
@@ -190,6 +199,11 @@ impl Tree<'_> {
             None => Ok(()),
         }
     }
+}
+
+/// Where nothing can be written any more, nothing needs to be read.
+pub(super) fn go_on_if(is_written: bool) -> ControlFlow<()> {
+    if is_written { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
 }
 
 fn write_part(out: &mut dyn Write, part: &Part) -> io::Result<()> {

@@ -1,5 +1,6 @@
 //! One line per unit.
 
+use super::tree::go_on_if;
 use super::{Shown, span};
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault};
@@ -17,6 +18,7 @@ use splatstream_format::unit_reader::{Event, UnitReader};
 use splatstream_format::{Error, Limits};
 use std::cell::RefCell;
 use std::io::{self, Read, Write};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// What `--json` prints: `units`, `error`.
@@ -97,9 +99,8 @@ impl Serialize for Lines<'_> {
         let mut lines = serializer.serialize_seq(None)?;
         let mut written = Ok(());
         self.0.list(&mut |line| {
-            if written.is_ok() {
-                written = lines.serialize_element(&line);
-            }
+            written = lines.serialize_element(&line);
+            go_on_if(written.is_ok())
         });
         written?;
         lines.end()
@@ -108,7 +109,7 @@ impl Serialize for Lines<'_> {
 
 impl Listing<'_> {
     /// Visits a line per unit. Where the end of a unit is not known it goes on at the next intact gop_header.
-    fn list(&self, visit: &mut dyn FnMut(Line)) {
+    fn list(&self, visit: &mut dyn FnMut(Line) -> ControlFlow<()>) {
         let mut units = UnitReader::new(self.limits);
         let mut context = Context::new(self.limits);
         let fed = feed(&mut **self.reader.borrow_mut(), &mut |bytes, is_end| {
@@ -120,7 +121,10 @@ impl Listing<'_> {
     /// The table for people.
     fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let mut table = Table::new(["unit", "type", "bytes at", "bytes", "frame", "layer", "refinement", ""]);
-        self.list(&mut |line| table.row(line.cells()));
+        self.list(&mut |line| {
+            table.row(line.cells());
+            ControlFlow::Continue(())
+        });
         out.write_all(table.text().as_bytes())?;
         match self.listed.borrow().0 {
             Some(error) => writeln!(out, "the first error is at {}", StreamFault::from(error)),
@@ -201,14 +205,15 @@ impl Context {
         units: &mut UnitReader,
         bytes: &[u8],
         is_end: bool,
-        visit: &mut dyn FnMut(Line),
+        visit: &mut dyn FnMut(Line) -> ControlFlow<()>,
     ) -> bool {
         let start = units.position();
         loop {
             let taken = usize::try_from(units.position() - start).unwrap_or(usize::MAX);
             match units.read(bytes.get(taken..).unwrap_or_default(), is_end) {
                 Ok(Event::FileHeader(header)) => self.follower = Follower::new(header.profile()),
-                Ok(Event::Unit(unit)) => visit(self.line(&unit)),
+                Ok(Event::Unit(unit)) if visit(self.line(&unit)).is_break() => return false,
+                Ok(Event::Unit(_)) => {}
                 Ok(Event::NeedMoreData(_)) => return true,
                 Ok(_) => return false,
                 Err(error) => {
