@@ -1,6 +1,7 @@
 //! From where scenes are looked at: a camera file, or cameras made for the scene.
 
 use crate::failure::Failure;
+use crate::up_guess::UpGuess;
 use clap::{Args, ValueEnum};
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_format::syntax::Camera as StreamCamera;
@@ -21,7 +22,8 @@ pub(crate) struct CameraArgs {
     /// Rows of the pictures, 540, 720 and 1080 as a rule; default is what the camera file says, or 540.
     #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(1..=8640))]
     pub(crate) height: Option<u32>,
-    /// What points up in the scene, for cameras that are made for it; default is what the stream says, or -y.
+    /// What points up in the scene, for cameras that are made for it; default is what the stream says, or y or -y,
+    /// guessed by which end of the first frame is heavier. The report says what was guessed.
     #[arg(long, value_enum, allow_hyphen_values = true)]
     pub(crate) up: Option<UpName>,
 }
@@ -149,7 +151,8 @@ impl CameraArgs {
         description: &SceneDescription,
     ) -> Result<Vec<Camera>, Failure> {
         let height = self.height.unwrap_or(HEIGHT);
-        let up = direction(self.up_axis(description)).unwrap_or_default();
+        let said = self.up_axis(description);
+        let up = direction(said).or_else(|| direction(UpGuess::of(frame).axis)).unwrap_or_default();
         match views {
             Some(Views::Ring(count)) => Ok(ring(frame, up, *count, height)),
             Some(Views::Forward(count)) => Ok(forward(frame, up, *count, height)),

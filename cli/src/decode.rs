@@ -1,5 +1,6 @@
 //! `splatstream decode`: a stream to frames in files.
 
+mod clamped;
 mod loss;
 mod report;
 mod target;
@@ -110,6 +111,7 @@ impl Decode {
         let verdict = summary.verdict();
         let loss = Loss::new(&stream, announced, &options, &summary, frames);
         let report = Report { seek, ..self.report(decoding, loss, announced, total) };
+        report.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         // Of a file that is no stream there is nothing to say but the error.
         console.report_beside(self.out.as_deref(), &report, || {
             if report.frames > 0 || verdict.is_none() { report.text() } else { String::new() }
@@ -159,6 +161,7 @@ impl Decode {
             verified: !self.no_verify,
             subset: self.subset,
             seek: None,
+            warnings: decoding.target.map(|target| target.warnings()).unwrap_or_default(),
             complete: loss.lost.is_empty() && reduced.is_empty() && (is_known || !has_errors),
             reduced,
             shown: decoding.shown,

@@ -1,5 +1,6 @@
 //! `splatstream demo`: everything once, without any input.
 
+mod pictures;
 mod report;
 
 use crate::compare::errors::{AttributeErrors, ErrorSums};
@@ -9,24 +10,27 @@ use crate::failure::Failure;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::Args;
+use pictures::Album;
 use report::{Demonstration, Encoding, Point, Scene};
 use splatstream_chart::numbers::bits_per_gaussian;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Report, Settings, encode};
+use splatstream_encoder::{Preset, Quality, Report, Settings, Structure, encode};
 use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_files::ply;
 use splatstream_format::Limits;
+use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_gaussians::GaussianFrame;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Try everything without any input: make a scene, encode it, decode it at every operating point, verify.
+/// Try everything without any input: make a moving scene, encode it, decode it at every operating point, verify, draw.
 ///
-/// Writes the source and the decoded frames, the stream, and a report.
+/// The stream has two spatial layers, two temporal layers with predicted frames, and three refinements. Writes the frames of
+/// the source, the stream, the decoded frames, a picture of each operating point, and a report.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream demo --out first-look")]
 pub(crate) struct Demo {
@@ -49,6 +53,9 @@ pub(crate) struct Demo {
 /// The stream's name in the directory of the demo.
 const STREAM: &str = "demo.gss";
 
+/// Frames of a GOP.
+const GOP: u32 = 8;
+
 impl Demo {
     /// Makes, encodes, decodes, verifies, reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
@@ -63,9 +70,7 @@ impl Demo {
         };
         let mut source = self.write_source(scene)?;
         let (stream, encoding, digests) = self.encode(&mut source.frames)?;
-        let infos = operating_points(&stream, &Limits::default()).map_err(|error| self.fault(error))?;
-        let points: Vec<Point> =
-            infos.iter().map(|info| self.decode(&stream, info)).collect::<Result<_, _>>()?;
+        let points = self.points(&stream, &source.frames)?;
         let errors = self.verify(&stream, &source.frames, &digests)?;
         let demonstration = Demonstration {
             directory: self.out.clone(),
@@ -96,12 +101,30 @@ impl Demo {
         Ok(Source { frames, summary })
     }
 
+    /// All that a stream can have, with little search.
+    fn settings(&self) -> Settings {
+        let structure = match self.frames {
+            1 => Structure::Intra,
+            _ => Structure::Predicted { layers: 2 },
+        };
+        Settings {
+            structure,
+            spatial_layers: 2,
+            refinements: vec![10, 30, 100],
+            gop: GOP,
+            preset: Preset::Fast,
+            psnr: Some(Quality::High.decibels()),
+            description: SceneDescription { up_axis: UpAxis::MinusY, ..SceneDescription::default() },
+            ..Settings::default()
+        }
+    }
+
     fn encode(&self, frames: &mut Vec<GaussianFrame>) -> Result<(Vec<u8>, Encoding, Vec<u64>), Failure> {
         let progress = Progress::frames("encoding", self.frames);
         let start = Instant::now();
         let mut stream = Vec::new();
         let Report { bytes, gaussians, digests, .. } =
-            encode(frames, &Settings::default(), &mut stream, &mut |done, _| progress.at(done))
+            encode(frames, &self.settings(), &mut stream, &mut |done, _| progress.at(done))
                 .map_err(|error| Failure::other(error.to_string()))?;
         let seconds = start.elapsed().as_secs_f64();
         OutputFile::write(&self.out.join(STREAM), &stream)?;
@@ -110,30 +133,60 @@ impl Demo {
         Ok((stream, Encoding { bytes, gaussians, bpg, seconds, gaussians_per_second: rate }, digests))
     }
 
-    /// Decodes one operating point, every digest compared, and writes its frames.
-    fn decode(&self, stream: &[u8], info: &OperatingPointInfo) -> Result<Point, Failure> {
-        let directory = self.out.join(format!("decoded-{}", info.point.to_string().replace(',', "")));
-        make_directory(&directory)?;
-        let (mut failed, mut writing) = (None, Duration::ZERO);
+    /// Decodes and draws every operating point, and writes the frames of the last, which is everything.
+    fn points(&self, stream: &[u8], source: &[GaussianFrame]) -> Result<Vec<Point>, Failure> {
+        let infos = operating_points(stream, &Limits::default()).map_err(|error| self.fault(error))?;
+        let mut album = Album::start(&self.out)?;
+        let progress = Progress::frames("decoding", infos.len() as u32 * self.frames);
+        let (mut points, mut moment) = (Vec::new(), None);
+        for (done, info) in infos.iter().enumerate() {
+            progress.at(done as u32 * self.frames);
+            let is_last = done + 1 == infos.len();
+            let directory = is_last.then(|| self.out.join("decoded"));
+            let (shown, seconds) = self.decode(stream, info, directory, moment)?;
+            // The smallest point has fewest frames: all others have its last one.
+            moment = moment.or(shown.as_ref().map(|(number, _)| *number));
+            let drawn = shown.map(|(number, frame)| album.draw(info.point, number, &frame, source));
+            points.push(Point::new(info, seconds, drawn.transpose()?.flatten()));
+        }
+        Ok(points)
+    }
+
+    /// Decodes one operating point, every digest compared; gives the frame that is drawn, the last one if none is named, and
+    /// writes all to a directory if there is one.
+    fn decode(
+        &self,
+        stream: &[u8],
+        info: &OperatingPointInfo,
+        directory: Option<PathBuf>,
+        moment: Option<u32>,
+    ) -> Result<(Option<(u32, GaussianFrame)>, f64), Failure> {
+        directory.as_deref().map_or(Ok(()), make_directory)?;
+        let (mut shown, mut failed, mut writing) = (None, None, Duration::ZERO);
         let options = Options { operating_point: info.point, ..Options::default() };
         let start = Instant::now();
         let summary = decode_stream(stream, &options, |sequence, frame| {
-            let path = frame_path(&directory, frame.index as usize);
-            let write = || {
+            let number = frame.index;
+            let take = || {
                 let gaussians = to_gaussians(frame.into_shown(), sequence)?;
                 let start = Instant::now();
-                let written = OutputFile::write(&path, &ply::write(&gaussians));
+                if let Some(directory) = &directory {
+                    OutputFile::write(&frame_path(directory, number as usize), &ply::write(&gaussians))?;
+                }
                 writing += start.elapsed();
-                written
+                if moment.is_none_or(|moment| moment == number) {
+                    shown = Some((number, gaussians));
+                }
+                Ok(())
             };
-            failed = write().err();
+            failed = take().err();
             if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         let seconds = start.elapsed().saturating_sub(writing).as_secs_f64();
         match (failed, summary.verdict()) {
             (Some(failure), _) => Err(failure),
             (None, Some(error)) => Err(self.fault(error)),
-            (None, None) => Ok(Point::new(info, seconds)),
+            (None, None) => Ok((shown, seconds)),
         }
     }
 

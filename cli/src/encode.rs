@@ -16,6 +16,7 @@ use crate::progress::Progress;
 use crate::setting_names::{
     AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
 };
+use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use pictures::{Goal, Pictures};
@@ -25,7 +26,7 @@ use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
 };
 use splatstream_format::payload::{Network, SceneDescription};
-use splatstream_gaussians::Defect;
+use splatstream_gaussians::{Defect, GaussianFrame};
 use splatstream_render::Camera;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ pub(crate) struct Encode {
     /// to the first frame for it.
     #[arg(long, value_enum, default_value_t = QualityName::High)]
     quality: QualityName,
-    /// Any other PSNR, decibels, 20 to 90.
+    /// A PSNR in decibels instead of a named quality, 20 to 90.
     #[arg(long, value_name = "DB", conflicts_with = "quality", value_parser = parse_psnr)]
     psnr: Option<f32>,
     /// The size of the stream instead, bits per Gaussian with everything counted, to 3 %: it is encoded a few times.
@@ -275,7 +276,7 @@ impl Encode {
         let read = self.read_files(&source);
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
-        let settings = self.settings(&mut source)?;
+        let (settings, guess) = self.settings(&mut source)?;
         let mut file = OutputFile::create(out, &read)?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
@@ -284,6 +285,7 @@ impl Encode {
         drop(progress);
         file.finish()?;
         let mut encoded = Encoded::new(out, &report, &settings, &source, start.elapsed().as_secs_f64());
+        encoded.chosen.extend(guess.map(choices::up));
         if inputs.len() > 1 {
             encoded.warnings.extend(unlike_frames(source.counts()));
         }
@@ -304,24 +306,42 @@ impl Encode {
         source.paths().iter().chain(cameras).chain(network).cloned().collect()
     }
 
-    fn settings(&self, source: &mut FrameFiles) -> Result<Settings, Failure> {
+    /// Spatial layers.
+    fn layer_count(&self, is_predicted: bool) -> Result<u8, Failure> {
+        match self.layers.as_slice() {
+            [] if is_predicted => Ok(3),
+            [] => Ok(1),
+            layers if layers.is_sorted_by(|a, b| a < b) && layers.len() <= 4 => Ok(layers.len() as u8),
+            _ => Err(Failure::Usage("--layers takes 1 to 4 rising heights, as 540,720,1080".into())),
+        }
+    }
+
+    /// What the stream says about its scene, the cameras of the encoder, and what was taken to point up if nobody says it.
+    fn scene(
+        &self,
+        first: &GaussianFrame,
+    ) -> Result<(SceneDescription, Vec<Camera>, Option<UpGuess>), Failure> {
+        let guess = self.views.up.is_none().then(|| UpGuess::of(first));
+        let mut description = self.description(guess);
         let cameras = match &self.cameras {
             None => Vec::new(),
-            Some(views) => {
-                let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
-                self.views.cameras(Some(views), &first, &SceneDescription::default())?
-            }
+            Some(views) => self.views.cameras(Some(views), first, &description)?,
         };
-        let description = self.description(&cameras);
-        let sequence = source.len() > 1;
-        let layers = match self.layers.as_slice() {
-            [] if sequence && !self.all_intra => 3,
-            [] => 1,
-            layers if layers.is_sorted_by(|a, b| a < b) && layers.len() <= 4 => layers.len() as u8,
-            _ => return Err(Failure::Usage("--layers takes 1 to 4 rising heights, as 540,720,1080".into())),
-        };
+        // Cameras that were made are made again by whoever needs some.
+        if let Some(Views::File(_)) = &self.cameras {
+            description.cameras = to_stream(cameras.get(..MAX_CAMERAS).unwrap_or(&cameras));
+        }
+        Ok((description, cameras, guess))
+    }
+
+    /// The settings, and what was taken to point up if nobody says it.
+    fn settings(&self, source: &mut FrameFiles) -> Result<(Settings, Option<UpGuess>), Failure> {
+        let is_predicted = source.len() > 1 && !self.all_intra;
+        let layers = self.layer_count(is_predicted)?;
         check_refinements(&self.refinements)?;
-        let structure = match sequence && !self.all_intra {
+        let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
+        let (description, cameras, guess) = self.scene(&first)?;
+        let structure = match is_predicted {
             true => Structure::Predicted { layers: self.temporal_layers },
             false => Structure::Intra,
         };
@@ -356,7 +376,7 @@ impl Encode {
             ..Settings::default()
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
-        Ok(settings)
+        Ok((settings, guess))
     }
 
     /// The size that was asked for.
@@ -365,18 +385,14 @@ impl Encode {
         self.target_bpg.map(Size::BitsPerGaussian).or(bytes)
     }
 
-    /// What the stream says about its scene. Cameras that were made are made again by whoever needs some.
-    fn description(&self, cameras: &[Camera]) -> SceneDescription {
-        let cameras = match &self.cameras {
-            Some(Views::File(_)) => to_stream(cameras.get(..MAX_CAMERAS).unwrap_or(cameras)),
-            _ => Vec::new(),
-        };
+    /// What the stream says about its scene, but for cameras. Of guesses it says those that something speaks for.
+    fn description(&self, guess: Option<UpGuess>) -> SceneDescription {
+        let told = guess.filter(|guess| guess.is_told()).map(|guess| guess.axis).unwrap_or_default();
         SceneDescription {
-            up_axis: self.views.up_axis(&SceneDescription::default()),
+            up_axis: self.views.up.map_or(told, Into::into),
             metres_per_unit: self.metres_per_unit,
             background: self.background.background,
             title: self.title.clone(),
-            cameras,
             ..SceneDescription::default()
         }
     }
@@ -402,9 +418,14 @@ fn failed(source: &FrameFiles, out: &Path, error: &splatstream_encoder::Error) -
                  repair the file, or leave such Gaussians out with --drop-invalid"
             ))
         }
-        Error::TooManyGaussians { frame, .. }
-        | Error::TooManyPerSecond { frame, .. }
-        | Error::OutOfGrid { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
+        Error::OutOfGrid { frame, farthest_row, .. } => Failure::other(format!(
+            "{}: {error}\n  repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from \
+             all others can put the rest out of reach",
+            source.name(*frame)
+        )),
+        Error::TooManyGaussians { frame, .. } | Error::TooManyPerSecond { frame, .. } => {
+            Failure::other(format!("{}: {error}", source.name(*frame)))
+        }
         Error::Output(cause) => Failure::file("write", out, cause),
         Error::Setting { .. } => Failure::Usage(error.to_string()),
         _ => Failure::other(error.to_string()),

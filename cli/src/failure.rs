@@ -1,5 +1,6 @@
 //! What went wrong, for people: file, byte, clause, cause, and what to do about it.
 
+use crate::output_file::is_standard;
 use serde::Serialize;
 use splatstream_format::{Class, Error};
 use splatstream_gaussians::FrameError;
@@ -81,34 +82,33 @@ impl fmt::Display for Failure {
             | Self::Interrupted(message) => f.write_str(message),
             Self::Verdict { line, .. } => f.write_str(line),
             Self::Stream { path, error, is_scene } => {
-                let path = path.display();
+                let name = if is_standard(path) { "standard input".into() } else { path.to_string_lossy() };
                 let advice = if *is_scene { OF_SCENE } else { advice(error.class()) };
-                write!(f, "{path}: {error}\n  {}", advice.replace("FILE", &path.to_string()))
+                write!(f, "{name}: {error}\n  {}", advice.replace("FILE", &path.to_string_lossy()))
             }
         }
     }
 }
 
 /// What to do with a scene that is given for a stream.
-const OF_SCENE: &str =
-    "this is a scene, not a stream: `splatstream encode FILE -o STREAM.gss` makes one of it";
+const OF_SCENE: &str = "this is a scene, not a stream; `splatstream encode FILE -o STREAM.gss` encodes it";
 
 /// What to do about an error of a class; FILE stands for the stream.
 fn advice(class: Class) -> &'static str {
     match class {
         Class::Malformed => {
-            "the file is damaged or no stream: copy it again; `splatstream inspect FILE` shows where it breaks"
+            "the file is damaged, or it is not a stream; copy it again; `splatstream inspect FILE` shows where it breaks"
         }
         Class::Invalid => {
-            "the file breaks that clause of the specification: tell whoever made it; \
+            "the file violates that clause of the specification; report it to the author of the encoder; \
              `splatstream inspect FILE` shows the elements up to there"
         }
         Class::Unsupported => {
-            "the file needs a later version or another profile: look for a newer splatstream"
+            "the file needs a later version or another profile; look for a newer splatstream"
         }
         Class::OverLimit => "if you trust the file, raise the limit with --max-gaussians",
         Class::Truncated => {
-            "the file is cut short: copy it again; `splatstream decode FILE -o DIR` writes what is there"
+            "the file is incomplete; copy it again; `splatstream decode FILE -o DIR` writes what is there"
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod costs;
 mod deps;
+mod element;
 mod hex;
 mod hull;
 mod points;
@@ -10,14 +11,15 @@ mod units;
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::stream_file::{LimitArgs, StreamFile};
+use crate::stream_file::{LimitArgs, StreamFile, fault};
 use clap::Args;
 use splatstream_format::Error;
 use std::path::PathBuf;
 
 /// Show the elements of a stream: offset, value, meaning, clause. Works on damaged streams.
 ///
-/// Offsets are those of bytes; 0x1a4+3 is bit 3 of byte 0x1a4. The clauses are those of the specification.
+/// Offsets are those of bytes; 0x1a4+3 is bit 3 of byte 0x1a4. The clauses are those of the specification. Elements and
+/// units are written while the stream is read, so that it can come by a pipe and have any length.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream inspect talk.gss | less\n  \
     splatstream inspect talk.gss --units\n  splatstream inspect talk.gss --ops --json\n  \
@@ -67,17 +69,17 @@ impl Inspect {
         if self.dot && !self.view.deps {
             return Err(Failure::Usage("--dot is a form of --deps: give both".to_owned()));
         }
-        let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
+        let stream = || StreamFile::read(&self.input);
         let error = match &self.view {
-            View { units: true, .. } => units::show(&stream, &limits, console),
-            View { ops: true, .. } => points::show(&stream, &limits, console),
-            View { deps: true, .. } => deps::show(&stream, self.dot, &limits, console),
-            View { stats: true, .. } => costs::show(&stream, &limits, console),
-            View { hex: Some(unit), .. } => hex::show(&stream, *unit, &limits, console),
-            View { .. } => tree::show(&stream, &limits, console),
+            View { units: true, .. } => units::show(&self.input, &limits, console),
+            View { ops: true, .. } => points::show(&stream()?, &limits, console),
+            View { deps: true, .. } => deps::show(&stream()?, self.dot, &limits, console),
+            View { stats: true, .. } => costs::show(&stream()?, &limits, console),
+            View { hex: Some(unit), .. } => hex::show(&stream()?, *unit, &limits, console),
+            View { .. } => tree::show(&self.input, &limits, console),
         }?;
-        error.map_or(Ok(()), |error| Err(stream.fault(error)))
+        error.map_or(Ok(()), |error| Err(fault(&self.input, error)))
     }
 }
 

@@ -28,6 +28,7 @@ mod stream_file;
 mod structure;
 mod train;
 mod unfinished;
+mod up_guess;
 mod validate;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -108,14 +109,26 @@ fn name_of(matches: &ArgMatches) -> String {
     iter::once("splatstream").chain(below.map(|(name, _)| name)).collect::<Vec<_>>().join(" ")
 }
 
-/// Runs `work` with so many threads.
+/// Runs `work` with so many threads, or one per processor.
 fn in_threads(
     threads: Option<u16>,
     work: impl FnOnce() -> Result<(), Failure> + Send,
 ) -> Result<(), Failure> {
-    let Some(threads) = threads else { return work() };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build();
-    pool.map_err(|error| Failure::other(format!("cannot start {threads} threads: {error}")))?.install(work)
+    let builder = rayon::ThreadPoolBuilder::new();
+    let Some(threads) = threads else {
+        // Later it would be a panic.
+        builder.build_global().map_err(|error| {
+            Failure::other(format!(
+                "cannot start a thread per processor: {error}\n  give fewer with --threads"
+            ))
+        })?;
+        return work();
+    };
+    let pool = builder.num_threads(threads.into()).build();
+    pool.map_err(|error| {
+        Failure::other(format!("cannot start {threads} threads: {error}\n  give fewer with --threads"))
+    })?
+    .install(work)
 }
 
 impl Command {

@@ -49,7 +49,7 @@ impl FrameRange {
         let bounds = || -> Result<_, ParseIntError> { Ok((number(first)?.unwrap_or(0), number(end)?)) };
         match bounds().map_err(|_| wrong())? {
             (first, Some(end)) if first >= end => {
-                Err(format!("'{text}' holds no frame: the end is the frame after the last"))
+                Err(format!("'{text}' is empty: the end is the frame after the last one"))
             }
             (first, end) => Ok(Self { first, end }),
         }

@@ -95,7 +95,9 @@ pub(crate) fn refuse_standard(path: &Path) -> Result<(), Failure> {
 pub(crate) fn refuse_inputs(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
     if inputs.iter().any(|input| is_same_file(path, input)) {
         let path = path.display();
-        return Err(Failure::Usage(format!("{path}: is read by this command; give another file to write")));
+        return Err(Failure::Usage(format!(
+            "{path}: this command reads that file; give the output another name"
+        )));
     }
     Ok(())
 }
@@ -108,23 +110,25 @@ pub(crate) fn check_stream_name(path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Usage(format!(
-        "{}: what is written is a stream: give a name that ends in .gss; \
+        "{}: the output is a stream; give it a name that ends in .gss; \
          `splatstream decode` writes .ply, .spz and .splat",
         path.display()
     )))
 }
 
-/// Refuses a name that is no directory, or that looks like that of a file; `what` goes there.
+/// Refuses a name that is not a directory, or that looks like that of a file; `what` goes there.
 pub(crate) fn check_directory(path: &Path, what: &str) -> Result<(), Failure> {
     let name = path.display();
     if is_standard(path) || path.exists() && !path.is_dir() {
-        return Err(Failure::Usage(format!("{name}: is no directory; {what} go to a directory")));
+        return Err(Failure::Usage(format!(
+            "{name}: this is not a directory; {what} are written to a directory"
+        )));
     }
     if path.is_dir() || path.extension().is_none() || ends_with_separator(path) {
         return Ok(());
     }
     Err(Failure::Usage(format!(
-        "{name}: looks like a file, and {what} go to a directory; if one shall have this name, write {name}/"
+        "{name}: this looks like the name of a file, but {what} are written to a directory; for a directory of this name, write {name}/"
     )))
 }
 
@@ -170,7 +174,7 @@ fn beside(path: &Path, target: &Path, old: Option<&Metadata>) -> Result<(File, U
     if !parent.is_dir() {
         let (path, parent) = (path.display(), parent.display());
         return Err(Failure::other(format!(
-            "{path}: cannot write: there is no directory {parent}\n  make it first"
+            "{path}: cannot write: there is no directory {parent}\n  create it first"
         )));
     }
     let failed = |error: io::Error| Failure::file("write", path, &without_path(error));

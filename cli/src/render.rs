@@ -9,6 +9,7 @@ use crate::numbers::{FrameRange, frames};
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
+use crate::up_guess::UpGuess;
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;
@@ -31,7 +32,7 @@ pub(crate) struct Render {
     /// A stream, a scene file, or a directory of frames; - is a stream on standard input.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame. Default are the cameras
+    /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame. Default: the cameras
     /// of the stream, or ring:8.
     #[arg(long, visible_alias = "cameras", value_name = "CAMS.json|ring:N|forward:N")]
     camera: Option<Views>,
@@ -70,9 +71,15 @@ struct Drawn {
     seconds: f64,
     /// Errors of the stream.
     errors: Vec<StreamFault>,
-    /// Whether nobody said what points up in pictures from cameras that were made.
-    #[serde(skip)]
-    up_is_guessed: bool,
+    /// What was taken to point up where nobody said it and cameras were made; null otherwise.
+    guessed_up: Option<Up>,
+}
+
+/// A guess.
+#[derive(Serialize)]
+struct Up {
+    axis: &'static str,
+    why: String,
 }
 
 /// One picture.
@@ -97,7 +104,7 @@ impl Render {
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));
-        let mut drawn = self.nothing(&description);
+        let mut drawn = self.nothing();
         let background = self.background.colour(&description);
         let mut cameras: Vec<Camera> = Vec::new();
         let mut next = 0;
@@ -105,6 +112,7 @@ impl Render {
             let Some((number, frame)) = frames.next()? else { break };
             if cameras.is_empty() {
                 cameras = named(self.cameras.cameras(self.camera.as_ref(), &frame, &description)?);
+                drawn.guessed_up = self.guessed_up(&frame, &description);
             }
             if span.contains(number) {
                 let antialiased = frame.antialiased() || self.antialiased;
@@ -127,12 +135,7 @@ impl Render {
     }
 
     /// The report before anything is drawn.
-    fn nothing(&self, description: &SceneDescription) -> Drawn {
-        let are_made = match &self.camera {
-            Some(Views::File(_)) => false,
-            Some(_) => true,
-            None => description.cameras.is_empty(),
-        };
+    fn nothing(&self) -> Drawn {
         Drawn {
             output: self.out.clone(),
             frames: 0,
@@ -140,8 +143,22 @@ impl Render {
             pictures: Vec::new(),
             seconds: 0.0,
             errors: Vec::new(),
-            up_is_guessed: are_made && self.cameras.up_axis(description) == UpAxis::Unknown,
+            guessed_up: None,
         }
+    }
+
+    /// What is taken to point up, if cameras are made and nobody says it.
+    fn guessed_up(&self, frame: &GaussianFrame, description: &SceneDescription) -> Option<Up> {
+        let are_made = match &self.camera {
+            Some(Views::File(_)) => false,
+            Some(_) => true,
+            None => description.cameras.is_empty(),
+        };
+        let is_said = self.cameras.up_axis(description) != UpAxis::Unknown;
+        (are_made && !is_said).then(|| {
+            let guess = UpGuess::of(frame);
+            Up { axis: guess.name(), why: guess.why() }
+        })
     }
 
     fn draw(
@@ -185,9 +202,11 @@ fn named(cameras: Vec<Camera>) -> Vec<Camera> {
 impl Drawn {
     fn text(&self) -> String {
         let count = self.pictures.len() as u64;
-        let hint = match self.up_is_guessed {
-            true => "  up           -y, a guess: if the pictures are upside down, give --up\n",
-            false => "",
+        let hint = match &self.guessed_up {
+            Some(Up { axis, why }) => {
+                format!("  up           {axis}, {why}; if the pictures are upside down, give --up\n")
+            }
+            None => String::new(),
         };
         format!(
             "{}: {} pictures of {}; {:.3} seconds per picture\n{hint}{}",

@@ -9,9 +9,9 @@ use splatstream_encoder::{
 /// How much to search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PresetName {
-    /// One context a plane, no trials.
+    /// One context per plane, no trials.
     Fast,
-    /// Two contexts a plane, trials on samples.
+    /// Two contexts per plane, trials on samples.
     Balanced,
     /// Everything is tried.
     Small,

@@ -7,7 +7,7 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::syntax::{FileHeader, SIGNATURE, SequenceParameters, UnitType};
 use splatstream_format::unit::{Landmark, Stream};
-use splatstream_format::{Error, Limits};
+use splatstream_format::{Error, ErrorKind, Limits};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -50,8 +50,7 @@ impl StreamFile {
 
     /// A failure of this stream.
     pub(crate) fn fault(&self, error: Error) -> Failure {
-        let is_scene = !self.bytes.starts_with(&SIGNATURE) && splatstream_files::detect(&self.path).is_ok();
-        Failure::Stream { path: self.path.clone(), error, is_scene }
+        fault(&self.path, error)
     }
 
     /// The first sequence parameters that are intact.
@@ -97,6 +96,47 @@ impl StreamFile {
             "{path}: there is no operating point {point}; the points go from s0,t0,r0 to {last}: \
              `splatstream inspect --ops {path}` lists them"
         )))
+    }
+}
+
+/// A failure of the stream at a path, which may be a scene instead.
+pub(crate) fn fault(path: &Path, error: Error) -> Failure {
+    let is_scene = error.kind == ErrorKind::Signature && splatstream_files::detect(path).is_ok();
+    Failure::Stream { path: path.to_path_buf(), error, is_scene }
+}
+
+/// The bytes at a path, or of standard input, as they come.
+pub(crate) fn open_pieces(path: &Path) -> Result<Box<dyn Read>, Failure> {
+    if path == Path::new(STANDARD) {
+        return Ok(Box::new(io::stdin().lock()));
+    }
+    let file = File::open(path).map_err(|error| Failure::file("read", path, &error))?;
+    Ok(Box::new(file))
+}
+
+/// Bytes that are read at once.
+const PIECE: usize = 1 << 16;
+
+/// Gives `take` the bytes of a stream from where it has come to on, and whether they are the last. It says where it has
+/// come to, or nothing if it needs no more. Only what it has not taken yet is kept; gives the number of bytes read.
+pub(crate) fn feed(
+    reader: &mut dyn Read,
+    take: &mut dyn FnMut(&[u8], bool) -> Option<u64>,
+) -> io::Result<u64> {
+    let (mut kept, mut at, mut bytes) = (Vec::new(), 0_u64, 0);
+    let mut piece = vec![0; PIECE];
+    loop {
+        let count = match reader.read(&mut piece) {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            count => count?,
+        };
+        kept.extend_from_slice(&piece[..count]);
+        bytes += count as u64;
+        let is_end = count == 0;
+        let Some(position) = take(&kept, is_end).filter(|_| !is_end) else { return Ok(bytes) };
+        let taken = usize::try_from(position - at).map_or(kept.len(), |taken| taken.min(kept.len()));
+        kept.drain(..taken);
+        at += taken as u64;
     }
 }
 

@@ -11,12 +11,17 @@ fn the_demo_writes_stream_frames_and_report() {
     let out = directory.path().join("demo");
     let report = json(&["demo", "--out", text(&out), "--gaussians", "800", "--frames", "2"]);
     let points = report["operating_points"].as_array().unwrap();
-    assert_eq!(points.len(), 5);
-    let gaussians: Vec<u64> = points.iter().filter_map(|point| point["gaussians"].as_u64()).collect();
-    assert_eq!(gaussians, [160, 320, 480, 800, 1600]);
+    assert_eq!(points.len(), 2 * 2 * 3, "spatial layers, temporal layers, refinements");
+    let of = |op: &str| points.iter().find(|point| point["op"] == op).unwrap();
+    assert_eq!((&of("s1,t1,r2")["gaussians"], &of("s1,t1,r2")["frames"]), (&1600.into(), &2.into()));
+    let decibels = ["s0,t0,r0", "s0,t0,r1", "s1,t1,r2"].map(|op| of(op)["psnr_db"].as_f64().unwrap());
+    assert!(decibels.is_sorted() && decibels[2] > 40.0, "{decibels:?}");
+    assert!(points.iter().all(|point| out.join(point["picture"].as_str().unwrap()).is_file()));
     let written = std::fs::read_to_string(out.join("report.json")).unwrap();
     assert_eq!(serde_json::from_str::<serde_json::Value>(&written).unwrap(), report);
-    for file in ["demo.gss", "report.txt", "source/frame_0001.ply", "decoded-s0t0r4/frame_0001.ply"] {
+    for file in
+        ["demo.gss", "report.txt", "source/frame_0001.ply", "decoded/frame_0001.ply", "pictures/source.png"]
+    {
         assert!(out.join(file).is_file(), "{file}");
     }
     succeed(&["validate", text(&out.join("demo.gss"))]);

@@ -2,10 +2,12 @@
 
 mod common;
 
-use common::{directory, fail, fixture, json, run, succeed, text};
+use common::{UNIT_HEADER, directory, fail, fixture, json, run, run_with, seal, succeed, text};
+use serde_json::Value;
 use splatstream_encoder::{Preset, Quality, Settings, ShChoice, encode};
 use splatstream_files::builtin::BuiltinScene;
 use std::fs;
+use std::io::Write;
 
 /// The committed stream is what the encoder wrote once; other encoders may write others. For a change of the
 /// bitstream `BLESS=1 cargo test -p splatstream-cli --test inspect the_fixture` writes it again.
@@ -47,14 +49,81 @@ fn the_tree_has_every_element() {
 #[test]
 fn the_tree_covers_every_byte_once() {
     let tree = json(&["inspect", text(&fixture()), "--tree"]);
-    let units = tree["units"].as_array().unwrap();
-    let elements = units.iter().flat_map(|unit| unit["elements"].as_array().unwrap());
+    let bits = |record: &Value| -> u64 {
+        record["elements"].as_array().unwrap().iter().map(|element| element["bits"].as_u64().unwrap()).sum()
+    };
     let mut end = 0;
-    for element in tree["file_header"].as_array().unwrap().iter().chain(elements) {
-        assert_eq!(element["at_bit"].as_u64(), Some(end), "{element}");
-        end += element["bits"].as_u64().unwrap();
+    let mut follow = |record: &Value| {
+        assert_eq!(record["at_bit"].as_u64(), Some(end), "{record}");
+        end += bits(record);
+    };
+    tree["file_header"].as_array().unwrap().iter().for_each(&mut follow);
+    for unit in tree["units"].as_array().unwrap() {
+        let at_bit = 8 * unit["at"].as_u64().unwrap();
+        follow(&serde_json::json!({ "at_bit": at_bit, "elements": [{ "bits": 8 * UNIT_HEADER }] }));
+        assert_eq!(unit["header"].as_object().unwrap().len(), 10);
+        unit["records"].as_array().unwrap().iter().for_each(&mut follow);
     }
-    assert_eq!(end, fs::metadata(fixture()).unwrap().len() * 8);
+    let length = fs::metadata(fixture()).unwrap().len();
+    assert_eq!((end, &tree["bytes"]), (length * 8, &length.into()));
+}
+
+#[test]
+fn values_are_typed_and_names_stand_beside_them() {
+    let tree = json(&["inspect", text(&fixture())]);
+    let units = tree["units"].as_array().unwrap();
+    let description = units.iter().find(|unit| unit["type"] == "scene_description").unwrap();
+    let elements = description["records"][0]["elements"].as_array().unwrap();
+    let expected = serde_json::json!({ "name": "up_axis", "bits": 8, "value": 0, "symbol": "unknown" });
+    assert_eq!(elements[0], expected);
+    assert_eq!(description["header"]["unit_type"], 10);
+    assert!(elements[6]["value"].as_array().unwrap().iter().all(Value::is_number), "{}", elements[6]);
+    assert!(tree["records"]["unit_header"]["frame"].is_string());
+}
+
+/// A stream of a file header and so many empty units.
+fn empty_units(count: usize) -> Vec<u8> {
+    let mut bytes = fs::read(fixture()).expect("the fixture")[..16].to_vec();
+    for _ in 0..count {
+        let at = bytes.len();
+        bytes.extend([0; UNIT_HEADER]);
+        bytes[at] = 0xF0;
+        seal(&mut bytes, at);
+    }
+    bytes
+}
+
+#[test]
+fn a_stream_of_any_length_comes_by_a_pipe() {
+    let count = 20_000;
+    for view in ["--tree", "--units"] {
+        let output = run_with(&["inspect", "-", view, "--json"], &empty_units(count));
+        assert_eq!(output.status.code(), Some(14), "there is no end unit");
+        assert!(output.stdout.len() < 300 * count, "{} bytes", output.stdout.len());
+        let shown: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(shown["units"].as_array().unwrap().len(), count);
+        assert_eq!(shown["error"]["code"], "TRUNCATED");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn nothing_is_read_that_nobody_sees() {
+    for view in ["--tree", "--units"] {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_splatstream"))
+            .args(["inspect", "-", view, "--json"])
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let mut endless = child.stdin.take().expect("a pipe");
+        drop(child.stdout.take());
+        let units = empty_units(10_000);
+        endless.write_all(&units[..16]).expect("it reads the file header");
+        // The command ends, and nobody takes the bytes any more.
+        while endless.write_all(&units[16..]).is_ok() {}
+        assert!(child.wait().expect("it ends").code().is_some(), "{view}");
+    }
 }
 
 #[test]

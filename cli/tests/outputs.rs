@@ -36,7 +36,7 @@ fn no_output_replaces_an_input() {
     let before = fs::read(&stream).unwrap();
     for out in [&stream, &link, &hard] {
         let said = fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(out)]);
-        assert!(said.contains("is read by this command"), "{said}");
+        assert!(said.contains("this command reads that file"), "{said}");
     }
     let (scene, frame) = (directory.path().join("scene.gss"), directory.path().join("frame.ply"));
     fs::hard_link(&still, &scene).unwrap();
@@ -91,7 +91,7 @@ fn names_say_what_is_written() {
         fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&at(name))]);
     }
     let said = fail(2, &["render", text(&stream), "-o", text(&at("x.png")), "--height", "20"]);
-    assert!(said.contains("looks like a file"), "{said}");
+    assert!(said.contains("looks like the name of a file"), "{said}");
     fail(2, &["render", text(&stream), "-o", "-", "--height", "20"]);
     fail(2, &["chart", text(&still), "-o", text(&at("x.html"))]);
     assert_eq!(names(directory.path()), before);
@@ -138,7 +138,7 @@ fn frames_of_an_earlier_run_are_not_mixed_with_new_ones() {
     }
     let again = ["decode", text(&stream), "-o", text(&out), "--frames", "0..2"];
     let said = fail(2, &again);
-    assert!(said.contains("4 files have") && said.contains("--force"), "{said}");
+    assert!(said.contains("has 4 files with names of frames") && said.contains("--force"), "{said}");
     json(&[&again[..], &["--force"]].concat());
     assert_eq!(names(&out), ["frame_0000.ply", "frame_0001.ply", "frame_12.ply", "notes.txt"]);
 }

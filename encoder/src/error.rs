@@ -55,7 +55,10 @@ pub enum Error {
         first: Defect,
     },
     /// An attribute cannot be put on its quantisation grid.
-    #[error("frame {frame}: {attribute} of Gaussian {row} is {value}, too far out for a step of {step}")]
+    #[error(
+        "frame {frame}: {attribute} of Gaussian {row} is {value}, too far out for a step of {step}; \
+         {count} Gaussians of the frame are, farthest of all Gaussian {farthest_row} with {farthest}"
+    )]
     OutOfGrid {
         /// The frame.
         frame: u32,
@@ -67,6 +70,12 @@ pub enum Error {
         value: f32,
         /// The step of the grid.
         step: f32,
+        /// Gaussians of the frame that are, in the same component of the attribute.
+        count: usize,
+        /// The one that is farthest out.
+        farthest_row: usize,
+        /// Its value.
+        farthest: f32,
     },
     /// A pushed frame is not what the frames before it have announced.
     #[error(

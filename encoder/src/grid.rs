@@ -142,7 +142,7 @@ fn parts(values: &[f32], offset: f32, step: f32) -> Vec<i32> {
 /// Whether the values of some Gaussians of a source frame are such that a decoder can have them.
 ///
 /// # Errors
-/// The first value of an attribute that is too far out.
+/// The first value of an attribute that is too far out, and the one that is farthest out.
 #[expect(clippy::indexing_slicing, reason = "axes are 0, 1 and 2; rows are those of the frame")]
 pub(crate) fn check_reach(
     frame: &GaussianFrame,
@@ -151,13 +151,24 @@ pub(crate) fn check_reach(
     number: u32,
 ) -> Result<(), Error> {
     let check = |attribute: &'static str, values: &[f32], step: f32, most: f32| {
-        let is_out = |row: &&u32| {
-            let steps = (values[**row as usize] / step).abs();
+        let value = |row: u32| values[row as usize];
+        let is_out = |row: &u32| {
+            let steps = (value(*row) / step).abs();
             steps > most || steps.is_nan()
         };
-        rows.iter().find(is_out).map_or(Ok(()), |&row| {
-            let (row, value) = (row as usize, values[row as usize]);
-            Err(Error::OutOfGrid { frame: number, attribute, row, value, step })
+        let out = || rows.iter().copied().filter(is_out);
+        let (first, farthest) =
+            (out().next(), out().max_by(|&a, &b| value(a).abs().total_cmp(&value(b).abs())));
+        let (Some(first), Some(farthest)) = (first, farthest) else { return Ok(()) };
+        Err(Error::OutOfGrid {
+            frame: number,
+            attribute,
+            row: first as usize,
+            value: value(first),
+            step,
+            count: out().count(),
+            farthest_row: farthest as usize,
+            farthest: value(farthest),
         })
     };
     for plane in frame.position() {

@@ -2,6 +2,7 @@
 
 use crate::grid::{MAX_COLOUR, PositionGrid};
 use splatstream_gaussians::{GaussianFrame, PlanesMut};
+use std::cmp::Ordering;
 
 /// Values of one attribute that were too far out and are coded as the nearest that are not.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,15 +17,34 @@ pub struct Isolated {
     pub row: u32,
     /// Its value.
     pub value: f32,
+    /// Frame, Gaussian and value of the one that is farthest out.
+    pub farthest: (u32, u32, f32),
 }
 
 impl Isolated {
+    /// What was found in a frame: rows and values.
+    pub(crate) fn of(
+        attribute: &'static str,
+        frame: u32,
+        found: impl Iterator<Item = (u32, f32)>,
+    ) -> Option<Self> {
+        let found: Vec<(u32, f32)> = found.collect();
+        let &(row, value) = found.first()?;
+        let &(far_row, far) = found.iter().max_by(|a, b| by_magnitude(&a.1, &b.1))?;
+        let count = found.len() as u64;
+        Some(Self { attribute, count, frame, row, value, farthest: (frame, far_row, far) })
+    }
+
     /// Adds what was found in a frame to what was found before.
-    #[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians")]
     pub(crate) fn add(found: Option<Self>, all: &mut Vec<Self>) {
         let Some(found) = found else { return };
         match all.iter_mut().find(|known| known.attribute == found.attribute) {
-            Some(known) => known.count += found.count,
+            Some(known) => {
+                known.count = known.count.saturating_add(found.count);
+                if found.farthest.2.abs() > known.farthest.2.abs() {
+                    known.farthest = found.farthest;
+                }
+            }
             None => all.push(found),
         }
     }
@@ -36,36 +56,21 @@ impl Isolated {
     clippy::indexing_slicing,
     reason = "axes are constants; rows are those of the frame, of which `rows` has as many"
 )]
-#[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians")]
 pub(crate) fn colours(
     mut frame: GaussianFrame,
     rows: &[u32],
     number: u32,
 ) -> (GaussianFrame, Option<Isolated>) {
     let is_out = |value: &f32| value.abs() > MAX_COLOUR;
-    let far = |row: usize| {
-        let planes = frame.dc().iter().chain(frame.sh());
-        planes.map(|plane| plane[row]).find(is_out)
-    };
-    let all = || frame.dc().iter().chain(frame.sh());
-    if !all().flatten().any(is_out) {
+    if !frame.dc().iter().chain(frame.sh()).flatten().any(is_out) {
         return (frame, None);
     }
-    let mut first = None;
-    let mut count = 0;
-    for row in 0..frame.len() {
-        if let Some(value) = far(row) {
-            count += 1;
-            first.get_or_insert((row, value));
-        }
-    }
-    let found = first.map(|(row, value)| Isolated {
-        attribute: "colour",
-        count,
-        frame: number,
-        row: rows[row],
-        value,
-    });
+    let value = |row: usize| {
+        let planes = frame.dc().iter().chain(frame.sh());
+        planes.map(|plane| plane[row]).filter(is_out).max_by(by_magnitude)
+    };
+    let found = (0..frame.len()).filter_map(|row| Some((rows[row], value(row)?)));
+    let found = Isolated::of("colour", number, found);
     let PlanesMut { dc, sh, .. } = frame.planes_mut();
     for value in dc.into_iter().chain(sh).flatten() {
         *value = value.clamp(-MAX_COLOUR, MAX_COLOUR);
@@ -78,7 +83,6 @@ pub(crate) fn colours(
     clippy::indexing_slicing,
     reason = "axes are constants; rows are those of the frame, of which `rows` has as many"
 )]
-#[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians")]
 pub(crate) fn positions(
     frame: &GaussianFrame,
     rows: &[u32],
@@ -89,10 +93,11 @@ pub(crate) fn positions(
         let values = [0, 1, 2].map(|axis: usize| frame.position()[axis][row]);
         (0..3).find(|&axis| grid.is_beyond(axis, values[axis])).map(|axis| (row, values[axis]))
     };
-    let mut found = (0..frame.len()).filter_map(far);
-    let (row, value) = found.next()?;
-    let count = 1 + found.count() as u64;
-    Some(Isolated { attribute: "position", count, frame: number, row: rows[row], value })
+    Isolated::of("position", number, (0..frame.len()).filter_map(far).map(|(row, value)| (rows[row], value)))
+}
+
+fn by_magnitude(a: &f32, b: &f32) -> Ordering {
+    a.abs().total_cmp(&b.abs())
 }
 
 #[cfg(test)]
@@ -106,12 +111,13 @@ mod tests {
         let degree = frame.sh_degree();
         let mut planes = frame.into_planes();
         planes.dc[1][7] = 1e6;
-        planes.dc[2][7] = -1e6;
+        planes.dc[2][7] = -2e6;
         planes.dc[0][9] = -30.0;
         let frame = GaussianFrame::from_planes(degree, planes).unwrap();
         let rows: Vec<u32> = (100..100 + frame.len() as u32).collect();
         let (frame, found) = colours(frame, &rows, 3);
-        let expected = Isolated { attribute: "colour", count: 2, frame: 3, row: 107, value: 1e6 };
+        let farthest = (3, 107, -2e6);
+        let expected = Isolated { attribute: "colour", count: 2, frame: 3, row: 107, value: -2e6, farthest };
         assert_eq!(found, Some(expected));
         assert_eq!((frame.dc()[1][7], frame.dc()[2][7], frame.dc()[0][9]), (16.0, -16.0, -16.0));
         assert_eq!(colours(frame, &rows, 3).1, None);

@@ -91,12 +91,8 @@ impl Announced {
 
     fn within(&self, mut frame: GaussianFrame, number: u32) -> (GaussianFrame, Vec<Isolated>) {
         let mut found = Vec::new();
-        let mut take = |attribute, (count, first): (u64, Option<(usize, f32)>)| {
-            let isolated = first.map(|(row, value)| {
-                let row = u32::try_from(row).unwrap_or(u32::MAX);
-                Isolated { attribute, count, frame: number, row, value }
-            });
-            Isolated::add(isolated, &mut found);
+        let mut take = |attribute, out: Vec<(u32, f32)>| {
+            Isolated::add(Isolated::of(attribute, number, out.into_iter()), &mut found);
         };
         let planes = frame.planes_mut();
         for plane in planes.log_scale {
@@ -109,43 +105,36 @@ impl Announced {
     }
 }
 
-/// Clamps values; gives how many were outside, and the first of them.
-fn clamp(plane: &mut [f32], [low, high]: [f32; 2]) -> (u64, Option<(usize, f32)>) {
-    let (mut count, mut first) = (0, None);
-    for (row, value) in plane.iter_mut().enumerate() {
+/// Clamps values; gives the rows and the values of those that were outside.
+fn clamp(plane: &mut [f32], [low, high]: [f32; 2]) -> Vec<(u32, f32)> {
+    let mut out = Vec::new();
+    for (row, value) in (0..).zip(plane) {
         let within = value.clamp(low, high);
         if within != *value {
-            count = u64::saturating_add(count, 1);
-            first.get_or_insert((row, *value));
+            out.push((row, *value));
             *value = within;
         }
     }
-    (count, first)
+    out
 }
 
-/// Shortens vectors, one coefficient a plane, that are longer than `most`; gives how many there were, and the first with
-/// its length.
-fn shorten(mut planes: Vec<&mut [f32]>, most: f32) -> (u64, Option<(usize, f32)>) {
-    let rows = planes.first().map_or(0, |plane| plane.len());
-    let mut squares = vec![0.0_f32; rows];
+/// Shortens vectors, one coefficient a plane, that are longer than `most`; gives the rows and the lengths of those.
+fn shorten(mut planes: Vec<&mut [f32]>, most: f32) -> Vec<(u32, f32)> {
+    let mut squares = vec![0.0_f32; planes.first().map_or(0, |plane| plane.len())];
     for plane in &planes {
         for (sum, value) in squares.iter_mut().zip(plane.iter()) {
             let value = value.clamp(-MAX_COLOUR, MAX_COLOUR);
             *sum = value.mul_add(value, *sum);
         }
     }
-    let (mut count, mut first) = (0, None);
-    for (row, square) in squares.into_iter().enumerate() {
-        let length = square.sqrt();
-        if length > most {
-            count = u64::saturating_add(count, 1);
-            first.get_or_insert((row, length));
-            for value in planes.iter_mut().filter_map(|plane| plane.get_mut(row)) {
-                *value = value.clamp(-MAX_COLOUR, MAX_COLOUR) * (most / length);
-            }
+    let lengths = (0..).zip(squares).map(|(row, square)| (row, square.sqrt()));
+    let out: Vec<(u32, f32)> = lengths.filter(|(_, length)| *length > most).collect();
+    for &(row, length) in &out {
+        for value in planes.iter_mut().filter_map(|plane| plane.get_mut(row as usize)) {
+            *value = value.clamp(-MAX_COLOUR, MAX_COLOUR) * (most / length);
         }
     }
-    (count, first)
+    out
 }
 
 #[cfg(test)]

@@ -207,7 +207,7 @@ impl fmt::Display for ErrorKind {
                 write!(f, "reconstruction digest is {computed:#018x}, the stream says {stored:#018x}")
             }
             Self::OverLimit { limit, asked, allowed } => {
-                write!(f, "{limit} is {asked}, at most {allowed} is allowed here")
+                write!(f, "the stream asks for {asked}, {limit} allows at most {allowed}")
             }
         }
     }

@@ -15,16 +15,21 @@ use crate::syntax::{
     SceneDescriptionHeader, SequenceParameters, TABLES, Table, TransformHeader, UnitHeader, UnitType,
     WeightsHeader, after,
 };
-use crate::unit::{Unit, Units};
+use crate::unit::Unit;
+use crate::unit_reader::{Event, UnitReader};
 use crate::{Error, ErrorKind, Limits, Result};
 use section::Coding;
 use std::borrow::Cow;
 
+mod decode_value;
 mod section;
 mod value;
 
+pub use section::BLOCK_PARTS;
+pub use value::{Number, Value};
+
 /// One syntax element of a stream.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Element {
     /// Absolute offset of the first bit.
     pub at_bit: u64,
@@ -34,8 +39,8 @@ pub struct Element {
     pub record: &'static str,
     /// The element, as the specification spells it.
     pub name: Cow<'static, str>,
-    /// Its value; an array in brackets, a long section in a summary.
-    pub value: String,
+    /// Its value; of a long section a summary.
+    pub value: Value,
     /// What it is, in a line.
     pub meaning: Cow<'static, str>,
     /// The clause of its syntax table.
@@ -45,57 +50,112 @@ pub struct Element {
 /// Visits every element of a stream in order, and gives the first error. After a damaged unit it goes on
 /// with the next one, as long as its end is known.
 pub fn inspect(bytes: &[u8], limits: &Limits, visit: &mut dyn FnMut(Element)) -> Option<Error> {
-    let mut inspector = Inspector {
-        visit,
-        // The units of a damaged file header are shown whatever layers they name.
-        follower: Follower::new(Profile::Dynamic),
-        limits: *limits,
-        coding: Coding::default(),
-        first: None,
-    };
-    inspector.stream(bytes);
-    inspector.first
+    let mut inspector = Inspector::new(limits, visit);
+    inspector.read(bytes, true);
+    inspector.error()
 }
 
-struct Inspector<'v> {
+/// As [`inspect`], for a stream whose bytes arrive in pieces. It holds none of them.
+///
+/// ```
+/// use splatstream_format::inspect::Inspector;
+/// use splatstream_format::syntax::Profile;
+/// use splatstream_format::unit::write_file_header;
+///
+/// let bytes = write_file_header(Profile::Dynamic, 1)?;
+/// let mut names = Vec::new();
+/// let mut visit = |element: splatstream_format::inspect::Element| names.push(element.name);
+/// let mut inspector = Inspector::new(&Default::default(), &mut visit);
+/// assert!(inspector.read(&bytes[..10], false), "the file header is not there yet");
+/// assert!(inspector.read(&bytes, false) && inspector.position() == 16);
+/// assert!(!inspector.read(&[], true) && inspector.error().is_some(), "there is no end unit");
+/// assert_eq!(names[..2], ["signature", "version_major"]);
+/// # Ok::<(), splatstream_format::Error>(())
+/// ```
+pub struct Inspector<'v> {
     visit: &'v mut dyn FnMut(Element),
+    /// Delimits the units, once the file header has been shown.
+    units: Option<UnitReader>,
     follower: Follower,
     limits: Limits,
     coding: Coding,
     first: Option<Error>,
 }
 
-impl Inspector<'_> {
-    fn stream(&mut self, bytes: &[u8]) {
+impl<'v> Inspector<'v> {
+    /// An inspector of a stream from its first byte on.
+    pub fn new(limits: &Limits, visit: &'v mut dyn FnMut(Element)) -> Self {
+        Self {
+            visit,
+            units: None,
+            // The units of a damaged file header are shown whatever layers they name.
+            follower: Follower::new(Profile::Dynamic),
+            limits: *limits,
+            coding: Coding::default(),
+            first: None,
+        }
+    }
+
+    /// Absolute offset of the first byte that it needs next.
+    pub fn position(&self) -> u64 {
+        self.units.as_ref().map_or(0, UnitReader::position)
+    }
+
+    /// The first error so far.
+    pub const fn error(&self) -> Option<Error> {
+        self.first
+    }
+
+    /// Visits the elements of the units that are there as a whole. `bytes` are those of the stream from
+    /// [`Inspector::position`] on; `is_end` says that no more will come. Whether more are needed: not after the end, nor
+    /// after a unit whose end is not known.
+    pub fn read(&mut self, bytes: &[u8], is_end: bool) -> bool {
+        let start = self.position();
+        if self.units.is_none() {
+            if bytes.len() < FileHeader::SIZE && !is_end {
+                return true;
+            }
+            if !self.file_header(bytes) {
+                return false;
+            }
+        }
+        while let Some(mut units) = self.units.take() {
+            let rest = usize::try_from(units.position().saturating_sub(start)).ok();
+            let rest = rest.and_then(|from| bytes.get(from..)).unwrap_or_default();
+            let (at, is_due) = (units.position(), units.is_open());
+            let event = units.read(rest, is_end);
+            self.units = Some(units);
+            if is_due && !matches!(event, Ok(Event::NeedMoreData(_))) {
+                self.fixed(&UnitHeader::TABLE, rest, at);
+            }
+            match event {
+                Ok(Event::Unit(unit)) => {
+                    let checked = self.unit(&unit);
+                    self.note(checked);
+                }
+                Ok(Event::NeedMoreData(_)) => return true,
+                Ok(_) => return false,
+                Err(error) => self.note(Err(error)),
+            }
+        }
+        false
+    }
+
+    /// Shows the file header; whether units follow.
+    fn file_header(&mut self, bytes: &[u8]) -> bool {
         self.fixed(&FileHeader::TABLE, bytes, 0);
-        let header = FileHeader::parse(bytes);
-        match header {
+        match FileHeader::parse(bytes) {
             Ok((header, _)) => self.follower = Follower::new(header.profile()),
             Err(error) => {
                 self.note(Err(error));
                 // Units describe themselves, but not those of another file format.
                 if matches!(error.kind, ErrorKind::Signature | ErrorKind::Truncated { .. }) {
-                    return;
+                    return false;
                 }
             }
         }
-        let profile = self.follower.profile();
-        let mut units = Units::starting_at(bytes, after(0, FileHeader::SIZE), profile, &self.limits);
-        loop {
-            let at = units.position();
-            if units.is_open() {
-                let rest = usize::try_from(at).ok().and_then(|start| bytes.get(start..));
-                self.fixed(&UnitHeader::TABLE, rest.unwrap_or_default(), at);
-            }
-            match units.next_unit() {
-                Some(Ok(unit)) => {
-                    let checked = self.unit(&unit);
-                    self.note(checked);
-                }
-                Some(Err(error)) => self.note(Err(error)),
-                None => return,
-            }
-        }
+        self.units = Some(UnitReader::starting_at(after(0, FileHeader::SIZE), &self.limits));
+        true
     }
 
     /// Checks of a unit and the elements of its payload, if it is the one that was written.
@@ -145,15 +205,7 @@ impl Inspector<'_> {
     /// A payload that is not looked at.
     fn opaque(&mut self, unit: &Unit<'_>, meaning: &'static str, clause: &'static str) {
         let (bytes, record) = (unit.payload.len(), unit.header.unit_type().name());
-        self.show(
-            unit.payload_at,
-            bytes,
-            "payload".into(),
-            format!("{bytes} bytes"),
-            meaning,
-            clause,
-            record,
-        );
+        self.show(unit.payload_at, bytes, "payload".into(), Value::Bytes(bytes), meaning, clause, record);
     }
 
     fn transform(&mut self, payload: &[u8], at: u64) -> Result<()> {
@@ -162,9 +214,9 @@ impl Inspector<'_> {
         self.coding.define(&transform.header);
         let mean_at = after(at, TransformHeader::SIZE);
         let mean_bytes = size_of_val(transform.mean.as_slice());
-        self.variable("transform", "mean", mean_at, mean_bytes, value::summary(&transform.mean));
+        self.variable("transform", "mean", mean_at, mean_bytes, Value::spread(&transform.mean));
         let basis_bytes = size_of_val(transform.basis.as_slice());
-        let basis = value::summary(&transform.basis);
+        let basis = Value::spread(&transform.basis);
         self.variable("transform", "basis", after(mean_at, mean_bytes), basis_bytes, basis);
         Ok(())
     }
@@ -173,7 +225,7 @@ impl Inspector<'_> {
         self.fixed(&CodebookHeader::TABLE, payload, at);
         let codebook = Codebook::parse(payload, at, &self.limits)?;
         let bytes = payload.len().saturating_sub(CodebookHeader::SIZE);
-        let entries = value::summary(&codebook.entries);
+        let entries = Value::spread(&codebook.entries);
         self.variable("codebook", "entries", after(at, CodebookHeader::SIZE), bytes, entries);
         Ok(())
     }
@@ -189,13 +241,12 @@ impl Inspector<'_> {
         match &weights {
             Weights::Carried(_) => {
                 let bytes = model.len().saturating_sub(NetworkHeader::SIZE);
-                let value = format!("{bytes} bytes");
                 let at = after(model_at, NetworkHeader::SIZE);
-                self.variable("network", "parameters", at, bytes, value);
+                self.variable("network", "parameters", at, bytes, Value::Bytes(bytes));
             }
             Weights::Registered(digest) => {
                 let value = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-                self.variable("weights", "model", model_at, model.len(), value);
+                self.variable("weights", "model", model_at, model.len(), Value::Words(value));
             }
         }
         weights.network(at).map(drop)
@@ -296,7 +347,7 @@ impl Inspector<'_> {
             let Some((raw, after_row)) = rest.split_at_checked(row.bytes) else {
                 return;
             };
-            let value = value::of(table.name, row.name, row.type_name, raw);
+            let value = decode_value::of(table.name, row.name, row.type_name, raw);
             let Row { name, meaning, clause, .. } = *row;
             self.show(at, row.bytes, name.into(), value, meaning, clause, table.name);
             rest = after_row;
@@ -308,21 +359,21 @@ impl Inspector<'_> {
     fn plain(&mut self, traced: &Traced<'_>) {
         let Traced { record, element, bytes, .. } = *traced;
         let value = match (element, columns(record, element)) {
-            ("models" | "blocks", _) | (_, None) => format!("{} bytes", bytes.len()),
-            (_, Some((type_name, ..))) => value::of(record, element, type_name, bytes),
+            ("models" | "blocks", _) | (_, None) => Value::Bytes(bytes.len()),
+            (_, Some((type_name, ..))) => decode_value::of(record, element, type_name, bytes),
         };
         self.traced(traced, value);
     }
 
     /// An element with a value.
-    fn traced(&mut self, traced: &Traced<'_>, value: String) {
+    fn traced(&mut self, traced: &Traced<'_>, value: Value) {
         let Traced { record, element, index, at, bytes } = *traced;
         let name = index.map_or(element.into(), |index| format!("{element}[{index}]").into());
         let (_, meaning, clause) = columns(record, element).unwrap_or_default();
         self.show(at, bytes.len(), name, value, meaning, clause, record);
     }
 
-    fn variable(&mut self, record: &str, name: &'static str, at: u64, bytes: usize, value: String) {
+    fn variable(&mut self, record: &str, name: &'static str, at: u64, bytes: usize, value: Value) {
         if let Some(row) = variable_row(record, name) {
             self.show(at, bytes, name.into(), value, row.meaning, row.clause, row.record);
         }
@@ -334,7 +385,7 @@ impl Inspector<'_> {
         at: u64,
         bytes: usize,
         name: Cow<'static, str>,
-        value: String,
+        value: Value,
         meaning: &'static str,
         clause: &'static str,
         record: &'static str,

@@ -16,7 +16,7 @@ fn elements(bytes: &[u8]) -> (Vec<Element>, Option<Error>) {
 /// The values of an element wherever it occurs.
 fn values(elements: &[Element], record: &str, name: &str) -> Vec<String> {
     let found = elements.iter().filter(|element| element.record == record && element.name == name);
-    found.map(|element| element.value.clone()).collect()
+    found.map(|element| element.value.to_string()).collect()
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub(crate) struct PictureArgs {
     /// Weights of the learned metric ST-LPIPS (an .npz file); without them it is left out.
     #[arg(long, value_name = "WEIGHTS.npz", requires = "cameras")]
     st_lpips: Option<PathBuf>,
-    /// Photographs, one PNG file a camera and named after it: both scenes are compared with these as well.
+    /// Photographs, one PNG file per camera and named after it: both scenes are compared with these as well.
     #[arg(long, value_name = "DIR", requires = "cameras")]
     photos: Option<PathBuf>,
 }

@@ -1,6 +1,7 @@
 //! What `decode` reports: figures, frame by frame what is there, and what is not.
 
 use super::loss::Loss;
+use crate::encode::warnings::Warning;
 use crate::failure::{StreamFault, faults_text};
 use crate::numbers::hex_digest;
 use crate::seek::Seek;
@@ -33,6 +34,8 @@ pub(super) struct Report {
     pub(super) loss: Loss,
     pub(super) reduced: Vec<Reduced>,
     pub(super) complete: bool,
+    /// What the format of the files cannot keep.
+    pub(super) warnings: Vec<Warning>,
 }
 
 /// The frames asked for; each list has an entry per frame.

@@ -1,5 +1,7 @@
 //! Where decoded frames go: a file or standard output for one frame, a directory for any number.
 
+use super::clamped::Losses;
+use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::output_file::{
     OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_inputs, refuse_terminal,
@@ -30,6 +32,7 @@ pub(crate) struct Target {
     inputs: Vec<PathBuf>,
     /// Frames of an earlier run, removed with the first frame that is written.
     stale: Vec<PathBuf>,
+    losses: Losses,
 }
 
 /// What a user says about the files.
@@ -74,6 +77,7 @@ impl Target {
             is_directory,
             inputs: vec![wanted.input.to_path_buf()],
             stale: if is_directory { stale(&wanted)? } else { Vec::new() },
+            losses: Losses::default(),
         })
     }
 
@@ -90,7 +94,14 @@ impl Target {
             .format
             .bytes(frame)
             .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
-        OutputFile::write_apart(&path, &self.inputs, &bytes)
+        OutputFile::write_apart(&path, &self.inputs, &bytes)?;
+        self.losses.add(number, frame, self.format);
+        Ok(())
+    }
+
+    /// What the format could not keep.
+    pub(crate) fn warnings(&self) -> Vec<Warning> {
+        self.losses.warnings(self.format)
     }
 
     fn path_of(&self, number: u32) -> PathBuf {
@@ -115,7 +126,7 @@ fn is_directory(path: &Path) -> Result<bool, Failure> {
     if path.extension().is_some() || path.exists() {
         let path = path.display();
         return Err(Failure::Usage(format!(
-            "{path}: no format that decode writes: end the name of a file in .ply, .spz or .splat, \
+            "{path}: decode cannot write this format; end the name of a file in .ply, .spz or .splat, \
              and that of a directory in /; {STANDARD} is standard output"
         )));
     }
@@ -129,9 +140,9 @@ fn stale(wanted: &Wanted<'_>) -> Result<Vec<PathBuf>, Failure> {
     stale.retain(|path| is_frame(path) && !path.is_dir());
     if !stale.is_empty() && !wanted.force {
         let (path, count) = (wanted.path.display(), stale.len());
-        let frames = if count == 1 { "1 file has" } else { &format!("{count} files have") };
+        let files = if count == 1 { "1 file" } else { &format!("{count} files") };
         return Err(Failure::Usage(format!(
-            "{path}: {frames} the names of frames, as from an earlier run; \
+            "{path}: the directory has {files} with names of frames, probably from an earlier run; \
              give another directory, or --force to remove them"
         )));
     }
@@ -155,7 +166,7 @@ impl Format {
             .find(|format| extension.eq_ignore_ascii_case(format.extension()))
     }
 
-    fn extension(self) -> &'static str {
+    pub(super) fn extension(self) -> &'static str {
         match self {
             Self::Ply => "ply",
             Self::Spz => "spz",

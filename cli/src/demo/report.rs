@@ -1,6 +1,8 @@
 //! What the demo tells.
 
+use super::pictures::Drawn;
 use crate::compare::errors::AttributeErrors;
+use crate::numbers::frames as counted;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_chart::table::Table;
@@ -43,23 +45,29 @@ pub(super) struct Point {
     op: String,
     bytes: u64,
     gaussians: u64,
+    frames: u32,
     percent: u8,
     bpg: f64,
     seconds: f64,
     gaussians_per_second: f64,
+    /// What it looks like.
+    #[serde(flatten)]
+    drawn: Option<Drawn>,
 }
 
 impl Point {
     /// An operating point that took so long to decode.
-    pub(super) fn new(info: &OperatingPointInfo, seconds: f64) -> Self {
+    pub(super) fn new(info: &OperatingPointInfo, seconds: f64, drawn: Option<Drawn>) -> Self {
         Self {
             op: info.point.to_string(),
             bytes: info.bytes,
             gaussians: info.gaussians,
+            frames: info.frames,
             percent: info.percent,
             bpg: bits_per_gaussian(info.bytes, info.gaussians),
             seconds,
             gaussians_per_second: info.gaussians as f64 / seconds.max(f64::MIN_POSITIVE),
+            drawn,
         }
     }
 }
@@ -70,13 +78,19 @@ impl Demonstration {
         let Scene { frames, gaussians, sh_degree, ply_bytes } = &self.scene;
         let Encoding { bytes, bpg, seconds, gaussians_per_second: rate, .. } = &self.encoding;
         let place = self.directory.display();
+        let moment = self.operating_points.iter().find_map(|point| point.drawn.as_ref());
+        let moment = moment.map_or(0, |drawn| drawn.frame);
         format!(
-            "scene     {frames} frames, {} Gaussians in all, SH degree {sh_degree}: {} bytes as PLY\n\
+            "scene     {}, {} Gaussians in all, SH degree {sh_degree}: {} bytes as PLY\n\
              encoded   {} bytes, {bpg:.2} bits per Gaussian, 1/{:.0} of the PLY; {seconds:.2} s, {} Gaussians per second\n\
-             decoded   at every operating point; every frame has the digest that the encoder computed\n\n\
-             {}\nerrors of frame 0 with everything decoded\n{}\n\
-             files     {place}: demo.gss, source/, decoded-*/, report.txt, report.json\n\
+             decoded   at every operating point; every frame has the digest that the encoder computed\n\
+             drawn     frame {moment} of every point, and of the source: {place}/pictures/source.png\n\n\
+             {}\nsS: spatial layers up to S, tT: temporal layers up to T, rR: refinements up to R; dB: PSNR of the picture \
+             against the source\n\n\
+             errors of frame 0 with everything decoded\n{}\n\
+             files     {place}: demo.gss, source/, decoded/, pictures/, report.txt, report.json\n\
              try next  splatstream inspect --stats {place}/demo.gss\n",
+            counted(*frames),
             grouped(*gaussians),
             grouped(*ply_bytes),
             grouped(*bytes),
@@ -88,24 +102,19 @@ impl Demonstration {
     }
 
     fn points(&self) -> Table {
-        let mut table = Table::new([
-            "point",
-            "bytes",
-            "Gaussians",
-            "%",
-            "bits per Gaussian",
-            "decoding ms",
-            "Gaussians per second",
-        ]);
+        let mut table =
+            Table::new(["point", "bytes", "frames", "% of a frame", "decoding ms", "dB", "picture"]);
         for point in &self.operating_points {
+            let drawn = point.drawn.as_ref();
+            let decibels = drawn.and_then(|drawn| drawn.psnr_db);
             table.row([
                 point.op.clone(),
                 grouped(point.bytes),
-                grouped(point.gaussians),
+                point.frames.to_string(),
                 point.percent.to_string(),
-                format!("{:.2}", point.bpg),
                 format!("{:.1}", point.seconds * 1000.0),
-                grouped(point.gaussians_per_second as u64),
+                decibels.map_or("-".to_owned(), |decibels| format!("{decibels:.1}")),
+                drawn.map_or("-".to_owned(), |drawn| drawn.picture.clone()),
             ]);
         }
         table

@@ -1,5 +1,6 @@
 //! What the encoder chose, and why.
 
+use crate::up_guess::UpGuess;
 use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
 use splatstream_encoder::{
@@ -41,6 +42,12 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     choices.push(invisible(report, settings));
     choices.extend(left_out(settings));
     choices
+}
+
+/// What was taken to point up where nobody said it.
+pub(super) fn up(guess: UpGuess) -> Choice {
+    let carried = if guess.is_told() { "the stream says so" } else { "the stream leaves it open" };
+    Choice::new("up", guess.name(), format!("{}; {carried}; --up changes it", guess.why()))
 }
 
 fn positions(report: &Report, settings: &Settings) -> Choice {

@@ -31,12 +31,12 @@ pub(crate) struct Warning {
 }
 
 impl Warning {
-    fn new(code: &'static str, message: String) -> Self {
+    pub(crate) fn new(code: &'static str, message: String) -> Self {
         Self { code, message }
     }
 
     /// For people.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         format!("warning: {}", self.message)
     }
 }
@@ -207,10 +207,14 @@ fn dropped(report: &Report, first: &Dropped, file_of: &dyn Fn(u32) -> String) ->
 }
 
 fn isolated_values(isolated: &Isolated, file_of: &dyn Fn(u32) -> String) -> Warning {
-    let Isolated { attribute, count, frame, row, value } = *isolated;
+    let Isolated { attribute, count, frame, row, value, farthest: (far_frame, far_row, far) } = *isolated;
+    let farthest = match (far_frame, far_row) == (frame, row) {
+        true => String::new(),
+        false => format!("; the farthest is Gaussian {far_row} of {} with {far}", file_of(far_frame)),
+    };
     let message = format!(
-        "{} a {attribute} far beyond what a scene has, for example Gaussian {row} of {} with {value}; the nearest \
-         sensible value is coded instead, and nothing else is worse for it; remove or repair such Gaussians",
+        "{} a {attribute} far beyond what a scene has, for example Gaussian {row} of {} with {value}{farthest}; the \
+         nearest sensible value is coded instead, and nothing else is worse for it; remove or repair such Gaussians",
         if count == 1 { "1 Gaussian has".to_owned() } else { format!("{} Gaussians have", grouped(count)) },
         file_of(frame),
     );

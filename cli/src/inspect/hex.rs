@@ -1,13 +1,16 @@
 //! The bytes of one unit beside its elements.
 
-use super::tree::{Branch, Row, each_unit, offset};
+use super::element::Alone;
+use super::tree::{Branch, Part, each_part, offset};
 use super::{Shown, span};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::stream_file::StreamFile;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use splatstream_format::Limits;
+use splatstream_format::inspect::Element;
 use std::fmt::Write;
+use std::ops::ControlFlow;
 
 /// Bytes a line.
 const WIDTH: usize = 16;
@@ -17,44 +20,49 @@ const WIDTH: usize = 16;
 struct Dump {
     unit: usize,
     #[serde(rename = "type")]
-    kind: String,
+    kind: &'static str,
     at: u64,
     bytes: u64,
+    #[serde(serialize_with = "with_bytes")]
     elements: Vec<Bytes>,
 }
 
 /// One element and its bytes.
-#[derive(Serialize)]
 struct Bytes {
-    #[serde(flatten)]
-    row: Row,
+    element: Element,
     hex: String,
+}
+
+fn with_bytes<S: Serializer>(elements: &[Bytes], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(elements.iter().map(|Bytes { element, hex }| Alone { element, hex }))
 }
 
 /// Dumps one unit.
 pub(super) fn show(stream: &StreamFile, number: usize, limits: &Limits, console: &Console) -> Shown {
     let (mut found, mut count) = (None, 0);
-    let error = each_unit(stream, limits, &mut |unit| {
-        count += 1;
-        if unit.unit == number {
-            found = Some(unit);
+    let visited = each_part(&mut stream.bytes.as_slice(), limits, &mut |part| {
+        if let Part::Unit(unit) = part {
+            count += 1;
+            found = found.take().or((unit.unit == number).then_some(unit));
         }
+        ControlFlow::Continue(())
     });
-    let Some(Branch { unit, kind, at, bytes, elements }) = found else {
-        if error.is_some() {
-            return Ok(error);
+    let Some(Branch { unit, kind, at, bytes, header, elements }) = found else {
+        if visited.error.is_some() {
+            return Ok(visited.error);
         }
         let path = stream.path.display();
         return Err(Failure::Usage(format!("{path}: there is no unit {number}, the stream has {count}")));
     };
-    let elements = elements.into_iter().map(|row| Bytes { hex: hex(stream, &row), row }).collect();
+    let elements = header.into_iter().chain(elements);
+    let elements = elements.map(|element| Bytes { hex: hex(stream, &element), element }).collect();
     let dump = Dump { unit, kind, at, bytes, elements };
     console.report(&dump, || dump.text())?;
-    Ok(error)
+    Ok(visited.error)
 }
 
 /// The bytes that an element touches, as the inspector found them within the stream.
-fn hex(stream: &StreamFile, row: &Row) -> String {
+fn hex(stream: &StreamFile, row: &Element) -> String {
     let start = usize::try_from(row.at_bit / 8).unwrap_or(usize::MAX);
     let end = usize::try_from((row.at_bit + row.bits).div_ceil(8)).unwrap_or(usize::MAX);
     let bytes = stream.bytes.get(start..end).unwrap_or_default();
@@ -77,7 +85,7 @@ impl Dump {
 impl Bytes {
     /// The lines of an element: its name and value stand beside the first.
     fn push(&self, text: &mut String) {
-        let row = &self.row;
+        let row = &self.element;
         let name = format!("{}.{} = {} ({})", row.record, row.name, row.value, row.clause);
         let lines = self.hex.as_bytes().chunks(2 * WIDTH);
         for (line, digits) in lines.enumerate() {

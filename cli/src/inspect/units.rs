@@ -1,25 +1,37 @@
 //! One line per unit.
 
+use super::tree::go_on_if;
 use super::{Shown, span};
 use crate::console::Console;
-use crate::failure::StreamFault;
-use crate::stream_file::StreamFile;
-use serde::Serialize;
+use crate::failure::{Failure, StreamFault};
+use crate::stream_file::{feed, open_pieces};
+use serde::ser::{SerializeSeq, SerializeStruct};
+use serde::{Serialize, Serializer};
 use splatstream_chart::numbers::grouped;
 use splatstream_chart::table::Table;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::follower::{Content, Follower, Standing};
 use splatstream_format::payload::FramePayload;
-use splatstream_format::syntax::{FrameType, IncrementHeader, UnitHeader, UnitType};
-use splatstream_format::unit::{Landmark, Stream, Unit};
+use splatstream_format::syntax::{FrameType, IncrementHeader, Profile, UnitHeader, UnitType};
+use splatstream_format::unit::{Landmark, Unit};
+use splatstream_format::unit_reader::{Event, UnitReader};
 use splatstream_format::{Error, Limits};
+use std::cell::RefCell;
+use std::io::{self, Read, Write};
+use std::ops::ControlFlow;
+use std::path::Path;
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Listing {
-    units: Vec<Line>,
-    error: Option<StreamFault>,
+/// What `--json` prints: `units`, `error`.
+struct Listing<'a> {
+    limits: &'a Limits,
+    /// Taken when the units are listed.
+    reader: RefCell<Box<dyn Read>>,
+    /// The first error, and why not everything could be read, once they have been.
+    listed: RefCell<(Option<Error>, Option<io::Error>)>,
 }
+
+/// The lines, written as they are made.
+struct Lines<'a>(&'a Listing<'a>);
 
 #[derive(Serialize)]
 struct Line {
@@ -58,43 +70,67 @@ struct Context {
     follower: Follower,
     limits: Limits,
     frame_type: Option<FrameType>,
+    /// Lines so far, and the first error.
+    count: usize,
+    first: Option<Error>,
 }
 
 /// Lists the units.
-pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> Shown {
-    let mut lines = Vec::new();
-    let error = list(stream, limits, &mut lines);
-    let listing = Listing { units: lines, error: error.map(StreamFault::from) };
-    console.report(&listing, || listing.text())?;
-    Ok(error)
+pub(super) fn show(path: &Path, limits: &Limits, console: &Console) -> Shown {
+    let listing = Listing { limits, reader: RefCell::new(open_pieces(path)?), listed: RefCell::default() };
+    console.stream(&listing, |out| listing.write(out))?;
+    match listing.listed.take() {
+        (_, Some(failed)) => Err(Failure::file("read", path, &failed)),
+        (error, None) => Ok(error),
+    }
 }
 
-/// Adds a line per unit; gives the first error. Where the end of a unit is not known it goes on at the next intact
-/// gop_header.
-fn list(stream: &StreamFile, limits: &Limits, lines: &mut Vec<Line>) -> Option<Error> {
-    let opened = match Stream::open(&stream.bytes, limits) {
-        Ok(opened) => opened,
-        Err(error) => return Some(error),
-    };
-    let mut context =
-        Context { follower: Follower::new(opened.header().profile()), limits: *limits, frame_type: None };
-    let mut units = opened.units();
-    let mut first = None;
-    while let Some(unit) = units.next_unit() {
-        let error = match unit {
-            Ok(unit) => {
-                let (line, error) = context.line(lines.len(), &unit);
-                lines.push(line);
-                error
-            }
-            Err(error) => {
-                units.scan_for(Landmark::GopHeader);
-                Some(error)
-            }
-        };
-        first = first.or(error);
+impl Serialize for Listing<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut listing = serializer.serialize_struct("Listing", 2)?;
+        listing.serialize_field("units", &Lines(self))?;
+        listing.serialize_field("error", &self.listed.borrow().0.map(StreamFault::from))?;
+        listing.end()
     }
-    first
+}
+
+impl Serialize for Lines<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut lines = serializer.serialize_seq(None)?;
+        let mut written = Ok(());
+        self.0.list(&mut |line| {
+            written = lines.serialize_element(&line);
+            go_on_if(written.is_ok())
+        });
+        written?;
+        lines.end()
+    }
+}
+
+impl Listing<'_> {
+    /// Visits a line per unit. Where the end of a unit is not known it goes on at the next intact gop_header.
+    fn list(&self, visit: &mut dyn FnMut(Line) -> ControlFlow<()>) {
+        let mut units = UnitReader::new(self.limits);
+        let mut context = Context::new(self.limits);
+        let fed = feed(&mut **self.reader.borrow_mut(), &mut |bytes, is_end| {
+            context.read(&mut units, bytes, is_end, visit).then(|| units.position())
+        });
+        self.listed.replace((context.first, fed.err()));
+    }
+
+    /// The table for people.
+    fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut table = Table::new(["unit", "type", "bytes at", "bytes", "frame", "layer", "refinement", ""]);
+        self.list(&mut |line| {
+            table.row(line.cells());
+            ControlFlow::Continue(())
+        });
+        out.write_all(table.text().as_bytes())?;
+        match self.listed.borrow().0 {
+            Some(error) => writeln!(out, "the first error is at {}", StreamFault::from(error)),
+            None => Ok(()),
+        }
+    }
 }
 
 impl Line {
@@ -114,6 +150,20 @@ impl Line {
             cells: None,
             increment: None,
         }
+    }
+
+    /// The cells of its row.
+    fn cells(&self) -> [String; 8] {
+        [
+            self.unit.to_string(),
+            self.kind.to_owned(),
+            span(self.at, self.bytes),
+            self.bytes.to_string(),
+            self.frame.to_string(),
+            format!("s{},t{}", self.spatial_layer, self.temporal_layer),
+            self.refinement.to_string(),
+            self.note(),
+        ]
     }
 
     /// What stands after the columns.
@@ -143,9 +193,41 @@ impl Line {
 }
 
 impl Context {
-    /// The line of a unit, and what is wrong with it.
-    fn line(&mut self, number: usize, unit: &Unit<'_>) -> (Line, Option<Error>) {
-        let mut line = Line::new(number, unit.at, &unit.header);
+    fn new(limits: &Limits) -> Self {
+        let follower = Follower::new(Profile::Dynamic);
+        Self { follower, limits: *limits, frame_type: None, count: 0, first: None }
+    }
+
+    /// The lines of the units that are there as a whole; whether more may come. `bytes` are those from where the reader
+    /// has come to on.
+    fn read(
+        &mut self,
+        units: &mut UnitReader,
+        bytes: &[u8],
+        is_end: bool,
+        visit: &mut dyn FnMut(Line) -> ControlFlow<()>,
+    ) -> bool {
+        let start = units.position();
+        loop {
+            let taken = usize::try_from(units.position() - start).unwrap_or(usize::MAX);
+            match units.read(bytes.get(taken..).unwrap_or_default(), is_end) {
+                Ok(Event::FileHeader(header)) => self.follower = Follower::new(header.profile()),
+                Ok(Event::Unit(unit)) if visit(self.line(&unit)).is_break() => return false,
+                Ok(Event::Unit(_)) => {}
+                Ok(Event::NeedMoreData(_)) => return true,
+                Ok(_) => return false,
+                Err(error) => {
+                    self.first = self.first.or(Some(error));
+                    units.scan_for(Landmark::GopHeader);
+                }
+            }
+        }
+    }
+
+    /// The line of a unit.
+    fn line(&mut self, unit: &Unit<'_>) -> Line {
+        let mut line = Line::new(self.count, unit.at, &unit.header);
+        self.count += 1;
         let standing = self.follower.take(unit);
         line.damaged = standing.is_err();
         // What decoders discard may hold anything.
@@ -154,7 +236,8 @@ impl Context {
         }
         let of_frame = matches!(unit.header.unit_type(), UnitType::FrameHeader | UnitType::Increment);
         line.frame_type = self.frame_type.filter(|_| of_frame).map(FrameType::name);
-        (line, standing.err())
+        self.first = self.first.or(standing.err());
+        line
     }
 
     /// Takes note of what a unit that is not discarded says, and puts it into its line.
@@ -187,28 +270,5 @@ impl Counts {
             new: header.new_count,
             sections: present.map(Section::name).collect(),
         }
-    }
-}
-
-impl Listing {
-    fn text(&self) -> String {
-        let mut table = Table::new(["unit", "type", "bytes at", "bytes", "frame", "layer", "refinement", ""]);
-        for line in &self.units {
-            table.row([
-                line.unit.to_string(),
-                line.kind.to_owned(),
-                span(line.at, line.bytes),
-                line.bytes.to_string(),
-                line.frame.to_string(),
-                format!("s{},t{}", line.spatial_layer, line.temporal_layer),
-                line.refinement.to_string(),
-                line.note(),
-            ]);
-        }
-        let mut text = table.text();
-        if let Some(error) = &self.error {
-            text += &format!("the first error is at {error}\n");
-        }
-        text
     }
 }

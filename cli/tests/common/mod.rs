@@ -29,10 +29,13 @@ pub(crate) fn run_with(arguments: &[&str], input: &[u8]) -> Output {
         .spawn()
         .expect("the binary starts");
     let mut stdin = child.stdin.take().expect("a pipe");
+    let input = input.to_vec();
+    // Beside reading: a command may write before it has read everything.
+    let writing = std::thread::spawn(move || stdin.write_all(&input));
+    let output = child.wait_with_output().expect("it ends");
     // A command that refuses its arguments does not read.
-    let _not_read = stdin.write_all(input);
-    drop(stdin);
-    child.wait_with_output().expect("it ends")
+    let _not_read = writing.join().expect("no panic");
+    output
 }
 
 /// Runs `splatstream`, which shall succeed; gives standard output.

@@ -1,6 +1,7 @@
 //! Inside a section: the models bit by bit, the blocks part by part.
 
-use super::{Element, Inspector};
+use super::decode_value::little_endian;
+use super::{Element, Inspector, Number, Value};
 use crate::entropy::in_force::{ModelsInForce, ModelsOfFrame, SectionModels};
 use crate::entropy::layout::{Layout, PlaneInfo, ShCoding};
 use crate::entropy::model::{ModelTrace, Source, read_models};
@@ -53,6 +54,14 @@ impl Coding {
     }
 }
 
+/// The parts of a block, elements of the record `block`: names, which come after `blocks[INDEX].`, and meanings.
+pub const BLOCK_PARTS: [(&str, &str); 4] = [
+    ("word_count", "16-bit words of the block"),
+    ("state", "states of the lanes"),
+    ("word", "words, in the order of use"),
+    ("raw_bits", "raw bits of the values"),
+];
+
 /// One element of a model as the trace reports it; the plane it belongs to is the number of `reuse` flags.
 struct ModelElement {
     name: &'static str,
@@ -64,12 +73,14 @@ struct ModelElement {
 
 impl ModelElement {
     /// The value, with the name of the source where it is one.
-    fn text(&self) -> String {
+    fn shown(&self) -> Value {
         let source = match self.name {
-            "source_a" | "source_b" => u8::try_from(self.value).ok().and_then(Source::from_code),
+            "source_a" | "source_b" => u8::try_from(self.value).ok(),
             _ => None,
         };
-        source.map_or(self.value.to_string(), |source| format!("{} ({})", self.value, source.name()))
+        source
+            .and_then(|code| Some(Value::code(code.into(), Source::from_code(code)?.name())))
+            .unwrap_or(Value::Number(Number::Signed(self.value)))
     }
 }
 
@@ -109,7 +120,7 @@ impl Inspector<'_> {
             let Some(coded) = current else { continue };
             match (traced.element, traced.index) {
                 ("lanes_log2", _) => {
-                    self.traced(traced, format!("{} ({})", coded.lanes_log2, coded.section.name()));
+                    self.traced(traced, Value::code(coded.lanes_log2.into(), coded.section.name()));
                 }
                 ("models", _) => self.models(traced, coded, sh, &mut models),
                 ("blocks", Some(block)) => self.block(block, traced, coded.lanes_log2),
@@ -136,13 +147,14 @@ impl Inspector<'_> {
         let reusable = models.reusable(coded.section, &layout);
         let read = read_models(coded.model, coded.model_at, &layout.alphabets(), &reusable, &mut elements);
         match read {
-            Ok(_) if coded.model.is_empty() => self.traced(traced, "0 bytes".into()),
+            Ok(_) if coded.model.is_empty() => self.traced(traced, Value::Bytes(0)),
             Ok(read) => {
                 self.show_models(&elements.list, layout.planes(), coded.model, coded.model_at);
                 models.replace(coded.section, SectionModels { layout, models: read });
             }
             Err(error) => {
-                self.traced(traced, format!("{} bytes, not readable: {}", coded.model.len(), error.kind));
+                let words = format!("{} bytes, not readable: {}", coded.model.len(), error.kind);
+                self.traced(traced, Value::Words(words));
             }
         }
     }
@@ -159,7 +171,7 @@ impl Inspector<'_> {
                 bits: element.bits,
                 record: "plane_model",
                 name: element.name.into(),
-                value: element.text(),
+                value: element.shown(),
                 meaning: meaning.into(),
                 clause: "5.12",
             });
@@ -172,7 +184,7 @@ impl Inspector<'_> {
                 bits,
                 record: "plane_model",
                 name: "padding".into(),
-                value: "0".into(),
+                value: Value::Number(Number::Unsigned(0)),
                 meaning: "up to the end of the byte".into(),
                 clause: "5.12",
             });
@@ -189,16 +201,16 @@ impl Inspector<'_> {
             Some((word_count, block.len().saturating_sub(rest.len()), words, raw))
         });
         let Some((word_count, head, words, raw)) = divided else {
-            return self.traced(traced, format!("{} bytes", block.len()));
+            return self.traced(traced, Value::Bytes(block.len()));
         };
         let parts = [
-            ("word_count", head, word_count.to_string(), "16-bit words of the block"),
-            ("state", states, hexadecimal(block, head, states, 4), "states of the lanes"),
-            ("word", words, summary(block, head.saturating_add(states), words), "words, in the order of use"),
-            ("raw_bits", raw, format!("{raw} bytes"), "raw bits of the values"),
+            (head, Value::Number(Number::Unsigned(word_count.into()))),
+            (states, hexadecimal(block, head, states, 4)),
+            (words, summary(block, head.saturating_add(states), words)),
+            (raw, Value::Bytes(raw)),
         ];
         let mut offset = at;
-        for (name, bytes, value, meaning) in parts {
+        for ((name, meaning), (bytes, value)) in BLOCK_PARTS.into_iter().zip(parts) {
             if bytes > 0 {
                 let name = format!("blocks[{index}].{name}");
                 self.show(offset, bytes, name.into(), value, meaning, "5.13", "block");
@@ -208,16 +220,15 @@ impl Inspector<'_> {
     }
 }
 
-/// Numbers of `width` bytes, little-endian, in hexadecimal.
-fn hexadecimal(bytes: &[u8], start: usize, length: usize, width: usize) -> String {
+/// Numbers of `width` bytes, little-endian.
+fn hexadecimal(bytes: &[u8], start: usize, length: usize, width: usize) -> Value {
     let section = bytes.get(start..start.saturating_add(length)).unwrap_or_default();
-    let digits = |number: &[u8]| number.iter().rev().map(|byte| format!("{byte:02x}")).collect::<String>();
-    let numbers: Vec<String> = section.chunks(width).map(digits).collect();
-    format!("[{}]", numbers.join(", "))
+    let numbers = section.chunks(width).map(little_endian).collect();
+    Value::Hexadecimals { numbers, bytes: width }
 }
 
 /// A few words in full, many by their number.
-fn summary(bytes: &[u8], start: usize, length: usize) -> String {
+fn summary(bytes: &[u8], start: usize, length: usize) -> Value {
     const FEW: usize = 32;
-    if length <= FEW { hexadecimal(bytes, start, length, 2) } else { format!("{length} bytes") }
+    if length <= FEW { hexadecimal(bytes, start, length, 2) } else { Value::Bytes(length) }
 }

@@ -1,7 +1,8 @@
 //! Files of 3D Gaussians in and out, and scenes made from a seed.
 //!
 //! * [`read_scene`] reads any supported file or directory; [`ply`], [`compressed_ply`], [`splat`], [`spz`]
-//!   and [`sog`] read one format each, and the first, third and fourth write.
+//!   and [`sog`] read one format each, and the first, third and fourth write; [`Clamped`] is what the last two
+//!   cannot keep.
 //! * [`builtin`] makes scenes from a seed, so that everything can be tried and tested without any input file.
 //!
 //! All of them give and take [`splatstream_gaussians::GaussianFrame`], whose axes are PLY's: x right, y down,
@@ -32,6 +33,7 @@ pub mod splat;
 pub mod spz;
 
 mod byte_values;
+mod clamped;
 mod cursor;
 mod decompress;
 mod error;
@@ -40,6 +42,7 @@ mod limits;
 mod reading;
 mod smallest_three;
 
+pub use clamped::Clamped;
 pub use error::{SceneError, SceneErrorKind};
 pub use format::{SceneFormat, detect, read_scene, read_scene_as_is};
 pub use limits::ReadLimits;

@@ -8,6 +8,7 @@
 //! | 28–31 | rotation w, x, y, z; (byte − 128) / 128 |
 
 use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
+use crate::clamped::{Clamped, is_no_byte};
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, frame_of, row_of};
@@ -38,7 +39,7 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
         return Err(SceneError::malformed(
             bytes.len().saturating_sub(over),
             what,
-            "this is no .splat file, or it is cut short",
+            "this is not a .splat file, or it is incomplete",
         ));
     }
     let mut planes = budget.planes(0, (bytes.len() / RECORD) as u64)?;
@@ -90,7 +91,7 @@ pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
             let scale = (libm::exp(f64::from(log)) as f32).min(f32::MAX);
             out.extend_from_slice(&scale.to_le_bytes());
         }
-        out.extend(row_of(frame.dc(), row).map(|dc| to_byte(colour_of_dc(dc) * 255.0)));
+        out.extend(row_of(frame.dc(), row).map(|dc| to_byte(byte_scale(dc))));
         out.push(byte_of_logit(opacity));
         let rotation = row_of(frame.rotation(), row);
         // Validated: no quaternion is zero.
@@ -98,4 +99,18 @@ pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
         out.extend(rotation.map(|part| to_byte(f64::from(part) * 128.0 + 128.0)));
     }
     Ok(out)
+}
+
+/// The values that [`write`] cannot keep: colours outside 0 to 1, and semi-axes beyond the largest float. One entry per
+/// property that has some.
+pub fn clamped(frame: &GaussianFrame) -> Vec<Clamped> {
+    let dc = Clamped::of("dc", frame.dc(), |_, dc| is_no_byte(byte_scale(dc)));
+    let largest = libm::log(f64::from(f32::MAX));
+    let scale = Clamped::of("log_scale", frame.log_scale(), |_, log| f64::from(log) > largest);
+    dc.into_iter().chain(scale).collect()
+}
+
+/// A colour on the scale of bytes.
+fn byte_scale(dc: f32) -> f64 {
+    colour_of_dc(dc) * 255.0
 }

@@ -20,6 +20,7 @@ mod attributes;
 mod axes;
 mod container;
 
+use crate::clamped::Clamped;
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, frame_of};
@@ -88,4 +89,10 @@ pub fn write_with(frame: &GaussianFrame, options: &WriteOptions) -> Result<Vec<u
     frame.validate()?;
     let (shape, streams) = attributes::pack(frame, options)?;
     container::write(&shape, &streams)
+}
+
+/// The values that [`write_with`] cannot keep, since they are outside the ranges of its table. One entry per property that
+/// has some.
+pub fn clamped(frame: &GaussianFrame, options: &WriteOptions) -> Vec<Clamped> {
+    attributes::clamped(frame, options)
 }

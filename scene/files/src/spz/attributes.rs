@@ -6,6 +6,7 @@ use super::WriteOptions;
 use super::axes::Flip;
 use super::container::{Shape, Streams};
 use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
+use crate::clamped::{Clamped, is_no_byte};
 use crate::error::SceneError;
 use crate::reading::row_of;
 use crate::smallest_three::{from_smallest_three, to_smallest_three};
@@ -117,12 +118,41 @@ pub(crate) fn pack(frame: &GaussianFrame, options: &WriteOptions) -> Result<(Sha
     let streams = [
         pack_positions(frame, &shape),
         frame.opacity_logit().iter().map(|&logit| byte_of_logit(logit)).collect(),
-        interleave(frame.dc(), |dc| to_byte((f64::from(dc) * COLOUR_SCALE + 0.5) * 255.0)),
-        interleave(frame.log_scale(), |log| to_byte((f64::from(log) + 10.0) * 16.0)),
+        interleave(frame.dc(), |dc| to_byte(scaled_dc(dc))),
+        interleave(frame.log_scale(), |log| to_byte(scaled_log(log))),
         (0..frame.len()).flat_map(|row| pack_rotation(frame, row, shape.flip)).collect(),
         pack_sh(frame, options, shape.flip),
     ];
     Ok((shape, streams))
+}
+
+/// The values that [`pack`] puts at the ends of their ranges.
+pub(crate) fn clamped(frame: &GaussianFrame, options: &WriteOptions) -> Vec<Clamped> {
+    if check_sh_bits(options).is_err() {
+        return Vec::new();
+    }
+    let signs = Flip::default().sh();
+    let sign = |plane: usize| signs.get(plane / 3).copied().unwrap_or(1.0);
+    let sh = |plane: usize, value: f32| {
+        let (steps, step) = sh_steps(value * sign(plane), sh_bits(plane, options));
+        !(0.0..=256.0 - step).contains(&(steps * step))
+    };
+    let found = [
+        Clamped::of("dc", frame.dc(), |_, dc| is_no_byte(scaled_dc(dc))),
+        Clamped::of("log_scale", frame.log_scale(), |_, log| is_no_byte(scaled_log(log))),
+        Clamped::of("sh", frame.sh(), sh),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+/// A DC coefficient on the scale of bytes.
+fn scaled_dc(dc: f32) -> f64 {
+    (f64::from(dc) * COLOUR_SCALE + 0.5) * 255.0
+}
+
+/// The log of a semi-axis on the scale of bytes.
+fn scaled_log(log: f32) -> f64 {
+    (f64::from(log) + 10.0) * 16.0
 }
 
 /// The bytes of three planes, row by row.
@@ -189,8 +219,8 @@ fn pack_sh(frame: &GaussianFrame, options: &WriteOptions, flip: Flip) -> Vec<u8>
     for row in 0..frame.len() {
         let signs = signs.into_iter().flat_map(|sign| [sign; 3]);
         for ((at, plane), sign) in frame.sh().iter().enumerate().zip(signs) {
-            let bits = if at < 9 { options.sh1_bits } else { options.sh_rest_bits };
-            out.push(sh_byte(plane.get(row).map_or(0.0, |value| value * sign), bits));
+            let value = plane.get(row).map_or(0.0, |value| value * sign);
+            out.push(sh_byte(value, sh_bits(at, options)));
         }
     }
     out
@@ -198,9 +228,19 @@ fn pack_sh(frame: &GaussianFrame, options: &WriteOptions, flip: Flip) -> Vec<u8>
 
 /// The nearest byte with zeros below its `bits` highest bits, so that 0 is exact whatever the bits.
 fn sh_byte(value: f32, bits: u8) -> u8 {
-    let step = f64::from(256_u32 >> bits);
-    let steps = ((f64::from(value) * 128.0 + 128.0) / step).round();
+    let (steps, step) = sh_steps(value, bits);
     to_byte((steps * step).min(256.0 - step))
+}
+
+/// The nearest number of steps, and the step on the scale of bytes.
+fn sh_steps(value: f32, bits: u8) -> (f64, f64) {
+    let step = f64::from(256_u32 >> bits);
+    (((f64::from(value) * 128.0 + 128.0) / step).round(), step)
+}
+
+/// Bits of the coefficients in a plane.
+fn sh_bits(plane: usize, options: &WriteOptions) -> u8 {
+    if plane < 9 { options.sh1_bits } else { options.sh_rest_bits }
 }
 
 #[cfg(test)]

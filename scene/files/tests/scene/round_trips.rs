@@ -1,8 +1,9 @@
 //! What is written comes back: exactly from PLY, within the stated bounds from the others.
 
 use proptest::prelude::*;
+use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::spz::WriteOptions;
-use splatstream_files::{ply, splat, spz};
+use splatstream_files::{Clamped, ply, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
 use super::samples::{LIMITS, frames};
@@ -76,6 +77,7 @@ proptest! {
         let back = splat::read(&splat::write(&frame).unwrap(), &LIMITS).unwrap();
         prop_assert_eq!(bits(back.position()), bits(frame.position()));
         prop_assert_eq!(back.sh_degree(), 0);
+        prop_assert_eq!(splat::clamped(&back), []);
         prop_assert!(largest(back.log_scale(), frame.log_scale()) < 10.0 / f64::from(1 << 22));
         // Half a step of 255 colours; the DC coefficient is 3.545 times the colour. Frames stay within 0–1.
         prop_assert!(largest(back.dc(), frame.dc()) <= 0.5 / 255.0 / 0.282_094 + 1e-6);
@@ -107,5 +109,24 @@ proptest! {
         prop_assert_eq!(bits(once.log_scale()), bits(twice.log_scale()));
         prop_assert_eq!(bits(once.sh()), bits(twice.sh()));
         prop_assert_eq!(bits(once.dc()), bits(twice.dc()));
+        prop_assert_eq!(spz::clamped(&once, &WriteOptions::default()), []);
     }
+}
+
+#[test]
+fn what_a_format_cannot_keep_is_counted() {
+    let frame = BuiltinScene { gaussians: 100, sh_degree: 1, ..BuiltinScene::default() }.frame(0);
+    let mut planes = frame.into_planes();
+    planes.dc.iter_mut().flatten().for_each(|dc| *dc = 0.0);
+    planes.log_scale.iter_mut().flatten().for_each(|log| *log = -3.0);
+    planes.sh.iter_mut().flatten().for_each(|sh| *sh = 0.0);
+    (planes.dc[0][7], planes.dc[2][3], planes.dc[1][3]) = (9.0, -4.0, 1.8);
+    planes.log_scale[1][50] = 6.5;
+    planes.sh[4][20] = -1.5;
+    let frame = GaussianFrame::from_planes(1, planes).unwrap();
+    let clamped = |property, count, row, value| Clamped { property, count, row, value };
+    let expected = [clamped("dc", 2, 3, -4.0), clamped("log_scale", 1, 50, 6.5), clamped("sh", 1, 20, -1.5)];
+    assert_eq!(spz::clamped(&frame, &WriteOptions::default()), expected);
+    // A colour goes from 0 to 1 there, which is a coefficient of 1.77 to either side.
+    assert_eq!(splat::clamped(&frame), [clamped("dc", 3, 3, 1.8)]);
 }
