@@ -101,7 +101,7 @@ pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
     Ok(out)
 }
 
-/// The values that [`write`] cannot keep: colours outside 0 to 1, and semi-axes beyond the largest float. One entry per
+/// The values that [`write()`] cannot keep: colours outside 0 to 1, and semi-axes beyond the largest float. One entry per
 /// property that has some.
 pub fn clamped(frame: &GaussianFrame) -> Vec<Clamped> {
     let dc = Clamped::of("dc", frame.dc(), |_, dc| is_no_byte(byte_scale(dc)));
