@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Whether fuzzing reaches: plants an unchecked bound in each reader of scene files and in the decoder, and says how soon
-# each is found, in processor time of one core, starting from the seeds alone.
+# each is found, in processor time of one core, starting from the seeds of that reader alone.
 # usage: fuzz/planted.sh [-k] [-s SECONDS] [-n TIMES] [FAULT...]
 #   -k  keep the program that the last call has built
 #   -s  processor time after which a fault counts as not found, seconds (120)
@@ -60,6 +60,12 @@ seek() {
     rm -rf "$folder"
     mkdir -p "$folder/corpus"
     starts_of "$target"
+    if [ "$target" = scene ]; then
+        # Of this reader only: its target shares its time among all of them.
+        mkdir "$folder/seeds"
+        cp seeds/scene/*"${fault%%-[gz]*}"* "$folder/seeds"
+        starts=(-dict=dictionaries/scene.dict "$folder/seeds")
+    fi
     # The limit is of time on the clock: more than enough where other work takes most of the processor.
     TIMEFORMAT='%U %S'
     { time PLANTED=$fault FUZZ_TARGET=$target "$program" "${options[@]}" -timeout=60 -seed="$random" \
