@@ -63,7 +63,12 @@ pub(crate) fn reach(
     let seeker = Seeker { source, fitting, progress, encodings: 0, trials: 0 };
     match (settings.size, settings.psnr) {
         (Some(size), _) => seeker.size(size, sink),
-        (None, decibels) => seeker.quality(decibels.unwrap_or_default().into(), sink),
+        (None, Some(decibels)) => seeker.quality(decibels.into(), sink),
+        (None, None) => Err(Error::Setting {
+            name: "target",
+            value: "none".to_owned(),
+            allowed: "a PSNR or a size, if steps are to be found for one",
+        }),
     }
 }
 
