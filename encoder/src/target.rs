@@ -156,7 +156,14 @@ impl Seeker<'_> {
     fn encode(&mut self) -> Result<Encoded, Error> {
         let mut encoded = match (self.fitting.settings.size, self.fitting.settings.psnr) {
             (Some(size), _) => self.size(size)?,
-            (None, decibels) => self.quality(decibels.unwrap_or_default().into())?,
+            (None, Some(decibels)) => self.quality(decibels.into())?,
+            (None, None) => {
+                return Err(Error::Setting {
+                    name: "target",
+                    value: "none".to_owned(),
+                    allowed: "a PSNR or a size, if steps are to be found for one",
+                });
+            }
         };
         let (fitted, encodings, trials) = (encoded.fitted as f32, self.encodings, self.trials);
         encoded.report.target = Some(TargetReport { fitted, encodings, trials });

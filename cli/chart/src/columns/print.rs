@@ -68,7 +68,9 @@ pub(crate) fn objects<R: Row, S: Serializer>(rows: &[R], serializer: S) -> Resul
 /// Text in columns.
 pub(crate) fn text<R: Row>(rows: &[R]) -> String {
     let (columns, cells) = cells(rows, Medium::Terminal);
-    let mut table = Table::of(columns.into_iter().map(|column| column.heading.into_owned()).collect());
+    // A terminal has no use for places where a word may be divided.
+    let heading = |column: Column<R>| column.heading.replace('\u{ad}', "");
+    let mut table = Table::of(columns.into_iter().map(heading).collect());
     for row in cells {
         table.add(row.iter().map(Value::readable).collect());
     }
