@@ -55,7 +55,8 @@ fn frames_after(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut frames = 0;
     let mut after = Vec::new();
     for (unit, end) in units(bytes).zip(ends(bytes).skip(1)) {
-        frames += usize::from(decoder.unit(&unit).is_some());
+        let ended = decoder.unit(&unit).is_some();
+        frames += usize::from(ended || decoder.finish_complete().is_some());
         after.push((end, frames));
         if decoder.has_stopped() {
             break;
