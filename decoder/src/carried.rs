@@ -4,8 +4,9 @@
 //! the motions that it has yet to make are kept with it. Once a list has been computed for a frame, the frames that refer
 //! to that frame go on from there; the motions that are kept are bounded by their cells.
 
-use crate::digest::lists_digest;
+use crate::digest::{list_digest_unless, lists_digest};
 use crate::displacement::CellField;
+use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
 use std::sync::Arc;
 
@@ -58,9 +59,15 @@ impl Carried {
 
     /// Those of a frame that refers to this one. `from` is the first list that the frame needs: it and those after it are
     /// computed here first, so that they are computed once for all frames that refer to this one.
-    pub(crate) fn moved(&mut self, field: &Arc<CellField>, drops_stale: bool, from: usize) -> Self {
+    pub(crate) fn moved(
+        &mut self,
+        field: &Arc<CellField>,
+        drops_stale: bool,
+        from: usize,
+        interrupt: &Interrupt,
+    ) -> Self {
         let needed = if self.motions.len() < MAX_WAITING_MOTIONS { from } else { 0 };
-        (needed..self.len()).for_each(|h| self.compute(h));
+        self.compute_from(needed, interrupt);
         self.forget();
         let mut moved = self.clone();
         if field.is_empty() {
@@ -69,22 +76,33 @@ impl Carried {
         moved.motions.push(Motion { field: Arc::clone(field), drops_stale });
         let waiting = moved.motions.iter().map(|motion| motion.field.len()).fold(0, usize::saturating_add);
         let first = if waiting > MAX_WAITING_CELLS { 0 } else { from };
-        (first..moved.len()).for_each(|h| moved.compute(h));
+        moved.compute_from(first, interrupt);
         moved.forget();
         moved
     }
 
     /// The lists from `first` on, each with the identities of its Gaussians, which are empty unless they are asked for.
-    pub(crate) fn lists_from(&mut self, first: usize) -> impl Iterator<Item = (&GaussianList, &[u32])> {
-        (first..self.len()).for_each(|h| self.compute(h));
+    pub(crate) fn lists_from(
+        &mut self,
+        first: usize,
+        interrupt: &Interrupt,
+    ) -> impl Iterator<Item = (&GaussianList, &[u32])> {
+        self.compute_from(first, interrupt);
         let lists = self.lists.iter().skip(first);
         lists.map(|carried| (carried.list.as_ref(), carried.identities.as_slice()))
     }
 
     /// The digest of all lists.
-    pub(crate) fn digest(&mut self) -> u64 {
-        let digests: Vec<_> = self.lists_from(0).map(|(list, _)| list.digest()).collect();
+    pub(crate) fn digest(&mut self, interrupt: &Interrupt) -> u64 {
+        let digest =
+            |(list, _): (&GaussianList, _)| list_digest_unless(interrupt, &list.planes, 0..list.len());
+        let digests: Vec<_> = self.lists_from(0, interrupt).map(digest).collect();
         lists_digest(&digests)
+    }
+
+    /// Makes the motions that the lists from `first` on have yet to make, as long as no interrupt is requested.
+    fn compute_from(&mut self, first: usize, interrupt: &Interrupt) {
+        (first..self.len()).take_while(|_| !interrupt.is_requested()).for_each(|h| self.compute(h));
     }
 
     /// Makes the motions that list h has yet to make.
@@ -140,11 +158,14 @@ mod tests {
         let mut waiting = Carried::new([Arc::new(list(3)), Arc::new(list(90))], &[]);
         let mut direct = [list(3), list(90)];
         for (axis, drops_stale, from) in [(0, false, 2), (1, false, 1), (2, true, 2), (0, true, 2)] {
-            waiting = waiting.moved(&field(axis), drops_stale, from);
+            waiting = waiting.moved(&field(axis), drops_stale, from, Interrupt::NEVER);
             direct = direct.map(|list| list.carried(&field(axis), drops_stale));
         }
-        assert!(waiting.lists_from(0).map(|(list, _)| list).eq(&direct));
-        assert_eq!(waiting.digest(), lists_digest(&direct.each_ref().map(GaussianList::digest)));
+        assert!(waiting.lists_from(0, Interrupt::NEVER).map(|(list, _)| list).eq(&direct));
+        assert_eq!(
+            waiting.digest(Interrupt::NEVER),
+            lists_digest(&direct.each_ref().map(GaussianList::digest))
+        );
         assert_eq!(direct.map(|list| list.len()), [1, 1], "what was stale is gone");
     }
 
@@ -152,7 +173,7 @@ mod tests {
     fn few_motions_wait() {
         let mut carried = Carried::new([Arc::new(list(3)), Arc::new(list(9))], &[]);
         for _ in 0..3 * MAX_WAITING_MOTIONS {
-            carried = carried.moved(&field(0), false, 2);
+            carried = carried.moved(&field(0), false, 2, Interrupt::NEVER);
             assert!(carried.motions.len() <= MAX_WAITING_MOTIONS);
         }
     }
@@ -161,10 +182,10 @@ mod tests {
     fn motions_that_all_lists_have_made_are_forgotten() {
         let mut carried = Carried::new([Arc::new(list(3)), Arc::new(list(9))], &[]);
         for _ in 0..5 {
-            carried = carried.moved(&field(0), false, 1);
+            carried = carried.moved(&field(0), false, 1, Interrupt::NEVER);
         }
         assert_eq!((carried.motions.len(), carried.lists[0].done), (5, 0));
-        carried = carried.moved(&field(0), false, 0);
+        carried = carried.moved(&field(0), false, 0, Interrupt::NEVER);
         assert!(carried.motions.is_empty());
     }
 }

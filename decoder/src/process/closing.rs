@@ -66,7 +66,7 @@ impl FrameInProgress {
         let mut state =
             FrameState { index: self.index, level, carried_shift: shift, ..FrameState::default() };
         if context.gop.header.is_predicted() {
-            self.lists.divide(context.options.identities);
+            self.lists.divide(context.options.identities, context.interrupt);
             state.identities = self.lists.identities.clone();
             let lists = || self.lists.lists.iter().cloned();
             state.carried = (decoded.level > 0).then(|| Carried::new(lists(), &self.lists.identities));
@@ -108,16 +108,18 @@ impl FrameInProgress {
             let digest = digest.filter(|_| state.is_exact && level < count && self.error.is_none());
             let from = if digest.is_some() { 0 } else { level };
             let from = if shows_subset { count } else { from };
-            state.carried =
-                reference.carried.as_mut().map(|carried| carried.moved(&self.field, level > 0, from));
+            state.carried = reference
+                .carried
+                .as_mut()
+                .map(|carried| carried.moved(&self.field, level > 0, from, context.interrupt));
             if let (Some((stored, at)), Some(carried)) = (digest, &mut state.carried) {
-                let computed = carried.digest();
+                let computed = carried.digest(context.interrupt);
                 decoded.carried_digest = Some(computed);
                 let kind = ErrorKind::Digest { stored, computed };
                 fault = (computed != stored).then_some(Error::new(at, "7.9.3", kind));
             }
             if let (Some(carried), false) = (&mut state.carried, shows_subset) {
-                show_carried(&mut decoded, carried);
+                show_carried(&mut decoded, carried, context.interrupt);
             }
         }
         decoded.error = decoded.error.or(fault);
@@ -132,9 +134,12 @@ impl FrameInProgress {
 }
 
 /// Shows the carried lists from the level of the frame on.
-fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried) {
+fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried, interrupt: &Interrupt) {
     let exact = decoded.planes.len();
-    for (list, identities) in carried.lists_from(decoded.level.into()) {
+    for (list, identities) in carried.lists_from(decoded.level.into(), interrupt) {
+        if interrupt.is_requested() {
+            return;
+        }
         decoded.planes.append(&list.planes);
         decoded.identities.extend_from_slice(identities);
         decoded.carried_lists = decoded.carried_lists.saturating_add(1);

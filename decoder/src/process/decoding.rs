@@ -106,13 +106,15 @@ impl Lists {
         put(&mut self.identities, r, identities);
     }
 
-    /// Makes lists of the planes; gives the Gaussians identities if `identifies` says so.
-    pub(super) fn divide(&mut self, identifies: bool) {
+    /// Makes lists of the planes; gives the Gaussians identities if `identifies` says so. Where an interrupt is requested,
+    /// the lists mean nothing.
+    pub(super) fn divide(&mut self, identifies: bool, interrupt: &Interrupt) {
         if !self.lists.is_empty() {
             return;
         }
         let mut start = 0_usize;
-        for (r, head) in core::mem::take(&mut self.heads).into_iter().enumerate() {
+        let heads = core::mem::take(&mut self.heads).into_iter().enumerate();
+        for (r, head) in heads.take_while(|_| !interrupt.is_requested()) {
             let end = start.saturating_add(head.size);
             if identifies {
                 self.follow_identities(r, Arc::default(), &[], head.size);
@@ -169,7 +171,7 @@ impl FrameInProgress {
         let prepared = self.prepare(pending, context);
         let is_direct = self.is_direct(pending, context);
         if !is_direct {
-            self.lists.divide(context.options.identities);
+            self.lists.divide(context.options.identities, context.interrupt);
         }
         let mut rest = prepared.as_slice();
         while !rest.is_empty() {
