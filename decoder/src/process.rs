@@ -210,7 +210,7 @@ impl Decoder {
         if self.sequence.is_none() { Landmark::SequenceParameters } else { Landmark::GopHeader }
     }
 
-    /// Takes the next unit; gives the frame that it ends, if it does.
+    /// Takes the next unit; gives the frame that it ends or completes, if it does.
     pub fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
         self.counted.units = self.counted.units.saturating_add(1);
         if self.has_stopped() || self.phase == Phase::Lost && !self.wants(unit) {
@@ -220,7 +220,7 @@ impl Decoder {
         let scope = unit.header.error_scope();
         if scope == ErrorScope::List {
             self.increment(unit);
-            return None;
+            return self.finish_complete();
         }
         let (done, taken) = self.take(unit);
         self.has_scene |=
@@ -241,21 +241,6 @@ impl Decoder {
             }
             _ => self.fail(error, ErrorScope::Gop),
         }
-    }
-
-    /// Ends the frame in progress if it has all units that belong to the operating point, so that it need not wait for
-    /// the unit after it.
-    pub fn finish_complete(&mut self) -> Option<DecodedFrame> {
-        let (frame, (sequence, _)) = (self.frame.as_ref()?, self.sequence.as_ref()?);
-        let takes = |spatial_layer, refinement| {
-            let id = UnitId::of_increment(frame.index, refinement);
-            UnitHeader::new(id.on_layers(spatial_layer, frame.role.temporal_layer), &[])
-                .is_ok_and(|header| self.belongs(&header))
-        };
-        let rest = frame.is_complete(sequence, takes).then(|| frame.without_content())?;
-        let frame = self.close_frame(FrameEnd::Complete);
-        self.frame = Some(rest);
-        frame
     }
 
     /// Ends the frame in progress: no more units will come.
@@ -410,10 +395,23 @@ impl Decoder {
         self.has_stopped = self.options.stop_at_first_error || self.is_exhausted;
     }
 
-    /// Ends the frame in progress.
+    /// Ends the frame in progress if it has all units that belong to the operating point, so that it need not wait for
+    /// the unit after it.
+    fn finish_complete(&mut self) -> Option<DecodedFrame> {
+        let (frame, (sequence, _)) = (self.frame.as_ref()?, self.sequence.as_ref()?);
+        let takes = |spatial_layer, refinement| {
+            let id = UnitId::of_increment(frame.index, refinement);
+            UnitHeader::new(id.on_layers(spatial_layer, frame.role.temporal_layer), &[])
+                .is_ok_and(|header| self.belongs(&header))
+        };
+        let is_complete = frame.is_complete(sequence, takes);
+        is_complete.then(|| self.close_frame(FrameEnd::Complete)).flatten()
+    }
+
+    /// Ends the frame in progress. One that is complete stays: it tells why it takes no further increment.
     fn close_frame(&mut self, end: FrameEnd) -> Option<DecodedFrame> {
         self.settle();
-        let mut frame = self.frame.take().filter(|frame| !frame.is_given)?;
+        let mut frame = self.frame.take().filter(|frame| !frame.has_ended)?;
         if self.interrupt.is_requested() {
             self.has_stopped = true;
             return None;
@@ -444,6 +442,9 @@ impl Decoder {
             self.references.store(layer, closed.state);
         }
         closed.fault.into_iter().for_each(|error| self.add(error));
+        if end == FrameEnd::Complete {
+            self.frame = Some(frame);
+        }
         (!self.has_stopped).then_some(closed.decoded)
     }
 

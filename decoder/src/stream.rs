@@ -187,8 +187,6 @@ impl StreamDecoder {
     fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
         let decoder = self.decoder.as_mut()?;
         let frame = decoder.unit(unit);
-        // It never ends a frame by itself and completes another.
-        let frame = frame.or_else(|| decoder.finish_complete());
         match unit.header.unit_type() {
             // An end unit with a fault is not the end.
             UnitType::End if !decoder.has_stopped() => self.reader.reopen(),

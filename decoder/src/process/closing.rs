@@ -24,14 +24,15 @@ pub(super) struct Closed {
 }
 
 impl FrameInProgress {
-    /// Ends the frame, all units of which have been decoded. The digest of carried lists is compared if the frame
+    /// Takes the content of the frame, all units of which have been decoded. The digest of carried lists is compared if the frame
     /// is not cut short.
     pub(super) fn close(
-        mut self,
+        &mut self,
         context: &Context<'_>,
         reference: Option<&mut FrameState>,
         is_whole: bool,
     ) -> Closed {
+        self.has_ended = true;
         self.carried_digest = self.carried_digest.filter(|_| is_whole);
         let mut decoded = DecodedFrame::empty(self.index, self.role.frame_type);
         decoded.level = u8::try_from(self.lists.heads.len()).unwrap_or(u8::MAX);
@@ -47,7 +48,7 @@ impl FrameInProgress {
         }
     }
 
-    fn close_intra(mut self, context: &Context<'_>, mut decoded: DecodedFrame) -> Closed {
+    fn close_intra(&mut self, context: &Context<'_>, mut decoded: DecodedFrame) -> Closed {
         let sequence = context.sequence;
         let sh_planes = usize::from(sequence.sh_dimension());
         let refinements = sequence.refinement_count;
@@ -78,13 +79,13 @@ impl FrameInProgress {
             decoded.identities = self.lists.shown_identities(decoded.planes.len());
         }
         let next_identity = self.lists.next_identity;
-        state.lists = self.lists.lists;
-        state.models = self.lists.models.first;
+        let lists = core::mem::take(&mut self.lists);
+        (state.lists, state.models) = (lists.lists, lists.models.first);
         Closed { decoded, state, fault: None, next_identity }
     }
 
     fn close_predicted(
-        mut self,
+        &mut self,
         context: &Context<'_>,
         mut decoded: DecodedFrame,
         reference: Option<&mut FrameState>,
@@ -127,8 +128,8 @@ impl FrameInProgress {
         let refinements = context.sequence.refinement_count;
         decoded.compensation = self.lists.compensation(&decoded, refinements, state.carried_shift);
         let next_identity = self.lists.next_identity;
-        state.lists = self.lists.lists;
-        state.models = self.lists.models.first;
+        let lists = core::mem::take(&mut self.lists);
+        (state.lists, state.models) = (lists.lists, lists.models.first);
         Closed { decoded, state, fault, next_identity }
     }
 }

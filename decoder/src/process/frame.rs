@@ -64,8 +64,8 @@ pub(super) struct FrameInProgress {
     pub(super) entropy: Vec<UnitEntropy>,
     /// The first error of the frame.
     pub(super) error: Option<Error>,
-    /// Whether it has ended with its last unit: no increment is accepted any more.
-    pub(super) is_given: bool,
+    /// Whether it has ended, and its content has been taken.
+    pub(super) has_ended: bool,
 }
 
 /// Which units of a frame there are.
@@ -163,30 +163,7 @@ impl FrameInProgress {
 
     /// Whether all of its units have been accepted that `takes` tells by spatial layer and refinement.
     pub(super) fn is_complete(&self, sequence: &SequenceParameters, takes: impl Fn(u8, u8) -> bool) -> bool {
-        self.seen && !self.is_given && self.expected.has_all(sequence, self.is_intra(), takes)
-    }
-
-    /// What tells why a frame that is complete takes no further increment.
-    pub(super) fn without_content(&self) -> Self {
-        Self {
-            point: self.point,
-            index: self.index,
-            payload_at: self.payload_at,
-            header: self.header,
-            role: self.role,
-            carried_digest: None,
-            reference: self.reference,
-            field: self.field.clone(),
-            seen: true,
-            pending: Vec::new(),
-            expected: self.expected.clone(),
-            decoded: self.decoded.clone(),
-            lists: Lists::default(),
-            bytes: 0,
-            entropy: Vec::new(),
-            error: None,
-            is_given: true,
-        }
+        self.seen && !self.has_ended && self.expected.has_all(sequence, self.is_intra(), takes)
     }
 
     /// Accepts an increment that belongs to the operating point. `None` if it is discarded.

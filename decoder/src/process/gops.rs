@@ -140,7 +140,7 @@ impl Decoder {
             bytes: unit_bytes(unit),
             entropy: moved.entropy.into_iter().collect(),
             error: absent,
-            is_given: false,
+            has_ended: false,
         });
         absent.into_iter().for_each(|error| self.report(error));
         Ok(())

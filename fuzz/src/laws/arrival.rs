@@ -55,8 +55,7 @@ fn frames_after(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut frames = 0;
     let mut after = Vec::new();
     for (unit, end) in units(bytes).zip(ends(bytes).skip(1)) {
-        let ended = decoder.unit(&unit).is_some();
-        frames += usize::from(ended || decoder.finish_complete().is_some());
+        frames += usize::from(decoder.unit(&unit).is_some());
         after.push((end, frames));
         if decoder.has_stopped() {
             break;
