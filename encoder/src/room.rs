@@ -105,26 +105,27 @@ impl Announced {
     }
 }
 
-/// Clamps values; gives the rows and the values of those that were outside.
+/// Clamps values; gives the rows and the values of those that were outside. What is not finite stays: no frame may hold it,
+/// which is found later.
 fn clamp(plane: &mut [f32], [low, high]: [f32; 2]) -> Vec<(u32, f32)> {
     let mut out = Vec::new();
     for (row, value) in (0..).zip(plane) {
-        let within = value.clamp(low, high);
-        if within != *value {
+        if value.is_finite() && !(low..=high).contains(value) {
             out.push((row, *value));
-            *value = within;
+            *value = value.clamp(low, high);
         }
     }
     out
 }
 
-/// Shortens vectors, one coefficient a plane, that are longer than `most`; gives the rows and the lengths of those.
+/// Shortens vectors, one coefficient a plane, that are longer than `most`; gives the rows and the lengths of those. As for
+/// [`clamp`], what is not finite stays.
 fn shorten(mut planes: Vec<&mut [f32]>, most: f32) -> Vec<(u32, f32)> {
     let mut squares = vec![0.0_f32; planes.first().map_or(0, |plane| plane.len())];
     for plane in &planes {
         for (sum, value) in squares.iter_mut().zip(plane.iter()) {
-            let value = value.clamp(-MAX_COLOUR, MAX_COLOUR);
-            *sum = value.mul_add(value, *sum);
+            let near = value.clamp(-MAX_COLOUR, MAX_COLOUR);
+            *sum = if value.is_finite() { near.mul_add(near, *sum) } else { f32::NAN };
         }
     }
     let lengths = (0..).zip(squares).map(|(row, square)| (row, square.sqrt()));
@@ -178,6 +179,20 @@ mod tests {
         let norm: f32 = held.sh().iter().map(|plane| plane[11] * plane[11]).sum();
         assert!((norm.sqrt() / announced.sh - 1.0).abs() < 1e-5);
         assert!(announced.hold(held, 5).unwrap().1.is_empty());
+    }
+
+    #[test]
+    fn what_no_frame_may_hold_stays_to_be_refused() {
+        let frame = scene();
+        let (_, announced) = announced(&frame);
+        let mut bad = frame;
+        let planes = bad.planes_mut();
+        (planes.log_scale[0][1], planes.opacity_logit[2]) = (f32::NAN, f32::INFINITY);
+        planes.sh.into_iter().for_each(|plane| plane[3] = f32::INFINITY);
+        let (held, told) = announced.hold(bad, 2).unwrap();
+        assert_eq!(told, []);
+        assert!(held.log_scale()[0][1].is_nan() && held.opacity_logit()[2] == f32::INFINITY);
+        assert!(held.sh().iter().all(|plane| plane[3] == f32::INFINITY));
     }
 
     #[test]
