@@ -10,7 +10,7 @@ use crate::sequence::analyse;
 use crate::settings::Settings;
 use crate::source::FrameSource;
 use crate::verification::Verifier;
-use crate::writer::{UnitWriter, Written};
+use crate::writer::{Record, UnitWriter};
 use splatstream_format::Limits;
 use splatstream_format::syntax::FrameType;
 use std::io::Write;
@@ -69,8 +69,9 @@ pub(crate) fn encode_once(
     let analysis = analyse(source, settings)?;
     let mut report = Report::new(&analysis, settings, ranking.importance());
     let is_verified = settings.verify || settings.psnr.is_some() || settings.size.is_some();
-    let verifier = is_verified.then(|| Verifier::new(source.len()));
-    let mut writer = UnitWriter::new(sink, settings.profile(), &analysis.parameters).with(verifier);
+    let mut record = Record::new(settings.profile(), &analysis.parameters);
+    record.verifier = is_verified.then(|| Verifier::new(source.len()));
+    let mut writer = UnitWriter::new(sink, &mut record);
     writer.start(&analysis, &settings.description)?;
     let network = learning::network(source, settings, &analysis)?;
     let coder = SequenceCoder {
@@ -86,8 +87,8 @@ pub(crate) fn encode_once(
         looked_at: 0,
     };
     coder.run(progress)?;
-    let Written { bytes, gops, verifier } = writer.finish()?;
-    (report.bytes, report.gops) = (bytes, gops);
-    report.pictures = verifier.map(|verifier| verifier.compare(source, settings)).transpose()?;
+    writer.finish()?;
+    (report.bytes, report.gops) = (record.offset, record.gops);
+    report.pictures = record.verifier.map(|verifier| verifier.compare(source, settings)).transpose()?;
     Ok(report)
 }

@@ -12,7 +12,7 @@ use crate::sequence::Survey;
 use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
 use crate::target;
-use crate::writer::{Record, UnitWriter, Written};
+use crate::writer::{Record, UnitWriter};
 use splatstream_format::Limits;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::SequenceParameters;
@@ -130,12 +130,10 @@ impl<W: Write> Encoder<W> {
         while !self.window.frames.is_empty() {
             self.gop()?;
         }
-        let Some(Stream { record, mut report, .. }) = self.stream else { return Err(Error::NoFrames) };
-        let Written { bytes, gops, .. } = UnitWriter::resume(&mut self.sink, record).finish()?;
+        let Some(Stream { mut record, mut report, .. }) = self.stream else { return Err(Error::NoFrames) };
+        UnitWriter::new(&mut self.sink, &mut record).finish()?;
         self.sink.flush()?;
-        (report.bytes, report.frames, report.gops) = (bytes, self.window.first, gops);
-        let dropped = report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum();
-        report.invisible = report.invisible.saturating_sub(dropped);
+        (report.bytes, report.frames, report.gops) = (record.offset, self.window.first, record.gops);
         Ok(report)
     }
 
@@ -151,7 +149,7 @@ impl<W: Write> Encoder<W> {
         let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
         let end = stream.gop(&mut source, (first, last), &mut self.sink).map_err(named)?;
         let coded = |dropped: &Dropped| dropped.frame < end;
-        stream.report.dropped.extend(source.into_dropped().into_iter().filter(coded));
+        stream.report.leave_out(source.into_dropped().into_iter().filter(coded));
         self.window.drop_before(end);
         Ok(())
     }
@@ -168,8 +166,8 @@ impl Stream {
             report.target = tried.target;
             report.stands_alone = tried.stands_alone;
         }
-        let mut writer = UnitWriter::new(sink, settings.profile(), &analysis.parameters);
-        writer.start(&analysis, &settings.description)?;
+        let mut record = Record::new(settings.profile(), &analysis.parameters);
+        UnitWriter::new(sink, &mut record).start(&analysis, &settings.description)?;
         let network = learning::network(source, &settings, &analysis)?;
         Ok(Self {
             sequence: analysis.parameters,
@@ -178,7 +176,7 @@ impl Stream {
             settings,
             ranking,
             network,
-            record: writer.pause(),
+            record,
             report,
             looked_at: 0,
         })
@@ -198,9 +196,7 @@ impl Stream {
         (first, last): (u32, u32),
         sink: &mut dyn Write,
     ) -> Result<u32, Error> {
-        let record =
-            core::mem::replace(&mut self.record, Record::new(self.settings.profile(), &self.sequence));
-        let mut writer = UnitWriter::resume(sink, record);
+        let mut writer = UnitWriter::new(sink, &mut self.record);
         let mut coder = SequenceCoder {
             source,
             settings: &self.settings,
@@ -215,7 +211,6 @@ impl Stream {
         };
         let end = coder.gop(first, last, &mut |_, _| ())?;
         (self.network, self.looked_at) = (coder.network, coder.looked_at);
-        self.record = writer.pause();
         Ok(end)
     }
 }

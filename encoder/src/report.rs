@@ -72,6 +72,14 @@ impl Report {
             ..Self::default()
         }
     }
+
+    /// Adds Gaussians that were left out because of their values. They were counted as invisible, which left them out.
+    pub(crate) fn leave_out(&mut self, dropped: impl IntoIterator<Item = Dropped>) {
+        for dropped in dropped {
+            self.invisible = self.invisible.saturating_sub(dropped.gaussians.into());
+            self.dropped.push(dropped);
+        }
+    }
 }
 
 /// A GOP.

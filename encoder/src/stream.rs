@@ -15,10 +15,6 @@ use std::io::Write;
 ///
 /// # Errors
 /// Settings or frames that cannot be coded, a source that cannot be read, a sink that cannot be written.
-#[expect(
-    clippy::arithmetic_side_effects,
-    reason = "Gaussians that are left out are invisible, and were counted as such"
-)]
 pub fn encode(
     source: &mut dyn FrameSource,
     settings: &Settings,
@@ -32,7 +28,6 @@ pub fn encode(
         false => encode_once(&mut source, settings, Ranking::new(settings), sink, progress),
     };
     let mut report = encoded.map_err(named)?;
-    report.dropped = source.into_dropped();
-    report.invisible -= report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum::<u64>();
+    report.leave_out(source.into_dropped());
     Ok(report)
 }

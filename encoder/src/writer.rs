@@ -15,7 +15,7 @@ use std::io::Write;
 /// Writes units, and keeps what the end of the stream says about them.
 pub(crate) struct UnitWriter<'a> {
     sink: &'a mut dyn Write,
-    record: Record,
+    record: &'a mut Record,
 }
 
 /// What is known of the units that have been written. A stream that is written GOP by GOP goes on with it.
@@ -28,19 +28,10 @@ pub(crate) struct Record {
     /// Where GOPs start.
     index: Vec<IndexEntry>,
     /// The GOPs that have been started.
-    gops: Vec<GopReport>,
+    pub(crate) gops: Vec<GopReport>,
     /// What the units add to the operating points.
     tally: Tally,
-    verifier: Option<Verifier>,
-}
-
-/// What has been written.
-pub(crate) struct Written {
-    /// Bytes of the stream.
-    pub(crate) bytes: u64,
-    /// Its GOPs.
-    pub(crate) gops: Vec<GopReport>,
-    /// What was kept of it to be looked at.
+    /// Is shown everything that is written, if there is one.
     pub(crate) verifier: Option<Verifier>,
 }
 
@@ -61,24 +52,9 @@ impl Record {
 }
 
 impl<'a> UnitWriter<'a> {
-    pub(crate) fn new(sink: &'a mut dyn Write, profile: Profile, sequence: &SequenceParameters) -> Self {
-        Self { sink, record: Record::new(profile, sequence) }
-    }
-
-    /// Goes on with a stream.
-    pub(crate) fn resume(sink: &'a mut dyn Write, record: Record) -> Self {
+    /// Begins or goes on with the stream of a record.
+    pub(crate) fn new(sink: &'a mut dyn Write, record: &'a mut Record) -> Self {
         Self { sink, record }
-    }
-
-    /// What a writer goes on with that [resumes](UnitWriter::resume).
-    pub(crate) fn pause(self) -> Record {
-        self.record
-    }
-
-    /// Shows everything that is written to a verifier too.
-    pub(crate) fn with(mut self, verifier: Option<Verifier>) -> Self {
-        self.record.verifier = verifier;
-        self
     }
 
     /// What stands before the first GOP.
@@ -115,7 +91,7 @@ impl<'a> UnitWriter<'a> {
     }
 
     /// What stands after the last GOP.
-    pub(crate) fn finish(mut self) -> Result<Written, Error> {
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
         if let Some(verifier) = &mut self.record.verifier {
             verifier.end_gop()?;
         }
@@ -128,8 +104,7 @@ impl<'a> UnitWriter<'a> {
         self.unit(UnitId::stream(UnitType::Index), &index.to_bytes()?)?;
         let frame_count = self.record.gops.iter().map(|gop| gop.frames).sum();
         let end = EndOfStream { frame_count, unit_count: self.record.units, index_offset };
-        self.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)?;
-        Ok(Written { bytes: self.record.offset, gops: self.record.gops, verifier: self.record.verifier })
+        self.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)
     }
 
     /// Writes a unit.

@@ -9,7 +9,7 @@ use crate::sequence::{Analysis, analyse};
 use crate::settings::{NetworkSource, Preset, Settings};
 use crate::source::FrameSource;
 use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, TrainingReport, train};
-use crate::writer::UnitWriter;
+use crate::writer::{Record, UnitWriter};
 use core::ops::ControlFlow;
 use splatstream_decoder::predictor::Predictor;
 use splatstream_format::Limits;
@@ -79,7 +79,8 @@ fn recorded(
 ) -> Result<Vec<Sample>, Error> {
     let recorder = Recorder::default();
     let (mut report, mut nowhere) = (Report::default(), std::io::sink());
-    let mut writer = UnitWriter::new(&mut nowhere, settings.profile(), sequence);
+    let mut record = Record::new(settings.profile(), sequence);
+    let mut writer = UnitWriter::new(&mut nowhere, &mut record);
     let coder = SequenceCoder {
         source,
         settings,
