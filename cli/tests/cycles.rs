@@ -8,6 +8,7 @@
 mod common;
 
 use common::{directory, text, write_still, write_stream};
+use splatstream_gaussians::random::SplitMix64;
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -29,18 +30,6 @@ enum Harm {
 const HARMS: [Harm; 6] =
     [Harm::Interrupt, Harm::Terminate, Harm::Kill, Harm::FullDisk, Harm::ReadOnly, Harm::None];
 
-/// Numbers without pattern, the same on every machine (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ mixed >> 31) % end
-    }
-}
-
 /// A command: its arguments but for the output, the name of that, and how long it takes and what it writes in peace.
 struct Job {
     arguments: Vec<String>,
@@ -55,14 +44,14 @@ impl Job {
         let mut job = Self { arguments, output, takes: Duration::ZERO, writes: BTreeMap::new() };
         let folder = directory();
         let start = Instant::now();
-        assert!(job.run(folder.path(), Harm::None, &mut Random(0)).success());
+        assert!(job.run(folder.path(), Harm::None, &mut SplitMix64::new(0)).success());
         (job.takes, job.writes) = (start.elapsed(), files(folder.path()));
         assert!(!job.writes.is_empty());
         job
     }
 
     /// The program as a harm lets it run.
-    fn program(&self, harm: Harm, random: &mut Random) -> Command {
+    fn program(&self, harm: Harm, random: &mut SplitMix64) -> Command {
         let program = env!("CARGO_BIN_EXE_splatstream");
         let within = |words: &[&str]| {
             let mut command = Command::new(words[0]);
@@ -71,7 +60,7 @@ impl Job {
         };
         match harm {
             Harm::FullDisk => {
-                let most = self.writes.values().map(|bytes| bytes.len() as u64 / 512).max().unwrap_or(0);
+                let most = self.writes.values().map(|bytes| bytes.len() / 512).max().unwrap_or(0);
                 let line = format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", random.below(most + 1));
                 within(&["sh", "-c", &line, "sh"])
             }
@@ -84,7 +73,7 @@ impl Job {
     }
 
     /// Runs it with a harm.
-    fn run(&self, folder: &Path, harm: Harm, random: &mut Random) -> ExitStatus {
+    fn run(&self, folder: &Path, harm: Harm, random: &mut SplitMix64) -> ExitStatus {
         let mut command = self.program(harm, random);
         let output = folder.join(self.output);
         command.args(&self.arguments).arg("-o").arg(&output).stdout(Stdio::null()).stderr(Stdio::null());
@@ -95,8 +84,8 @@ impl Job {
             Harm::Kill => "-KILL",
             Harm::FullDisk | Harm::ReadOnly | Harm::None => return child.wait().unwrap(),
         };
-        let micros = random.below(self.takes.as_micros() as u64 * 5 / 4 + 1);
-        std::thread::sleep(Duration::from_micros(micros));
+        let micros = random.below(self.takes.as_micros() as usize * 5 / 4 + 1);
+        std::thread::sleep(Duration::from_micros(micros as u64));
         // It may have ended before.
         let _ = Command::new("kill").args([signal, &child.id().to_string()]).stderr(Stdio::null()).status();
         child.wait().unwrap()
@@ -142,7 +131,7 @@ struct Tally {
 }
 
 /// One cycle: what is there afterwards is whole, or what was there before.
-fn cycle(job: &Job, harm: Harm, random: &mut Random, tally: &mut Tally) {
+fn cycle(job: &Job, harm: Harm, random: &mut SplitMix64, tally: &mut Tally) {
     let folder = directory();
     let place = folder.path();
     let old = b"what was there".to_vec();
@@ -196,7 +185,7 @@ fn nothing_is_half_written_and_nothing_is_left() {
         Job::new(&["extract", text(&stream), "--op", "s0,t0,r1"], "out.gss"),
         Job::new(&["decode", text(&stream), "--frames", "1..2"], "frame.ply"),
     ];
-    let mut random = Random(19);
+    let mut random = SplitMix64::new(19);
     let mut tallies: BTreeMap<Harm, Tally> = BTreeMap::new();
     for number in 0..count {
         let (job, harm) = (&jobs[number % jobs.len()], HARMS[number / jobs.len() % HARMS.len()]);

@@ -12,22 +12,7 @@ mod readers;
 #[path = "damage/streams.rs"]
 mod streams;
 
-/// Numbers without pattern, the same on every machine (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ mixed >> 31
-    }
-
-    /// A number below another, which is not 0.
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
-}
+use splatstream_gaussians::random::SplitMix64;
 
 /// How many inputs of a campaign there are: all, or a tenth of them.
 fn so_many(all: usize) -> usize {
@@ -36,7 +21,7 @@ fn so_many(all: usize) -> usize {
 }
 
 /// Bytes as a bad disk or a bad line leaves them: up to four damages, each of one kind.
-fn damaged(bytes: &[u8], random: &mut Random) -> Vec<u8> {
+fn damaged(bytes: &[u8], random: &mut SplitMix64) -> Vec<u8> {
     let mut out = bytes.to_vec();
     for _ in 0..=random.below(4) {
         if out.is_empty() {
@@ -46,9 +31,9 @@ fn damaged(bytes: &[u8], random: &mut Random) -> Vec<u8> {
         let end = (start + 1 + random.below(64)).min(out.len());
         match random.below(7) {
             0 => out[start] ^= 1 << random.below(8),
-            1 => out[start] = random.next() as u8,
+            1 => out[start] = random.bits() as u8,
             2 => out[start..end].fill(0),
-            3 => out[start..end].iter_mut().for_each(|byte| *byte = random.next() as u8),
+            3 => out[start..end].iter_mut().for_each(|byte| *byte = random.bits() as u8),
             4 => drop(out.drain(start..end)),
             5 => drop(out.splice(start..start, out[start..end].to_vec())),
             _ => out.truncate(start),

@@ -13,6 +13,7 @@ use splatstream_format::syntax::{
 use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_fuzz::records::{LAWS, SEQUENCE};
 use splatstream_fuzz::{scene, streams};
+use splatstream_gaussians::random::SplitMix64;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -54,16 +55,10 @@ fn saved(target: &str) -> Vec<(PathBuf, Vec<u8>)> {
     files
 }
 
-/// Bytes without pattern, the same on every machine (SplitMix64).
+/// Bytes without pattern, the same on every machine.
 fn noise(seed: u64, length: usize) -> Vec<u8> {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ mixed >> 31) as u8
-    };
-    (0..length).map(|_| next()).collect()
+    let mut random = SplitMix64::new(seed);
+    (0..length).map(|_| random.bits() as u8).collect()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Long chains of predicted frames of which units are lost on the way.
 
 use crate::intact::{Intact, options};
-use crate::{Random, peak_of_process, so_many};
+use crate::{peak_of_process, so_many};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{PredictorChoice, Preset, Quality, Settings, Structure, encode};
 use splatstream_files::builtin::{BuiltinScene, Tracking};
@@ -9,6 +9,7 @@ use splatstream_format::syntax::{FileHeader, UnitHeader, UnitType};
 use splatstream_format::unit::Stream;
 use splatstream_format::{Error, ErrorKind, Limits};
 use splatstream_fuzz::laws::{Decoded, exact};
+use splatstream_gaussians::random::SplitMix64;
 
 const POINTS: [&str; 4] = ["s0,t0,r0", "s0,t1,r1", "s1,t0,r2", "s1,t1,r2"];
 
@@ -32,7 +33,7 @@ fn chain(frames: u32) -> Vec<u8> {
 }
 
 /// The stream without some of its increments, one of so many, and how many these are.
-fn with_losses(bytes: &[u8], one_of: usize, random: &mut Random) -> (Vec<u8>, usize) {
+fn with_losses(bytes: &[u8], one_of: usize, random: &mut SplitMix64) -> (Vec<u8>, usize) {
     let mut out = bytes[..FileHeader::SIZE].to_vec();
     let mut lost = 0;
     for unit in Stream::open(bytes, &Limits::default()).unwrap().units().map(Result::unwrap) {
@@ -51,7 +52,7 @@ fn long_chains_with_losses_never_drift() {
     let length = so_many(300).max(40) as u32;
     let bytes = chain(length);
     let intact = Intact::new(&bytes);
-    let mut random = Random(18);
+    let mut random = SplitMix64::new(18);
     let (mut decodes, mut lost, mut frames, mut whole) = (0, 0, 0, 0);
     for point in POINTS {
         let operating_point: OperatingPoint = point.parse().unwrap();

@@ -1,11 +1,12 @@
 //! Damaged scene files.
 
-use crate::{Random, damaged, so_many};
+use crate::{damaged, so_many};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::{ReadLimits, ply, splat, spz};
 use splatstream_fuzz::measured::measured;
 use splatstream_fuzz::scene::{FORMS, Form, allowance};
 use splatstream_gaussians::GaussianFrame;
+use splatstream_gaussians::random::SplitMix64;
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -48,7 +49,7 @@ fn files() -> Vec<File> {
 #[test]
 fn readers_refuse_damaged_files_or_read_what_is_there() {
     let (files, count) = (files(), so_many(2000));
-    let mut random = Random(16);
+    let mut random = SplitMix64::new(16);
     let (mut refused, mut same, mut different, mut peak) = (0, 0, 0, 0);
     for number in 0..count {
         let file = &files[number % files.len()];

@@ -1,10 +1,11 @@
 //! Damaged streams: whole and in pieces, at several operating points.
 
 use crate::intact::{Intact, options};
-use crate::{Random, damaged, peak_of_process, so_many};
+use crate::{damaged, peak_of_process, so_many};
 use splatstream::{Decoder, Error, Frame, Limits, OperatingPoint};
 use splatstream_fuzz::laws::{Decoded, exact};
 use splatstream_fuzz::streams;
+use splatstream_gaussians::random::SplitMix64;
 use std::sync::Arc;
 
 const POINTS: [&str; 3] = ["s0,t0,r0", "s0,t9,r9", "s9,t0,r1"];
@@ -34,7 +35,7 @@ fn whole(bytes: &[u8], point: OperatingPoint) -> Given {
     (frames, end)
 }
 
-fn pushed(bytes: &[u8], point: OperatingPoint, random: &mut Random) -> Given {
+fn pushed(bytes: &[u8], point: OperatingPoint, random: &mut SplitMix64) -> Given {
     let mut decoder = Decoder::new().with_operating_point(point).with_limits(Limits::default());
     let (mut frames, mut rest) = (Vec::new(), bytes);
     while !rest.is_empty() {
@@ -75,7 +76,7 @@ fn what_is_left_of_damaged_streams_is_right_and_losses_are_told() {
     let talk = include_bytes!("../../../examples/talk.gss").as_slice();
     let streams: Vec<&[u8]> = streams::ALL.into_iter().chain([talk]).collect();
     let count = so_many(700);
-    let mut random = Random(17);
+    let mut random = SplitMix64::new(17);
     let (mut decodes, mut frames, mut whole_frames) = (0, 0, 0);
     for number in 0..count {
         let stream = streams[number % streams.len()];
