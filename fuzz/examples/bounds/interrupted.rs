@@ -1,7 +1,6 @@
 //! How long a decoder goes on after it has been interrupted, wherever it is.
 
-use crate::Result;
-use rustix::time::{ClockId, clock_gettime};
+use crate::{Result, processor_time};
 use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Step, StreamDecoder};
@@ -53,10 +52,4 @@ fn decode(bytes: &[u8], level: u8, interrupt: &Interrupt) -> StreamDecoder {
         }
     }
     decoder
-}
-
-/// Processor time of this process so far, of all threads.
-fn processor_time() -> Duration {
-    let now = clock_gettime(ClockId::ProcessCPUTime);
-    Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec.unsigned_abs() as u32)
 }

@@ -7,23 +7,25 @@
 //! `... --example bounds -- --interrupt [LEVEL]... [CASE]...` interrupts the decoder of each at many places, and prints for
 //! how long it goes on, on one thread.
 
+use rustix::time::{ClockId, clock_gettime};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_format::Limits;
 use std::ops::ControlFlow;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 mod cases;
 mod healing;
 mod interrupted;
 mod stream;
 
-/// Ticks of processor time in a second, as /proc gives them.
-const TICKS: f64 = 100.0;
-/// What the process that decodes a stream is told, before its file and its level.
-const DECODE: &str = "--decode";
-/// The same of the process that is interrupted; and what asks for it.
+/// Asks for the table of interrupted decoders.
 const INTERRUPT: &str = "--interrupt";
+/// What the process that decodes a stream is told, before its file and its level.
+const DECODE_FILE: &str = "--decode-file";
+/// The same of the process that is interrupted.
+const INTERRUPT_FILE: &str = "--interrupt-file";
 
 const HEAD: &str = "\
 | Case | Level | Bytes | Frames | CPU s | CPU ms a frame | A.3 counts in a frame | ns each | Peak MB | A.3 MB |
@@ -34,8 +36,8 @@ type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     match words.as_slice() {
-        [decode, path, level] if decode == DECODE => return measured(path, level.parse()?),
-        [interrupt, path, level] if interrupt == INTERRUPT && path.ends_with(".gss") => {
+        [word, path, level] if word == DECODE_FILE => return measured(path, level.parse()?),
+        [word, path, level] if word == INTERRUPT_FILE => {
             let found = interrupted::milliseconds(path, level.parse()?)?;
             found.iter().for_each(|one| println!("{one}"));
             return Ok(());
@@ -70,7 +72,7 @@ fn told_by_process(what: &str, level: u8, case: &cases::Case) -> Result<String> 
     let path = std::env::temp_dir().join(format!("bounds-{}.gss", std::process::id()));
     std::fs::write(&path, &case.bytes)?;
     let mut process = Command::new(std::env::current_exe()?);
-    if what == INTERRUPT {
+    if what == INTERRUPT_FILE {
         process.env("RAYON_NUM_THREADS", "1");
     }
     let output = process.arg(what).arg(&path).arg(level.to_string()).stderr(Stdio::inherit()).output()?;
@@ -83,7 +85,7 @@ fn told_by_process(what: &str, level: u8, case: &cases::Case) -> Result<String> 
 
 /// Has a case decoded and interrupted, and prints its line.
 fn print_interrupted(name: &str, level: u8, case: &cases::Case) -> Result<()> {
-    let told = told_by_process(INTERRUPT, level, case)?;
+    let told = told_by_process(INTERRUPT_FILE, level, case)?;
     let found = told.lines().map(str::parse).collect::<core::result::Result<Vec<f64>, _>>()?;
     let [median, largest] = [found.get(found.len() / 2), found.last()].map(|one| one.copied().unwrap_or(0.0));
     println!("| {name} | {level} | {median:.1} | {largest:.1} |");
@@ -92,7 +94,7 @@ fn print_interrupted(name: &str, level: u8, case: &cases::Case) -> Result<()> {
 
 /// Has a case decoded, and prints its line.
 fn print(name: &str, level: u8, case: &cases::Case) -> Result<()> {
-    let line = told_by_process(DECODE, level, case)?;
+    let line = told_by_process(DECODE_FILE, level, case)?;
     let [frames, seconds, peak, errors] = line.split_whitespace().collect::<Vec<_>>()[..] else {
         return Err(format!("{name}: {line}").into());
     };
@@ -117,10 +119,10 @@ fn print(name: &str, level: u8, case: &cases::Case) -> Result<()> {
 /// Decodes a file, and prints frames, processor seconds, peak bytes and errors.
 fn measured(path: &str, level: u8) -> Result<()> {
     let bytes = std::fs::read(path)?;
-    let before = processor_seconds()?;
+    let before = processor_time();
     let options = Options { limits: Limits::of_level(level), ..Options::default() };
     let summary = decode_stream(&bytes, &options, |_, _| ControlFlow::Continue(()));
-    let seconds = processor_seconds()? - before;
+    let seconds = processor_time().saturating_sub(before).as_secs_f64();
     println!("{} {seconds} {} {}", summary.frames, peak_bytes()?, summary.errors.len());
     if let Some(error) = summary.verdict() {
         eprintln!("{error}");
@@ -128,13 +130,10 @@ fn measured(path: &str, level: u8) -> Result<()> {
     Ok(())
 }
 
-/// Processor time of this process so far.
-fn processor_seconds() -> Result<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat")?;
-    // After the name, which is in brackets, the 12th and 13th fields are user and system time.
-    let (_, fields) = stat.rsplit_once(") ").ok_or("no process")?;
-    let ticks: f64 = fields.split(' ').skip(11).take(2).filter_map(|field| field.parse::<f64>().ok()).sum();
-    Ok(ticks / TICKS)
+/// Processor time of this process so far, of all threads.
+fn processor_time() -> Duration {
+    let now = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec.unsigned_abs() as u32)
 }
 
 /// The largest memory in use so far.
