@@ -1,19 +1,19 @@
 //! `splatstream demo`: everything once, without any input.
 
+mod everything;
 mod pictures;
 mod report;
 
-use crate::compare::errors::{AttributeErrors, ErrorSums};
-use crate::compare::{Match, compare_frames};
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::Args;
+use everything::Everything;
 use pictures::Album;
 use report::{Demonstration, Encoding, Point, Scene};
 use splatstream_chart::numbers::bits_per_gaussian;
-use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
+use splatstream_decoder::operating_point::{OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
@@ -70,8 +70,9 @@ impl Demo {
         };
         let mut source = self.write_source(scene)?;
         let (stream, encoding, digests) = self.encode(&mut source.frames)?;
-        let points = self.points(&stream, &source.frames)?;
-        let errors = self.verify(&stream, &source.frames, &digests)?;
+        let mut everything = Everything::start(self.out.join("decoded"), source.frames.first())?;
+        let points = self.points(&stream, &source.frames, &mut everything)?;
+        let errors = everything.verified(&digests)?;
         let demonstration = Demonstration {
             directory: self.out.clone(),
             scene: source.summary,
@@ -133,8 +134,13 @@ impl Demo {
         Ok((stream, Encoding { bytes, gaussians, bpg, seconds, gaussians_per_second: rate }, digests))
     }
 
-    /// Decodes and draws every operating point, and writes the frames of the last, which is everything.
-    fn points(&self, stream: &[u8], source: &[GaussianFrame]) -> Result<Vec<Point>, Failure> {
+    /// Decodes and draws every operating point; the last is everything.
+    fn points(
+        &self,
+        stream: &[u8],
+        source: &[GaussianFrame],
+        everything: &mut Everything<'_>,
+    ) -> Result<Vec<Point>, Failure> {
         let infos = operating_points(stream, &Limits::default()).map_err(|error| self.fault(error))?;
         let mut album = Album::start(&self.out)?;
         let progress = Progress::frames("decoding", infos.len() as u32 * self.frames);
@@ -142,8 +148,8 @@ impl Demo {
         for (done, info) in infos.iter().enumerate() {
             progress.at(done as u32 * self.frames);
             let is_last = done + 1 == infos.len();
-            let directory = is_last.then(|| self.out.join("decoded"));
-            let (shown, seconds) = self.decode(stream, info, directory, moment)?;
+            let last = is_last.then_some(&mut *everything);
+            let (shown, seconds) = self.decode(stream, info, moment, last)?;
             // The smallest point has fewest frames: all others have its last one.
             moment = moment.or(shown.as_ref().map(|(number, _)| *number));
             let drawn = shown.map(|(number, frame)| album.draw(info.point, number, &frame, source));
@@ -153,27 +159,26 @@ impl Demo {
     }
 
     /// Decodes one operating point, every digest compared; gives the frame that is drawn, the last one if none is named, and
-    /// writes all to a directory if there is one.
+    /// the seconds of decoding. Frames of the last operating point are verified and written too.
     fn decode(
         &self,
         stream: &[u8],
         info: &OperatingPointInfo,
-        directory: Option<PathBuf>,
         moment: Option<u32>,
+        mut everything: Option<&mut Everything<'_>>,
     ) -> Result<(Option<(u32, GaussianFrame)>, f64), Failure> {
-        directory.as_deref().map_or(Ok(()), make_directory)?;
-        let (mut shown, mut failed, mut writing) = (None, None, Duration::ZERO);
+        let (mut shown, mut failed, mut apart) = (None, None, Duration::ZERO);
         let options = Options { operating_point: info.point, ..Options::default() };
         let start = Instant::now();
         let summary = decode_stream(stream, &options, |sequence, frame| {
-            let number = frame.index;
+            let (number, digest) = (frame.index, frame.digest);
             let take = || {
                 let gaussians = to_gaussians(frame.into_shown(), sequence)?;
                 let start = Instant::now();
-                if let Some(directory) = &directory {
-                    OutputFile::write(&frame_path(directory, number as usize), &ply::write(&gaussians))?;
+                if let Some(everything) = &mut everything {
+                    everything.take(number, digest, &gaussians)?;
                 }
-                writing += start.elapsed();
+                apart += start.elapsed();
                 if moment.is_none_or(|moment| moment == number) {
                     shown = Some((number, gaussians));
                 }
@@ -182,48 +187,11 @@ impl Demo {
             failed = take().err();
             if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        let seconds = start.elapsed().saturating_sub(writing).as_secs_f64();
+        let seconds = start.elapsed().saturating_sub(apart).as_secs_f64();
         match (failed, summary.verdict()) {
             (Some(failure), _) => Err(failure),
             (None, Some(error)) => Err(self.fault(error)),
             (None, None) => Ok((shown, seconds)),
-        }
-    }
-
-    /// Compares all of the decoded stream with what the encoder says it is, and with the source.
-    fn verify(
-        &self,
-        stream: &[u8],
-        source: &[GaussianFrame],
-        digests: &[u64],
-    ) -> Result<AttributeErrors, Failure> {
-        let mut sums = ErrorSums::default();
-        let (mut decoded, mut broken) = (Vec::new(), None);
-        let options = Options { operating_point: OperatingPoint::ALL, ..Options::default() };
-        let summary = decode_stream(stream, &options, |sequence, frame| {
-            decoded.extend(frame.digest);
-            // One frame says enough about the errors of a scene like this one.
-            if frame.index == 0
-                && let Some(original) = source.first()
-            {
-                match to_gaussians(frame.into_shown(), sequence) {
-                    Ok(shown) => {
-                        compare_frames(original, &shown, Match::Auto, &mut sums);
-                    }
-                    Err(error) => broken = Some(error),
-                }
-            }
-            ControlFlow::Continue(())
-        });
-        if let Some(error) = broken {
-            return Err(error.into());
-        }
-        match summary.verdict() {
-            Some(error) => Err(self.fault(error)),
-            None if decoded != digests => {
-                Err(Failure::other("the decoder's digests are not the encoder's: please report this"))
-            }
-            None => Ok(sums.errors()),
         }
     }
 
