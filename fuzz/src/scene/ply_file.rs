@@ -68,7 +68,7 @@ fn describe(element: &Element, index: usize, text: &mut String) -> u64 {
         4 => ("camera", "focus", 3),
         _ => ("face", "", 1),
     };
-    // Two elements of one name are refused: others come after one that is passed over.
+    // Two elements of one name are refused: others come after one that is skipped.
     let number = if name == "camera" || name == "face" { index.to_string() } else { String::new() };
     let _ = writeln!(text, "element {name}{number} {}", element.rows);
     if name == "face" {

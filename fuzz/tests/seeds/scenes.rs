@@ -74,7 +74,7 @@ fn compressed_ply() -> Vec<u8> {
     bytes
 }
 
-/// One vertex behind an element to be passed over.
+/// One vertex after an element that is skipped.
 fn plain_ply(encoding: &str, cell: impl Fn(f64) -> Vec<u8>) -> Vec<u8> {
     let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
     let mut header = format!("ply\nformat {encoding} 1.0\nelement camera 1\nproperty double focus\n");
