@@ -1,4 +1,4 @@
-//! Encode and decode speed, Gaussians per second, memory to memory.
+//! Encode and decode speed, Gaussians per second, memory to memory; of sequences by the kind of frame.
 //!
 //! `cargo bench -p splatstream-encoder` runs the built-in scene, and real scenes where `../shared/data` has them.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed benchmark")]
@@ -8,7 +8,7 @@ use divan::{Bencher, black_box};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Preset, Settings, encode};
+use splatstream_encoder::{Preset, Settings, Structure, encode};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::{ReadLimits, read_scene};
 use splatstream_gaussians::GaussianFrame;
@@ -54,12 +54,45 @@ fn encode_preset<const PRESET: usize>(bencher: Bencher, name: &str) {
 fn decode_verify<const VERIFY: usize>(bencher: Bencher, name: &str) {
     let Some(frame) = scene(name) else { return };
     let bytes = stream(&frame, Preset::Balanced);
-    let options = Options { verify: VERIFY == 1, ..Options::default() };
-    bencher.counter(ItemsCount::new(frame.len())).bench(|| {
-        let summary = decode_stream(black_box(&bytes), &options, |sequence, frame| {
-            black_box(to_gaussians(frame.into_shown(), sequence).unwrap());
-            ControlFlow::Continue(())
-        });
-        assert_eq!(summary.verdict(), None);
+    bencher.counter(ItemsCount::new(frame.len())).bench(|| decode(black_box(&bytes), VERIFY == 1));
+}
+
+fn decode(bytes: &[u8], verify: bool) {
+    let options = Options { verify, ..Options::default() };
+    let summary = decode_stream(bytes, &options, |sequence, frame| {
+        black_box(to_gaussians(frame.into_shown(), sequence).unwrap());
+        ControlFlow::Continue(())
     });
+    assert_eq!(summary.verdict(), None);
+}
+
+/// Frames after the first.
+const LATER: u32 = 8;
+
+/// What the frames of a sequence do.
+#[derive(Clone, Copy, Debug)]
+enum Motion {
+    /// There is one frame, an I frame.
+    None,
+    /// P frames follow in which nothing moves.
+    Still,
+    /// P frames follow in which a third of the Gaussians move.
+    Moving,
+}
+
+/// All frames to `f32` planes, digests not verified, on one thread. Items are Gaussians of all frames: what P frames take
+/// is what the I frame alone does not.
+#[divan::bench(args = [Motion::None, Motion::Still, Motion::Moving], sample_count = 15, sample_size = 1)]
+fn decode_frames(bencher: Bencher, motion: Motion) {
+    let scene = BuiltinScene { gaussians: 50_000, sh_degree: 1, ..BuiltinScene::default() };
+    let count = if matches!(motion, Motion::None) { 1 } else { 1 + LATER };
+    let time = |number| if matches!(motion, Motion::Moving) { number } else { 0 };
+    let mut frames: Vec<GaussianFrame> = (0..count).map(|number| scene.frame(time(number))).collect();
+    let structure = Structure::Predicted { layers: 1 };
+    let settings = Settings { preset: Preset::Fast, structure, ..Settings::default() };
+    let mut bytes = Vec::new();
+    encode(&mut frames, &settings, &mut bytes, &mut |_, _| {}).unwrap();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let items = ItemsCount::new(scene.gaussians as usize * count as usize);
+    bencher.counter(items).bench_local(|| one.install(|| decode(black_box(&bytes), false)));
 }
