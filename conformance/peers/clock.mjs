@@ -1,4 +1,6 @@
 // CPU seconds of this process, all threads.
+import { createInterface } from 'node:readline';
+
 const SLOW = 60; // seconds: what takes longer is not repeated
 
 // [the last result of work, the median of its seconds]
@@ -11,6 +13,16 @@ export async function timed(repeat, work) {
     runs.push(seconds() - begin);
   } while (runs.length < repeat && runs.at(-1) <= SLOW);
   return [result, median(runs)];
+}
+
+// Does what each line of standard input names, and answers with a line of JSON: what that gives, and the seconds it took.
+export async function serve(works) {
+  for await (const name of createInterface({ input: process.stdin })) {
+    const [begin, wall] = [seconds(), performance.now()];
+    const result = await works[name]();
+    const cpu_s = seconds() - begin;
+    console.log(JSON.stringify({ ...result, cpu_s, wall_s: (performance.now() - wall) / 1000 }));
+  }
 }
 
 function seconds() {

@@ -33,28 +33,38 @@ def rates(scene):
 
 
 def code(rate, scene, decoded, tools):
-    if len(set(scene.counts)) > 1:
-        raise Missing("it needs the same count in every frame")
-    program = tools.program("splat4d")
-    frames, coded, out = tools.scratch("frames"), tools.scratch("scene.splat4d"), tools.scratch("frame.splat")
-    shutil.rmtree(frames, ignore_errors=True)
-    os.makedirs(frames)
-    for number, gaussians in enumerate(scene.frames()):
-        _records(gaussians).tofile(os.path.join(frames, "frame_%04d.splat" % number))
-    encode = [program, "encode", "-i", frames, "-o", coded, "--no-verify"] + rate.settings["flags"]
-    encode_s = process(encode, tools.repeat)
+    coder = Coder(rate, scene, tools)
+    encode_s = process(coder.encode, tools.repeat)
     for number, path in enumerate(decoded):
-        run([program, "decode", coded, "--frame", number, "-o", out])
-        ply.write(path, _gaussians(np.fromfile(out, RECORD)))
-    decode_s = sum(process([program, "decode", coded, "--frame", last, "-o", out], tools.repeat)
-                   for last in _last_of_groups(program, coded, len(decoded)))
-    return Coded(os.path.getsize(coded), scene.gaussians, encode_s, decode_s, "process", spoken(encode))
+        run(coder.decode_frame(number))
+        ply.write(path, _gaussians(np.fromfile(coder.out, RECORD)))
+    decode_s = sum(process(command, tools.repeat) for command in coder.decode())
+    return Coded(os.path.getsize(coder.coded), scene.gaussians, encode_s, decode_s, "process", spoken(coder.encode))
 
 
-def _last_of_groups(program, coded, frames):
-    info = run([program, "info", coded])
-    gop = json.JSONDecoder().raw_decode(info[info.index("{"):])[0]["gop"]
-    return [min(begin + gop, frames) - 1 for begin in range(0, frames, gop)]
+class Coder:
+    """The commands that code a scene, whose frames are written for them."""
+
+    def __init__(self, rate, scene, tools):
+        if len(set(scene.counts)) > 1:
+            raise Missing("it needs the same count in every frame")
+        self.program, self.frames = tools.program("splat4d"), len(scene.paths)
+        self.coded, self.out = tools.scratch("scene.splat4d"), tools.scratch("frame.splat")
+        folder = tools.scratch("frames")
+        shutil.rmtree(folder, ignore_errors=True)
+        os.makedirs(folder)
+        for number, gaussians in enumerate(scene.frames()):
+            _records(gaussians).tofile(os.path.join(folder, "frame_%04d.splat" % number))
+        self.encode = [self.program, "encode", "-i", folder, "-o", self.coded, "--no-verify"] + rate.settings["flags"]
+
+    def decode_frame(self, number):
+        return [self.program, "decode", self.coded, "--frame", number, "-o", self.out]
+
+    def decode(self):
+        """What decodes every frame, once the scene is coded: the last of every group needs the whole group."""
+        info = run([self.program, "info", self.coded])
+        gop = json.JSONDecoder().raw_decode(info[info.index("{"):])[0]["gop"]
+        return [self.decode_frame(min(begin + gop, self.frames) - 1) for begin in range(0, self.frames, gop)]
 
 
 def _records(gaussians):

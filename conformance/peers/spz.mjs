@@ -1,9 +1,10 @@
-// Codes frames with @adobe/spz, in memory. Standard input is a job, the last line of the output is its result.
+// Codes frames with @adobe/spz, in memory. Standard input is a job, the last line of the output is its result. With the
+// name of a file that holds the job, it encodes or decodes whenever standard input says so.
 import { readFileSync, writeFileSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
-import { timed } from './clock.mjs';
+import { serve, timed } from './clock.mjs';
 
-const job = JSON.parse(readFileSync(0));
+const job = JSON.parse(readFileSync(process.argv[2] ?? 0));
 const { default: createSpzModule } = await import(pathToFileURL(job.module));
 const spz = await createSpzModule({ print: () => {} });
 const { RDF } = spz.CoordinateSystem;
@@ -12,15 +13,26 @@ const clouds = job.frames.map(cloud);
 
 const pack = (c) => spz.saveSpzToBuffer(c, { from: RDF, ...job.pack });
 const unpack = (bytes) => spz.loadSpzFromBuffer(bytes, { to: RDF });
-const [packed, encode_s] = await timed(job.repeat, () => clouds.map(pack));
-const [unpacked, decode_s] = await timed(job.repeat, () => packed.map(unpack));
+const bytes = (packed) => packed.reduce((sum, part) => sum + part.length, 0);
+const gaussians = (unpacked) => unpacked.reduce((sum, c) => sum + c.numPoints, 0);
+await (process.argv[2] ? answer() : once());
 
-unpacked.forEach((c, i) => writeFileSync(job.frames[i].out, flat(c)));
-console.log(JSON.stringify({
-  bytes: packed.reduce((sum, bytes) => sum + bytes.length, 0),
-  gaussians: unpacked.reduce((sum, c) => sum + c.numPoints, 0),
-  encode_s, decode_s,
-}));
+async function once() {
+  const [packed, encode_s] = await timed(job.repeat, () => clouds.map(pack));
+  const [unpacked, decode_s] = await timed(job.repeat, () => packed.map(unpack));
+  unpacked.forEach((c, i) => writeFileSync(job.frames[i].out, flat(c)));
+  console.log(JSON.stringify({ bytes: bytes(packed), gaussians: gaussians(unpacked), encode_s, decode_s }));
+}
+
+async function answer() {
+  let packed = [];
+  const encode = () => {
+    packed = clouds.map(pack);
+    return { bytes: bytes(packed) };
+  };
+  const decode = () => ({ gaussians: gaussians(packed.map(unpack)) });
+  await serve({ encode, decode });
+}
 
 function cloud({ in: path, count }) {
   const bytes = readFileSync(path);

@@ -25,20 +25,25 @@ def _rate(version, sh1_bits, sh_rest_bits):
 
 
 def code(rate, scene, decoded, tools):
+    work = job(rate, scene, tools)
+    done = tools.node("spz.mjs", work)
+    for frame, path in zip(work["frames"], decoded):
+        ply.write(path, _gaussians(np.fromfile(frame["out"], "<f4"), frame["count"]))
+    call = "saveSpzToBuffer(cloud, {from: RDF, version: %(version)d, sh1Bits: %(sh1Bits)d, shRestBits: %(shRestBits)d})"
+    return Coded(done["bytes"], done["gaussians"], done["encode_s"], done["decode_s"], "in-process",
+                 call % rate.settings + " of @adobe/spz (WebAssembly)")
+
+
+def job(rate, scene, tools):
+    """What spz.mjs is told; the frames are written for it."""
     frames = []
     for number, gaussians in enumerate(scene.frames()):
         frame = {"in": tools.scratch("spz_in_%d" % number), "out": tools.scratch("spz_out_%d" % number),
                  "count": len(gaussians)}
         _cloud(gaussians).tofile(frame["in"])
         frames.append(frame)
-    job = {"module": tools.entry(SPZ), "pack": rate.settings, "degree": scene.degree, "frames": frames,
-           "repeat": tools.repeat}
-    done = tools.node("spz.mjs", job)
-    for frame, path in zip(frames, decoded):
-        ply.write(path, _gaussians(np.fromfile(frame["out"], "<f4"), frame["count"]))
-    call = "saveSpzToBuffer(cloud, {from: RDF, version: %(version)d, sh1Bits: %(sh1Bits)d, shRestBits: %(shRestBits)d})"
-    return Coded(done["bytes"], done["gaussians"], done["encode_s"], done["decode_s"], "in-process",
-                 call % rate.settings + " of @adobe/spz (WebAssembly)")
+    return {"module": tools.entry(SPZ), "pack": rate.settings, "degree": scene.degree, "frames": frames,
+            "repeat": tools.repeat}
 
 
 def _cloud(gaussians):

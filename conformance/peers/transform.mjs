@@ -1,16 +1,21 @@
 // Converts frames with splat-transform, in memory and on one thread; with `decode`, there and back to PLY.
-// Standard input is a job, the last line of the output is its result.
+// Standard input is a job, the last line of the output is its result. With the name of a file that holds the job, it encodes
+// or decodes all frames whenever standard input says so.
 import { readFileSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { timed } from './clock.mjs';
+import { serve, timed } from './clock.mjs';
 
-const job = JSON.parse(readFileSync(0));
+const job = JSON.parse(readFileSync(process.argv[2] ?? 0));
 const splat = await import(pathToFileURL(job.module));
 splat.WorkerQueue.maxWorkers = 0;
 
-const result = job.info ? await info(job.info) : await convertAll();
-console.log(JSON.stringify(result));
+if (process.argv[2]) {
+  await answer();
+} else {
+  const result = job.info ? await info(job.info) : await convertAll();
+  console.log(JSON.stringify(result));
+}
 
 async function info(path) {
   const name = basename(path);
@@ -21,21 +26,48 @@ async function info(path) {
 async function convertAll() {
   const total = { bytes: 0, encode_s: 0, decode_s: 0 };
   for (const frame of job.frames) {
-    const input = files(frame.in);
-    const [coded, encode_s] = await timed(job.repeat, () => convert(input, basename(frame.in), `frame.${job.suffix}`));
+    const [coded, encode_s] = await timed(job.repeat, encoder(frame));
     total.bytes += coded.length;
     total.encode_s += encode_s;
     let written = coded;
     if (job.decode) {
-      const memory = new splat.MemoryReadFileSystem();
-      memory.set(`frame.${job.suffix}`, coded);
-      const [decoded, decode_s] = await timed(job.repeat, () => convert(memory, `frame.${job.suffix}`, 'decoded.ply'));
+      const [decoded, decode_s] = await timed(job.repeat, decoder(coded));
       total.decode_s += decode_s;
       written = decoded;
     }
     writeFileSync(frame.out, written);
   }
   return total;
+}
+
+async function answer() {
+  const encoders = job.frames.map(encoder);
+  let coded = [];
+  const all = async (works) => {
+    const results = [];
+    for (const work of works) results.push(await work());
+    return results;
+  };
+  const encode = async () => {
+    coded = await all(encoders);
+    return { bytes: coded.reduce((sum, part) => sum + part.length, 0) };
+  };
+  const decode = async () => {
+    await all(coded.map(decoder));
+    return {};
+  };
+  await serve({ encode, decode });
+}
+
+function encoder(frame) {
+  const input = files(frame.in);
+  return () => convert(input, basename(frame.in), `frame.${job.suffix}`);
+}
+
+function decoder(coded) {
+  const memory = new splat.MemoryReadFileSystem();
+  memory.set(`frame.${job.suffix}`, coded);
+  return () => convert(memory, `frame.${job.suffix}`, 'decoded.ply');
 }
 
 async function convert(input, from, to) {

@@ -1,5 +1,6 @@
 //! What a codec costs as scenes grow: nanoseconds of processor time per Gaussian, and peak memory, of encoding and
-//! decoding, against the number of Gaussians and of frames; and where that is not linear.
+//! decoding, against the number of Gaussians and of frames; where that is not linear; and what decoding frames of each kind
+//! costs.
 //!
 //! `cargo run --release -p splatstream-encoder --example scale -- [GAUSSIANS] [FRAMES]` goes up to 4,000,000 Gaussians in
 //! one frame and 1,000 frames, or to what is said; 0 leaves a table out.
@@ -13,7 +14,7 @@ mod table;
 use measured::{Result, Seconds, decoded, measured};
 use peak_alloc::PeakAlloc;
 use scenes::Source;
-use splatstream_encoder::{Preset, Quality, Settings, Structure, encode};
+use splatstream_encoder::{Preset, Settings, Structure, encode};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use table::{Cost, Growth, Row};
@@ -27,6 +28,10 @@ const GAUSSIANS: [u32; 6] = [10_000, 30_000, 100_000, 300_000, 1_000_000, 4_000_
 const FRAMES: [u32; 4] = [1, 10, 100, 1_000];
 /// Gaussians of each frame of a sequence, of SH degree 1.
 const GAUSSIANS_OF_FRAME: u32 = 3_000;
+/// Gaussians of frames of each kind.
+const GAUSSIANS_OF_KIND: u32 = 100_000;
+/// P frames after an I frame.
+const LATER_FRAMES: u32 = 8;
 /// Times that something is done; the shortest counts.
 const REPEAT: u32 = 3;
 /// Seconds from which on nothing is done again.
@@ -46,7 +51,31 @@ fn main() -> Result<()> {
         println!("Tracked frames of {GAUSSIANS_OF_FRAME} Gaussians, SH degree 1, GOPs of 16:\n");
         let source = |frames| Source::sequence(GAUSSIANS_OF_FRAME, frames);
         table::print(&Growth::FRAMES, &rows(&lengths, source)?);
+        print_kinds()?;
     }
+    Ok(())
+}
+
+/// Prints what decoding takes by the kind of frame: what P frames take is what their I frame alone does not.
+fn print_kinds() -> Result<()> {
+    let decode_ns = |source: Source| -> Result<f64> {
+        let structure = Structure::Predicted { layers: 1 };
+        let settings = Settings { preset: Preset::Fast, structure, ..Settings::default() };
+        let (stream, _) = encoded(&source, &settings)?;
+        Ok(decoded_cost(&stream)?.processor * 1e9 / f64::from(GAUSSIANS_OF_KIND))
+    };
+    let of = |frames: u32| Source::sequence(GAUSSIANS_OF_KIND, frames);
+    let intra = decode_ns(of(1))?;
+    let later = |whole: f64| (whole - intra) / f64::from(LATER_FRAMES);
+    let moving = later(decode_ns(of(1 + LATER_FRAMES))?);
+    let still = later(decode_ns(of(1 + LATER_FRAMES).still())?);
+    println!("Decoding frames of {GAUSSIANS_OF_KIND} Gaussians, SH degree 1, fast preset, one layer:\n");
+    println!("| frame | ns per Gaussian | times as fast as an I frame |\n|---|--:|--:|");
+    for (name, cost) in [("I", intra), ("P, a third of the scene moves", moving), ("P, nothing moves", still)]
+    {
+        println!("| {name} | {cost:.0} | {:.1} |", intra / cost);
+    }
+    println!();
     Ok(())
 }
 
@@ -56,29 +85,32 @@ fn rows(sizes: &[u32], source: impl Fn(u32) -> Source) -> Result<Vec<Row>> {
 
 /// Measures one scene.
 fn row(size: u32, source: &Source) -> Result<Row> {
-    let (_, fast) = encoded(source, Preset::Fast)?;
-    let (stream, balanced) = encoded(source, Preset::Balanced)?;
-    let decode = repeated(|| {
-        let (gaussians, seconds) = measured(|| decoded(&stream, true));
-        Ok((gaussians?, seconds))
-    })?;
-    Ok(Row { size, bytes: stream.len(), fast, balanced, decode })
-}
-
-/// The stream of a scene, and what it costs without what the scene itself takes.
-fn encoded(source: &Source, preset: Preset) -> Result<(Vec<u8>, Cost)> {
     let (structure, spatial_layers) = match source.is_sequence() {
         false => (Structure::Intra, 1),
         true => (Structure::Predicted { layers: 2 }, 3),
     };
-    let steps = Quality::default().steps();
-    let settings = Settings { preset, steps, structure, spatial_layers, ..Settings::default() };
+    let settings = Settings { structure, spatial_layers, ..Settings::default() };
+    let (_, fast) = encoded(source, &Settings { preset: Preset::Fast, ..settings.clone() })?;
+    let (stream, balanced) = encoded(source, &Settings { preset: Preset::Balanced, ..settings })?;
+    Ok(Row { size, bytes: stream.len(), fast, balanced, decode: decoded_cost(&stream)? })
+}
+
+/// What decoding costs, digests compared.
+fn decoded_cost(stream: &[u8]) -> Result<Cost> {
+    repeated(|| {
+        let (gaussians, seconds) = measured(|| decoded(stream, true));
+        Ok((gaussians?, seconds))
+    })
+}
+
+/// The stream of a scene, and what it costs without what the scene itself takes.
+fn encoded(source: &Source, settings: &Settings) -> Result<(Vec<u8>, Cost)> {
     // Not in memory, which is measured.
     let path = std::env::temp_dir().join(format!("scale-{}.gss", std::process::id()));
     let cost = repeated(|| {
         let mut source = source.clone();
         let mut out = BufWriter::new(File::create(&path)?);
-        let (report, seconds) = measured(|| encode(&mut source, &settings, &mut out, &mut |_, _| {}));
+        let (report, seconds) = measured(|| encode(&mut source, settings, &mut out, &mut |_, _| {}));
         out.flush()?;
         let processor = seconds.processor - source.processor_seconds();
         Ok((report?.gaussians, Seconds { processor, ..seconds }))

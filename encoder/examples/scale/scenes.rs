@@ -17,6 +17,8 @@ pub(crate) struct Source {
     scene: BuiltinScene,
     /// So many scenes side by side.
     copies: u32,
+    /// All frames are the first.
+    is_still: bool,
     taken: Duration,
 }
 
@@ -26,13 +28,18 @@ impl Source {
         let copies = gaussians.div_ceil(MOST);
         let gaussians = gaussians / copies;
         let scene = BuiltinScene { gaussians, frames: 1, sh_degree: 2, ..BuiltinScene::default() };
-        Self { scene, copies, taken: Duration::ZERO }
+        Self { scene, copies, is_still: false, taken: Duration::ZERO }
     }
 
     /// A sequence of frames of so many Gaussians.
     pub(crate) fn sequence(gaussians: u32, frames: u32) -> Self {
         let scene = BuiltinScene { gaussians, frames, sh_degree: 1, ..BuiltinScene::default() };
-        Self { scene, copies: 1, taken: Duration::ZERO }
+        Self { scene, copies: 1, is_still: false, taken: Duration::ZERO }
+    }
+
+    /// The same where nothing moves.
+    pub(crate) fn still(self) -> Self {
+        Self { is_still: true, ..self }
     }
 
     pub(crate) fn is_sequence(&self) -> bool {
@@ -76,7 +83,7 @@ impl FrameSource for Source {
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
         let start = processor_time();
-        let frame = self.make(number);
+        let frame = self.make(if self.is_still { 0 } else { number });
         self.taken += processor_time().saturating_sub(start);
         frame
     }
