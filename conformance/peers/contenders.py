@@ -138,12 +138,15 @@ def splats4d_as_program(scene, setup):
     coder = splats4d.Coder(rates[0], scene, setup.tools)
 
     def encode():
-        return dict(_program([coder.encode]), bytes=os.path.getsize(coder.coded))
+        return sized(_program([coder.encode]))
 
     def decode():
         if not os.path.exists(coder.coded):
             encode()
-        return _program(coder.decode())
+        return sized(_program(coder.decode()))
+
+    def sized(sample):
+        return dict(sample, bytes=os.path.getsize(coder.coded))
 
     options = rates[0].options + ", a whole process"
     return [Case("splats4d", "encode", options, 1, encode), Case("splats4d", "decode", options, 1, decode)]

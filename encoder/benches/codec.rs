@@ -72,7 +72,7 @@ const LATER: u32 = 8;
 /// What the frames of a sequence do.
 #[derive(Clone, Copy, Debug)]
 enum Motion {
-    /// There is one frame, an I frame.
+    /// There is one frame, an I frame, which may predict its later refinements.
     None,
     /// P frames follow in which nothing moves.
     Still,

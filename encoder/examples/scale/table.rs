@@ -82,7 +82,9 @@ fn excesses(growth: &Growth, rows: &[Row]) -> Vec<String> {
         ("memory of decoding", growth.memory, |row| row.decode.peak as f64),
     ];
     let mut lines = Vec::new();
-    for (row, next) in rows.iter().zip(rows.iter().skip(1)) {
+    // A frame alone is another kind of stream.
+    let rows = rows.iter().filter(|row| row.size > 1);
+    for (row, next) in rows.clone().zip(rows.skip(1)) {
         let sizes = f64::from(next.size) / f64::from(row.size);
         for (name, power, figure) in figures {
             let times = figure(next) / figure(row);
