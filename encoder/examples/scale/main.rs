@@ -44,13 +44,13 @@ fn main() -> Result<()> {
     let sizes: Vec<u32> = GAUSSIANS.into_iter().filter(|&count| count <= most_gaussians).collect();
     if !sizes.is_empty() {
         println!("One frame of SH degree 2, whose size and extent grow alike:\n");
-        table::print(&Growth::GAUSSIANS, &rows(&sizes, Source::single)?);
+        print_table(&Growth::GAUSSIANS, &sizes, Source::single)?;
     }
     let lengths: Vec<u32> = FRAMES.into_iter().filter(|&count| count <= most_frames).collect();
     if !lengths.is_empty() {
         println!("Tracked frames of {GAUSSIANS_OF_FRAME} Gaussians, SH degree 1, GOPs of 16:\n");
         let source = |frames| Source::sequence(GAUSSIANS_OF_FRAME, frames);
-        table::print(&Growth::FRAMES, &rows(&lengths, source)?);
+        print_table(&Growth::FRAMES, &lengths, source)?;
         print_kinds()?;
     }
     Ok(())
@@ -83,8 +83,17 @@ fn print_kinds() -> Result<()> {
     Ok(())
 }
 
-fn rows(sizes: &[u32], source: impl Fn(u32) -> Source) -> Result<Vec<Row>> {
-    sizes.iter().map(|&size| row(size, &source(size))).collect()
+/// Measures scenes of growing size, and prints each as soon as it is measured.
+fn print_table(growth: &Growth, sizes: &[u32], source: impl Fn(u32) -> Source) -> Result<()> {
+    table::print_head(growth);
+    let mut rows = Vec::new();
+    for &size in sizes {
+        let row = row(size, &source(size))?;
+        row.print();
+        rows.push(row);
+    }
+    table::print_excesses(growth, &rows);
+    Ok(())
 }
 
 /// Measures one scene.

@@ -51,16 +51,24 @@ pub(crate) struct Row {
     pub(crate) decode: Cost,
 }
 
-/// Prints rows of growing size, in Markdown, and what grows more than it may.
-pub(crate) fn print(growth: &Growth, rows: &[Row]) {
+/// Prints the head of the table, in Markdown.
+pub(crate) fn print_head(growth: &Growth) {
     println!("| {} | bits per Gaussian | fast: ns | MB | balanced: ns | MB | decode: ns | MB |", growth.size);
     println!("|--:|--:|--:|--:|--:|--:|--:|--:|");
-    for row in rows {
-        let bits = 8.0 * row.bytes as f64 / row.balanced.gaussians as f64;
-        let costs = [row.fast, row.balanced, row.decode];
+}
+
+impl Row {
+    /// Prints a line of the table.
+    pub(crate) fn print(&self) {
+        let bits = 8.0 * self.bytes as f64 / self.balanced.gaussians as f64;
+        let costs = [self.fast, self.balanced, self.decode];
         let costs = costs.map(|cost| format!("{:.0} | {:.1}", cost.nanoseconds(), cost.peak_megabytes()));
-        println!("| {} | {bits:.1} | {} |", row.size, costs.join(" | "));
+        println!("| {} | {bits:.1} | {} |", self.size, costs.join(" | "));
     }
+}
+
+/// Prints what grows more than it may in rows of growing size.
+pub(crate) fn print_excesses(growth: &Growth, rows: &[Row]) {
     println!();
     let found = excesses(growth, rows);
     found.iter().for_each(|line| println!("{line}"));
