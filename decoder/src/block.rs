@@ -2,7 +2,7 @@
 
 use crate::attribute::{self, ATTRIBUTE_RANGE, in_range};
 use crate::coded_block::{Buffers, CodedBlock};
-use crate::colour::Colour;
+use crate::colour::{Colour, Components};
 use crate::context::lanes::{DeltaContexts, PlaneContexts};
 use crate::frame::FrameSlice;
 use crate::layout::{Attribute, Layout, PlaneInfo};
@@ -11,8 +11,9 @@ use crate::steps::StepRule;
 use crate::vector::{Task, vectorized};
 use core::ops::Range;
 use splatstream_format::Result;
+use splatstream_format::entropy::machine::Machine;
 use splatstream_format::entropy::model::Source;
-use splatstream_format::entropy::reader::{BlockReader, PlaneDecoder};
+use splatstream_format::entropy::reader::{BlockReader, Delta, Index, PlaneDecoder, Signed};
 use splatstream_format::entropy::token::Alphabet;
 
 /// What the elements of the sequence and of the unit say about every block of the unit.
@@ -88,7 +89,7 @@ pub fn decode_coded(
     for (plane, ((&info, decoder), has_sums)) in planes.enumerate() {
         buffers.interrupt.check()?;
         if info.is_position() {
-            reader.deltas(decoder, &mut DeltaContexts::new(decoder), &mut block.deltas);
+            vectorized(ReadDeltas { reader: &mut reader, decoder, out: &mut block.deltas });
             block.push_decoded(info, Vec::new(), 0, false, buffers);
             continue;
         }
@@ -130,12 +131,27 @@ struct ReadPlane<'r, 'b> {
 
 impl Task for ReadPlane<'_, '_> {
     #[inline(always)]
-    fn run(self) {
+    fn run(self, machine: impl Machine) {
         let Self { reader, decoder, mut contexts, alphabet, out } = self;
         match alphabet {
-            Alphabet::Index => reader.indices(decoder, &mut contexts, out),
-            _ => reader.signed(decoder, &mut contexts, out),
+            Alphabet::Index => reader.plane::<Index, _>(machine, decoder, &mut contexts, out),
+            _ => reader.plane::<Signed, _>(machine, decoder, &mut contexts, out),
         }
+    }
+}
+
+/// The symbols of a plane of the position alphabet, to be read.
+struct ReadDeltas<'r, 'b> {
+    reader: &'r mut BlockReader<'b>,
+    decoder: &'r PlaneDecoder,
+    out: &'r mut [u64],
+}
+
+impl Task for ReadDeltas<'_, '_> {
+    #[inline(always)]
+    fn run(self, machine: impl Machine) {
+        let Self { reader, decoder, out } = self;
+        reader.plane::<Delta, _>(machine, decoder, &mut DeltaContexts::new(decoder), out);
     }
 }
 
@@ -166,24 +182,22 @@ fn reconstruct(
     let CodedBlock { coded, exponents, .. } = block;
     let [_, _, of_rotation, of_dc, of_sh] = exponents;
     for ((info, plane), decoder) in unit.layout.planes().iter().zip(coded.iter_mut()).zip(decoders) {
-        match info.attribute {
-            Attribute::Rotation => {
-                attribute::rotations(plane, decoder.bias(), of_rotation, at)?;
-                out.write(ROTATION.wrapping_add(usize::from(info.index)), plane);
-            }
-            Attribute::Dc => of_dc.scale(plane, decoder.bias()),
-            // Indices of codebook entries are whole: sums of their entries have steps.
-            Attribute::Sh if info.alphabet == Alphabet::Attribute => of_sh.scale(plane, decoder.bias()),
-            // Known already; the others are not in this section.
-            _ => {}
+        if info.attribute == Attribute::Rotation {
+            attribute::rotations(plane, decoder.bias(), of_rotation, at)?;
+            out.write(ROTATION.wrapping_add(usize::from(info.index)), plane);
         }
     }
     let first = |attribute: Attribute| {
         let planes = unit.layout.planes().iter();
         planes.take_while(|info| info.attribute < attribute).count()
     };
-    let (dc, sh) = (first(Attribute::Dc), first(Attribute::Sh));
-    let of = |range: Range<usize>| coded.get(range).unwrap_or_default();
+    let (dc, sh, end) = (first(Attribute::Dc), first(Attribute::Sh), coded.len());
+    let biases: Vec<i32> = decoders.iter().map(PlaneDecoder::bias).collect();
+    let components = |range: Range<usize>, exponents| Components {
+        coded: coded.get(range.clone()).unwrap_or_default(),
+        biases: biases.get(range).unwrap_or_default(),
+        exponents,
+    };
     let colour = out.planes.get_mut(DC..).unwrap_or_default();
-    unit.colour.reconstruct(of(dc..sh), of(sh..coded.len()), of_sh, colour, at)
+    unit.colour.reconstruct(components(dc..sh, of_dc), components(sh..end, of_sh), colour, at)
 }

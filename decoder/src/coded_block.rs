@@ -1,11 +1,13 @@
 //! The values of a block as they are coded, and the memory that blocks hand on.
 
 use crate::attribute;
+use crate::context::spacings;
 use crate::interrupt::Interrupt;
 use crate::layout::{Attribute, PlaneInfo, Section};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule};
 use splatstream_format::entropy::lanes::Segments;
+use std::sync::OnceLock;
 
 /// The values of a block as they are coded, and what contexts need of the reconstruction.
 ///
@@ -24,9 +26,25 @@ pub struct CodedBlock {
     steps: StepRule,
     /// The exponents of the steps of each attribute, as soon as what they follow from is there.
     pub(crate) exponents: [Exponents; 5],
+    /// What several planes take contexts from, as soon as one asks for it.
+    derived: Derived,
     /// For each plane the sum of the magnitudes of the attribute's planes up to it; kept as planes are added,
     /// so that a group of n planes costs n additions and not n squared.
     magnitudes: Vec<Vec<i32>>,
+}
+
+/// Values that follow from those of a block.
+#[derive(Debug, Clone, Default)]
+struct Derived {
+    log_volumes: OnceLock<Vec<i32>>,
+    anisotropies: OnceLock<Vec<i32>>,
+    spacings: OnceLock<Vec<i32>>,
+}
+
+/// A value as thresholds see it: these have 32 bits.
+#[inline(always)]
+fn limited(value: i64) -> i32 {
+    value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
 }
 
 impl CodedBlock {
@@ -41,6 +59,7 @@ impl CodedBlock {
             lanes_log2,
             steps,
             exponents: [const { Exponents::Same(0) }; 5],
+            derived: Derived::default(),
             magnitudes: Vec::new(),
         }
     }
@@ -161,6 +180,31 @@ impl CodedBlock {
     pub fn magnitudes_before(&self, plane: usize) -> &[i32] {
         let before = plane.checked_sub(1).and_then(|before| self.magnitudes.get(before));
         before.map(Vec::as_slice).unwrap_or_default()
+    }
+
+    /// The sums of the three log-scales, which are there.
+    pub(crate) fn log_volumes(&self) -> &[i32] {
+        self.derived.log_volumes.get_or_init(|| {
+            let [a, b, c] = &self.log_scale;
+            let sum = |((&a, &b), &c): ((&i32, &i32), &i32)| {
+                limited(i64::from(a).wrapping_add(b.into()).wrapping_add(c.into()))
+            };
+            a.iter().zip(b).zip(c).map(sum).collect()
+        })
+    }
+
+    /// The largest log-scales less the smallest, which are there.
+    pub(crate) fn anisotropies(&self) -> &[i32] {
+        self.derived.anisotropies.get_or_init(|| {
+            let [a, _, c] = &self.log_scale;
+            let difference = |(&a, &c): (&i32, &i32)| limited(i64::from(a).wrapping_sub(c.into()));
+            a.iter().zip(c).map(difference).collect()
+        })
+    }
+
+    /// How far the neighbours in Morton order are.
+    pub(crate) fn spacings(&self) -> &[i32] {
+        self.derived.spacings.get_or_init(|| spacings(&self.deltas))
     }
 
     /// Gaussians in the block.

@@ -5,6 +5,7 @@ use crate::layout::ShCoding;
 use crate::steps::Exponents;
 use crate::vector::{Task, vectorized};
 use core::ops::RangeInclusive;
+use splatstream_format::entropy::machine::Machine;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::{Error, ErrorKind, Result};
 
@@ -31,16 +32,15 @@ pub struct Colour<'a> {
 }
 
 impl Colour<'_> {
-    /// Writes red, green, blue and the SH planes of a block to `out`. The components have been multiplied by their
-    /// steps; `of_entries` are those of sums of codebook entries.
+    /// Writes red, green, blue and the SH planes of a block to `out`. With a codebook, `sh` are indices, and its steps
+    /// are those of sums of entries.
     ///
     /// # Errors
     /// Invalid if a component or a colour is out of range or an index names no entry.
     pub fn reconstruct(
         &self,
-        dc: &[Vec<i32>],
-        sh: &[Vec<i32>],
-        of_entries: &Exponents,
+        dc: Components<'_>,
+        sh: Components<'_>,
         out: &mut [&mut [i32]],
         at: u64,
     ) -> Result<()> {
@@ -49,9 +49,8 @@ impl Colour<'_> {
         match (self.mode, self.sh) {
             (ShCoding::Coefficients { .. }, Some(transform)) => inverse(transform, sh, sh_out, at),
             (ShCoding::VectorQuantised { .. }, Some(transform)) => {
-                let entries = self.entries(sh, usize::from(transform.header.rank), at)?;
-                let components: Vec<_> = entries.iter().map(|plane| of_entries.scaled(plane)).collect();
-                inverse(transform, &components, sh_out, at)
+                let entries = self.entries(sh.coded, usize::from(transform.header.rank), at)?;
+                inverse(transform, Components { coded: &entries, biases: &[], ..sh }, sh_out, at)
             }
             _ => {
                 sh_out.iter_mut().for_each(|plane| plane.fill(0));
@@ -94,6 +93,40 @@ fn in_entries(stage: &[i32], largest: usize, at: u64) -> Result<()> {
     }
 }
 
+/// The components of some Gaussians, as they are coded.
+#[derive(Debug, Clone, Copy)]
+pub struct Components<'c> {
+    /// The coded values, plane by plane.
+    pub coded: &'c [Vec<i32>],
+    /// What is added to the values of each plane; planes without a bias have 0.
+    pub biases: &'c [i32],
+    /// The exponents of their steps, by which the sums are multiplied.
+    pub exponents: &'c Exponents,
+}
+
+impl<'c> Components<'c> {
+    /// Components that are known as they are.
+    pub const fn known(planes: &'c [Vec<i32>]) -> Self {
+        Self { coded: planes, biases: &[], exponents: &Exponents::Same(0) }
+    }
+
+    /// The planes with their biases.
+    #[inline(always)]
+    fn planes(&self) -> impl Iterator<Item = (&'c [i32], i32)> {
+        let biases = self.biases.iter().copied().chain(core::iter::repeat(0));
+        self.coded.iter().map(Vec::as_slice).zip(biases)
+    }
+
+    /// The error of the first component that is out of range, if there is one.
+    fn check(&self, at: u64) -> Result<()> {
+        self.planes().try_for_each(|(plane, bias)| {
+            let mut plane = plane.to_vec();
+            self.exponents.scale(&mut plane, bias);
+            in_range(&plane, &COMPONENT_RANGE, "component", "7.6.5", at)
+        })
+    }
+}
+
 /// `out_j = mean_j + Round(sum over k of basis[k][j] * component_k, 6)`.
 ///
 /// # Errors
@@ -101,7 +134,7 @@ fn in_entries(stage: &[i32], largest: usize, at: u64) -> Result<()> {
 /// the sum stays below 2^31.
 pub fn inverse(
     transform: &Transform,
-    components: &[Vec<i32>],
+    components: Components<'_>,
     out: &mut [&mut [i32]],
     at: u64,
 ) -> Result<()> {
@@ -122,24 +155,23 @@ pub fn add_inverse(
     out: &mut [&mut [i32]],
     at: u64,
 ) -> Result<()> {
+    let components = Components::known(components);
     transformed(transform, components, out, at, |predicted, _, change| predicted.wrapping_add(change))
 }
 
 /// Writes what `join` makes of the value in `out`, the mean and the transformed components.
 fn transformed(
     transform: &Transform,
-    components: &[Vec<i32>],
+    components: Components<'_>,
     out: &mut [&mut [i32]],
     at: u64,
     join: impl Fn(i32, i32, i32) -> i32,
 ) -> Result<()> {
-    let dimension = usize::from(transform.header.dimension);
-    for plane in components {
-        in_range(plane, &COMPONENT_RANGE, "component", "7.6.5", at)?;
-    }
-    let weights = weights(transform, dimension);
-    vectorized(Tiles { weights: &weights, means: &transform.mean, components, out, join });
-    Ok(())
+    let weights = weights(transform, usize::from(transform.header.dimension));
+    let mut in_range = true;
+    let means = &transform.mean;
+    vectorized(Tiles { weights: &weights, means, components, out, join, in_range: &mut in_range });
+    if in_range { Ok(()) } else { components.check(at) }
 }
 
 /// A pair of weights, or of components, in the halves of an `i32`: machines multiply both pairs and add the products in
@@ -162,29 +194,38 @@ fn weights(transform: &Transform, dimension: usize) -> Vec<Vec<i32>> {
     (0..dimension).map(of_axis).collect()
 }
 
-/// Colours, tile by tile: the sums of products of a tile stay in registers.
+/// Colours, tile by tile: the components of a tile are brought to their steps and checked while they are packed, and the
+/// sums of products stay in registers.
 struct Tiles<'t, 'o, F> {
     weights: &'t [Vec<i32>],
     means: &'t [i32],
-    components: &'t [Vec<i32>],
+    components: Components<'t>,
     out: &'t mut [&'o mut [i32]],
     join: F,
+    /// Becomes false if a component is out of range.
+    in_range: &'t mut bool,
 }
 
 impl<F: Fn(i32, i32, i32) -> i32> Task for Tiles<'_, '_, F> {
     #[inline(always)]
-    fn run(self) {
-        let Self { weights, means, components, out, join } = self;
+    fn run(self, _: impl Machine) {
+        let Self { weights, means, components, out, join, in_range } = self;
         let count = out.first().map_or(0, |plane| plane.len());
-        let mut tile = vec![[0_i32; TILE]; components.len().div_ceil(2)];
+        let mut tile = vec![[0_i32; TILE]; components.coded.len().div_ceil(2)];
+        let mut greatest = [0; TILE];
         for start in (0..count).step_by(TILE) {
-            for (tile, pair) in tile.iter_mut().zip(components.chunks(2)) {
-                let [first, second] = [0, 1].map(|index: usize| {
-                    pair.get(index).and_then(|plane| plane.get(start..)).unwrap_or_default()
-                });
-                // Components have 15 bits.
-                tile.iter_mut().zip(first).for_each(|(slot, &low)| *slot = low & 0xFFFF);
-                tile.iter_mut().zip(second).for_each(|(slot, &high)| *slot |= high.wrapping_shl(16));
+            let steps = components.exponents.steps(start);
+            for (number, (plane, bias)) in components.planes().enumerate() {
+                let values = scaled(plane, start, bias, &steps);
+                for (greatest, value) in greatest.iter_mut().zip(values) {
+                    *greatest = value.unsigned_abs().max(*greatest);
+                }
+                let Some(slots) = tile.get_mut(number / 2) else { continue };
+                // Components in range have 15 bits.
+                match number % 2 {
+                    0 => slots.iter_mut().zip(values).for_each(|(slot, low)| *slot = low & 0xFFFF),
+                    _ => slots.iter_mut().zip(values).for_each(|(slot, high)| *slot |= high.wrapping_shl(16)),
+                }
             }
             for ((plane, &mean), weights) in out.iter_mut().zip(means).zip(weights) {
                 let sums = tile_sums(weights, &tile);
@@ -193,7 +234,28 @@ impl<F: Fn(i32, i32, i32) -> i32> Task for Tiles<'_, '_, F> {
                 }
             }
         }
+        *in_range = greatest.iter().all(|&greatest| greatest <= COMPONENT_RANGE.end().unsigned_abs());
     }
+}
+
+/// The values of a tile with their bias, times the steps; 0 where there are none.
+#[inline(always)]
+fn scaled(plane: &[i32], start: usize, bias: i32, steps: &[i32; TILE]) -> [i32; TILE] {
+    let rest = plane.get(start..).unwrap_or_default();
+    let mut values = [0; TILE];
+    match rest.first_chunk::<TILE>() {
+        Some(rest) => {
+            for ((slot, &value), &step) in values.iter_mut().zip(rest).zip(steps) {
+                *slot = value.wrapping_add(bias).wrapping_mul(step);
+            }
+        }
+        None => {
+            for ((slot, &value), &step) in values.iter_mut().zip(rest).zip(steps) {
+                *slot = value.wrapping_add(bias).wrapping_mul(step);
+            }
+        }
+    }
+    values
 }
 
 /// The sums of the products of weights and components. With |weights| at most 4096 and at most 45 components they stay

@@ -5,7 +5,9 @@ use crate::stage::Stage;
 use crate::steps::Exponents;
 use splatstream_format::entropy::lanes::Segments;
 use splatstream_format::entropy::layout::PlaneInfo;
+use splatstream_format::entropy::machine::{Machine, WIDE};
 use splatstream_format::entropy::model::{AxisLookup, ContextAxis, Source};
+use splatstream_format::entropy::reader::vector;
 use std::borrow::Cow;
 
 pub(crate) mod lanes;
@@ -50,20 +52,14 @@ pub(crate) enum SourceValues<'b> {
     Same(i32),
     /// Those of a plane.
     Plane(&'b [i32]),
-    /// The sum of three planes.
-    Sum([&'b [i32]; 3]),
-    /// One plane less another.
-    Difference([&'b [i32]; 2]),
     /// Exponents of steps.
     Exponents(&'b [u8]),
-    /// How far the deltas before and after each entry are.
-    Spacing(&'b [u64]),
 }
 
 impl<'b> SourceValues<'b> {
     /// The values of a source for plane number `plane` of a block.
     pub(crate) fn of(source: Source, plane: usize, info: PlaneInfo, block: &'b CodedBlock) -> Self {
-        let [largest, middle, smallest] = block.log_scale.each_ref().map(Vec::as_slice);
+        let [largest, middle, _] = block.log_scale.each_ref().map(Vec::as_slice);
         match source {
             Source::None | Source::NeighbourSum | Source::NeighbourMagnitude => Self::Same(0),
             Source::PreviousPlane => {
@@ -73,10 +69,10 @@ impl<'b> SourceValues<'b> {
             Source::GroupMagnitude => Self::Plane(block.magnitudes_before(plane)),
             Source::LargestLogScale => Self::Plane(largest),
             Source::MiddleLogScale => Self::Plane(middle),
-            Source::LogVolume => Self::Sum([largest, middle, smallest]),
-            Source::Anisotropy => Self::Difference([largest, smallest]),
+            Source::LogVolume => Self::Plane(block.log_volumes()),
+            Source::Anisotropy => Self::Plane(block.anisotropies()),
             Source::Opacity => Self::Plane(&block.opacity),
-            Source::PositionSpacing => Self::Spacing(&block.deltas),
+            Source::PositionSpacing => Self::Plane(block.spacings()),
             Source::StepExponent => match Stage::of(info.attribute).map(|stage| block.exponents(stage)) {
                 None => Self::Same(0),
                 Some(Exponents::Same(exponent)) => Self::Same((*exponent).into()),
@@ -85,59 +81,62 @@ impl<'b> SourceValues<'b> {
         }
     }
 
-    /// Writes the values of the entries from `first` on to `out`, as many as it holds.
+    /// The values of eight entries of each of eight lanes, from `first` on; 0 where there are no entries.
     #[inline(always)]
-    pub(crate) fn write(&self, first: usize, out: &mut [i32]) {
-        let range = first..first.wrapping_add(out.len());
-        let of = |plane: &'b [i32]| plane.get(range.clone()).unwrap_or_default().iter().copied();
-        let wide = |plane: &'b [i32]| of(plane).map(i64::from);
+    pub(crate) fn vectors<M: Machine>(&self, machine: M, first: [usize; WIDE]) -> [M::V; WIDE] {
+        let mut vectors = [machine.splat(0); WIDE];
         match *self {
-            Self::Same(value) => out.fill(value),
-            Self::Plane(plane) => out.iter_mut().zip(of(plane)).for_each(|(slot, value)| *slot = value),
-            Self::Sum([a, b, c]) => {
-                for (slot, ((a, b), c)) in out.iter_mut().zip(wide(a).zip(wide(b)).zip(wide(c))) {
-                    *slot = limited(a.wrapping_add(b).wrapping_add(c));
-                }
-            }
-            Self::Difference([a, c]) => {
-                for (slot, (a, c)) in out.iter_mut().zip(wide(a).zip(wide(c))) {
-                    *slot = limited(a.wrapping_sub(c));
+            Self::Same(value) => vectors.fill(machine.splat(value.cast_unsigned())),
+            Self::Plane(plane) => {
+                for (slot, first) in vectors.iter_mut().zip(first) {
+                    *slot = vector(machine, &eight(plane, first));
                 }
             }
             Self::Exponents(exponents) => {
-                let exponents = exponents.get(range).unwrap_or_default();
-                out.iter_mut().zip(exponents).for_each(|(slot, &exponent)| *slot = exponent.into());
-            }
-            Self::Spacing(deltas) => {
-                let deltas = deltas.get(first..).unwrap_or_default();
-                let mut lengths = deltas.iter().map(|&delta| bit_length(delta));
-                let mut here = lengths.next().unwrap_or(0);
-                for (slot, next) in out.iter_mut().zip(lengths.chain([0])) {
-                    *slot = here.wrapping_add(next).cast_signed();
-                    here = next;
+                for (slot, first) in vectors.iter_mut().zip(first) {
+                    *slot = machine.load(eight(exponents, first).map(u32::from));
                 }
             }
         }
+        vectors
     }
 }
 
-/// The values of a source that is not serial for every entry of a block, known before `plane` is read.
+/// Eight values from `first` on; 0 where there are none.
+#[inline(always)]
+fn eight<T: Copy + Default>(plane: &[T], first: usize) -> [T; WIDE] {
+    let rest = plane.get(first..).unwrap_or_default();
+    match rest.first_chunk() {
+        Some(values) => *values,
+        None => last(rest),
+    }
+}
+
+#[cold]
+fn last<T: Copy + Default>(rest: &[T]) -> [T; WIDE] {
+    let mut values = [T::default(); WIDE];
+    values.iter_mut().zip(rest).for_each(|(slot, &value)| *slot = value);
+    values
+}
+
+/// The values of a source that is not serial for every entry of a block, known before `plane` is read; none of a serial
+/// source.
 pub fn values(source: Source, plane: usize, info: PlaneInfo, block: &CodedBlock) -> Cow<'_, [i32]> {
     match SourceValues::of(source, plane, info, block) {
-        SourceValues::Plane(plane) => plane.into(),
         _ if source == Source::None || is_serial(source) => Cow::default(),
-        source => {
-            let mut values = vec![0; block.len()];
-            source.write(0, &mut values);
-            values.into()
-        }
+        SourceValues::Plane(plane) => plane.into(),
+        SourceValues::Same(value) => vec![value; block.len()].into(),
+        SourceValues::Exponents(exponents) => exponents.iter().map(|&exponent| exponent.into()).collect(),
     }
 }
 
-/// A value as thresholds see it: these have 32 bits.
-#[inline(always)]
-fn limited(value: i64) -> i32 {
-    value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+/// How far the deltas before and after each entry are, in bits.
+pub(crate) fn spacings(deltas: &[u64]) -> Vec<i32> {
+    let lengths = || deltas.iter().map(|&delta| bit_length(delta));
+    lengths()
+        .zip(lengths().skip(1).chain([0]))
+        .map(|(here, next)| here.wrapping_add(next).cast_signed())
+        .collect()
 }
 
 /// The contexts of one axis for every entry; empty if the axis has no or a serial source.

@@ -7,6 +7,8 @@
 //! Nothing overflows: sizes are below 2^34, weights below 2^13, so that a sum of three products stays below 2^49.
 
 use crate::stage::Stage;
+use crate::vector::{Task, vectorized};
+use splatstream_format::entropy::machine::Machine;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, SequenceParameters};
 
 /// Exponents of steps, one more than the largest.
@@ -18,10 +20,12 @@ pub const STEPS: [i32; EXPONENTS] = [
     6144,
 ];
 
-/// The step of an exponent, which is at most 24.
+/// The step of an exponent, which is at most 24. Calculated, since vectors do that and tables keep them from it.
 #[inline(always)]
 pub fn step(exponent: u8) -> i32 {
-    STEPS.get(usize::from(exponent)).copied().unwrap_or(1)
+    let exponent = u32::from(exponent.min(MAX_ATTRIBUTE_STEP));
+    let odd = (exponent & 1).cast_signed();
+    odd.wrapping_add(3).wrapping_shl(exponent >> 1) >> 1
 }
 
 /// The size of a Gaussian: the sum of its two largest log-scales.
@@ -118,23 +122,114 @@ impl StepRule {
     /// The exponents of an attribute of Gaussians of which what comes before it is known; of log_scale, those of the
     /// two planes after the first. Planes that are not known yet may be empty.
     pub fn exponents(&self, stage: Stage, log_scale: [&[i32]; 3], opacity: &[i32]) -> Exponents {
-        let weight = |weights: &[i64; 5]| weights.get(stage as usize).copied().unwrap_or(0);
-        let of_anisotropy = if stage == Stage::Rotation { self.anisotropy_weight } else { 0 };
-        if weight(&self.size_weight) | weight(&self.opacity_weight) | of_anisotropy == 0 {
+        let sum = self.weighted(stage);
+        if sum.is_zero() {
             return Exponents::Same(self.announced.get(stage as usize).copied().unwrap_or(0));
         }
         let [largest, middle, smallest] = log_scale;
-        Exponents::Each(match stage {
-            Stage::LogScale => largest.iter().map(|&largest| self.of_log_scale(largest)).collect(),
-            Stage::Opacity => {
-                let shapes = largest.iter().zip(middle).zip(smallest);
-                shapes.map(|((&a, &b), &c)| self.of(stage, [a, b, c], 0)).collect()
-            }
-            _ => {
-                let known = largest.iter().zip(middle).zip(smallest).zip(opacity);
-                known.map(|(((&a, &b), &c), &opacity)| self.of(stage, [a, b, c], opacity)).collect()
-            }
+        let Some(narrow) = sum.narrow(log_scale, opacity) else {
+            return Exponents::Each(match stage {
+                Stage::LogScale => largest.iter().map(|&largest| self.of_log_scale(largest)).collect(),
+                Stage::Opacity => {
+                    let shapes = largest.iter().zip(middle).zip(smallest);
+                    shapes.map(|((&a, &b), &c)| self.of(stage, [a, b, c], 0)).collect()
+                }
+                _ => {
+                    let known = largest.iter().zip(middle).zip(smallest).zip(opacity);
+                    known.map(|(((&a, &b), &c), &opacity)| self.of(stage, [a, b, c], opacity)).collect()
+                }
+            });
+        };
+        let mut exponents = vec![0; largest.len()];
+        let planes = match stage {
+            // The size that matters is that of a disc of the largest log-scale, and nothing else is weighed.
+            Stage::LogScale => [largest, largest, largest, largest],
+            Stage::Opacity => [largest, middle, smallest, largest],
+            _ => [largest, middle, smallest, opacity],
+        };
+        vectorized(EachExponent { sum: narrow, planes, out: &mut exponents });
+        Exponents::Each(exponents)
+    }
+
+    /// The weighted sum of an attribute after log_scale.
+    fn weighted(&self, stage: Stage) -> WeightedSum<i64> {
+        let weight = |weights: &[i64; 5]| weights.get(stage as usize).copied().unwrap_or(0);
+        WeightedSum {
+            announced: self.announced.get(stage as usize).copied().unwrap_or(0).into(),
+            weights: [
+                weight(&self.size_weight),
+                weight(&self.opacity_weight),
+                if stage == Stage::Rotation { self.anisotropy_weight } else { 0 },
+            ],
+            references: [self.size_reference, self.opacity_reference, self.anisotropy_reference],
+        }
+    }
+}
+
+/// What is added to an exponent, Q14: of size, opacity and anisotropy how far each is below its reference, weighted.
+#[derive(Debug, Clone, Copy)]
+struct WeightedSum<T> {
+    announced: T,
+    weights: [T; 3],
+    references: [T; 3],
+}
+
+impl WeightedSum<i64> {
+    fn is_zero(&self) -> bool {
+        self.weights == [0; 3]
+    }
+
+    /// The same in 32 bits, unless values of these planes might overflow it.
+    fn narrow(&self, log_scale: [&[i32]; 3], opacity: &[i32]) -> Option<WeightedSum<i32>> {
+        let greatest =
+            |plane: &[i32]| plane.iter().fold(0, |greatest, value| value.unsigned_abs().max(greatest));
+        let of_scales = log_scale.map(greatest).into_iter().fold(0, u32::max);
+        // Sizes and anisotropies are of two log-scales.
+        let reaches = [
+            i64::from(of_scales).wrapping_mul(2),
+            greatest(opacity).into(),
+            i64::from(of_scales).wrapping_mul(2),
+        ];
+        let term = |((weight, reference), reach): ((i64, i64), i64)| {
+            weight.saturating_mul(reference.saturating_abs().saturating_add(reach))
+        };
+        let terms = self.weights.into_iter().zip(self.references).zip(reaches).map(term);
+        let most = terms.fold(1 << 14, i64::saturating_add);
+        let half = |value: i64| i32::try_from(value).ok().filter(|value| value.unsigned_abs() < 1 << 30);
+        let [a, b, c] = self.weights.map(half);
+        let [d, e, f] = self.references.map(half);
+        (most < 1 << 30 && of_scales < 1 << 28).then_some(())?;
+        Some(WeightedSum {
+            announced: half(self.announced)?,
+            weights: [a?, b?, c?],
+            references: [d?, e?, f?],
         })
+    }
+}
+
+/// The exponents of some Gaussians, from largest, middle and smallest log-scale and opacity.
+struct EachExponent<'p> {
+    sum: WeightedSum<i32>,
+    planes: [&'p [i32]; 4],
+    out: &'p mut [u8],
+}
+
+impl Task for EachExponent<'_> {
+    #[inline(always)]
+    fn run(self, _: impl Machine) {
+        let Self { sum: WeightedSum { announced, weights, references }, planes, out } = self;
+        let ([of_size, of_opacity, of_anisotropy], [size, opacity, anisotropy]) = (weights, references);
+        let [a, b, c, d] = planes;
+        for ((((slot, &a), &b), &c), &d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            let (least, greatest) = (a.min(b).min(c), a.max(b).max(c));
+            let below = size.wrapping_sub(a.wrapping_add(b).wrapping_add(c).wrapping_sub(least));
+            let fainter = opacity.wrapping_sub(d).max(0);
+            let rounder = anisotropy.wrapping_sub(greatest.wrapping_sub(least)).max(0);
+            let sum = of_size.wrapping_mul(below).wrapping_add(of_opacity.wrapping_mul(fainter));
+            let sum = sum.wrapping_add(of_anisotropy.wrapping_mul(rounder));
+            let exponent = announced.wrapping_add(sum.wrapping_add(1 << 13) >> 14);
+            *slot = exponent.clamp(0, MAX_ATTRIBUTE_STEP.into()) as u8;
+        }
     }
 }
 
@@ -146,6 +241,20 @@ impl Exponents {
             Self::Same(exponent) => *exponent,
             Self::Each(exponents) => exponents.get(row).copied().unwrap_or(0),
         }
+    }
+
+    /// The steps of the Gaussians from `first` on; 1 where there are none.
+    #[inline(always)]
+    pub(crate) fn steps<const COUNT: usize>(&self, first: usize) -> [i32; COUNT] {
+        let mut steps = [1; COUNT];
+        match self {
+            Self::Same(exponent) => steps.fill(step(*exponent)),
+            Self::Each(exponents) => {
+                let rest = exponents.get(first..).unwrap_or_default();
+                steps.iter_mut().zip(rest).for_each(|(slot, &exponent)| *slot = step(exponent));
+            }
+        }
+        steps
     }
 
     /// Adds a bias to coded values, and multiplies them by the steps. Values are below 2^17, so that products fit.
@@ -180,6 +289,9 @@ mod tests {
     #[test]
     fn the_steps_are_those_of_their_formula() {
         assert_eq!(STEPS[0], 1);
+        for (exponent, &step) in STEPS.iter().enumerate() {
+            assert_eq!(super::step(exponent as u8), step);
+        }
         for (exponent, &step) in STEPS.iter().enumerate().skip(1) {
             let thirds = i32::from((exponent + 1) % 2 == 1);
             assert_eq!(step, (2 + thirds) << ((exponent - 1) / 2), "{exponent}");

@@ -1,21 +1,22 @@
 //! Loops compiled for the vectors of the machine. What they compute is the same everywhere.
 
-use pulp::{Scalar, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
+use splatstream_format::entropy::machine::{Machine, Portable};
 
 /// A loop. What it calls is compiled for each kind of machine as far as it is inlined.
 pub(crate) trait Task {
     /// Runs the loop; `#[inline(always)]`.
-    fn run(self);
+    fn run(self, machine: impl Machine);
 }
 
-struct OnMachine<T>(T);
+struct OnMachine<T, M>(T, M);
 
-impl<T: Task> WithSimd for OnMachine<T> {
+impl<T: Task, M: Machine> WithSimd for OnMachine<T, M> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.0.run();
+        self.0.run(self.1);
     }
 }
 
@@ -23,8 +24,14 @@ impl<T: Task> WithSimd for OnMachine<T> {
 #[inline]
 pub(crate) fn vectorized(task: impl Task) {
     #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
-    if let Some(v3) = pulp::x86::V3::try_new() {
-        return Simd::vectorize(v3, OnMachine(task));
+    {
+        use splatstream_format::entropy::machine::Avx2;
+        if let Some(v4) = pulp::x86::V4::try_new() {
+            return Simd::vectorize(v4, OnMachine(task, Avx2(*v4)));
+        }
+        if let Some(v3) = pulp::x86::V3::try_new() {
+            return Simd::vectorize(v3, OnMachine(task, Avx2(v3)));
+        }
     }
-    Scalar::new().vectorize(OnMachine(task));
+    task.run(Portable);
 }

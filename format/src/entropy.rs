@@ -8,6 +8,7 @@ pub mod frequencies;
 pub mod in_force;
 pub mod lanes;
 pub mod layout;
+pub mod machine;
 pub mod model;
 pub mod parametric;
 pub mod reader;

@@ -2,8 +2,9 @@
 
 use arbitrary::{Result, Unstructured};
 use splatstream_format::entropy::frequencies::Frequencies;
+use splatstream_format::entropy::machine::Portable;
 use splatstream_format::entropy::model::{ContextAxis, PlaneModel, Source, read_models, write_models};
-use splatstream_format::entropy::reader::{BlockReader, KnownContexts, PlaneDecoder};
+use splatstream_format::entropy::reader::{BlockReader, Delta, Index, KnownContexts, PlaneDecoder, Signed};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 
@@ -139,16 +140,16 @@ fn read(reader: &mut BlockReader<'_>, plane: &Plane) -> Vec<u64> {
     let mut values = vec![0_i32; plane.contexts.len()];
     match plane.alphabet {
         Alphabet::Attribute => {
-            reader.signed(&decoder, &mut contexts, &mut values);
+            reader.plane::<Signed, _>(Portable, &decoder, &mut contexts, &mut values);
             values.into_iter().map(|value| zigzag(value).into()).collect()
         }
         Alphabet::Index => {
-            reader.indices(&decoder, &mut contexts, &mut values);
+            reader.plane::<Index, _>(Portable, &decoder, &mut contexts, &mut values);
             values.into_iter().map(|value| u64::from(value.cast_unsigned())).collect()
         }
         Alphabet::Position => {
             let mut deltas = vec![0; plane.contexts.len()];
-            reader.deltas(&decoder, &mut contexts, &mut deltas);
+            reader.plane::<Delta, _>(Portable, &decoder, &mut contexts, &mut deltas);
             deltas
         }
     }

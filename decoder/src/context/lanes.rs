@@ -1,11 +1,12 @@
 //! Contexts while a plane is decoded, for all lanes of a block together.
 
-use super::{DeltaNeighbours, SourceValues, is_serial, term};
+use super::{DeltaNeighbours, SourceValues, is_serial};
 use crate::coded_block::CodedBlock;
 use splatstream_format::entropy::MAX_LANES;
 use splatstream_format::entropy::layout::PlaneInfo;
+use splatstream_format::entropy::machine::{Machine, WIDE};
 use splatstream_format::entropy::model::{AxisLookup, Source};
-use splatstream_format::entropy::reader::{Contexts, PlaneDecoder};
+use splatstream_format::entropy::reader::{Contexts, PlaneDecoder, signed, vector};
 
 /// The contexts of a plane that is not of the position alphabet.
 pub(crate) struct PlaneContexts<'b> {
@@ -27,10 +28,10 @@ enum AxisValues<'b> {
 
 /// The sums of the last four values of each lane.
 struct Sums {
-    source: Source,
-    sums: [i32; MAX_LANES],
+    is_magnitude: bool,
+    sums: [[i32; WIDE]; MAX_LANES / WIDE],
     /// The terms of the last four steps, the oldest at `oldest`.
-    terms: [[i32; MAX_LANES]; 4],
+    terms: [[[i32; WIDE]; MAX_LANES / WIDE]; 4],
     oldest: usize,
 }
 
@@ -53,35 +54,30 @@ impl<'b> PlaneContexts<'b> {
     }
 }
 
-impl Contexts<i32> for PlaneContexts<'_> {
+impl<M: Machine> Contexts<M, i32> for PlaneContexts<'_> {
     #[inline(always)]
-    fn gather(&self, first: usize, contexts: &mut [u8]) {
+    fn add_known(&self, machine: M, first: [usize; WIDE], contexts: &mut [M::V; WIDE]) {
         for axis in &self.axes {
-            let AxisValues::Known(values) = &axis.values else { continue };
-            if let SourceValues::Plane(plane) = values {
-                axis.lookup.add_contexts(plane.get(first..).unwrap_or_default(), contexts);
-                continue;
+            if let AxisValues::Known(values) = &axis.values {
+                axis.lookup.add(machine, &values.vectors(machine, first), contexts);
             }
-            let mut of_axis = [0; MAX_LANES];
-            let of_axis = of_axis.get_mut(..contexts.len()).unwrap_or_default();
-            values.write(first, of_axis);
-            axis.lookup.add_contexts(of_axis, contexts);
         }
     }
 
     #[inline(always)]
-    fn complete(&self, contexts: &mut [u8]) {
+    fn add_serial<const GROUPS: usize>(&self, machine: M, contexts: &mut [M::V; GROUPS]) {
         for axis in &self.axes {
-            let AxisValues::Serial(sums) = &axis.values else { continue };
-            axis.lookup.add_contexts(&sums.sums, contexts);
+            if let AxisValues::Serial(sums) = &axis.values {
+                axis.lookup.add(machine, &sums.vectors(machine), contexts);
+            }
         }
     }
 
     #[inline(always)]
-    fn follow(&mut self, values: &[i32]) {
+    fn follow<const GROUPS: usize>(&mut self, machine: M, values: &[[i32; WIDE]; GROUPS]) {
         for axis in &mut self.axes {
             if let AxisValues::Serial(sums) = &mut axis.values {
-                sums.follow(values);
+                sums.follow(machine, values);
             }
         }
     }
@@ -89,16 +85,28 @@ impl Contexts<i32> for PlaneContexts<'_> {
 
 impl Sums {
     fn new(source: Source) -> Self {
-        Self { source, sums: [0; MAX_LANES], terms: [[0; MAX_LANES]; 4], oldest: 0 }
+        let none = [[0; WIDE]; MAX_LANES / WIDE];
+        Self { is_magnitude: source == Source::NeighbourMagnitude, sums: none, terms: [none; 4], oldest: 0 }
     }
 
     #[inline(always)]
-    fn follow(&mut self, values: &[i32]) {
+    fn vectors<M: Machine, const GROUPS: usize>(&self, machine: M) -> [M::V; GROUPS] {
+        let mut vectors = [machine.splat(0); GROUPS];
+        for (slot, sums) in vectors.iter_mut().zip(&self.sums) {
+            *slot = vector(machine, sums);
+        }
+        vectors
+    }
+
+    #[inline(always)]
+    fn follow<M: Machine, const GROUPS: usize>(&mut self, machine: M, values: &[[i32; WIDE]; GROUPS]) {
         let Some(oldest) = self.terms.get_mut(self.oldest & 3) else { return };
-        for ((sum, before), &value) in self.sums.iter_mut().zip(oldest).zip(values) {
-            let term = term(self.source, value);
-            *sum = sum.wrapping_add(term).wrapping_sub(*before);
-            *before = term;
+        for ((sums, before), values) in self.sums.iter_mut().zip(oldest).zip(values) {
+            let values = vector(machine, values);
+            let term = if self.is_magnitude { machine.magnitude(values) } else { values };
+            let change = machine.sub(term, vector(machine, before));
+            *sums = signed(machine, machine.add(vector(machine, sums), change));
+            *before = signed(machine, term);
         }
         self.oldest = self.oldest.wrapping_add(1);
     }
@@ -108,7 +116,7 @@ impl Sums {
 pub(crate) struct DeltaContexts<'b> {
     /// Each axis that has a source.
     axes: [Option<&'b AxisLookup>; 2],
-    neighbours: [DeltaNeighbours; MAX_LANES],
+    neighbours: [[DeltaNeighbours; WIDE]; MAX_LANES / WIDE],
 }
 
 impl<'b> DeltaContexts<'b> {
@@ -116,24 +124,29 @@ impl<'b> DeltaContexts<'b> {
         let [has_first, has_second] = decoder.axes().each_ref().map(|axis| axis.source != Source::None);
         let [first, second] = decoder.lookups();
         let axes = [has_first.then_some(first), has_second.then_some(second)];
-        Self { axes, neighbours: [DeltaNeighbours::default(); MAX_LANES] }
+        Self { axes, neighbours: [[DeltaNeighbours::default(); WIDE]; MAX_LANES / WIDE] }
     }
 }
 
-impl Contexts<u64> for DeltaContexts<'_> {
-    fn gather(&self, _: usize, _: &mut [u8]) {}
+impl<M: Machine> Contexts<M, u64> for DeltaContexts<'_> {
+    #[inline(always)]
+    fn add_known(&self, _: M, _: [usize; WIDE], _: &mut [M::V; WIDE]) {}
 
     #[inline(always)]
-    fn complete(&self, contexts: &mut [u8]) {
+    fn add_serial<const GROUPS: usize>(&self, machine: M, contexts: &mut [M::V; GROUPS]) {
+        let mut values = [machine.splat(0); GROUPS];
+        for (slot, neighbours) in values.iter_mut().zip(&self.neighbours) {
+            *slot = vector(machine, &neighbours.each_ref().map(DeltaNeighbours::value));
+        }
         for lookup in self.axes.iter().flatten() {
-            for (context, neighbours) in contexts.iter_mut().zip(&self.neighbours) {
-                *context = context.wrapping_add(lookup.context(neighbours.value()));
-            }
+            lookup.add(machine, &values, contexts);
         }
     }
 
     #[inline(always)]
-    fn follow(&mut self, values: &[u64]) {
-        self.neighbours.iter_mut().zip(values).for_each(|(neighbours, &delta)| neighbours.push(delta));
+    fn follow<const GROUPS: usize>(&mut self, _: M, values: &[[u64; WIDE]; GROUPS]) {
+        for (neighbours, values) in self.neighbours.iter_mut().zip(values) {
+            neighbours.iter_mut().zip(values).for_each(|(neighbours, &delta)| neighbours.push(delta));
+        }
     }
 }

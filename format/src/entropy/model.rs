@@ -1,6 +1,7 @@
 //! Clauses 5.12 and 8.5: the model of a plane - bias, token split, contexts, frequency tables.
 
 use super::frequencies::{Frequencies, mantissa, token_bits};
+use super::machine::Machine;
 use super::parametric::Parametric;
 use super::token::Alphabet;
 use crate::bits::{BitReader, BitWriter};
@@ -115,92 +116,57 @@ impl ContextAxis {
     }
 }
 
-/// Values looked up together.
-const RUN: usize = 16;
-/// Entries of a lookup table.
-const LOOKUP: usize = 1 << 12;
-
-/// The contexts of an axis, times a factor, as a table: one load in place of a comparison with each threshold.
+/// The contexts of an axis, times a factor, for many values at a time.
+///
+/// All values are compared with all thresholds: vectors do that faster than a search or a table does, both of which wait
+/// for memory or for a branch that no processor guesses.
 #[derive(Debug, Clone)]
 pub struct AxisLookup {
-    axis: ContextAxis,
+    thresholds: Vec<i32>,
     factor: u8,
-    /// The value of the first entry, which stands for all smaller values too.
-    least: i32,
-    /// That of the last entry that is used, which stands for all greater values too.
-    greatest: i32,
-    /// None: the thresholds are too far apart.
-    table: Option<Box<[u8; LOOKUP]>>,
 }
 
 impl AxisLookup {
     /// The contexts of an axis, times a factor. A plane has at most 64 contexts, so that no product is above 255.
     pub fn new(axis: &ContextAxis, factor: u8) -> Self {
-        let least = axis.thresholds.first().map_or(0, |&first| first.saturating_sub(1));
-        let greatest = axis.thresholds.last().copied().unwrap_or(0);
-        let last = i64::from(greatest).wrapping_sub(i64::from(least)).max(0);
-        let context = |value: i32| axis.context(value).wrapping_mul(factor);
-        let entries = usize::try_from(last).unwrap_or(usize::MAX);
-        let table = (entries < LOOKUP).then(|| {
-            let mut table = Box::new([0; LOOKUP]);
-            table.iter_mut().zip(least..=greatest).for_each(|(entry, value)| *entry = context(value));
-            table
-        });
-        Self { axis: axis.clone(), factor, least, greatest, table }
+        Self { thresholds: axis.thresholds.clone(), factor }
     }
 
     /// [`ContextAxis::context`] of the axis, times the factor.
     #[inline(always)]
     pub fn context(&self, value: i32) -> u8 {
-        match &self.table {
-            Some(table) => Self::entry(table, self.place(value)),
-            None => self.axis.context(value).wrapping_mul(self.factor),
+        let count = self.thresholds.iter().map(|&threshold| u8::from(threshold <= value));
+        count.fold(0, u8::wrapping_add).wrapping_mul(self.factor)
+    }
+
+    /// Adds the contexts of vectors of signed values to others.
+    ///
+    /// A loop and no closure: what is called in a closure is not compiled for the machine unless it is inlined.
+    #[inline(always)]
+    pub fn add<M: Machine, const COUNT: usize>(
+        &self,
+        machine: M,
+        values: &[M::V; COUNT],
+        contexts: &mut [M::V; COUNT],
+    ) {
+        let mut counts = [machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0)); COUNT];
+        for &threshold in &self.thresholds {
+            let threshold = machine.splat(threshold.cast_unsigned());
+            for (count, &value) in counts.iter_mut().zip(values) {
+                *count = machine.add(*count, machine.greater(threshold, value));
+            }
+        }
+        let factor = machine.splat(self.factor.into());
+        for (context, count) in contexts.iter_mut().zip(counts) {
+            *context = machine.add(*context, machine.mul(count, factor));
         }
     }
 
     /// Adds the contexts of some values to others.
-    #[inline(always)]
     pub fn add_contexts(&self, values: &[i32], contexts: &mut [u8]) {
-        match &self.table {
-            Some(table) => {
-                let length = contexts.len().min(values.len());
-                let (values, last_values) = values.get(..length).unwrap_or_default().as_chunks();
-                let (slots, last_slots) = contexts.as_chunks_mut();
-                for (slots, values) in slots.iter_mut().zip(values) {
-                    self.add_run(table, values, slots);
-                }
-                for (slot, &value) in last_slots.iter_mut().zip(last_values) {
-                    *slot = slot.wrapping_add(Self::entry(table, self.place(value)));
-                }
-            }
-            None => {
-                for (slot, &value) in contexts.iter_mut().zip(values) {
-                    *slot = slot.wrapping_add(self.axis.context(value).wrapping_mul(self.factor));
-                }
-            }
+        for (slot, &value) in contexts.iter_mut().zip(values) {
+            *slot = slot.wrapping_add(self.context(value));
         }
-    }
-
-    /// The numbers of a run of entries first, which vectors compute: branches on values would be guessed wrong.
-    #[inline(always)]
-    fn add_run(&self, table: &[u8; LOOKUP], values: &[i32; RUN], slots: &mut [u8; RUN]) {
-        let places = values.map(|value| self.place(value));
-        for (slot, place) in slots.iter_mut().zip(places) {
-            *slot = slot.wrapping_add(Self::entry(table, place));
-        }
-    }
-
-    /// The number of the entry of a value.
-    #[inline(always)]
-    fn place(&self, value: i32) -> u32 {
-        value.max(self.least).min(self.greatest).wrapping_sub(self.least).cast_unsigned()
-    }
-
-    /// An entry; its number is below the length of the table, so that nothing is checked.
-    #[inline(always)]
-    fn entry(table: &[u8; LOOKUP], place: u32) -> u8 {
-        let index = usize::try_from(place & 0xFFF).unwrap_or(0);
-        table.get(index).copied().unwrap_or(0)
     }
 }
 

@@ -4,14 +4,15 @@
 //! independent chains. Some steps make a tile. Before a tile, what is known beforehand of its contexts is gathered lane
 //! by lane; after it, its values are handed on lane by lane: memory is only touched in runs.
 
-use super::frequencies::Frequencies;
 use super::lanes::Segments;
+use super::machine::{Machine, WIDE};
 use super::model::{AxisLookup, ContextAxis, PlaneModel};
 use super::token::{join, unzigzag};
 use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
 use crate::bits::BitReader;
 use crate::payload::leb128;
 use crate::{Error, ErrorKind, Result};
+use core::ops::Range;
 
 /// Slots of a table.
 const SLOTS: usize = 4096;
@@ -19,11 +20,6 @@ const SLOTS: usize = 4096;
 const TOKENS: usize = 256;
 /// Contexts of a plane, at most.
 const CONTEXTS: usize = 64;
-/// Slots of a table, on average, from which on raw bits are expected of every symbol: below, that a symbol has some is
-/// a branch that is seldom taken.
-const MANY_RAW: u64 = 400;
-/// Steps of a tile.
-const TILE: usize = 16;
 
 /// A plane model arranged for decoding. Built once a unit, shared by its blocks.
 #[derive(Debug, Clone)]
@@ -38,8 +34,6 @@ pub struct PlaneDecoder {
     value_of_token: Box<[(u64, u32); TOKENS]>,
     /// Tokens below this one are values, and have no raw bits.
     direct: u32,
-    /// Whether many of the symbols have raw bits.
-    is_raw: bool,
 }
 
 /// A frequency table, by slot and by token.
@@ -51,6 +45,18 @@ struct Table {
 }
 
 impl Table {
+    #[inline(always)]
+    fn token(&self, slot: u32) -> u32 {
+        let slot = usize::try_from(slot & 0xFFF).unwrap_or(0);
+        self.token_of_slot.get(slot).copied().unwrap_or(0).into()
+    }
+
+    #[inline(always)]
+    fn interval(&self, token: u32) -> u32 {
+        let token = usize::try_from(token & 0xFF).unwrap_or(0);
+        self.interval_of_token.get(token).copied().unwrap_or(0)
+    }
+
     fn new(of_token: &[u16]) -> Self {
         let mut table = Self { token_of_slot: [0; SLOTS], interval_of_token: [0; TOKENS] };
         let mut slots = table.token_of_slot.iter_mut();
@@ -75,12 +81,6 @@ impl PlaneDecoder {
         for (token, value) in (0..=u8::MAX).zip(value_of_token.iter_mut()) {
             *value = join(token, model.direct_log2);
         }
-        let direct = 1_u32.wrapping_shl(model.direct_log2.into());
-        let of_raw = |table: &Frequencies| -> u64 {
-            let direct = usize::try_from(direct).unwrap_or(usize::MAX);
-            table.of_token().iter().skip(direct).map(|&frequency| u64::from(frequency)).sum()
-        };
-        let raw: u64 = model.tables.iter().map(of_raw).sum();
         let [first, second] = &model.axes;
         let second_contexts = u8::try_from(second.contexts()).unwrap_or(u8::MAX);
         Self {
@@ -90,14 +90,20 @@ impl PlaneDecoder {
             table_of_context,
             tables: model.tables.iter().map(|table| Table::new(table.of_token())).collect(),
             value_of_token,
-            direct,
-            is_raw: raw > u64::try_from(model.tables.len()).unwrap_or(0).saturating_mul(MANY_RAW),
+            direct: 1_u32.wrapping_shl(model.direct_log2.into()),
         }
     }
 
     /// What is added to the coded values.
     pub fn bias(&self) -> i32 {
         self.bias
+    }
+
+    /// The smallest value of a token and its number of raw bits.
+    #[inline(always)]
+    fn value(&self, token: u32) -> (u64, u32) {
+        let token = usize::try_from(token & 0xFF).unwrap_or(0);
+        self.value_of_token.get(token).copied().unwrap_or((0, 0))
     }
 
     /// The two context axes.
@@ -112,30 +118,141 @@ impl PlaneDecoder {
 }
 
 /// The contexts of the symbols of a plane.
-pub trait Contexts<V> {
-    /// Adds what is known beforehand of the contexts of the entries from `first` on to `contexts`, one for each.
-    fn gather(&self, first: usize, contexts: &mut [u8]);
+pub trait Contexts<M: Machine, V> {
+    /// Adds what is known beforehand of the contexts of eight entries of each of eight lanes: the entries at `first` and
+    /// those after them. What is added for entries that there are not means nothing.
+    fn add_known(&self, machine: M, first: [usize; WIDE], contexts: &mut [M::V; WIDE]);
 
-    /// Adds what follows from the values before to the contexts of a step, one for each lane.
-    fn complete(&self, contexts: &mut [u8]);
+    /// Adds what follows from the values before to the contexts of a step.
+    fn add_serial<const GROUPS: usize>(&self, machine: M, contexts: &mut [M::V; GROUPS]);
 
-    /// Learns the values of a step, one for each lane.
-    fn follow(&mut self, values: &[V]);
+    /// Learns the values of a step; those of lanes that have no entry mean nothing.
+    fn follow<const GROUPS: usize>(&mut self, machine: M, values: &[[V; WIDE]; GROUPS]);
 }
 
 /// Contexts that are known beforehand, one for each entry; none are all 0.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownContexts<'c>(pub &'c [u8]);
 
-impl<V> Contexts<V> for KnownContexts<'_> {
-    fn gather(&self, first: usize, contexts: &mut [u8]) {
-        let known = self.0.get(first..).unwrap_or_default();
-        contexts.iter_mut().zip(known).for_each(|(slot, &context)| *slot = context);
+impl<M: Machine, V> Contexts<M, V> for KnownContexts<'_> {
+    #[inline(always)]
+    fn add_known(&self, machine: M, first: [usize; WIDE], contexts: &mut [M::V; WIDE]) {
+        for (slot, first) in contexts.iter_mut().zip(first) {
+            let mut of_lane = [0; WIDE];
+            let known = self.0.get(first..).unwrap_or_default();
+            of_lane.iter_mut().zip(known).for_each(|(slot, &context)| *slot = context.into());
+            *slot = machine.add(*slot, machine.load(of_lane));
+        }
     }
 
-    fn complete(&self, _: &mut [u8]) {}
+    #[inline(always)]
+    fn add_serial<const GROUPS: usize>(&self, _: M, _: &mut [M::V; GROUPS]) {}
 
-    fn follow(&mut self, _: &[V]) {}
+    #[inline(always)]
+    fn follow<const GROUPS: usize>(&mut self, _: M, _: &[[V; WIDE]; GROUPS]) {}
+}
+
+/// What an unsigned value stands for.
+pub trait Symbol: Copy {
+    /// What is stored.
+    type Stored: Copy + Default;
+
+    /// Of values that are their own tokens.
+    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [Self::Stored; WIDE];
+
+    /// Of any value.
+    fn of_value(value: u64) -> Self::Stored;
+
+    /// Row i of the result has value i of every row.
+    fn transpose<M: Machine>(machine: M, rows: [[Self::Stored; WIDE]; WIDE]) -> [[Self::Stored; WIDE]; WIDE];
+}
+
+/// Signed values, 4.5.
+#[derive(Debug, Clone, Copy)]
+pub struct Signed;
+/// Indices into a codebook.
+#[derive(Debug, Clone, Copy)]
+pub struct Index;
+/// Morton deltas.
+#[derive(Debug, Clone, Copy)]
+pub struct Delta;
+
+impl Symbol for Signed {
+    type Stored = i32;
+
+    #[inline(always)]
+    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [i32; WIDE] {
+        let sign = machine.sub(machine.splat(0), machine.and(tokens, machine.splat(1)));
+        signed(machine, machine.xor(machine.shr::<1>(tokens), sign))
+    }
+
+    #[inline(always)]
+    fn of_value(value: u64) -> i32 {
+        unzigzag(low_half(value))
+    }
+
+    #[inline(always)]
+    fn transpose<M: Machine>(machine: M, rows: [[i32; WIDE]; WIDE]) -> [[i32; WIDE]; WIDE] {
+        let (mut vectors, mut columns) = ([machine.splat(0); WIDE], rows);
+        for (slot, row) in vectors.iter_mut().zip(&rows) {
+            *slot = vector(machine, row);
+        }
+        for (slot, column) in columns.iter_mut().zip(machine.transpose(vectors)) {
+            *slot = signed(machine, column);
+        }
+        columns
+    }
+}
+
+impl Symbol for Index {
+    type Stored = i32;
+
+    #[inline(always)]
+    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [i32; WIDE] {
+        signed(machine, tokens)
+    }
+
+    #[inline(always)]
+    fn of_value(value: u64) -> i32 {
+        low_half(value).cast_signed()
+    }
+
+    #[inline(always)]
+    fn transpose<M: Machine>(machine: M, rows: [[i32; WIDE]; WIDE]) -> [[i32; WIDE]; WIDE] {
+        Signed::transpose(machine, rows)
+    }
+}
+
+impl Symbol for Delta {
+    type Stored = u64;
+
+    #[inline(always)]
+    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [u64; WIDE] {
+        machine.store(tokens).map(u64::from)
+    }
+
+    #[inline(always)]
+    fn of_value(value: u64) -> u64 {
+        value
+    }
+
+    #[inline(always)]
+    fn transpose<M: Machine>(_: M, rows: [[u64; WIDE]; WIDE]) -> [[u64; WIDE]; WIDE] {
+        let column = |index: usize| rows.map(|row| row.get(index).copied().unwrap_or(0));
+        core::array::from_fn(column)
+    }
+}
+
+/// A vector of signed values.
+#[inline(always)]
+pub fn vector<M: Machine>(machine: M, values: &[i32; WIDE]) -> M::V {
+    machine.load(values.map(i32::cast_unsigned))
+}
+
+/// The values of a vector, signed.
+#[inline(always)]
+pub fn signed<M: Machine>(machine: M, values: M::V) -> [i32; WIDE] {
+    machine.store(values).map(u32::cast_signed)
 }
 
 /// Reads the symbols of one block, plane by plane.
@@ -143,7 +260,7 @@ impl<V> Contexts<V> for KnownContexts<'_> {
 /// Running out of words or bits is remembered and reported by [`BlockReader::finish`].
 #[derive(Debug)]
 pub struct BlockReader<'a> {
-    states: [u32; MAX_LANES],
+    states: [[u32; WIDE]; MAX_LANES / WIDE],
     lanes_log2: u8,
     words: Words<'a>,
     raw: BitReader<'a>,
@@ -159,14 +276,21 @@ struct Words<'a> {
 }
 
 impl Words<'_> {
-    /// The next word is taken only if the state is below its bound: a choice of values, not a branch, for
-    /// no processor guesses it.
+    /// The next words, as many as lanes of a vector may take.
     #[inline(always)]
-    fn refill(&mut self, state: u32) -> u32 {
-        let word = self.words.get(self.next).map_or(0, |bytes| u16::from_le_bytes(*bytes));
-        let low = state < STATE_LOW;
-        self.next = self.next.wrapping_add(usize::from(low));
-        if low { state.wrapping_shl(16) | u32::from(word) } else { state }
+    fn ahead(&self) -> [u16; WIDE] {
+        let rest = self.words.get(self.next..).unwrap_or_default();
+        match rest.first_chunk::<WIDE>() {
+            Some(words) => words.map(u16::from_le_bytes),
+            None => Self::last(rest),
+        }
+    }
+
+    #[cold]
+    fn last(rest: &[[u8; 2]]) -> [u16; WIDE] {
+        let mut words = [0; WIDE];
+        words.iter_mut().zip(rest).for_each(|(word, bytes)| *word = u16::from_le_bytes(*bytes));
+        words
     }
 
     fn are_spent(&self) -> bool {
@@ -186,8 +310,8 @@ impl<'a> BlockReader<'a> {
         let (states_bytes, rest) = rest.split_at_checked(lanes.wrapping_mul(4)).ok_or(short("state"))?;
         let word_bytes = usize::try_from(word_count).ok().and_then(|count| count.checked_mul(2));
         let (bytes, raw) = word_bytes.and_then(|count| rest.split_at_checked(count)).ok_or(short("word"))?;
-        let mut states = [STATE_LOW; MAX_LANES];
-        for (state, bytes) in states.iter_mut().zip(states_bytes.chunks_exact(4)) {
+        let mut states = [[STATE_LOW; WIDE]; MAX_LANES / WIDE];
+        for (state, bytes) in states.as_flattened_mut().iter_mut().zip(states_bytes.chunks_exact(4)) {
             *state = bytes.try_into().map_or(0, u32::from_le_bytes);
             if *state < STATE_LOW {
                 return Err(Error::new(at, "8.4", ErrorKind::EntropyFinalState));
@@ -199,121 +323,124 @@ impl<'a> BlockReader<'a> {
         Ok(Self { states, lanes_log2, words: Words { words, next: 0 }, raw: BitReader::new(raw), at, raw_at })
     }
 
-    /// Reads one plane of as many values as `out` holds. `map` turns the unsigned value into what is stored; the stored
-    /// value is what `contexts` sees.
+    /// Reads one plane of as many values as `out` holds; what is stored is what `contexts` sees.
     #[inline(always)]
-    fn plane<V: Copy + Default>(
+    pub fn plane<S: Symbol, M: Machine>(
         &mut self,
+        machine: M,
         decoder: &PlaneDecoder,
-        contexts: &mut impl Contexts<V>,
-        map: impl Fn(u64) -> V + Copy,
-        out: &mut [V],
+        contexts: &mut impl Contexts<M, S::Stored>,
+        out: &mut [S::Stored],
     ) {
         let Some(first_table) = decoder.tables.first() else { return };
         let mut tables = [first_table; CONTEXTS];
         for (table, &number) in tables.iter_mut().zip(&decoder.table_of_context) {
             *table = decoder.tables.get(usize::from(number)).unwrap_or(first_table);
         }
-        match decoder.is_raw {
-            true => self.tiles::<V, true>(decoder, &tables, contexts, map, out),
-            false => self.tiles::<V, false>(decoder, &tables, contexts, map, out),
+        let plane = Plane { machine, decoder, tables };
+        match self.lanes_log2 {
+            5.. => self.tiles::<S, M, 4>(&plane, contexts, out),
+            4 => self.tiles::<S, M, 2>(&plane, contexts, out),
+            _ => self.tiles::<S, M, 1>(&plane, contexts, out),
         }
     }
 
     /// The tiles of a plane, one after the other.
     #[inline(always)]
-    fn tiles<V: Copy + Default, const RAW: bool>(
+    fn tiles<S: Symbol, M: Machine, const GROUPS: usize>(
         &mut self,
-        decoder: &PlaneDecoder,
-        tables: &[&Table; CONTEXTS],
-        contexts: &mut impl Contexts<V>,
-        map: impl Fn(u64) -> V + Copy,
-        out: &mut [V],
+        plane: &Plane<'_, M>,
+        contexts: &mut impl Contexts<M, S::Stored>,
+        out: &mut [S::Stored],
     ) {
+        let machine = plane.machine;
         let segments = Segments::new(out.len(), self.lanes_log2);
-        let mut values = [[V::default(); MAX_LANES]; TILE];
-        for start in (0..segments.length()).step_by(TILE) {
-            let mut known = [[0; TILE]; MAX_LANES];
-            for (lane, known) in (0..segments.lanes()).zip(&mut known) {
-                let range = segments.entries(lane, start, TILE);
-                contexts.gather(range.start, known.get_mut(..range.len()).unwrap_or_default());
+        let lanes: [[Range<usize>; WIDE]; GROUPS] = core::array::from_fn(|group| {
+            let first = group.wrapping_mul(WIDE);
+            core::array::from_fn(|lane| segments.entries(first.wrapping_add(lane), 0, usize::MAX))
+        });
+        let mut values = [[[S::Stored::default(); WIDE]; WIDE]; GROUPS];
+        let mut known = [[machine.splat(0); WIDE]; GROUPS];
+        for start in (0..segments.length()).step_by(WIDE) {
+            for (known, lanes) in known.iter_mut().zip(&lanes) {
+                let first = lanes.each_ref().map(|lane| lane.start.wrapping_add(start));
+                let mut rows = [machine.splat(0); WIDE];
+                contexts.add_known(machine, first, &mut rows);
+                *known = machine.transpose(rows);
             }
-            for (index, values) in values.iter_mut().enumerate().take(segments.length().wrapping_sub(start)) {
-                let active = segments.active(start.wrapping_add(index));
-                let values = values.get_mut(..active).unwrap_or_default();
-                let mut of_step = [0; MAX_LANES];
-                for (context, known) in of_step.iter_mut().zip(&known) {
-                    *context = known.get(index).copied().unwrap_or(0);
+            for step in 0..WIDE.min(segments.length().wrapping_sub(start)) {
+                let mut of_step = [machine.splat(0); GROUPS];
+                for (of_step, known) in of_step.iter_mut().zip(&known) {
+                    known.get(step).into_iter().for_each(|&known| *of_step = known);
                 }
-                let of_step = of_step.get_mut(..active).unwrap_or_default();
-                contexts.complete(of_step);
-                self.step::<V, RAW>(decoder, tables, of_step, map, values);
-                contexts.follow(values);
+                contexts.add_serial(machine, &mut of_step);
+                let active = segments.active(start.wrapping_add(step));
+                let decoded = self.step::<S, M, GROUPS>(plane, of_step, active);
+                contexts.follow(machine, &decoded);
+                for (values, decoded) in values.iter_mut().zip(decoded) {
+                    values.get_mut(step).into_iter().for_each(|slot| *slot = decoded);
+                }
             }
-            for lane in 0..segments.lanes().min(MAX_LANES) {
-                let entries = out.get_mut(segments.entries(lane, start, TILE)).unwrap_or_default();
-                for (slot, values) in entries.iter_mut().zip(&values) {
-                    *slot = values.get(lane).copied().unwrap_or_default();
+            for (rows, lanes) in values.iter().zip(&lanes) {
+                for (lane, column) in lanes.iter().zip(&S::transpose(machine, *rows)) {
+                    let rest = lane.start.wrapping_add(start)..lane.end;
+                    let entries = out.get_mut(rest).unwrap_or_default();
+                    match entries.first_chunk_mut() {
+                        Some(entries) => *entries = *column,
+                        None => entries.iter_mut().zip(column).for_each(|(slot, &value)| *slot = value),
+                    }
                 }
             }
         }
     }
 
-    /// One symbol of each lane. Each loop does a part of the work for all lanes: loads that are slow wait together, and
-    /// vectors do what has no loads.
+    /// One symbol of each lane below `active`; the values of other lanes mean nothing. Each loop does a part of the work for
+    /// all lanes: loads that are slow wait together.
     #[inline(always)]
-    fn step<V, const RAW: bool>(
+    fn step<S: Symbol, M: Machine, const GROUPS: usize>(
         &mut self,
-        decoder: &PlaneDecoder,
-        tables: &[&Table; CONTEXTS],
-        contexts: &[u8],
-        map: impl Fn(u64) -> V,
-        values: &mut [V],
-    ) {
-        let (mut tokens, mut intervals) = ([0_u32; MAX_LANES], [0_u32; MAX_LANES]);
-        let symbols = tokens.iter_mut().zip(&mut intervals);
-        for (((token, interval), &state), &context) in symbols.zip(&self.states).zip(contexts) {
-            // Every index is below the length of its array: nothing is checked.
-            let Some(table) = tables.get(usize::from(context & 63)) else { continue };
-            let slot = usize::try_from(state & 0xFFF).unwrap_or(0);
-            let found = table.token_of_slot.get(slot).copied().unwrap_or(0);
-            *interval = table.interval_of_token.get(usize::from(found)).copied().unwrap_or(0);
-            *token = found.into();
+        plane: &Plane<'_, M>,
+        contexts: [M::V; GROUPS],
+        active: usize,
+    ) -> [[S::Stored; WIDE]; GROUPS] {
+        let machine = plane.machine;
+        let mut symbols = [([0_u32; WIDE], [0_u32; WIDE]); GROUPS];
+        for ((symbols, states), contexts) in symbols.iter_mut().zip(&self.states).zip(contexts) {
+            let slots = machine.store(machine.and(machine.load(*states), machine.splat(0xFFF)));
+            *symbols = plane.find(slots, machine.store(contexts));
         }
-        // Copies, so that the loop keeps them in registers.
-        let (mut words, mut raw) = (self.words, self.raw);
-        let states = self.states.iter_mut().zip(tokens.iter().zip(&intervals));
-        for ((state, (&token, &interval)), value) in states.zip(values) {
-            let [first, frequency] = [interval & 0xFFFF, interval >> 16];
-            let next = frequency.wrapping_mul(state.wrapping_shr(FREQUENCY_BITS));
-            *state = words.refill(next.wrapping_add(*state & 0xFFF).wrapping_sub(first));
-            *value = map(if RAW || token >= decoder.direct {
-                let index = usize::try_from(token & 0xFF).unwrap_or(0);
-                let (least, raw_bits) = decoder.value_of_token.get(index).copied().unwrap_or((0, 0));
-                least.wrapping_add(raw.bits(raw_bits))
-            } else {
-                token.into()
-            });
+        let mut lane_of_group = machine.load([0, 1, 2, 3, 4, 5, 6, 7]);
+        let active_lanes = machine.splat(u32::try_from(active).unwrap_or(0));
+        let mut is_split = machine.splat(0);
+        let last_direct = machine.splat(plane.decoder.direct.wrapping_sub(1));
+        for (states, (tokens, intervals)) in self.states.iter_mut().zip(&symbols) {
+            let state = machine.load(*states);
+            let interval = machine.load(*intervals);
+            let first = machine.and(interval, machine.splat(0xFFFF));
+            let rest = machine.sub(machine.and(state, machine.splat(0xFFF)), first);
+            let product = machine
+                .mul(machine.shr::<16>(interval), machine.shr::<{ FREQUENCY_BITS.cast_signed() }>(state));
+            let mask = machine.greater(active_lanes, lane_of_group);
+            let (next, taken) = machine.advance(state, machine.add(product, rest), mask, &self.words.ahead());
+            *states = machine.store(next);
+            self.words.next = self.words.next.wrapping_add(taken);
+            let split = machine.greater(machine.load(*tokens), last_direct);
+            is_split = machine.or(is_split, machine.and(split, mask));
+            lane_of_group = machine.add(lane_of_group, machine.splat(8));
         }
-        (self.words, self.raw) = (words, raw);
-    }
-
-    /// Reads signed values.
-    #[inline(always)]
-    pub fn signed(&mut self, decoder: &PlaneDecoder, contexts: &mut impl Contexts<i32>, out: &mut [i32]) {
-        self.plane(decoder, contexts, |value| unzigzag(low_half(value)), out);
-    }
-
-    /// Reads codebook indices.
-    #[inline(always)]
-    pub fn indices(&mut self, decoder: &PlaneDecoder, contexts: &mut impl Contexts<i32>, out: &mut [i32]) {
-        self.plane(decoder, contexts, |value| low_half(value).cast_signed(), out);
-    }
-
-    /// Reads Morton deltas.
-    #[inline(always)]
-    pub fn deltas(&mut self, decoder: &PlaneDecoder, contexts: &mut impl Contexts<u64>, out: &mut [u64]) {
-        self.plane(decoder, contexts, |value| value, out);
+        let mut values = [[S::Stored::default(); WIDE]; GROUPS];
+        for (values, (tokens, _)) in values.iter_mut().zip(&symbols) {
+            *values = S::of_tokens(machine, machine.load(*tokens));
+        }
+        if machine.any(is_split) {
+            let tokens = symbols.iter().flat_map(|(tokens, _)| tokens);
+            let split = values.as_flattened_mut().iter_mut().zip(tokens).take(active);
+            for (value, &token) in split.filter(|&(_, &token)| token >= plane.decoder.direct) {
+                let (least, raw_bits) = plane.decoder.value(token);
+                *value = S::of_value(least.wrapping_add(self.raw.bits(raw_bits)));
+            }
+        }
+        values
     }
 
     /// Checks that the block ends here: every state back at its start, words and bits used up.
@@ -321,12 +448,42 @@ impl<'a> BlockReader<'a> {
     /// # Errors
     /// Malformed otherwise.
     pub fn finish(self) -> Result<()> {
-        let spent = self.states.iter().all(|&state| state == STATE_LOW);
+        let spent = self.states.as_flattened().iter().all(|&state| state == STATE_LOW);
         // Raw bits that were not there are the first thing that went wrong.
         if !self.raw.overran() && (!spent || !self.words.are_spent()) {
             return Err(Error::new(self.at, "8.4", ErrorKind::EntropyFinalState));
         }
         self.raw.finish(self.raw_at, "raw_bits", "8.4")
+    }
+}
+
+/// A plane to be read.
+struct Plane<'d, M> {
+    machine: M,
+    decoder: &'d PlaneDecoder,
+    /// The table of each context.
+    tables: [&'d Table; CONTEXTS],
+}
+
+impl<M> Plane<'_, M> {
+    /// The tokens of slots, and their intervals. Every index here is below the length of its array: nothing is checked.
+    #[inline(always)]
+    fn find(&self, slots: [u32; WIDE], contexts: [u32; WIDE]) -> ([u32; WIDE], [u32; WIDE]) {
+        const NONE: &Table = &Table { token_of_slot: [0; SLOTS], interval_of_token: [0; TOKENS] };
+        let table = |context: u32| -> &Table {
+            let context = usize::try_from(context & 63).unwrap_or(0);
+            self.tables.get(context).copied().unwrap_or(NONE)
+        };
+        let tables = contexts.map(table);
+        let mut tokens = slots;
+        for (token, table) in tokens.iter_mut().zip(tables) {
+            *token = table.token(*token);
+        }
+        let mut intervals = tokens;
+        for (interval, table) in intervals.iter_mut().zip(tables) {
+            *interval = table.interval(*interval);
+        }
+        (tokens, intervals)
     }
 }
 
