@@ -149,7 +149,7 @@ fn colours(bencher: Bencher, rank: u8) {
     let mut out = vec![vec![0; BLOCK]; dimension];
     bencher.counter(ItemsCount::new(BLOCK)).bench_local(|| {
         let mut planes: Vec<&mut [i32]> = out.iter_mut().map(Vec::as_mut_slice).collect();
-        colour::inverse(&transform, black_box(&components), &mut planes, 0).unwrap();
+        colour::add_inverse(&transform, black_box(&components), &mut planes, 0).unwrap();
     });
 }
 

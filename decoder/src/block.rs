@@ -1,20 +1,20 @@
 //! A block: coded planes in, integer attributes out. Blocks are independent, so all cores decode one frame.
 
-use crate::attribute::{self, ATTRIBUTE_RANGE, in_range};
 use crate::coded_block::{Buffers, CodedBlock};
-use crate::colour::{Colour, Components};
+use crate::colour::Colour;
 use crate::context::lanes::{DeltaContexts, PlaneContexts};
 use crate::frame::FrameSlice;
-use crate::layout::{Attribute, Layout, PlaneInfo};
-use crate::position;
+use crate::layout::{Layout, PlaneInfo};
 use crate::steps::StepRule;
 use crate::vector::{Task, vectorized};
-use core::ops::Range;
+use reconstruction::Reconstruction;
 use splatstream_format::Result;
 use splatstream_format::entropy::machine::Machine;
 use splatstream_format::entropy::model::Source;
 use splatstream_format::entropy::reader::{BlockReader, Delta, Index, PlaneDecoder, Signed};
 use splatstream_format::entropy::token::Alphabet;
+
+mod reconstruction;
 
 /// What the elements of the sequence and of the unit say about every block of the unit.
 #[derive(Debug, Clone, Copy)]
@@ -60,8 +60,12 @@ pub fn decode_block(
 ) -> Result<()> {
     let count = out.planes.first().map_or(0, |plane| plane.len());
     let planes = CodedPlanes { lanes_log2: unit.lanes_log2, layout: unit.layout, steps: unit.steps };
-    let mut block = decode_coded(bytes, at, count, &planes, decoders, buffers)?;
-    let reconstructed = reconstruct(&mut block, unit, decoders, at, out);
+    let mut reconstruction = Reconstruction::new(unit, at, out);
+    let block =
+        decode_planes(bytes, at, count, &planes, decoders, buffers, |block, plane, info, bias, buffers| {
+            reconstruction.take(block, plane, info, bias, buffers);
+        })?;
+    let reconstructed = reconstruction.finish(&block, buffers);
     buffers.recycle(block);
     reconstructed
 }
@@ -78,9 +82,22 @@ pub fn decode_coded(
     decoders: &[PlaneDecoder],
     buffers: &mut Buffers<'_>,
 ) -> Result<CodedBlock> {
+    decode_planes(bytes, at, count, unit, decoders, buffers, |_, _, _, _, _| ())
+}
+
+/// The same. After each plane `take` is called with its number and bias, and may take what no later plane needs: all but
+/// that plane.
+fn decode_planes(
+    bytes: &[u8],
+    at: u64,
+    count: usize,
+    unit: &CodedPlanes<'_>,
+    decoders: &[PlaneDecoder],
+    buffers: &mut Buffers<'_>,
+    mut take: impl FnMut(&mut CodedBlock, usize, PlaneInfo, i32, &mut Buffers<'_>),
+) -> Result<CodedBlock> {
     let mut reader = BlockReader::open(bytes, at, unit.lanes_log2)?;
     let mut deltas = core::mem::take(&mut buffers.deltas);
-    deltas.clear();
     deltas.resize(count, 0);
     let mut block = CodedBlock::new(deltas, unit.lanes_log2, unit.steps);
     block.reserve(buffers);
@@ -98,6 +115,7 @@ pub fn decode_coded(
         let (alphabet, out) = (info.alphabet, coded.as_mut_slice());
         vectorized(ReadPlane { reader: &mut reader, decoder, contexts, alphabet, out });
         block.push_decoded(info, coded, decoder.bias(), has_sums, buffers);
+        take(&mut block, plane, info, decoder.bias(), buffers);
     }
     reader.finish()?;
     Ok(block)
@@ -153,51 +171,4 @@ impl Task for ReadDeltas<'_, '_> {
         let Self { reader, decoder, out } = self;
         reader.plane::<Delta, _>(machine, decoder, &mut DeltaContexts::new(decoder), out);
     }
-}
-
-/// Index of the first plane of an attribute of a [`FrameSlice`].
-const OPACITY: usize = 3;
-const ROTATION: usize = 4;
-const DC: usize = 7;
-
-/// Coded planes, all there, to the integer attributes of the block. The planes are of no use afterwards.
-///
-/// # Errors
-/// Invalid if a value is out of range.
-fn reconstruct(
-    block: &mut CodedBlock,
-    unit: &UnitParameters<'_>,
-    decoders: &[PlaneDecoder],
-    at: u64,
-    out: &mut FrameSlice<'_>,
-) -> Result<()> {
-    position::positions(&block.deltas, unit.position_bits, unit.position_shift, &mut out.position, at)?;
-    let log_scale = block.log_scale.each_ref().map(Vec::as_slice);
-    attribute::check_log_scales(log_scale, unit.canonical_axes, at)?;
-    in_range(&block.opacity, &ATTRIBUTE_RANGE, "opacity", "7.6.2", at)?;
-    for (index, plane) in log_scale.into_iter().enumerate() {
-        out.write(index, plane);
-    }
-    out.write(OPACITY, &block.opacity);
-    let CodedBlock { coded, exponents, .. } = block;
-    let [_, _, of_rotation, of_dc, of_sh] = exponents;
-    for ((info, plane), decoder) in unit.layout.planes().iter().zip(coded.iter_mut()).zip(decoders) {
-        if info.attribute == Attribute::Rotation {
-            attribute::rotations(plane, decoder.bias(), of_rotation, at)?;
-            out.write(ROTATION.wrapping_add(usize::from(info.index)), plane);
-        }
-    }
-    let first = |attribute: Attribute| {
-        let planes = unit.layout.planes().iter();
-        planes.take_while(|info| info.attribute < attribute).count()
-    };
-    let (dc, sh, end) = (first(Attribute::Dc), first(Attribute::Sh), coded.len());
-    let biases: Vec<i32> = decoders.iter().map(PlaneDecoder::bias).collect();
-    let components = |range: Range<usize>, exponents| Components {
-        coded: coded.get(range.clone()).unwrap_or_default(),
-        biases: biases.get(range).unwrap_or_default(),
-        exponents,
-    };
-    let colour = out.planes.get_mut(DC..).unwrap_or_default();
-    unit.colour.reconstruct(components(dc..sh, of_dc), components(sh..end, of_sh), colour, at)
 }

@@ -1,6 +1,7 @@
 //! The values of a block as they are coded, and the memory that blocks hand on.
 
 use crate::attribute;
+use crate::components::Pair;
 use crate::context::spacings;
 use crate::interrupt::Interrupt;
 use crate::layout::{Attribute, PlaneInfo, Section};
@@ -223,6 +224,7 @@ impl CodedBlock {
 pub struct Buffers<'i> {
     planes: Vec<Vec<i32>>,
     pub(crate) deltas: Vec<u64>,
+    pub(crate) components: Vec<Vec<Pair>>,
     /// Ends the work on these blocks.
     pub(crate) interrupt: &'i Interrupt,
 }
@@ -230,7 +232,7 @@ pub struct Buffers<'i> {
 impl<'i> Buffers<'i> {
     /// No memory yet, for blocks on which the work ends where an interrupt is requested.
     pub const fn new(interrupt: &'i Interrupt) -> Self {
-        Self { planes: Vec::new(), deltas: Vec::new(), interrupt }
+        Self { planes: Vec::new(), deltas: Vec::new(), components: Vec::new(), interrupt }
     }
 
     /// A plane of so many values, which mean nothing.
@@ -238,6 +240,11 @@ impl<'i> Buffers<'i> {
         let mut plane = self.planes.pop().unwrap_or_default();
         plane.resize(count, 0);
         plane
+    }
+
+    /// Takes the memory of a plane, if there is one.
+    pub(crate) fn take(&mut self, plane: Option<&mut Vec<i32>>) {
+        self.planes.extend(plane.map(core::mem::take).filter(|plane| plane.capacity() > 0));
     }
 
     /// Takes the memory of a block.

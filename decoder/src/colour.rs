@@ -1,6 +1,7 @@
 //! Clause 7.6.5: colour components to colour, by an integer transform.
 
 use crate::attribute::in_range;
+use crate::components::{Components, Pair, TILE};
 use crate::layout::ShCoding;
 use crate::steps::Exponents;
 use crate::vector::{Task, vectorized};
@@ -14,9 +15,6 @@ pub const COMPONENT_RANGE: RangeInclusive<i32> = -8191..=8191;
 
 /// The values of colour in output steps.
 pub(crate) const COLOUR_RANGE: RangeInclusive<i32> = -(1 << 30)..=1 << 30;
-
-/// Gaussians transformed at a time: their sums stay in registers.
-const TILE: usize = 32;
 
 /// Everything a unit needs to compute colour from components.
 #[derive(Debug, Clone, Copy)]
@@ -32,25 +30,27 @@ pub struct Colour<'a> {
 }
 
 impl Colour<'_> {
-    /// Writes red, green, blue and the SH planes of a block to `out`. With a codebook, `sh` are indices, and its steps
-    /// are those of sums of entries.
+    /// Writes red, green, blue and the SH planes of a block to `out`.
     ///
     /// # Errors
     /// Invalid if a component or a colour is out of range or an index names no entry.
-    pub fn reconstruct(
+    pub(crate) fn reconstruct(
         &self,
-        dc: Components<'_>,
-        sh: Components<'_>,
+        dc: &Components,
+        sh: &ShValues<'_>,
         out: &mut [&mut [i32]],
         at: u64,
     ) -> Result<()> {
         let (dc_out, sh_out) = out.split_at_mut_checked(3).unwrap_or_default();
         inverse(self.dc, dc, dc_out, at)?;
-        match (self.mode, self.sh) {
-            (ShCoding::Coefficients { .. }, Some(transform)) => inverse(transform, sh, sh_out, at),
-            (ShCoding::VectorQuantised { .. }, Some(transform)) => {
-                let entries = self.entries(sh.coded, usize::from(transform.header.rank), at)?;
-                inverse(transform, Components { coded: &entries, biases: &[], ..sh }, sh_out, at)
+        match (sh, self.sh) {
+            (ShValues::Components(components), Some(transform)) => inverse(transform, components, sh_out, at),
+            (ShValues::Indices { planes, exponents }, Some(transform)) => {
+                let entries = self.entries(planes, usize::from(transform.header.rank), at)?;
+                let count = entries.first().map_or(0, Vec::len);
+                let mut components = Components::new(count, entries.len(), exponents, Vec::new());
+                entries.iter().for_each(|plane| components.add(plane, 0, at));
+                inverse(transform, &components, sh_out, at)
             }
             _ => {
                 sh_out.iter_mut().for_each(|plane| plane.fill(0));
@@ -93,38 +93,12 @@ fn in_entries(stage: &[i32], largest: usize, at: u64) -> Result<()> {
     }
 }
 
-/// The components of some Gaussians, as they are coded.
-#[derive(Debug, Clone, Copy)]
-pub struct Components<'c> {
-    /// The coded values, plane by plane.
-    pub coded: &'c [Vec<i32>],
-    /// What is added to the values of each plane; planes without a bias have 0.
-    pub biases: &'c [i32],
-    /// The exponents of their steps, by which the sums are multiplied.
-    pub exponents: &'c Exponents,
-}
-
-impl<'c> Components<'c> {
-    /// Components that are known as they are.
-    pub const fn known(planes: &'c [Vec<i32>]) -> Self {
-        Self { coded: planes, biases: &[], exponents: &Exponents::Same(0) }
-    }
-
-    /// The planes with their biases.
-    #[inline(always)]
-    fn planes(&self) -> impl Iterator<Item = (&'c [i32], i32)> {
-        let biases = self.biases.iter().copied().chain(core::iter::repeat(0));
-        self.coded.iter().map(Vec::as_slice).zip(biases)
-    }
-
-    /// The error of the first component that is out of range, if there is one.
-    fn check(&self, at: u64) -> Result<()> {
-        self.planes().try_for_each(|(plane, bias)| {
-            let mut plane = plane.to_vec();
-            self.exponents.scale(&mut plane, bias);
-            in_range(&plane, &COMPONENT_RANGE, "component", "7.6.5", at)
-        })
-    }
+/// SH of some Gaussians without predictors, as they are coded.
+pub(crate) enum ShValues<'c> {
+    /// Components, or none.
+    Components(&'c Components),
+    /// Indices into the codebooks, stage by stage, and the exponents of the steps of sums of entries.
+    Indices { planes: &'c [Vec<i32>], exponents: &'c Exponents },
 }
 
 /// `out_j = mean_j + Round(sum over k of basis[k][j] * component_k, 6)`.
@@ -132,13 +106,8 @@ impl<'c> Components<'c> {
 /// # Errors
 /// Invalid if a component leaves -8191..=8191 or a colour its range. With |basis| at most 4096 and at most 45 components
 /// the sum stays below 2^31.
-pub fn inverse(
-    transform: &Transform,
-    components: Components<'_>,
-    out: &mut [&mut [i32]],
-    at: u64,
-) -> Result<()> {
-    transformed(transform, components, out, at, |_, mean, change| mean.wrapping_add(change))?;
+fn inverse(transform: &Transform, components: &Components, out: &mut [&mut [i32]], at: u64) -> Result<()> {
+    transformed(transform, components, out, |_, mean, change| mean.wrapping_add(change))?;
     // A sum is below 2^25 after rounding, so that only extreme means can leave the range.
     let near_limit = transform.mean.iter().any(|mean| mean.unsigned_abs() > (1 << 30) - (1 << 25));
     let mut planes = out.iter().filter(|_| near_limit);
@@ -155,23 +124,21 @@ pub fn add_inverse(
     out: &mut [&mut [i32]],
     at: u64,
 ) -> Result<()> {
-    let components = Components::known(components);
-    transformed(transform, components, out, at, |predicted, _, change| predicted.wrapping_add(change))
+    let components = Components::known(components, at);
+    transformed(transform, &components, out, |predicted, _, change| predicted.wrapping_add(change))
 }
 
 /// Writes what `join` makes of the value in `out`, the mean and the transformed components.
 fn transformed(
     transform: &Transform,
-    components: Components<'_>,
+    components: &Components,
     out: &mut [&mut [i32]],
-    at: u64,
     join: impl Fn(i32, i32, i32) -> i32,
 ) -> Result<()> {
+    components.check()?;
     let weights = weights(transform, usize::from(transform.header.dimension));
-    let mut in_range = true;
-    let means = &transform.mean;
-    vectorized(Tiles { weights: &weights, means, components, out, join, in_range: &mut in_range });
-    if in_range { Ok(()) } else { components.check(at) }
+    vectorized(Tiles { weights: &weights, means: &transform.mean, components, out, join });
+    Ok(())
 }
 
 /// A pair of weights, or of components, in the halves of an `i32`: machines multiply both pairs and add the products in
@@ -194,74 +161,46 @@ fn weights(transform: &Transform, dimension: usize) -> Vec<Vec<i32>> {
     (0..dimension).map(of_axis).collect()
 }
 
-/// Colours, tile by tile: the components of a tile are brought to their steps and checked while they are packed, and the
-/// sums of products stay in registers.
+/// Colours, tile by tile.
 struct Tiles<'t, 'o, F> {
     weights: &'t [Vec<i32>],
     means: &'t [i32],
-    components: Components<'t>,
+    components: &'t Components,
     out: &'t mut [&'o mut [i32]],
     join: F,
-    /// Becomes false if a component is out of range.
-    in_range: &'t mut bool,
 }
 
 impl<F: Fn(i32, i32, i32) -> i32> Task for Tiles<'_, '_, F> {
     #[inline(always)]
     fn run(self, _: impl Machine) {
-        let Self { weights, means, components, out, join, in_range } = self;
-        let count = out.first().map_or(0, |plane| plane.len());
-        let mut tile = vec![[0_i32; TILE]; components.coded.len().div_ceil(2)];
-        let mut greatest = [0; TILE];
-        for start in (0..count).step_by(TILE) {
-            let steps = components.exponents.steps(start);
-            for (number, (plane, bias)) in components.planes().enumerate() {
-                let values = scaled(plane, start, bias, &steps);
-                for (greatest, value) in greatest.iter_mut().zip(values) {
-                    *greatest = value.unsigned_abs().max(*greatest);
-                }
-                let Some(slots) = tile.get_mut(number / 2) else { continue };
-                // Components in range have 15 bits.
-                match number % 2 {
-                    0 => slots.iter_mut().zip(values).for_each(|(slot, low)| *slot = low & 0xFFFF),
-                    _ => slots.iter_mut().zip(values).for_each(|(slot, high)| *slot |= high.wrapping_shl(16)),
-                }
-            }
+        let Self { weights, means, components, out, join } = self;
+        let mut start = 0_usize;
+        for tile in components.tiles() {
             for ((plane, &mean), weights) in out.iter_mut().zip(means).zip(weights) {
-                let sums = tile_sums(weights, &tile);
-                for (slot, sum) in plane.get_mut(start..).unwrap_or_default().iter_mut().zip(sums) {
-                    *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
+                let sums = tile_sums(weights, tile);
+                let slots = plane.get_mut(start..).unwrap_or_default();
+                match slots.first_chunk_mut::<TILE>() {
+                    Some(slots) => {
+                        for (slot, sum) in slots.iter_mut().zip(sums) {
+                            *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
+                        }
+                    }
+                    None => {
+                        for (slot, sum) in slots.iter_mut().zip(sums) {
+                            *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
+                        }
+                    }
                 }
             }
-        }
-        *in_range = greatest.iter().all(|&greatest| greatest <= COMPONENT_RANGE.end().unsigned_abs());
-    }
-}
-
-/// The values of a tile with their bias, times the steps; 0 where there are none.
-#[inline(always)]
-fn scaled(plane: &[i32], start: usize, bias: i32, steps: &[i32; TILE]) -> [i32; TILE] {
-    let rest = plane.get(start..).unwrap_or_default();
-    let mut values = [0; TILE];
-    match rest.first_chunk::<TILE>() {
-        Some(rest) => {
-            for ((slot, &value), &step) in values.iter_mut().zip(rest).zip(steps) {
-                *slot = value.wrapping_add(bias).wrapping_mul(step);
-            }
-        }
-        None => {
-            for ((slot, &value), &step) in values.iter_mut().zip(rest).zip(steps) {
-                *slot = value.wrapping_add(bias).wrapping_mul(step);
-            }
+            start = start.wrapping_add(TILE);
         }
     }
-    values
 }
 
 /// The sums of the products of weights and components. With |weights| at most 4096 and at most 45 components they stay
 /// below 2^31.
 #[inline(always)]
-fn tile_sums(weights: &[i32], tile: &[[i32; TILE]]) -> [i32; TILE] {
+fn tile_sums(weights: &[i32], tile: &[Pair]) -> [i32; TILE] {
     let mut sums = [0_i32; TILE];
     for (&weights, components) in weights.iter().zip(tile) {
         for (sum, &pair) in sums.iter_mut().zip(components) {

@@ -49,6 +49,7 @@ pub mod cell;
 pub mod coded_block;
 pub mod colour;
 pub mod companding;
+mod components;
 pub mod context;
 mod curve;
 pub mod digest;

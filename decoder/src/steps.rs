@@ -243,20 +243,6 @@ impl Exponents {
         }
     }
 
-    /// The steps of the Gaussians from `first` on; 1 where there are none.
-    #[inline(always)]
-    pub(crate) fn steps<const COUNT: usize>(&self, first: usize) -> [i32; COUNT] {
-        let mut steps = [1; COUNT];
-        match self {
-            Self::Same(exponent) => steps.fill(step(*exponent)),
-            Self::Each(exponents) => {
-                let rest = exponents.get(first..).unwrap_or_default();
-                steps.iter_mut().zip(rest).for_each(|(slot, &exponent)| *slot = step(exponent));
-            }
-        }
-        steps
-    }
-
     /// Adds a bias to coded values, and multiplies them by the steps. Values are below 2^17, so that products fit.
     pub fn scale(&self, values: &mut [i32], bias: i32) {
         match self {
