@@ -5,13 +5,17 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Preset, Settings, Structure, encode};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::{ReadLimits, read_scene};
+use splatstream_format::Limits;
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::camera::{Up, ring};
+use splatstream_render::render;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -95,4 +99,27 @@ fn decode_frames(bencher: Bencher, motion: Motion) {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let items = ItemsCount::new(scene.gaussians as usize * count as usize);
     bencher.counter(items).bench_local(|| one.install(|| decode(black_box(&bytes), false)));
+}
+
+/// From bytes in memory to the first picture, 540 lines: the least that shows a scene of two spatial layers, which is the
+/// first refinement of the lower one.
+#[divan::bench(args = SCENES, sample_count = 15, sample_size = 1)]
+fn first_picture(bencher: Bencher, name: &str) {
+    let Some(frame) = scene(name) else { return };
+    let camera = ring(&frame, Up::default(), 1, 540).remove(0);
+    let settings = Settings { preset: Preset::Fast, spatial_layers: 2, ..Settings::default() };
+    let mut bytes = Vec::new();
+    encode(&mut vec![frame], &settings, &mut bytes, &mut |_, _| {}).unwrap();
+    let least = OperatingPoint { spatial: 0, temporal: 0, refinement: 0 };
+    let prefix = extract(&bytes, least, &Limits::default()).unwrap();
+    bencher.bench(|| {
+        let mut picture = None;
+        let summary = decode_stream(black_box(&prefix), &Options::default(), |sequence, frame| {
+            let shown = to_gaussians(frame.into_shown(), sequence).unwrap();
+            picture = Some(render(&shown, &camera, [0.0; 3]));
+            ControlFlow::Continue(())
+        });
+        assert_eq!(summary.verdict(), None);
+        picture
+    });
 }
