@@ -19,6 +19,7 @@ pub struct CellField {
     /// Morton codes of the cells, increasing; the cells in the same order.
     codes: Vec<u64>,
     cells: Vec<Cell>,
+    motions: Vec<Motion>,
 }
 
 impl CellField {
@@ -27,8 +28,9 @@ impl CellField {
     /// `cell_log2` is 0 to position_bits, `position_bits` at most 20, `unit` that of
     /// [`rotation_unit`](crate::cell::rotation_unit).
     pub fn new(cell_log2: u8, position_bits: u8, unit: i64, cells: Vec<(u64, Cell)>) -> Self {
-        let (codes, cells) = cells.into_iter().unzip();
-        Self { cell_log2, position_bits, unit, codes, cells }
+        let (codes, cells): (Vec<u64>, Vec<Cell>) = cells.into_iter().unzip();
+        let motions = cells.iter().map(|cell| Motion::of(cell, cell_log2)).collect();
+        Self { cell_log2, position_bits, unit, codes, cells, motions }
     }
 
     /// True if nothing moves.
@@ -53,7 +55,7 @@ impl CellField {
         position_fine: [i32; 3],
         rotation_fine: [i32; 3],
     ) -> ([i32; 3], [i32; 3]) {
-        let (motion, bounds) = (self.motion(cell), self.bounds());
+        let (motion, bounds) = (Motion::of(cell, self.cell_log2), self.bounds());
         (motion.position(position_fine, bounds), motion.rotation(rotation_fine, bounds))
     }
 
@@ -82,12 +84,12 @@ impl CellField {
             let Some(coordinates) = positions.next().map(|first| self.coordinates(first)) else { return };
             let same = positions.take_while(|&next| self.coordinates(next) == coordinates).count();
             let length = same.wrapping_add(1);
-            let cell = self.at_or_after(coordinates, &mut index);
+            let cell = self.at_or_after(coordinates, &mut index).zip(self.motions.get(index));
             let (own, rest) = split(planes, length);
             let (own_stale, rest_stale) = stale.split_at_mut_checked(length).unwrap_or_default();
-            if let Some(cell) = cell {
+            if let Some((cell, motion)) = cell {
                 own_stale.fill(cell.stale);
-                self.motion(cell).displace(own, self.bounds());
+                motion.displace(own, self.bounds());
             }
             (planes, stale) = (rest, rest_stale);
         }
@@ -109,16 +111,15 @@ impl CellField {
         let code = morton(x, y, z);
         let is_at = |index: usize| {
             let before = index.checked_sub(1).and_then(|before| self.codes.get(before));
-            before.is_none_or(|&before| before < code) && self.codes.get(index).is_none_or(|&at| code <= at)
+            let end = self.codes.len();
+            index <= end
+                && before.is_none_or(|&before| before < code)
+                && self.codes.get(index).is_none_or(|&at| code <= at)
         };
         let next = index.wrapping_add(1);
         if !is_at(*index) {
-            let found = if next <= self.codes.len() && is_at(next) {
-                next
-            } else {
-                self.codes.partition_point(|&before| before < code)
-            };
-            *index = found;
+            let search = || self.codes.partition_point(|&before| before < code);
+            *index = if is_at(next) { next } else { search() };
         }
         // A Morton code has 21 bits of a coordinate: a position far outside the grid is in no cell.
         self.cells.get(*index).filter(|cell| cell.coordinates == coordinates)
@@ -127,10 +128,6 @@ impl CellField {
     fn bounds(&self) -> Bounds {
         let last = 1_i32.wrapping_shl(u32::from(self.position_bits)).wrapping_sub(1) << 6;
         Bounds { position: last, one: i32::try_from(self.unit.wrapping_mul(64)).unwrap_or(i32::MAX) }
-    }
-
-    fn motion(&self, cell: &Cell) -> Motion {
-        Motion::of(cell, self.cell_log2)
     }
 }
 

@@ -120,26 +120,47 @@ impl Task for Displace<'_, '_> {
     #[inline(always)]
     fn run(self) {
         let Self { motion, planes: (position, rotation), bounds } = self;
+        each_run(position, Positions { motion, bounds });
         // Without a rotation of the cell the quaternion product is what it was.
-        each_run(position, |[xs, ys, zs]| {
-            for ((x, y), z) in xs.iter_mut().zip(ys).zip(zs) {
-                [*x, *y, *z] = motion.position([*x, *y, *z], bounds);
-            }
-        });
-        each_run(rotation, |[xs, ys, zs]| {
-            for ((x, y), z) in xs.iter_mut().zip(ys).zip(zs) {
-                [*x, *y, *z] = match motion.rotates() {
-                    true => motion.rotation([*x, *y, *z], bounds),
-                    false => [*x, *y, *z].map(limited),
-                };
-            }
-        });
+        match motion.rotates() {
+            true => each_run(rotation, Rotations { motion, bounds }),
+            false => rotation.into_iter().flatten().for_each(|part| *part = limited(*part)),
+        }
+    }
+}
+
+/// What changes three values.
+trait Change {
+    fn of(&self, values: [i32; 3]) -> [i32; 3];
+}
+
+struct Positions<'m> {
+    motion: &'m Motion,
+    bounds: Bounds,
+}
+
+impl Change for Positions<'_> {
+    #[inline(always)]
+    fn of(&self, fine: [i32; 3]) -> [i32; 3] {
+        self.motion.position(fine, self.bounds)
+    }
+}
+
+struct Rotations<'m> {
+    motion: &'m Motion,
+    bounds: Bounds,
+}
+
+impl Change for Rotations<'_> {
+    #[inline(always)]
+    fn of(&self, fine: [i32; 3]) -> [i32; 3] {
+        self.motion.rotation(fine, self.bounds)
     }
 }
 
 /// Changes three planes, [`LANES`] values of each at a time, in arrays that nothing else can see.
 #[inline(always)]
-fn each_run(planes: [&mut [i32]; 3], mut change: impl FnMut(&mut [[i32; LANES]; 3])) {
+fn each_run(planes: [&mut [i32]; 3], change: impl Change) {
     let [xs, ys, zs] = planes;
     for ((x, y), z) in xs.chunks_mut(LANES).zip(ys.chunks_mut(LANES)).zip(zs.chunks_mut(LANES)) {
         let mut planes = [[0; LANES]; 3];
@@ -147,7 +168,10 @@ fn each_run(planes: [&mut [i32]; 3], mut change: impl FnMut(&mut [[i32; LANES]; 
         for (values, plane) in planes.iter_mut().zip(&own) {
             values.iter_mut().zip(plane.iter()).for_each(|(value, &from)| *value = from);
         }
-        change(&mut planes);
+        let [to_x, to_y, to_z] = &mut planes;
+        for ((x, y), z) in to_x.iter_mut().zip(to_y).zip(to_z) {
+            [*x, *y, *z] = change.of([*x, *y, *z]);
+        }
         for (values, plane) in planes.iter().zip(&mut own) {
             plane.iter_mut().zip(values).for_each(|(slot, &value)| *slot = value);
         }

@@ -44,7 +44,7 @@ impl NeighbourSearch {
     /// A search among points, given by their planes x, y, z of one length. Coordinates are below 2^21.
     pub fn new(points: [&[u32]; 3]) -> Self {
         let [xs, ys, zs] = points;
-        let codes: Vec<u64> = (xs, ys, zs).into_par_iter().map(|(&x, &y, &z)| morton(x, y, z)).collect();
+        let codes = curve::codes(points);
         let coordinate = |plane: &[u32], index: u32| plane.get(index as usize).copied().unwrap_or(0);
         let point =
             |(code, index)| Point { code, index, at: [xs, ys, zs].map(|plane| coordinate(plane, index)) };
