@@ -3,6 +3,7 @@
 //! A fine position is in 64ths of a grid step, a fine rotation in 64ths of rotation_step.
 
 use crate::cell::Cell;
+use crate::interrupt::Interrupt;
 use crate::motion::{Bounds, Motion, Planes};
 use crate::position::morton;
 use rayon::prelude::*;
@@ -63,6 +64,16 @@ impl CellField {
     ///
     /// The planes hold fine positions and fine rotations and have the same length.
     pub fn displace_planes(&self, position: &mut [Vec<i32>; 3], rotation: &mut [Vec<i32>; 3]) -> Vec<bool> {
+        self.displace_unless(Interrupt::NEVER, position, rotation)
+    }
+
+    /// The same; where an interrupt is requested, the planes mean nothing.
+    pub(crate) fn displace_unless(
+        &self,
+        interrupt: &Interrupt,
+        position: &mut [Vec<i32>; 3],
+        rotation: &mut [Vec<i32>; 3],
+    ) -> Vec<bool> {
         let [x, y, z] = position;
         let [a, b, c] = rotation;
         let mut stale = vec![false; x.len()];
@@ -70,6 +81,7 @@ impl CellField {
             .par_chunks_mut(RUN)
             .zip(x.par_chunks_mut(RUN).zip(y.par_chunks_mut(RUN)).zip(z.par_chunks_mut(RUN)))
             .zip(a.par_chunks_mut(RUN).zip(b.par_chunks_mut(RUN)).zip(c.par_chunks_mut(RUN)))
+            .filter(|_| !interrupt.is_requested())
             .for_each(|((stale, ((x, y), z)), ((a, b), c))| self.displace_run(stale, [x, y, z], [a, b, c]));
         stale
     }

@@ -31,6 +31,13 @@ pub(crate) struct FrameState {
     pub(crate) models: ModelsInForce,
 }
 
+impl FrameState {
+    /// Its exact lists, once no frame refers to it.
+    pub(crate) fn into_lists(self) -> Vec<Arc<GaussianList>> {
+        self.lists
+    }
+}
+
 /// log2 of how many frames a frame is later than the one it refers to: a power of two (7.3.1).
 pub(crate) fn span_log2(index: u32, reference: &FrameState) -> u8 {
     let span = index.saturating_sub(reference.index);

@@ -129,13 +129,27 @@ pub struct MoveSpace {
     kept: Vec<Vec<bool>>,
     /// All parents along the curve.
     order: Vec<Place>,
+    /// Memory of other frames.
+    spare_lists: Vec<Vec<Parent>>,
+    spare_order: Vec<Place>,
 }
 
 impl MoveSpace {
     /// Of a frame without increments.
     pub fn new(ratio: SpanRatio, position_bits: u8) -> Self {
-        let last = 1_i32.wrapping_shl(position_bits.into()).wrapping_sub(1).wrapping_shl(6);
-        Self { ratio, last, ..Self::default() }
+        let mut space = Self::default();
+        space.restart(ratio, position_bits);
+        space
+    }
+
+    /// Becomes that of another frame without increments.
+    pub(crate) fn restart(&mut self, ratio: SpanRatio, position_bits: u8) {
+        self.ratio = ratio;
+        self.last = 1_i32.wrapping_shl(position_bits.into()).wrapping_sub(1).wrapping_shl(6);
+        self.spare_lists = core::mem::take(&mut self.lists);
+        self.spare_lists.reverse();
+        self.kept.clear();
+        self.order.clear();
     }
 
     /// Increments whose parents have been added.
@@ -152,7 +166,9 @@ impl MoveSpace {
     /// motions are not known yet.
     pub fn push(&mut self, reference: &GaussianList, displaced: &GaussianList) {
         let list = u32::try_from(self.lists.len()).unwrap_or(u32::MAX);
-        let mut parents = vec![Parent::default(); displaced.len()];
+        let mut parents = self.spare_lists.pop().unwrap_or_default();
+        parents.clear();
+        parents.resize(displaced.len(), Parent::default());
         parents.par_chunks_mut(RUN).enumerate().for_each(|(run, parents)| {
             let first = run.wrapping_mul(RUN);
             fill(parents, &reference.position_fine, first, |parent, start| parent.start = start);
@@ -166,8 +182,9 @@ impl MoveSpace {
         });
         let positions = displaced.planes.position.each_ref().map(Vec::as_slice);
         let sorted = curve::order(curve::codes(positions).into_iter());
-        let own: Vec<Place> = sorted.into_iter().map(|(code, row)| Place { code, list, row }).collect();
-        self.order = if self.order.is_empty() { own } else { merged(&self.order, &own) };
+        let own = sorted.into_iter().map(|(code, row)| Place { code, list, row });
+        merge(&self.order, own, &mut self.spare_order);
+        core::mem::swap(&mut self.order, &mut self.spare_order);
         self.lists.push(parents);
     }
 
@@ -351,14 +368,17 @@ fn at<T: Copy + Default>(values: &[T], index: usize) -> T {
     values.get(index).copied().unwrap_or_default()
 }
 
-/// Two sorted lists as one; the second has the higher numbers of lists.
-fn merged(first: &[Place], second: &[Place]) -> Vec<Place> {
-    let mut merged = Vec::with_capacity(first.len().saturating_add(second.len()));
-    let (mut first, mut second) = (first.iter().peekable(), second.iter().peekable());
-    while let (Some(a), Some(b)) = (first.peek(), second.peek()) {
-        let next = if a.code <= b.code { first.next() } else { second.next() };
-        merged.extend(next.copied());
+/// Two sorted lists as one; the second has the higher number.
+fn merge(first: &[Place], second: impl ExactSizeIterator<Item = Place>, merged: &mut Vec<Place>) {
+    merged.clear();
+    merged.reserve(first.len().saturating_add(second.len()));
+    let mut rest = first;
+    for place in second {
+        let before = rest.iter().take_while(|other| other.code <= place.code).count();
+        let (lower, higher) = rest.split_at_checked(before).unwrap_or_default();
+        merged.extend_from_slice(lower);
+        merged.push(place);
+        rest = higher;
     }
-    merged.extend(first.chain(second).copied());
-    merged
+    merged.extend_from_slice(rest);
 }

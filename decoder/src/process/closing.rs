@@ -3,6 +3,7 @@
 use super::decoded::{Compensation, DecodedFrame, Shift};
 use super::decoding::Lists;
 use super::frame::{Context, FrameInProgress};
+use super::spares::Spares;
 use crate::carried::Carried;
 use crate::digest::lists_digest;
 use crate::frame::QuantizedFrame;
@@ -21,6 +22,8 @@ pub(super) struct Closed {
     pub(super) fault: Option<Error>,
     /// The identity of the next new Gaussian.
     pub(super) next_identity: u32,
+    /// For the frames after this one.
+    pub(super) spares: Spares,
 }
 
 impl FrameInProgress {
@@ -79,9 +82,10 @@ impl FrameInProgress {
             decoded.identities = self.lists.shown_identities(decoded.planes.len());
         }
         let next_identity = self.lists.next_identity;
-        let lists = core::mem::take(&mut self.lists);
-        (state.lists, state.models) = (lists.lists, lists.models.first);
-        Closed { decoded, state, fault: None, next_identity }
+        let Lists { lists, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
+        (state.lists, state.models) = (lists, models.first);
+        spares.end_frame(displaced);
+        Closed { decoded, state, fault: None, next_identity, spares }
     }
 
     fn close_predicted(
@@ -128,9 +132,10 @@ impl FrameInProgress {
         let refinements = context.sequence.refinement_count;
         decoded.compensation = self.lists.compensation(&decoded, refinements, state.carried_shift);
         let next_identity = self.lists.next_identity;
-        let lists = core::mem::take(&mut self.lists);
-        (state.lists, state.models) = (lists.lists, lists.models.first);
-        Closed { decoded, state, fault, next_identity }
+        let Lists { lists, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
+        (state.lists, state.models) = (lists, models.first);
+        spares.end_frame(displaced);
+        Closed { decoded, state, fault, next_identity, spares }
     }
 }
 
