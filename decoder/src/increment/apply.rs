@@ -150,8 +150,8 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
     let mut list = parents;
     let codes = unit.values.plane(Section::Predictors, 0);
     let is_predicted = codes.iter().any(|&code| code != Predictor::None.code());
-    let before =
-        (situation.temporal.is_some() && is_predicted).then(|| reference_set(situation, &list.planes));
+    let before = (situation.temporal.is_some() && is_predicted)
+        .then(|| reference_set_unless(unit.interrupt, situation, &list.planes));
     if let Some(temporal) = situation.temporal.as_ref().filter(|_| unit.header.extrapolates_opacity) {
         extrapolate(&mut list, temporal);
     }
@@ -167,7 +167,7 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
     unit.interrupt.check()?;
     let set = match before {
         Some(set) => set,
-        None if is_predicted => reference_set(situation, &list.planes),
+        None if is_predicted => reference_set_unless(unit.interrupt, situation, &list.planes),
         None => QuantizedFrame::default(),
     };
     unit.interrupt.check()?;
@@ -183,12 +183,19 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
 
 /// Clause 7.7: everything that new Gaussians may be predicted from, in order.
 pub fn reference_set(situation: &Situation<'_>, parents: &QuantizedFrame) -> QuantizedFrame {
+    reference_set_unless(Interrupt::NEVER, situation, parents)
+}
+
+/// The same; where an interrupt is requested, the set means nothing.
+fn reference_set_unless(
+    interrupt: &Interrupt,
+    situation: &Situation<'_>,
+    parents: &QuantizedFrame,
+) -> QuantizedFrame {
     let [before, after] = situation.around;
-    let mut set = QuantizedFrame::zeroed(0, parents.sh.len());
-    for &part in before.iter().chain([&parents]).chain(after) {
-        set.append(part);
-    }
-    set
+    let parts: Vec<&QuantizedFrame> =
+        before.iter().copied().chain([parents]).chain(after.iter().copied()).collect();
+    QuantizedFrame::joined(&parts, parents.sh.len(), interrupt)
 }
 
 /// Whether a unit leaves its parents as they come and adds nothing.

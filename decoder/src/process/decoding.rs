@@ -327,8 +327,9 @@ impl FrameInProgress {
             at: pending.payload_at,
         };
         let Outcome { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
-        let digest = || list_digest_unless(context.interrupt, &list.planes, 0..list.len());
-        self.check_list(pending, context, digest)?;
+        let known = context.reference.and_then(|reference| reference.digest(pending.refinement, &list));
+        let compute = || list_digest_unless(context.interrupt, &list.planes, 0..list.len());
+        self.check_list(pending, context, || known.cloned().unwrap_or_else(compute))?;
         if context.options.entropy {
             let state = of_sections(&pending.increment.sections, values);
             let payload_at = pending.payload_at;
