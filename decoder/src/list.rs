@@ -14,6 +14,9 @@ pub const FRACTION_BITS: u32 = 6;
 /// One step of the position grid in fine units.
 pub const FINE: i32 = 1 << FRACTION_BITS;
 
+/// Rows are settled one by one as long as the list is so many times as long.
+const FEW_ROWS: usize = 8;
+
 /// The canonical integer of a fine one: `Round(fine, 6)`.
 #[inline]
 pub fn canonical(fine: i32) -> i32 {
@@ -150,6 +153,30 @@ impl GaussianList {
                 *slot = canonical(value);
             }
         });
+    }
+
+    /// The same for some Gaussians, given by their rows.
+    pub(crate) fn settle_rows(&mut self, rows: &[&[u32]]) {
+        let count = rows.iter().map(|rows| rows.len()).fold(0, usize::saturating_add);
+        if count.saturating_mul(FEW_ROWS) > self.len() {
+            return self.settle();
+        }
+        let rows = || rows.iter().flat_map(|rows| rows.iter()).map(|&row| row as usize);
+        let Self { planes, position_fine, rotation_fine, .. } = self;
+        for (plane, fine) in planes.position.iter_mut().zip(position_fine) {
+            for row in rows() {
+                if let (Some(slot), Some(&value)) = (plane.get_mut(row), fine.get(row)) {
+                    *slot = canonical(value).cast_unsigned();
+                }
+            }
+        }
+        for (plane, fine) in planes.rotation.iter_mut().zip(rotation_fine) {
+            for row in rows() {
+                if let (Some(slot), Some(&value)) = (plane.get_mut(row), fine.get(row)) {
+                    *slot = canonical(value);
+                }
+            }
+        }
     }
 
     /// Clause 7.5: displaces every Gaussian by its cell and returns the stale flag of each; no flags if nothing moves.

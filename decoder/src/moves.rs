@@ -169,22 +169,20 @@ impl MoveSpace {
         let mut parents = self.spare_lists.pop().unwrap_or_default();
         parents.clear();
         parents.resize(displaced.len(), Parent::default());
-        parents.par_chunks_mut(RUN).enumerate().for_each(|(run, parents)| {
-            let first = run.wrapping_mul(RUN);
-            fill(parents, &reference.position_fine, first, |parent, start| parent.start = start);
-            fill(parents, &displaced.position_fine, first, |parent, moved| {
-                parent.displacement = join(moved, parent.start, i32::wrapping_sub);
-                parent.motion = parent.displacement;
+        let Self { order, spare_order, ratio, .. } = self;
+        let sort = || {
+            let positions = displaced.planes.position.each_ref().map(Vec::as_slice);
+            let sorted = curve::order(curve::codes(positions).into_iter());
+            let own = sorted.into_iter().map(|(code, row)| Place { code, list, row });
+            merge(order, own, spare_order);
+            core::mem::swap(order, spare_order);
+        };
+        let fill_in = || {
+            parents.par_chunks_mut(RUN).enumerate().for_each(|(run, parents)| {
+                gather(parents, run.wrapping_mul(RUN), reference, displaced, *ratio);
             });
-            fill(parents, &reference.change.motion, first, |parent, motion| {
-                parent.trend = motion.map(|motion| self.ratio.scaled(motion));
-            });
-        });
-        let positions = displaced.planes.position.each_ref().map(Vec::as_slice);
-        let sorted = curve::order(curve::codes(positions).into_iter());
-        let own = sorted.into_iter().map(|(code, row)| Place { code, list, row });
-        merge(&self.order, own, &mut self.spare_order);
-        core::mem::swap(&mut self.order, &mut self.spare_order);
+        };
+        rayon::join(sort, fill_in);
         self.lists.push(parents);
     }
 
@@ -352,6 +350,24 @@ fn half_trend(parent: &Parent) -> [i32; 3] {
 
 fn join([a, b, c]: [i32; 3], [d, e, f]: [i32; 3], each: impl Fn(i32, i32) -> i32) -> [i32; 3] {
     [each(a, d), each(b, e), each(c, f)]
+}
+
+/// Fills in parents from row `first` on, whose motions in the frame are those of their cells so far.
+fn gather(
+    parents: &mut [Parent],
+    first: usize,
+    reference: &GaussianList,
+    displaced: &GaussianList,
+    ratio: SpanRatio,
+) {
+    fill(parents, &reference.position_fine, first, |parent, start| parent.start = start);
+    fill(parents, &displaced.position_fine, first, |parent, moved| {
+        parent.displacement = join(moved, parent.start, i32::wrapping_sub);
+        parent.motion = parent.displacement;
+    });
+    fill(parents, &reference.change.motion, first, |parent, motion| {
+        parent.trend = motion.map(|motion| ratio.scaled(motion));
+    });
 }
 
 /// Gives each of the parents from row `first` on its values of three planes; nothing where the planes end.

@@ -234,9 +234,7 @@ fn change_parents(
         attributes.write_to(list, &updated);
     }
     unit.interrupt.check()?;
-    if !moved.is_empty() || !updated.is_empty() {
-        list.settle();
-    }
+    list.settle_rows(&[&moved, &updated]);
     Ok(modes.iter().map(|&mode| mode != REMOVED).collect())
 }
 
