@@ -234,6 +234,23 @@ mod tests {
         isqrt((one * one - dot(fine, fine)).max(0).unsigned_abs())
     }
 
+    /// Clause 7.5 word for word: products of the vector, one after the other.
+    #[expect(clippy::arithmetic_side_effects, reason = "an overflow is a failed test")]
+    fn by_products(cell: &Cell, cell_log2: u8, fine: [i32; 3]) -> [i64; 3] {
+        let half = (1_i64 << (cell_log2 + 6)) >> 1;
+        let v = cell.rotation.map(i64::from);
+        let w = isqrt((1 << 28) - dot(v, v).unsigned_abs()) as i64;
+        let centre = cell.coordinates.map(|at| (i64::from(at) << (cell_log2 + 6)) + half);
+        let across = cross(v, join(fine.map(i64::from), centre, |fine, centre| fine - centre));
+        let again = cross(v, across);
+        let rotated = join(across, again, |across, again| (w * across + again + (1 << 26)) >> 27);
+        let shift = join(rotated, cell.translation.map(i64::from), |rotated, shift| rotated + 8 * shift);
+        join(fine.map(i64::from), shift, |fine, shift| (fine + shift).clamp(0, LAST.into()))
+    }
+
+    /// The largest fine position of 20 bits.
+    const LAST: i32 = ((1 << 20) - 1) << 6;
+
     #[test]
     fn roots_next_to_squares_are_those_of_integers() {
         for root in (1..1 << 21).step_by(977).chain([2, 3, (1 << 21) - 1, 1 << 21]) {
@@ -245,6 +262,18 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_matrix_moves_as_products_do(
+            coordinates in [0_u32..32, 0_u32..32, 0_u32..32],
+            translation in [-1_048_576..=1_048_576, -1_048_576..=1_048_576, -1_048_576..=1_048_576],
+            rotation in [-8192..=8192, -8192..=8192, -8192..=8192],
+            fine in [0..=LAST, 0..=LAST, 0..=LAST],
+        ) {
+            let cell = Cell { coordinates, translation, rotation, stale: false };
+            let moved = Motion::of(&cell, 15).position(fine, Bounds { position: LAST, one: 1 << 20 });
+            prop_assert_eq!(moved.map(i64::from), by_products(&cell, 15, fine));
+        }
+
         #[test]
         fn the_real_part_is_the_root_of_integers(
             one in 0..=1 << 21,

@@ -166,3 +166,78 @@ impl Task for Positions<'_> {
         }
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::arithmetic_side_effects, reason = "an overflow is a failed test")]
+mod tests {
+    use super::super::{HAS_MOVE, REMOVED, SpanRatio};
+    use super::*;
+    use crate::frame::QuantizedFrame;
+    use crate::list::GaussianList;
+    use crate::position::morton;
+    use proptest::prelude::*;
+
+    /// Few coordinates, so that many parents share a place or lie equally far.
+    fn list() -> impl Strategy<Value = Vec<[u32; 3]>> {
+        proptest::collection::vec([0_u32..6, 0_u32..6, 0_u32..3], 1..80)
+    }
+
+    fn of_points(points: &[[u32; 3]]) -> GaussianList {
+        let mut planes = QuantizedFrame::zeroed(points.len(), 0);
+        planes.position = [0, 1, 2].map(|axis| points.iter().map(|point| point[axis]).collect());
+        GaussianList::of_planes(planes, true)
+    }
+
+    /// The definition: all parents in the order of code, list and row; of those around the own one that are known, the
+    /// nearest, ties to the lower list and row.
+    fn by_hand(lists: &[Vec<[u32; 3]>; 2], kept: &[bool], modes: &[i32], row: u32) -> Vec<(u32, u32)> {
+        let mut order: Vec<(u64, u32, u32)> = Vec::new();
+        for (list, points) in (0..).zip(lists) {
+            order.extend((0..).zip(points).map(|(row, &[x, y, z])| (morton(x, y, z), list, row)));
+        }
+        order.sort_unstable();
+        let own = order.iter().position(|&(_, list, at)| (list, at) == (1, row)).unwrap();
+        let known = |&&(_, list, at): &&(u64, u32, u32)| match (list, modes[at as usize % modes.len()]) {
+            (0, _) => kept[at as usize],
+            (_, REMOVED) => false,
+            (_, mode) => mode & HAS_MOVE == 0 || at < row,
+        };
+        let near = order.iter().enumerate().filter(|(index, _)| index.abs_diff(own) <= MOVE_WINDOW);
+        let point = |list: u32, row: u32| lists[list as usize][row as usize];
+        let mut found: Vec<(u64, u32, u32)> = near
+            .map(|(_, place)| place)
+            .filter(known)
+            .map(|&(_, list, at)| (distance(point(1, row), point(list, at)), list, at))
+            .collect();
+        found.sort_unstable();
+        found.into_iter().map(|(_, list, at)| (list, at)).take(MOVE_NEIGHBOURS).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn neighbours_are_those_of_the_definition(
+            lists in [list(), list()],
+            kept in proptest::collection::vec(any::<bool>(), 80),
+            modes in proptest::collection::vec(0..=REMOVED, 80),
+        ) {
+            let mut space = MoveSpace::new(SpanRatio::default(), 8);
+            let [first, last] = lists.each_ref().map(|points| of_points(points));
+            let kept = &kept[..first.len()];
+            let modes = &modes[..last.len()];
+            space.push(&first, &first);
+            let mut after = first.clone();
+            after.retain(kept);
+            space.settle(&after, kept);
+            space.push(&last, &last);
+            let candidates = Candidates::new(&space, modes);
+            for (row, _) in (0..).zip(modes).filter(|(_, mode)| **mode & HAS_MOVE != 0) {
+                let Neighbours { found, count } = candidates.nearest(row, &space.order);
+                let mut found = found[..count].to_vec();
+                let mut expected = by_hand(&lists, kept, modes, row);
+                found.sort_unstable();
+                expected.sort_unstable();
+                prop_assert_eq!(found, expected);
+            }
+        }
+    }
+}
