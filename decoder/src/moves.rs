@@ -3,7 +3,7 @@
 //! A parent moves by its cell, as it did before, or as its neighbours do. Neighbours are found as those of new
 //! Gaussians are ([`crate::neighbours`]): among the parents next to it along the Morton curve, of which those count
 //! whose motion is known when the parent's turn comes. Who counts follows from the modes alone, so that neighbours are
-//! found in parallel ([`candidates`]); the motions follow one after the other, in the order of the parents.
+//! found in parallel (`candidates`); the motions follow one after the other, in the order of the parents.
 
 use crate::curve;
 use crate::list::GaussianList;
