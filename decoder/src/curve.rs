@@ -5,6 +5,11 @@
 //!
 //! What is added here counts points or is an index of one, so that no sum is above the number of points.
 
+use crate::position::morton;
+use crate::vector::{Task, vectorized};
+use rayon::prelude::*;
+use splatstream_format::entropy::machine::Machine;
+
 /// Bits of a digit.
 const DIGIT: u32 = 11;
 /// Values of a digit.
@@ -13,6 +18,34 @@ const VALUES: usize = 1 << DIGIT;
 const DIGITS: usize = 6;
 /// Codes below which comparisons are faster.
 const FEW: usize = 512;
+
+/// Points whose codes one task computes.
+const RUN: usize = 4096;
+
+/// The Morton codes of points, given by their planes x, y, z of one length. Coordinates are below 2^21.
+pub(crate) fn codes([xs, ys, zs]: [&[u32]; 3]) -> Vec<u64> {
+    let mut codes = vec![0; xs.len()];
+    codes
+        .par_chunks_mut(RUN)
+        .zip(xs.par_chunks(RUN).zip(ys.par_chunks(RUN)).zip(zs.par_chunks(RUN)))
+        .for_each(|(codes, ((xs, ys), zs))| vectorized(Codes { points: [xs, ys, zs], codes }));
+    codes
+}
+
+struct Codes<'c> {
+    points: [&'c [u32]; 3],
+    codes: &'c mut [u64],
+}
+
+impl Task for Codes<'_> {
+    #[inline(always)]
+    fn run(self, _: impl Machine) {
+        let [xs, ys, zs] = self.points;
+        for (code, ((&x, &y), &z)) in self.codes.iter_mut().zip(xs.iter().zip(ys).zip(zs)) {
+            *code = morton(x, y, z);
+        }
+    }
+}
 
 /// The indices of codes in the order of (code, index).
 pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>) -> Vec<(u64, u32)> {

@@ -3,7 +3,8 @@
 //! A fine position is in 64ths of a grid step, a fine rotation in 64ths of rotation_step.
 
 use crate::cell::Cell;
-use crate::motion::Motion;
+use crate::interrupt::Interrupt;
+use crate::motion::{Bounds, Motion, Planes};
 use crate::position::morton;
 use rayon::prelude::*;
 
@@ -19,6 +20,7 @@ pub struct CellField {
     /// Morton codes of the cells, increasing; the cells in the same order.
     codes: Vec<u64>,
     cells: Vec<Cell>,
+    motions: Vec<Motion>,
 }
 
 impl CellField {
@@ -27,8 +29,9 @@ impl CellField {
     /// `cell_log2` is 0 to position_bits, `position_bits` at most 20, `unit` that of
     /// [`rotation_unit`](crate::cell::rotation_unit).
     pub fn new(cell_log2: u8, position_bits: u8, unit: i64, cells: Vec<(u64, Cell)>) -> Self {
-        let (codes, cells) = cells.into_iter().unzip();
-        Self { cell_log2, position_bits, unit, codes, cells }
+        let (codes, cells): (Vec<u64>, Vec<Cell>) = cells.into_iter().unzip();
+        let motions = cells.iter().map(|cell| Motion::of(cell, cell_log2)).collect();
+        Self { cell_log2, position_bits, unit, codes, cells, motions }
     }
 
     /// True if nothing moves.
@@ -53,14 +56,24 @@ impl CellField {
         position_fine: [i32; 3],
         rotation_fine: [i32; 3],
     ) -> ([i32; 3], [i32; 3]) {
-        let motion = self.motion(cell);
-        (motion.position(position_fine, self.position_max()), motion.rotation(rotation_fine, self.unit))
+        let (motion, bounds) = (Motion::of(cell, self.cell_log2), self.bounds());
+        (motion.position(position_fine, bounds), motion.rotation(rotation_fine, bounds))
     }
 
     /// Displaces every Gaussian by its cell and returns for each whether that cell is stale.
     ///
     /// The planes hold fine positions and fine rotations and have the same length.
     pub fn displace_planes(&self, position: &mut [Vec<i32>; 3], rotation: &mut [Vec<i32>; 3]) -> Vec<bool> {
+        self.displace_unless(Interrupt::NEVER, position, rotation)
+    }
+
+    /// The same; where an interrupt is requested, the planes mean nothing.
+    pub(crate) fn displace_unless(
+        &self,
+        interrupt: &Interrupt,
+        position: &mut [Vec<i32>; 3],
+        rotation: &mut [Vec<i32>; 3],
+    ) -> Vec<bool> {
         let [x, y, z] = position;
         let [a, b, c] = rotation;
         let mut stale = vec![false; x.len()];
@@ -68,27 +81,29 @@ impl CellField {
             .par_chunks_mut(RUN)
             .zip(x.par_chunks_mut(RUN).zip(y.par_chunks_mut(RUN)).zip(z.par_chunks_mut(RUN)))
             .zip(a.par_chunks_mut(RUN).zip(b.par_chunks_mut(RUN)).zip(c.par_chunks_mut(RUN)))
+            .filter(|_| !interrupt.is_requested())
             .for_each(|((stale, ((x, y), z)), ((a, b), c))| self.displace_run(stale, [x, y, z], [a, b, c]));
         stale
     }
 
-    /// Neighbours in a list mostly share a cell, so the last cell found is kept.
+    /// Neighbours in a list mostly share a cell: those that follow each other in one are moved together.
     fn displace_run(&self, stale: &mut [bool], position: [&mut [i32]; 3], rotation: [&mut [i32]; 3]) {
-        let ([xs, ys, zs], [r0, r1, r2]) = (position, rotation);
-        let positions = xs.iter_mut().zip(ys).zip(zs);
-        let rotations = r0.iter_mut().zip(r1).zip(r2);
-        let mut last = None;
-        let mut found = None;
-        for ((stale, ((x, y), z)), ((a, b), c)) in stale.iter_mut().zip(positions).zip(rotations) {
-            let coordinates = self.coordinates([*x, *y, *z]);
-            if last != Some(coordinates) {
-                last = Some(coordinates);
-                found = self.at(coordinates).map(|cell| (cell.stale, self.motion(cell)));
+        let mut index = 0;
+        let (mut planes, mut stale) = ((position, rotation), stale);
+        loop {
+            let ([xs, ys, zs], _) = &planes;
+            let mut positions = xs.iter().zip(ys.iter()).zip(zs.iter()).map(|((&x, &y), &z)| [x, y, z]);
+            let Some(coordinates) = positions.next().map(|first| self.coordinates(first)) else { return };
+            let same = positions.take_while(|&next| self.coordinates(next) == coordinates).count();
+            let length = same.wrapping_add(1);
+            let cell = self.at_or_after(coordinates, &mut index).zip(self.motions.get(index));
+            let (own, rest) = split(planes, length);
+            let (own_stale, rest_stale) = stale.split_at_mut_checked(length).unwrap_or_default();
+            if let Some((cell, motion)) = cell {
+                own_stale.fill(cell.stale);
+                motion.displace(own, self.bounds());
             }
-            let Some((is_stale, motion)) = &found else { continue };
-            *stale = *is_stale;
-            [*x, *y, *z] = motion.position([*x, *y, *z], self.position_max());
-            [*a, *b, *c] = motion.rotation([*a, *b, *c], self.unit);
+            (planes, stale) = (rest, rest_stale);
         }
     }
 
@@ -98,20 +113,41 @@ impl CellField {
     }
 
     fn at(&self, coordinates: [u32; 3]) -> Option<&Cell> {
+        self.at_or_after(coordinates, &mut 0)
+    }
+
+    /// The cell with these coordinates. It is looked for first at `index` and at the one after: lists are nearly in the
+    /// order of the cells. `index` becomes that of the cell, or of the next one.
+    fn at_or_after(&self, coordinates: [u32; 3], index: &mut usize) -> Option<&Cell> {
         let [x, y, z] = coordinates;
-        let index = self.codes.binary_search(&morton(x, y, z)).ok()?;
+        let code = morton(x, y, z);
+        let is_at = |index: usize| {
+            let before = index.checked_sub(1).and_then(|before| self.codes.get(before));
+            let end = self.codes.len();
+            index <= end
+                && before.is_none_or(|&before| before < code)
+                && self.codes.get(index).is_none_or(|&at| code <= at)
+        };
+        let next = index.wrapping_add(1);
+        if !is_at(*index) {
+            let search = || self.codes.partition_point(|&before| before < code);
+            *index = if is_at(next) { next } else { search() };
+        }
         // A Morton code has 21 bits of a coordinate: a position far outside the grid is in no cell.
-        self.cells.get(index).filter(|cell| cell.coordinates == coordinates)
+        self.cells.get(*index).filter(|cell| cell.coordinates == coordinates)
     }
 
-    /// The largest fine position.
-    fn position_max(&self) -> i64 {
-        (1_i64.wrapping_shl(u32::from(self.position_bits)).wrapping_sub(1)) << 6
+    fn bounds(&self) -> Bounds {
+        let last = 1_i32.wrapping_shl(u32::from(self.position_bits)).wrapping_sub(1) << 6;
+        Bounds { position: last, one: i32::try_from(self.unit.wrapping_mul(64)).unwrap_or(i32::MAX) }
     }
+}
 
-    fn motion(&self, cell: &Cell) -> Motion {
-        Motion::of(cell, self.cell_log2)
-    }
+/// The first `length` Gaussians and the others.
+fn split((position, rotation): Planes<'_>, length: usize) -> (Planes<'_>, Planes<'_>) {
+    let [x, y, z] = position.map(|plane| plane.split_at_mut_checked(length).unwrap_or_default());
+    let [a, b, c] = rotation.map(|plane| plane.split_at_mut_checked(length).unwrap_or_default());
+    (([x.0, y.0, z.0], [a.0, b.0, c.0]), ([x.1, y.1, z.1], [a.1, b.1, c.1]))
 }
 
 #[cfg(test)]

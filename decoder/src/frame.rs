@@ -1,5 +1,7 @@
 //! Clause 7.9: the canonical integer planes of a frame.
 
+use crate::interrupt::Interrupt;
+use rayon::prelude::*;
 use splatstream_gaussians::{FrameError, MAX_SH_DEGREE, sh_planes};
 
 /// A reconstructed frame: integers on the grids of the sequence, Gaussians in coded order.
@@ -155,6 +157,17 @@ impl QuantizedFrame {
         }
     }
 
+    /// The Gaussians of several frames, which have `sh_planes` SH planes, one after the other. Where an interrupt is
+    /// requested, they mean nothing.
+    pub(crate) fn joined(parts: &[&Self], sh_planes: usize, interrupt: &Interrupt) -> Self {
+        let mut all = Self::zeroed(0, sh_planes);
+        let positions = parts.iter().map(|part| part.position.iter().collect()).collect();
+        join(all.position.iter_mut(), positions, interrupt);
+        let others = parts.iter().map(|part| part.signed_planes().collect()).collect();
+        join(all.signed_planes_mut(), others, interrupt);
+        all
+    }
+
     /// The planes after the positions, in canonical order: log-scale, opacity, rotation, dc, sh.
     pub fn signed_planes(&self) -> impl Iterator<Item = &Vec<i32>> {
         self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation).chain(&self.dc).chain(&self.sh)
@@ -169,6 +182,20 @@ impl QuantizedFrame {
             .chain(&mut self.dc)
             .chain(&mut self.sh)
     }
+}
+
+/// Fills empty planes, each with those at its index of all parts.
+fn join<'p, T: Copy + Send + Sync + 'p>(
+    planes: impl Iterator<Item = &'p mut Vec<T>>,
+    parts: Vec<Vec<&Vec<T>>>,
+    interrupt: &Interrupt,
+) {
+    let planes: Vec<&mut Vec<T>> = planes.collect();
+    planes.into_par_iter().enumerate().filter(|_| !interrupt.is_requested()).for_each(|(index, plane)| {
+        let own = || parts.iter().filter_map(|part| part.get(index));
+        plane.reserve_exact(own().map(|part| part.len()).fold(0, usize::saturating_add));
+        own().for_each(|part| plane.extend_from_slice(part));
+    });
 }
 
 /// Keeps the values whose flag is set; values without a flag stay.

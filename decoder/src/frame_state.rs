@@ -1,6 +1,7 @@
 //! A decoded frame of a predicted GOP as later frames refer to it.
 
 use crate::carried::Carried;
+use crate::digest::ListDigest;
 use crate::list::GaussianList;
 use crate::process::Shift;
 use splatstream_format::entropy::in_force::ModelsInForce;
@@ -17,6 +18,8 @@ pub(crate) struct FrameState {
     pub(crate) level: u8,
     /// The exact lists; of an I frame those that it shows.
     pub(crate) lists: Vec<Arc<GaussianList>>,
+    /// Their digests, as far as they were compared.
+    pub(crate) digests: Vec<ListDigest>,
     /// The carried lists; none if they are not available.
     pub(crate) carried: Option<Carried>,
     /// The lists of the I frame of the GOP, if they are a whole anchor: units predict from them.
@@ -29,6 +32,19 @@ pub(crate) struct FrameState {
     pub(crate) carried_shift: Shift,
     /// The plane models in force in a frame that refers to this one: for its cells, and for its unit of refinement 0.
     pub(crate) models: ModelsInForce,
+}
+
+impl FrameState {
+    /// The digest of a list of another frame, if that is list r of this one itself, and its digest was compared.
+    pub(crate) fn digest(&self, r: u8, list: &Arc<GaussianList>) -> Option<&ListDigest> {
+        let own = self.lists.get(usize::from(r)).filter(|own| Arc::ptr_eq(own, list));
+        own.and_then(|_| self.digests.get(usize::from(r)))
+    }
+
+    /// Its exact lists, once no frame refers to it.
+    pub(crate) fn into_lists(self) -> Vec<Arc<GaussianList>> {
+        self.lists
+    }
 }
 
 /// log2 of how many frames a frame is later than the one it refers to: a power of two (7.3.1).

@@ -9,4 +9,5 @@ pub mod values;
 
 mod apply;
 
+pub(crate) use apply::is_idle;
 pub use apply::{Applied, Situation, Temporal, Unit, apply, field, reference_set};

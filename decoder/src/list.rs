@@ -6,12 +6,16 @@
 use crate::digest::{ListDigest, list_digest};
 use crate::displacement::CellField;
 use crate::frame::{QuantizedFrame, retain};
+use crate::interrupt::Interrupt;
 use rayon::prelude::*;
 
 /// Fraction bits of positions and rotations inside the prediction loop.
 pub const FRACTION_BITS: u32 = 6;
 /// One step of the position grid in fine units.
 pub const FINE: i32 = 1 << FRACTION_BITS;
+
+/// Rows are settled one by one as long as the list is so many times as long.
+const FEW_ROWS: usize = 8;
 
 /// The canonical integer of a fine one: `Round(fine, 6)`.
 #[inline]
@@ -47,15 +51,22 @@ pub struct Change {
 impl Change {
     /// From one state of some Gaussians to another.
     pub fn between(before: &GaussianList, after: &GaussianList) -> Self {
-        let difference = |before: &Vec<i32>, after: &Vec<i32>| -> Vec<i32> {
-            after.iter().zip(before).map(|(after, before)| after.wrapping_sub(*before)).collect()
-        };
+        let mut change = Self::default();
+        change.set(before, after);
+        change
+    }
+
+    /// Becomes the change from one state of some Gaussians to another; memory that it has is used again.
+    fn set(&mut self, before: &GaussianList, after: &GaussianList) {
         let [x, y, z] = &before.position_fine;
         let [to_x, to_y, to_z] = &after.position_fine;
-        Self {
-            motion: [difference(x, to_x), difference(y, to_y), difference(z, to_z)],
-            fade: difference(&before.planes.opacity, &after.planes.opacity),
-        }
+        let from = [x, y, z, &before.planes.opacity];
+        let to = [to_x, to_y, to_z, &after.planes.opacity];
+        let planes: Vec<_> = self.planes_mut().zip(from.into_iter().zip(to)).collect();
+        planes.into_par_iter().for_each(|(plane, (from, to))| {
+            plane.clear();
+            plane.extend(to.iter().zip(from).map(|(to, from)| to.wrapping_sub(*from)));
+        });
     }
 
     fn planes_mut(&mut self) -> impl Iterator<Item = &mut Vec<i32>> {
@@ -89,14 +100,32 @@ impl GaussianList {
     /// A copy that later frames start from: what has changed before is not of it.
     #[must_use]
     pub fn unchanged(&self) -> Self {
-        let Self { planes, position_fine, rotation_fine, anchor, change: _ } = self;
-        Self {
-            planes: planes.clone(),
-            position_fine: position_fine.clone(),
-            rotation_fine: rotation_fine.clone(),
-            anchor: anchor.clone(),
-            change: Change::default(),
+        self.unchanged_in(Self::empty(self.planes.sh.len()), Interrupt::NEVER)
+    }
+
+    /// The same in the memory of a list that is not needed any more. Where an interrupt is requested, the copy means
+    /// nothing.
+    pub(crate) fn unchanged_in(&self, mut spare: Self, interrupt: &Interrupt) -> Self {
+        spare.planes.sh.resize_with(self.planes.sh.len(), Vec::new);
+        let from = self.planes.signed_planes().chain(&self.position_fine).chain(&self.rotation_fine);
+        let to = spare.planes.signed_planes_mut();
+        let to = to.chain(&mut spare.position_fine).chain(&mut spare.rotation_fine);
+        let copies: Vec<(&mut Vec<i32>, &Vec<i32>)> = to.zip(from).collect();
+        let copies = copies.into_par_iter().filter(|_| !interrupt.is_requested());
+        copies.for_each(|(to, from)| to.clone_from(from));
+        for (to, from) in spare.planes.position.iter_mut().zip(&self.planes.position) {
+            to.clone_from(from);
         }
+        spare.anchor.clone_from(&self.anchor);
+        spare.change.planes_mut().for_each(Vec::clear);
+        spare
+    }
+
+    /// Takes note of what the Gaussians have become since a state of them.
+    pub(crate) fn follow_change(&mut self, since: &Self) {
+        let mut change = core::mem::take(&mut self.change);
+        change.set(since, self);
+        self.change = change;
     }
 
     /// Gaussians in the list.
@@ -112,25 +141,58 @@ impl GaussianList {
     /// Derives the canonical positions and rotations from the fine ones.
     pub fn settle(&mut self) {
         let Self { planes, position_fine, rotation_fine, .. } = self;
-        for (plane, fine) in planes.position.iter_mut().zip(position_fine) {
-            for (slot, &value) in plane.iter_mut().zip(fine.iter()) {
+        let positions = planes.position.par_iter_mut().zip(position_fine.par_iter());
+        positions.for_each(|(plane, fine)| {
+            for (slot, &value) in plane.iter_mut().zip(fine) {
                 *slot = canonical(value).cast_unsigned();
+            }
+        });
+        let rotations = planes.rotation.par_iter_mut().zip(rotation_fine.par_iter());
+        rotations.for_each(|(plane, fine)| {
+            for (slot, &value) in plane.iter_mut().zip(fine) {
+                *slot = canonical(value);
+            }
+        });
+    }
+
+    /// The same for some Gaussians, given by their rows.
+    pub(crate) fn settle_rows(&mut self, rows: &[&[u32]]) {
+        let count = rows.iter().map(|rows| rows.len()).fold(0, usize::saturating_add);
+        if count.saturating_mul(FEW_ROWS) > self.len() {
+            return self.settle();
+        }
+        let rows = || rows.iter().flat_map(|rows| rows.iter()).map(|&row| row as usize);
+        let Self { planes, position_fine, rotation_fine, .. } = self;
+        for (plane, fine) in planes.position.iter_mut().zip(position_fine) {
+            for row in rows() {
+                if let (Some(slot), Some(&value)) = (plane.get_mut(row), fine.get(row)) {
+                    *slot = canonical(value).cast_unsigned();
+                }
             }
         }
         for (plane, fine) in planes.rotation.iter_mut().zip(rotation_fine) {
-            for (slot, &value) in plane.iter_mut().zip(fine.iter()) {
-                *slot = canonical(value);
+            for row in rows() {
+                if let (Some(slot), Some(&value)) = (plane.get_mut(row), fine.get(row)) {
+                    *slot = canonical(value);
+                }
             }
         }
     }
 
     /// Clause 7.5: displaces every Gaussian by its cell and returns the stale flag of each; no flags if nothing moves.
     pub fn displace(&mut self, field: &CellField) -> Vec<bool> {
+        self.displace_unless(Interrupt::NEVER, field)
+    }
+
+    /// The same; where an interrupt is requested, the list means nothing.
+    pub(crate) fn displace_unless(&mut self, interrupt: &Interrupt, field: &CellField) -> Vec<bool> {
         if field.is_empty() {
             return Vec::new();
         }
-        let stale = field.displace_planes(&mut self.position_fine, &mut self.rotation_fine);
-        self.settle();
+        let stale = field.displace_unless(interrupt, &mut self.position_fine, &mut self.rotation_fine);
+        if !interrupt.is_requested() {
+            self.settle();
+        }
         stale
     }
 

@@ -3,20 +3,23 @@
 //! A parent moves by its cell, as it did before, or as its neighbours do. Neighbours are found as those of new
 //! Gaussians are ([`crate::neighbours`]): among the parents next to it along the Morton curve, of which those count
 //! whose motion is known when the parent's turn comes. Who counts follows from the modes alone, so that neighbours are
-//! found in parallel; the motions follow one after the other, in the order of the parents.
+//! found in parallel (`candidates`); the motions follow one after the other, in the order of the parents.
 
 use crate::curve;
 use crate::list::GaussianList;
-use crate::position::morton;
+use crate::vector::vectorized;
+use candidates::{Candidates, NEVER, Neighbours, Search};
 use rayon::prelude::*;
 use splatstream_format::{Error, ErrorKind, Result};
+
+mod candidates;
 
 /// Candidates on either side of a parent along the curve, at most.
 pub const MOVE_WINDOW: usize = 16;
 /// Neighbours of a moved parent, at most.
 pub const MOVE_NEIGHBOURS: usize = 4;
 
-/// Places of the order searched by one task.
+/// Parents, places or moves that one task takes.
 const RUN: usize = 2048;
 
 /// Bits of a mode that say whether a parent moves, and whether it goes.
@@ -113,10 +116,6 @@ struct Place {
     code: u64,
     list: u32,
     row: u32,
-    /// Canonical, displaced.
-    at: [u32; 3],
-    /// Whether its motion is known, in a list before the last.
-    known: bool,
 }
 
 /// The parents of the increments of a P or B frame, up to the one that is decoded.
@@ -126,15 +125,31 @@ pub struct MoveSpace {
     /// The largest fine coordinate.
     last: i32,
     lists: Vec<Vec<Parent>>,
+    /// Which parents of each list but the last stay, empty if all do: the motions of the others are not known.
+    kept: Vec<Vec<bool>>,
     /// All parents along the curve.
     order: Vec<Place>,
+    /// Memory of other frames.
+    spare_lists: Vec<Vec<Parent>>,
+    spare_order: Vec<Place>,
 }
 
 impl MoveSpace {
     /// Of a frame without increments.
     pub fn new(ratio: SpanRatio, position_bits: u8) -> Self {
-        let last = 1_i32.wrapping_shl(position_bits.into()).wrapping_sub(1).wrapping_shl(6);
-        Self { ratio, last, ..Self::default() }
+        let mut space = Self::default();
+        space.restart(ratio, position_bits);
+        space
+    }
+
+    /// Becomes that of another frame without increments.
+    pub(crate) fn restart(&mut self, ratio: SpanRatio, position_bits: u8) {
+        self.ratio = ratio;
+        self.last = 1_i32.wrapping_shl(position_bits.into()).wrapping_sub(1).wrapping_shl(6);
+        self.spare_lists = core::mem::take(&mut self.lists);
+        self.spare_lists.reverse();
+        self.kept.clear();
+        self.order.clear();
     }
 
     /// Increments whose parents have been added.
@@ -151,23 +166,23 @@ impl MoveSpace {
     /// motions are not known yet.
     pub fn push(&mut self, reference: &GaussianList, displaced: &GaussianList) {
         let list = u32::try_from(self.lists.len()).unwrap_or(u32::MAX);
-        let vector = |planes: &[Vec<i32>; 3], row: usize| planes.each_ref().map(|plane| at(plane, row));
-        let parent = |row: usize| {
-            let start = vector(&reference.position_fine, row);
-            let moved = vector(&displaced.position_fine, row);
-            let trend = vector(&reference.change.motion, row).map(|motion| self.ratio.scaled(motion));
-            let displacement = join(moved, start, i32::wrapping_sub);
-            Parent { start, displacement, trend, motion: displacement }
+        let mut parents = self.spare_lists.pop().unwrap_or_default();
+        parents.clear();
+        parents.resize(displaced.len(), Parent::default());
+        let Self { order, spare_order, ratio, .. } = self;
+        let sort = || {
+            let positions = displaced.planes.position.each_ref().map(Vec::as_slice);
+            let sorted = curve::order(curve::codes(positions).into_iter());
+            let own = sorted.into_iter().map(|(code, row)| Place { code, list, row });
+            merge(order, own, spare_order);
+            core::mem::swap(order, spare_order);
         };
-        let parents: Vec<Parent> = (0..displaced.len()).into_par_iter().map(parent).collect();
-        let position = |index: usize| displaced.planes.position.each_ref().map(|plane| at(plane, index));
-        let code = |index: usize| {
-            let [x, y, z] = position(index);
-            morton(x, y, z)
+        let fill_in = || {
+            parents.par_chunks_mut(RUN).enumerate().for_each(|(run, parents)| {
+                gather(parents, run.wrapping_mul(RUN), reference, displaced, *ratio);
+            });
         };
-        let place = |(code, row)| Place { code, list, row, at: position(row as usize), known: false };
-        let own: Vec<Place> = curve::order((0..displaced.len()).map(code)).into_iter().map(place).collect();
-        self.order = merged(&self.order, &own);
+        rayon::join(sort, fill_in);
         self.lists.push(parents);
     }
 
@@ -175,18 +190,18 @@ impl MoveSpace {
     /// (empty: all).
     pub fn settle(&mut self, after: &GaussianList, keep: &[bool]) {
         let Some(parents) = self.lists.last_mut() else { return };
-        let is_kept = |row: usize| keep.get(row).copied().unwrap_or(true);
-        let mut next = 0_usize;
-        for (row, parent) in parents.iter_mut().enumerate() {
-            if is_kept(row) {
-                parent.motion = after.change.motion.each_ref().map(|plane| at(plane, next));
-                next = next.wrapping_add(1);
+        let keeps_all = keep.iter().all(|&keep| keep);
+        match keeps_all {
+            true => fill(parents, &after.change.motion, 0, |parent, motion| parent.motion = motion),
+            false => {
+                let [x, y, z] = after.change.motion.each_ref().map(|plane| plane.iter().copied());
+                let kept = parents.iter_mut().zip(keep).filter(|(_, keep)| **keep);
+                for (((parent, _), (x, y)), z) in kept.zip(x.zip(y)).zip(z) {
+                    parent.motion = [x, y, z];
+                }
             }
         }
-        let list = u32::try_from(self.lists.len().wrapping_sub(1)).unwrap_or(u32::MAX);
-        for place in self.order.iter_mut().filter(|place| place.list == list) {
-            place.known = is_kept(place.row as usize);
-        }
+        self.kept.push(if keeps_all { Vec::new() } else { keep.to_vec() });
     }
 
     /// The parents that were added last, to be moved one after the other.
@@ -210,73 +225,37 @@ impl MoveSpace {
         rows: &[u32],
         wanted: &(impl Fn(usize) -> bool + Sync),
     ) -> Vec<Neighbours> {
-        let list = u32::try_from(self.lists.len().wrapping_sub(1)).unwrap_or(u32::MAX);
-        let starts: Vec<usize> = (0..self.order.len()).step_by(RUN).collect();
-        let of_run = |&start: &usize| -> Vec<(usize, Neighbours)> {
-            let run = self.order.get(start..).unwrap_or_default().iter().take(RUN);
-            let own = (start..).zip(run).filter(|(_, place)| place.list == list);
-            let moved = own.filter(|(_, place)| at(modes, place.row as usize) & HAS_MOVE != 0);
-            let found = moved.filter_map(|(index, place)| {
-                let number = rows.binary_search(&place.row).ok().filter(|&number| wanted(number))?;
-                Some((number, self.nearest(index, place, list, modes)))
-            });
-            found.collect()
-        };
-        let found: Vec<Vec<(usize, Neighbours)>> = starts.par_iter().map(of_run).collect();
+        let candidates = Candidates::new(self, modes);
         let mut neighbours = vec![Neighbours::default(); rows.len()];
-        for (number, of_move) in found.into_iter().flatten() {
-            if let Some(slot) = neighbours.get_mut(number) {
-                *slot = of_move;
-            }
-        }
+        neighbours.par_chunks_mut(RUN).zip(rows.par_chunks(RUN)).enumerate().for_each(
+            |(run, (neighbours, rows))| {
+                let first = run.wrapping_mul(RUN);
+                vectorized(Search {
+                    candidates: &candidates,
+                    order: &self.order,
+                    rows,
+                    first,
+                    wanted,
+                    neighbours,
+                });
+            },
+        );
         neighbours
     }
 
-    /// The nearest known parents next to a place.
-    fn nearest(&self, index: usize, place: &Place, list: u32, modes: &[i32]) -> Neighbours {
-        let end = index.saturating_add(MOVE_WINDOW).saturating_add(1).min(self.order.len());
-        let candidates = self.order.get(index.saturating_sub(MOVE_WINDOW)..end).unwrap_or_default();
-        let mut nearest = Neighbours::default();
-        for candidate in candidates {
-            let known = match candidate.list == list {
-                false => candidate.known,
-                true => match at(modes, candidate.row as usize) {
-                    REMOVED => false,
-                    mode if mode & HAS_MOVE != 0 => candidate.row < place.row,
-                    // The parent itself is moved.
-                    _ => true,
-                },
-            };
-            if known {
-                nearest.add((distance(place.at, candidate.at), candidate.list, candidate.row));
-            }
-        }
-        nearest
-    }
-}
-
-/// The neighbours of a moved parent: squared distance, list and row, in this order.
-#[derive(Debug, Clone, Copy, Default)]
-struct Neighbours {
-    found: [(u64, u32, u32); MOVE_NEIGHBOURS],
-    count: usize,
-}
-
-impl Neighbours {
-    /// Takes a candidate if it is among the nearest.
+    /// From which row on moved parents of the last list can go by the parent at a place.
     #[inline(always)]
-    fn add(&mut self, mut candidate: (u64, u32, u32)) {
-        self.count = self.count.wrapping_add(1);
-        for (index, slot) in self.found.iter_mut().enumerate() {
-            if index.wrapping_add(1) >= self.count {
-                *slot = candidate;
-                return;
-            }
-            if candidate < *slot {
-                core::mem::swap(&mut candidate, slot);
-            }
+    fn known_from(&self, place: &Place, last: u32, modes: &[i32]) -> u32 {
+        let row = place.row as usize;
+        if place.list != last {
+            let kept = self.kept.get(place.list as usize).map(Vec::as_slice).unwrap_or_default();
+            return if kept.get(row).copied().unwrap_or(true) { 0 } else { NEVER };
         }
-        self.count = MOVE_NEIGHBOURS;
+        match at(modes, row) {
+            REMOVED => NEVER,
+            mode if mode & HAS_MOVE != 0 => place.row.wrapping_add(1),
+            _ => 0,
+        }
     }
 }
 
@@ -345,19 +324,22 @@ impl Moves<'_> {
         let Some(neighbours) = self.neighbours.get(number) else { return [0; 3] };
         let own = u32::try_from(self.space.lists.len().wrapping_sub(1)).unwrap_or(u32::MAX);
         let mut sum = [0_i64; 3];
-        for &(_, list, row) in neighbours.found.iter().take(neighbours.count) {
+        for &(list, row) in neighbours.found.iter().take(neighbours.count) {
             let Some(parents) = self.space.lists.get(list as usize) else { continue };
             let other = at(parents, row as usize);
             let motion = if list == own { at(&self.motion, row as usize) } else { other.motion };
             let term = of(motion, &other);
             sum.iter_mut().zip(term).for_each(|(sum, term)| *sum = sum.wrapping_add(term.into()));
         }
-        let count = i64::try_from(neighbours.count).unwrap_or(0);
-        let twice = count.wrapping_mul(2);
-        sum.map(|sum| {
-            let mean = sum.wrapping_mul(2).wrapping_add(count).checked_div_euclid(twice).unwrap_or(0);
-            i32::try_from(mean).unwrap_or(0)
-        })
+        // floor((2 sum + count) / (2 count)).
+        let mean = |sum: i64| match neighbours.count {
+            0 => 0,
+            1 => sum,
+            2 => sum.wrapping_add(1) >> 1,
+            3 => sum.wrapping_mul(2).wrapping_add(3).div_euclid(6),
+            _ => sum.wrapping_add(2) >> 2,
+        };
+        sum.map(|sum| i32::try_from(mean(sum)).unwrap_or(0))
     }
 }
 
@@ -370,25 +352,49 @@ fn join([a, b, c]: [i32; 3], [d, e, f]: [i32; 3], each: impl Fn(i32, i32) -> i32
     [each(a, d), each(b, e), each(c, f)]
 }
 
+/// Fills in parents from row `first` on, whose motions in the frame are those of their cells so far.
+fn gather(
+    parents: &mut [Parent],
+    first: usize,
+    reference: &GaussianList,
+    displaced: &GaussianList,
+    ratio: SpanRatio,
+) {
+    fill(parents, &reference.position_fine, first, |parent, start| parent.start = start);
+    fill(parents, &displaced.position_fine, first, |parent, moved| {
+        parent.displacement = join(moved, parent.start, i32::wrapping_sub);
+        parent.motion = parent.displacement;
+    });
+    fill(parents, &reference.change.motion, first, |parent, motion| {
+        parent.trend = motion.map(|motion| ratio.scaled(motion));
+    });
+}
+
+/// Gives each of the parents from row `first` on its values of three planes; nothing where the planes end.
+#[inline(always)]
+fn fill(parents: &mut [Parent], planes: &[Vec<i32>; 3], first: usize, each: impl Fn(&mut Parent, [i32; 3])) {
+    let [x, y, z] = planes.each_ref().map(|plane| plane.get(first..).unwrap_or_default());
+    for (parent, ((&x, &y), &z)) in parents.iter_mut().zip(x.iter().zip(y).zip(z)) {
+        each(parent, [x, y, z]);
+    }
+}
+
 #[inline(always)]
 fn at<T: Copy + Default>(values: &[T], index: usize) -> T {
     values.get(index).copied().unwrap_or_default()
 }
 
-#[inline(always)]
-fn distance([x, y, z]: [u32; 3], [a, b, c]: [u32; 3]) -> u64 {
-    let sides = [x.abs_diff(a), y.abs_diff(b), z.abs_diff(c)].map(u64::from);
-    sides.into_iter().fold(0_u64, |sum, side| sum.wrapping_add(side.wrapping_mul(side)))
-}
-
-/// Two sorted lists as one; the second has the higher numbers of lists.
-fn merged(first: &[Place], second: &[Place]) -> Vec<Place> {
-    let mut merged = Vec::with_capacity(first.len().saturating_add(second.len()));
-    let (mut first, mut second) = (first.iter().peekable(), second.iter().peekable());
-    while let (Some(a), Some(b)) = (first.peek(), second.peek()) {
-        let next = if a.code <= b.code { first.next() } else { second.next() };
-        merged.extend(next.copied());
+/// Two sorted lists as one; the second has the higher number.
+fn merge(first: &[Place], second: impl ExactSizeIterator<Item = Place>, merged: &mut Vec<Place>) {
+    merged.clear();
+    merged.reserve(first.len().saturating_add(second.len()));
+    let mut rest = first;
+    for place in second {
+        let before = rest.iter().take_while(|other| other.code <= place.code).count();
+        let (lower, higher) = rest.split_at_checked(before).unwrap_or_default();
+        merged.extend_from_slice(lower);
+        merged.push(place);
+        rest = higher;
     }
-    merged.extend(first.chain(second).copied());
-    merged
+    merged.extend_from_slice(rest);
 }

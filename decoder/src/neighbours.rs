@@ -13,6 +13,9 @@ use rayon::prelude::*;
 /// Candidates on either side of a point on the curve, at most.
 pub const WINDOW: usize = 16;
 
+/// Bits of the number of a candidate, below its squared distance: this is below 2^44, as coordinates are below 2^21.
+const NUMBER_BITS: u32 = 5;
+
 /// Points sought by one task.
 const RUN: usize = 1024;
 
@@ -44,7 +47,7 @@ impl NeighbourSearch {
     /// A search among points, given by their planes x, y, z of one length. Coordinates are below 2^21.
     pub fn new(points: [&[u32]; 3]) -> Self {
         let [xs, ys, zs] = points;
-        let codes: Vec<u64> = (xs, ys, zs).into_par_iter().map(|(&x, &y, &z)| morton(x, y, z)).collect();
+        let codes = curve::codes(points);
         let coordinate = |plane: &[u32], index: u32| plane.get(index as usize).copied().unwrap_or(0);
         let point =
             |(code, index)| Point { code, index, at: [xs, ys, zs].map(|plane| coordinate(plane, index)) };
@@ -63,13 +66,28 @@ impl NeighbourSearch {
 
     /// Replaces `out` by the `count` first neighbours of `point`, or by all candidates there are, nearest first.
     ///
-    /// `count` is at most [`WINDOW`], so that `min(count, len)` neighbours are found.
+    /// `count` is at most [`WINDOW`], so that `min(count, len)` neighbours are found. Coordinates are below 2^21.
     pub fn nearest(&self, point: [u32; 3], count: usize, out: &mut Vec<Neighbour>) {
         out.clear();
         let candidates = self.candidates(point);
-        out.extend(candidates.iter().map(|candidate| candidate.seen_from(point)));
-        out.sort_unstable();
-        out.truncate(count);
+        let mut keys = [u64::MAX; 2 * WINDOW];
+        for ((key, candidate), number) in keys.iter_mut().zip(candidates).zip(0..) {
+            *key = candidate.seen_from(point).distance << NUMBER_BITS | number;
+        }
+        let keys = keys.get_mut(..candidates.len()).unwrap_or_default();
+        keys.sort_unstable();
+        let is_equal = |pair: &[u64]| matches!(pair, [a, b] if a >> NUMBER_BITS == b >> NUMBER_BITS);
+        if keys.windows(2).any(is_equal) {
+            out.extend(candidates.iter().map(|candidate| candidate.seen_from(point)));
+            out.sort_unstable();
+            out.truncate(count);
+            return;
+        }
+        let found = keys.iter().take(count).filter_map(|key| {
+            let candidate = candidates.get((key & ((1 << NUMBER_BITS) - 1)) as usize)?;
+            Some(Neighbour { distance: key >> NUMBER_BITS, index: candidate.index })
+        });
+        out.extend(found);
     }
 
     /// The neighbours of many points, min(count, [`len`](Self::len)) of each, one point after the other.

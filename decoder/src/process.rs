@@ -14,6 +14,7 @@ use frame::{Context, FrameInProgress, Refused};
 use phase::{Phase, ends_frame, ends_gop, is_layered, unexpected};
 use references::References;
 use report::Report;
+use spares::Spares;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::syntax::{
     ErrorScope, FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
@@ -21,6 +22,7 @@ use splatstream_format::syntax::{
 use splatstream_format::unit::{Landmark, Unit};
 use splatstream_format::{Error, ErrorKind, Limits, Result};
 
+mod applying;
 mod closing;
 mod control;
 mod decoded;
@@ -30,6 +32,7 @@ mod gops;
 mod phase;
 mod references;
 mod report;
+mod spares;
 mod trailer;
 
 pub use decoded::{Compensation, DecodedFrame, Shift};
@@ -113,6 +116,7 @@ pub struct Decoder {
     gop: Option<Gop>,
     frame: Option<FrameInProgress>,
     references: References,
+    spares: Spares,
     /// The least `gop_index` of the next GOP.
     next_gop: u64,
     /// The least display index of the next frame.
@@ -152,6 +156,7 @@ impl Decoder {
             gop: None,
             frame: None,
             references: References::default(),
+            spares: Spares::default(),
             next_gop: 0,
             next_frame: 0,
             frames_left: 0,
@@ -437,9 +442,11 @@ impl Decoder {
         let reference = reference.and_then(|layer| self.references.get_mut(layer));
         let closed = frame.close(&context, reference, end != FrameEnd::Cut);
         self.next_identity = closed.next_identity;
+        self.spares = closed.spares;
         self.has_stopped |= self.interrupt.is_requested();
-        if is_kept {
-            self.references.store(layer, closed.state);
+        match is_kept {
+            true => self.references.store(layer, closed.state, |state| self.spares.take(state.into_lists())),
+            false => self.spares.take(closed.state.into_lists()),
         }
         closed.fault.into_iter().for_each(|error| self.add(error));
         if end == FrameEnd::Complete {

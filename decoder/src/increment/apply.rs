@@ -12,7 +12,7 @@ use crate::cell::{Cell, rotation_unit};
 use crate::displacement::CellField;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
-use crate::list::{Change, FINE, GaussianList};
+use crate::list::{FINE, GaussianList};
 use crate::moves::{MovePredictor, MoveSpace, Moves, SpanRatio};
 use crate::position::{collect, positions};
 use crate::predictor::Predictor;
@@ -148,8 +148,10 @@ fn cell(code: u64, stale: i32, motion: [i64; 6], at: u64) -> Result<Cell> {
 /// Invalid by clauses 7.4 to 7.7.
 pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) -> Result<Applied> {
     let mut list = parents;
-    let before =
-        (situation.temporal.is_some() && unit.header.predictor_count() > 0).then(|| list.planes.clone());
+    let codes = unit.values.plane(Section::Predictors, 0);
+    let is_predicted = codes.iter().any(|&code| code != Predictor::None.code());
+    let before = (situation.temporal.is_some() && is_predicted)
+        .then(|| reference_set_unless(unit.interrupt, situation, &list.planes));
     if let Some(temporal) = situation.temporal.as_ref().filter(|_| unit.header.extrapolates_opacity) {
         extrapolate(&mut list, temporal);
     }
@@ -158,14 +160,15 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
     unit.interrupt.check()?;
     let predictors = predictors(unit)?;
     if let Some(temporal) = &situation.temporal {
-        list.change = Change::between(temporal.reference, &list);
+        list.follow_change(temporal.reference);
     }
     unit.interrupt.check()?;
     list.retain(&keep);
     unit.interrupt.check()?;
-    let set = match predictors.iter().any(|&predictor| predictor != Predictor::None) {
-        true => reference_set(situation, before.as_ref().unwrap_or(&list.planes)),
-        false => QuantizedFrame::default(),
+    let set = match before {
+        Some(set) => set,
+        None if is_predicted => reference_set_unless(unit.interrupt, situation, &list.planes),
+        None => QuantizedFrame::default(),
     };
     unit.interrupt.check()?;
     if !set.is_empty() {
@@ -180,12 +183,25 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
 
 /// Clause 7.7: everything that new Gaussians may be predicted from, in order.
 pub fn reference_set(situation: &Situation<'_>, parents: &QuantizedFrame) -> QuantizedFrame {
+    reference_set_unless(Interrupt::NEVER, situation, parents)
+}
+
+/// The same; where an interrupt is requested, the set means nothing.
+fn reference_set_unless(
+    interrupt: &Interrupt,
+    situation: &Situation<'_>,
+    parents: &QuantizedFrame,
+) -> QuantizedFrame {
     let [before, after] = situation.around;
-    let mut set = QuantizedFrame::zeroed(0, parents.sh.len());
-    for &part in before.iter().chain([&parents]).chain(after) {
-        set.append(part);
-    }
-    set
+    let parts: Vec<&QuantizedFrame> =
+        before.iter().copied().chain([parents]).chain(after.iter().copied()).collect();
+    QuantizedFrame::joined(&parts, parents.sh.len(), interrupt)
+}
+
+/// Whether a unit leaves its parents as they come and adds nothing.
+pub(crate) fn is_idle(header: &IncrementHeader, reference: &GaussianList) -> bool {
+    let fades = header.extrapolates_opacity && !reference.change.fade.is_empty();
+    !header.has_modes() && header.new_count == 0 && !fades
 }
 
 /// Applies moves and updates; returns which parents stay.
@@ -218,9 +234,7 @@ fn change_parents(
         attributes.write_to(list, &updated);
     }
     unit.interrupt.check()?;
-    if !moved.is_empty() || !updated.is_empty() {
-        list.settle();
-    }
+    list.settle_rows(&[&moved, &updated]);
     Ok(modes.iter().map(|&mode| mode != REMOVED).collect())
 }
 
@@ -257,26 +271,43 @@ fn check_modes(unit: &Unit<'_>, modes: &[i32], intra: bool) -> Result<()> {
 
 /// Moves without predictors: residuals on top of displaced positions.
 fn move_parents(unit: &Unit<'_>, list: &mut GaussianList, moved: &[u32]) -> Result<()> {
+    let grid = MoveGrid::new(unit);
     for (axis, plane) in list.position_fine.iter_mut().enumerate() {
         for (&row, &value) in moved.iter().zip(unit.values.plane(Section::Moves, axis)) {
             let Some(slot) = usize::try_from(row).ok().and_then(|row| plane.get_mut(row)) else { continue };
-            *slot = moved_by(unit, *slot, value)?;
+            *slot = grid.moved(*slot, value)?;
         }
     }
     Ok(())
 }
 
-/// A fine coordinate after a move by so many steps.
-fn moved_by(unit: &Unit<'_>, from: i32, value: i32) -> Result<i32> {
-    let last =
-        1_i64.wrapping_shl(unit.sequence.position_bits.into()).wrapping_sub(1).wrapping_mul(FINE.into());
-    let step = i64::from(FINE).wrapping_shl(unit.header.position_shift.into());
-    let sum = i64::from(from).wrapping_add(i64::from(value).wrapping_mul(step));
-    if !(0..=last).contains(&sum) {
-        let rule = "a position lies outside the grid";
-        return Err(Error::new(unit.at, "7.4", ErrorKind::Constraint { rule }));
+/// What fine coordinates are moved on.
+struct MoveGrid {
+    /// The largest fine coordinate.
+    last: i64,
+    /// The step of a move, in fine units.
+    step: i64,
+    /// Of the unit, for errors.
+    at: u64,
+}
+
+impl MoveGrid {
+    fn new(unit: &Unit<'_>) -> Self {
+        let size = 1_i64.wrapping_shl(unit.sequence.position_bits.into());
+        let last = size.wrapping_sub(1).wrapping_mul(FINE.into());
+        let step = i64::from(FINE).wrapping_shl(unit.header.position_shift.into());
+        Self { last, step, at: unit.at }
     }
-    Ok(i32::try_from(sum).unwrap_or(0))
+
+    /// A fine coordinate after a move by so many steps.
+    fn moved(&self, from: i32, steps: i32) -> Result<i32> {
+        let sum = i64::from(from).wrapping_add(i64::from(steps).wrapping_mul(self.step));
+        if !(0..=self.last).contains(&sum) {
+            let rule = "a position lies outside the grid";
+            return Err(Error::new(self.at, "7.4", ErrorKind::Constraint { rule }));
+        }
+        Ok(i32::try_from(sum).unwrap_or(0))
+    }
 }
 
 /// Moves with predictors: residuals on top of predictions, one parent after the other.
@@ -290,14 +321,15 @@ fn move_predicted(unit: &Unit<'_>, list: &mut GaussianList, space: &MoveSpace, m
         predictors.get(run).copied().unwrap_or_default()
     };
     let mut moves: Moves<'_> = space.moves(modes, |number| predictor_of(number).has_neighbours());
+    let planes = [0, 1, 2].map(|axis| unit.values.plane(Section::Moves, axis));
+    let grid = MoveGrid::new(unit);
     for number in 0..moves.rows().len() {
         if number.is_multiple_of(RUN) {
             unit.interrupt.check()?;
         }
         let mut position = moves.predicted(number, predictor_of(number));
-        for (axis, coordinate) in position.iter_mut().enumerate() {
-            let value = unit.values.plane(Section::Moves, axis).get(number).copied().unwrap_or(0);
-            *coordinate = moved_by(unit, *coordinate, value)?;
+        for (coordinate, values) in position.iter_mut().zip(planes) {
+            *coordinate = grid.moved(*coordinate, values.get(number).copied().unwrap_or(0))?;
         }
         moves.set(number, position);
         let row = moves.rows().get(number).map_or(usize::MAX, |&row| row as usize);

@@ -7,6 +7,7 @@ use crate::list::{FINE, FRACTION_BITS, GaussianList};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule, step};
 use core::ops::RangeInclusive;
+use rayon::prelude::*;
 use splatstream_format::Result;
 use splatstream_format::payload::Transform;
 
@@ -132,14 +133,14 @@ impl Attributes {
             opacity: shapes.opacity.clone(),
             rotation_fine: list.rotation_fine.each_ref().map(pick),
             dc: planes.dc.each_ref().map(pick),
-            sh: planes.sh.iter().map(pick).collect(),
+            sh: planes.sh.par_iter().map(pick).collect(),
             parents: Some(shapes),
         }
     }
 
     /// Writes the attributes back to the Gaussians of the list; [`GaussianList::settle`] has to follow.
     pub fn write_to(&self, list: &mut GaussianList, rows: &[u32]) {
-        let write = |plane: &mut Vec<i32>, values: &[i32]| {
+        let write = |(plane, values): (&mut Vec<i32>, &Vec<i32>)| {
             for (&row, &value) in rows.iter().zip(values) {
                 if let Some(slot) = usize::try_from(row).ok().and_then(|row| plane.get_mut(row)) {
                     *slot = value;
@@ -151,7 +152,8 @@ impl Attributes {
         let to = to.chain(&mut planes.dc).chain(&mut planes.sh);
         let from = self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation_fine);
         let from = from.chain(&self.dc).chain(&self.sh);
-        to.zip(from).for_each(|(plane, values)| write(plane, values));
+        let planes: Vec<(&mut Vec<i32>, &Vec<i32>)> = to.zip(from).collect();
+        planes.into_par_iter().for_each(write);
     }
 
     /// Adds the residuals of all attributes.

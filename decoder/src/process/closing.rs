@@ -3,6 +3,7 @@
 use super::decoded::{Compensation, DecodedFrame, Shift};
 use super::decoding::Lists;
 use super::frame::{Context, FrameInProgress};
+use super::spares::Spares;
 use crate::carried::Carried;
 use crate::digest::lists_digest;
 use crate::frame::QuantizedFrame;
@@ -21,6 +22,8 @@ pub(super) struct Closed {
     pub(super) fault: Option<Error>,
     /// The identity of the next new Gaussian.
     pub(super) next_identity: u32,
+    /// For the frames after this one.
+    pub(super) spares: Spares,
 }
 
 impl FrameInProgress {
@@ -79,9 +82,10 @@ impl FrameInProgress {
             decoded.identities = self.lists.shown_identities(decoded.planes.len());
         }
         let next_identity = self.lists.next_identity;
-        let lists = core::mem::take(&mut self.lists);
-        (state.lists, state.models) = (lists.lists, lists.models.first);
-        Closed { decoded, state, fault: None, next_identity }
+        let Lists { lists, digests, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
+        (state.lists, state.models, state.digests) = (lists, models.first, digests);
+        spares.end_frame(displaced);
+        Closed { decoded, state, fault: None, next_identity, spares }
     }
 
     fn close_predicted(
@@ -128,9 +132,10 @@ impl FrameInProgress {
         let refinements = context.sequence.refinement_count;
         decoded.compensation = self.lists.compensation(&decoded, refinements, state.carried_shift);
         let next_identity = self.lists.next_identity;
-        let lists = core::mem::take(&mut self.lists);
-        (state.lists, state.models) = (lists.lists, lists.models.first);
-        Closed { decoded, state, fault, next_identity }
+        let Lists { lists, digests, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
+        (state.lists, state.models, state.digests) = (lists, models.first, digests);
+        spares.end_frame(displaced);
+        Closed { decoded, state, fault, next_identity, spares }
     }
 }
 
@@ -154,10 +159,8 @@ impl Lists {
         if self.lists.is_empty() && !self.planes.is_empty() {
             return core::mem::take(&mut self.planes);
         }
-        let mut planes = QuantizedFrame::zeroed(0, sh_planes);
-        let lists = self.lists.iter().take_while(|_| !interrupt.is_requested());
-        lists.for_each(|list| planes.append(&list.planes));
-        planes
+        let parts: Vec<&QuantizedFrame> = self.lists.iter().map(|list| &list.planes).collect();
+        QuantizedFrame::joined(&parts, sh_planes, interrupt)
     }
 
     /// The identities of the exact Gaussians, of which there are so many.

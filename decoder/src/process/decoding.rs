@@ -6,20 +6,20 @@
 //!
 //! Where units only add Gaussians without predictors, steps 2 and 3 are one: see [`crate::direct`].
 
+use super::applying::{self, Outcome};
 use super::decoded::Shift;
 use super::frame::{Context, DividedUnit, FrameInProgress, Refused};
+use super::spares::Spares;
 use crate::digest::{ListDigest, list_digest_unless, lists_digest};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::frame::QuantizedFrame;
-use crate::frame_state::{FrameState, span_log2};
+use crate::increment::Unit;
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, SectionCoding, UnitValues};
-use crate::increment::{Applied, Situation, Temporal, Unit, apply};
 use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::list::GaussianList;
-use crate::moves::{MoveSpace, SpanRatio};
 use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
@@ -45,11 +45,15 @@ pub(super) struct Lists {
     pub(super) digests: Vec<ListDigest>,
     pub(super) models: ModelsOfFrame,
     /// In a P or B frame: the first lists of the reference frame displaced, as far as units predicted from them.
-    displaced: Vec<GaussianList>,
+    pub(super) displaced: Vec<Arc<GaussianList>>,
+    /// How many of them units that are still to be applied may need.
+    pub(super) displaced_needed: usize,
     /// Which parents the unit of each list has kept; empty: all.
-    kept: Vec<Vec<bool>>,
-    /// In a P or B frame: the parents of the first units, as far as moves were predicted from them.
-    moves: Option<MoveSpace>,
+    pub(super) kept: Vec<Vec<bool>>,
+    /// In a P or B frame: whether there is a space of the parents of the first units, from which moves were predicted.
+    pub(super) has_moves: bool,
+    /// Memory of frames before, and that space.
+    pub(super) spares: Spares,
     /// The identities of the Gaussians of each list, if they are asked for.
     pub(super) identities: Vec<Identities>,
     /// The identity of the next new Gaussian.
@@ -65,8 +69,8 @@ pub(super) struct Head {
     pub(super) spatial_layer: u8,
     pub(super) shift: Shift,
     /// Gaussians of the list, and how many of them, the last ones, the unit added.
-    size: usize,
-    added: usize,
+    pub(super) size: usize,
+    pub(super) added: usize,
 }
 
 /// A pending unit with its models read.
@@ -80,8 +84,8 @@ struct Prepared<'r, 'a> {
 
 impl Lists {
     /// Of a frame with these models in force before its first unit, whose new Gaussians have identities from this one on.
-    pub(super) fn new(models: ModelsInForce, next_identity: u32) -> Self {
-        Self { models: ModelsOfFrame::starting_with(models), next_identity, ..Self::default() }
+    pub(super) fn new(models: ModelsInForce, next_identity: u32, spares: Spares) -> Self {
+        Self { models: ModelsOfFrame::starting_with(models), next_identity, spares, ..Self::default() }
     }
 
     /// So many new identities.
@@ -139,9 +143,16 @@ impl Lists {
         Ok(())
     }
 
+    /// Takes note of what units will need that are to be applied.
+    fn expect(&mut self, units: &[DividedUnit<'_>]) {
+        let predicts = |unit: &&DividedUnit<'_>| applying::predicts(&unit.increment.header);
+        let last = units.iter().filter(predicts).map(|unit| unit.refinement).max();
+        self.displaced_needed = last.map_or(0, usize::from);
+    }
+
     /// Takes the list that a unit leaves.
-    fn take(&mut self, refinement: u8, list: GaussianList, head: Head) {
-        put(&mut self.lists, refinement.into(), Arc::new(list));
+    fn take(&mut self, refinement: u8, list: Arc<GaussianList>, head: Head) {
+        put(&mut self.lists, refinement.into(), list);
         put(&mut self.heads, refinement.into(), head);
     }
 }
@@ -172,6 +183,7 @@ impl FrameInProgress {
         let is_direct = self.is_direct(pending, context);
         if !is_direct {
             self.lists.divide(context.options.identities, context.interrupt);
+            self.lists.expect(pending);
         }
         let mut rest = prepared.as_slice();
         while !rest.is_empty() {
@@ -314,112 +326,28 @@ impl FrameInProgress {
             interrupt: context.interrupt,
             at: pending.payload_at,
         };
-        let Applied { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
-        let digest = || list_digest_unless(context.interrupt, &list.planes, 0..list.len());
-        self.check_list(pending, context, digest)?;
+        let Outcome { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
+        let known = context.reference.and_then(|reference| reference.digest(pending.refinement, &list));
+        let compute = || list_digest_unless(context.interrupt, &list.planes, 0..list.len());
+        self.check_list(pending, context, || known.cloned().unwrap_or_else(compute))?;
         if context.options.entropy {
             let state = of_sections(&pending.increment.sections, values);
             let payload_at = pending.payload_at;
             self.entropy.extend(state.map(|state| UnitEntropy { payload_at, state }));
         }
-        let (size, head) = (list.len(), Head::new(pending, list.len(), added.len()));
+        let (size, head) = (list.len(), Head::new(pending, list.len(), added));
         if context.options.identities {
             let r = usize::from(pending.refinement);
             let parents = match context.reference {
                 Some(reference) => reference.identities.get(r),
                 None => self.lists.identities.get(r),
             };
-            self.lists.follow_identities(r, parents.cloned().unwrap_or_default(), &keep, added.len());
+            self.lists.follow_identities(r, parents.cloned().unwrap_or_default(), &keep, added);
         }
         self.lists.take(pending.refinement, list, head);
         put(&mut self.lists.kept, pending.refinement.into(), keep);
         self.finish_unit(pending, size, prepared);
         Ok(())
-    }
-
-    fn applied(&mut self, unit: &Unit<'_>, refinement: u8, context: &Context<'_>) -> Result<Applied> {
-        context.interrupt.check()?;
-        let r = usize::from(refinement);
-        let sh_planes = usize::from(context.sequence.sh_dimension());
-        let empty = || GaussianList::empty(sh_planes);
-        let Some(reference) = context.reference else {
-            let parents = self.lists.lists.get(r).map_or_else(empty, |list| list.as_ref().clone());
-            let lower: Vec<&QuantizedFrame> =
-                self.lists.lists.iter().take(r).map(|list| &list.planes).collect();
-            return apply(unit, parents, &Situation { around: [&lower, &[]], temporal: None });
-        };
-        let before = reference.lists.get(r).map_or_else(|| Arc::new(empty()), Arc::clone);
-        let mut parents = before.unchanged();
-        context.interrupt.check()?;
-        parents.displace(&self.field);
-        context.interrupt.check()?;
-        let ratio = SpanRatio::new(span_log2(self.index, reference), reference.span_log2);
-        let predicts_moves = unit.header.move_predictor_count() > 0;
-        let predicts_new = unit.header.predictor_count() > 0;
-        if predicts_moves || predicts_new {
-            self.displace_before(r, reference, context.interrupt);
-        }
-        let mut moves = None;
-        if predicts_moves {
-            context.interrupt.check()?;
-            let mut space = self.moves_before(r, reference, ratio, unit.sequence.position_bits);
-            context.interrupt.check()?;
-            space.push(&before, &parents);
-            moves = Some(space);
-        }
-        let temporal = Temporal { reference: &before, ratio, moves: moves.as_ref() };
-        let added = if predicts_new { self.added_before(r) } else { Vec::new() };
-        let lower: Vec<&QuantizedFrame> =
-            self.lists.displaced.iter().take(r).map(|list| &list.planes).collect();
-        let anchor = reference.anchor.iter().flat_map(|lists| lists.iter().skip(r.saturating_add(1)));
-        let after: Vec<&QuantizedFrame> = anchor.map(|list| &list.planes).chain(&added).collect();
-        let applied =
-            apply(unit, parents, &Situation { around: [&lower, &after], temporal: Some(temporal) })?;
-        context.interrupt.check()?;
-        if let Some(mut space) = moves {
-            space.settle(&applied.list, &applied.keep);
-            self.lists.moves = Some(space);
-        }
-        Ok(applied)
-    }
-
-    /// Displaces the lists before list r of the reference frame, unless units before have asked for them.
-    fn displace_before(&mut self, r: usize, reference: &FrameState, interrupt: &Interrupt) {
-        for list in reference.lists.iter().take(r).skip(self.lists.displaced.len()) {
-            if interrupt.is_requested() {
-                return;
-            }
-            let mut list = list.unchanged();
-            list.displace(&self.field);
-            self.lists.displaced.push(list);
-        }
-    }
-
-    /// The parents of the units before unit r, with their motions; their lists have been displaced.
-    fn moves_before(
-        &mut self,
-        r: usize,
-        reference: &FrameState,
-        ratio: SpanRatio,
-        position_bits: u8,
-    ) -> MoveSpace {
-        let new = || MoveSpace::new(ratio, position_bits);
-        let mut space = self.lists.moves.take().unwrap_or_else(new);
-        let units = reference.lists.iter().zip(&self.lists.displaced).zip(&self.lists.lists);
-        let units = units.zip(&self.lists.kept).take(r).skip(space.len());
-        for (((before, displaced), list), keep) in units {
-            space.push(before, displaced);
-            space.settle(list, keep);
-        }
-        space
-    }
-
-    /// The Gaussians that the units before unit r added.
-    fn added_before(&self, r: usize) -> Vec<QuantizedFrame> {
-        let added = |(list, head): (&Arc<GaussianList>, &Head)| {
-            list.planes.part(head.size.saturating_sub(head.added)..head.size)
-        };
-        self.lists.lists.iter().zip(&self.lists.heads).take(r).map(added).collect()
     }
 
     fn check_list(

@@ -136,7 +136,7 @@ impl Decoder {
             pending: Vec::new(),
             expected: Progress::new(limit),
             decoded: Progress::new(limit),
-            lists: Lists::new(moved.models, self.next_identity),
+            lists: Lists::new(moved.models, self.next_identity, core::mem::take(&mut self.spares)),
             bytes: unit_bytes(unit),
             entropy: moved.entropy.into_iter().collect(),
             error: absent,

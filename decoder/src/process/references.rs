@@ -25,9 +25,9 @@ impl References {
     }
 
     /// Keeps a frame. No later frame refers to those of its layer and of higher ones that came before.
-    pub(super) fn store(&mut self, layer: u8, state: FrameState) {
+    pub(super) fn store(&mut self, layer: u8, state: FrameState, give_up: impl FnMut(FrameState)) {
         let layer = usize::from(layer);
-        self.layers.iter_mut().skip(layer).for_each(|slot| *slot = None);
+        self.layers.iter_mut().skip(layer).filter_map(Option::take).for_each(give_up);
         if let Some(slot) = self.layers.get_mut(layer) {
             *slot = Some(state);
         }

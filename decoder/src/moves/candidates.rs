@@ -1,0 +1,244 @@
+//! The neighbours of moved parents: the nearest of those next to them along the Morton curve.
+
+use super::{MOVE_NEIGHBOURS, MOVE_WINDOW, MoveSpace, Place, RUN, at};
+use crate::position::collect;
+use crate::vector::{Task, vectorized};
+use rayon::prelude::*;
+use splatstream_format::entropy::machine::Machine;
+
+/// Stands for the row of a move that no parent is known to.
+pub(super) const NEVER: u32 = u32::MAX;
+
+/// Places on either side of a place, and itself.
+const CANDIDATES: usize = 2 * MOVE_WINDOW + 1;
+
+/// Bits of the index of a candidate, below the squared distance: this is below 2^44, as coordinates are below 2^21.
+const INDEX_BITS: u32 = 6;
+
+/// All parents along the curve, as a search looks at them; [`MOVE_WINDOW`] that no move knows stand before and after them.
+pub(super) struct Candidates {
+    /// Canonical, displaced.
+    position: [Vec<u32>; 3],
+    /// The row of the first move of the last list that knows the motion of the parent.
+    known_from: Vec<u32>,
+    /// The place of each parent of the last list.
+    place_of: Vec<u32>,
+}
+
+/// The neighbours of a moved parent: list and row of each.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Neighbours {
+    pub(super) found: [(u32, u32); MOVE_NEIGHBOURS],
+    pub(super) count: usize,
+}
+
+impl Candidates {
+    /// The parents of a space; `modes` are those of the last list.
+    pub(super) fn new(space: &MoveSpace, modes: &[i32]) -> Self {
+        let order = &space.order;
+        let last = u32::try_from(space.lists.len().wrapping_sub(1)).unwrap_or(u32::MAX);
+        let padded = order.len().saturating_add(2 * MOVE_WINDOW);
+        let mut position = [(); 3].map(|()| vec![0; padded]);
+        let mut known_from = vec![NEVER; padded];
+        let mut place_of = vec![0; space.lists.last().map_or(0, Vec::len)];
+        for (index, place) in (0_u32..).zip(order).filter(|(_, place)| place.list == last) {
+            place_of.get_mut(place.row as usize).into_iter().for_each(|slot| *slot = index);
+        }
+        let [xs, ys, zs] = position.each_mut().map(|plane| plane.get_mut(MOVE_WINDOW..).unwrap_or_default());
+        let positions = xs.par_chunks_mut(RUN).zip(ys.par_chunks_mut(RUN)).zip(zs.par_chunks_mut(RUN));
+        positions.zip(order.par_chunks(RUN)).for_each(|(((xs, ys), zs), places)| {
+            vectorized(Positions { places, planes: [xs, ys, zs] });
+        });
+        let known = known_from.get_mut(MOVE_WINDOW..).unwrap_or_default();
+        known.par_chunks_mut(RUN).zip(order.par_chunks(RUN)).for_each(|(known, places)| {
+            for (known, place) in known.iter_mut().zip(places) {
+                *known = space.known_from(place, last, modes);
+            }
+        });
+        Self { position, known_from, place_of }
+    }
+
+    /// The nearest parents next to that of a row, as far as it knows their motions.
+    #[inline(always)]
+    fn nearest(&self, row: u32, order: &[Place]) -> Neighbours {
+        let index = at(&self.place_of, row as usize) as usize;
+        let window = |plane| window(plane, index);
+        let [Some(xs), Some(ys), Some(zs)] = self.position.each_ref().map(|plane| window(plane)) else {
+            return Neighbours::default();
+        };
+        let Some(known_from) = window(&self.known_from) else { return Neighbours::default() };
+        let own = self.position.each_ref().map(|plane| at(plane, index.wrapping_add(MOVE_WINDOW)));
+        let mut keys = [u64::MAX; CANDIDATES];
+        let points = xs.iter().zip(ys).zip(zs).zip(known_from);
+        for ((key, number), (((&x, &y), &z), &known_from)) in keys.iter_mut().zip(0..).zip(points) {
+            let found = distance(own, [x, y, z]) << INDEX_BITS | number;
+            *key = if known_from <= row { found } else { u64::MAX };
+        }
+        let nearest = smallest(&keys);
+        let first = index.wrapping_sub(MOVE_WINDOW);
+        let place = |key: u64| {
+            let number = (key & ((1 << INDEX_BITS) - 1)) as usize;
+            order.get(first.wrapping_add(number)).map_or((0, 0), |place| (place.list, place.row))
+        };
+        let count = nearest.iter().filter(|&&key| key != u64::MAX).count();
+        let reach = nearest.last().map_or(0, |&key| key >> INDEX_BITS);
+        let within = keys.iter().filter(|&&key| key >> INDEX_BITS <= reach).count();
+        if count == MOVE_NEIGHBOURS && within > MOVE_NEIGHBOURS {
+            return among_equals(&keys, place);
+        }
+        Neighbours { found: nearest.map(place), count }
+    }
+}
+
+/// The candidates of a place in a plane.
+#[inline(always)]
+fn window(plane: &[u32], index: usize) -> Option<&[u32; CANDIDATES]> {
+    plane.get(index..)?.first_chunk()
+}
+
+/// The smallest keys, in order.
+#[inline(always)]
+fn smallest(keys: &[u64; CANDIDATES]) -> [u64; MOVE_NEIGHBOURS] {
+    let mut smallest = [u64::MAX; MOVE_NEIGHBOURS];
+    for &key in keys {
+        let mut larger = key;
+        for slot in &mut smallest {
+            (*slot, larger) = (larger.min(*slot), larger.max(*slot));
+        }
+    }
+    smallest
+}
+
+/// The nearest where more are equally far than can be taken: those of lower lists and rows.
+#[cold]
+fn among_equals(keys: &[u64; CANDIDATES], place: impl Fn(u64) -> (u32, u32)) -> Neighbours {
+    let known = keys.iter().filter(|&&key| key != u64::MAX);
+    let mut all: Vec<(u64, (u32, u32))> = known.map(|&key| (key >> INDEX_BITS, place(key))).collect();
+    all.sort_unstable();
+    let mut nearest = Neighbours::default();
+    for (slot, (_, place)) in nearest.found.iter_mut().zip(all) {
+        *slot = place;
+        nearest.count = nearest.count.wrapping_add(1);
+    }
+    nearest
+}
+
+#[inline(always)]
+fn distance([x, y, z]: [u32; 3], [a, b, c]: [u32; 3]) -> u64 {
+    let sides = [x.abs_diff(a), y.abs_diff(b), z.abs_diff(c)].map(u64::from);
+    sides.into_iter().fold(0_u64, |sum, side| sum.wrapping_add(side.wrapping_mul(side)))
+}
+
+/// Finds the neighbours of the moves of some rows; the first is number `first`.
+pub(super) struct Search<'s, W> {
+    pub(super) candidates: &'s Candidates,
+    pub(super) order: &'s [Place],
+    pub(super) rows: &'s [u32],
+    pub(super) first: usize,
+    /// Which numbers want neighbours.
+    pub(super) wanted: &'s W,
+    pub(super) neighbours: &'s mut [Neighbours],
+}
+
+impl<W: Fn(usize) -> bool> Task for Search<'_, W> {
+    #[inline(always)]
+    fn run(self, _: impl Machine) {
+        let Self { candidates, order, rows, first, wanted, neighbours } = self;
+        for (number, (slot, &row)) in (first..).zip(neighbours.iter_mut().zip(rows)) {
+            if wanted(number) {
+                *slot = candidates.nearest(row, order);
+            }
+        }
+    }
+}
+
+/// Takes positions out of Morton codes.
+struct Positions<'p> {
+    places: &'p [Place],
+    planes: [&'p mut [u32]; 3],
+}
+
+impl Task for Positions<'_> {
+    #[inline(always)]
+    fn run(self, _: impl Machine) {
+        let [xs, ys, zs] = self.planes;
+        for (place, ((x, y), z)) in self.places.iter().zip(xs.iter_mut().zip(ys).zip(zs)) {
+            [*x, *y, *z] = [collect(place.code), collect(place.code >> 1), collect(place.code >> 2)];
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::arithmetic_side_effects, reason = "an overflow is a failed test")]
+mod tests {
+    use super::super::{HAS_MOVE, REMOVED, SpanRatio};
+    use super::*;
+    use crate::frame::QuantizedFrame;
+    use crate::list::GaussianList;
+    use crate::position::morton;
+    use proptest::prelude::*;
+
+    /// Few coordinates, so that many parents share a place or lie equally far.
+    fn list() -> impl Strategy<Value = Vec<[u32; 3]>> {
+        proptest::collection::vec([0_u32..6, 0_u32..6, 0_u32..3], 1..80)
+    }
+
+    fn of_points(points: &[[u32; 3]]) -> GaussianList {
+        let mut planes = QuantizedFrame::zeroed(points.len(), 0);
+        planes.position = [0, 1, 2].map(|axis| points.iter().map(|point| point[axis]).collect());
+        GaussianList::of_planes(planes, true)
+    }
+
+    /// The definition: all parents in the order of code, list and row; of those around the own one that are known, the
+    /// nearest, ties to the lower list and row.
+    fn by_hand(lists: &[Vec<[u32; 3]>; 2], kept: &[bool], modes: &[i32], row: u32) -> Vec<(u32, u32)> {
+        let mut order: Vec<(u64, u32, u32)> = Vec::new();
+        for (list, points) in (0..).zip(lists) {
+            order.extend((0..).zip(points).map(|(row, &[x, y, z])| (morton(x, y, z), list, row)));
+        }
+        order.sort_unstable();
+        let own = order.iter().position(|&(_, list, at)| (list, at) == (1, row)).unwrap();
+        let known = |&&(_, list, at): &&(u64, u32, u32)| match (list, modes[at as usize % modes.len()]) {
+            (0, _) => kept[at as usize],
+            (_, REMOVED) => false,
+            (_, mode) => mode & HAS_MOVE == 0 || at < row,
+        };
+        let near = order.iter().enumerate().filter(|(index, _)| index.abs_diff(own) <= MOVE_WINDOW);
+        let point = |list: u32, row: u32| lists[list as usize][row as usize];
+        let mut found: Vec<(u64, u32, u32)> = near
+            .map(|(_, place)| place)
+            .filter(known)
+            .map(|&(_, list, at)| (distance(point(1, row), point(list, at)), list, at))
+            .collect();
+        found.sort_unstable();
+        found.into_iter().map(|(_, list, at)| (list, at)).take(MOVE_NEIGHBOURS).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn neighbours_are_those_of_the_definition(
+            lists in [list(), list()],
+            kept in proptest::collection::vec(any::<bool>(), 80),
+            modes in proptest::collection::vec(0..=REMOVED, 80),
+        ) {
+            let mut space = MoveSpace::new(SpanRatio::default(), 8);
+            let [first, last] = lists.each_ref().map(|points| of_points(points));
+            let kept = &kept[..first.len()];
+            let modes = &modes[..last.len()];
+            space.push(&first, &first);
+            let mut after = first.clone();
+            after.retain(kept);
+            space.settle(&after, kept);
+            space.push(&last, &last);
+            let candidates = Candidates::new(&space, modes);
+            for (row, _) in (0..).zip(modes).filter(|(_, mode)| **mode & HAS_MOVE != 0) {
+                let Neighbours { found, count } = candidates.nearest(row, &space.order);
+                let mut found = found[..count].to_vec();
+                let mut expected = by_hand(&lists, kept, modes, row);
+                found.sort_unstable();
+                expected.sort_unstable();
+                prop_assert_eq!(found, expected);
+            }
+        }
+    }
+}
