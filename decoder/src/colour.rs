@@ -117,7 +117,7 @@ fn inverse(transform: &Transform, components: &Components, out: &mut [&mut [i32]
 /// `out_j += Round(sum over k of basis[k][j] * component_k, 6)`: a residual on top of what `out` holds.
 ///
 /// # Errors
-/// As [`inverse`].
+/// Invalid if a component leaves -8191..=8191.
 pub fn add_inverse(
     transform: &Transform,
     components: &[Vec<i32>],
