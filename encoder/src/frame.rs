@@ -21,9 +21,11 @@ pub(crate) mod steadiness;
 pub(crate) mod survivors;
 pub(crate) mod unit;
 mod update_decision;
-mod visible_difference;
+pub(crate) mod visible_difference;
 
-pub(crate) use axis_matching::Namings;
+pub(crate) use axis_matching::{Namings, Pose};
+pub(crate) use update_decision::pixel;
+pub(crate) use visible_difference::{Seen, Shown};
 
 use crate::matching::Cloud;
 use splatstream_decoder::list::GaussianList;

@@ -1,18 +1,20 @@
 //! Which Gaussians come first.
 
+use crate::frame::pixel;
 use crate::settings::{Importance, Preset, Settings};
+use rayon::prelude::*;
 use splatstream_format::syntax::prefix_length;
 use splatstream_gaussians::{GaussianFrame, importance};
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
-use splatstream_render::contribution::{Worth, worth};
+use splatstream_render::contribution::{SmallViews, Worth};
 
 /// The Gaussians of a frame, most important first, and what pictures show of them.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ranked {
     pub(crate) order: Vec<u32>,
-    /// [Energy](Worth::energy) by Gaussian; empty where no views were needed.
-    pub(crate) energy: Vec<f64>,
+    /// By Gaussian; empty where no views were needed.
+    pub(crate) shown: Vec<Worth>,
 }
 
 /// Orders the frames of a sequence, most important Gaussian first.
@@ -58,9 +60,12 @@ impl Ranking {
     /// The first frame, whose order [`Ranking::order`] will not find again.
     pub(crate) fn rank_first(&mut self, frame: &GaussianFrame) -> Ranked {
         let mut ranked = self.ranked(frame);
-        if ranked.energy.is_empty() && !self.rounds.is_empty() {
+        if ranked.shown.is_empty() {
             self.cameras(frame);
-            ranked.energy = energies(&worth(frame, &self.cameras));
+            ranked.shown = match self.preset {
+                Preset::Fast => expected(frame, &self.cameras),
+                Preset::Balanced | Preset::Small => self.views(frame).worth(),
+            };
         }
         self.known_order = Some(ranked.order.clone());
         ranked
@@ -77,18 +82,19 @@ impl Ranking {
     fn ranked(&mut self, frame: &GaussianFrame) -> Ranked {
         let volume = importance::opacity_volume(frame);
         if self.importance == Importance::Volume {
-            return Ranked { order: importance::order(&volume), energy: Vec::new() };
+            return Ranked { order: importance::order(&volume), shown: Vec::new() };
         }
         self.cameras(frame);
-        let shown = worth(frame, &self.cameras);
+        let views = self.views(frame);
+        let shown = views.worth();
         let order = match self.importance {
-            Importance::Removal => self.eliminate(frame, &volume, &shown),
+            Importance::Removal => self.eliminate(&views, &volume, &shown),
             _ => {
                 let given: Vec<f64> = shown.iter().map(|worth| worth.contribution).collect();
-                ranked(&given, &volume, &all(frame))
+                ranked(&given, &volume, &all(frame.len()))
             }
         };
-        Ranked { order, energy: energies(&shown) }
+        Ranked { order, shown }
     }
 
     /// A GOP begins: after a cut there is something else to see, from elsewhere. Views for which an order is known already
@@ -112,22 +118,36 @@ impl Ranking {
         &self.cameras
     }
 
+    /// What orders go by: some of the cameras, in small pictures.
+    fn views<'f>(&self, frame: &'f GaussianFrame) -> SmallViews<'f> {
+        let (most, lines) = match self.preset {
+            Preset::Fast => (3, 96),
+            Preset::Balanced => (10, 144),
+            Preset::Small => (24, 360),
+        };
+        let stride = self.cameras.len().div_ceil(most).max(1);
+        let cameras: Vec<Camera> = self.cameras.iter().step_by(stride).cloned().collect();
+        SmallViews::new(frame, &cameras, lines)
+    }
+
     /// From the last to the first: what pictures miss least goes, the rest is weighed again without it.
     ///
     /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
     /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what
     /// goes at the same time, the contribution alone none of how alike things look.
-    fn eliminate(&self, frame: &GaussianFrame, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
-        let mut kept = all(frame);
+    fn eliminate(&self, views: &SmallViews<'_>, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
+        let count = volume.len();
+        let mut kept = all(count);
         let mut gone: Vec<u32> = Vec::new();
         for &percent in &self.rounds {
-            let of_kept = match kept.len() == frame.len() {
+            kept.sort_unstable();
+            let of_kept = match kept.len() == count {
                 true => whole.to_vec(),
-                false => worth(&frame.select(&kept), &self.cameras),
+                false => views.worth_of(&kept),
             };
             let scores: Vec<f64> = of_kept.iter().map(|w| (w.contribution * w.loss).sqrt()).collect();
             kept = ranked(&scores, volume, &kept);
-            let going = kept.split_off(prefix_length(percent, frame.len() as u32) as usize);
+            let going = kept.split_off(prefix_length(percent, count as u32) as usize);
             gone = going.into_iter().chain(gone).collect();
         }
         kept.extend(gone);
@@ -135,12 +155,23 @@ impl Ranking {
     }
 }
 
-fn energies(shown: &[Worth]) -> Vec<f64> {
-    shown.iter().map(|worth| worth.energy).collect()
+/// What pictures would show of each Gaussian if no other hid it: from its opacity, and from the pixels that it covers.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
+fn expected(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
+    let of_row = |row: usize| {
+        let scales = frame.log_scale().each_ref().map(|plane| plane[row]);
+        let least = scales.into_iter().fold(f32::INFINITY, f32::min);
+        let pixel = pixel(frame, row, cameras).max(f32::MIN_POSITIVE);
+        let area = libm::expf(scales.iter().sum::<f32>() - least) / (pixel * pixel);
+        let opacity = 1.0 / (1.0 + libm::expf(-frame.opacity_logit()[row]));
+        let [contribution, energy] = [opacity * area, opacity * opacity * area].map(f64::from);
+        Worth { contribution, loss: energy, energy }
+    };
+    (0..frame.len()).into_par_iter().map(of_row).collect()
 }
 
-fn all(frame: &GaussianFrame) -> Vec<u32> {
-    (0..frame.len() as u32).collect()
+fn all(count: usize) -> Vec<u32> {
+    (0..count as u32).collect()
 }
 
 /// `gaussians` by falling score; those that no view tells apart by opacity times volume. `scores` go with

@@ -16,6 +16,7 @@ use crate::steps::Steps;
 use splatstream_decoder::steps::STEPS;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, MAX_REFINEMENTS, SequenceParameters};
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::contribution::Worth;
 
 /// The exponent of the steps that are asked for: finer ones have room below it, coarser ones above.
 const NOMINAL: u8 = 5;
@@ -56,13 +57,13 @@ pub struct Laws {
 }
 
 impl Laws {
-    /// For a scene whose Gaussians have the order of importance `order`, of which pictures show `energy`, and
+    /// For a scene whose Gaussians have the order of importance `order`, of which pictures show so much, and
     /// refinements up to these percentages.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "counts in memory; exponents are at most 13 and positions have 1 bit or more"
     )]
-    pub(crate) fn of(frame: &GaussianFrame, order: &[u32], energy: &[f64], refinements: &[u8]) -> Self {
+    pub(crate) fn of(frame: &GaussianFrame, order: &[u32], shown: &[Worth], refinements: &[u8]) -> Self {
         if frame.is_empty() {
             return Self::default();
         }
@@ -78,7 +79,7 @@ impl Laws {
             anisotropy: ANISOTROPY_POWER,
             area_reference: mean as f32,
             anisotropy_reference: reference,
-            coarser: coarser(order, energy, refinements),
+            coarser: coarser(order, shown, refinements),
         }
     }
 
@@ -156,12 +157,12 @@ fn shape(frame: &GaussianFrame, row: usize) -> (f32, f32) {
 
 /// How much coarser each refinement is than the first, in half octaves, by the mean of the logarithm of what pictures
 /// show of its Gaussians.
-fn coarser(order: &[u32], energy: &[f64], refinements: &[u8]) -> [u8; MAX_REFINEMENTS as usize] {
+fn coarser(order: &[u32], shown: &[Worth], refinements: &[u8]) -> [u8; MAX_REFINEMENTS as usize] {
     let mut coarser = [0; MAX_REFINEMENTS as usize];
     let mut first = None;
     for (slot, part) in coarser.iter_mut().zip(parts(refinements, order.len())) {
         let rows = &order[part];
-        let of_row = |&row: &u32| energy.get(row as usize).copied().unwrap_or(0.0);
+        let of_row = |&row: &u32| shown.get(row as usize).map_or(0.0, |worth| worth.energy);
         let least = first.map_or(f64::MIN_POSITIVE, |(mean, _)| LEAST_ENERGY * mean);
         let count = rows.len().max(1) as f64;
         let mean = rows.iter().map(of_row).sum::<f64>() / count;
@@ -178,10 +179,12 @@ mod tests {
 
     #[test]
     fn refinements_are_coarser_by_what_pictures_show_less() {
-        let energy: Vec<f64> = [vec![2048.0; 50], vec![8.0; 30], vec![0.0; 20]].concat();
+        let energies = [vec![2048.0; 50], vec![8.0; 30], vec![0.0; 20]].concat();
+        let shown: Vec<Worth> =
+            energies.into_iter().map(|energy| Worth { energy, ..Worth::default() }).collect();
         let order: Vec<u32> = (0..100).collect();
         let expected = [0, 4, 5, 0, 0, 0, 0, 0, 0, 0];
-        assert_eq!(coarser(&order, &energy, &[50, 80, 100]), expected);
+        assert_eq!(coarser(&order, &shown, &[50, 80, 100]), expected);
     }
 
     #[test]

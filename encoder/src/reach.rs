@@ -87,10 +87,8 @@ impl Core {
         }
         let axes = frame.position().each_ref().map(|plane| {
             let mut values: Vec<f32> = rows.iter().map(|&row| plane[row]).collect();
-            values.sort_unstable_by(f32::total_cmp);
             let last = values.len().saturating_sub(1);
-            [3, 20, 80, 97]
-                .map(|percent: usize| values.get(last * percent / 100).copied().unwrap_or_default())
+            [3, 20, 80, 97].map(|percent: usize| selected(&mut values, last * percent / 100))
         });
         let halves = |low: usize, high: usize| {
             axes.iter().map(|axis| 0.5 * axis[high] - 0.5 * axis[low]).fold(0.0, f32::max)
@@ -237,7 +235,7 @@ impl Reach {
             for apart in apart {
                 let coarser = coarser(apart, linear, segment);
                 octaves += f64::from(coarser);
-                error += weight * libm::exp2(2.0 * f64::from(coarser)) / 3.0;
+                error += weight * power_of_two(2 * coarser) / 3.0;
             }
         }
         1.5 * libm::log2((error / weights).max(1.0)) - octaves / self.sample.len().max(1) as f64
@@ -294,5 +292,23 @@ fn candidates(half: f64) -> impl Iterator<Item = Candidate> {
 
 /// log2 of the step at a distance from the middle.
 fn coarser(apart: f64, linear: f64, segment: f64) -> i32 {
-    if apart <= linear { 0 } else { libm::floor(libm::log2((apart - linear) / segment + 2.0)) as i32 }
+    if apart <= linear { 0 } else { exponent((apart - linear) / segment + 2.0) }
+}
+
+/// The value at a place of sorted values; 0 if there is none.
+fn selected(values: &mut [f32], place: usize) -> f32 {
+    if place >= values.len() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(place, f32::total_cmp).1
+}
+
+/// 2 to an integer of small magnitude, exactly.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
+/// The integer part of the binary logarithm of a number from 1 on: its exponent.
+fn exponent(value: f64) -> i32 {
+    (value.to_bits() >> 52) as i32 - 1023
 }

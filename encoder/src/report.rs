@@ -98,7 +98,7 @@ pub struct PictureReport {
     pub frames: Vec<VerifiedFrame>,
     /// Views of each.
     pub views: u32,
-    /// Rows of each picture.
+    /// Rows of each picture. Of these a part is drawn, in strips over all of its height.
     pub height: u32,
 }
 

@@ -281,7 +281,7 @@ pub struct Settings {
     pub sh: ShChoice,
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     pub keep_invisible: bool,
-    /// What puts Gaussians into the first refinements; none: volume for the fast preset, removal for others.
+    /// What puts Gaussians into the first refinements; none: contribution for the fast preset, removal for others.
     pub importance: Option<Importance>,
     /// The views that importance and pictures are measured in; none: made for the first frame, all around.
     pub cameras: Vec<Camera>,

@@ -22,8 +22,11 @@ use splatstream_format::syntax::FrameType;
 use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
 
-/// A PSNR is near enough within so many decibels, and a size within this part of it.
-const NEAR_DECIBELS: f64 = 0.3;
+/// A PSNR is near enough within so many decibels of what is this much higher than the one that is asked for: a little too
+/// good is better than not good enough, and either is better than another encoding.
+const NEAR_DECIBELS: f64 = 0.45;
+const ABOVE: f64 = 0.05;
+/// A size is near enough within this part of it.
 const NEAR_SIZE: f64 = 0.015;
 
 /// The PSNR that is tried first for a size, decibels, and by how much the logarithm of the size grows for each: from real
@@ -102,7 +105,7 @@ impl<'a> Fitting<'a> {
         let (frame, _) = isolated::colours(frame, &shown, 0);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
-        Ok(Self { settings, fit: Fit::new(frame, &ranked, settings)?, ranking, known: Vec::new() })
+        Ok(Self { settings, fit: Fit::new(&frame, &ranked, settings), ranking, known: Vec::new() })
     }
 
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
@@ -172,7 +175,7 @@ impl Seeker<'_> {
 
     /// A stream with pictures of a PSNR. Of a sequence its first frames are tried: one of each type.
     fn quality(&mut self, wanted: f64) -> Result<Encoded, Error> {
-        let mut secant = Secant::new(wanted, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
+        let mut secant = Secant::new(wanted + ABOVE, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
         let frames_of_part = match self.fitting.settings.temporal_layers() {
             0 => 1,
             layers => 1 + (1 << (layers - 1)),

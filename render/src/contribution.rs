@@ -1,7 +1,7 @@
 //! How much each Gaussian matters to a set of views.
 
 use crate::camera::Camera;
-use crate::rasterise::{Blend, Ink, Lanes, Shapes, TILE, Tile, View, blend_tile};
+use crate::rasterise::{Blend, Ink, Lanes, Shapes, Sight, Splat, TILE, Tile, View, blend_tile};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
@@ -11,7 +11,7 @@ use splatstream_gaussians::GaussianFrame;
 ///
 /// Equal on every machine and for any number of threads. A Gaussian that no view sees has 0.
 pub fn contribution(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
-    sums::<false>(frame, cameras).into_iter().map(|worth| worth.contribution).collect()
+    worth(frame, cameras).into_iter().map(|worth| worth.contribution).collect()
 }
 
 /// What a Gaussian is to a set of views.
@@ -35,33 +35,75 @@ pub fn removal(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<f64> {
     worth(frame, cameras).into_iter().map(|worth| worth.loss).collect()
 }
 
-/// All measures of each Gaussian, for the price of [`removal`].
+/// All measures of each Gaussian.
 pub fn worth(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
-    sums::<true>(frame, cameras)
-}
-
-/// `loss` and `energy` stay 0 without `REMOVAL`.
-#[expect(
-    clippy::indexing_slicing,
-    reason = "lanes and lines are counted by the tile; places and Gaussians are those that it was made from"
-)]
-fn sums<const REMOVAL: bool>(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     let mut sums = vec![Worth::default(); frame.len()];
     let shapes = Shapes::of(frame);
     for camera in cameras {
-        let view = &View::new(frame, &shapes, camera);
-        let rows = (0..view.rows.len()).into_par_iter().with_max_len(1);
-        let shares: Vec<Vec<Share>> =
-            rows.map(|row| pulp::Arch::new().dispatch(RowShares::<REMOVAL> { view, row })).collect();
-        // In the order of the rows, whoever computed them.
-        for share in shares.iter().flatten() {
-            let sum = &mut sums[view.splats[share.place as usize].gaussian as usize];
-            sum.contribution += f64::from(share.contribution);
-            sum.loss += f64::from(share.loss);
-            sum.energy += f64::from(share.energy);
-        }
+        add(&View::new(frame, &shapes, &Sight::of(camera)), &mut sums);
     }
     sums
+}
+
+/// A frame as cameras see it in pictures smaller than theirs, which cost less and show nearly the same of each Gaussian.
+///
+/// A Gaussian smaller than a pixel covers as much of it as it would cover in the large picture, whatever the filter of
+/// the renderer makes of it.
+pub struct SmallViews<'a> {
+    frame: &'a GaussianFrame,
+    shapes: Shapes,
+    /// Cameras of the small pictures, and the side of a pixel of the large ones in pixels of the small ones.
+    cameras: Vec<(Camera, f32)>,
+}
+
+impl<'a> SmallViews<'a> {
+    /// Pictures of at most so many lines.
+    #[must_use]
+    pub fn new(frame: &'a GaussianFrame, cameras: &[Camera], lines: u32) -> Self {
+        let small = |camera: &Camera| match camera.height > lines {
+            true => (camera.scaled_to_height(lines), lines as f32 / camera.height as f32),
+            false => (camera.clone(), 1.0),
+        };
+        Self { frame, shapes: Shapes::of(frame), cameras: cameras.iter().map(small).collect() }
+    }
+
+    /// What each Gaussian is to them.
+    #[must_use]
+    pub fn worth(&self) -> Vec<Worth> {
+        self.measure(None)
+    }
+
+    /// What each of some Gaussians is to them if there were no others. `rows` rise; so does what is returned.
+    #[must_use]
+    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
+    pub fn worth_of(&self, rows: &[u32]) -> Vec<Worth> {
+        let all = self.measure(Some(rows));
+        rows.iter().map(|&row| all[row as usize]).collect()
+    }
+
+    fn measure(&self, rows: Option<&[u32]>) -> Vec<Worth> {
+        let mut sums = vec![Worth::default(); self.frame.len()];
+        for (camera, fine) in &self.cameras {
+            let sight = Sight { rows, fine: *fine, ..Sight::of(camera) };
+            add(&View::new(self.frame, &self.shapes, &sight), &mut sums);
+        }
+        sums
+    }
+}
+
+/// Adds what each Gaussian is to a view.
+#[expect(clippy::indexing_slicing, reason = "places and Gaussians are those that the view was made from")]
+fn add(view: &View, sums: &mut [Worth]) {
+    let rows = (0..view.rows.len()).into_par_iter().with_max_len(1);
+    let shares: Vec<Vec<Share>> =
+        rows.map(|row| pulp::Arch::new().dispatch(RowShares { view, row })).collect();
+    // In the order of the rows, whoever computed them.
+    for share in shares.iter().flatten() {
+        let sum = &mut sums[view.splats[share.place as usize].gaussian as usize];
+        sum.contribution += f64::from(share.contribution);
+        sum.loss += f64::from(share.loss);
+        sum.energy += f64::from(share.energy);
+    }
 }
 
 /// What an ellipse is to a tile: sums over its pixels.
@@ -74,12 +116,12 @@ struct Share {
 }
 
 /// What each ellipse is to the tiles of a row.
-struct RowShares<'a, const REMOVAL: bool> {
+struct RowShares<'a> {
     view: &'a View,
     row: usize,
 }
 
-impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
+impl WithSimd for RowShares<'_> {
     type Output = Vec<Share>;
 
     #[inline(always)]
@@ -87,82 +129,94 @@ impl<const REMOVAL: bool> WithSimd for RowShares<'_, REMOVAL> {
         let View { splats, rows } = self.view;
         let entries = rows.entries(self.row, splats);
         let mut shares = Vec::new();
+        let mut trace = Trace::default();
         for column in 0..entries.tiles() {
             let places = entries.of_tile(column);
             if places.is_empty() {
                 continue;
             }
-            let tile = || Tile::new(self.row, column, rows.size());
-            let mut ink = Ink::default();
-            if REMOVAL {
-                blend_tile(splats, places, &mut tile(), &mut ink);
-            }
-            let mut counter = Counter::<REMOVAL> {
-                ink,
-                given: [0.0; TILE],
-                lost: [0.0; TILE],
-                squared: [0.0; TILE],
-                places,
-                shares: &mut shares,
-            };
-            blend_tile(splats, places, &mut tile(), &mut counter);
+            trace.clear();
+            blend_tile(splats, places, &mut Tile::new(self.row, column, rows.size()), &mut trace);
+            trace.shares(splats, places, &mut shares);
         }
         shares
     }
 }
 
-/// Sums what a Gaussian is to a tile.
-struct Counter<'a, const REMOVAL: bool> {
-    /// For removal: the light of the Gaussians that are still to come.
+/// What a tile was blended from, to be gone through again when all of its light is known.
+#[derive(Default)]
+struct Trace {
     ink: Ink,
-    given: Lanes,
-    lost: Lanes,
-    squared: Lanes,
-    places: &'a [u32],
-    shares: &'a mut Vec<Share>,
+    lines: Vec<Line>,
+    /// Entries of the tile that have lines, and where their lines end.
+    entries: Vec<(u32, usize)>,
 }
 
-impl<const REMOVAL: bool> Blend for Counter<'_, REMOVAL> {
+/// What a Gaussian adds to a line.
+struct Line {
+    line: u32,
+    visible: Lanes,
+    passing: Lanes,
+}
+
+impl Blend for Trace {
     #[inline(always)]
-    #[expect(
-        clippy::indexing_slicing,
-        reason = "lanes and lines are counted by the tile; places and Gaussians are those that it was made from"
-    )]
     fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes) {
-        for (sum, visible) in self.given.iter_mut().zip(visible) {
-            *sum += visible;
-        }
-        if !REMOVAL {
-            return;
-        }
-        for (sum, visible) in self.squared.iter_mut().zip(visible) {
-            *sum += visible * visible;
-        }
-        for (behind, colour) in self.ink.light[line].iter_mut().zip(colour) {
-            for lane in 0..TILE {
-                let own = visible[lane] * colour;
-                behind[lane] -= own;
-                // What passes is T (1 - a): a pixel that is done has a negative sign there, and nothing visible.
-                let change =
-                    own - behind[lane] * (visible[lane] / passing[lane].abs().max(f32::MIN_POSITIVE));
-                self.lost[lane] += change * change;
-            }
-        }
+        self.ink.line(colour, line, visible, passing);
+        self.lines.push(Line { line: line as u32, visible: *visible, passing: *passing });
     }
 
     #[inline(always)]
+    fn done(&mut self, entry: usize) {
+        self.entries.push((entry as u32, self.lines.len()));
+    }
+}
+
+impl Trace {
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.ink = Ink::default();
+        self.lines.clear();
+        self.entries.clear();
+    }
+
+    /// Sums what each Gaussian is to the tile: the light behind it is what is left of all of it.
+    #[inline(always)]
     #[expect(
         clippy::indexing_slicing,
-        reason = "lanes and lines are counted by the tile; places and Gaussians are those that it was made from"
+        reason = "entries are those of the tile, and lines are counted by them"
     )]
-    fn done(&mut self, entry: usize) {
-        let contribution: f32 = self.given.iter().sum();
-        if contribution > 0.0 {
-            let (loss, energy) = (self.lost.iter().sum(), self.squared.iter().sum());
-            self.shares.push(Share { place: self.places[entry], contribution, loss, energy });
+    fn shares(&mut self, splats: &[Splat], places: &[u32], shares: &mut Vec<Share>) {
+        let mut start = 0;
+        for &(entry, end) in &self.entries {
+            let place = places[entry as usize];
+            let colour = splats[place as usize].colour;
+            let [mut given, mut lost, mut squared] = [[0.0; TILE]; 3];
+            for Line { line, visible, passing } in &self.lines[start..end] {
+                for lane in 0..TILE {
+                    given[lane] += visible[lane];
+                    squared[lane] += visible[lane] * visible[lane];
+                }
+                let mut ratio = [0.0; TILE];
+                for lane in 0..TILE {
+                    // What passes is T (1 - a): a pixel that is done has a negative sign there, and nothing visible.
+                    ratio[lane] = visible[lane] / passing[lane].abs().max(f32::MIN_POSITIVE);
+                }
+                for (behind, colour) in self.ink.light[*line as usize].iter_mut().zip(colour) {
+                    for lane in 0..TILE {
+                        let own = visible[lane] * colour;
+                        behind[lane] -= own;
+                        let change = own - behind[lane] * ratio[lane];
+                        lost[lane] += change * change;
+                    }
+                }
+            }
+            start = end;
+            let contribution: f32 = given.iter().sum();
+            if contribution > 0.0 {
+                let (loss, energy) = (lost.iter().sum(), squared.iter().sum());
+                shares.push(Share { place, contribution, loss, energy });
+            }
         }
-        self.given = [0.0; TILE];
-        self.lost = [0.0; TILE];
-        self.squared = [0.0; TILE];
     }
 }

@@ -12,7 +12,8 @@ mod tile;
 use crate::camera::Camera;
 use crate::image::Image;
 pub(crate) use project::Shapes;
-use project::{Splat, project};
+pub(crate) use project::Splat;
+use project::project;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::TileRows;
@@ -38,21 +39,92 @@ pub struct Rendering {
 /// not finite, are left out.
 /// Gaussians at one depth are drawn in the order of the frame.
 pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> Rendering {
-    draw(frame, camera, background, pulp::Arch::new())
+    draw(frame, camera, background, (Strips::ALL, pulp::Arch::new()))
+}
+
+/// Draws some strips of a picture, one below the other. Each pixel is as in the whole picture.
+pub fn render_strips(
+    frame: &GaussianFrame,
+    camera: &Camera,
+    background: [f32; 3],
+    strips: Strips,
+) -> Rendering {
+    draw(frame, camera, background, (strips, pulp::Arch::new()))
+}
+
+/// The Gaussians that may touch some strips of a picture, by rising row: a frame of these draws the same strips.
+pub fn touching(frame: &GaussianFrame, camera: &Camera, strips: Strips) -> Vec<u32> {
+    let strips = strips.within((camera.height as usize).div_ceil(TILE));
+    let splats = project(frame, &Shapes::of(frame), &Sight { strips, ..Sight::of(camera) });
+    let mut rows: Vec<u32> = splats.into_iter().map(|splat| splat.gaussian).collect();
+    rows.par_sort_unstable();
+    rows
 }
 
 /// Draws with the instructions of `arch`, which change nothing but the time.
 #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
-fn draw(frame: &GaussianFrame, camera: &Camera, background: [f32; 3], arch: pulp::Arch) -> Rendering {
-    let view = View::new(frame, &Shapes::of(frame), camera);
+fn draw(
+    frame: &GaussianFrame,
+    camera: &Camera,
+    background: [f32; 3],
+    (strips, arch): (Strips, pulp::Arch),
+) -> Rendering {
     let (width, height) = (camera.width as usize, camera.height as usize);
-    let mut pixels = vec![[0.0; 3]; width * height];
-    let mut alpha = vec![0.0; width * height];
+    let strips = strips.within(height.div_ceil(TILE));
+    let view = View::new(frame, &Shapes::of(frame), &Sight { strips, ..Sight::of(camera) });
+    let rows: Vec<usize> = strips.rows(height.div_ceil(TILE)).collect();
+    let lines: usize = rows.iter().map(|row| TILE.min(height - row * TILE)).sum();
+    let mut pixels = vec![[0.0; 3]; width * lines];
+    let mut alpha = vec![0.0; width * lines];
     let bands = pixels.par_chunks_mut(width * TILE).zip(alpha.par_chunks_mut(width * TILE));
-    bands.enumerate().with_max_len(1).for_each(|(row, (pixels, alpha))| {
+    bands.zip(rows).with_max_len(1).for_each(|((pixels, alpha), row)| {
         arch.dispatch(DrawRow { view: &view, row, pixels, alpha, background });
     });
     Rendering { colour: Image::new(width, pixels), alpha }
+}
+
+/// Strips of 16 lines of a picture: errors of a few of them are nearly those of the whole picture, and cost little.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Strips {
+    /// The first strip, counted from the top.
+    pub first: u32,
+    /// From one strip to the next, 1 or more. Of a picture with fewer strips than this, one is drawn.
+    pub every: u32,
+}
+
+impl Strips {
+    /// The whole picture.
+    pub const ALL: Self = Self { first: 0, every: 1 };
+
+    /// As many of them, of a picture of so many strips.
+    fn within(self, count: usize) -> Self {
+        let every = self.every.clamp(1, count.max(1) as u32);
+        Self { first: self.first.checked_rem(every).unwrap_or_default(), every }
+    }
+
+    /// The rows of tiles among so many.
+    fn rows(self, count: usize) -> impl Iterator<Item = usize> {
+        (self.first as usize..count).step_by(self.every.max(1) as usize)
+    }
+}
+
+/// A camera, and what is drawn of its picture.
+#[derive(Clone, Copy)]
+pub(crate) struct Sight<'a> {
+    pub(crate) camera: &'a Camera,
+    pub(crate) strips: Strips,
+    /// The Gaussians that are drawn, by rising row; none: all.
+    pub(crate) rows: Option<&'a [u32]>,
+    /// The side of a pixel of the picture that this one stands for, pixels of this one, at most 1. Where that is
+    /// finer, a Gaussian covers as much as it does there, however small it is here.
+    pub(crate) fine: f32,
+}
+
+impl<'a> Sight<'a> {
+    /// A whole picture of all Gaussians that stands for itself.
+    pub(crate) const fn of(camera: &'a Camera) -> Self {
+        Self { camera, strips: Strips::ALL, rows: None, fine: 1.0 }
+    }
 }
 
 /// A frame as one camera sees it, before blending.
@@ -65,9 +137,9 @@ pub(crate) struct View {
 
 impl View {
     /// Projects and sorts.
-    pub(crate) fn new(frame: &GaussianFrame, shapes: &Shapes, camera: &Camera) -> Self {
-        let splats = project(frame, shapes, camera);
-        let rows = TileRows::new(&splats, camera);
+    pub(crate) fn new(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Self {
+        let splats = project(frame, shapes, sight);
+        let rows = TileRows::new(&splats, sight);
         Self { splats, rows }
     }
 }
@@ -137,8 +209,23 @@ mod tests {
     fn vector_instructions_draw_the_same_bits_as_plain_ones() {
         let frame = BuiltinScene { gaussians: 5_000, ..BuiltinScene::default() }.frame(0);
         for camera in ring(&frame, Up::default(), 2, 133) {
-            let plain = draw(&frame, &camera, [0.5; 3], pulp::Arch::Scalar);
+            let plain = draw(&frame, &camera, [0.5; 3], (Strips::ALL, pulp::Arch::Scalar));
             assert_eq!(render(&frame, &camera, [0.5; 3]), plain);
+        }
+    }
+
+    #[test]
+    fn strips_are_parts_of_the_picture() {
+        let frame = BuiltinScene { gaussians: 5_000, ..BuiltinScene::default() }.frame(0);
+        for (camera, first) in ring(&frame, Up::default(), 3, 133).iter().zip(0..) {
+            let whole = render(&frame, camera, [0.5; 3]);
+            let strips = Strips { first, every: 4 };
+            let drawn = render_strips(&frame, camera, [0.5; 3], strips);
+            let line = camera.width as usize * TILE;
+            let chunks: Vec<&[[f32; 3]]> = whole.colour.pixels().chunks(line).collect();
+            let expected: Vec<[f32; 3]> =
+                strips.within(chunks.len()).rows(chunks.len()).flat_map(|row| chunks[row]).copied().collect();
+            assert_eq!(drawn.colour.pixels(), expected);
         }
     }
 }

@@ -35,16 +35,17 @@ impl NewList {
         };
         let placed: Vec<(Vec<u32>, SectionValues, Grain)> = added.into_par_iter().map(place).collect();
         let layout = coder.layout(Section::New);
-        let list = |(added, values, grain): &(Vec<u32>, SectionValues, Grain)| {
+        let draft = |(_, values, grain): &(Vec<u32>, SectionValues, Grain)| {
             // Lists with equal steps have one bias, so that a unit may use the models of the one before.
             let alike = placed.iter().filter(|(_, _, other)| other.attribute_step == grain.attribute_step);
             let alike: Vec<&SectionValues> = alike.map(|(_, values, _)| values).collect();
             let biases = biases(Section::New, &layout, &alike, models, &coder.plan);
             let steps = coder.steps(grain.attribute_step);
-            let coded = SectionDraft::new(layout.clone(), values, &biases, steps, &coder.plan);
-            Self { added: added.clone(), values: values.clone(), coded }
+            SectionDraft::new(layout.clone(), values, &biases, steps, &coder.plan)
         };
-        placed.par_iter().map(list).collect()
+        let drafts: Vec<SectionDraft> = placed.par_iter().map(draft).collect();
+        let lists = placed.into_iter().zip(drafts);
+        lists.map(|((added, values, _), coded)| Self { added, values, coded }).collect()
     }
 
     /// How many there are.

@@ -205,7 +205,7 @@ fn bits(steps: i32) -> f32 {
     clippy::indexing_slicing,
     reason = "attributes and axes are constants; rows and entries are counted by what they index"
 )]
-fn pixel(frame: &GaussianFrame, row: usize, cameras: &[Camera]) -> f32 {
+pub(crate) fn pixel(frame: &GaussianFrame, row: usize, cameras: &[Camera]) -> f32 {
     let side = |camera: &Camera| {
         let apart = [0, 1, 2].map(|axis: usize| frame.position()[axis][row] - camera.position[axis]);
         apart.iter().map(|d| d * d).sum::<f32>().sqrt() / camera.focal[0].max(f32::MIN_POSITIVE)

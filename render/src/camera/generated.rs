@@ -134,16 +134,15 @@ impl Subject {
         if rows.is_empty() {
             rows = (0..frame.len()).collect();
         }
-        let sorted = frame.position().each_ref().map(|plane| {
-            let mut values: Vec<f32> = rows.iter().map(|&row| plane[row]).collect();
-            values.sort_unstable_by(f32::total_cmp);
-            values
-        });
-        let at = |percent: usize| {
-            let value = |values: &Vec<f32>| values.get(values.len() * percent / 100).copied();
-            Vec3::from(sorted.each_ref().map(|values| value(values).unwrap_or_default()))
+        let mut axes =
+            frame.position().each_ref().map(|plane| rows.iter().map(|&row| plane[row]).collect::<Vec<f32>>());
+        let mut at = |percent: usize| {
+            Vec3::from(axes.each_mut().map(|values| {
+                let place = values.len() * percent / 100;
+                if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(place, f32::total_cmp).1 }
+            }))
         };
-        let boxes = BOXES.map(|percents| percents.map(at));
+        let boxes = BOXES.map(|percents| percents.map(&mut at));
         let side = |[low, high]: [Vec3; 2]| (high - low).length();
         let mut subject = boxes[0];
         for inner in &boxes[1..] {

@@ -2,11 +2,14 @@
 #![expect(clippy::arithmetic_side_effects, reason = "vectors of floats; counts of Gaussians in memory")]
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
 
+use super::{Sight, Strips, TILE};
 use crate::camera::Camera;
 use glam::{Mat3, Vec3};
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_gaussians::{GaussianFrame, sh_basis, sh_coefficients};
 use std::f32::consts::LOG2_E;
+use std::ops::Range;
 
 /// Gaussians nearer to the camera's plane than this share of the mean depth are not drawn: see [`near`].
 const NEAR: f32 = 1.0 / 256.0;
@@ -50,6 +53,8 @@ pub(crate) struct Splat {
 pub(crate) struct Shapes {
     /// The semi-axes of each Gaussian as vectors in the world.
     axes: Vec<[Vec3; 3]>,
+    /// The longest semi-axis of each Gaussian.
+    longest: Vec<f32>,
     /// Opacity of each Gaussian.
     opacity: Vec<f32>,
 }
@@ -57,21 +62,24 @@ pub(crate) struct Shapes {
 impl Shapes {
     pub(crate) fn of(frame: &GaussianFrame) -> Self {
         let rows = (0..frame.len()).into_par_iter().with_min_len(CHUNK);
-        let axes = rows.map(|row| semi_axes(frame, row)).collect();
+        let axes: Vec<[Vec3; 3]> = rows.map(|row| semi_axes(frame, row)).collect();
+        let squared = |axes: &[Vec3; 3]| axes.map(Vec3::length_squared).into_iter().fold(0.0, f32::max);
+        let longest = axes.par_iter().with_min_len(CHUNK).map(|axes| squared(axes).sqrt()).collect();
         let logits = frame.opacity_logit().par_iter().with_min_len(CHUNK);
-        Self { axes, opacity: logits.map(|logit| 1.0 / (1.0 + libm::expf(-logit))).collect() }
+        Self { axes, longest, opacity: logits.map(|logit| 1.0 / (1.0 + libm::expf(-logit))).collect() }
     }
 }
 
 /// The ellipses of the Gaussians that touch the picture, nearest first.
-pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, camera: &Camera) -> Vec<Splat> {
-    let view = View::new(frame, shapes, camera);
-    let starts: Vec<usize> = (0..frame.len()).step_by(CHUNK).collect();
+pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Vec<Splat> {
+    let view = View::new(frame, shapes, sight);
+    let count = sight.rows.map_or(frame.len(), <[u32]>::len);
+    let starts: Vec<usize> = (0..count).step_by(CHUNK).collect();
     let chunks: Vec<Vec<(f32, Splat)>> = starts
         .par_iter()
         .map(|&start| {
-            let rows = start..frame.len().min(start + CHUNK);
-            rows.filter_map(|row| view.project(row)).collect()
+            let places = start..count.min(start + CHUNK);
+            pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows: sight.rows, places })
         })
         .collect();
     // Positive floats order as their bits; equal depths keep the order of the frame.
@@ -86,6 +94,27 @@ pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, camera: &Camera) -
     keys.par_iter().map(splat).collect()
 }
 
+/// Projects some Gaussians: places of the rows, or of the frame where there are none.
+struct ProjectChunk<'a> {
+    view: &'a View<'a>,
+    rows: Option<&'a [u32]>,
+    places: Range<usize>,
+}
+
+impl WithSimd for ProjectChunk<'_> {
+    type Output = Vec<(f32, Splat)>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let row = |place: usize| self.rows.map_or(place, |rows| rows[place] as usize);
+        let mut splats = Vec::new();
+        for place in self.places {
+            splats.extend(self.view.project(row(place)));
+        }
+        splats
+    }
+}
+
 /// A frame and a camera, as projection needs them.
 struct View<'a> {
     frame: &'a GaussianFrame,
@@ -98,12 +127,16 @@ struct View<'a> {
     focal: [f32; 2],
     principal: [f32; 2],
     size: [f32; 2],
+    strips: Strips,
+    /// Variance of the low-pass filter in the picture that this one stands for, square pixels of this one.
+    fine_pass: f32,
     /// Slopes beyond which the Jacobian is not followed: the picture and 15 % on either side.
     slopes: [(f32, f32); 2],
 }
 
 impl<'a> View<'a> {
-    fn new(frame: &'a GaussianFrame, shapes: &'a Shapes, camera: &Camera) -> Self {
+    fn new(frame: &'a GaussianFrame, shapes: &'a Shapes, sight: &Sight<'_>) -> Self {
+        let camera = sight.camera;
         let to_camera = Mat3::from_cols_array_2d(&camera.rotation).transpose();
         let size = [camera.width as f32, camera.height as f32];
         let slopes = [0, 1].map(|axis| {
@@ -121,21 +154,29 @@ impl<'a> View<'a> {
             focal: camera.focal,
             principal: camera.principal,
             size,
+            strips: sight.strips,
+            fine_pass: LOW_PASS * sight.fine * sight.fine,
             slopes,
         }
     }
 
     /// Depth and ellipse of a Gaussian; none if it cannot be seen.
+    #[inline(always)]
     fn project(&self, row: usize) -> Option<(f32, Splat)> {
         let offset = Vec3::from(self.frame.position().each_ref().map(|plane| plane[row])) - self.position;
         let at = self.to_camera * offset;
-        if at.z.is_nan() || at.z < self.near {
+        if at.z.is_nan() || at.z < self.near || self.is_outside(at, self.shapes.longest[row]) {
             return None;
         }
         let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(row, at);
         let (wide, tall) = (xx + LOW_PASS, yy + LOW_PASS);
         let determinant = sharp + LOW_PASS * (xx + tall);
-        let kept = if self.frame.antialiased() { (sharp / determinant).sqrt() } else { 1.0 };
+        // What it covers in the picture that this one stands for.
+        let fine = match self.frame.antialiased() {
+            true => sharp,
+            false => sharp + self.fine_pass * (xx + (yy + self.fine_pass)),
+        };
+        let kept = (fine / determinant).sqrt();
         let opacity = self.shapes.opacity[row] * kept;
         let peak = libm::log2f(opacity);
         // Squared Mahalanobis distance at which alpha is 1/255.
@@ -151,6 +192,9 @@ impl<'a> View<'a> {
         if !(touches(0) && touches(1) && extent[0].is_finite() && extent[1].is_finite()) {
             return None;
         }
+        if !self.is_in_strips(centre[1] - extent[1], centre[1] + extent[1]) {
+            return None;
+        }
         let splat = Splat {
             centre,
             xx: -0.5 * LOG2_E * (tall / determinant),
@@ -164,7 +208,39 @@ impl<'a> View<'a> {
         Some((at.z, splat))
     }
 
+    /// Whether a Gaussian surely touches nothing that is drawn: by a circle around it in which it is, with room for
+    /// rounding.
+    #[inline(always)]
+    fn is_outside(&self, at: Vec3, longest: f32) -> bool {
+        let near = 1.0 / at.z;
+        let bounds = [0, 1].map(|axis: usize| {
+            let slope = at[axis] * near;
+            let (least, most) = self.slopes[axis];
+            let seen = slope.clamp(least, most);
+            let scale = self.focal[axis] * near * longest;
+            let reach = 3.4 * (scale * scale * (1.0 + seen * seen) + LOW_PASS).sqrt() + 1.0;
+            let centre = self.focal[axis] * slope + self.principal[axis];
+            (centre - reach, centre + reach)
+        });
+        let is_beside = (0..2).any(|axis: usize| bounds[axis].1 < 0.0 || bounds[axis].0 > self.size[axis]);
+        is_beside || !self.is_in_strips(bounds[1].0, bounds[1].1)
+    }
+
+    /// Whether lines between these belong to a strip that is drawn. What is not finite does.
+    #[inline(always)]
+    fn is_in_strips(&self, top: f32, bottom: f32) -> bool {
+        let every = self.strips.every as f32;
+        if self.strips.every <= 1 {
+            return true;
+        }
+        let [top, bottom] = [top, bottom].map(|line| line / TILE as f32 - self.strips.first as f32);
+        // The first strip that ends below the top begins above the bottom.
+        let strip = ((top - 1.0) / every).ceil() * every;
+        strip <= bottom || strip.is_nan()
+    }
+
     /// Covariance of the projection, without low-pass.
+    #[inline(always)]
     fn covariance(&self, row: usize, at: Vec3) -> Covariance {
         let near = 1.0 / at.z;
         let [x, y] = [0, 1].map(|axis| {

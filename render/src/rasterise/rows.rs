@@ -4,9 +4,8 @@
     reason = "rows and tiles of a picture, and counts of what is in memory"
 )]
 
-use super::TILE;
 use super::project::{LOG2_255, Splat};
-use crate::camera::Camera;
+use super::{Sight, TILE};
 use rayon::prelude::*;
 
 /// The ellipses that touch each row of tiles, nearest first.
@@ -29,9 +28,12 @@ impl TileRows {
         clippy::indexing_slicing,
         reason = "rows and tiles are cut to the picture before, and entries are counted before they are placed"
     )]
-    pub(crate) fn new(splats: &[Splat], camera: &Camera) -> Self {
+    pub(crate) fn new(splats: &[Splat], sight: &Sight<'_>) -> Self {
+        let camera = sight.camera;
         let count = (camera.height as usize).div_ceil(TILE);
         let mut rows = vec![Vec::new(); count];
+        let mut is_drawn = vec![false; count];
+        sight.strips.rows(count).for_each(|row| is_drawn[row] = true);
         // Bands of rows, so that threads share no row.
         let band = count.div_ceil(2 * rayon::current_num_threads()).max(1);
         rows.par_chunks_mut(band).enumerate().for_each(|(number, rows)| {
@@ -40,7 +42,9 @@ impl TileRows {
                 let (top, bottom) = tiles_across(splat.centre[1], splat.extent[1]);
                 let top = top.max(first as i32);
                 for row in top..=bottom.min((first + rows.len()) as i32 - 1) {
-                    rows[row as usize - first].push(place);
+                    if is_drawn[row as usize] {
+                        rows[row as usize - first].push(place);
+                    }
                 }
             }
         });
@@ -95,8 +99,9 @@ impl TileRows {
 
 /// First and last tile that a centre and its reach touch on one axis.
 fn tiles_across(centre: f32, extent: f32) -> (i32, i32) {
-    let tile = |at: f32| (at / TILE as f32).floor() as i32;
-    (tile(centre - extent).max(0), tile(centre + extent))
+    // What is projected ends at 0 or above, so that truncation is the floor.
+    let tile = |at: f32| (at.max(0.0) / TILE as f32) as i32;
+    (tile(centre - extent), tile(centre + extent))
 }
 
 /// First and last tile that an ellipse touches between two lines of pixel centres.

@@ -4,6 +4,7 @@ use crate::rotation::normalise_rows;
 use crate::sh::{MAX_SH_DEGREE, rest_index, sh_planes};
 use std::collections::TryReserveError;
 use std::fmt;
+use std::sync::Arc;
 
 /// The attributes of a frame, one vector a scalar; row `i` of every vector belongs to Gaussian `i`.
 ///
@@ -41,14 +42,16 @@ pub struct PlanesMut<'a> {
     pub sh: Vec<&'a mut [f32]>,
 }
 
-/// A frame of Gaussians: structure of arrays, equal lengths by construction, `f32`, PLY's domain.
+/// A frame of Gaussians: structure of arrays, equal lengths by construction, `f32`, PLY's domain. A clone shares the
+/// values until either is changed.
 ///
 /// Values are not checked by construction: see [`GaussianFrame::validate`]. Readers call it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GaussianFrame {
     sh_degree: u8,
     antialiased: bool,
-    planes: Planes,
+    /// Shared by copies of the frame until one of them changes.
+    planes: Arc<Planes>,
 }
 
 /// Why planes do not make a frame.
@@ -177,13 +180,13 @@ impl GaussianFrame {
         if let Some((property, plane)) = planes.named(sh_degree).find(|(_, plane)| plane.len() != rows) {
             return Err(FrameError::Length { property, expected: rows, found: plane.len() });
         }
-        Ok(Self { sh_degree, antialiased: false, planes })
+        Ok(Self { sh_degree, antialiased: false, planes: Arc::new(planes) })
     }
 
     /// The same Gaussians, rotations at unit length; those without direction stay as they are.
     #[must_use]
     pub fn with_unit_rotations(mut self) -> Self {
-        normalise_rows(&mut self.planes.rotation);
+        normalise_rows(&mut Arc::make_mut(&mut self.planes).rotation);
         self
     }
 
@@ -250,7 +253,7 @@ impl GaussianFrame {
 
     /// The values, to be changed; planes keep their number and their length, so that the frame stays one.
     pub fn planes_mut(&mut self) -> PlanesMut<'_> {
-        let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = &mut self.planes;
+        let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = Arc::make_mut(&mut self.planes);
         PlanesMut {
             position: position.each_mut().map(Vec::as_mut_slice),
             log_scale: log_scale.each_mut().map(Vec::as_mut_slice),
@@ -263,7 +266,7 @@ impl GaussianFrame {
 
     /// The planes themselves.
     pub fn into_planes(self) -> Planes {
-        self.planes
+        Arc::unwrap_or_clone(self.planes)
     }
 
     /// The Gaussians at `indices`, in that order; an index may come more than once.
@@ -272,7 +275,11 @@ impl GaussianFrame {
     /// If an index is not below [`GaussianFrame::len`].
     #[must_use]
     pub fn select(&self, indices: &[u32]) -> Self {
-        Self { planes: self.planes.gather(indices), ..*self }
+        Self {
+            sh_degree: self.sh_degree,
+            antialiased: self.antialiased,
+            planes: Arc::new(self.planes.gather(indices)),
+        }
     }
 }
 

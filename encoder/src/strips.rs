@@ -1,0 +1,87 @@
+//! Strips of the pictures of a frame, to compare those of another frame with.
+//!
+//! Every so many lines of a picture have nearly the errors of all of them, and are drawn in a part of the time. They are
+//! of the size at which quality is meant, since small pictures hide errors that large ones show.
+
+use crate::error::Error;
+use splatstream_gaussians::GaussianFrame;
+use splatstream_render::metrics::{LOSSLESS_DB, psnr};
+use splatstream_render::{Camera, Rendering, Strips, render_strips, touching};
+
+/// Around the scene.
+const BACKGROUND: [f32; 3] = [0.0; 3];
+
+/// Frames of fewer Gaussians than the first have more strips, for the errors of a few Gaussians are in few places; those
+/// of more than the second have fewer.
+const FEW: usize = 1 << 15;
+const MANY: usize = 1 << 19;
+
+/// A strip in so many, of a frame of so many Gaussians, where it is one in `every` of usual frames.
+#[expect(clippy::arithmetic_side_effects, reason = "small constants, and Gaussians in memory")]
+fn strip_of(every: u32, gaussians: usize) -> u32 {
+    match gaussians < FEW {
+        true => (every as usize * gaussians / FEW).max(1) as u32,
+        false => every * gaussians.div_ceil(MANY) as u32,
+    }
+}
+
+/// Which strips are taken of a view: at another height in each.
+#[expect(clippy::arithmetic_side_effects, reason = "counts of cameras, and small constants")]
+fn strips(number: u32, every: u32) -> Strips {
+    Strips { first: every / 2 + number * (every / 3).max(1), every }
+}
+
+/// A view of some strips, and the Gaussians that these show.
+pub(crate) struct StripView {
+    camera: Camera,
+    strips: Strips,
+    picture: Rendering,
+    /// The Gaussians, and which they are.
+    pub(crate) frame: GaussianFrame,
+    pub(crate) rows: Vec<u32>,
+}
+
+impl StripView {
+    /// One strip in `every` of each view.
+    pub(crate) fn all(frame: &GaussianFrame, cameras: &[Camera], every: u32) -> Vec<Self> {
+        let every = strip_of(every, frame.len());
+        let view = |(camera, number): (&Camera, u32)| {
+            let strips = strips(number, every);
+            let rows = touching(frame, camera, strips);
+            let frame = frame.select(&rows);
+            let picture = render_strips(&frame, camera, BACKGROUND, strips);
+            Self { camera: camera.clone(), strips, picture, frame, rows }
+        };
+        cameras.iter().zip(0..).map(view).collect()
+    }
+
+    /// PSNR of another version of the same Gaussians, dB; none if nothing can be seen.
+    pub(crate) fn psnr(&self, frame: &GaussianFrame) -> Option<f64> {
+        compared(&self.picture, &render_strips(frame, &self.camera, BACKGROUND, self.strips))
+    }
+}
+
+/// The mean of the decibels of the views in which something can be seen; none if there is no such view.
+pub(crate) fn mean(decibels: impl Iterator<Item = Result<Option<f64>, Error>>) -> Result<Option<f64>, Error> {
+    let decibels: Vec<f64> = decibels.filter_map(Result::transpose).collect::<Result<_, Error>>()?;
+    Ok((!decibels.is_empty()).then(|| decibels.iter().sum::<f64>() / decibels.len() as f64))
+}
+
+/// The mean PSNR of a frame in one strip in `every` of each view, dB; none if nothing can be seen in any.
+pub(crate) fn mean_psnr(
+    original: &GaussianFrame,
+    decoded: &GaussianFrame,
+    cameras: &[Camera],
+    every: u32,
+) -> Result<Option<f64>, Error> {
+    let every = strip_of(every, original.len());
+    mean(cameras.iter().zip(0..).map(|(camera, number)| {
+        let drawn = |frame| render_strips(frame, camera, BACKGROUND, strips(number, every));
+        Ok(compared(&drawn(original), &drawn(decoded)))
+    }))
+}
+
+fn compared(one: &Rendering, other: &Rendering) -> Option<f64> {
+    let is_blank = one.alpha.iter().chain(&other.alpha).all(|&alpha| alpha <= 0.0);
+    (!is_blank).then(|| psnr(&one.colour, &other.colour).min(LOSSLESS_DB))
+}
