@@ -9,3 +9,13 @@
     clippy::panic,
     clippy::unwrap_used
 )]
+
+mod boxes;
+pub mod division;
+pub mod manifest;
+pub mod mpd;
+pub mod package;
+mod representation;
+pub mod unpackage;
+
+pub use representation::Representation;
