@@ -6,8 +6,8 @@
 use crate::representation::Representation;
 use splatstream_format::follower::{Content, Follower, Standing};
 use splatstream_format::syntax::{
-    FileHeader, FrameType, GopHeader, IncrementHeader, MAX_NEIGHBOURS, SequenceParameters, UnitHeader,
-    UnitType,
+    EndOfStream, FileHeader, FrameType, GopHeader, IncrementHeader, MAX_NEIGHBOURS, SequenceParameters,
+    UnitHeader, UnitType,
 };
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Result};
@@ -119,6 +119,9 @@ pub struct Divider {
     /// Offset of the units after the last GOP.
     tail_start: Option<u64>,
     gop: Option<Gop>,
+    /// Units and frames so far.
+    units: u32,
+    frames: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,6 +156,8 @@ impl Divider {
             head_end,
             tail_start: None,
             gop: None,
+            units: 0,
+            frames: 0,
         }
     }
 
@@ -182,6 +187,11 @@ impl Divider {
             Standing::Discarded => None,
         };
         let unit_type = unit.header.unit_type();
+        if let Some(Content::End(end)) = &content {
+            self.check_end(end, unit.payload_at)?;
+        }
+        self.units = self.units.saturating_add(1);
+        self.frames = self.frames.saturating_add((unit_type == UnitType::FrameHeader).into());
         match unit_type {
             UnitType::Increment => self.increment(unit, content.as_ref()).map(|()| None),
             UnitType::FrameHeader => self.frame(unit).map(|()| None),
@@ -197,6 +207,19 @@ impl Divider {
             | UnitType::Reserved(_)
             | UnitType::User(_) => self.any_place(unit).map(|()| None),
         }
+    }
+
+    /// SS-EN-001: the end unit counts what came. So nothing is missing where it is right.
+    fn check_end(&self, end: &EndOfStream, at: u64) -> Result<()> {
+        let counts =
+            [("frame_count", end.frame_count, self.frames), ("unit_count", end.unit_count, self.units)];
+        for (element, value, expected) in counts {
+            if value != expected {
+                let kind = ErrorKind::Mismatch { element, value: value.into(), expected: expected.into() };
+                return Err(Error::new(at, EndOfStream::TABLE.semantics, kind));
+            }
+        }
+        Ok(())
     }
 
     /// A unit that may stand anywhere goes with what follows it.
