@@ -96,6 +96,8 @@ fn reports_on_the_committed_stream_are_as_before() {
         ("validate_damaged", "validate damaged.gss"),
         ("extract", "extract small.gss --op s0,t0,r0 -o part.gss"),
         ("extract_damaged", "extract damaged.gss --op s0,t0,r2 -o rest.gss"),
+        ("package", "package small.gss -o package/"),
+        ("unpackage", "unpackage package/ -o back.gss"),
         ("compare", "compare small.gss part.gss --cameras ring:2 --height 40"),
         ("render", "render small.gss -o pictures --camera ring:1 --height 20 --frames 0..1"),
     ] {

@@ -247,6 +247,11 @@ impl Manifest {
         Ok(manifest)
     }
 
+    /// Whether a stream is the one that was packaged.
+    pub fn describes(&self, stream: &[u8]) -> bool {
+        u64::try_from(stream.len()) == Ok(self.stream.bytes) && digest_of(&[stream]) == self.stream.digest
+    }
+
     /// The manifest as JSON, with a line feed at the end.
     pub fn to_json(&self) -> String {
         // Keys are strings and values are finite: nothing can fail.

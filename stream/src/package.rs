@@ -213,11 +213,8 @@ impl Plan {
         let head = stream.get(..usize::try_from(division.head_end).unwrap_or(0)).unwrap_or_default();
         let refinements = division.sequence.refinement_count;
         let init = Init { representation, refinements, clock, head }.to_bytes();
-        let end = division.gops.last().map_or(0, |gop| {
-            clock.ticks(u64::from(gop.first_frame).saturating_add(gop.header.gop_frame_count.into()))
-        });
         let all: Vec<_> = segments.iter().flatten().cloned().collect();
-        let indices = segment::indices(&all, end, clock)?;
+        let indices = segment::indices(&all, clock)?;
         let mut tail = Vec::new();
         if representation == Representation::Spatial(0) {
             let start = usize::try_from(division.tail_start).unwrap_or(usize::MAX);

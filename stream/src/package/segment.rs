@@ -35,6 +35,8 @@ pub(crate) struct Subsegment {
     pub(crate) frames: Vec<u32>,
     /// When the first frame is shown, ticks; of one without frames, when its GOP is.
     pub(crate) time: u64,
+    /// When the last frame ends; of one without frames, when its GOP does.
+    pub(crate) end: u64,
     /// Whether it starts with what decoding of a GOP starts with.
     pub(crate) is_access_point: bool,
     /// Its levels, lowest first.
@@ -71,7 +73,7 @@ pub(crate) fn subsegments(
     number: &mut u32,
 ) -> Result<Vec<Subsegment>> {
     let samples = samples(gop, representation, clock);
-    let start = clock.time(gop.first_frame);
+    let whole = (clock.time(gop.first_frame), end_of(gop, clock));
     let mut groups: Vec<Vec<Sample<'_>>> = vec![Vec::new()];
     let mut bytes = 0_u64;
     for sample in samples {
@@ -93,7 +95,7 @@ pub(crate) fn subsegments(
     }
     let mut made = Vec::new();
     for group in groups {
-        made.push(subsegment(&group, start, refinements, number)?);
+        made.push(subsegment(&group, whole, refinements, number)?);
     }
     if let (Some(first), true) = (made.first_mut(), representation.is_intra()) {
         first.is_access_point = true;
@@ -117,8 +119,7 @@ fn samples(gop: &Gop, representation: Representation, clock: Clock) -> Vec<Sampl
             _ => samples.push(Sample { frame, time: clock.time(frame), duration: 0, pieces: vec![piece] }),
         }
     }
-    let end = clock.ticks(u64::from(gop.first_frame).saturating_add(gop.header.gop_frame_count.into()));
-    let mut next = end;
+    let mut next = samples.last().map_or(0, |last| clock.ticks(frame_after(gop, last.frame)));
     for sample in samples.iter_mut().rev() {
         sample.duration = next.saturating_sub(sample.time);
         next = sample.time;
@@ -126,15 +127,41 @@ fn samples(gop: &Gop, representation: Representation, clock: Clock) -> Vec<Sampl
     samples
 }
 
-fn subsegment(samples: &[Sample<'_>], start: u64, refinements: u8, number: &mut u32) -> Result<Subsegment> {
+/// 6.5: the frame after one in the same Representation, or the first one after the GOP.
+fn frame_after(gop: &Gop, frame: u32) -> u64 {
+    let (header, index) = (&gop.header, frame.saturating_sub(gop.first_frame));
+    let (role, depth) = (header.role(index), u32::from(header.temporal_depth));
+    let step = match (header.is_predicted(), role.reference, role.temporal_layer) {
+        (false, ..) => 1,
+        (true, None, _) => header.gop_frame_count,
+        (true, Some(_), 0) => 1_u32.wrapping_shl(depth),
+        (true, Some(_), layer) => 2_u32.wrapping_shl(depth.saturating_sub(layer.into())),
+    };
+    let end = u64::from(gop.first_frame).saturating_add(header.gop_frame_count.into());
+    u64::from(frame).saturating_add(step.into()).min(end)
+}
+
+/// When a GOP ends.
+pub(crate) fn end_of(gop: &Gop, clock: Clock) -> u64 {
+    clock.ticks(u64::from(gop.first_frame).saturating_add(gop.header.gop_frame_count.into()))
+}
+
+/// Samples, or none of a GOP with a start and an end, as a subsegment.
+fn subsegment(
+    samples: &[Sample<'_>],
+    (start, end): (u64, u64),
+    refinements: u8,
+    number: &mut u32,
+) -> Result<Subsegment> {
     let time = samples.first().map_or(start, |sample| sample.time);
+    let end = samples.last().map_or(end, |sample| sample.time.saturating_add(sample.duration));
     let mut levels = Vec::new();
     for refinement in 0..refinements {
         levels.push(level(samples, time, refinement, *number)?);
         *number = number.wrapping_add(1);
     }
     let frames = samples.iter().map(|sample| sample.frame).collect();
-    Ok(Subsegment { frames, time, is_access_point: false, levels })
+    Ok(Subsegment { frames, time, end, is_access_point: false, levels })
 }
 
 fn level(samples: &[Sample<'_>], time: u64, refinement: u8, number: u32) -> Result<Level> {
@@ -184,14 +211,15 @@ fn fragment(number: u32, track: u32, time: u64, entries: &[(u32, u32)]) -> Vec<u
     out
 }
 
-/// C.5.2 and C.5.3: `sidx` and `ssix` of subsegments, which end at a time.
-pub(crate) fn indices(subsegments: &[Subsegment], end: u64, clock: Clock) -> Result<Vec<u8>> {
+/// C.5.2 and C.5.3: `sidx` and `ssix` of subsegments.
+pub(crate) fn indices(subsegments: &[Subsegment], clock: Clock) -> Result<Vec<u8>> {
     let count = u64::try_from(subsegments.len()).unwrap_or(u64::MAX);
     Limits::check(0, "reference_count", count, u16::MAX.into())
         .map_err(|error| Error { clause: "C.5.2", ..error })?;
     let Some(first) = subsegments.first() else { return Ok(Vec::new()) };
     let levels = level_index(subsegments);
-    let next = subsegments.iter().skip(1).map(|subsegment| subsegment.time).chain([end]);
+    let end = subsegments.last().map(|last| last.end);
+    let next = subsegments.iter().skip(1).map(|subsegment| subsegment.time).chain(end);
     let references = subsegments.iter().zip(next).map(|(subsegment, next)| {
         let duration = u32::try_from(next.saturating_sub(subsegment.time)).unwrap_or(u32::MAX);
         (u32::try_from(subsegment.size()).unwrap_or(u32::MAX), duration, subsegment.is_access_point)

@@ -1,0 +1,106 @@
+//! `splatstream unpackage`: the stream that a package was made of.
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::output_file::{OutputFile, check_stream_name};
+use crate::stream_file::LimitArgs;
+use clap::Args;
+use serde::Serialize;
+use splatstream_chart::numbers::grouped;
+use splatstream_stream::manifest::Manifest;
+use splatstream_stream::package::Package;
+use splatstream_stream::unpackage::unpackage;
+use std::path::{Path, PathBuf};
+
+/// Write the stream that a package was made of, byte for byte.
+#[derive(Args)]
+#[command(after_help = "Example:\n  splatstream unpackage talk/ -o talk.gss\n\n\
+    Reads every .mp4 file of the directory. A manifest beside them is used to check the result.")]
+pub(crate) struct Unpackage {
+    /// The directory of the package.
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// The stream to write; - is standard output.
+    #[arg(short, long = "out", value_name = "OUT.gss")]
+    out: PathBuf,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    output: &'a Path,
+    bytes: u64,
+    files: usize,
+    /// Whether a manifest says that these are the bytes that were packaged.
+    verified: bool,
+}
+
+impl Unpackage {
+    /// Puts the stream together.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        console.claim(Some(&self.out))?;
+        check_stream_name(&self.out)?;
+        let paths = self.media()?;
+        let mut files = Vec::new();
+        for path in &paths {
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            files.push((name, read(path)?));
+        }
+        let given: Vec<_> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+        let stream = unpackage(&given, &self.limits.limits());
+        let stream = stream.map_err(|error| {
+            let path = self.directory.join(&error.file);
+            Failure::stream(if path.exists() { &path } else { &self.directory }, error.error)
+        })?;
+        let verified = self.verify(&stream)?;
+        OutputFile::write_apart(&self.out, &paths, &stream)?;
+        let bytes = stream.len() as u64;
+        let report = Report { output: &self.out, bytes, files: paths.len(), verified };
+        console.report_beside(Some(&self.out), &report, || report.text())
+    }
+
+    /// The files of Representations, by name.
+    fn media(&self) -> Result<Vec<PathBuf>, Failure> {
+        let failed = |error| Failure::file("read", &self.directory, &error);
+        let mut paths = Vec::new();
+        for entry in std::fs::read_dir(&self.directory).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            if path.extension().is_some_and(|extension| extension == "mp4") && path.is_file() {
+                paths.push(path);
+            }
+        }
+        paths.sort();
+        Ok(paths)
+    }
+
+    /// Whether there is a manifest; a stream that is not the one it describes is refused.
+    fn verify(&self, stream: &[u8]) -> Result<bool, Failure> {
+        let path = self.directory.join(Package::MANIFEST);
+        if !path.exists() {
+            return Ok(false);
+        }
+        let manifest = Manifest::parse(&read(&path)?);
+        let manifest = manifest.map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+        if !manifest.describes(stream) {
+            return Err(Failure::other(format!(
+                "{}: the files are not those that the manifest was written for\n  copy the package again",
+                self.directory.display()
+            )));
+        }
+        Ok(true)
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| Failure::file("read", path, &error))
+}
+
+impl Report<'_> {
+    fn text(&self) -> String {
+        let verified = if self.verified { ", as the manifest has them" } else { "" };
+        let bytes = grouped(self.bytes);
+        format!("{}: {bytes} bytes from {} files{verified}\n", self.output.display(), self.files)
+    }
+}
