@@ -1,5 +1,7 @@
 //! `splatstream package`: a stream as files for DASH.
 
+mod live;
+
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs};
@@ -28,6 +30,10 @@ pub(crate) struct PackageStream {
     /// What is fetched at once.
     #[arg(long, value_enum, default_value_t = LayoutName::Gop)]
     layout: LayoutName,
+    /// Package a stream that is still being written, GOP by GOP: files appear as they are complete, until the end unit
+    /// comes.
+    #[arg(long)]
+    live: bool,
     /// Replace a package that is in the directory.
     #[arg(long)]
     force: bool,
@@ -52,7 +58,8 @@ struct Report<'a> {
     /// Of the stream, and of all files.
     bytes_in: u64,
     bytes: u64,
-    frames: u64,
+    /// None of a live package.
+    frames: Option<u64>,
     gops: usize,
     representations: Vec<RepresentationReport<'a>>,
 }
@@ -73,18 +80,19 @@ impl PackageStream {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "packages")?;
         let stale = self.stale()?;
-        let stream = StreamFile::read(&self.input)?;
         let layout = match self.layout {
             LayoutName::Gop => Layout::Gop,
             LayoutName::Frame => Layout::Frame,
         };
         let options = Options { layout, ..Options::default() };
+        if self.live {
+            self.clear(stale)?;
+            return live::run((&self.input, &self.out), &options, &self.limits.limits(), console);
+        }
+        let stream = StreamFile::read(&self.input)?;
         let package = Package::of(&stream.bytes, &options, &self.limits.limits());
         let package = package.map_err(|error| stream.fault(error))?;
-        make_directory(&self.out)?;
-        for path in stale {
-            std::fs::remove_file(&path).map_err(|error| Failure::file("remove", &path, &error))?;
-        }
+        self.clear(stale)?;
         let sizes = self.write(&package)?;
         let report = Report::new(&self.out, &package.manifest, sizes);
         console.report(&report, || report.text())
@@ -110,6 +118,14 @@ impl PackageStream {
         Ok(bytes)
     }
 
+    /// Makes the directory, without an earlier package.
+    fn clear(&self, stale: Vec<PathBuf>) -> Result<(), Failure> {
+        make_directory(&self.out)?;
+        stale.iter().try_for_each(|path| {
+            std::fs::remove_file(path).map_err(|error| Failure::file("remove", path, &error))
+        })
+    }
+
     /// The files of an earlier package, if they may be replaced.
     fn stale(&self) -> Result<Vec<PathBuf>, Failure> {
         let Ok(entries) = std::fs::read_dir(&self.out) else { return Ok(Vec::new()) };
@@ -130,7 +146,10 @@ impl PackageStream {
 /// Whether a file has a name that packages have.
 fn is_of_package(path: &Path) -> bool {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
-    let of_representation = name.strip_suffix(".mp4").is_some_and(|id| Representation::from_id(id).is_some());
+    let stem = name.strip_suffix(".mp4").or(name.strip_suffix(".m4s"));
+    // Of a live package there is more after the identifier.
+    let id = stem.map(|stem| stem.split_once('-').map_or(stem, |(id, _)| id));
+    let of_representation = id.is_some_and(|id| Representation::from_id(id).is_some());
     of_representation || [Package::MANIFEST, Package::MPD].contains(&name)
 }
 
@@ -154,19 +173,23 @@ impl<'a> Report<'a> {
             layout: &manifest.layout,
             bytes_in: manifest.stream.bytes,
             bytes,
-            frames: manifest.stream.frames,
+            frames: Some(manifest.stream.frames),
             gops: manifest.gops.len(),
             representations: representations.collect(),
         }
     }
 
+    /// Of a live package, whose files are by GOP.
+    fn of_live(output: &'a Path, layout: &'a str, bytes_in: u64, bytes: u64, gops: usize) -> Self {
+        Self { output, layout, bytes_in, bytes, frames: None, gops, representations: Vec::new() }
+    }
+
     fn text(&self) -> String {
         let more = percent(self.bytes, self.bytes_in) - 100.0;
         let mut text = format!(
-            "{}: {} GOPs, {} frames, {} bytes ({more:.1} % more than the stream)\n",
+            "{}: {} GOPs, {} bytes ({more:.1} % more than the stream)\n",
             self.output.display(),
             self.gops,
-            self.frames,
             grouped(self.bytes)
         );
         for one in &self.representations {

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Write the stream that a package was made of, byte for byte.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream unpackage talk/ -o talk.gss\n\n\
-    Reads every .mp4 file of the directory. A manifest beside them is used to check the result.")]
+    Reads every .mp4 and .m4s file of the directory. A manifest beside them is used to check the result.")]
 pub(crate) struct Unpackage {
     /// The directory of the package.
     #[arg(value_name = "DIR")]
@@ -43,10 +43,14 @@ impl Unpackage {
         console.claim(Some(&self.out))?;
         check_stream_name(&self.out)?;
         let paths = self.media()?;
-        let mut files = Vec::new();
+        let mut files: Vec<(String, Vec<u8>)> = Vec::new();
         for path in &paths {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            files.push((name, read(path)?));
+            match files.last_mut().filter(|_| part_of(path).is_some_and(|(_, part)| part > 0)) {
+                // Segments of a live package follow their initialisation segment.
+                Some((_, bytes)) => bytes.extend(read(path)?),
+                None => files.push((name, read(path)?)),
+            }
         }
         let given: Vec<_> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
         let stream = unpackage(&given, &self.limits.limits());
@@ -67,11 +71,11 @@ impl Unpackage {
         let mut paths = Vec::new();
         for entry in std::fs::read_dir(&self.directory).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
-            if path.extension().is_some_and(|extension| extension == "mp4") && path.is_file() {
+            if part_of(&path).is_some() && path.is_file() {
                 paths.push(path);
             }
         }
-        paths.sort();
+        paths.sort_by_key(|path| part_of(path));
         Ok(paths)
     }
 
@@ -91,6 +95,17 @@ impl Unpackage {
         }
         Ok(true)
     }
+}
+
+/// The Representation that a file says it is of, and its number in it: 0 begins it.
+fn part_of(path: &Path) -> Option<(String, u64)> {
+    let name = path.file_name()?.to_str()?;
+    if let Some(stem) = name.strip_suffix(".mp4") {
+        return Some((stem.strip_suffix("-init").unwrap_or(stem).to_owned(), 0));
+    }
+    let (id, number) = name.strip_suffix(".m4s")?.split_once('-')?;
+    let number = if number == "end" { u64::MAX } else { number.parse().ok().filter(|number| *number > 0)? };
+    Some((id.to_owned(), number))
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {

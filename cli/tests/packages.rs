@@ -42,6 +42,28 @@ fn a_package_is_replaced_only_where_that_is_asked_for() {
 }
 
 #[test]
+fn a_stream_that_grows_is_packaged_as_it_comes() {
+    let directory = directory();
+    let stream = write_stream(directory.path());
+    let bytes = fs::read(&stream).unwrap();
+    for (layout, input) in [("gop", text(&stream)), ("frame", "-")] {
+        let (out, back) = (directory.path().join(layout), directory.path().join("back.gss"));
+        let package = ["package", input, "-o", text(&out), "--layout", layout, "--live"];
+        let output = run_with(&package, &bytes);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(out.join("s0-2.m4s").exists() && !out.join("manifest.json").exists());
+        let mpd = fs::read_to_string(out.join("manifest.mpd")).unwrap();
+        assert!(mpd.contains("static"), "{mpd}");
+        assert_eq!(json(&["unpackage", text(&out), "-o", text(&back)])["verified"], false);
+        assert!(fs::read(&back).unwrap() == bytes);
+        fail(2, &package);
+    }
+    let cut =
+        run_with(&["package", "-", "-o", text(&directory.path().join("cut")), "--live"], &bytes[..5000]);
+    assert_eq!(cut.status.code(), Some(14));
+}
+
+#[test]
 fn damage_is_said() {
     let directory = directory();
     let (out, back) = (directory.path().join("out"), directory.path().join("back.gss"));

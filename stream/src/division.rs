@@ -171,6 +171,11 @@ impl Divider {
         self.head_end
     }
 
+    /// The GOP in progress: its pieces so far, of which the last may grow.
+    pub const fn open_gop(&self) -> Option<&Gop> {
+        self.gop.as_ref()
+    }
+
     /// Offset of the units after the last GOP, once the first of them has come.
     pub const fn tail_start(&self) -> Option<u64> {
         self.tail_start

@@ -12,6 +12,7 @@
 
 mod boxes;
 pub mod division;
+pub mod live;
 pub mod manifest;
 pub mod mpd;
 pub mod package;

@@ -1,5 +1,7 @@
 //! C.7: the media presentation description.
 
+mod live;
+
 use crate::manifest::{ByteRange, Manifest, RepresentationInfo};
 use crate::package::Layout;
 use std::fmt::Write;
@@ -7,34 +9,52 @@ use std::fmt::Write;
 /// What an ordinary DASH client does not know, so that it passes over the AdaptationSet.
 pub const SCHEME: &str = "urn:splatstream:dash:carriage:1";
 
-/// The MPD of files that are complete.
-pub(crate) fn of(manifest: &Manifest) -> String {
+/// Where segments are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Segments<'a> {
+    /// In a file of each Representation, which is complete.
+    Files,
+    /// In a file of each GOP. More may come unless `is_end`.
+    Numbered {
+        /// When the stream began, and what time it is.
+        started: &'a str,
+        now: &'a str,
+        is_end: bool,
+    },
+}
+
+/// The MPD of a package.
+pub(crate) fn of(manifest: &Manifest, segments: Segments<'_>) -> String {
     let mut xml = Xml::default();
     xml.out.push_str("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    let stream = &manifest.stream;
-    let ticks = |frames: u64| u128::from(frames).saturating_mul(stream.ticks_per_frame.into());
-    let longest = manifest.gops.iter().map(|gop| gop.frame_count).max().unwrap_or(0);
-    let mpd = [
+    let longest = longest(manifest);
+    let mut attributes = vec![
         ("xmlns", "urn:mpeg:dash:schema:mpd:2011".to_owned()),
         ("profiles", "urn:mpeg:dash:profile:full:2011".to_owned()),
-        ("type", "static".to_owned()),
-        ("mediaPresentationDuration", duration(ticks(stream.frames), stream.ticks_per_second)),
-        ("minBufferTime", duration(ticks(longest.into()), stream.ticks_per_second)),
     ];
-    xml.element("MPD", &mpd, |xml| {
+    match segments {
+        Segments::Numbered { started, now, is_end: false } => attributes.extend([
+            ("type", "dynamic".to_owned()),
+            ("availabilityStartTime", started.to_owned()),
+            ("publishTime", now.to_owned()),
+            ("minimumUpdatePeriod", longest.clone()),
+        ]),
+        _ => attributes.extend([
+            ("type", "static".to_owned()),
+            ("mediaPresentationDuration", duration(manifest, manifest.stream.frames)),
+        ]),
+    }
+    attributes.push(("minBufferTime", longest));
+    xml.element("MPD", &attributes, |xml| {
+        live::service(xml, manifest, segments);
         xml.element("Period", &[("id", "0".to_owned()), ("start", "PT0S".to_owned())], |xml| {
-            adaptation_set(xml, manifest, segment_base);
+            adaptation_set(xml, manifest, segments);
         });
     });
     xml.out
 }
 
-/// Everything but where segments are, which `segments` says of each Representation.
-pub(crate) fn adaptation_set(
-    xml: &mut Xml,
-    manifest: &Manifest,
-    segments: impl Fn(&mut Xml, &RepresentationInfo),
-) {
+fn adaptation_set(xml: &mut Xml, manifest: &Manifest, segments: Segments<'_>) {
     let stream = &manifest.stream;
     let set = [
         ("id", "0".to_owned()),
@@ -46,12 +66,14 @@ pub(crate) fn adaptation_set(
     xml.element("AdaptationSet", &set, |xml| {
         let scheme = [("schemeIdUri", SCHEME.to_owned()), ("value", stream.specification.clone())];
         xml.empty("EssentialProperty", &scheme);
+        live::clock(xml, manifest, segments);
         for level in 1..=stream.refinements.len() {
             let component = [("id", level.to_string()), ("contentType", "application".to_owned())];
             xml.empty("ContentComponent", &component);
         }
+        live::template(xml, manifest, segments);
         for (index, one) in manifest.representations.iter().enumerate() {
-            representation(xml, manifest, index, one, &segments);
+            representation(xml, manifest, index, one, segments);
         }
     });
 }
@@ -61,7 +83,7 @@ fn representation(
     manifest: &Manifest,
     index: usize,
     one: &RepresentationInfo,
-    segments: &impl Fn(&mut Xml, &RepresentationInfo),
+    segments: Segments<'_>,
 ) {
     let mut attributes = vec![("id", one.id.clone()), ("bandwidth", one.bandwidth.to_string())];
     if !one.depends_on.is_empty() {
@@ -72,11 +94,16 @@ fn representation(
         attributes.push(("startWithSAP", "1".to_owned()));
     }
     xml.element("Representation", &attributes, |xml| {
-        xml.text("BaseURL", &one.file);
+        let is_file = matches!(segments, Segments::Files);
+        if is_file {
+            xml.text("BaseURL", &one.file);
+        }
         if one.level_bandwidths.len() > 1 {
             sub_representations(xml, one);
         }
-        segments(xml, one);
+        if is_file {
+            segment_base(xml, one);
+        }
     });
 }
 
@@ -136,11 +163,24 @@ fn common_divisor(mut a: u128, mut b: u128) -> u128 {
     a
 }
 
-/// Ticks as an `xs:duration`, rounded up to a millisecond.
-fn duration(ticks: u128, timescale: u32) -> String {
-    let milliseconds = ticks.saturating_mul(1000).div_ceil(timescale.max(1).into());
+/// The duration of the longest GOP.
+fn longest(manifest: &Manifest) -> String {
+    let longest = manifest.gops.iter().map(|gop| gop.frame_count).max().unwrap_or(0);
+    duration(manifest, longest.into())
+}
+
+/// Frames as an `xs:duration`.
+fn duration(manifest: &Manifest, frames: u64) -> String {
+    format!("PT{}S", seconds(manifest, frames))
+}
+
+/// Frames in seconds, rounded up to a millisecond.
+fn seconds(manifest: &Manifest, frames: u64) -> String {
+    let stream = &manifest.stream;
+    let ticks = u128::from(frames).saturating_mul(stream.ticks_per_frame.into());
+    let milliseconds = ticks.saturating_mul(1000).div_ceil(stream.ticks_per_second.max(1).into());
     let (seconds, rest) = (milliseconds / 1000, milliseconds % 1000);
-    format!("PT{seconds}.{rest:03}S")
+    format!("{seconds}.{rest:03}")
 }
 
 /// XML as it is written.

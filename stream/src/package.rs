@@ -81,6 +81,12 @@ impl Clock {
     pub(crate) fn ticks(self, frames: u64) -> u64 {
         frames.saturating_mul(self.frame_ticks.into())
     }
+
+    /// Bits per second of bytes in so many ticks, rounded up.
+    pub(crate) fn rate(self, bytes: u64, ticks: u64) -> u64 {
+        let bits = u128::from(bytes).saturating_mul(8).saturating_mul(self.timescale.into());
+        u64::try_from(bits.div_ceil(u128::from(ticks.max(1)))).unwrap_or(u64::MAX)
+    }
 }
 
 /// A part of a file.
@@ -148,7 +154,7 @@ impl<'a> Package<'a> {
             files.push(describer.file(file));
         }
         let manifest = describer.manifest();
-        let mpd = mpd::of(&manifest);
+        let mpd = mpd::of(&manifest, mpd::Segments::Files);
         Ok(Self { stream, files, manifest, mpd })
     }
 

@@ -41,6 +41,15 @@ impl Representation {
         matches!(self, Self::Spatial(_))
     }
 
+    /// `I`, `P` or `B`.
+    pub const fn frame_type(self) -> &'static str {
+        match self {
+            Self::Spatial(_) => "I",
+            Self::Temporal(0) => "P",
+            Self::Temporal(_) => "B",
+        }
+    }
+
     /// The name of its file.
     pub fn file_name(self) -> String {
         format!("{self}.mp4")

@@ -3,50 +3,13 @@
 
 mod common;
 
+use common::mpd::check;
 use common::{files, is_conforming, package, vectors, worked_example};
 use roxmltree::{Document, Node};
 use serde_json::{Value, json};
 use splatstream_format::Limits;
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::{Layout, Options, Package};
-
-/// Elements of the DASH schema that occur here, in the order in which their parent may have them, and its attributes.
-const SCHEMA: &[(&str, &[&str], &[&str])] = &[
-    ("MPD", &["Period"], &["profiles", "type", "mediaPresentationDuration", "minBufferTime"]),
-    ("Period", &["AdaptationSet"], &["id", "start"]),
-    (
-        "AdaptationSet",
-        &["EssentialProperty", "ContentComponent", "Representation"],
-        &["id", "contentType", "mimeType", "codecs", "subsegmentAlignment"],
-    ),
-    ("EssentialProperty", &[], &["schemeIdUri", "value"]),
-    ("ContentComponent", &[], &["id", "contentType"]),
-    (
-        "Representation",
-        &["BaseURL", "SubRepresentation", "SegmentBase"],
-        &["id", "bandwidth", "dependencyId", "frameRate", "startWithSAP"],
-    ),
-    ("BaseURL", &[], &[]),
-    ("SubRepresentation", &[], &["level", "dependencyLevel", "bandwidth", "contentComponent"]),
-    ("SegmentBase", &["Initialization"], &["indexRange", "indexRangeExact"]),
-    ("Initialization", &[], &["range"]),
-];
-
-fn check_element(node: Node<'_, '_>) {
-    let name = node.tag_name().name();
-    assert_eq!(node.tag_name().namespace(), Some("urn:mpeg:dash:schema:mpd:2011"));
-    let (_, children, attributes) = SCHEMA.iter().find(|(known, ..)| *known == name).unwrap();
-    for attribute in node.attributes() {
-        assert!(attributes.contains(&attribute.name()), "{name}@{}", attribute.name());
-    }
-    let places: Vec<usize> = node
-        .children()
-        .filter(Node::is_element)
-        .map(|child| children.iter().position(|known| *known == child.tag_name().name()).unwrap())
-        .collect();
-    assert!(places.is_sorted(), "the children of {name} are not in the order of the schema");
-    node.children().filter(Node::is_element).for_each(check_element);
-}
 
 fn elements<'a>(document: &'a Document<'a>, name: &'static str) -> Vec<Node<'a, 'a>> {
     document.descendants().filter(|node| node.tag_name().name() == name).collect()
@@ -63,7 +26,7 @@ fn the_mpd_has_the_elements_of_the_schema_in_their_order() {
     for layout in [Layout::Gop, Layout::Frame] {
         let package = package(&stream, &Options { layout, ..Options::default() });
         let document = Document::parse(&package.mpd).unwrap();
-        check_element(document.root_element());
+        check(document.root_element());
         let set = elements(&document, "AdaptationSet")[0];
         let info = &package.manifest.stream;
         assert_eq!(set.attribute("codecs"), Some(format!("gss1.{}.{}", info.profile, info.level).as_str()));

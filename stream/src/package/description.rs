@@ -8,7 +8,7 @@ use crate::manifest::{
     SubsegmentInfo, UnitCount, digest_of,
 };
 use crate::representation::Representation;
-use splatstream_format::syntax::{FrameType, SPECIFICATION};
+use splatstream_format::syntax::{FileHeader, FrameType, SPECIFICATION, SequenceParameters};
 
 /// Collects what the files are.
 pub(crate) struct Describer<'a> {
@@ -46,7 +46,7 @@ impl Growing {
 
 impl<'a> Describer<'a> {
     pub(crate) fn new(stream: &'a [u8], division: &'a Division, options: &'a Options) -> Self {
-        let gops = division.gops.iter().map(gop_info).collect();
+        let gops = division.gops.iter().map(GopInfo::of).collect();
         Self { stream, division, options, representations: Vec::new(), gops }
     }
 
@@ -76,7 +76,7 @@ impl<'a> Describer<'a> {
                 info.subsegments.push(described);
             }
             for (most, bytes) in level_bandwidths.iter_mut().zip(bytes) {
-                *most = (*most).max(rate(bytes, ticks, clock));
+                *most = (*most).max(clock.rate(bytes, ticks));
             }
         }
         let tail = file.boxes(planned.tail);
@@ -86,7 +86,7 @@ impl<'a> Describer<'a> {
         self.representations.push(RepresentationInfo {
             id: representation.to_string(),
             file: name.clone(),
-            frame_type: frame_type(representation).to_owned(),
+            frame_type: representation.frame_type().to_owned(),
             layer: representation.codes().1,
             depends_on: self.representations.iter().map(|earlier| earlier.id.clone()).collect(),
             bandwidth: before.saturating_add(own).max(1),
@@ -108,29 +108,14 @@ impl<'a> Describer<'a> {
 
     /// The manifest of all files.
     pub(crate) fn manifest(self) -> Manifest {
-        let sequence = &self.division.sequence;
-        let clock = Clock::of(sequence);
-        let ends = self.division.gops.last();
-        let refinements = sequence.refinement_percent.iter().take(sequence.refinement_count.into());
+        let stream = StreamInfo::of(&self.division.header, &self.division.sequence, self.gops.last());
         Manifest {
             format: Manifest::FORMAT.to_owned(),
             version: Manifest::VERSION,
             stream: StreamInfo {
-                specification: SPECIFICATION.to_owned(),
-                profile: self.division.header.profile,
-                level: self.division.header.level,
                 bytes: size(self.stream.len()),
                 digest: digest_of(&[self.stream]),
-                frames: ends.map_or(0, |gop| {
-                    u64::from(gop.first_frame).saturating_add(gop.header.gop_frame_count.into())
-                }),
-                sh_degree: sequence.sh_degree,
-                spatial_layers: sequence.spatial_layer_count,
-                temporal_layers: sequence.temporal_layer_count,
-                refinements: refinements.copied().collect(),
-                whole_anchor: sequence.whole_anchor(),
-                ticks_per_second: clock.timescale,
-                ticks_per_frame: clock.frame_ticks,
+                ..stream
             },
             layout: self.options.layout.name().to_owned(),
             representations: self.representations,
@@ -140,14 +125,45 @@ impl<'a> Describer<'a> {
     }
 }
 
-fn gop_info(gop: &Gop) -> GopInfo {
-    GopInfo {
-        index: gop.header.gop_index,
-        first_frame: gop.first_frame,
-        frame_count: gop.header.gop_frame_count,
-        predicted: gop.header.is_predicted(),
-        temporal_depth: gop.header.temporal_depth,
-        subsegments: Vec::new(),
+impl GopInfo {
+    /// A GOP, without its subsegments.
+    pub(crate) fn of(gop: &Gop) -> Self {
+        Self {
+            index: gop.header.gop_index,
+            first_frame: gop.first_frame,
+            frame_count: gop.header.gop_frame_count,
+            predicted: gop.header.is_predicted(),
+            temporal_depth: gop.header.temporal_depth,
+            subsegments: Vec::new(),
+        }
+    }
+
+    /// Display index after its last frame.
+    fn end(&self) -> u64 {
+        u64::from(self.first_frame).saturating_add(self.frame_count.into())
+    }
+}
+
+impl StreamInfo {
+    /// A stream up to a GOP, of which neither bytes nor digest are known.
+    pub(crate) fn of(header: &FileHeader, sequence: &SequenceParameters, last: Option<&GopInfo>) -> Self {
+        let clock = Clock::of(sequence);
+        let refinements = sequence.refinement_percent.iter().take(sequence.refinement_count.into());
+        Self {
+            specification: SPECIFICATION.to_owned(),
+            profile: header.profile,
+            level: header.level,
+            bytes: 0,
+            digest: String::new(),
+            frames: last.map_or(0, GopInfo::end),
+            sh_degree: sequence.sh_degree,
+            spatial_layers: sequence.spatial_layer_count,
+            temporal_layers: sequence.temporal_layer_count,
+            refinements: refinements.copied().collect(),
+            whole_anchor: sequence.whole_anchor(),
+            ticks_per_second: clock.timescale,
+            ticks_per_frame: clock.frame_ticks,
+        }
     }
 }
 
@@ -213,21 +229,6 @@ fn level_info(refinement: u8, percent: u8, bytes: ByteRange, tools: &Tools) -> L
 fn bits_per_gaussian(bytes: u64, gaussians: u64) -> Option<f64> {
     let thousandths = bytes.saturating_mul(8000).checked_div(gaussians)?;
     Some(f64::from(u32::try_from(thousandths).unwrap_or(u32::MAX)) / 1000.0)
-}
-
-/// Bits per second, rounded up.
-fn rate(bytes: u64, ticks: u64, clock: Clock) -> u64 {
-    let bits = u128::from(bytes).saturating_mul(8).saturating_mul(clock.timescale.into());
-    let rate = bits.div_ceil(u128::from(ticks.max(1)));
-    u64::try_from(rate).unwrap_or(u64::MAX)
-}
-
-const fn frame_type(representation: Representation) -> &'static str {
-    match representation {
-        Representation::Spatial(_) => "I",
-        Representation::Temporal(0) => "P",
-        Representation::Temporal(_) => "B",
-    }
 }
 
 fn size(bytes: usize) -> u64 {

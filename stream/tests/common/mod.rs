@@ -1,6 +1,8 @@
 //! What several tests do with packages.
 #![allow(dead_code, clippy::unwrap_used, reason = "every test takes what it needs; a panic is a failed test")]
 
+pub(crate) mod mpd;
+
 use mp4_atom::{Any, Decode, Moof, Moov, Sidx};
 use splatstream_format::Limits;
 use splatstream_stream::package::{Options, Package};

@@ -1,0 +1,109 @@
+//! What the MPD of a live package says: the GOPs so far, and what they cost.
+
+use crate::division::Gop;
+use crate::manifest::{ByteRange, GopInfo, Manifest, RepresentationInfo, StreamInfo};
+use crate::mpd::{self, Segments};
+use crate::package::segment::Subsegment;
+use crate::package::{Clock, Layout};
+use crate::representation::Representation;
+use splatstream_format::syntax::{FileHeader, SequenceParameters};
+
+/// The GOPs so far.
+#[derive(Debug, Default)]
+pub(super) struct Timeline {
+    sequence: Option<(FileHeader, SequenceParameters)>,
+    gops: Vec<GopInfo>,
+    costs: Vec<Cost>,
+}
+
+/// What a Representation costs.
+#[derive(Debug, Clone)]
+struct Cost {
+    /// Bytes of each level in the GOP in progress.
+    bytes: Vec<u64>,
+    /// The largest rate of each level, bits per second.
+    rates: Vec<u64>,
+    frames: u32,
+}
+
+impl Timeline {
+    /// Before the first GOP of so many Representations.
+    pub(super) fn begin(&mut self, header: &FileHeader, sequence: &SequenceParameters, count: usize) {
+        let levels = usize::from(sequence.refinement_count);
+        self.sequence = Some((*header, *sequence));
+        self.costs = vec![Cost { bytes: vec![0; levels], rates: vec![0; levels], frames: 0 }; count];
+    }
+
+    /// The number of the GOP in progress, from 1.
+    pub(super) fn next_number(&self) -> usize {
+        self.gops.len().saturating_add(1)
+    }
+
+    /// Counts subsegments of a Representation.
+    pub(super) fn count(&mut self, representation: usize, made: &[Subsegment]) {
+        let Some(cost) = self.costs.get_mut(representation) else { return };
+        for subsegment in made {
+            let frames = u32::try_from(subsegment.frames.len()).unwrap_or(u32::MAX);
+            cost.frames = cost.frames.saturating_add(frames);
+            for (sum, level) in cost.bytes.iter_mut().zip(&subsegment.levels) {
+                *sum = sum.saturating_add(level.size);
+            }
+        }
+    }
+
+    /// The GOP in progress is complete.
+    pub(super) fn add(&mut self, gop: &Gop) {
+        let Some((_, sequence)) = &self.sequence else { return };
+        let clock = Clock::of(sequence);
+        let ticks = clock.ticks(gop.header.gop_frame_count.into());
+        for cost in &mut self.costs {
+            for (rate, bytes) in cost.rates.iter_mut().zip(&mut cost.bytes) {
+                *rate = (*rate).max(clock.rate(core::mem::take(bytes), ticks));
+            }
+        }
+        self.gops.push(GopInfo::of(gop));
+    }
+
+    /// The MPD; none before the first GOP has begun.
+    pub(super) fn mpd(
+        &self,
+        representations: impl Iterator<Item = Representation>,
+        layout: Layout,
+        started: &str,
+        now: &str,
+        is_end: bool,
+    ) -> Option<String> {
+        let (header, sequence) = self.sequence.as_ref()?;
+        let mut described: Vec<RepresentationInfo> = Vec::new();
+        for (representation, cost) in representations.zip(&self.costs) {
+            let own = cost.rates.iter().map(|rate| (*rate).max(1)).fold(0, u64::saturating_add);
+            let before = described.last().map_or(0, |last| last.bandwidth);
+            let depends_on = described.iter().map(|earlier| earlier.id.clone()).collect();
+            let nothing = ByteRange { offset: 0, size: 0, digest: String::new() };
+            described.push(RepresentationInfo {
+                id: representation.to_string(),
+                file: String::new(),
+                frame_type: representation.frame_type().to_owned(),
+                layer: representation.codes().1,
+                depends_on,
+                bandwidth: before.saturating_add(own),
+                level_bandwidths: cost.rates.clone(),
+                frames: cost.frames,
+                bytes: 0,
+                init: nothing,
+                index: None,
+                tail: None,
+            });
+        }
+        let manifest = Manifest {
+            format: Manifest::FORMAT.to_owned(),
+            version: Manifest::VERSION,
+            stream: StreamInfo::of(header, sequence, self.gops.last()),
+            layout: layout.name().to_owned(),
+            representations: described,
+            gops: self.gops.clone(),
+            quality: None,
+        };
+        Some(mpd::of(&manifest, Segments::Numbered { started, now, is_end }))
+    }
+}
