@@ -172,7 +172,12 @@ fn reports_of_the_conformance_suite_have_the_keys_they_had() {
     let list = shape(&report(at, &format!("conformance list {suite}")));
     let failing = shape(&report(at, &format!("conformance run {suite} --stdio cat")));
     let matrix = shape(&report(at, "conformance matrix mine.json -o page.md"));
-    let all = [("run", run), ("list", list), ("failing", failing), ("matrix", matrix)];
+    let packages = shape(&report(
+        at,
+        &format!("conformance packages --packages {}", text(&vectors.join("../packages"))),
+    ));
+    let all =
+        [("run", run), ("list", list), ("failing", failing), ("matrix", matrix), ("packages", packages)];
     insta::assert_json_snapshot!(
         "conformance",
         all.into_iter().collect::<std::collections::BTreeMap<_, _>>()

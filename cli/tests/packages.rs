@@ -5,6 +5,7 @@ mod common;
 
 use common::{directory, fail, fixture, json, run_with, succeed, text, write_stream};
 use std::fs;
+use std::path::Path;
 
 #[test]
 fn a_stream_comes_back_from_its_package() {
@@ -61,6 +62,23 @@ fn a_stream_that_grows_is_packaged_as_it_comes() {
     let cut =
         run_with(&["package", "-", "-o", text(&directory.path().join("cut")), "--live"], &bytes[..5000]);
     assert_eq!(cut.status.code(), Some(14));
+}
+
+#[test]
+fn another_unpackager_is_tested_on_the_packages() {
+    let packages = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/packages");
+    let run = ["conformance", "packages", "--packages", text(&packages)];
+    assert_eq!(json(&run)["failed"], 0);
+    // It writes something and is content with everything.
+    let said = fail(3, &[&run[..], &["--unpackager", "cp {in}/package.json {out}"]].concat());
+    assert!(said.contains("packages failed"), "{said}");
+    let words = run_with(&[&run[..], &["--unpackager", "cp {in}/package.json {out}"]].concat(), b"");
+    let words = String::from_utf8(words.stdout).unwrap();
+    assert!(
+        words.contains("invalid/tail-missing: it accepted a package that is invalid (SS-CR-019)"),
+        "{words}"
+    );
+    assert!(words.contains("0 of "), "{words}");
 }
 
 #[test]

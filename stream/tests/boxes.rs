@@ -7,6 +7,8 @@ mod common;
 use common::{File, package, read, words, worked_example};
 use mp4_atom::{Codec, FourCC};
 use splatstream_format::Limits;
+use splatstream_format::syntax::{EndOfStream, UnitId, UnitType};
+use splatstream_format::unit::{Stream, write_unit};
 use splatstream_stream::division::Division;
 use splatstream_stream::package::{Clock, Layout, Options};
 
@@ -181,4 +183,45 @@ fn a_gop_that_is_too_large_becomes_several_subsegments() {
     let options = Options { max_subsegment: 100, ..Options::default() };
     let error = splatstream_stream::package::Package::of(&stream, &options, &Limits::default()).unwrap_err();
     assert_eq!((error.clause, error.kind.code()), ("C.5.2", "OVER_LIMIT"));
+}
+
+/// The worked example with a private unit of so many bytes before its first frame.
+fn with_private_unit(length: usize) -> Vec<u8> {
+    let stream = worked_example();
+    let parsed = Stream::open(&stream, &Limits::default()).unwrap();
+    let units: Vec<_> = parsed.units().map(Result::unwrap).collect();
+    let (gop, end) = (units[1], units.last().unwrap());
+    assert_eq!(gop.header.unit_type(), UnitType::GopHeader);
+    let after = gop.payload_at as usize + gop.payload.len();
+    let mut out = stream[..after].to_vec();
+    write_unit(&mut out, UnitId::stream(UnitType::User(200)), &vec![7; length]).unwrap();
+    let more = out.len() - after;
+    out.extend_from_slice(&stream[after..end.at as usize]);
+    let counted = EndOfStream::parse_payload(end.payload, end.payload_at).unwrap();
+    let counted = EndOfStream {
+        unit_count: counted.unit_count + 1,
+        index_offset: counted.index_offset + more as u64,
+        ..counted
+    };
+    write_unit(&mut out, UnitId::stream(UnitType::End), &counted.to_bytes().unwrap()).unwrap();
+    out
+}
+
+/// SS-CR-018.
+#[test]
+fn a_level_of_more_than_24_bits_has_several_ranges() {
+    let stream = with_private_unit(40_000_000);
+    let package = package(&stream, &Options::default());
+    let s0 = &read(&package)[0];
+    let index = words(&s0.body("ssix").unwrap()[4..]);
+    let ranges: Vec<(u32, u32)> = index[2..].iter().map(|range| (range >> 24, range & 0xFF_FFFF)).collect();
+    assert_eq!(index[..2], [1, 4]);
+    assert_eq!(ranges.iter().map(|range| range.0).collect::<Vec<_>>(), [1, 1, 1, 2]);
+    assert_eq!((ranges[0].1, ranges[1].1), (16_777_215, 16_777_215));
+    let first =
+        s0.boxes.iter().filter(|(_, _, found)| ["moof", "mdat"].contains(&found.kind().to_string().as_str()));
+    let sizes: Vec<usize> = first.map(|(at, end, _)| end - at).collect();
+    let level: u32 = ranges[..3].iter().map(|range| range.1).sum();
+    assert_eq!(level as usize, sizes[0] + sizes[1]);
+    assert_eq!(s0.index().1.references[0].referenced_size, level + ranges[3].1);
 }
