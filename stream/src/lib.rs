@@ -17,6 +17,7 @@ pub mod manifest;
 pub mod mpd;
 pub mod package;
 mod representation;
+pub mod segments;
 pub mod unpackage;
 
 pub use representation::Representation;

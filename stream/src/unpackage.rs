@@ -1,6 +1,6 @@
 //! C.10: the files of a package become the stream again, byte for byte.
 
-mod file;
+pub(crate) mod file;
 
 use crate::division::{Division, Piece};
 use crate::representation::Representation;

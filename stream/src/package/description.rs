@@ -56,31 +56,9 @@ impl<'a> Describer<'a> {
         let mut file = Growing::default();
         let init = file.add(vec![Chunk::Boxes(planned.init)], &[]);
         let index = file.boxes(planned.indices);
-        let clock = Clock::of(&self.division.sequence);
-        let mut level_bandwidths = vec![0; self.division.sequence.refinement_count.into()];
-        for ((gop, info), segments) in self.division.gops.iter().zip(&mut self.gops).zip(&planned.segments) {
-            let ticks = clock.ticks(gop.header.gop_frame_count.into());
-            let mut bytes = vec![0_u64; level_bandwidths.len()];
-            for subsegment in segments {
-                let described = describe(
-                    subsegment,
-                    representation,
-                    gop,
-                    &self.division.sequence.refinement_percent,
-                    &mut file,
-                    self.stream,
-                );
-                for (sum, level) in bytes.iter_mut().zip(&described.levels) {
-                    *sum = sum.saturating_add(level.bytes.size);
-                }
-                info.subsegments.push(described);
-            }
-            for (most, bytes) in level_bandwidths.iter_mut().zip(bytes) {
-                *most = (*most).max(clock.rate(bytes, ticks));
-            }
-        }
+        let level_bandwidths = self.subsegments(representation, &planned.segments, &mut file);
         let tail = file.boxes(planned.tail);
-        let own = level_bandwidths.iter().copied().fold(0, u64::saturating_add);
+        let own = level_bandwidths.iter().map(|rate| (*rate).max(1)).fold(0, u64::saturating_add);
         let before = self.representations.last().map_or(0, |last| last.bandwidth);
         let name = representation.file_name();
         self.representations.push(RepresentationInfo {
@@ -89,7 +67,7 @@ impl<'a> Describer<'a> {
             frame_type: representation.frame_type().to_owned(),
             layer: representation.codes().1,
             depends_on: self.representations.iter().map(|earlier| earlier.id.clone()).collect(),
-            bandwidth: before.saturating_add(own).max(1),
+            bandwidth: before.saturating_add(own),
             level_bandwidths,
             frames: self.frames_of(representation),
             bytes: file.at,
@@ -98,6 +76,34 @@ impl<'a> Describer<'a> {
             tail,
         });
         File { name, chunks: file.chunks }
+    }
+
+    /// Appends the subsegments of each GOP; the largest rate of each level, bits per second.
+    fn subsegments(
+        &mut self,
+        representation: Representation,
+        segments: &[Vec<Subsegment>],
+        file: &mut Growing,
+    ) -> Vec<u64> {
+        let sequence = &self.division.sequence;
+        let clock = Clock::of(sequence);
+        let mut rates = vec![0; sequence.refinement_count.into()];
+        for ((gop, info), segments) in self.division.gops.iter().zip(&mut self.gops).zip(segments) {
+            let ticks = clock.ticks(gop.header.gop_frame_count.into());
+            let mut bytes = vec![0_u64; rates.len()];
+            for subsegment in segments {
+                let percents = &sequence.refinement_percent;
+                let described = describe(subsegment, representation, gop, percents, file, self.stream);
+                for (sum, level) in bytes.iter_mut().zip(&described.levels) {
+                    *sum = sum.saturating_add(level.bytes.size);
+                }
+                info.subsegments.push(described);
+            }
+            for (most, bytes) in rates.iter_mut().zip(bytes) {
+                *most = (*most).max(clock.rate(bytes, ticks));
+            }
+        }
+        rates
     }
 
     fn frames_of(&self, representation: Representation) -> u32 {

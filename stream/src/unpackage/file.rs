@@ -16,26 +16,26 @@ const FRAGMENT: &str = "C.5.1";
 const TAIL: &str = "C.6";
 
 /// A file, read.
-#[derive(Debug)]
-pub(super) struct Media<'a> {
-    pub(super) representation: Representation,
-    pub(super) refinements: u8,
+#[derive(Debug, Clone)]
+pub(crate) struct Media<'a> {
+    pub(crate) representation: Representation,
+    pub(crate) refinements: u8,
     /// The file header and the units before the first GOP.
-    pub(super) head: &'a [u8],
+    pub(crate) head: &'a [u8],
     /// Where they are in the file.
-    pub(super) head_at: u64,
+    pub(crate) head_at: u64,
     /// The units after the last GOP.
-    pub(super) tail: Option<&'a [u8]>,
+    pub(crate) tail: Option<&'a [u8]>,
     /// By track: the samples in order.
     tracks: Vec<Vec<Sample<'a>>>,
 }
 
 /// Bytes in a file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Part<'a> {
-    pub(super) bytes: &'a [u8],
+pub(crate) struct Part<'a> {
+    pub(crate) bytes: &'a [u8],
     /// Absolute offset in the file.
-    pub(super) at: u64,
+    pub(crate) at: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -65,27 +65,52 @@ struct Configuration<'a> {
 
 impl<'a> Media<'a> {
     /// Reads a file: the boxes of C.2 in any number, others are passed over.
-    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self> {
-        let mut file: Option<Self> = None;
+    pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self> {
         let mut cursor = Cursor::new(bytes, 0);
+        while let Some(found) = cursor.next_box(TOP)? {
+            match &found.kind {
+                b"moov" => {
+                    let mut file = movie(found)?;
+                    file.boxes(cursor, bytes)?;
+                    return Ok(file);
+                }
+                b"moof" | b"gssT" => {
+                    let rule = "moov comes before fragments";
+                    return Err(Error::new(found.at, TOP, ErrorKind::Constraint { rule }));
+                }
+                _ => {}
+            }
+        }
+        Err(Error::new(cursor.at(), TOP, ErrorKind::Truncated { element: "moov" }))
+    }
+
+    /// A file of which no sample is known.
+    pub(crate) fn empty(representation: Representation, refinements: u8) -> Self {
+        let tracks = vec![Vec::new(); refinements.into()];
+        Self { representation, refinements, head: &[], head_at: 0, tail: None, tracks }
+    }
+
+    /// Reads fragments, of which `bytes` are all.
+    pub(crate) fn read(&mut self, bytes: &'a [u8]) -> Result<()> {
+        self.boxes(Cursor::new(bytes, 0), bytes)
+    }
+
+    /// Reads the boxes after `moov`.
+    fn boxes(&mut self, mut cursor: Cursor<'a>, bytes: &'a [u8]) -> Result<()> {
         // Where the next sample may start: none is used twice.
         let mut free = 0;
         while let Some(found) = cursor.next_box(TOP)? {
-            let early =
-                Error::new(found.at, TOP, ErrorKind::Constraint { rule: "moov comes before fragments" });
             match &found.kind {
-                b"moov" if file.is_none() => file = Some(movie(found)?),
                 b"moov" => {
                     let rule = "a file has one moov";
                     return Err(Error::new(found.at, TOP, ErrorKind::Constraint { rule }));
                 }
-                b"moof" => file.as_mut().ok_or(early)?.fragments(found, bytes, &mut free)?,
-                b"gssT" => file.as_mut().ok_or(early)?.take_tail(found)?,
+                b"moof" => self.fragments(found, bytes, &mut free)?,
+                b"gssT" => self.take_tail(found)?,
                 _ => {}
             }
         }
-        let none = Error::new(cursor.at(), TOP, ErrorKind::Truncated { element: "moov" });
-        file.ok_or(none)
+        Ok(())
     }
 
     fn take_tail(&mut self, found: Box<'a>) -> Result<()> {
@@ -129,16 +154,21 @@ impl<'a> Media<'a> {
     }
 
     /// C.3: the places of the samples that are not empty.
-    pub(super) fn places(&self, sequence: &SequenceParameters) -> Result<Vec<(Place, Part<'a>)>> {
-        let ticks = u64::from(Clock::of(sequence).frame_ticks);
+    pub(crate) fn places(&self, sequence: &SequenceParameters) -> Result<Vec<(Place, Part<'a>)>> {
         let times = |track: &Vec<Sample<'_>>| track.iter().map(|sample| sample.time).collect::<Vec<u64>>();
         let first = self.tracks.first().map(times).unwrap_or_default();
+        if self.tracks.iter().any(|track| times(track) != first) {
+            let rule = "the samples of all tracks have the same times";
+            return Err(Error::new(self.head_at, "C.3", ErrorKind::Constraint { rule }));
+        }
+        self.places_of_levels(sequence)
+    }
+
+    /// The same of a file that need not have all levels.
+    pub(crate) fn places_of_levels(&self, sequence: &SequenceParameters) -> Result<Vec<(Place, Part<'a>)>> {
+        let ticks = u64::from(Clock::of(sequence).frame_ticks);
         let mut places = Vec::new();
         for (refinement, track) in (0_u8..).zip(&self.tracks) {
-            if times(track) != first {
-                let rule = "the samples of all tracks have the same times";
-                return Err(Error::new(self.head_at, "C.3", ErrorKind::Constraint { rule }));
-            }
             for Sample { time, part } in track.iter().filter(|sample| !sample.part.bytes.is_empty()) {
                 let whole = time.checked_rem(ticks) == Some(0);
                 let frame = time.checked_div(ticks).and_then(|frame| u32::try_from(frame).ok());
@@ -225,7 +255,7 @@ fn configuration(mut body: Cursor<'_>) -> Result<Configuration<'_>> {
 }
 
 /// The sequence parameters among the units of `gssC`, which are all the stream has before its first GOP.
-pub(super) fn sequence(head: &[u8], at: u64) -> Result<SequenceParameters> {
+pub(crate) fn sequence(head: &[u8], at: u64) -> Result<SequenceParameters> {
     let in_file = |error: Error| Error { at: error.at.saturating_add(at), ..error };
     let stream = Stream::open(head, &Limits::default()).map_err(in_file)?;
     let profile = stream.header().profile();
