@@ -251,19 +251,41 @@ fn saved(kind: &str, name: &str) -> (Value, Files) {
     (serde_json::from_slice(&files.remove(record).1).unwrap(), files)
 }
 
+/// Streams that use more than the worked example does: vectors by area and name, and what is in them.
+const STREAMS: [(&str, &str); 5] = [
+    ("extraction/extraction-skipped-units", "several GOPs, spatial layers, and units that decoders discard"),
+    ("codebook/codebook-defined-again", "codebooks between frames"),
+    ("temporal/temporal-gops-mixed", "GOPs of different structures"),
+    ("temporal/temporal-gop-of-1024", "a long GOP of which most frames are absent"),
+    ("learned/learned-registered-layers", "a learned predictor, with spatial layers"),
+];
+
+/// The valid packages: name, purpose, stream, layout.
+fn valid() -> Vec<(String, String, Vec<u8>, Layout)> {
+    let mut all = Vec::new();
+    for layout in [Layout::Gop, Layout::Frame] {
+        let name = format!("worked-temporal-example-{}", layout.name());
+        let purpose = format!("the stream of annex E with the layout {}", layout.name());
+        all.push((name, purpose, worked_example(), layout));
+    }
+    for (path, purpose) in STREAMS {
+        let stream = folder().join("../vectors/valid").join(path).join("in.gss");
+        let name = path.split_once('/').unwrap().1.to_owned();
+        all.push((name, purpose.to_owned(), std::fs::read(stream).unwrap(), Layout::Gop));
+    }
+    all
+}
+
 /// SS-CR-002, SS-CR-003.
 #[test]
 fn valid_packages_are_made_and_unpackaged_as_recorded() {
-    let stream = worked_example();
-    for layout in [Layout::Gop, Layout::Frame] {
-        let name = format!("worked-temporal-example-{}", layout.name());
+    for (name, purpose, stream, layout) in valid() {
         let mut made = whole(&stream, layout);
         made.sort();
-        let manifest =
-            Manifest::parse(&made.iter().find(|(name, _)| name == Package::MANIFEST).unwrap().1).unwrap();
-        assert!(manifest.describes(&stream));
+        let manifest = Manifest::parse(&made.iter().find(|(name, _)| name == Package::MANIFEST).unwrap().1);
+        assert!(manifest.unwrap().describes(&stream));
         let record = json!({
-            "purpose": format!("the stream of annex E with the layout {}", layout.name()),
+            "purpose": purpose,
             "requirements": ["SS-CR-001", "SS-CR-002"],
             "expect": {"outcome": "accept", "bytes": stream.len(), "sha256": sha256(&stream)},
         });
