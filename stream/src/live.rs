@@ -66,8 +66,10 @@ struct Output {
     representation: Representation,
     /// Of the next fragment.
     number: u32,
-    /// Whether the file of the GOP in progress has been begun.
+    /// Whether there is a file of the GOP in progress.
     is_open: bool,
+    /// Whether there is a subsegment in it.
+    is_begun: bool,
 }
 
 impl Live {
@@ -147,12 +149,12 @@ impl Live {
                 self.complete(&gop, kept, changes)?;
                 changes.extend(self.describe(now, false));
             }
-            self.open(kept, changes)?;
+            self.open(kept, now, changes)?;
         }
     }
 
     /// After a unit: begins what a first GOP begins, and writes frames that are complete.
-    fn open(&mut self, kept: &[u8], changes: &mut Vec<Change>) -> Result<()> {
+    fn open(&mut self, kept: &[u8], now: &str, changes: &mut Vec<Change>) -> Result<()> {
         let Some((_, divider)) = &self.divider else { return Ok(()) };
         let Some(gop) = divider.open_gop() else { return Ok(()) };
         if self.head.is_none() {
@@ -167,8 +169,28 @@ impl Live {
         let pieces = gop.pieces.get(self.written..complete).unwrap_or_default().to_vec();
         let part = Gop { pieces, ..gop.clone() };
         self.begin(changes);
+        let is_new = self.written == 0;
+        if is_new {
+            self.announce(&part, changes);
+        }
         self.written = complete;
-        self.write(&part, false, kept, changes)
+        self.write(&part, false, kept, changes)?;
+        if is_new {
+            changes.extend(self.describe(now, false));
+        }
+        Ok(())
+    }
+
+    /// Begins the files of a GOP that will grow.
+    fn announce(&mut self, gop: &Gop, changes: &mut Vec<Change>) {
+        self.timeline.announce(gop);
+        for output in &mut self.outputs {
+            let name = self.timeline.name_of_segment(output.representation);
+            let mut bytes = Vec::new();
+            put_brands(&mut bytes, *b"styp", &SEGMENT);
+            changes.push(Change::whole(name, bytes));
+            output.is_open = true;
+        }
     }
 
     /// Writes the rest of a GOP.
@@ -178,7 +200,7 @@ impl Live {
         self.write(&Gop { pieces, ..gop.clone() }, true, kept, changes)?;
         self.written = 0;
         self.timeline.add(gop);
-        self.outputs.iter_mut().for_each(|output| output.is_open = false);
+        self.outputs.iter_mut().for_each(|output| (output.is_open, output.is_begun) = (false, false));
         Ok(())
     }
 
@@ -193,7 +215,7 @@ impl Live {
             let (refinements, clock) = (sequence.refinement_count, Clock::of(sequence));
             let init = Init { representation, refinements, clock, head }.to_bytes();
             changes.push(Change::whole(format!("{representation}-init.mp4"), init));
-            self.outputs.push(Output { representation, number: 1, is_open: false });
+            self.outputs.push(Output { representation, number: 1, is_open: false, is_begun: false });
         }
         self.timeline.begin(header, sequence, self.outputs.len());
     }
@@ -206,21 +228,21 @@ impl Live {
         let (clock, refinements) = (Clock::of(sequence), sequence.refinement_count);
         for (index, output) in self.outputs.iter_mut().enumerate() {
             let of_it = part.pieces.iter().any(|piece| piece.place.representation == output.representation);
-            if !of_it && (!is_end || output.is_open) {
+            if !of_it && (!is_end || output.is_begun) {
                 continue;
             }
             let representation = output.representation;
             let number = &mut output.number;
             let mut made =
                 segment::subsegments(part, representation, refinements, clock, &self.options, number)?;
-            if let (true, Some(first)) = (output.is_open, made.first_mut()) {
+            if let (true, Some(first)) = (output.is_begun, made.first_mut()) {
                 first.is_access_point = false;
             }
-            let name = format!("{representation}-{}.m4s", self.timeline.next_number());
+            let name = self.timeline.name_of_segment(representation);
             let bytes = bytes_of(&made, clock, output.is_open, (kept, self.kept_at))?;
             self.timeline.count(index, &made);
             changes.push(Change { name, bytes, appends: output.is_open });
-            output.is_open = true;
+            (output.is_open, output.is_begun) = (true, true);
         }
         Ok(())
     }

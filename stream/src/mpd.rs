@@ -2,7 +2,7 @@
 
 mod live;
 
-use crate::manifest::{ByteRange, Manifest, RepresentationInfo};
+use crate::manifest::{ByteRange, GopInfo, Manifest, RepresentationInfo};
 use crate::package::Layout;
 use std::fmt::Write;
 
@@ -20,6 +20,8 @@ pub(crate) enum Segments<'a> {
         started: &'a str,
         now: &'a str,
         is_end: bool,
+        /// The GOP in progress, if its files are there already.
+        growing: Option<&'a GopInfo>,
     },
 }
 
@@ -27,13 +29,13 @@ pub(crate) enum Segments<'a> {
 pub(crate) fn of(manifest: &Manifest, segments: Segments<'_>) -> String {
     let mut xml = Xml::default();
     xml.out.push_str("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    let longest = longest(manifest);
+    let longest = duration(manifest, longest(manifest, segments).into());
     let mut attributes = vec![
         ("xmlns", "urn:mpeg:dash:schema:mpd:2011".to_owned()),
         ("profiles", "urn:mpeg:dash:profile:full:2011".to_owned()),
     ];
     match segments {
-        Segments::Numbered { started, now, is_end: false } => attributes.extend([
+        Segments::Numbered { started, now, is_end: false, .. } => attributes.extend([
             ("type", "dynamic".to_owned()),
             ("availabilityStartTime", started.to_owned()),
             ("publishTime", now.to_owned()),
@@ -163,10 +165,18 @@ fn common_divisor(mut a: u128, mut b: u128) -> u128 {
     a
 }
 
-/// The duration of the longest GOP.
-fn longest(manifest: &Manifest) -> String {
-    let longest = manifest.gops.iter().map(|gop| gop.frame_count).max().unwrap_or(0);
-    duration(manifest, longest.into())
+/// The GOPs that there are files of.
+fn gops<'a>(manifest: &'a Manifest, segments: Segments<'a>) -> impl Iterator<Item = &'a GopInfo> {
+    let growing = match segments {
+        Segments::Numbered { growing, .. } => growing,
+        Segments::Files => None,
+    };
+    manifest.gops.iter().chain(growing)
+}
+
+/// Frames of the longest GOP.
+fn longest(manifest: &Manifest, segments: Segments<'_>) -> u32 {
+    gops(manifest, segments).map(|gop| gop.frame_count).max().unwrap_or(0)
 }
 
 /// Frames as an `xs:duration`.

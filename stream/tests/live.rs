@@ -153,8 +153,15 @@ fn a_frame_is_written_before_the_next_one_is_complete() {
     let changes = live.push(before, START).unwrap();
     let segment = changes.iter().find(|change| change.name == "s0-1.m4s").unwrap();
     let file = File::parse("s0-1.m4s", &segment.bytes);
-    assert_eq!(file.kinds()[..4], ["styp", "sidx", "ssix", "moof"]);
-    assert!(changes.iter().all(|change| change.name != "t0-1.m4s"));
+    assert_eq!(file.kinds(), ["styp"]);
+    let grown = changes.iter().find(|change| change.name == "s0-1.m4s" && change.appends).unwrap();
+    let file = File::parse("s0-1.m4s", &grown.bytes);
+    assert_eq!(file.kinds()[..3], ["sidx", "ssix", "moof"]);
+    // The MPD names the GOP that is not complete.
+    let mpd = changes.iter().find(|change| change.name == "manifest.mpd").unwrap();
+    assert!(String::from_utf8_lossy(&mpd.bytes).contains("<S "));
+    assert!(changes.iter().any(|change| change.name == "t0-1.m4s"));
+    assert!(changes.iter().all(|change| change.name != "t0-1.m4s" || !change.appends));
     live.push(after, START).unwrap();
 }
 

@@ -13,6 +13,8 @@ use splatstream_format::syntax::{FileHeader, SequenceParameters};
 pub(super) struct Timeline {
     sequence: Option<(FileHeader, SequenceParameters)>,
     gops: Vec<GopInfo>,
+    /// The GOP in progress, if its files are there already.
+    growing: Option<GopInfo>,
     costs: Vec<Cost>,
 }
 
@@ -23,7 +25,9 @@ struct Cost {
     bytes: Vec<u64>,
     /// The largest rate of each level, bits per second.
     rates: Vec<u64>,
+    /// Frames of complete GOPs, and of the one in progress.
     frames: u32,
+    frames_now: u32,
 }
 
 impl Timeline {
@@ -31,12 +35,18 @@ impl Timeline {
     pub(super) fn begin(&mut self, header: &FileHeader, sequence: &SequenceParameters, count: usize) {
         let levels = usize::from(sequence.refinement_count);
         self.sequence = Some((*header, *sequence));
-        self.costs = vec![Cost { bytes: vec![0; levels], rates: vec![0; levels], frames: 0 }; count];
+        self.costs =
+            vec![Cost { bytes: vec![0; levels], rates: vec![0; levels], frames: 0, frames_now: 0 }; count];
     }
 
-    /// The number of the GOP in progress, from 1.
-    pub(super) fn next_number(&self) -> usize {
-        self.gops.len().saturating_add(1)
+    /// The file of the GOP in progress; their numbers are from 1.
+    pub(super) fn name_of_segment(&self, representation: Representation) -> String {
+        format!("{representation}-{}.m4s", self.gops.len().saturating_add(1))
+    }
+
+    /// The files of the GOP in progress are there, and will grow.
+    pub(super) fn announce(&mut self, gop: &Gop) {
+        self.growing = Some(GopInfo::of(gop));
     }
 
     /// Counts subsegments of a Representation.
@@ -44,7 +54,7 @@ impl Timeline {
         let Some(cost) = self.costs.get_mut(representation) else { return };
         for subsegment in made {
             let frames = u32::try_from(subsegment.frames.len()).unwrap_or(u32::MAX);
-            cost.frames = cost.frames.saturating_add(frames);
+            cost.frames_now = cost.frames_now.saturating_add(frames);
             for (sum, level) in cost.bytes.iter_mut().zip(&subsegment.levels) {
                 *sum = sum.saturating_add(level.size);
             }
@@ -56,7 +66,9 @@ impl Timeline {
         let Some((_, sequence)) = &self.sequence else { return };
         let clock = Clock::of(sequence);
         let ticks = clock.ticks(gop.header.gop_frame_count.into());
+        self.growing = None;
         for cost in &mut self.costs {
+            cost.frames = cost.frames.saturating_add(core::mem::take(&mut cost.frames_now));
             for (rate, bytes) in cost.rates.iter_mut().zip(&mut cost.bytes) {
                 *rate = (*rate).max(clock.rate(core::mem::take(bytes), ticks));
             }
@@ -76,7 +88,8 @@ impl Timeline {
         let (header, sequence) = self.sequence.as_ref()?;
         let mut described: Vec<RepresentationInfo> = Vec::new();
         for (representation, cost) in representations.zip(&self.costs) {
-            let own = cost.rates.iter().map(|rate| (*rate).max(1)).fold(0, u64::saturating_add);
+            let rates = self.rates(cost, Clock::of(sequence));
+            let own = rates.iter().map(|rate| (*rate).max(1)).fold(0, u64::saturating_add);
             let before = described.last().map_or(0, |last| last.bandwidth);
             let depends_on = described.iter().map(|earlier| earlier.id.clone()).collect();
             let nothing = ByteRange { offset: 0, size: 0, digest: String::new() };
@@ -87,7 +100,7 @@ impl Timeline {
                 layer: representation.codes().1,
                 depends_on,
                 bandwidth: before.saturating_add(own),
-                level_bandwidths: cost.rates.clone(),
+                level_bandwidths: rates,
                 frames: cost.frames,
                 bytes: 0,
                 init: nothing,
@@ -104,6 +117,14 @@ impl Timeline {
             gops: self.gops.clone(),
             quality: None,
         };
-        Some(mpd::of(&manifest, Segments::Numbered { started, now, is_end }))
+        let growing = self.growing.as_ref();
+        Some(mpd::of(&manifest, Segments::Numbered { started, now, is_end, growing }))
+    }
+
+    /// The rates of a Representation, with what the GOP in progress has taken so far.
+    fn rates(&self, cost: &Cost, clock: Clock) -> Vec<u64> {
+        let ticks = self.growing.as_ref().map(|gop| clock.ticks(gop.frame_count.into()));
+        let now = |bytes: u64| ticks.map_or(0, |ticks| clock.rate(bytes, ticks));
+        cost.rates.iter().zip(&cost.bytes).map(|(rate, bytes)| now(*bytes).max(*rate)).collect()
     }
 }

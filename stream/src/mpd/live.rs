@@ -1,6 +1,6 @@
 //! C.9: what an MPD says of segments that are files of their own, and of those that are still being made.
 
-use super::{Segments, Xml, seconds};
+use super::{Segments, Xml, gops, longest, seconds};
 use crate::manifest::Manifest;
 use crate::package::Layout;
 
@@ -45,14 +45,13 @@ pub(super) fn template(xml: &mut Xml, manifest: &Manifest, segments: Segments<'_
         ("startNumber", "1".to_owned()),
     ];
     if is_low_latency(manifest, segments) {
-        let longest = manifest.gops.iter().map(|gop| gop.frame_count).max().unwrap_or(1);
-        let early = seconds(manifest, longest.saturating_sub(1).into());
+        let early = seconds(manifest, longest(manifest, segments).saturating_sub(1).into());
         attributes.push(("availabilityTimeOffset", early));
         attributes.push(("availabilityTimeComplete", "false".to_owned()));
     }
     xml.element("SegmentTemplate", &attributes, |xml| {
         xml.element("SegmentTimeline", &[], |xml| {
-            for (start, ticks, repeated) in runs(manifest) {
+            for (start, ticks, repeated) in runs(manifest, segments) {
                 let mut attributes = vec![("t", start.to_string()), ("d", ticks.to_string())];
                 if repeated > 0 {
                     attributes.push(("r", repeated.to_string()));
@@ -64,10 +63,10 @@ pub(super) fn template(xml: &mut Xml, manifest: &Manifest, segments: Segments<'_
 }
 
 /// GOPs of one length that follow each other: time and duration of the first, and how many come after it.
-fn runs(manifest: &Manifest) -> Vec<(u64, u64, u64)> {
+fn runs(manifest: &Manifest, segments: Segments<'_>) -> Vec<(u64, u64, u64)> {
     let mut runs: Vec<(u64, u64, u64)> = Vec::new();
     let ticks = |frames: u32| u64::from(frames).saturating_mul(manifest.stream.ticks_per_frame.into());
-    for gop in &manifest.gops {
+    for gop in gops(manifest, segments) {
         let (start, length) = (ticks(gop.first_frame), ticks(gop.frame_count));
         match runs.last_mut() {
             Some((first, of_one, repeated))
