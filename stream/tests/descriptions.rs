@@ -55,6 +55,35 @@ fn the_mpd_has_the_elements_of_the_schema_in_their_order() {
     }
 }
 
+/// SS-CR-020, SS-CR-021, SS-CR-022, SS-CR-024.
+#[test]
+fn another_reader_of_mpds_finds_the_layers() {
+    let stream = worked_example();
+    let package = package(&stream, &Options::default());
+    let mpd = dash_mpd_core::parse(&package.mpd).unwrap();
+    assert_eq!(mpd.mpdtype.as_deref(), Some("static"));
+    let set = &mpd.periods[0].adaptations[0];
+    assert_eq!(set.mimeType.as_deref(), Some("application/mp4"));
+    assert_eq!(set.essential_property.len(), 1);
+    assert_eq!(set.representations.len(), package.manifest.representations.len());
+    for (read, info) in set.representations.iter().zip(&package.manifest.representations) {
+        assert_eq!((read.id.as_deref(), read.bandwidth), (Some(info.id.as_str()), Some(info.bandwidth)));
+        assert_eq!(read.dependencyId.clone().unwrap_or_default(), info.depends_on.join(" "));
+        assert_eq!(read.BaseURL[0].base, info.file);
+        let range = read.SegmentBase.as_ref().unwrap().indexRange.clone().unwrap();
+        let index = info.index.as_ref().unwrap();
+        assert_eq!(range, format!("{}-{}", index.offset, index.offset + index.size - 1));
+        let bandwidths: Vec<u64> =
+            read.SubRepresentation.iter().map(|level| level.bandwidth.unwrap()).collect();
+        assert_eq!(bandwidths, info.level_bandwidths);
+        for (number, level) in (1..).zip(&read.SubRepresentation) {
+            let below: Vec<String> = (1..number).map(|below| below.to_string()).collect();
+            assert_eq!(level.level, Some(number));
+            assert_eq!(level.dependencyLevel.clone().unwrap_or_default(), below.join(" "));
+        }
+    }
+}
+
 /// SS-CR-022.
 #[test]
 fn bandwidths_of_levels_add_up_to_those_of_representations() {
