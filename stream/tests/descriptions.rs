@@ -19,7 +19,7 @@ fn number(node: &Node<'_, '_>, attribute: &str) -> u64 {
     node.attribute(attribute).unwrap().parse().unwrap()
 }
 
-/// SS-CR-020, SS-CR-021, SS-CR-023, SS-CR-024.
+// covers: SS-CR-020, SS-CR-021, SS-CR-023, SS-CR-024
 #[test]
 fn the_mpd_has_the_elements_of_the_schema_in_their_order() {
     let stream = worked_example();
@@ -55,7 +55,7 @@ fn the_mpd_has_the_elements_of_the_schema_in_their_order() {
     }
 }
 
-/// SS-CR-020, SS-CR-021, SS-CR-022, SS-CR-024.
+// covers: SS-CR-020, SS-CR-021, SS-CR-022, SS-CR-024
 #[test]
 fn another_reader_of_mpds_finds_the_layers() {
     let stream = worked_example();
@@ -84,7 +84,7 @@ fn another_reader_of_mpds_finds_the_layers() {
     }
 }
 
-/// SS-CR-022.
+// covers: SS-CR-022
 #[test]
 fn bandwidths_of_levels_add_up_to_those_of_representations() {
     let stream = worked_example();
@@ -116,7 +116,7 @@ fn value(manifest: &Manifest) -> Value {
     serde_json::from_str(&manifest.to_json()).unwrap()
 }
 
-/// SS-CR-025.
+// covers: SS-CR-025
 #[test]
 fn ranges_of_the_manifest_are_those_of_the_files() {
     let schema: Value = serde_json::from_str(include_str!("../manifest.schema.json")).unwrap();
@@ -179,7 +179,7 @@ const NONSENSE: &[(&str, &str, &str)] = &[
     ("/stream/bytes", "1e99", "line 1"),
 ];
 
-/// SS-CR-026.
+// covers: SS-CR-026
 #[test]
 fn a_manifest_that_cannot_be_true_is_refused() {
     let stream = worked_example();
@@ -200,7 +200,7 @@ fn a_manifest_that_cannot_be_true_is_refused() {
     assert!(Manifest::parse(deep.as_bytes()).is_err());
 }
 
-/// SS-CR-001, SS-CR-005.
+// covers: SS-CR-001, SS-CR-005
 #[test]
 fn units_out_of_order_are_refused() {
     let stream = worked_example();
