@@ -2,7 +2,7 @@
 # libFuzzer is run with it. Sourced with the working directory in fuzz/.
 
 # As in src/targets.rs.
-targets=(units records entropy scene decode cost synthetic encode oracle)
+targets=(units records entropy packages scene decode cost synthetic encode oracle)
 
 # Options of every run. The limit on single allocations is in src/ceiling.rs: -malloc_limit_mb needs a sanitizer,
 # which stable lacks.

@@ -10,7 +10,7 @@ from pathlib import Path
 
 TYPES = {"i32": 2**31 - 1, "u32": 2**32 - 1, "i64": 2**63 - 1, "u64": 2**64 - 1}
 HERE = Path(__file__).parent
-TEXTS = {path.name: path.read_text() for glob in ("0*.md", "[abfg]-*.md") for path in sorted(HERE.glob(glob))}
+TEXTS = {path.name: path.read_text() for glob in ("0*.md", "[abcfg]-*.md") for path in sorted(HERE.glob(glob))}
 # Numbers with a point that are not clauses: versions, rounded numbers of A.3, code.
 NUMBERS = re.compile(r"(?:[Vv]ersion|SplatStream) \d+\.\d+|\d+\.\d+ (?:k|M|G|MB)\b|`[^`]*`")
 CLAUSE = re.compile(r"(?<![\w.-])([1-9A-F](?:\.\d+)+)(?![\w-]|\.\d)")

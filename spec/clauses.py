@@ -14,7 +14,7 @@ import sys
 from check import CLAUSE
 
 # Where every number with a point is that of a clause, as check.py demands; elsewhere there are decibels and bits too.
-PAGES = re.compile(r"0\d-|[abfg]-|changes")
+PAGES = re.compile(r"0\d-|[abcfg]-|changes")
 HEADING = re.compile(r"^(#+) (?:Annex )?((?:\d+|[A-Z])(?:\.\d+)*) .*$", re.M)
 REQUIREMENT = r"\bSS-[A-Z]{2}-\d{3}\b"
 DEFINED = re.compile(rf"\*\*\[({REQUIREMENT})\]\*\*")

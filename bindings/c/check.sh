@@ -55,6 +55,8 @@ wasm() {
         return
     fi
     cargo build --release -p splatstream-c --target "$target"
+    # Players in pages read manifests.
+    cargo check --release -p splatstream-stream --target "$target"
     node bindings/c/tests/wasm.mjs "$built/$target/release/splatstream_c.wasm" "$stream" >"$built/c/wasm-frames"
     # The same frames as from the native library, if that has run.
     [ ! -e "$built/c/frames" ] || diff <(cut -d, -f1 "$built/c/frames") "$built/c/wasm-frames"

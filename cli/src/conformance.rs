@@ -3,6 +3,7 @@
 mod decode;
 mod list;
 mod matrix;
+mod packages;
 mod run;
 
 use crate::console::Console;
@@ -31,6 +32,7 @@ enum Command {
     Run(Box<run::Run>),
     List(list::List),
     Matrix(matrix::Matrix),
+    Packages(packages::Packages),
     Decode(decode::Decode),
 }
 
@@ -41,6 +43,7 @@ impl Conformance {
             Command::Run(command) => command.run(console),
             Command::List(command) => command.run(console),
             Command::Matrix(command) => command.run(console),
+            Command::Packages(command) => command.run(console),
             Command::Decode(command) => command.run(),
         }
     }
@@ -72,7 +75,12 @@ struct SuiteArgs {
 
 impl SuiteArgs {
     fn read(&self) -> Result<Suite, Failure> {
-        let named = self.suite.clone().or_else(Suite::locate);
+        Suite::read(&Self::folder(self.suite.clone())?).map_err(refused)
+    }
+
+    /// The folder of the vectors that was named, or the one of the repository.
+    fn folder(named: Option<PathBuf>) -> Result<PathBuf, Failure> {
+        let named = named.or_else(Suite::locate);
         let named = named.unwrap_or_else(|| Path::new("conformance/vectors").into());
         let folder = std::path::absolute(&named).map_err(|error| Failure::file("find", &named, &error))?;
         if !folder.is_dir() {
@@ -81,7 +89,7 @@ impl SuiteArgs {
             let advice = "give the folder of the vectors with --suite DIR; they are in conformance/vectors of the repository";
             return Err(Failure::other(format!("{path}: {what}\n  {advice}")));
         }
-        Suite::read(&folder).map_err(refused)
+        Ok(folder)
     }
 
     fn selection(&self) -> Selection {

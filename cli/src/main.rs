@@ -20,6 +20,7 @@ mod inspect;
 mod manual;
 mod numbers;
 mod output_file;
+mod package;
 mod progress;
 mod render;
 mod seek;
@@ -28,6 +29,7 @@ mod stream_file;
 mod structure;
 mod train;
 mod unfinished;
+mod unpackage;
 mod up_guess;
 mod validate;
 
@@ -71,6 +73,8 @@ enum Command {
     Compare(compare::Compare),
     Render(render::Render),
     Chart(chart::Chart),
+    Package(package::PackageStream),
+    Unpackage(unpackage::Unpackage),
     Train(train::Train),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
@@ -143,6 +147,8 @@ impl Command {
             Self::Compare(command) => command.run(console),
             Self::Render(command) => command.run(console),
             Self::Chart(command) => command.run(console),
+            Self::Package(command) => command.run(console),
+            Self::Unpackage(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),

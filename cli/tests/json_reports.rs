@@ -96,6 +96,8 @@ fn reports_on_the_committed_stream_are_as_before() {
         ("validate_damaged", "validate damaged.gss"),
         ("extract", "extract small.gss --op s0,t0,r0 -o part.gss"),
         ("extract_damaged", "extract damaged.gss --op s0,t0,r2 -o rest.gss"),
+        ("package", "package small.gss -o package/"),
+        ("unpackage", "unpackage package/ -o back.gss"),
         ("compare", "compare small.gss part.gss --cameras ring:2 --height 40"),
         ("render", "render small.gss -o pictures --camera ring:1 --height 20 --frames 0..1"),
     ] {
@@ -170,7 +172,12 @@ fn reports_of_the_conformance_suite_have_the_keys_they_had() {
     let list = shape(&report(at, &format!("conformance list {suite}")));
     let failing = shape(&report(at, &format!("conformance run {suite} --stdio cat")));
     let matrix = shape(&report(at, "conformance matrix mine.json -o page.md"));
-    let all = [("run", run), ("list", list), ("failing", failing), ("matrix", matrix)];
+    let packages = shape(&report(
+        at,
+        &format!("conformance packages --packages {}", text(&vectors.join("../packages"))),
+    ));
+    let all =
+        [("run", run), ("list", list), ("failing", failing), ("matrix", matrix), ("packages", packages)];
     insta::assert_json_snapshot!(
         "conformance",
         all.into_iter().collect::<std::collections::BTreeMap<_, _>>()

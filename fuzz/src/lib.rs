@@ -13,6 +13,7 @@ pub mod entropy;
 pub mod laws;
 pub mod measured;
 pub mod oracle;
+pub mod packages;
 pub mod records;
 pub mod scene;
 pub mod seal;

@@ -1,6 +1,6 @@
 //! The targets by name. One program holds them all: linking it once is much of what building costs.
 
-use crate::{cost, decode, encode, entropy, oracle, records, scene, synthetic, units};
+use crate::{cost, decode, encode, entropy, oracle, packages, records, scene, synthetic, units};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -14,10 +14,11 @@ pub struct Target {
 }
 
 /// Every target, cheap ones first.
-pub const ALL: [Target; 9] = [
+pub const ALL: [Target; 10] = [
     Target { name: "units", run: units::run },
     Target { name: "records", run: records::run },
     Target { name: "entropy", run: entropy::run },
+    Target { name: "packages", run: packages::run },
     Target { name: "scene", run: scene::run },
     Target { name: "decode", run: decode::run },
     Target { name: "cost", run: cost::run },

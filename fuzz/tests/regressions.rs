@@ -51,6 +51,11 @@ fn symbols_come_back() {
 }
 
 #[test]
+fn packages_come_back_or_are_refused() {
+    replay("packages", false);
+}
+
+#[test]
 fn scene_files_read_or_are_refused() {
     replay("scene", false);
 }

@@ -14,6 +14,7 @@ use splatstream_format::unit::{write_file_header, write_unit};
 use splatstream_fuzz::records::{LAWS, SEQUENCE};
 use splatstream_fuzz::{scene, streams};
 use splatstream_gaussians::random::SplitMix64;
+use splatstream_stream::package::{Options as PackageOptions, Package};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -107,6 +108,24 @@ fn noise_is_coded_and_encoded() {
     noise_is_seed_of("entropy", (1..=8).map(|part| part * 500));
     noise_is_seed_of("synthetic", (1..=16).map(|part| part * 100));
     noise_is_seed_of("encode", (1..=12).map(|part| part * 250));
+}
+
+#[test]
+fn packages_are_seeds() {
+    let mut seeds = Vec::new();
+    for stream in 0..streams::ALL.len() as u8 {
+        seeds.push((format!("stream-{stream}"), vec![0, stream]));
+        seeds.push((format!("files-{stream}"), vec![1, stream]));
+        let edits = [vec![1, stream + 128], noise(u64::from(stream) + 900, 20)].concat();
+        seeds.push((format!("edits-{stream}"), edits));
+    }
+    let plain = Package::of(streams::ALL[0], &PackageOptions::default(), &splatstream_fuzz::LIMITS).unwrap();
+    let mut file = vec![2];
+    plain.write("s0.mp4", &mut file).unwrap();
+    seeds.push(("file".to_owned(), file));
+    seeds.push(("manifest".to_owned(), [&[3], plain.manifest.to_json().as_bytes()].concat()));
+    bless("packages", &seeds);
+    assert_eq!(saved("packages").len(), seeds.len());
 }
 
 #[test]

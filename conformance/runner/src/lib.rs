@@ -26,6 +26,7 @@ pub mod judge;
 pub mod limits;
 pub mod matrix;
 pub mod output;
+pub mod packages;
 mod process_group;
 pub mod protocol;
 pub mod reference;

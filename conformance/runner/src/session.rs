@@ -9,12 +9,13 @@ use crate::command::{self, Template};
 use crate::error::{Error, Result};
 use crate::limits::Limits;
 use crate::process_group::ProcessGroup;
-use crate::protocol::{Request, Said};
+use crate::protocol::{EVERYTHING, Request, Said};
+use crate::vector::Mode;
 use crate::watchdog::Watchdog;
 use persistent::{Persistent, Reply};
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use tempfile::TempDir;
 
@@ -71,6 +72,18 @@ impl<'a> Session<'a> {
             Decoder::Once(template) => self.ask_once(&template.words(&request)),
             Decoder::Persistent(words) => self.ask_persistent(words, &request),
         }
+    }
+
+    /// Asks about any input; gives the answer and the file of a name that may have been written.
+    pub(crate) fn ask_file(&mut self, input: &Path, name: &str) -> Result<(Answer, PathBuf)> {
+        let out = self.clean_out()?.join(name);
+        let (input, op) = (input.to_path_buf(), EVERYTHING.to_owned());
+        let request = Request { input, op, mode: Mode::Full, out: out.clone() };
+        let answer = match self.decoder {
+            Decoder::Once(template) => self.ask_once(&template.words(&request)),
+            Decoder::Persistent(words) => self.ask_persistent(words, &request),
+        };
+        Ok((answer?, out))
     }
 
     /// The file that the decoder gets.

@@ -1,0 +1,208 @@
+//! `splatstream package`: a stream as files for DASH.
+
+mod live;
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs};
+use crate::stream_file::{LimitArgs, StreamFile};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use splatstream_chart::numbers::{grouped, percent};
+use splatstream_stream::Representation;
+use splatstream_stream::manifest::{Manifest, RepresentationInfo};
+use splatstream_stream::package::{Layout, Options, Package};
+use std::path::{Path, PathBuf};
+use std::slice;
+
+/// Write a stream as files for DASH: fragmented MP4, an MPD and a manifest. Nothing is decoded.
+#[derive(Args)]
+#[command(after_help = "Example:\n  splatstream package talk.gss -o talk/\n\n\
+    A file per spatial layer of the I frames and per temporal layer of the others, with a track per refinement.\n\
+    What the files are is annex C of the specification; `splatstream unpackage` gives the stream back.")]
+pub(crate) struct PackageStream {
+    /// The stream; - is standard input.
+    #[arg(value_name = "IN.gss")]
+    input: PathBuf,
+    /// The directory to write to.
+    #[arg(short, long = "out", value_name = "DIR")]
+    out: PathBuf,
+    /// What is fetched at once.
+    #[arg(long, value_enum, default_value_t = LayoutName::Gop)]
+    layout: LayoutName,
+    /// Package a stream that is still being written, GOP by GOP: files appear as they are complete, until the end unit
+    /// comes.
+    #[arg(long)]
+    live: bool,
+    /// Replace a package that is in the directory.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// The layouts of annex C.5.4.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LayoutName {
+    /// A GOP: any prefix of its refinements is one range of bytes.
+    Gop,
+    /// A frame: low latency, more requests.
+    Frame,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    output: &'a Path,
+    layout: &'a str,
+    /// Of the stream, and of all files.
+    bytes_in: u64,
+    bytes: u64,
+    /// None of a live package.
+    frames: Option<u64>,
+    gops: usize,
+    representations: Vec<RepresentationReport<'a>>,
+}
+
+#[derive(Serialize)]
+struct RepresentationReport<'a> {
+    id: &'a str,
+    file: &'a str,
+    frame_type: &'a str,
+    frames: u32,
+    subsegments: usize,
+    bytes: u64,
+    bandwidth: u64,
+}
+
+impl PackageStream {
+    /// Packages the stream.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        check_directory(&self.out, "packages")?;
+        let stale = self.stale()?;
+        let layout = match self.layout {
+            LayoutName::Gop => Layout::Gop,
+            LayoutName::Frame => Layout::Frame,
+        };
+        let options = Options { layout, ..Options::default() };
+        if self.live {
+            self.clear(stale)?;
+            return live::run((&self.input, &self.out), &options, &self.limits.limits(), console);
+        }
+        let stream = StreamFile::read(&self.input)?;
+        let package = Package::of(&stream.bytes, &options, &self.limits.limits());
+        let package = package.map_err(|error| stream.fault(error))?;
+        self.clear(stale)?;
+        let sizes = self.write(&package)?;
+        let report = Report::new(&self.out, &package.manifest, sizes);
+        console.report(&report, || report.text())
+    }
+
+    /// Writes all files, those that name others last; how many bytes they have.
+    fn write(&self, package: &Package<'_>) -> Result<u64, Failure> {
+        let mut bytes = 0;
+        for representation in &package.manifest.representations {
+            let path = self.out.join(&representation.file);
+            let mut file = OutputFile::create(&path, slice::from_ref(&self.input))?;
+            package
+                .write(&representation.file, &mut file)
+                .map_err(|error| Failure::file("write", &path, &error))?;
+            file.finish()?;
+            bytes += representation.bytes;
+        }
+        let manifest = package.manifest.to_json();
+        for (name, text) in [(Package::MANIFEST, &manifest), (Package::MPD, &package.mpd)] {
+            OutputFile::write_apart(&self.out.join(name), slice::from_ref(&self.input), text.as_bytes())?;
+            bytes += text.len() as u64;
+        }
+        Ok(bytes)
+    }
+
+    /// Makes the directory, without an earlier package.
+    fn clear(&self, stale: Vec<PathBuf>) -> Result<(), Failure> {
+        make_directory(&self.out)?;
+        stale.iter().try_for_each(|path| {
+            std::fs::remove_file(path).map_err(|error| Failure::file("remove", path, &error))
+        })
+    }
+
+    /// The files of an earlier package, if they may be replaced.
+    fn stale(&self) -> Result<Vec<PathBuf>, Failure> {
+        let Ok(entries) = std::fs::read_dir(&self.out) else { return Ok(Vec::new()) };
+        let mut stale: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        stale.retain(|path| is_of_package(path) && !path.is_dir());
+        stale.sort();
+        if !stale.is_empty() && !self.force {
+            return Err(Failure::Usage(format!(
+                "{}: there is a package in the directory; give another one, or --force to replace it",
+                self.out.display()
+            )));
+        }
+        stale.iter().try_for_each(|path| refuse_inputs(path, slice::from_ref(&self.input)))?;
+        Ok(stale)
+    }
+}
+
+/// Whether a file has a name that packages have.
+fn is_of_package(path: &Path) -> bool {
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
+    let stem = name.strip_suffix(".mp4").or(name.strip_suffix(".m4s"));
+    // Of a live package there is more after the identifier.
+    let id = stem.map(|stem| stem.split_once('-').map_or(stem, |(id, _)| id));
+    let of_representation = id.is_some_and(|id| Representation::from_id(id).is_some());
+    of_representation || [Package::MANIFEST, Package::MPD].contains(&name)
+}
+
+impl<'a> Report<'a> {
+    fn new(output: &'a Path, manifest: &'a Manifest, bytes: u64) -> Self {
+        let subsegments = |one: &RepresentationInfo| {
+            let all = manifest.gops.iter().flat_map(|gop| &gop.subsegments);
+            all.filter(|subsegment| subsegment.representation == one.id).count()
+        };
+        let representations = manifest.representations.iter().map(|one| RepresentationReport {
+            id: &one.id,
+            file: &one.file,
+            frame_type: &one.frame_type,
+            frames: one.frames,
+            subsegments: subsegments(one),
+            bytes: one.bytes,
+            bandwidth: one.bandwidth,
+        });
+        Self {
+            output,
+            layout: &manifest.layout,
+            bytes_in: manifest.stream.bytes,
+            bytes,
+            frames: Some(manifest.stream.frames),
+            gops: manifest.gops.len(),
+            representations: representations.collect(),
+        }
+    }
+
+    /// Of a live package, whose files are by GOP.
+    fn of_live(output: &'a Path, layout: &'a str, bytes_in: u64, bytes: u64, gops: usize) -> Self {
+        Self { output, layout, bytes_in, bytes, frames: None, gops, representations: Vec::new() }
+    }
+
+    fn text(&self) -> String {
+        let more = percent(self.bytes, self.bytes_in) - 100.0;
+        let mut text = format!(
+            "{}: {} GOPs, {} bytes ({more:.1} % more than the stream)\n",
+            self.output.display(),
+            self.gops,
+            grouped(self.bytes)
+        );
+        for one in &self.representations {
+            text += &format!(
+                "  {:<12} {} {} frames, {} subsegments, {} bytes; up to here {:.3} Mbit/s\n",
+                one.file,
+                one.frames,
+                one.frame_type,
+                one.subsegments,
+                grouped(one.bytes),
+                one.bandwidth as f64 / 1e6
+            );
+        }
+        text
+    }
+}

@@ -1,0 +1,121 @@
+//! `splatstream unpackage`: the stream that a package was made of.
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::output_file::{OutputFile, check_stream_name};
+use crate::stream_file::LimitArgs;
+use clap::Args;
+use serde::Serialize;
+use splatstream_chart::numbers::grouped;
+use splatstream_stream::manifest::Manifest;
+use splatstream_stream::package::Package;
+use splatstream_stream::unpackage::unpackage;
+use std::path::{Path, PathBuf};
+
+/// Write the stream that a package was made of, byte for byte.
+#[derive(Args)]
+#[command(after_help = "Example:\n  splatstream unpackage talk/ -o talk.gss\n\n\
+    Reads every .mp4 and .m4s file of the directory. A manifest beside them is used to check the result.")]
+pub(crate) struct Unpackage {
+    /// The directory of the package.
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// The stream to write; - is standard output.
+    #[arg(short, long = "out", value_name = "OUT.gss")]
+    out: PathBuf,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    output: &'a Path,
+    bytes: u64,
+    files: usize,
+    /// Whether a manifest says that these are the bytes that were packaged.
+    verified: bool,
+}
+
+impl Unpackage {
+    /// Puts the stream together.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        console.claim(Some(&self.out))?;
+        check_stream_name(&self.out)?;
+        let paths = self.media()?;
+        let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+        for path in &paths {
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            match files.last_mut().filter(|_| part_of(path).is_some_and(|(_, part)| part > 0)) {
+                // Segments of a live package follow their initialisation segment.
+                Some((_, bytes)) => bytes.extend(read(path)?),
+                None => files.push((name, read(path)?)),
+            }
+        }
+        let given: Vec<_> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+        let stream = unpackage(&given, &self.limits.limits());
+        let stream = stream.map_err(|error| {
+            let path = self.directory.join(&error.file);
+            Failure::stream(if path.exists() { &path } else { &self.directory }, error.error)
+        })?;
+        let verified = self.verify(&stream)?;
+        OutputFile::write_apart(&self.out, &paths, &stream)?;
+        let bytes = stream.len() as u64;
+        let report = Report { output: &self.out, bytes, files: paths.len(), verified };
+        console.report_beside(Some(&self.out), &report, || report.text())
+    }
+
+    /// The files of Representations, by name.
+    fn media(&self) -> Result<Vec<PathBuf>, Failure> {
+        let failed = |error| Failure::file("read", &self.directory, &error);
+        let mut paths = Vec::new();
+        for entry in std::fs::read_dir(&self.directory).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            if part_of(&path).is_some() && path.is_file() {
+                paths.push(path);
+            }
+        }
+        paths.sort_by_key(|path| part_of(path));
+        Ok(paths)
+    }
+
+    /// Whether there is a manifest; a stream that is not the one it describes is refused.
+    fn verify(&self, stream: &[u8]) -> Result<bool, Failure> {
+        let path = self.directory.join(Package::MANIFEST);
+        if !path.exists() {
+            return Ok(false);
+        }
+        let manifest = Manifest::parse(&read(&path)?);
+        let manifest = manifest.map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+        if !manifest.describes(stream) {
+            return Err(Failure::other(format!(
+                "{}: the files are not those that the manifest was written for\n  copy the package again",
+                self.directory.display()
+            )));
+        }
+        Ok(true)
+    }
+}
+
+/// The Representation that a file says it is of, and its number in it: 0 begins it.
+fn part_of(path: &Path) -> Option<(String, u64)> {
+    let name = path.file_name()?.to_str()?;
+    if let Some(stem) = name.strip_suffix(".mp4") {
+        return Some((stem.strip_suffix("-init").unwrap_or(stem).to_owned(), 0));
+    }
+    let (id, number) = name.strip_suffix(".m4s")?.split_once('-')?;
+    let number = if number == "end" { u64::MAX } else { number.parse().ok().filter(|number| *number > 0)? };
+    Some((id.to_owned(), number))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| Failure::file("read", path, &error))
+}
+
+impl Report<'_> {
+    fn text(&self) -> String {
+        let verified = if self.verified { ", as the manifest has them" } else { "" };
+        let bytes = grouped(self.bytes);
+        format!("{}: {bytes} bytes from {} files{verified}\n", self.output.display(), self.files)
+    }
+}
