@@ -9,3 +9,7 @@
     clippy::panic,
     clippy::unwrap_used
 )]
+
+pub mod control;
+pub mod qoe;
+pub mod simulation;
