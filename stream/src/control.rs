@@ -14,7 +14,8 @@
 //! // Nothing is known of the network: the base of the first GOP comes first.
 //! let Decision::Fetch(fetch) = session.decide(0) else { panic!("nothing is there yet") };
 //! assert_eq!((fetch.gop(), fetch.ranges()[0].representation), (0, 0));
-//! // All of it arrives after 0.2 s, and playback begins.
+//! // The response begins after 0.1 s and ends after 0.2 s, and playback begins.
+//! session.received(100_000, 0);
 //! session.received(200_000, fetch.bytes());
 //! assert_eq!(session.state().shown().len(), 1);
 //! ```

@@ -18,6 +18,8 @@ pub struct Weights {
     pub change: f64,
     /// What a full buffer's last second is worth, in units of the sustainable point's next gain in quality.
     pub price: f64,
+    /// How many times as much more the first second of an empty buffer is worth.
+    pub fear: f64,
     /// Seconds of transfers that the sustainable rate is the mean of.
     pub memory: f64,
     /// Share of the buffer from which GOPs that are there already are upgraded.
@@ -31,13 +33,14 @@ pub struct Weights {
 impl Default for Weights {
     fn default() -> Self {
         Self {
-            horizon: 5,
+            horizon: 8,
             stall: 1.0,
             change: 1.0,
-            price: 1.0,
+            price: 0.6,
+            fear: 4.0,
             memory: 20.0,
-            upgrade: 0.5,
-            haste: 0.6,
+            upgrade: 0.15,
+            haste: 0.8,
             first_guess: 1_000_000.0,
         }
     }
@@ -69,17 +72,28 @@ impl Layered {
             super::ladder::quality_range(horizon(state, state.first_missing(), weights.horizon));
         let sustainable = state.network().mean(weights.memory).unwrap_or(weights.first_guess);
         let range = (most - least).max(1.0);
-        let price = price(state, sustainable).unwrap_or(range / 100.0) * weights.price;
+        let price = price(state, sustainable).unwrap_or(range / 100.0) * self.eagerness(state);
+        let full = seconds(state.settings().buffer_us);
         Outlook {
             throughput: state.network().robust().unwrap_or(weights.first_guess),
             latency: state.network().latency(),
             buffer: seconds(state.buffer_us()),
-            full: seconds(state.settings().buffer_us),
+            full,
             before: state.quality_before(state.first_missing()),
             stall_weight: weights.stall * most.max(1.0),
             change_weight: weights.change,
-            price,
+            // Towards its end, what is buffered of a stored presentation loses its worth.
+            price: price * (left(state) / full.max(0.1)).min(1.0),
+            fear: weights.fear,
         }
+    }
+
+    /// What a full buffer's last second is worth: on a network that proves steady so much that no more than it sustains is
+    /// fetched, or else pictures would change to and fro.
+    fn eagerness(&self, state: &State) -> f64 {
+        let steady =
+            state.network().error().map_or(0.0, |error| (1.0 - error / STEADY_ERROR).clamp(0.0, 1.0));
+        self.weights.price + (1.0 - self.weights.price).max(0.0) * steady
     }
 
     /// What to fetch for the next GOP, and what quality it will have.
@@ -179,11 +193,22 @@ impl Layered {
     }
 }
 
+/// Error of predictions from which a network is not steady at all.
+const STEADY_ERROR: f64 = 0.05;
+
 /// A rule that waits looks again after this time.
 const TICK_US: u64 = 100_000;
 
 fn plan_is_over(state: &State) -> bool {
     state.first_missing() >= state.ladder().gops().len()
+}
+
+/// Seconds of the presentation that are still to be fetched; without end if it is live.
+fn left(state: &State) -> f64 {
+    if state.settings().live.is_some() {
+        return f64::INFINITY;
+    }
+    horizon(state, state.first_missing(), usize::MAX).iter().map(|gop| seconds(gop.duration_us())).sum()
 }
 
 /// The next GOPs from one on.

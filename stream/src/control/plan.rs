@@ -22,6 +22,8 @@ pub(crate) struct Outlook {
     pub(crate) change_weight: f64,
     /// What a second of buffer is worth when it is full, in dB.
     pub(crate) price: f64,
+    /// How many times as much more the first second is worth.
+    pub(crate) fear: f64,
 }
 
 impl Outlook {
@@ -30,10 +32,13 @@ impl Outlook {
         if bytes == 0 { 0.0 } else { self.latency + real(bytes) * 8.0 / self.throughput.max(1.0) }
     }
 
-    /// What a buffer is worth: a second more of it is worth the price times full / buffer.
+    /// What a buffer is worth, in dB·s: its last second is worth the price if it is full, and the more the emptier it is, up
+    /// to 1 + `fear` times the price.
     pub(crate) fn worth(&self, buffer: f64) -> f64 {
-        let share = (buffer / self.full.max(0.1)).clamp(0.02, 1.0);
-        self.price * self.full * libm::log(share)
+        let full = self.full.max(0.1);
+        let missing = (1.0 - buffer / full).clamp(0.0, 1.0);
+        let third = missing * missing * missing;
+        self.price * (buffer - full * self.fear * third / 3.0)
     }
 }
 

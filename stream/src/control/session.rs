@@ -53,7 +53,7 @@ impl<R: Rule> Session<R> {
             Decision::Fetch(fetch) if state.request.is_none() => {
                 let now_us = state.now_us;
                 let progress = Transfer { sent_us: now_us, first_us: now_us, last_us: now_us, bytes: 0 };
-                state.request = Some(Request { fetch: fetch.clone(), progress });
+                state.request = Some(Request { fetch: fetch.clone(), begun: false, progress });
             }
             Decision::Abandon if state.request.is_some() => {
                 self.end_request(true);
@@ -66,12 +66,14 @@ impl<R: Rule> Session<R> {
         decision
     }
 
-    /// Says how many bytes of the running request have arrived so far. A request ends with its last byte.
+    /// Says how many bytes of the running request have arrived so far. The first call says that the response has begun, as
+    /// soon as that is known, also with 0 bytes: throughput counts from then on. A request ends with its last byte.
     pub fn received(&mut self, now_us: u64, bytes: u64) {
         self.advance(now_us);
         let state = &mut self.state;
         let Some(request) = &mut state.request else { return };
-        if request.progress.bytes == 0 {
+        if !request.begun {
+            request.begun = true;
             request.progress.first_us = state.now_us;
         }
         request.progress.last_us = state.now_us;
@@ -86,7 +88,7 @@ impl<R: Rule> Session<R> {
         self.resume();
     }
 
-    /// Says that the running request has failed. What has arrived of it stays.
+    /// Says that the running request has failed. What has arrived of it stays, unless the rule plays whole GOPs only.
     pub fn failed(&mut self, now_us: u64) {
         self.advance(now_us);
         self.end_request(false);
@@ -102,6 +104,9 @@ impl<R: Rule> Session<R> {
         }
         if let Some(settled) = state.settled.get_mut(gop) {
             *settled |= wanted;
+            if let Some(arrived) = state.arrived.get_mut(gop).filter(|_| state.only_whole && !*settled) {
+                *arrived = Levels::none(state.ladder.representations().len());
+            }
         }
     }
 

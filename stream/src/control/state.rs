@@ -55,6 +55,8 @@ pub enum Playback {
 pub struct Request {
     /// What was asked for.
     pub fetch: Fetch,
+    /// Whether the response has begun.
+    pub begun: bool,
     /// When it was sent, when bytes first and last arrived, and how many.
     pub progress: Transfer,
 }

@@ -32,6 +32,9 @@ impl Transfer {
     }
 }
 
+/// Transfers that count as the last.
+const LAST: usize = 5;
+
 /// Transfers that are remembered.
 const REMEMBERED: usize = 64;
 
@@ -52,7 +55,7 @@ impl Network {
             let real = transfer.throughput();
             // What was short says little.
             let weight = (transfer.duration() / 0.5).min(1.0);
-            self.errors.push(((predicted - real) / real).max(0.0) * weight);
+            self.errors.push((predicted - real) / real * weight);
         }
         self.transfers.push(transfer);
         if self.transfers.len() > REMEMBERED {
@@ -83,13 +86,18 @@ impl Network {
     /// What the network carries at least, in bits per second: the harmonic mean of the last seconds, divided by 1 + the
     /// largest recent error of such a prediction upwards (at most [`MOST_ERROR`]); none before the first transfer.
     pub fn robust(&self) -> Option<f64> {
-        let errors = self.errors.iter().rev().take(5).copied();
+        let errors = self.errors.iter().rev().take(LAST).copied();
         Some(self.mean(RECENT_SECONDS)? / (1.0 + errors.fold(0.0, f64::max).min(MOST_ERROR)))
+    }
+
+    /// How far such predictions have been off lately, as a share of the throughput; none before the second transfer.
+    pub fn error(&self) -> Option<f64> {
+        self.errors.iter().rev().take(LAST).map(|error| error.abs()).reduce(f64::max)
     }
 
     /// Mean latency of the last five requests in seconds; 0 before the first.
     pub fn latency(&self) -> f64 {
-        let last: Vec<f64> = self.transfers.iter().rev().take(5).map(Transfer::latency).collect();
+        let last: Vec<f64> = self.transfers.iter().rev().take(LAST).map(Transfer::latency).collect();
         last.iter().sum::<f64>() / real(super::number::size(last.len()).max(1))
     }
 }

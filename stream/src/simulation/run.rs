@@ -167,7 +167,8 @@ impl<R: Rule> Run<'_, R> {
             let mark = flow.marks.iter().find(|&&mark| mark > flow.bytes).copied().unwrap_or(0);
             let carried = flow.before.saturating_add(u128::from(mark).saturating_mul(BYTE));
             let mark_us = self.link.trace.time_of(carried).unwrap_or(u64::MAX).max(flow.first_us);
-            next = next.min(mark_us).min(self.now_us.saturating_add(TICK_US)).min(loss.unwrap_or(u64::MAX));
+            let event_us = if self.now_us < flow.first_us { flow.first_us } else { mark_us };
+            next = next.min(event_us).min(self.now_us.saturating_add(TICK_US)).min(loss.unwrap_or(u64::MAX));
         }
         self.now_us = next.max(self.now_us);
         self.receive(loss == Some(self.now_us));
@@ -182,9 +183,7 @@ impl<R: Rule> Run<'_, R> {
             let bytes = u64::try_from(carried / BYTE).unwrap_or(u64::MAX).min(all);
             self.report.bytes = self.report.bytes.saturating_add(bytes.saturating_sub(flow.bytes));
             flow.bytes = bytes;
-            if bytes > 0 {
-                self.session.received(self.now_us, bytes);
-            }
+            self.session.received(self.now_us, bytes);
             if bytes == all {
                 self.flow = None;
                 return;
