@@ -2,11 +2,13 @@
 //!
 //! ```text
 //! cargo run --release -p splatstream-stream --example qoe -- TRACES [--csv FILE] [--gops N] [--peer NAME=COMMAND]...
+//!     [--partial-peer NAME=COMMAND]...
 //! ```
 //!
 //! `TRACES` has CSV files of lines `seconds,Mbit/s`, whose names say the class of the network: 3G..., 4G..., hd... for
 //! broadband, 5g... . Weights of our rule were tuned on every other trace of each class, in the order of names; the rest is
-//! held out, and tables show both. A peer is a program that speaks the protocol of conformance/peers/README.md.
+//! held out, and tables show both. A peer is a program that speaks the protocol of conformance/peers/README.md; a partial one
+//! plays what has arrived of a GOP when its time comes, where others play whole GOPs only.
 
 mod peer;
 mod table;
@@ -39,12 +41,19 @@ struct Row {
     abandoned: u64,
 }
 
+/// A rule in another program.
+struct Candidate {
+    name: String,
+    command: String,
+    partial: bool,
+}
+
 #[derive(Default)]
 struct Arguments {
     traces: PathBuf,
     csv: Option<PathBuf>,
     gops: usize,
-    peers: Vec<(String, String)>,
+    peers: Vec<Candidate>,
 }
 
 fn main() -> Result<()> {
@@ -93,7 +102,7 @@ fn play(presentation: &Ladder, rule: Box<dyn Rule>, trace: &Trace) -> Report {
 }
 
 /// Our rule, the baselines and the peers.
-fn rules(peers: &[(String, String)]) -> Result<Vec<(String, Box<dyn Rule>)>> {
+fn rules(peers: &[Candidate]) -> Result<Vec<(String, Box<dyn Rule>)>> {
     let mut rules: Vec<(String, Box<dyn Rule>)> = vec![
         ("layered".into(), Box::new(Layered::default())),
         ("throughput".into(), Box::new(Single::whole(ThroughputRule))),
@@ -103,8 +112,10 @@ fn rules(peers: &[(String, String)]) -> Result<Vec<(String, Box<dyn Rule>)>> {
         ("buffer, partial".into(), Box::new(Single::partial(BufferRule))),
         ("bola, partial".into(), Box::new(Single::partial(Bola::default()))),
     ];
-    for (name, command) in peers {
-        rules.push((name.clone(), Box::new(Single::whole(Peer::start(command)?))));
+    for peer in peers {
+        let rule = Peer::start(&peer.command)?;
+        let rule = if peer.partial { Single::partial(rule) } else { Single::whole(rule) };
+        rules.push((peer.name.clone(), Box::new(rule)));
     }
     Ok(rules)
 }
@@ -150,10 +161,11 @@ fn parse() -> Result<Arguments> {
         match word.as_str() {
             "--csv" => arguments.csv = Some(value()?.into()),
             "--gops" => arguments.gops = value()?.parse()?,
-            "--peer" => {
+            "--peer" | "--partial-peer" => {
                 let peer = value()?;
-                let (name, command) = peer.split_once('=').ok_or("--peer is NAME=COMMAND")?;
-                arguments.peers.push((name.into(), command.into()));
+                let (name, command) = peer.split_once('=').ok_or("a peer is NAME=COMMAND")?;
+                let partial = word == "--partial-peer";
+                arguments.peers.push(Candidate { name: name.into(), command: command.into(), partial });
             }
             _ => arguments.traces = word.into(),
         }
