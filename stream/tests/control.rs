@@ -21,7 +21,7 @@ fn rule(number: usize) -> Box<dyn Rule> {
         2 => Box::new(BufferRule),
         _ => Box::new(Bola::default()),
     };
-    if number % 2 == 0 { Box::new(Single::whole(single)) } else { Box::new(Single::partial(single)) }
+    if number.is_multiple_of(2) { Box::new(Single::whole(single)) } else { Box::new(Single::partial(single)) }
 }
 
 /// Steps of up to 20 s and 40 Mbit/s, of which some are outages, and at least one is not.
