@@ -87,8 +87,9 @@ class Peer:
         if to is None:
             return {}
         self.rule.report_download(self.progress(self.last, size, downloaded, time, latency, to), False)
-        self.last = to
-        return {"rung": to}
+        # As written, sabre does not go on with that quality: it asks the rule again.
+        self.last, _ = self.rule.get_quality_delay(question["gop"])
+        return {"rung": self.last}
 
 
 def main():

@@ -81,7 +81,7 @@ class Peers(unittest.TestCase):
             BEGIN, pick(0, 0), first, pick(1, 3, 0.6, transfer(0.5, 1)), pick(2, 6, 2.6, transfer(0.5, 1)), slow])
         # The last pick waits 1.5 s and what the player idled before, 2 s.
         self.assertEqual(answers, [{}, {"rung": 0, "wait": 0}, {}, {"rung": 0, "wait": 0}, {"rung": 1, "wait": 3.5},
-                                   {"rung": 0}])
+                                   {"rung": 1}])
 
     def test_the_slot_of_l3gs_is_what_the_network_carries(self):
         files = {"SplatSelector.py": SELECTOR, "BandwidthPredictor.py": PREDICTOR}

@@ -161,3 +161,73 @@ impl Bitrates {
         self.of.get(&shown.point).copied().unwrap_or(self.least)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{Layered, Point, Settings};
+    use crate::simulation::{Link, Trace, ladders, simulate};
+
+    /// A playback of three GOPs: the base after 1 s, the best at once, the base again after a stall of 2 s.
+    fn playback(ladder: &Ladder) -> Report {
+        let mut report = simulate(
+            ladder,
+            &Settings::default(),
+            Layered::default(),
+            &Link::new(Trace::constant(1_000_000_000)),
+        );
+        let ends = |gop: usize| (ladder.gops()[gop].points().first(), ladder.gops()[gop].points().last());
+        let chosen: [Option<&Point>; 3] = [ends(0).0, ends(1).1, ends(2).0];
+        for ((shown, point), (began_us, waited_us)) in report.shown.iter_mut().zip(chosen).zip([
+            (1_000_000, 1_000_000),
+            (2_000_000, 0),
+            (5_000_000, 2_000_000),
+        ]) {
+            let point = point.expect("every GOP has points");
+            (shown.point, shown.quality, shown.bytes) = (point.name, point.quality, point.bytes);
+            (shown.began_us, shown.waited_us) = (began_us, waited_us);
+        }
+        report.ended_us = 6_000_000;
+        report
+    }
+
+    fn near(value: f64, expected: f64) {
+        assert!((value - expected).abs() < 1e-9, "{value} {expected}");
+    }
+
+    #[test]
+    fn scores_follow_their_formulas() {
+        let ladder = ladders::small(3);
+        let report = playback(&ladder);
+        let score = Score::of(&ladder, &report);
+        let q: Vec<f64> = report.shown.iter().map(|shown| shown.quality).collect();
+        let best = ladder
+            .gops()
+            .iter()
+            .filter_map(|gop| gop.points().last())
+            .map(|point| point.quality)
+            .sum::<f64>()
+            / 3.0;
+        near(score.quality, (q[0] + q[1] + q[2]) / 3.0);
+        let changes = (q[1] - q[0]) + (q[1] - q[2]);
+        near(score.experience, (q[0] + q[1] + q[2] - changes - 3.0 * best) / 3.0);
+        assert_eq!(
+            (score.startup_seconds, score.stalled_seconds, score.stalls, score.switches),
+            (1.0, 2.0, 1, 2)
+        );
+        let mean = |of: fn(&[Point]) -> Option<&Point>| {
+            ladder
+                .gops()
+                .iter()
+                .filter_map(|gop| of(gop.points()))
+                .map(|point| real(point.bytes) * 8.0)
+                .sum::<f64>()
+                / 3.0
+        };
+        let (least, most) = (mean(<[Point]>::first), mean(<[Point]>::last));
+        near(score.sabre_utility, libm::log(most / least) / 6.0);
+        near(score.sabre_rebuffering, 2.0 / 6.0);
+        near(score.sabre_score, (libm::log(most / least) - 5.0 * 2.0) / 6.0);
+        near(score.lolp, (2.0 * least + most - 2.0 * (most - least) - 2.0 * most) / 3e6);
+    }
+}

@@ -116,8 +116,8 @@ pub struct Description {
     pub frames: Vec<u32>,
     /// Per Representation its refinements, from 1 to 16.
     pub pieces: Vec<Vec<Piece>>,
-    /// Quality in dB of operating points, as displayed over the whole GOP. Points that are missing get an estimate, which
-    /// is only good for comparing points of one GOP.
+    /// Quality in dB of operating points, as displayed over the whole GOP: frames that are not there count as the one
+    /// before, standing still. If a point is missing, all get estimates, which are only good for comparing points of one GOP.
     pub quality: Vec<(OperatingPoint, f64)>,
 }
 
@@ -199,6 +199,28 @@ impl fmt::Display for LadderError {
 impl std::error::Error for LadderError {}
 
 /// A presentation as a player sees it: Representations, and GOPs in the order they are played, of which more may follow.
+///
+/// ```
+/// use splatstream_stream::control::{Description, Ladder, Layer, OperatingPoint, Piece, Representation};
+///
+/// // I frames with two refinements, and P frames that need the same refinement of them.
+/// let mut ladder = Ladder::new(vec![
+///     Representation { layer: Layer::Spatial(0), needs: vec![] },
+///     Representation { layer: Layer::Temporal(0), needs: vec![0] },
+/// ])?;
+/// ladder.push(Description {
+///     duration_us: 500_000,
+///     frames: vec![1, 14],
+///     pieces: vec![
+///         vec![Piece { bytes: 40_000, gaussians: 5_000 }, Piece { bytes: 300_000, gaussians: 51_000 }],
+///         vec![Piece { bytes: 90_000, gaussians: 5_000 }, Piece { bytes: 800_000, gaussians: 51_000 }],
+///     ],
+///     quality: vec![],
+/// })?;
+/// let points: Vec<String> = ladder.gops()[0].points().iter().map(|point| format!("{} {}", point.name, point.bytes)).collect();
+/// assert_eq!(points, ["s0,i,r0 40000", "s0,t0,r0 130000", "s0,i,r1 340000", "s0,t0,r1 1230000"]);
+/// # Ok::<(), splatstream_stream::control::LadderError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ladder {
     representations: Vec<Representation>,
@@ -336,20 +358,18 @@ fn point(name: OperatingPoint, levels: Levels, gop: &Description) -> Point {
     point
 }
 
-/// Gives points their quality: from the table or, where it is missing, 6 dB per factor of ten in bytes below 36 dB, less
+/// Gives points their quality: from the table or, if that lacks one of them, 6 dB per factor of ten in bytes below 36 dB, less
 /// up to 6 dB for frames that stand still.
 fn estimate(points: &mut [Point], table: &[(OperatingPoint, f64)]) {
+    let known =
+        |point: &Point| table.iter().find(|(name, _)| *name == point.name).map(|&(_, quality)| quality);
+    let complete = points.iter().all(|point| known(point).is_some());
     let most = real(points.iter().map(|point| point.bytes).max().unwrap_or(1).max(1));
     let all = f64::from(points.iter().map(|point| point.frames).max().unwrap_or(1).max(1));
     for point in points {
-        let known = table.iter().find(|(name, _)| *name == point.name);
-        point.quality = known.map_or_else(
-            || {
-                let share = real(point.bytes.max(1)) / most;
-                36.0 + 6.0 * libm::log10(share) - 6.0 * (1.0 - f64::from(point.frames) / all)
-            },
-            |&(_, quality)| quality,
-        );
+        let share = real(point.bytes.max(1)) / most;
+        let guess = 36.0 + 6.0 * libm::log10(share) - 6.0 * (1.0 - f64::from(point.frames) / all);
+        point.quality = known(point).filter(|_| complete).unwrap_or(guess);
     }
 }
 
@@ -359,4 +379,80 @@ pub(crate) fn quality_range(gops: &[Gop]) -> (f64, f64) {
     let least = |gop: &Gop| gop.points.first().map_or(0.0, |point| point.quality);
     let most = |gop: &Gop| gop.points.iter().map(|point| point.quality).fold(f64::NEG_INFINITY, f64::max);
     (mean(least), mean(most))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn representation(layer: Layer, needs: &[usize]) -> Representation {
+        Representation { layer, needs: needs.to_vec() }
+    }
+
+    #[test]
+    fn representations_must_be_in_order() {
+        let base = || representation(Layer::Spatial(0), &[]);
+        let refused = [
+            vec![],
+            vec![representation(Layer::Temporal(0), &[])],
+            vec![base(), representation(Layer::Temporal(0), &[])],
+            vec![base(), representation(Layer::Temporal(0), &[1])],
+            vec![
+                base(),
+                representation(Layer::Temporal(0), &[0, 2]),
+                representation(Layer::Spatial(1), &[0]),
+            ],
+        ];
+        for representations in refused {
+            assert_eq!(Ladder::new(representations), Err(LadderError::Dependencies));
+        }
+    }
+
+    #[test]
+    fn incomplete_descriptions_are_refused() {
+        let piece = Piece { bytes: 1, gaussians: 1 };
+        let mut ladder = Ladder::new(vec![representation(Layer::Spatial(0), &[])]).expect("it is the base");
+        let good =
+            Description { duration_us: 1, frames: vec![1], pieces: vec![vec![piece]], quality: vec![] };
+        let name = OperatingPoint { spatial: 0, temporal: None, refinement: 0 };
+        let refused = [
+            (Description { frames: vec![], ..good.clone() }, LadderError::Pieces),
+            (Description { pieces: vec![vec![]], ..good.clone() }, LadderError::Pieces),
+            (Description { pieces: vec![vec![piece; 17]], ..good.clone() }, LadderError::Pieces),
+            (Description { duration_us: 0, ..good.clone() }, LadderError::Values),
+            (Description { quality: vec![(name, f64::NAN)], ..good.clone() }, LadderError::Values),
+        ];
+        for (description, error) in refused {
+            assert_eq!(ladder.push(description), Err(error));
+        }
+        assert_eq!((ladder.push(good), ladder.gops().len()), (Ok(()), 1));
+    }
+
+    #[test]
+    fn points_are_those_whose_dependencies_are_met() {
+        // P frames need both spatial layers, whose I frames have no refinements.
+        let representations = vec![
+            representation(Layer::Spatial(0), &[]),
+            representation(Layer::Spatial(1), &[0]),
+            representation(Layer::Temporal(0), &[0, 1]),
+        ];
+        let mut ladder = Ladder::new(representations).expect("they are in order");
+        let piece = |bytes| Piece { bytes, gaussians: bytes };
+        let pieces = vec![vec![piece(10)], vec![piece(5)], vec![piece(2), piece(20)]];
+        let frames = vec![1, 0, 3];
+        ladder.push(Description { duration_us: 1, frames, pieces, quality: vec![] }).expect("it is complete");
+        let points = ladder.gops()[0].points().iter();
+        let points: Vec<_> = points
+            .map(|point| (point.name.to_string(), point.bytes, point.gaussians, point.frames))
+            .collect();
+        let expected = [
+            ("s0,i,r0", 10, 10, 1),
+            ("s1,i,r0", 15, 15, 1),
+            ("s1,t0,r0", 17, 15, 4),
+            ("s1,t0,r1", 37, 22, 4),
+        ];
+        let expected =
+            expected.map(|(name, bytes, gaussians, frames)| (name.to_owned(), bytes, gaussians, frames));
+        assert_eq!(points, expected);
+    }
 }

@@ -1,7 +1,7 @@
 //! The rule for layered streams.
 
 use super::ladder::{Gop, Levels};
-use super::number::{count, microseconds, real, seconds};
+use super::number::{count, real, seconds};
 use super::options::{Choice, choices, gain};
 use super::plan::{Outlook, best};
 use super::rule::{Decision, Fetch, Rule};
@@ -143,34 +143,24 @@ impl Layered {
     fn fetch(&self, state: &State) -> Decision {
         let outlook = self.outlook(state);
         let next = state.first_missing();
-        let later = state.now_us().saturating_add(TICK_US);
         let plan = self.extend(state, &outlook);
+        let quality = plan.as_ref().map(|plan| plan.quality);
+        let wanted = plan.filter(|_| has_room(state, next) && state.available_us(next) <= state.now_us());
+        // Time in which nothing else could be fetched costs nothing.
+        let price = if wanted.is_some() { outlook.price } else { 0.0 };
         let buffered = outlook.buffer >= self.weights.upgrade * outlook.full;
-        let duration_us = state.ladder().gops().get(next).map_or(u64::MAX, Gop::duration_us);
-        let room = state.buffer_us().saturating_add(duration_us) <= state.settings().buffer_us
-            || state.buffer_us() == 0;
-        let available = plan.is_some() && state.available_us(next) <= state.now_us();
-        if buffered || !room || !available {
-            // Time that would be idle costs nothing.
-            let idle = !room || !available;
-            let outlook = if idle { Outlook { price: 0.0, ..outlook } } else { outlook };
-            if let Some(fetch) = self.upgrade(state, &outlook, plan.as_ref().map(|plan| plan.quality)) {
-                return Decision::Fetch(fetch);
-            }
-        }
-        let wanted = plan.filter(|_| room && available);
-        if let Some(fetch) = wanted.and_then(|plan| Fetch::towards(state, next, &plan.levels)) {
-            return Decision::Fetch(fetch);
-        }
-        let until_us = if available || plan_is_over(state) {
-            later
+        let upgrade = if buffered || wanted.is_none() {
+            self.upgrade(state, &Outlook { price, ..outlook }, quality)
         } else {
-            later.min(state.available_us(next).max(state.now_us()))
+            None
         };
-        Decision::Wait { until_us }
+        let fetch = upgrade.or_else(|| Fetch::towards(state, next, &wanted?.levels));
+        let later = Decision::Wait { until_us: state.now_us().saturating_add(TICK_US) };
+        fetch.map_or(later, Decision::Fetch)
     }
 
-    /// Whether the running request stands in the way of the next base.
+    /// Whether the running request is of no use any more, or stands in the way of the next base: that would come too late
+    /// after it, and little more is buffered than that takes.
     fn abandons(&self, state: &State, request: &Request) -> bool {
         let gop = request.fetch.gop();
         if gop < state.first_open() {
@@ -184,14 +174,14 @@ impl Layered {
         let left = request.fetch.bytes().saturating_sub(request.progress.bytes);
         let rate = current_rate(state, request).unwrap_or(self.weights.first_guess);
         let time = |bytes: u64| real(bytes) * 8.0 / rate.max(1.0);
-        let latency = state.network().latency();
+        let need = (state.network().latency() + time(base) * MARGIN).max(0.5);
         let buffer = seconds(state.buffer_us());
-        // Too late after this request, and it has more to carry than the base.
-        time(left) + latency + time(base) * 1.5 > buffer
-            && left > base
-            && buffer < 4.0 * (latency + time(base) * 1.5).max(0.5)
+        time(left) + need > buffer && left > base && buffer < 4.0 * need
     }
 }
+
+/// The base of the next GOP is planned to take so many times as long as predicted.
+const MARGIN: f64 = 1.5;
 
 /// Error of predictions from which a network is not steady at all.
 const STEADY_ERROR: f64 = 0.05;
@@ -199,8 +189,10 @@ const STEADY_ERROR: f64 = 0.05;
 /// A rule that waits looks again after this time.
 const TICK_US: u64 = 100_000;
 
-fn plan_is_over(state: &State) -> bool {
-    state.first_missing() >= state.ladder().gops().len()
+/// Whether one more GOP fits in the buffer; it does if nothing is there.
+fn has_room(state: &State, gop: usize) -> bool {
+    let duration_us = state.ladder().gops().get(gop).map_or(0, Gop::duration_us);
+    state.buffer_us() == 0 || state.buffer_us().saturating_add(duration_us) <= state.settings().buffer_us
 }
 
 /// Seconds of the presentation that are still to be fetched; without end if it is live.
@@ -273,6 +265,6 @@ impl Rule for Layered {
         if self.abandons(state, request) {
             return Decision::Abandon;
         }
-        Decision::Wait { until_us: state.now_us().saturating_add(microseconds(0.1)) }
+        Decision::Wait { until_us: state.now_us().saturating_add(TICK_US) }
     }
 }

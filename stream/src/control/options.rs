@@ -90,6 +90,8 @@ pub struct Range {
     pub from: u8,
     /// Refinement after the last.
     pub to: u8,
+    /// Where it begins in the bytes that the Representation has for the GOP.
+    pub offset: u64,
     /// Length.
     pub bytes: u64,
 }
@@ -133,8 +135,75 @@ fn append(gop: &Gop, levels: &mut Levels, wanted: &Levels, ranges: &mut Vec<Rang
                     last.to = to;
                     last.bytes = last.bytes.saturating_add(piece.bytes);
                 }
-                _ => ranges.push(Range { representation, from: refinement, to, bytes: piece.bytes }),
+                _ => {
+                    let before = gop.pieces(representation).iter().take(usize::from(refinement));
+                    let offset = before.map(|piece| piece.bytes).fold(0, u64::saturating_add);
+                    ranges.push(Range { representation, from: refinement, to, offset, bytes: piece.bytes });
+                }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ladder::{Description, Ladder, Layer, OperatingPoint, Piece, Representation};
+    use super::*;
+
+    /// I frames and P frames of two refinements; the qualities are those of s0,i,r0 to s0,t0,r1.
+    fn gop(qualities: [f64; 4]) -> Gop {
+        let representations = vec![
+            Representation { layer: Layer::Spatial(0), needs: vec![] },
+            Representation { layer: Layer::Temporal(0), needs: vec![0] },
+        ];
+        let pieces = |bytes: [u64; 2]| bytes.map(|bytes| Piece { bytes, gaussians: bytes }).to_vec();
+        let names = [(None, 0), (Some(0), 0), (None, 1), (Some(0), 1)];
+        let named = |((temporal, refinement), quality)| {
+            (OperatingPoint { spatial: 0, temporal, refinement }, quality)
+        };
+        let mut ladder = Ladder::new(representations).expect("they are in order");
+        let description = Description {
+            duration_us: 1_000_000,
+            frames: vec![1, 9],
+            pieces: vec![pieces([100, 200]), pieces([400, 800])],
+            quality: names.into_iter().zip(qualities).map(named).collect(),
+        };
+        ladder.push(description).expect("it is complete");
+        ladder.gops()[0].clone()
+    }
+
+    #[test]
+    fn choices_are_the_hull_of_what_is_missing() {
+        let gop = gop([20.0, 30.0, 22.0, 36.0]);
+        let costs = |choices: Vec<Choice>| {
+            choices.iter().map(|choice| (choice.bytes, choice.quality)).collect::<Vec<_>>()
+        };
+        let none = Levels::none(2);
+        // 300 bytes for 22 dB lie below the line from 100 to 500.
+        assert_eq!(costs(choices(&gop, &none, &Limits::default())), [(100, 20.0), (500, 30.0), (1500, 36.0)]);
+        let mut intra = none.clone();
+        intra.raise(0, 2);
+        assert_eq!(costs(choices(&gop, &intra, &Limits::default())), [(0, 22.0), (400, 30.0), (1200, 36.0)]);
+        let limits = Limits { gaussians: 400, ..Limits::default() };
+        assert_eq!(costs(choices(&gop, &none, &limits)), [(100, 20.0), (500, 30.0)]);
+    }
+
+    #[test]
+    fn pieces_come_base_first_and_then_by_gain_per_byte() {
+        let ranges = |gop: &Gop| {
+            let mut all = Levels::none(2);
+            all.raise(0, 2);
+            all.raise(1, 2);
+            let ranges = order(gop, &Levels::none(2), &all);
+            ranges
+                .iter()
+                .map(|range| (range.representation, range.from, range.to, range.offset, range.bytes))
+                .collect::<Vec<_>>()
+        };
+        let moving = [(0, 0, 1, 0, 100), (1, 0, 1, 0, 400), (0, 1, 2, 100, 200), (1, 1, 2, 400, 800)];
+        assert_eq!(ranges(&gop([20.0, 30.0, 22.0, 36.0])), moving);
+        // Here a better I frame is worth more than motion.
+        let still = [(0, 0, 2, 0, 300), (1, 0, 2, 0, 1200)];
+        assert_eq!(ranges(&gop([20.0, 22.0, 30.0, 36.0])), still);
     }
 }

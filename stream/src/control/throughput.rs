@@ -107,3 +107,39 @@ const RECENT_SECONDS: f64 = 5.0;
 
 /// Largest error of a prediction that is believed to come again.
 pub const MOST_ERROR: f64 = 1.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A second at so many bits per second.
+    fn second(rate: u64) -> Transfer {
+        Transfer { sent_us: 0, first_us: 50_000, last_us: 1_050_000, bytes: rate / 8 }
+    }
+
+    #[test]
+    fn predictions_follow_the_harmonic_mean_and_the_largest_overestimate() {
+        let mut network = Network::default();
+        assert_eq!((network.mean(5.0), network.robust()), (None, None));
+        network.add(second(8_000_000));
+        assert_eq!(network.robust(), Some(8_000_000.0));
+        // 8 Mbit/s were predicted where 5 came: 60 % too much.
+        network.add(second(5_000_000));
+        assert_eq!(network.mean(5.0), Some(6_500_000.0));
+        assert_eq!(network.robust(), Some(6_500_000.0 / 1.6));
+        // Less than came is no danger.
+        network.add(second(20_000_000));
+        assert_eq!(network.robust(), Some(11_000_000.0 / 1.6));
+        assert_eq!(network.mean(1.0), Some(20_000_000.0));
+        assert!((network.latency() - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn old_transfers_are_forgotten() {
+        let mut network = Network::default();
+        for _ in 0..200 {
+            network.add(second(1_000_000));
+        }
+        assert_eq!((network.transfers.len(), network.mean(1e9)), (REMEMBERED, Some(1_000_000.0)));
+    }
+}

@@ -141,3 +141,40 @@ fn decimal(text: &str) -> Option<u64> {
     let digits: String = part.chars().chain("000000".chars()).take(6).collect();
     whole.parse::<u64>().ok()?.checked_mul(1_000_000)?.checked_add(digits.parse().ok()?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_carried_is_exact() {
+        let trace = Trace::parse("t_s,mbps\n0.000,1.5\n0.5,0\n2,4\n").expect("it is a trace");
+        assert_eq!(
+            trace,
+            Trace::new(&[(500_000, 1_500_000), (1_500_000, 0), (1_500_000, 4_000_000)])
+                .expect("it has steps")
+        );
+        assert_eq!((trace.period_us(), trace.mean()), (3_500_000, 1_928_571));
+        assert_eq!(trace.carried(500_000), 750_000 * 1_000_000);
+        assert_eq!(trace.carried(2_000_001), trace.carried(500_000) + 4_000_000);
+        assert_eq!(trace.carried(7_000_000), 2 * 6_750_000 * 1_000_000);
+        assert_eq!(trace.time_of(trace.carried(500_000)), Some(500_000));
+        assert_eq!(trace.time_of(trace.carried(500_000) + 1), Some(2_000_001));
+        assert_eq!(Trace::constant(0).time_of(1), None);
+    }
+
+    #[test]
+    fn broken_traces_are_refused() {
+        let bad = [
+            "t_s,mbps\n0,1\n0,2\n",
+            "t_s,mbps\n0,1\n1;2\n",
+            "t_s,mbps\n0,1\n1,-2\n",
+            "t_s,mbps\n0,1\n1,2e3\n",
+        ];
+        for csv in bad {
+            assert_eq!(Trace::parse(csv), Err(TraceError::Line(3)));
+        }
+        assert_eq!(Trace::parse("t_s,mbps\n"), Err(TraceError::Empty));
+        assert_eq!(Trace::new(&[(0, 1)]), Err(TraceError::Empty));
+    }
+}
