@@ -3,8 +3,8 @@
 
 use proptest::prelude::*;
 use splatstream_stream::control::{
-    Bola, BufferRule, Decision, Ladder, Layered, Levels, Limits, Live, Playback, Rule, Session, Settings,
-    Single, SingleRule, State, ThroughputRule,
+    Bola, BufferRule, Decision, Description, Ladder, Layered, Levels, Limits, Live, Playback, Rule, Session,
+    Settings, Single, SingleRule, State, ThroughputRule,
 };
 use splatstream_stream::simulation::{Link, Report, Trace, ladders, simulate};
 
@@ -124,8 +124,7 @@ fn steady(gops: usize) -> Ladder {
         let pieces = (0..first.representations().len()).map(|index| gop.pieces(index).to_vec()).collect();
         let quality = gop.points().iter().map(|point| (point.name, point.quality)).collect();
         let frames = vec![1, 0, 14, 15];
-        let description =
-            splatstream_stream::control::Description { duration_us: 1_000_000, frames, pieces, quality };
+        let description = Description { duration_us: 1_000_000, frames, pieces, quality };
         ladder.push(description).unwrap();
     }
     ladder
@@ -244,4 +243,34 @@ fn live_playback_comes_to_the_latency_that_is_aimed_at() {
     assert_eq!(fastest, 1050);
     let (latency_us, _) = live_latency(8_000_000, 120);
     assert!((7_700_000..8_200_000).contains(&latency_us), "{latency_us}");
+}
+
+#[test]
+fn a_growing_presentation_is_played_as_it_grows() {
+    let whole = ladders::small(6);
+    let mut session = Session::new(
+        Ladder::new(whole.representations().to_vec()).unwrap(),
+        Settings::default(),
+        Layered::default(),
+        0,
+    );
+    assert!(matches!(session.decide(0), Decision::Wait { .. }), "there is nothing to fetch");
+    for (index, gop) in whole.gops().iter().enumerate() {
+        let now_us = 1_000_000 * (index as u64 + 1);
+        let pieces = (0..whole.representations().len()).map(|index| gop.pieces(index).to_vec()).collect();
+        let frames = vec![1, 0, 14, 15];
+        let description = Description { duration_us: gop.duration_us(), frames, pieces, quality: vec![] };
+        session.push(now_us, description).unwrap();
+        let mut requests = 0;
+        while let Decision::Fetch(fetch) = session.decide(now_us) {
+            assert_eq!(fetch.gop(), index);
+            session.received(now_us, 0);
+            session.received(now_us + 20_000, fetch.bytes());
+            requests += 1;
+            assert!(requests < 20, "a GOP is fetched without end");
+        }
+        assert_eq!(session.state().shown().len(), index + 1);
+    }
+    session.decide(7_500_000);
+    assert_eq!(session.state().playback(), Playback::Ended);
 }

@@ -1,8 +1,8 @@
 //! What playback is worth under our rule and others, over a folder of network traces:
 //!
 //! ```text
-//! cargo run --release -p splatstream-stream --example qoe -- TRACES [--csv FILE] [--gops N] [--peer NAME=COMMAND]...
-//!     [--partial-peer NAME=COMMAND]...
+//! cargo run --release -p splatstream-stream --example qoe -- TRACES [--csv FILE] [--gops N] [--buffer SECONDS]
+//!     [--latency SECONDS] [--peer NAME=COMMAND]... [--partial-peer NAME=COMMAND]...
 //! ```
 //!
 //! `TRACES` has CSV files of lines `seconds,Mbit/s`, whose names say the class of the network: 3G..., 4G..., hd... for
@@ -53,6 +53,8 @@ struct Arguments {
     traces: PathBuf,
     csv: Option<PathBuf>,
     gops: usize,
+    buffer_us: u64,
+    latency_us: u64,
     peers: Vec<Candidate>,
 }
 
@@ -67,7 +69,7 @@ fn main() -> Result<()> {
         for (ladder, presentation) in presentations(class, arguments.gops) {
             for (rule, made) in rules(&arguments.peers)? {
                 let start = Instant::now();
-                let report = play(&presentation, made, &trace);
+                let report = play(&presentation, made, &trace, &arguments);
                 let cost = costs.entry(rule.clone()).or_default();
                 cost.0 += start.elapsed().as_secs_f64();
                 cost.1 += report.decisions;
@@ -96,9 +98,10 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn play(presentation: &Ladder, rule: Box<dyn Rule>, trace: &Trace) -> Report {
-    let link = Link { limit_us: 4_000_000_000, ..Link::new(trace.clone()) };
-    simulate(presentation, &Settings::default(), rule, &link)
+fn play(presentation: &Ladder, rule: Box<dyn Rule>, trace: &Trace, arguments: &Arguments) -> Report {
+    let link = Link { limit_us: 4_000_000_000, latency_us: arguments.latency_us, ..Link::new(trace.clone()) };
+    let settings = Settings { buffer_us: arguments.buffer_us, ..Settings::default() };
+    simulate(presentation, &settings, rule, &link)
 }
 
 /// Our rule, the baselines and the peers.
@@ -153,14 +156,21 @@ fn classes(folder: &Path) -> Result<Vec<(&'static str, bool, PathBuf)>> {
     if found.is_empty() { Err("there are no traces (*.csv) in this folder".into()) } else { Ok(found) }
 }
 
+fn microseconds(seconds: &str) -> Result<u64> {
+    Ok((seconds.parse::<f64>()? * 1e6) as u64)
+}
+
 fn parse() -> Result<Arguments> {
-    let mut arguments = Arguments { gops: 240, ..Arguments::default() };
+    let mut arguments =
+        Arguments { gops: 240, buffer_us: 25_000_000, latency_us: 50_000, ..Arguments::default() };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} needs a value"));
         match word.as_str() {
             "--csv" => arguments.csv = Some(value()?.into()),
             "--gops" => arguments.gops = value()?.parse()?,
+            "--buffer" => arguments.buffer_us = microseconds(&value()?)?,
+            "--latency" => arguments.latency_us = microseconds(&value()?)?,
             "--peer" | "--partial-peer" => {
                 let peer = value()?;
                 let (name, command) = peer.split_once('=').ok_or("a peer is NAME=COMMAND")?;

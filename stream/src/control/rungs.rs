@@ -71,10 +71,10 @@ impl SingleRule for BufferRule {
     }
 }
 
-/// BOLA-E: the utility of a bitrate is its logarithm; the rung with the largest (V · (utility + gamma) - buffer) / bitrate is
-/// picked (Spiteri, Urgaonkar, Sitaraman, "BOLA: Near-Optimal Bitrate Adaptation for Online Videos", INFOCOM 2016). A virtual
-/// buffer stands in for what was not filled at the start, a rise above the throughput is not followed, and a nearly
-/// empty buffer limits what is fetched (the same and Sparacio, MMSys 2018).
+/// BOLA-E with the cap of BOLA-O, as dash.js has it: the utility of a bitrate is its logarithm; the rung with the largest
+/// (V · (utility + gamma) - buffer) / bitrate is picked (Spiteri, Urgaonkar, Sitaraman, "BOLA: Near-Optimal Bitrate Adaptation
+/// for Online Videos", INFOCOM 2016). Time that was not spent on fetching counts as buffered, a rise above the throughput is
+/// not followed, and a nearly empty buffer limits what is fetched (the same and Sparacio, MMSys 2018).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bola {
     placeholder: f64,
@@ -116,6 +116,17 @@ impl Bola {
         (0..rung).map(against).fold(0.0, f64::max)
     }
 
+    /// Counts time in which nothing was fetched as if it had been buffered, within what the last rung implies.
+    fn account(&mut self, situation: &Situation<'_>, last: usize) {
+        let Some(transfer) = situation.network.last() else { return };
+        let idle = seconds(situation.now_us.saturating_sub(transfer.last_us));
+        let then = situation.buffer + seconds(situation.now_us.saturating_sub(transfer.sent_us));
+        let (v, gamma) = Self::parameters(situation);
+        let most = (v * (utility(situation, last) + gamma) - then).max(0.0);
+        self.placeholder =
+            (self.placeholder.min(most) + idle).max(Self::least_buffer(situation, last) - then);
+    }
+
     /// Limits a rung to what arrives within half of the buffer.
     fn within_buffer(situation: &Situation<'_>, rung: usize, throughput: f64) -> usize {
         let safe = 0.5 * (situation.buffer - situation.network.latency()).max(0.0) * throughput / 8.0;
@@ -139,8 +150,9 @@ impl SingleRule for Bola {
             self.started = true;
             self.placeholder = (Self::least_buffer(situation, sustained) - situation.buffer).max(0.0);
         }
-        let mut rung = Self::preferred(situation, situation.buffer + self.placeholder);
         let last = situation.last.unwrap_or(0);
+        self.account(situation, last);
+        let mut rung = Self::preferred(situation, situation.buffer + self.placeholder);
         if rung > last && rung > sustained {
             rung = last.max(sustained);
         }

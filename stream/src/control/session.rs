@@ -59,7 +59,9 @@ impl<R: Rule> Session<R> {
                 self.end_request(true);
                 self.resume();
             }
-            Decision::Fetch(_) | Decision::Abandon => return Decision::Wait { until_us: state.now_us },
+            Decision::Fetch(_) | Decision::Abandon => {
+                return Decision::Wait { until_us: state.now_us.saturating_add(1000) };
+            }
             Decision::Rate { milli } => state.rate_milli = (*milli).max(1),
             Decision::Wait { .. } => {}
         }

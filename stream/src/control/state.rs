@@ -261,12 +261,11 @@ impl State {
 
     /// Time from capture to display of what is playing, in a live presentation.
     pub fn latency_us(&self) -> Option<u64> {
-        let live = self.settings.live?;
-        let first = self.ladder.gops().first().map_or(0, Gop::duration_us);
-        let start = self.available_us(self.current);
-        let duration = self.ladder.gops().get(self.current).map_or(first, Gop::duration_us);
-        let captured =
-            start.max(live.available_us).saturating_sub(duration).saturating_add(self.offset_ns / 1000);
+        self.settings.live?;
+        let duration_us = self.ladder.gops().get(self.current).or(self.ladder.gops().last())?.duration_us();
+        // A GOP can be requested when it has been captured to its end.
+        let began_us = self.available_us(self.current).saturating_sub(duration_us);
+        let captured = began_us.saturating_add(self.offset_ns / 1000);
         Some(self.now_us.saturating_sub(captured))
     }
 
