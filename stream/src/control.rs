@@ -36,7 +36,7 @@ pub use ladder::{
     Description, Gop, Ladder, LadderError, Layer, Levels, OperatingPoint, Piece, Point, Representation,
 };
 pub use layered::{Layered, Weights};
-pub use options::{Choice, Limits, Range, choices, order};
+pub use options::{Choice, Limits, Range, choices, order, whole_ranges};
 pub use rule::{Decision, Fetch, Rule};
 pub use rungs::{Bola, BufferRule, ThroughputRule};
 pub use session::Session;

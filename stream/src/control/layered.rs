@@ -136,7 +136,7 @@ impl Layered {
             }
         }
         let (_, gop, levels) = found?;
-        Fetch::towards(state, gop, &levels)
+        request(state, outlook, gop, &levels)
     }
 
     /// The next request, or when to look for one again.
@@ -154,7 +154,7 @@ impl Layered {
         } else {
             None
         };
-        let fetch = upgrade.or_else(|| Fetch::towards(state, next, &wanted?.levels));
+        let fetch = upgrade.or_else(|| request(state, &outlook, next, &wanted?.levels));
         let later = Decision::Wait { until_us: state.now_us().saturating_add(TICK_US) };
         fetch.map_or(later, Decision::Fetch)
     }
@@ -185,6 +185,20 @@ const MARGIN: f64 = 1.5;
 
 /// Error of predictions from which a network is not steady at all.
 const STEADY_ERROR: f64 = 0.05;
+
+/// A request counts as at leisure if it is predicted to take at most this share of the time to the start of its GOP.
+const LEISURE: f64 = 0.25;
+
+/// Requests what is missing, in few ranges if there is time.
+fn request(state: &State, outlook: &Outlook, gop: usize, wanted: &Levels) -> Option<Fetch> {
+    let fetch = Fetch::towards(state, gop, wanted)?;
+    let until = seconds(state.media_until(gop));
+    if outlook.time(fetch.bytes()) > LEISURE * until {
+        Some(fetch)
+    } else {
+        Fetch::at_leisure(state, gop, wanted)
+    }
+}
 
 /// A rule that waits looks again after this time.
 const TICK_US: u64 = 100_000;

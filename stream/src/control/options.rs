@@ -108,6 +108,19 @@ pub fn order(gop: &Gop, arrived: &Levels, wanted: &Levels) -> Vec<Range> {
     ranges
 }
 
+/// The same pieces with one range for each Representation, in the order of Representations: fewer requests, where there is
+/// time for all of them.
+pub fn whole_ranges(gop: &Gop, arrived: &Levels, wanted: &Levels) -> Vec<Range> {
+    let mut ranges = Vec::new();
+    for representation in 0..gop.representations() {
+        let mut levels = arrived.clone();
+        let mut own = arrived.clone();
+        own.raise(representation, wanted.of(representation));
+        append(gop, &mut levels, &own, &mut ranges);
+    }
+    ranges
+}
+
 /// The pieces of the point that gains most per byte among those within what is wanted.
 fn best_step(gop: &Gop, levels: &Levels, wanted: &Levels) -> Option<Levels> {
     let Some(current) = gop.playable(levels) else {
@@ -205,5 +218,18 @@ mod tests {
         // Here a better I frame is worth more than motion.
         let still = [(0, 0, 2, 0, 300), (1, 0, 2, 0, 1200)];
         assert_eq!(ranges(&gop([20.0, 22.0, 30.0, 36.0])), still);
+    }
+
+    #[test]
+    fn whole_ranges_are_one_for_each_representation() {
+        let gop = gop([20.0, 30.0, 22.0, 36.0]);
+        let (mut arrived, mut wanted) = (Levels::none(2), Levels::none(2));
+        arrived.raise(0, 1);
+        wanted.raise(0, 2);
+        wanted.raise(1, 2);
+        let ranges = whole_ranges(&gop, &arrived, &wanted);
+        let ranges: Vec<_> =
+            ranges.iter().map(|range| (range.representation, range.offset, range.bytes)).collect();
+        assert_eq!(ranges, [(0, 100, 200), (1, 0, 1200)]);
     }
 }

@@ -1,7 +1,7 @@
 //! What a rule sees and answers.
 
 use super::ladder::Levels;
-use super::options::{Range, order};
+use super::options::{Range, order, whole_ranges};
 use super::state::State;
 
 /// What the caller of a session is asked to do.
@@ -31,9 +31,16 @@ pub struct Fetch {
 }
 
 impl Fetch {
-    /// What is missing of a set of pieces; none if all are there or the GOP is not.
+    /// What is missing of a set of pieces, so ordered that any part of it is worth as much as it can be; none if all are
+    /// there or the GOP is not.
     pub fn towards(state: &State, gop: usize, wanted: &Levels) -> Option<Self> {
         let ranges = order(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted);
+        (!ranges.is_empty()).then_some(Self { gop, ranges })
+    }
+
+    /// The same with one range for each Representation, for when there is time for all of it.
+    pub fn at_leisure(state: &State, gop: usize, wanted: &Levels) -> Option<Self> {
+        let ranges = whole_ranges(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted);
         (!ranges.is_empty()).then_some(Self { gop, ranges })
     }
 

@@ -173,7 +173,8 @@ impl<R: SingleRule> Single<R> {
         let known = state.ladder().gops().get(gop).filter(|_| gop >= state.first_open());
         let name = self.rungs.get(rung).or(self.rungs.last()).map(|rung| rung.point);
         let point = known.and_then(|known| known.points().iter().find(|point| Some(point.name) == name));
-        let fetch = point.and_then(|point| Fetch::towards(state, gop, &point.levels));
+        let all = if self.whole { Fetch::at_leisure } else { Fetch::towards };
+        let fetch = point.and_then(|point| all(state, gop, &point.levels));
         fetch.map_or(later, Decision::Fetch)
     }
 }
