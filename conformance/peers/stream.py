@@ -22,11 +22,14 @@ def main():
     parser.add_argument("--gops", type=int, default=240, metavar="N", help="seconds that are played of each presentation")
     parser.add_argument("--buffer", type=float, default=25, metavar="SECONDS", help="that are buffered at most")
     parser.add_argument("--latency", type=float, default=0.05, metavar="SECONDS", help="from a request to its first byte")
+    parser.add_argument("--live", type=float, metavar="SECONDS", help="live, with this time from capture to display")
     parser.add_argument("--csv", metavar="FILE", help="a line for each playback")
     arguments = parser.parse_args()
     command = ["cargo", "run", "--quiet", "--release", "-p", "splatstream-stream", "--example", "qoe", "--",
                os.path.abspath(arguments.traces), "--gops", str(arguments.gops), "--buffer", str(arguments.buffer),
                "--latency", str(arguments.latency)]
+    if arguments.live:
+        command += ["--live", str(arguments.live)]
     if arguments.csv:
         command += ["--csv", os.path.abspath(arguments.csv)]
     return subprocess.call(command + peers(arguments), cwd=HERE)

@@ -38,6 +38,8 @@ pub struct Score {
     pub switches: u64,
     /// Sum of the changes of quality from GOP to GOP per minute, in dB.
     pub change_per_minute: f64,
+    /// Mean time from capture to display of the GOPs of a live presentation when they begin; 0 for a stored one.
+    pub latency_seconds: f64,
     /// Megabytes that were received.
     pub megabytes: f64,
     /// Share of the bytes received that were not played.
@@ -91,6 +93,13 @@ impl Score {
             stalls: size(report.shown.iter().skip(1).filter(|shown| shown.waited_us > 0).count()),
             switches: size(pairs().filter(|(a, b)| a.point != b.point).count()),
             change_per_minute: changes * 60.0 / seconds(ladder.duration_us()).max(1e-6),
+            latency_seconds: report
+                .shown
+                .iter()
+                .filter_map(|shown| shown.latency_us)
+                .map(seconds)
+                .sum::<f64>()
+                / real(size(report.shown.len()).max(1)),
             megabytes: real(report.bytes) / 1e6,
             unplayed: 1.0 - real(useful.min(report.bytes)) / real(report.bytes.max(1)),
             ..Self::default()

@@ -9,7 +9,7 @@ use crate::Row;
 /// A column: its title, and its value in a score.
 type Column = (&'static str, fn(&Score) -> f64);
 
-const COLUMNS: [Column; 12] = [
+const COLUMNS: [Column; 13] = [
     ("experience", |score| score.experience),
     ("quality_db", |score| score.quality),
     ("startup_s", |score| score.startup_seconds),
@@ -17,6 +17,7 @@ const COLUMNS: [Column; 12] = [
     ("stalls", |score| score.stalls as f64),
     ("switches", |score| score.switches as f64),
     ("change_db_min", |score| score.change_per_minute),
+    ("latency_s", |score| score.latency_seconds),
     ("megabytes", |score| score.megabytes),
     ("unplayed", |score| score.unplayed),
     ("sabre_utility", |score| score.sabre_utility),

@@ -73,7 +73,9 @@ impl Layered {
         let sustainable = state.network().mean(weights.memory).unwrap_or(weights.first_guess);
         let range = (most - least).max(1.0);
         let price = price(state, sustainable).unwrap_or(range / 100.0) * self.eagerness(state);
-        let full = seconds(state.settings().buffer_us);
+        // Live, no more can be buffered than has been captured.
+        let captured_us = state.settings().live.map_or(u64::MAX, |live| live.target_us);
+        let full = seconds(state.settings().buffer_us.min(captured_us));
         Outlook {
             throughput: state.network().robust().unwrap_or(weights.first_guess),
             latency: state.network().latency(),
