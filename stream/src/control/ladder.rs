@@ -13,7 +13,8 @@ pub enum Layer {
     Temporal(u8),
 }
 
-/// One file of a presentation: a layer of all GOPs, whose refinements are prefixes of one byte range per GOP.
+/// One file of a presentation: a layer of all GOPs, whose refinements are prefixes of one byte range per GOP. Where P and B
+/// frames need complete I frames (`whole_anchor`), the Representations of I frames have one refinement.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Representation {
     /// What it carries.
