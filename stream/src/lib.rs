@@ -17,6 +17,11 @@ pub mod manifest;
 pub mod mpd;
 pub mod package;
 mod representation;
+#[cfg(feature = "server")]
+pub mod server;
+#[cfg(feature = "server")]
+#[path = "simulation/trace.rs"]
+mod trace;
 pub mod unpackage;
 
 pub use representation::Representation;
