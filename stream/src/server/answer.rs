@@ -65,22 +65,9 @@ fn serve(transfer: Transfer, request: &Request, mut found: Found) -> Response {
             return refuse(transfer, StatusCode::RANGE_NOT_SATISFIABLE, &[(CONTENT_RANGE, &range)]);
         }
     };
-    let modified = httpdate::fmt_http_date(version.modified);
-    let mut headers = vec![
-        (ACCEPT_RANGES, "bytes"),
-        (CACHE_CONTROL, found.cache_control),
-        (ETAG, &version.etag),
-        (LAST_MODIFIED, &modified),
-    ];
-    headers.extend(range.as_deref().map(|range| (CONTENT_RANGE, range)));
-    let length_text = length.to_string();
-    if status != StatusCode::NOT_MODIFIED {
-        headers.extend([
-            (CONTENT_TYPE, found.content_type),
-            (X_CONTENT_TYPE_OPTIONS, "nosniff"),
-            (CONTENT_LENGTH, length_text.as_str()),
-        ]);
-    }
+    let mut headers = described(&found, &version, status, length);
+    headers.extend(range.map(|range| (CONTENT_RANGE, range)));
+    let headers: Vec<_> = headers.iter().map(|(name, value)| (name.clone(), value.as_str())).collect();
     if request.method() == Method::HEAD || length == 0 {
         return respond(transfer, status, &headers, Content::Empty);
     }
@@ -88,6 +75,24 @@ fn serve(transfer: Transfer, request: &Request, mut found: Found) -> Response {
         Ok(_) => respond(transfer, status, &headers, Content::Part(found, length)),
         Err(_) => refuse(transfer, StatusCode::INTERNAL_SERVER_ERROR, &[]),
     }
+}
+
+/// What headers say of a file, and of the body, which has so many bytes.
+fn described(found: &Found, version: &Version, status: StatusCode, length: u64) -> Vec<(HeaderName, String)> {
+    let mut headers = vec![
+        (ACCEPT_RANGES, "bytes".to_owned()),
+        (CACHE_CONTROL, found.cache_control.to_owned()),
+        (ETAG, version.etag.clone()),
+        (LAST_MODIFIED, httpdate::fmt_http_date(version.modified)),
+    ];
+    if status != StatusCode::NOT_MODIFIED {
+        headers.extend([
+            (CONTENT_TYPE, found.content_type.to_owned()),
+            (X_CONTENT_TYPE_OPTIONS, "nosniff".to_owned()),
+            (CONTENT_LENGTH, length.to_string()),
+        ]);
+    }
+    headers
 }
 
 enum Content {
