@@ -24,6 +24,7 @@ mod package;
 mod progress;
 mod render;
 mod seek;
+mod serve;
 mod setting_names;
 mod stream_file;
 mod structure;
@@ -75,6 +76,7 @@ enum Command {
     Chart(chart::Chart),
     Package(package::PackageStream),
     Unpackage(unpackage::Unpackage),
+    Serve(serve::Serve),
     Train(train::Train),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
@@ -149,6 +151,7 @@ impl Command {
             Self::Chart(command) => command.run(console),
             Self::Package(command) => command.run(console),
             Self::Unpackage(command) => command.run(console),
+            Self::Serve(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),
