@@ -11,13 +11,16 @@
 )]
 
 mod boxes;
+pub mod control;
 pub mod division;
 pub mod live;
 pub mod manifest;
 pub mod mpd;
 pub mod package;
+pub mod qoe;
 mod representation;
 pub mod segments;
+pub mod simulation;
 pub mod unpackage;
 
 pub use representation::Representation;

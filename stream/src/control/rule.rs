@@ -1,0 +1,83 @@
+//! What a rule sees and answers.
+
+use super::ladder::Levels;
+use super::options::{Range, order, whole_ranges};
+use super::state::State;
+
+/// What the caller of a session is asked to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// Send one request, for byte ranges of one GOP that are to arrive in this order.
+    Fetch(Fetch),
+    /// Ask again at this time, or when bytes arrive, whatever comes first.
+    Wait {
+        /// Microseconds of the caller's clock.
+        until_us: u64,
+    },
+    /// Give the running request up. What has arrived of it stays.
+    Abandon,
+    /// Play at another rate.
+    Rate {
+        /// Thousandths of the normal rate.
+        milli: u32,
+    },
+}
+
+/// Byte ranges of one GOP, in the order they are wanted: each piece after those it needs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fetch {
+    gop: usize,
+    ranges: Vec<Range>,
+}
+
+impl Fetch {
+    /// What is missing of a set of pieces, so ordered that any part of it is worth as much as it can be; none if all are
+    /// there or the GOP is not.
+    pub fn towards(state: &State, gop: usize, wanted: &Levels) -> Option<Self> {
+        let ranges = order(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted);
+        (!ranges.is_empty()).then_some(Self { gop, ranges })
+    }
+
+    /// The same with one range for each Representation, for when there is time for all of it.
+    pub fn at_leisure(state: &State, gop: usize, wanted: &Levels) -> Option<Self> {
+        let ranges = whole_ranges(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted);
+        (!ranges.is_empty()).then_some(Self { gop, ranges })
+    }
+
+    /// Index of the GOP.
+    pub fn gop(&self) -> usize {
+        self.gop
+    }
+
+    /// What is requested, in order.
+    pub fn ranges(&self) -> &[Range] {
+        &self.ranges
+    }
+
+    /// Bytes of all ranges.
+    pub fn bytes(&self) -> u64 {
+        self.ranges.iter().map(|range| range.bytes).fold(0, u64::saturating_add)
+    }
+}
+
+/// Decides what a player does next.
+pub trait Rule {
+    /// What to do in a state. [`Decision::Fetch`] is ignored while a request is running, [`Decision::Abandon`] otherwise.
+    fn decide(&mut self, state: &State) -> Decision;
+
+    /// Whether a GOP is played only when all that was chosen for it has arrived, as players without layers do. Otherwise
+    /// what is there when its time comes is played.
+    fn whole_gops(&self) -> bool {
+        false
+    }
+}
+
+impl<R: Rule + ?Sized> Rule for Box<R> {
+    fn decide(&mut self, state: &State) -> Decision {
+        (**self).decide(state)
+    }
+
+    fn whole_gops(&self) -> bool {
+        (**self).whole_gops()
+    }
+}

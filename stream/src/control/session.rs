@@ -1,0 +1,191 @@
+//! The state machine of playback: events in, decisions out.
+
+use super::ladder::{Description, Gop, Ladder, LadderError, Levels};
+use super::rule::{Decision, Fetch, Rule};
+use super::state::{Playback, Request, Settings, Shown, State};
+use super::throughput::Transfer;
+
+/// One playback of a presentation under a rule. The caller has the clock, the network and the screen: it says what time it
+/// is and what has arrived, sends the requests that it is given, and shows what [`State::shown`] says.
+///
+/// Times are microseconds on the caller's clock and never go back.
+#[derive(Debug)]
+pub struct Session<R> {
+    state: State,
+    rule: R,
+}
+
+impl<R: Rule> Session<R> {
+    /// A session that begins now, with nothing fetched.
+    pub fn new(ladder: Ladder, settings: Settings, rule: R, now_us: u64) -> Self {
+        let whole = rule.whole_gops();
+        Self { state: State::new(ladder, settings, now_us, whole), rule }
+    }
+
+    /// What it knows.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Adds a GOP at the end of a growing presentation. Playback that had ended waits for it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Ladder::push`].
+    pub fn push(&mut self, now_us: u64, gop: Description) -> Result<(), LadderError> {
+        self.advance(now_us);
+        self.state.ladder.push(gop)?;
+        self.state.grow();
+        if self.state.playback == Playback::Ended {
+            self.state.playback = Playback::Stalled;
+            self.state.waiting_since_us = self.state.now_us;
+        }
+        Ok(())
+    }
+
+    /// What to do now. Ask again after doing it, until the answer is [`Decision::Wait`]; then when its time has come, when
+    /// bytes have arrived, and when a GOP has ended ([`State::gop_end_us`]). A request counts as sent when it is returned.
+    pub fn decide(&mut self, now_us: u64) -> Decision {
+        self.advance(now_us);
+        let state = &mut self.state;
+        let decision = self.rule.decide(state);
+        match &decision {
+            Decision::Fetch(fetch) if state.request.is_none() => {
+                let now_us = state.now_us;
+                let progress = Transfer { sent_us: now_us, first_us: now_us, last_us: now_us, bytes: 0 };
+                state.request = Some(Request { fetch: fetch.clone(), begun: false, progress });
+            }
+            Decision::Abandon if state.request.is_some() => {
+                self.end_request(true);
+                self.resume();
+            }
+            Decision::Fetch(_) | Decision::Abandon => {
+                return Decision::Wait { until_us: state.now_us.saturating_add(1000) };
+            }
+            Decision::Rate { milli } => state.rate_milli = (*milli).max(1),
+            Decision::Wait { .. } => {}
+        }
+        decision
+    }
+
+    /// Says how many bytes of the running request have arrived so far. The first call says that the response has begun, as
+    /// soon as that is known, also with 0 bytes: throughput counts from then on. A request ends with its last byte.
+    pub fn received(&mut self, now_us: u64, bytes: u64) {
+        self.advance(now_us);
+        let state = &mut self.state;
+        let Some(request) = &mut state.request else { return };
+        if !request.begun {
+            request.begun = true;
+            request.progress.first_us = state.now_us;
+        }
+        request.progress.last_us = state.now_us;
+        request.progress.bytes = bytes.max(request.progress.bytes);
+        let (gop, bytes) = (request.fetch.gop(), request.progress.bytes);
+        if let (Some(arrived), Some(known)) = (state.arrived.get_mut(gop), state.ladder.gops().get(gop)) {
+            arrive(arrived, known, &request.fetch, bytes);
+        }
+        if request.progress.bytes >= request.fetch.bytes() {
+            self.end_request(true);
+        }
+        self.resume();
+    }
+
+    /// Says that the running request has failed. What has arrived of it stays, unless the rule plays whole GOPs only.
+    pub fn failed(&mut self, now_us: u64) {
+        self.advance(now_us);
+        self.end_request(false);
+    }
+
+    fn end_request(&mut self, wanted: bool) {
+        let state = &mut self.state;
+        let Some(request) = state.request.take() else { return };
+        state.network.add(request.progress);
+        let gop = request.fetch.gop();
+        if let Some(fetched) = state.fetched.get_mut(gop) {
+            *fetched = fetched.saturating_add(request.progress.bytes);
+        }
+        if let Some(settled) = state.settled.get_mut(gop) {
+            *settled |= wanted;
+            if let Some(arrived) = state.arrived.get_mut(gop).filter(|_| state.only_whole && !*settled) {
+                *arrived = Levels::none(state.ladder.representations().len());
+            }
+        }
+    }
+
+    /// Moves the playhead to the present.
+    fn advance(&mut self, now_us: u64) {
+        while let Some(end_us) = self.state.gop_end_us().filter(|&end_us| end_us <= now_us) {
+            self.state.now_us = end_us.max(self.state.now_us);
+            self.state.current = self.state.current.saturating_add(1);
+            self.state.offset_ns = 0;
+            self.begin();
+        }
+        let state = &mut self.state;
+        if state.playback == Playback::Playing {
+            let passed = now_us.saturating_sub(state.now_us);
+            state.offset_ns =
+                state.offset_ns.saturating_add(passed.saturating_mul(u64::from(state.rate_milli)));
+        }
+        state.now_us = now_us.max(state.now_us);
+    }
+
+    /// Begins the current GOP right after the one before, or stalls.
+    fn begin(&mut self) {
+        let state = &mut self.state;
+        state.waiting_since_us = state.now_us;
+        if state.current >= state.ladder.gops().len() {
+            state.playback = Playback::Ended;
+        } else if state.is_ready(state.current) {
+            self.show();
+        } else {
+            state.playback = Playback::Stalled;
+        }
+    }
+
+    /// Begins the current GOP after a start-up or a stall, as soon as enough is buffered.
+    fn resume(&mut self) {
+        let state = &self.state;
+        let still = matches!(state.playback, Playback::Starting | Playback::Stalled);
+        let missing = state.first_missing();
+        let enough = state.buffer_us() >= state.settings.start_us || missing >= state.ladder.gops().len();
+        if still && missing > state.current && enough {
+            self.show();
+        }
+    }
+
+    fn show(&mut self) {
+        let state = &mut self.state;
+        let gop = state.current;
+        let running = state.request.as_ref().filter(|request| request.fetch.gop() == gop);
+        let running = running.map_or(0, |request| request.progress.bytes);
+        let latency_us = state.latency_us();
+        let known = state.ladder.gops().get(gop).zip(state.arrived.get(gop));
+        let Some(point) = known.and_then(|(known, arrived)| known.playable(arrived)) else { return };
+        state.playback = Playback::Playing;
+        state.shown.push(Shown {
+            gop,
+            point: point.name,
+            quality: point.quality,
+            bytes: point.bytes,
+            fetched: state.fetched.get(gop).map_or(0, |fetched| fetched.saturating_add(running)),
+            gaussians: point.gaussians,
+            began_us: state.now_us,
+            waited_us: state.now_us.saturating_sub(state.waiting_since_us),
+            latency_us,
+            rate_milli: state.rate_milli,
+        });
+    }
+}
+
+/// Adds the pieces of a request that are within its first bytes.
+fn arrive(arrived: &mut Levels, gop: &Gop, fetch: &Fetch, bytes: u64) {
+    let mut left = bytes;
+    for range in fetch.ranges() {
+        let pieces = gop.pieces(range.representation).iter().zip(1_u8..);
+        for (piece, count) in pieces.filter(|(_, count)| *count > range.from && *count <= range.to) {
+            let Some(rest) = left.checked_sub(piece.bytes) else { return };
+            left = rest;
+            arrived.raise(range.representation, count);
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! What a session knows at one time: what has arrived, what is playing, what is being fetched.
+
+use super::ladder::{Gop, Ladder, Levels, OperatingPoint};
+use super::options::Limits;
+use super::rule::Fetch;
+use super::throughput::{Network, Transfer};
+
+/// How a session plays. The default is a stored presentation on a device without limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Playable time that is buffered at most, in microseconds.
+    pub buffer_us: u64,
+    /// Playable time that is needed before playback starts or goes on after a stall; less if the presentation ends.
+    pub start_us: u64,
+    /// What the device can take.
+    pub limits: Limits,
+    /// Set for a live presentation.
+    pub live: Option<Live>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { buffer_us: 25_000_000, start_us: 0, limits: Limits::default(), live: None }
+    }
+}
+
+/// How a live presentation is played.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Live {
+    /// When GOP 0 can be requested, on the caller's clock; each further one can be after its own duration.
+    pub available_us: u64,
+    /// Time from capture to display that is aimed at; not less than a GOP.
+    pub target_us: u64,
+    /// Least rate of playback, in thousandths.
+    pub slowest_milli: u32,
+    /// Largest rate of playback, in thousandths.
+    pub fastest_milli: u32,
+}
+
+/// What playback is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Playback {
+    /// It has not started.
+    Starting,
+    /// It moves.
+    Playing,
+    /// It waits for pieces.
+    Stalled,
+    /// All GOPs were played.
+    Ended,
+}
+
+/// The running request.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// What was asked for.
+    pub fetch: Fetch,
+    /// Whether the response has begun.
+    pub begun: bool,
+    /// When it was sent, when bytes first and last arrived, and how many.
+    pub progress: Transfer,
+}
+
+/// A GOP that was played.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// Its index.
+    pub gop: usize,
+    /// What was played of it.
+    pub point: OperatingPoint,
+    /// Quality of that in dB.
+    pub quality: f64,
+    /// Bytes of that.
+    pub bytes: u64,
+    /// All bytes that were fetched for this GOP before it was played.
+    pub fetched: u64,
+    /// Gaussians of a frame of that, at most.
+    pub gaussians: u64,
+    /// When it began, on the caller's clock.
+    pub began_us: u64,
+    /// How long playback stood still before it; for GOP 0 the start-up.
+    pub waited_us: u64,
+    /// Time from capture to display in a live presentation.
+    pub latency_us: Option<u64>,
+    /// Rate of playback when it began, in thousandths.
+    pub rate_milli: u32,
+}
+
+/// What a session knows at one time. Times are microseconds of the caller's clock.
+#[derive(Clone, Debug)]
+pub struct State {
+    pub(super) ladder: Ladder,
+    pub(super) settings: Settings,
+    pub(super) now_us: u64,
+    pub(super) playback: Playback,
+    /// The GOP that is played, or that playback waits for.
+    pub(super) current: usize,
+    /// How far into it playback is, in nanoseconds.
+    pub(super) offset_ns: u64,
+    pub(super) rate_milli: u32,
+    pub(super) waiting_since_us: u64,
+    pub(super) arrived: Vec<Levels>,
+    pub(super) fetched: Vec<u64>,
+    /// GOPs for which a request has ended as the rule wanted.
+    pub(super) settled: Vec<bool>,
+    pub(super) only_whole: bool,
+    pub(super) request: Option<Request>,
+    pub(super) network: Network,
+    pub(super) shown: Vec<Shown>,
+}
+
+impl State {
+    pub(super) fn new(ladder: Ladder, settings: Settings, now_us: u64, only_whole: bool) -> Self {
+        let mut state = Self {
+            ladder,
+            settings,
+            now_us,
+            playback: Playback::Starting,
+            current: 0,
+            offset_ns: 0,
+            rate_milli: 1000,
+            waiting_since_us: now_us,
+            arrived: Vec::new(),
+            fetched: Vec::new(),
+            settled: Vec::new(),
+            only_whole,
+            request: None,
+            network: Network::default(),
+            shown: Vec::new(),
+        };
+        state.grow();
+        state
+    }
+
+    /// Makes room for all GOPs of the ladder.
+    pub(super) fn grow(&mut self) {
+        let gops = self.ladder.gops().len();
+        self.arrived.resize(gops, Levels::none(self.ladder.representations().len()));
+        self.fetched.resize(gops, 0);
+        self.settled.resize(gops, false);
+    }
+
+    /// The presentation.
+    pub fn ladder(&self) -> &Ladder {
+        &self.ladder
+    }
+
+    /// How it is played.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The time of the last event.
+    pub fn now_us(&self) -> u64 {
+        self.now_us
+    }
+
+    /// What playback is doing.
+    pub fn playback(&self) -> Playback {
+        self.playback
+    }
+
+    /// How long playback has been standing still, in microseconds; 0 while it moves and at its end.
+    pub fn waiting_us(&self) -> u64 {
+        match self.playback {
+            Playback::Starting | Playback::Stalled => self.now_us.saturating_sub(self.waiting_since_us),
+            Playback::Playing | Playback::Ended => 0,
+        }
+    }
+
+    /// Rate of playback, in thousandths.
+    pub fn rate_milli(&self) -> u32 {
+        self.rate_milli
+    }
+
+    /// The running request.
+    pub fn request(&self) -> Option<&Request> {
+        self.request.as_ref()
+    }
+
+    /// The requests so far.
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// The GOPs that were played or have begun.
+    pub fn shown(&self) -> &[Shown] {
+        &self.shown
+    }
+
+    /// The pieces of a GOP that have arrived, also those of a running request.
+    pub fn arrived(&self, gop: usize) -> Option<&Levels> {
+        self.arrived.get(gop)
+    }
+
+    /// The first GOP that has not begun: pieces of earlier ones are of no use any more.
+    pub fn first_open(&self) -> usize {
+        match self.playback {
+            Playback::Playing => self.current.saturating_add(1),
+            Playback::Ended => self.ladder.gops().len(),
+            Playback::Starting | Playback::Stalled => self.current,
+        }
+    }
+
+    /// The first open GOP that cannot be played yet; the number of GOPs if all can.
+    pub fn first_missing(&self) -> usize {
+        let open = self.first_open();
+        let gops = self.ladder.gops().len();
+        (open..gops).find(|&gop| !self.is_ready(gop)).unwrap_or(gops)
+    }
+
+    /// Whether a GOP can be played.
+    pub fn is_ready(&self, gop: usize) -> bool {
+        let running = self.request.as_ref().is_some_and(|request| request.fetch.gop() == gop);
+        let whole = !self.only_whole || (!running && self.settled.get(gop) == Some(&true));
+        let Some((gop, arrived)) = self.ladder.gops().get(gop).zip(self.arrived.get(gop)) else {
+            return false;
+        };
+        whole && gop.playable(arrived).is_some()
+    }
+
+    /// Quality of a GOP as it would be played now; none if it cannot be.
+    pub fn quality(&self, gop: usize) -> Option<f64> {
+        let (gop, arrived) = self.ladder.gops().get(gop).zip(self.arrived.get(gop))?;
+        Some(gop.playable(arrived)?.quality)
+    }
+
+    /// Quality of what is before an open GOP: that of the GOP before it; none before the first.
+    pub fn quality_before(&self, gop: usize) -> Option<f64> {
+        let before = gop.checked_sub(1)?;
+        if before >= self.first_open() {
+            return self.quality(before);
+        }
+        self.shown.last().map(|shown| shown.quality)
+    }
+
+    /// Media time from the playhead to the end of what can be played without a gap, in microseconds.
+    pub fn buffer_us(&self) -> u64 {
+        self.media_until(self.first_missing())
+    }
+
+    /// Media time from the playhead to the start of a GOP, in microseconds; 0 if it has begun.
+    pub fn media_until(&self, gop: usize) -> u64 {
+        let until = self
+            .ladder
+            .gops()
+            .iter()
+            .take(gop)
+            .skip(self.current)
+            .map(Gop::duration_us)
+            .fold(0, u64::saturating_add);
+        until.saturating_sub(self.offset_ns / 1000)
+    }
+
+    /// When a GOP can be requested; 0 unless the presentation is live.
+    pub fn available_us(&self, gop: usize) -> u64 {
+        let Some(live) = self.settings.live else { return 0 };
+        let before = self.ladder.gops().iter().take(gop.saturating_add(1)).skip(1).map(Gop::duration_us);
+        before.fold(live.available_us, u64::saturating_add)
+    }
+
+    /// Time from capture to display of what is playing, in a live presentation.
+    pub fn latency_us(&self) -> Option<u64> {
+        self.settings.live?;
+        let duration_us = self.ladder.gops().get(self.current).or(self.ladder.gops().last())?.duration_us();
+        // A GOP can be requested when it has been captured to its end.
+        let began_us = self.available_us(self.current).saturating_sub(duration_us);
+        let captured = began_us.saturating_add(self.offset_ns / 1000);
+        Some(self.now_us.saturating_sub(captured))
+    }
+
+    /// When the GOP that is playing ends; none while playback stands still.
+    pub fn gop_end_us(&self) -> Option<u64> {
+        if self.playback != Playback::Playing {
+            return None;
+        }
+        let gop = self.ladder.gops().get(self.current)?;
+        let left_ns = gop.duration_us().saturating_mul(1000).saturating_sub(self.offset_ns);
+        let rate = u64::from(self.rate_milli).max(1);
+        Some(self.now_us.saturating_add(left_ns.div_ceil(rate)))
+    }
+}
