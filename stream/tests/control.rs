@@ -273,3 +273,80 @@ fn a_growing_presentation_is_played_as_it_grows() {
     session.decide(7_500_000);
     assert_eq!(session.state().playback(), Playback::Ended);
 }
+
+/// Plays with a session whose requests are answered at once by `serve`: bytes that arrive, or none for a failure.
+fn serve_all(
+    session: &mut Session<Box<dyn Rule>>,
+    seconds: u64,
+    mut serve: impl FnMut(&mut Session<Box<dyn Rule>>, u64),
+) {
+    for now_us in (0..seconds * 1_000_000).step_by(10_000) {
+        for _ in 0..8 {
+            match session.decide(now_us) {
+                Decision::Fetch(_) => serve(session, now_us),
+                Decision::Wait { .. } => break,
+                Decision::Abandon | Decision::Rate { .. } => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn a_server_that_fails_is_asked_less_and_less_often() {
+    for number in 0..5 {
+        let mut session = Session::new(ladders::small(5), Settings::default(), rule(number), 0);
+        let mut requests = Vec::new();
+        serve_all(&mut session, 30, |session, now_us| {
+            requests.push(now_us);
+            session.failed(now_us);
+        });
+        assert!((8..16).contains(&requests.len()), "rule {number}: {} requests", requests.len());
+        assert!(requests.windows(2).all(|pair| pair[1] - pair[0] >= 100_000));
+    }
+}
+
+#[test]
+fn playback_goes_on_without_pieces_that_cannot_be_had() {
+    for number in 0..5 {
+        let ladder = ladders::small(12);
+        let mut session = Session::new(ladder.clone(), Settings::default(), rule(number), 0);
+        // P frames of GOP 4 end after two refinements; GOP 7 has no base.
+        session.unavailable(0, 4, 2, 2);
+        session.unavailable(0, 7, 0, 0);
+        serve_all(&mut session, 20, |session, now_us| {
+            let request = session.state().request().unwrap();
+            assert_ne!(request.fetch.gop(), 7);
+            assert!(
+                request.fetch.gop() != 4
+                    || request.fetch.ranges().iter().all(|range| range.representation != 2 || range.to <= 2)
+            );
+            let bytes = request.fetch.bytes();
+            session.received(now_us, 0);
+            session.received(now_us + 1000, bytes);
+        });
+        let state = session.state();
+        assert_eq!(state.playback(), Playback::Ended, "rule {number}");
+        let shown: Vec<usize> = state.shown().iter().map(|shown| shown.gop).collect();
+        assert_eq!(shown, [0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11], "rule {number}");
+        assert!(state.is_lost(7) && !state.is_lost(4));
+        assert!(state.shown().iter().skip(1).all(|shown| shown.waited_us == 0));
+    }
+}
+
+#[test]
+fn what_arrives_damaged_is_fetched_again() {
+    let mut session = Session::new(ladders::small(8), Settings::default(), rule(0), 0);
+    let mut bases = 0;
+    serve_all(&mut session, 20, |session, now_us| {
+        let fetch = session.state().request().unwrap().fetch.clone();
+        session.received(now_us, 0);
+        session.received(now_us + 1000, fetch.bytes());
+        if fetch.gop() == 5 && fetch.ranges()[0].offset == 0 && fetch.ranges()[0].representation == 0 {
+            bases += 1;
+            if bases == 1 {
+                session.damaged(now_us + 1000, 5, 0, 0);
+            }
+        }
+    });
+    assert_eq!((bases, session.state().shown().len()), (2, 8));
+}

@@ -63,6 +63,11 @@ impl Levels {
         Self(vec![0; representations])
     }
 
+    /// A set of all pieces that there can be.
+    pub fn all(representations: usize) -> Self {
+        Self(vec![u8::MAX; representations])
+    }
+
     /// How many refinements of a Representation are in the set.
     pub fn of(&self, representation: usize) -> u8 {
         self.0.get(representation).copied().unwrap_or(0)
@@ -83,6 +88,18 @@ impl Levels {
         if let Some(own) = self.0.get_mut(representation) {
             *own = (*own).max(count);
         }
+    }
+
+    /// Removes the refinements of a Representation from a count on.
+    pub fn lower(&mut self, representation: usize, count: u8) {
+        if let Some(own) = self.0.get_mut(representation) {
+            *own = (*own).min(count);
+        }
+    }
+
+    /// The pieces that are in both sets.
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self(self.0.iter().enumerate().map(|(index, &count)| count.min(other.of(index))).collect())
     }
 
     /// The pieces of both sets.

@@ -101,12 +101,11 @@ impl Layered {
     /// What to fetch for the next GOP, and what quality it will have.
     fn extend(&self, state: &State, outlook: &Outlook) -> Option<Choice> {
         let next = state.first_missing();
-        let stage = |(gop, arrived): (&Gop, &Levels)| {
-            (choices(gop, arrived, &state.settings().limits), seconds(gop.duration_us()))
-        };
-        let gops = horizon(state, next, self.weights.horizon).iter();
-        let arrived = (next..).map_while(|gop| state.arrived(gop));
-        let stages: Vec<(Vec<Choice>, f64)> = gops.zip(arrived).map(stage).collect();
+        let gops = horizon(state, next, self.weights.horizon).iter().zip(next..);
+        let stages: Vec<(Vec<Choice>, f64)> = gops
+            .map(|(gop, index)| (state.choices(index), seconds(gop.duration_us())))
+            .filter(|(choices, _)| !choices.is_empty())
+            .collect();
         let (index, _) = best(&stages, outlook);
         stages.into_iter().next()?.0.into_iter().nth(index)
     }
@@ -116,9 +115,9 @@ impl Layered {
     fn upgrade(&self, state: &State, outlook: &Outlook, next: Option<f64>) -> Option<Fetch> {
         let mut found: Option<(f64, usize, Levels)> = None;
         for index in state.first_open()..state.first_missing() {
-            let (gop, arrived) = (state.ladder().gops().get(index)?, state.arrived(index)?);
+            let gop = state.ladder().gops().get(index)?;
             let until = seconds(state.media_until(index)) * self.weights.haste;
-            let options = choices(gop, arrived, &state.settings().limits);
+            let options = state.choices(index);
             let Some(now) = options.first().cloned() else { continue };
             let around = [state.quality_before(index), state.quality(index.saturating_add(1)).or(next)];
             for option in options.into_iter().skip(1) {
@@ -246,12 +245,15 @@ fn price(state: &State, throughput: f64) -> Option<f64> {
     Some(step * seconds(gop.duration_us()) * throughput / 8.0)
 }
 
+/// A request that has run for so long says something of the network.
+const ENOUGH_SECONDS: f64 = 0.3;
+
 /// Throughput of the running request in bits per second, if enough of it has arrived, or else the prediction. What has not
 /// begun after its latency counts as arriving at the rate that would deliver its first byte now.
 fn current_rate(state: &State, request: &Request) -> Option<f64> {
     let predicted = state.network().robust();
     let since = seconds(state.now_us().saturating_sub(request.progress.sent_us)) - state.network().latency();
-    if since < 0.3 {
+    if since < ENOUGH_SECONDS {
         return predicted;
     }
     let own = real(request.progress.bytes.max(1)) * 8.0 / since;
@@ -267,7 +269,7 @@ fn catch_up(state: &State) -> Option<u32> {
     let wanted = if short { distance.min(-0.2) } else { distance };
     let step = (wanted * 10.0).clamp(-100.0, 100.0);
     let milli = 1000.0 + 5.0 * libm::trunc(step);
-    let rate = milli.clamp(f64::from(live.slowest_milli), f64::from(live.fastest_milli));
+    let rate = milli.max(f64::from(live.slowest_milli)).min(f64::from(live.fastest_milli));
     let rate = u32::try_from(count(rate)).unwrap_or(1000);
     (state.playback() == Playback::Playing && rate != state.rate_milli()).then_some(rate)
 }

@@ -42,7 +42,19 @@ pub struct Choice {
 /// is to leave it or, if it cannot be played yet, to fetch its base; each further one costs more bytes, and its gain in
 /// quality per byte is less than that of the one before.
 pub fn choices(gop: &Gop, arrived: &Levels, limits: &Limits) -> Vec<Choice> {
-    let allowed = |(index, point): &(usize, &Point)| *index == 0 || limits.allow(point, gop);
+    available_choices(gop, arrived, &Levels::all(gop.representations()), limits)
+}
+
+/// The same, where only some pieces can be had.
+pub(crate) fn available_choices(
+    gop: &Gop,
+    arrived: &Levels,
+    available: &Levels,
+    limits: &Limits,
+) -> Vec<Choice> {
+    let allowed = |(index, point): &(usize, &Point)| {
+        available.contains(&point.levels) && (*index == 0 || limits.allow(point, gop))
+    };
     let there = gop.playable(arrived).map(|point| Choice {
         levels: arrived.clone(),
         bytes: 0,

@@ -48,6 +48,9 @@ impl<R: Rule> Session<R> {
     pub fn decide(&mut self, now_us: u64) -> Decision {
         self.advance(now_us);
         let state = &mut self.state;
+        if state.request.is_none() && state.retry_us > state.now_us {
+            return Decision::Wait { until_us: state.retry_us };
+        }
         let decision = self.rule.decide(state);
         match &decision {
             Decision::Fetch(fetch) if state.request.is_none() => {
@@ -83,17 +86,48 @@ impl<R: Rule> Session<R> {
         let (gop, bytes) = (request.fetch.gop(), request.progress.bytes);
         if let (Some(arrived), Some(known)) = (state.arrived.get_mut(gop), state.ladder.gops().get(gop)) {
             arrive(arrived, known, &request.fetch, bytes);
+            *arrived = state
+                .available
+                .get(gop)
+                .map_or_else(|| arrived.clone(), |available| arrived.intersection(available));
         }
         if request.progress.bytes >= request.fetch.bytes() {
+            state.failures = 0;
             self.end_request(true);
         }
         self.resume();
     }
 
-    /// Says that the running request has failed. What has arrived of it stays, unless the rule plays whole GOPs only.
+    /// Says that the running request has failed. What has arrived of it stays, unless the rule plays whole GOPs only. The
+    /// next one waits for 0.1 s, and twice as long after each further failure, up to 3.2 s.
     pub fn failed(&mut self, now_us: u64) {
         self.advance(now_us);
         self.end_request(false);
+        let state = &mut self.state;
+        let wait_us = 100_000_u64 << state.failures.min(5);
+        state.failures = state.failures.saturating_add(1);
+        state.retry_us = state.now_us.saturating_add(wait_us);
+    }
+
+    /// Says that pieces of a GOP arrived damaged: those of a Representation from a refinement on. They are fetched again where
+    /// they are wanted.
+    pub fn damaged(&mut self, now_us: u64, gop: usize, representation: usize, refinement: u8) {
+        self.advance(now_us);
+        if let Some(arrived) = self.state.arrived.get_mut(gop) {
+            arrived.lower(representation, refinement);
+        }
+    }
+
+    /// Says that pieces of a GOP cannot be had: those of a Representation from a refinement on. What needs them is not
+    /// fetched, nor what has arrived of them played. If the base is among them, the GOP is lost ([`State::is_lost`]).
+    pub fn unavailable(&mut self, now_us: u64, gop: usize, representation: usize, refinement: u8) {
+        self.advance(now_us);
+        let state = &mut self.state;
+        if let Some((available, arrived)) = state.available.get_mut(gop).zip(state.arrived.get_mut(gop)) {
+            available.lower(representation, refinement);
+            arrived.lower(representation, refinement);
+        }
+        self.resume();
     }
 
     fn end_request(&mut self, wanted: bool) {
@@ -159,6 +193,10 @@ impl<R: Rule> Session<R> {
         let running = state.request.as_ref().filter(|request| request.fetch.gop() == gop);
         let running = running.map_or(0, |request| request.progress.bytes);
         let latency_us = state.latency_us();
+        if state.is_lost(gop) {
+            state.playback = Playback::Playing;
+            return;
+        }
         let known = state.ladder.gops().get(gop).zip(state.arrived.get(gop));
         let Some(point) = known.and_then(|(known, arrived)| known.playable(arrived)) else { return };
         state.playback = Playback::Playing;

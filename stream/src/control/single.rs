@@ -1,6 +1,6 @@
 //! Rules that know no layers: they pick one of some operating points for each GOP, as for a presentation of alternatives.
 
-use super::ladder::{Ladder, OperatingPoint};
+use super::ladder::{Ladder, OperatingPoint, Point};
 use super::number::{real, seconds, size};
 use super::options::{Choice, Limits, hull};
 use super::rule::{Decision, Fetch, Rule};
@@ -174,7 +174,9 @@ impl<R: SingleRule> Single<R> {
         let name = self.rungs.get(rung).or(self.rungs.last()).map(|rung| rung.point);
         let point = known.and_then(|known| known.points().iter().find(|point| Some(point.name) == name));
         let all = if self.whole { Fetch::at_leisure } else { Fetch::towards };
-        let fetch = point.and_then(|point| all(state, gop, &point.levels));
+        let within =
+            |point: &Point| Some(&known?.playable(&point.levels.intersection(state.available(gop)?))?.levels);
+        let fetch = point.and_then(|point| all(state, gop, within(point)?));
         fetch.map_or(later, Decision::Fetch)
     }
 }

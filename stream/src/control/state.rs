@@ -1,7 +1,7 @@
 //! What a session knows at one time: what has arrived, what is playing, what is being fetched.
 
 use super::ladder::{Gop, Ladder, Levels, OperatingPoint};
-use super::options::Limits;
+use super::options::{Choice, Limits, available_choices};
 use super::rule::Fetch;
 use super::throughput::{Network, Transfer};
 
@@ -100,11 +100,17 @@ pub struct State {
     pub(super) rate_milli: u32,
     pub(super) waiting_since_us: u64,
     pub(super) arrived: Vec<Levels>,
+    /// The pieces of each GOP that can be had, as far as is known.
+    pub(super) available: Vec<Levels>,
     pub(super) fetched: Vec<u64>,
     /// GOPs for which a request has ended as the rule wanted.
     pub(super) settled: Vec<bool>,
     pub(super) only_whole: bool,
     pub(super) request: Option<Request>,
+    /// Requests that failed since the last one that did not.
+    pub(super) failures: u32,
+    /// Nothing is requested before.
+    pub(super) retry_us: u64,
     pub(super) network: Network,
     pub(super) shown: Vec<Shown>,
 }
@@ -121,10 +127,13 @@ impl State {
             rate_milli: 1000,
             waiting_since_us: now_us,
             arrived: Vec::new(),
+            available: Vec::new(),
             fetched: Vec::new(),
             settled: Vec::new(),
             only_whole,
             request: None,
+            failures: 0,
+            retry_us: now_us,
             network: Network::default(),
             shown: Vec::new(),
         };
@@ -136,6 +145,7 @@ impl State {
     pub(super) fn grow(&mut self) {
         let gops = self.ladder.gops().len();
         self.arrived.resize(gops, Levels::none(self.ladder.representations().len()));
+        self.available.resize(gops, Levels::all(self.ladder.representations().len()));
         self.fetched.resize(gops, 0);
         self.settled.resize(gops, false);
     }
@@ -193,6 +203,11 @@ impl State {
         self.arrived.get(gop)
     }
 
+    /// The pieces of a GOP that can be had, as far as is known.
+    pub fn available(&self, gop: usize) -> Option<&Levels> {
+        self.available.get(gop)
+    }
+
     /// The first GOP that has not begun: pieces of earlier ones are of no use any more.
     pub fn first_open(&self) -> usize {
         match self.playback {
@@ -209,8 +224,26 @@ impl State {
         (open..gops).find(|&gop| !self.is_ready(gop)).unwrap_or(gops)
     }
 
+    /// Whether the base of a GOP cannot be had: the picture before it stands still for its duration.
+    pub fn is_lost(&self, gop: usize) -> bool {
+        let base = self.ladder.gops().get(gop).and_then(|gop| gop.points().first());
+        base.zip(self.available.get(gop)).is_some_and(|(base, available)| !available.contains(&base.levels))
+    }
+
+    /// What can be done with a GOP on this device: the hull of the pieces that can be had (`choices`).
+    pub fn choices(&self, gop: usize) -> Vec<Choice> {
+        let of = |known: &Gop| {
+            let (arrived, available) = self.arrived.get(gop).zip(self.available.get(gop))?;
+            Some(available_choices(known, arrived, available, &self.settings.limits))
+        };
+        self.ladder.gops().get(gop).and_then(of).unwrap_or_default()
+    }
+
     /// Whether a GOP can be played.
     pub fn is_ready(&self, gop: usize) -> bool {
+        if self.is_lost(gop) {
+            return true;
+        }
         let running = self.request.as_ref().is_some_and(|request| request.fetch.gop() == gop);
         let whole = !self.only_whole || (!running && self.settled.get(gop) == Some(&true));
         let Some((gop, arrived)) = self.ladder.gops().get(gop).zip(self.arrived.get(gop)) else {
