@@ -20,25 +20,25 @@
 //! assert_eq!(session.state().shown().len(), 1);
 //! ```
 
-pub mod ladder;
+mod baselines;
+pub(crate) mod ladder;
 mod layered;
 pub(crate) mod number;
 mod options;
 mod plan;
 mod rule;
-mod rungs;
 mod session;
 mod single;
 mod state;
 mod throughput;
 
+pub use baselines::{Bola, BufferRule, ThroughputRule};
 pub use ladder::{
     Description, Gop, Ladder, LadderError, Layer, Levels, OperatingPoint, Piece, Point, Representation,
 };
 pub use layered::{Layered, Weights};
 pub use options::{Choice, Limits, Range, choices, order, whole_ranges};
 pub use rule::{Decision, Fetch, Rule};
-pub use rungs::{Bola, BufferRule, ThroughputRule};
 pub use session::Session;
 pub use single::{Pick, Rung, Single, SingleRule, Situation};
 pub use state::{Live, Playback, Request, Settings, Shown, State};

@@ -56,7 +56,8 @@ pub struct Score {
     /// `LoL+` per GOP in Mbit/s: bitrate · duration - |change of bitrate| - largest bitrate · stalls - latency · weight -
     /// least bitrate · |1 - rate of playback|, where the weight is 0.05 of the least bitrate up to a latency of 1.1 s and 0.1
     /// of the largest beyond (Bentaleb et al., "Catching the Moment with `LoL+` in Twitch-Like Low-Latency Live Streaming
-    /// Platforms", IEEE Transactions on Multimedia 2021, and `LoLpQoEEvaluator.js` of dash.js). The latency of a stored presentation is 0.
+    /// Platforms", IEEE Transactions on Multimedia 2021, and `LoLpQoEEvaluator.js` of dash.js). The latency of a stored
+    /// presentation is 0.
     pub lolp: f64,
 }
 

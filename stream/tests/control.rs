@@ -350,3 +350,13 @@ fn what_arrives_damaged_is_fetched_again() {
     });
     assert_eq!((bases, session.state().shown().len()), (2, 8));
 }
+
+#[test]
+fn a_playback_is_the_same_on_every_machine() {
+    let steps: Vec<(u64, u64)> =
+        (1..40_u64).map(|n| (300_000 + n * 70_001 % 900_000, n * 3_700_003 % 25_000_000)).collect();
+    let report = play(&ladders::small(100), Layered::default(), Trace::new(&steps).unwrap());
+    let quality: f64 = report.shown.iter().map(|shown| shown.quality).sum();
+    let seen = (report.requests, report.bytes, report.ended_us, quality.to_bits());
+    assert_eq!(seen, (150, 133_531_625, 100_218_870, 4_659_192_726_289_317_297));
+}
