@@ -37,6 +37,8 @@ pub use report::{GopLog, Loss, Outcome, PlayedGop, Screen};
 pub struct Options {
     /// Buffer and limits of the device. The buffer is made shorter where [`Options::memory`] needs it.
     pub settings: Settings,
+    /// The highest spatial and temporal layer that are fetched; higher numbers than there are fetch all.
+    pub layers: (u8, u8),
     /// Whether time passes as it does. Otherwise playback skips the time in which nothing is being fetched.
     pub real_time: bool,
     /// To establish a connection.
@@ -61,6 +63,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             settings: Settings::default(),
+            layers: (u8::MAX, u8::MAX),
             real_time: true,
             connect_timeout: Duration::from_secs(10),
             read_timeout: Duration::from_secs(10),
@@ -129,7 +132,7 @@ impl Client {
         Ok(Self { source, manifest, options })
     }
 
-    /// The manifest, as it was read last.
+    /// The manifest, as it was read last, with the layers that are fetched.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
@@ -141,7 +144,7 @@ fn read_manifest(source: &Source, options: &Options) -> Result<Manifest, ClientE
     let mut attempt = 1;
     loop {
         match source.whole(Package::MANIFEST, Manifest::MAX_BYTES) {
-            Ok(bytes) => return Ok(Manifest::parse(&bytes)?),
+            Ok(bytes) => return Ok(Manifest::parse(&bytes)?.up_to(options.layers)),
             Err(fault) if attempt >= options.base_attempts || fault.is_final() => {
                 return Err(ClientError::Unreachable(source.place(Package::MANIFEST), fault.to_string()));
             }

@@ -9,10 +9,25 @@ use core::ops::Range;
 /// What a frame that stands still costs in dB, where no picture of it was measured.
 const STILL: f64 = 6.0;
 
-/// The PSNR in dB that stands for pictures without any error.
-const EXACT: f64 = 100.0;
+/// PSNR in dB from which on nobody sees a difference.
+const EXACT: f64 = 50.0;
 
 impl Manifest {
+    /// The same without layers above a spatial and a temporal one.
+    #[must_use]
+    pub fn up_to(mut self, (spatial, temporal): (u8, u8)) -> Self {
+        let wanted = |id: &str| match layer(id) {
+            Some(Layer::Spatial(layer)) => layer <= spatial,
+            Some(Layer::Temporal(layer)) => layer <= temporal,
+            None => false,
+        };
+        self.representations.retain(|one| wanted(&one.id));
+        for gop in &mut self.gops {
+            gop.subsegments.retain(|one| wanted(&one.representation));
+        }
+        self
+    }
+
     /// The presentation as a controller plans it. Of Representations of predicted frames it is taken that they need all
     /// refinements of all spatial layers where `whole_anchor` says so, and the base and the temporal layers below otherwise.
     ///
@@ -196,6 +211,18 @@ mod tests {
         assert_eq!((most.name.to_string().as_str(), most.frames), ("s1,t1,r1", 3));
         assert_eq!(most.bytes, sizes.iter().sum::<u64>());
         assert_eq!(manifest.description(1), None);
+    }
+
+    #[test]
+    fn layers_are_left_out() {
+        let manifest = manifest().up_to((0, 0));
+        let ids: Vec<&str> = manifest.representations.iter().map(|one| one.id.as_str()).collect();
+        assert_eq!((ids, manifest.gops[0].subsegments.len()), (vec!["s0", "t0"], 2));
+        let ladder = manifest.ladder().expect("it is complete");
+        assert_eq!(
+            ladder.gops()[0].points().last().map(|point| point.name.to_string()).as_deref(),
+            Some("s0,t0,r1")
+        );
     }
 
     #[test]
