@@ -1,6 +1,7 @@
 //! `splatstream package`: a stream as files for DASH.
 
 mod live;
+mod quality;
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -15,7 +16,7 @@ use splatstream_stream::package::{Layout, Options, Package};
 use std::path::{Path, PathBuf};
 use std::slice;
 
-/// Write a stream as files for DASH: fragmented MP4, an MPD and a manifest. Nothing is decoded.
+/// Write a stream as files for DASH: fragmented MP4, an MPD and a manifest. Nothing is decoded without --quality.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream package talk.gss -o talk/\n\n\
     A file per spatial layer of the I frames and per temporal layer of the others, with a track per refinement.\n\
@@ -34,6 +35,10 @@ pub(crate) struct PackageStream {
     /// comes.
     #[arg(long)]
     live: bool,
+    /// Measure what every operating point of every GOP looks like against everything, for players: PSNR and SSIM of
+    /// pictures of two of its frames go to the manifest.
+    #[arg(long, conflicts_with = "live")]
+    quality: bool,
     /// Replace a package that is in the directory.
     #[arg(long)]
     force: bool,
@@ -91,7 +96,11 @@ impl PackageStream {
         }
         let stream = StreamFile::read(&self.input)?;
         let package = Package::of(&stream.bytes, &options, &self.limits.limits());
-        let package = package.map_err(|error| stream.fault(error))?;
+        let mut package = package.map_err(|error| stream.fault(error))?;
+        if self.quality {
+            package.manifest.quality =
+                Some(quality::measure(&stream, &package.manifest, &self.limits.limits())?);
+        }
         self.clear(stale)?;
         let sizes = self.write(&package)?;
         let report = Report::new(&self.out, &package.manifest, sizes);
