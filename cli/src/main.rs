@@ -21,6 +21,7 @@ mod manual;
 mod numbers;
 mod output_file;
 mod package;
+mod play;
 mod progress;
 mod render;
 mod seek;
@@ -75,6 +76,7 @@ enum Command {
     Chart(chart::Chart),
     Package(package::PackageStream),
     Unpackage(unpackage::Unpackage),
+    Play(play::Play),
     Train(train::Train),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
@@ -149,6 +151,7 @@ impl Command {
             Self::Chart(command) => command.run(console),
             Self::Package(command) => command.run(console),
             Self::Unpackage(command) => command.run(console),
+            Self::Play(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),
