@@ -162,6 +162,8 @@ enum ImportanceName {
     Removal,
     /// Transmittance times alpha over the pixels of all views.
     Contribution,
+    /// Opacity squared times the pixels covered, mean of all views, whatever hides it; needs no pictures.
+    Footprint,
     /// Opacity times volume; needs no views.
     Volume,
 }
@@ -471,6 +473,7 @@ impl From<ImportanceName> for Importance {
         match name {
             ImportanceName::Removal => Self::Removal,
             ImportanceName::Contribution => Self::Contribution,
+            ImportanceName::Footprint => Self::Footprint,
             ImportanceName::Volume => Self::Volume,
         }
     }

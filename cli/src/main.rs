@@ -25,6 +25,7 @@ mod play;
 mod progress;
 mod render;
 mod seek;
+mod serve;
 mod setting_names;
 mod stream_file;
 mod structure;
@@ -76,6 +77,7 @@ enum Command {
     Chart(chart::Chart),
     Package(package::PackageStream),
     Unpackage(unpackage::Unpackage),
+    Serve(serve::Serve),
     Play(play::Play),
     Train(train::Train),
     Conformance(conformance::Conformance),
@@ -151,6 +153,7 @@ impl Command {
             Self::Chart(command) => command.run(console),
             Self::Package(command) => command.run(console),
             Self::Unpackage(command) => command.run(console),
+            Self::Serve(command) => command.run(console),
             Self::Play(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),

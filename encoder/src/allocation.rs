@@ -26,12 +26,12 @@ use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
 
 /// Views made for the scene, and their height, where none are given; of given ones no more are taken.
-const VIEWS: (u32, u32) = (4, 540);
+const VIEWS: u32 = 4;
+const HEIGHT: u32 = 540;
 /// Of so many strips of a view one is drawn.
 const EVERY: u32 = 8;
 const EVERY_FAST: u32 = 16;
-/// The same where attributes are measured alone, in so many of the views: shares need not be exact.
-const EVERY_ALONE: u32 = 8;
+/// Views in which attributes are measured alone: shares need not be exact.
 const ALONE: usize = 2;
 /// Frames of fewer Gaussians are measured so for the fast preset too.
 const FEW: usize = 1 << 12;
@@ -95,9 +95,9 @@ pub(crate) struct Fit {
     pub(crate) refinement: Vec<u8>,
     /// Principal components of dc and of sh.
     pub(crate) bases: [Components; 2],
-    /// The source as some views show it: where attributes are measured together, and alone.
+    /// The source as some views show it, and by which of them attributes are measured alone.
     views: Vec<StripView>,
-    alone: Vec<StripView>,
+    alone: Vec<usize>,
     /// Some of the Gaussians, and which these are.
     sample: (GaussianFrame, Vec<u32>),
     sensitivity: Sensitivity,
@@ -110,14 +110,15 @@ impl Fit {
             true => Laws::of(frame, &ranked.order, &ranked.shown, &settings.refinements),
             false => Laws::default(),
         };
+        let is_fast = settings.preset == Preset::Fast;
         let cameras = cameras(frame, settings);
         // Of few Gaussians the estimates are poor, and pictures cost little.
-        let alone = if settings.preset == Preset::Fast && frame.len() >= FEW { 0 } else { ALONE };
+        let alone = if is_fast && frame.len() >= FEW { 0 } else { ALONE };
         // Views made for a scene rise from below to above: not the first of them.
         let apart = cameras.len().div_ceil(ALONE).max(1);
-        let alone: Vec<Camera> =
-            cameras.iter().skip(usize::from(cameras.len() > 1)).step_by(apart).take(alone).cloned().collect();
-        let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
+        let alone =
+            (0..cameras.len()).skip(usize::from(cameras.len() > 1)).step_by(apart).take(alone).collect();
+        let every = if is_fast { EVERY_FAST } else { EVERY };
         let mut scene = Scene::new();
         scene.add(frame, &(0..frame.len() as u32).collect::<Vec<u32>>());
         let mut refinement = vec![0; frame.len()];
@@ -137,7 +138,7 @@ impl Fit {
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),
             views: StripView::all(frame, &cameras, every),
-            alone: StripView::all(frame, &alone, EVERY_ALONE),
+            alone,
             sample: (sample, rows),
         }
     }
@@ -172,7 +173,7 @@ impl Fit {
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..corrections {
             // Where nothing can be seen nothing is too bad.
-            let now = self.psnr(&ATTRIBUTES, &steps, &self.views)?.unwrap_or(decibels.into());
+            let now = self.psnr(&steps)?.unwrap_or(decibels.into());
             let missing = f64::from(decibels) - now;
             if missing.abs() < NEAR {
                 break;
@@ -189,16 +190,11 @@ impl Fit {
         Ok(steps)
     }
 
-    /// PSNR of pictures with these attributes on their grids, dB.
-    fn psnr(
-        &self,
-        attributes: &[Attribute],
-        steps: &Steps,
-        views: &[StripView],
-    ) -> Result<Option<f64>, Error> {
-        mean(views.iter().map(|view| {
+    /// PSNR of pictures with all attributes on their grids, dB.
+    fn psnr(&self, steps: &Steps) -> Result<Option<f64>, Error> {
+        mean(self.views.iter().map(|view| {
             let trial = Trial::new(self, &view.frame, Some(&view.rows), steps);
-            Ok(view.psnr(&trial.decoded(attributes)?))
+            Ok(view.psnr(&trial.decoded(&ATTRIBUTES)?))
         }))
     }
 
@@ -211,12 +207,17 @@ impl Fit {
 
     /// The same as strips of a few views show it.
     fn measured(&self, steps: &Steps) -> Result<[f64; 6], Error> {
+        let views = || self.alone.iter().map(|&view| &self.views[view]);
+        let trials: Vec<Trial<'_>> =
+            views().map(|view| Trial::new(self, &view.frame, Some(&view.rows), steps)).collect();
         let mut errors = [0.0; 6];
         for (error, attribute) in errors.iter_mut().zip(ATTRIBUTES) {
             if attribute == Attribute::Sh && self.sample.0.sh_degree() == 0 {
                 continue;
             }
-            let decibels = self.psnr(&[attribute], steps, &self.alone)?;
+            let of_view =
+                |(view, trial): (&StripView, &Trial<'_>)| Ok(view.psnr(&trial.decoded(&[attribute])?));
+            let decibels = mean(views().zip(&trials).map(of_view))?;
             *error = decibels.map_or(0.0, |decibels| libm::pow(10.0, -0.1 * decibels));
         }
         Ok(errors)
@@ -255,9 +256,9 @@ impl Fit {
 /// The views that a fit goes by.
 fn cameras(frame: &GaussianFrame, settings: &Settings) -> Vec<Camera> {
     match settings.cameras.as_slice() {
-        [] => spiral(frame, Up::default(), VIEWS.0, VIEWS.1),
+        [] => spiral(frame, Up::default(), VIEWS, HEIGHT),
         given => {
-            let stride = given.len().div_ceil(VIEWS.0 as usize).max(1);
+            let stride = given.len().div_ceil(VIEWS as usize).max(1);
             given.iter().step_by(stride).cloned().collect()
         }
     }

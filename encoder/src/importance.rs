@@ -35,7 +35,7 @@ impl Ranking {
     /// What the settings ask for. With one refinement there is nothing to rank.
     pub(crate) fn new(settings: &Settings) -> Self {
         let by_preset = match settings.preset {
-            Preset::Fast => Importance::Contribution,
+            Preset::Fast => Importance::Footprint,
             Preset::Balanced | Preset::Small => Importance::Removal,
         };
         let importance = match settings.refinements.len() {
@@ -63,7 +63,7 @@ impl Ranking {
         if ranked.shown.is_empty() {
             self.cameras(frame);
             ranked.shown = match self.preset {
-                Preset::Fast => expected(frame, &self.cameras),
+                Preset::Fast => unhidden(frame, &self.cameras),
                 Preset::Balanced | Preset::Small => self.views(frame).worth(),
             };
         }
@@ -85,14 +85,19 @@ impl Ranking {
             return Ranked { order: importance::order(&volume), shown: Vec::new() };
         }
         self.cameras(frame);
+        let by = |shown: &[Worth], score: fn(&Worth) -> f64| {
+            let scores: Vec<f64> = shown.iter().map(score).collect();
+            ranked(&scores, &volume, &all(frame.len()))
+        };
+        if self.importance == Importance::Footprint {
+            let shown = unhidden(frame, &self.cameras);
+            return Ranked { order: by(&shown, |worth| worth.energy), shown };
+        }
         let views = self.views(frame);
         let shown = views.worth();
         let order = match self.importance {
             Importance::Removal => self.eliminate(&views, &volume, &shown),
-            _ => {
-                let given: Vec<f64> = shown.iter().map(|worth| worth.contribution).collect();
-                ranked(&given, &volume, &all(frame.len()))
-            }
+            _ => by(&shown, |worth| worth.contribution),
         };
         Ranked { order, shown }
     }
@@ -157,7 +162,7 @@ impl Ranking {
 
 /// What pictures would show of each Gaussian if no other hid it: from its opacity, and from the pixels that it covers.
 #[expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
-fn expected(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
+fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     let of_row = |row: usize| {
         let scales = frame.log_scale().each_ref().map(|plane| plane[row]);
         let least = scales.into_iter().fold(f32::INFINITY, f32::min);
@@ -179,7 +184,7 @@ fn all(count: usize) -> Vec<u32> {
 #[expect(clippy::indexing_slicing, reason = "rows are those of the frame; windows have two entries")]
 fn ranked(scores: &[f64], volume: &[f64], gaussians: &[u32]) -> Vec<u32> {
     let mut rows: Vec<(f64, u32)> = scores.iter().copied().zip(gaussians.iter().copied()).collect();
-    rows.sort_unstable_by(|a, b| {
+    rows.par_sort_unstable_by(|a, b| {
         let volumes = volume[b.1 as usize].total_cmp(&volume[a.1 as usize]);
         b.0.total_cmp(&a.0).then(volumes).then(a.1.cmp(&b.1))
     });

@@ -19,8 +19,9 @@ use splatstream_format::entropy::frequencies::Frequencies;
 use splatstream_format::entropy::model::{AxisLookup, ContextAxis, PlaneModel, Source, write_models};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 
-/// Gaussians after which only every other block is looked at.
-const SAMPLE: usize = 1 << 16;
+/// Gaussians that are looked at for the choice of a model, nearly: whole blocks.
+const SAMPLE: usize = 1 << 15;
+const SAMPLE_FAST: usize = 1 << 14;
 /// Thresholds of the first and of the second axis.
 const FIRST_THRESHOLDS: usize = 15;
 const SECOND_THRESHOLDS: usize = 3;
@@ -204,7 +205,12 @@ pub(crate) fn choose(
     tools: Tools,
 ) -> PlaneModel {
     let total: usize = blocks.iter().map(CodedBlock::len).sum();
-    let stride = if total > SAMPLE && preset != Preset::Small { 2 } else { 1 };
+    let most = match preset {
+        Preset::Fast => SAMPLE_FAST,
+        Preset::Balanced => SAMPLE,
+        Preset::Small => usize::MAX,
+    };
+    let stride = total.div_ceil(most).max(1);
     let sample: Vec<&CodedBlock> = blocks.iter().step_by(stride).collect();
     let values: Vec<u64> = sample.iter().flat_map(|block| unsigned_values(info, plane, block)).collect();
     let direct_log2 = direct_log2(info, &values);

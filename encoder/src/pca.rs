@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 /// Gaussians looked at, at most; more do not change the components by anything that matters.
-const SAMPLE: usize = 1 << 17;
+const SAMPLE: usize = 1 << 15;
 
 /// Mean and orthonormal components, the one of largest variance first.
 #[derive(Debug, Clone, PartialEq)]

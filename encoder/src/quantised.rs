@@ -76,13 +76,13 @@ impl<'a> Trial<'a> {
                     let (offset, step) = (self.sequence.log_scale_offset(), self.sequence.log_scale_step());
                     for (axis, plane) in planes.log_scale.iter_mut().enumerate() {
                         let value = |coded: &Coded| offset + step * coded.shape.log_scale[axis] as f32;
-                        *plane = self.coded.iter().map(value).collect();
+                        *plane = self.coded.par_iter().map(value).collect();
                     }
                 }
                 Attribute::Opacity => {
                     let (offset, step) = (self.sequence.opacity_offset(), self.sequence.opacity_step());
                     let value = |coded: &Coded| offset + step * coded.shape.opacity as f32;
-                    planes.opacity_logit = self.coded.iter().map(value).collect();
+                    planes.opacity_logit = self.coded.par_iter().map(value).collect();
                 }
                 Attribute::Rotation => self.rotations(&mut planes),
                 Attribute::Dc => {

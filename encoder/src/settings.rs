@@ -85,6 +85,9 @@ pub enum Importance {
     Removal,
     /// Transmittance times alpha, summed over the pixels of all views.
     Contribution,
+    /// Opacity squared times the pixels that it covers, mean of the views: what they would show if no Gaussian hid
+    /// another. No picture is drawn.
+    Footprint,
     /// Opacity times volume: the paper's, and the only one that needs no views.
     Volume,
 }
@@ -281,7 +284,7 @@ pub struct Settings {
     pub sh: ShChoice,
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     pub keep_invisible: bool,
-    /// What puts Gaussians into the first refinements; none: contribution for the fast preset, removal for others.
+    /// What puts Gaussians into the first refinements; none: footprint for the fast preset, removal for others.
     pub importance: Option<Importance>,
     /// The views that importance and pictures are measured in; none: made for the first frame, all around.
     pub cameras: Vec<Camera>,

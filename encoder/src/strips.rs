@@ -6,7 +6,7 @@
 use crate::error::Error;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
-use splatstream_render::{Camera, Rendering, Strips, render_strips, touching};
+use splatstream_render::{Camera, PreparedFrame, Rendering, Strips};
 
 /// Around the scene.
 const BACKGROUND: [f32; 3] = [0.0; 3];
@@ -45,11 +45,12 @@ impl StripView {
     /// One strip in `every` of each view.
     pub(crate) fn all(frame: &GaussianFrame, cameras: &[Camera], every: u32) -> Vec<Self> {
         let every = strip_of(every, frame.len());
+        let whole = PreparedFrame::new(frame);
         let view = |(camera, number): (&Camera, u32)| {
             let strips = strips(number, every);
-            let rows = touching(frame, camera, strips);
+            let rows = whole.touching(camera, strips);
             let frame = frame.select(&rows);
-            let picture = render_strips(&frame, camera, BACKGROUND, strips);
+            let picture = PreparedFrame::new(&frame).strips(camera, BACKGROUND, strips);
             Self { camera: camera.clone(), strips, picture, frame, rows }
         };
         cameras.iter().zip(0..).map(view).collect()
@@ -57,7 +58,8 @@ impl StripView {
 
     /// PSNR of another version of the same Gaussians, dB; none if nothing can be seen.
     pub(crate) fn psnr(&self, frame: &GaussianFrame) -> Option<f64> {
-        compared(&self.picture, &render_strips(frame, &self.camera, BACKGROUND, self.strips))
+        let drawn = PreparedFrame::new(frame).strips(&self.camera, BACKGROUND, self.strips);
+        compared(&self.picture, &drawn)
     }
 }
 
@@ -75,9 +77,10 @@ pub(crate) fn mean_psnr(
     every: u32,
 ) -> Result<Option<f64>, Error> {
     let every = strip_of(every, original.len());
+    let (original, decoded) = (PreparedFrame::new(original), PreparedFrame::new(decoded));
     mean(cameras.iter().zip(0..).map(|(camera, number)| {
-        let drawn = |frame| render_strips(frame, camera, BACKGROUND, strips(number, every));
-        Ok(compared(&drawn(original), &drawn(decoded)))
+        let drawn = |frame: &PreparedFrame<'_>| frame.strips(camera, BACKGROUND, strips(number, every));
+        Ok(compared(&drawn(&original), &drawn(&decoded)))
     }))
 }
 

@@ -19,7 +19,8 @@ use splatstream_render::Camera;
 use splatstream_render::camera::{Up, held_out};
 
 /// Views of each frame, and their height: with other heights PSNR is another number.
-const VIEWS: (u32, u32) = (4, 540);
+const VIEWS: u32 = 4;
+const HEIGHT: u32 = 540;
 
 /// Of so many strips of a view one is drawn; for the fast preset.
 const EVERY: u32 = 6;
@@ -154,12 +155,11 @@ impl Verifier {
                 psnr: mean_psnr(&original, frame, &cameras(&original, settings), every)?,
             });
         }
-        Ok(PictureReport { frames, views: VIEWS.0, height: VIEWS.1 })
+        Ok(PictureReport { frames, views: VIEWS, height: HEIGHT })
     }
 }
 
 /// Views of a frame that nothing was chosen by.
 fn cameras(frame: &GaussianFrame, settings: &Settings) -> Vec<Camera> {
-    let (count, height) = VIEWS;
-    held_out(frame, Up::default(), &settings.cameras, count, height)
+    held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT)
 }

@@ -10,8 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The crates of the workspace; `fuzz` has one of its own.
-const CRATES: [&str; 7] =
-    ["format", "scene/gaussians", "scene/files", "decoder", "encoder", "cli", "cli/chart"];
+const CRATES: [&str; 8] =
+    ["format", "scene/gaussians", "scene/files", "decoder", "encoder", "stream", "cli", "cli/chart"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()

@@ -3,7 +3,7 @@
 //! * [`camera`]: pinhole cameras, read from the JSON files in use or made for a scene that has none;
 //! * [`rasterise`]: a frame of Gaussians to a picture, as 3D Gaussian splatting defines it;
 //! * [`ReferencePictures`]: a frame as cameras see it, to compare other frames with;
-//! * [`render_strips`]: strips of a picture, which show nearly the errors of all of it;
+//! * [`PreparedFrame::strips`]: strips of a picture, which show nearly the errors of all of it;
 //! * [`contribution`]: how much each Gaussian shows in a set of views;
 //! * [`metrics`]: PSNR, SSIM, a learned metric, and the mean difference of two rate-distortion curves.
 //!
@@ -25,5 +25,5 @@ mod reference;
 
 pub use camera::Camera;
 pub use image::Image;
-pub use rasterise::{Rendering, Strips, render, render_strips, touching};
+pub use rasterise::{PreparedFrame, Rendering, Strips, render};
 pub use reference::ReferencePictures;

@@ -13,7 +13,7 @@ use crate::camera::Camera;
 use crate::image::Image;
 pub(crate) use project::Shapes;
 pub(crate) use project::Splat;
-use project::project;
+use project::{project, touching};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::TileRows;
@@ -39,39 +39,47 @@ pub struct Rendering {
 /// not finite, are left out.
 /// Gaussians at one depth are drawn in the order of the frame.
 pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> Rendering {
-    draw(frame, camera, background, (Strips::ALL, pulp::Arch::new()))
+    PreparedFrame::new(frame).strips(camera, background, Strips::ALL)
 }
 
-/// Draws some strips of a picture, one below the other. Each pixel is as in the whole picture.
-pub fn render_strips(
-    frame: &GaussianFrame,
-    camera: &Camera,
-    background: [f32; 3],
-    strips: Strips,
-) -> Rendering {
-    draw(frame, camera, background, (strips, pulp::Arch::new()))
+/// A frame, and what is the same of it in all views, worked out once.
+pub struct PreparedFrame<'a> {
+    frame: &'a GaussianFrame,
+    shapes: Shapes,
 }
 
-/// The Gaussians that may touch some strips of a picture, by rising row: a frame of these draws the same strips.
-pub fn touching(frame: &GaussianFrame, camera: &Camera, strips: Strips) -> Vec<u32> {
-    let strips = strips.within((camera.height as usize).div_ceil(TILE));
-    let splats = project(frame, &Shapes::of(frame), &Sight { strips, ..Sight::of(camera) });
-    let mut rows: Vec<u32> = splats.into_iter().map(|splat| splat.gaussian).collect();
-    rows.par_sort_unstable();
-    rows
+impl<'a> PreparedFrame<'a> {
+    /// Prepares a frame to be drawn.
+    #[must_use]
+    pub fn new(frame: &'a GaussianFrame) -> Self {
+        Self { frame, shapes: Shapes::of(frame) }
+    }
+
+    /// Draws some strips of a picture, one below the other. Each pixel is as in the [whole picture](render).
+    #[must_use]
+    pub fn strips(&self, camera: &Camera, background: [f32; 3], strips: Strips) -> Rendering {
+        draw(self, camera, background, (strips, pulp::Arch::new()))
+    }
+
+    /// The Gaussians that touch some strips of a picture, by rising row: a frame of these draws the same strips.
+    #[must_use]
+    pub fn touching(&self, camera: &Camera, strips: Strips) -> Vec<u32> {
+        let strips = strips.within((camera.height as usize).div_ceil(TILE));
+        touching(self.frame, &self.shapes, &Sight { strips, ..Sight::of(camera) })
+    }
 }
 
 /// Draws with the instructions of `arch`, which change nothing but the time.
 #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
 fn draw(
-    frame: &GaussianFrame,
+    prepared: &PreparedFrame<'_>,
     camera: &Camera,
     background: [f32; 3],
     (strips, arch): (Strips, pulp::Arch),
 ) -> Rendering {
     let (width, height) = (camera.width as usize, camera.height as usize);
     let strips = strips.within(height.div_ceil(TILE));
-    let view = View::new(frame, &Shapes::of(frame), &Sight { strips, ..Sight::of(camera) });
+    let view = View::new(prepared.frame, &prepared.shapes, &Sight { strips, ..Sight::of(camera) });
     let rows: Vec<usize> = strips.rows(height.div_ceil(TILE)).collect();
     let lines: usize = rows.iter().map(|row| TILE.min(height - row * TILE)).sum();
     let mut pixels = vec![[0.0; 3]; width * lines];
@@ -209,7 +217,8 @@ mod tests {
     fn vector_instructions_draw_the_same_bits_as_plain_ones() {
         let frame = BuiltinScene { gaussians: 5_000, ..BuiltinScene::default() }.frame(0);
         for camera in ring(&frame, Up::default(), 2, 133) {
-            let plain = draw(&frame, &camera, [0.5; 3], (Strips::ALL, pulp::Arch::Scalar));
+            let plain =
+                draw(&PreparedFrame::new(&frame), &camera, [0.5; 3], (Strips::ALL, pulp::Arch::Scalar));
             assert_eq!(render(&frame, &camera, [0.5; 3]), plain);
         }
     }
@@ -220,7 +229,7 @@ mod tests {
         for (camera, first) in ring(&frame, Up::default(), 3, 133).iter().zip(0..) {
             let whole = render(&frame, camera, [0.5; 3]);
             let strips = Strips { first, every: 4 };
-            let drawn = render_strips(&frame, camera, [0.5; 3], strips);
+            let drawn = PreparedFrame::new(&frame).strips(camera, [0.5; 3], strips);
             let line = camera.width as usize * TILE;
             let chunks: Vec<&[[f32; 3]]> = whole.colour.pixels().chunks(line).collect();
             let expected: Vec<[f32; 3]> =

@@ -22,6 +22,8 @@ pub mod package;
 pub mod qoe;
 mod representation;
 pub mod segments;
+#[cfg(feature = "server")]
+pub mod server;
 pub mod simulation;
 pub mod unpackage;
 

@@ -1,5 +1,5 @@
-//! C.2 to C.6: another reader of ISO BMFF finds in the files what the annex says. The requirements that a test is about
-//! stand before it; `conformance/coverage/carriage.csv` is made of them.
+//! C.2 to C.6: another reader of ISO BMFF finds in the files what the annex says. What tests cover
+//! stands before them; `conformance/coverage/carriage.csv` is made of it.
 #![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
 
 mod common;
@@ -23,7 +23,7 @@ fn division() -> Division {
     Division::of(&worked_example(), &Limits::default()).unwrap()
 }
 
-/// SS-CR-003, SS-CR-019.
+// covers: SS-CR-003, SS-CR-019
 #[test]
 fn boxes_come_in_the_order_of_the_annex() {
     for layout in BOTH {
@@ -42,7 +42,7 @@ fn boxes_come_in_the_order_of_the_annex() {
     assert_eq!(files[0].body("gssT").unwrap(), [&[0; 4], &stream[tail..]].concat());
 }
 
-/// SS-CR-008, SS-CR-009, SS-CR-010.
+// covers: SS-CR-008, SS-CR-009, SS-CR-010
 #[test]
 fn the_movie_has_a_track_for_each_refinement() {
     let (stream, division) = (worked_example(), division());
@@ -66,7 +66,7 @@ fn the_movie_has_a_track_for_each_refinement() {
     }
 }
 
-/// SS-CR-011.
+// covers: SS-CR-011
 #[test]
 fn every_track_is_a_level() {
     for file in read_all(Layout::Gop) {
@@ -79,7 +79,7 @@ fn every_track_is_a_level() {
     }
 }
 
-/// SS-CR-004, SS-CR-006, SS-CR-007, SS-CR-012, SS-CR-013.
+// covers: SS-CR-004, SS-CR-006, SS-CR-007, SS-CR-012, SS-CR-013
 #[test]
 fn samples_are_the_pieces_of_their_frames() {
     let (stream, division) = (worked_example(), division());
@@ -121,7 +121,7 @@ fn samples_are_the_pieces_of_their_frames() {
     }
 }
 
-/// SS-CR-015, SS-CR-016, SS-CR-018.
+// covers: SS-CR-015, SS-CR-016, SS-CR-018
 #[test]
 fn indices_lead_to_subsegments_and_their_levels() {
     let division = division();
@@ -162,7 +162,7 @@ fn indices_lead_to_subsegments_and_their_levels() {
     }
 }
 
-/// SS-CR-017.
+// covers: SS-CR-017
 #[test]
 fn a_gop_that_is_too_large_becomes_several_subsegments() {
     let stream = worked_example();
@@ -207,7 +207,7 @@ fn with_private_unit(length: usize) -> Vec<u8> {
     out
 }
 
-/// SS-CR-018.
+// covers: SS-CR-018
 #[test]
 fn a_level_of_more_than_24_bits_has_several_ranges() {
     let stream = with_private_unit(40_000_000);

@@ -19,7 +19,7 @@ fn number(node: &Node<'_, '_>, attribute: &str) -> u64 {
     node.attribute(attribute).unwrap().parse().unwrap()
 }
 
-/// SS-CR-020, SS-CR-021, SS-CR-023, SS-CR-024.
+// covers: SS-CR-020, SS-CR-021, SS-CR-023, SS-CR-024
 #[test]
 fn the_mpd_has_the_elements_of_the_schema_in_their_order() {
     let stream = worked_example();
@@ -55,7 +55,36 @@ fn the_mpd_has_the_elements_of_the_schema_in_their_order() {
     }
 }
 
-/// SS-CR-022.
+// covers: SS-CR-020, SS-CR-021, SS-CR-022, SS-CR-024
+#[test]
+fn another_reader_of_mpds_finds_the_layers() {
+    let stream = worked_example();
+    let package = package(&stream, &Options::default());
+    let mpd = dash_mpd_core::parse(&package.mpd).unwrap();
+    assert_eq!(mpd.mpdtype.as_deref(), Some("static"));
+    let set = &mpd.periods[0].adaptations[0];
+    assert_eq!(set.mimeType.as_deref(), Some("application/mp4"));
+    assert_eq!(set.essential_property.len(), 1);
+    assert_eq!(set.representations.len(), package.manifest.representations.len());
+    for (read, info) in set.representations.iter().zip(&package.manifest.representations) {
+        assert_eq!((read.id.as_deref(), read.bandwidth), (Some(info.id.as_str()), Some(info.bandwidth)));
+        assert_eq!(read.dependencyId.clone().unwrap_or_default(), info.depends_on.join(" "));
+        assert_eq!(read.BaseURL[0].base, info.file);
+        let range = read.SegmentBase.as_ref().unwrap().indexRange.clone().unwrap();
+        let index = info.index.as_ref().unwrap();
+        assert_eq!(range, format!("{}-{}", index.offset, index.offset + index.size - 1));
+        let bandwidths: Vec<u64> =
+            read.SubRepresentation.iter().map(|level| level.bandwidth.unwrap()).collect();
+        assert_eq!(bandwidths, info.level_bandwidths);
+        for (number, level) in (1..).zip(&read.SubRepresentation) {
+            let below: Vec<String> = (1..number).map(|below| below.to_string()).collect();
+            assert_eq!(level.level, Some(number));
+            assert_eq!(level.dependencyLevel.clone().unwrap_or_default(), below.join(" "));
+        }
+    }
+}
+
+// covers: SS-CR-022
 #[test]
 fn bandwidths_of_levels_add_up_to_those_of_representations() {
     let stream = worked_example();
@@ -87,7 +116,7 @@ fn value(manifest: &Manifest) -> Value {
     serde_json::from_str(&manifest.to_json()).unwrap()
 }
 
-/// SS-CR-025.
+// covers: SS-CR-025
 #[test]
 fn ranges_of_the_manifest_are_those_of_the_files() {
     let schema: Value = serde_json::from_str(include_str!("../manifest.schema.json")).unwrap();
@@ -150,7 +179,7 @@ const NONSENSE: &[(&str, &str, &str)] = &[
     ("/stream/bytes", "1e99", "line 1"),
 ];
 
-/// SS-CR-026.
+// covers: SS-CR-026
 #[test]
 fn a_manifest_that_cannot_be_true_is_refused() {
     let stream = worked_example();
@@ -171,7 +200,7 @@ fn a_manifest_that_cannot_be_true_is_refused() {
     assert!(Manifest::parse(deep.as_bytes()).is_err());
 }
 
-/// SS-CR-001, SS-CR-005.
+// covers: SS-CR-001, SS-CR-005
 #[test]
 fn units_out_of_order_are_refused() {
     let stream = worked_example();

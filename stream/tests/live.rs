@@ -100,7 +100,7 @@ fn comes_back(stream: &[u8], layout: Layout, size: usize) -> Directory {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(128) })]
 
-    /// SS-CR-027.
+    // covers: SS-CR-027
     #[test]
     fn every_stream_comes_back_from_its_segments(
         seed in proptest::collection::vec(any::<u8>(), 0..6000),
@@ -112,7 +112,7 @@ proptest! {
     }
 }
 
-/// SS-CR-027.
+// covers: SS-CR-027
 #[test]
 fn every_conforming_vector_comes_back_from_its_segments() {
     for path in vectors().into_iter().filter(|path| is_conforming(path)) {
@@ -123,7 +123,7 @@ fn every_conforming_vector_comes_back_from_its_segments() {
     }
 }
 
-/// SS-CR-028, SS-CR-029.
+// covers: SS-CR-028, SS-CR-029
 #[test]
 fn the_mpd_is_dynamic_until_the_stream_ends() {
     let stream = worked_example();
@@ -140,7 +140,7 @@ fn the_mpd_is_dynamic_until_the_stream_ends() {
     }
 }
 
-/// SS-CR-027.
+// covers: SS-CR-027
 #[test]
 fn a_frame_is_written_before_the_next_one_is_complete() {
     let stream = worked_example();

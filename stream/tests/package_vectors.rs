@@ -276,7 +276,7 @@ fn valid() -> Vec<(String, String, Vec<u8>, Layout)> {
     all
 }
 
-/// SS-CR-002, SS-CR-003.
+// covers: SS-CR-002, SS-CR-003
 #[test]
 fn valid_packages_are_made_and_unpackaged_as_recorded() {
     for (name, purpose, stream, layout) in valid() {
@@ -299,7 +299,7 @@ fn valid_packages_are_made_and_unpackaged_as_recorded() {
     }
 }
 
-/// SS-CR-003, SS-CR-004, SS-CR-006, SS-CR-007, SS-CR-008, SS-CR-009, SS-CR-010, SS-CR-012, SS-CR-014, SS-CR-019, SS-CR-030.
+// covers: SS-CR-003, SS-CR-004, SS-CR-006, SS-CR-007, SS-CR-008, SS-CR-009, SS-CR-010, SS-CR-012, SS-CR-014, SS-CR-019, SS-CR-030
 #[test]
 fn packages_with_a_fault_are_refused_as_recorded() {
     let stream = worked_example();

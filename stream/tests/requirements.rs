@@ -1,4 +1,4 @@
-//! Every requirement of annex C has a test: those that stand before it. `BLESS=1` writes the table of
+//! Every requirement of annex C has a test that says it covers it. `BLESS=1` writes the table of
 //! `conformance/coverage/carriage.csv` again.
 #![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
 
@@ -19,12 +19,12 @@ fn requirements(annex: &str) -> Vec<(String, String)> {
     found
 }
 
-/// The tests that stand under each requirement.
+/// The tests that say they cover each requirement.
 fn cited(source: &str, tests: &mut BTreeMap<String, Vec<String>>) {
     let mut waiting = Vec::new();
     for line in source.lines().map(str::trim_start) {
-        if let Some(comment) = line.strip_prefix("/// ") {
-            let words = comment.split([',', ' ', '.']).filter(|word| word.starts_with("SS-CR-"));
+        if let Some(comment) = line.strip_prefix("// covers:") {
+            let words = comment.split([',', ' ']).filter(|word| word.starts_with("SS-CR-"));
             waiting.extend(words.map(str::to_owned));
         } else if let Some(rest) = line.strip_prefix("fn ") {
             let name = rest.split(['(', '<']).next().unwrap();

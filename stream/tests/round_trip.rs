@@ -45,7 +45,7 @@ fn check(stream: &[u8]) -> Result<usize, splatstream_format::Error> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(192) })]
 
-    /// SS-CR-002.
+    // covers: SS-CR-002
     #[test]
     fn every_stream_that_obeys_the_syntax_comes_back(seed in proptest::collection::vec(any::<u8>(), 0..6000)) {
         let stream = ArbitraryStream::arbitrary(&mut Unstructured::new(&seed)).unwrap().to_bytes().unwrap();
@@ -78,7 +78,7 @@ proptest! {
     }
 }
 
-/// SS-CR-001, SS-CR-002.
+// covers: SS-CR-001, SS-CR-002
 #[test]
 fn every_vector_that_is_packaged_comes_back() {
     let (mut whole, mut refused) = (0, 0);

@@ -31,7 +31,7 @@ fn fetched(package: &Package<'_>, wants: impl Fn(&Place) -> bool, refinement: us
     samples.into_iter().fold(head, |stream, (_, units)| [stream, units].concat())
 }
 
-/// SS-CR-004, SS-CR-018.
+// covers: SS-CR-004, SS-CR-018
 #[test]
 fn ranges_hold_the_units_of_operating_points() {
     for path in vectors().into_iter().filter(|path| is_conforming(path)).step_by(5) {

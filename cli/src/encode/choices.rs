@@ -128,6 +128,9 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
         Importance::Contribution => {
             ("contribution", "transmittance times alpha over the pixels of all views")
         }
+        Importance::Footprint => {
+            ("footprint", "opacity squared times the pixels covered, mean of all views, whatever hides it")
+        }
         Importance::Volume => ("volume", "opacity times volume, no views"),
     };
     let views = match (report.importance?, settings.cameras.len()) {

@@ -4,7 +4,7 @@ use crate::common::dynamic::{predicted, scene};
 use crate::common::{decoded, encoded, frame_of, strict};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Fidelity, Quality, Report, Settings, Steps, Structure};
+use splatstream_encoder::{Fidelity, Importance, Quality, Report, Settings, Steps, Structure};
 use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_format::syntax::FrameType;
 use splatstream_gaussians::GaussianFrame;
@@ -23,6 +23,7 @@ fn by_pictures(frames: &[GaussianFrame]) -> Settings {
         steps: Quality::Medium.steps(),
         cameras: spiral(&frames[0], Up::default(), VIEWS, LINES),
         fidelity: Some(Fidelity::Pictures),
+        importance: Some(Importance::Contribution),
         ..predicted(1)
     }
 }

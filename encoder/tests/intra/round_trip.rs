@@ -28,6 +28,7 @@ fn settings() -> impl Strategy<Value = Settings> {
         Just(None),
         Just(Some(Importance::Removal)),
         Just(Some(Importance::Contribution)),
+        Just(Some(Importance::Footprint)),
         Just(Some(Importance::Volume))
     ];
     // Two small pictures: what they show does not matter here.

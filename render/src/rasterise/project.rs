@@ -75,13 +75,11 @@ pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>)
     let view = View::new(frame, shapes, sight);
     let count = sight.rows.map_or(frame.len(), <[u32]>::len);
     let starts: Vec<usize> = (0..count).step_by(CHUNK).collect();
-    let chunks: Vec<Vec<(f32, Splat)>> = starts
-        .par_iter()
-        .map(|&start| {
-            let places = start..count.min(start + CHUNK);
-            pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows: sight.rows, places })
-        })
-        .collect();
+    let chunk = |&start: &usize| {
+        let places = start..count.min(start + CHUNK);
+        pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows: sight.rows, places })
+    };
+    let chunks: Vec<Vec<(f32, Splat)>> = starts.par_iter().map(chunk).collect();
     // Positive floats order as their bits; equal depths keep the order of the frame.
     let key = |((depth, _), place): (&(f32, Splat), usize)| u64::from(depth.to_bits()) << 32 | place as u64;
     let places = starts.iter().zip(&chunks).flat_map(|(&start, chunk)| chunk.iter().zip(start..));
@@ -92,6 +90,13 @@ pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>)
         chunks[place / CHUNK][place % CHUNK].1
     };
     keys.par_iter().map(splat).collect()
+}
+
+/// The Gaussians of a whole frame that touch the picture, by rising row.
+pub(crate) fn touching(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Vec<u32> {
+    let view = View::new(frame, shapes, sight);
+    let rows = (0..frame.len()).into_par_iter().with_min_len(CHUNK);
+    rows.filter(|&row| view.ellipse(row).is_some()).map(|row| row as u32).collect()
 }
 
 /// Projects some Gaussians: places of the rows, or of the frame where there are none.
@@ -109,7 +114,9 @@ impl WithSimd for ProjectChunk<'_> {
         let row = |place: usize| self.rows.map_or(place, |rows| rows[place] as usize);
         let mut splats = Vec::new();
         for place in self.places {
-            splats.extend(self.view.project(row(place)));
+            if let Some((offset, depth, splat)) = self.view.ellipse(row(place)) {
+                splats.push((depth, Splat { colour: self.view.colour(row(place), offset), ..splat }));
+            }
         }
         splats
     }
@@ -160,9 +167,9 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Depth and ellipse of a Gaussian; none if it cannot be seen.
+    /// A Gaussian from the camera, its depth, and its ellipse without colour; none if it cannot be seen.
     #[inline(always)]
-    fn project(&self, row: usize) -> Option<(f32, Splat)> {
+    fn ellipse(&self, row: usize) -> Option<(Vec3, f32, Splat)> {
         let offset = Vec3::from(self.frame.position().each_ref().map(|plane| plane[row])) - self.position;
         let at = self.to_camera * offset;
         if at.z.is_nan() || at.z < self.near || self.is_outside(at, self.shapes.longest[row]) {
@@ -202,10 +209,10 @@ impl<'a> View<'a> {
             yy: -0.5 * LOG2_E / tall,
             peak,
             extent,
-            colour: self.colour(row, offset),
+            colour: [0.0; 3],
             gaussian: row as u32,
         };
-        Some((at.z, splat))
+        Some((offset, at.z, splat))
     }
 
     /// Whether a Gaussian surely touches nothing that is drawn: by a circle around it in which it is, with room for

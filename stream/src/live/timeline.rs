@@ -86,9 +86,29 @@ impl Timeline {
         is_end: bool,
     ) -> Option<String> {
         let (header, sequence) = self.sequence.as_ref()?;
+        let representations = self.described(representations, Clock::of(sequence));
+        let manifest = Manifest {
+            format: Manifest::FORMAT.to_owned(),
+            version: Manifest::VERSION,
+            stream: StreamInfo::of(header, sequence, self.gops.last()),
+            layout: layout.name().to_owned(),
+            representations,
+            gops: self.gops.clone(),
+            quality: None,
+        };
+        let growing = self.growing.as_ref();
+        Some(mpd::of(&manifest, Segments::Numbered { started, now, is_end, growing }))
+    }
+
+    /// What the MPD says of each Representation.
+    fn described(
+        &self,
+        representations: impl Iterator<Item = Representation>,
+        clock: Clock,
+    ) -> Vec<RepresentationInfo> {
         let mut described: Vec<RepresentationInfo> = Vec::new();
         for (representation, cost) in representations.zip(&self.costs) {
-            let rates = self.rates(cost, Clock::of(sequence));
+            let rates = self.rates(cost, clock);
             let own = rates.iter().map(|rate| (*rate).max(1)).fold(0, u64::saturating_add);
             let before = described.last().map_or(0, |last| last.bandwidth);
             let depends_on = described.iter().map(|earlier| earlier.id.clone()).collect();
@@ -108,17 +128,7 @@ impl Timeline {
                 tail: None,
             });
         }
-        let manifest = Manifest {
-            format: Manifest::FORMAT.to_owned(),
-            version: Manifest::VERSION,
-            stream: StreamInfo::of(header, sequence, self.gops.last()),
-            layout: layout.name().to_owned(),
-            representations: described,
-            gops: self.gops.clone(),
-            quality: None,
-        };
-        let growing = self.growing.as_ref();
-        Some(mpd::of(&manifest, Segments::Numbered { started, now, is_end, growing }))
+        described
     }
 
     /// The rates of a Representation, with what the GOP in progress has taken so far.

@@ -1,11 +1,12 @@
 //! What must hold of a manifest, so that a reader can act on it.
 
 use super::{
-    ByteRange, CLAUSE, GopInfo, LevelInfo, Manifest, ManifestError, RepresentationInfo, SubsegmentInfo,
+    ByteRange, CLAUSE, FrameInfo, GopInfo, LevelInfo, Manifest, ManifestError, RepresentationInfo,
+    SubsegmentInfo,
 };
 use crate::package::Layout;
 use crate::representation::Representation;
-use splatstream_format::syntax::{MAX_LAYERS, MAX_REFINEMENTS};
+use splatstream_format::syntax::{GopHeader, MAX_LAYERS, MAX_REFINEMENTS};
 use std::collections::HashMap;
 
 type Result = core::result::Result<(), ManifestError>;
@@ -143,12 +144,14 @@ impl Manifest {
             return demand(false, || format!("{}.representation", at()), "unknown");
         };
         let last = u64::from(gop.first_frame).saturating_add(gop.frame_count.into());
+        let header = match gop.predicted {
+            true => GopHeader::predicted(gop.index, gop.frame_count, gop.temporal_depth),
+            false => GopHeader::intra(gop.index, gop.frame_count),
+        };
         let mut next = gop.first_frame.into();
         for frame in &subsegment.frames {
             let within = (next..last).contains(&u64::from(frame.frame));
-            let known = ["I", "P", "B"].contains(&frame.frame_type.as_str());
-            let earlier = frame.reference.is_none_or(|of| (gop.first_frame..frame.frame).contains(&of));
-            let holds = within && known && earlier && frame.temporal_layer < self.stream.temporal_layers;
+            let holds = within && *frame == FrameInfo::of(&header, gop.first_frame, frame.frame);
             demand(holds, || format!("{}.frames", at()), format!("frame {} cannot be here", frame.frame))?;
             next = u64::from(frame.frame).saturating_add(1);
         }

@@ -8,7 +8,7 @@ use crate::manifest::{
     SubsegmentInfo, UnitCount, digest_of,
 };
 use crate::representation::Representation;
-use splatstream_format::syntax::{FileHeader, FrameType, SPECIFICATION, SequenceParameters};
+use splatstream_format::syntax::{FileHeader, FrameType, GopHeader, SPECIFICATION, SequenceParameters};
 
 /// Collects what the files are.
 pub(crate) struct Describer<'a> {
@@ -181,7 +181,8 @@ fn describe(
     file: &mut Growing,
     stream: &[u8],
 ) -> SubsegmentInfo {
-    let frames = subsegment.frames.iter().map(|&frame| frame_info(gop, frame)).collect();
+    let frames =
+        subsegment.frames.iter().map(|&frame| FrameInfo::of(&gop.header, gop.first_frame, frame)).collect();
     let levels =
         (0_u8..).zip(subsegment.levels.iter().zip(percents)).map(|(refinement, (level, &percent))| {
             let bytes = file.add(chunks(level), stream);
@@ -198,18 +199,21 @@ fn chunks(level: &Level) -> Vec<Chunk> {
     std::iter::once(Chunk::Boxes(level.header.clone())).chain(parts).collect()
 }
 
-fn frame_info(gop: &Gop, frame: u32) -> FrameInfo {
-    let role = gop.header.role(frame.saturating_sub(gop.first_frame));
-    let name = match role.frame_type {
-        FrameType::Intra => "I",
-        FrameType::Predicted => "P",
-        FrameType::Enhancement => "B",
-    };
-    FrameInfo {
-        frame,
-        frame_type: name.to_owned(),
-        temporal_layer: role.temporal_layer,
-        reference: role.reference.map(|reference| gop.first_frame.saturating_add(reference)),
+impl FrameInfo {
+    /// A frame of a GOP that starts with a display index.
+    pub(crate) fn of(header: &GopHeader, first_frame: u32, frame: u32) -> Self {
+        let role = header.role(frame.saturating_sub(first_frame));
+        let name = match role.frame_type {
+            FrameType::Intra => "I",
+            FrameType::Predicted => "P",
+            FrameType::Enhancement => "B",
+        };
+        Self {
+            frame,
+            frame_type: name.to_owned(),
+            temporal_layer: role.temporal_layer,
+            reference: role.reference.map(|reference| first_frame.saturating_add(reference)),
+        }
     }
 }
 
