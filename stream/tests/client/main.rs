@@ -3,6 +3,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod live;
+mod network;
 mod server;
 
 use common::{files, is_conforming, package, vectors};
@@ -17,6 +19,7 @@ use splatstream_stream::package::{Layout, Options as Packaging, Package};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// A stream of several GOPs with three temporal layers.
@@ -33,9 +36,14 @@ fn vector(name: &str) -> Vec<u8> {
 fn served(stream: &[u8], layout: Layout) -> BTreeMap<String, Vec<u8>> {
     let mut package = package(stream, &Packaging { layout, ..Packaging::default() });
     let mut served: BTreeMap<String, Vec<u8>> = files(&package).into_iter().collect();
-    package.manifest.stream.ticks_per_frame = package.manifest.stream.ticks_per_second;
+    frame_lasts(&mut package.manifest, 1000);
     served.insert(Package::MANIFEST.to_owned(), package.manifest.to_json().into_bytes());
     served
+}
+
+/// Makes every frame last some milliseconds.
+fn frame_lasts(manifest: &mut Manifest, milliseconds: u32) {
+    (manifest.stream.ticks_per_second, manifest.stream.ticks_per_frame) = (1000, milliseconds);
 }
 
 fn options() -> Options {
@@ -188,34 +196,42 @@ fn is_range(request: &Request, file: &str) -> bool {
 
 #[test]
 fn passing_faults_cost_nothing() {
-    let faults: [fn(&Request) -> Answer; 7] = [
-        |_| Answer::Short(10),
+    let faults: [fn(&Request) -> Answer; 8] = [
         |_| Answer::Flip,
-        |_| Answer::Reset,
-        |_| Answer::Status(500),
         |_| Answer::Whole,
         |_| Answer::Other,
+        |_| Answer::Short(10),
+        |_| Answer::Short(usize::MAX),
+        |_| Answer::Reset,
+        |_| Answer::Status(500),
         |_| Answer::Late(Duration::from_millis(900)),
     ];
-    for (kind, fault) in faults.into_iter().enumerate() {
-        for file in ["s0.mp4", "t0.mp4", "manifest.json"] {
-            let done = std::sync::atomic::AtomicBool::new(false);
-            let stream = mixed();
-            let is_manifest = file == "manifest.json";
-            if is_manifest && [1, 4, 5].contains(&kind) {
-                continue;
+    // What goes wrong is waited for: all at the same time.
+    std::thread::scope(|scope| {
+        for (kind, fault) in faults.into_iter().enumerate() {
+            scope.spawn(move || pass(kind, fault, "s0.mp4"));
+            scope.spawn(move || pass(kind, fault, "t0.mp4"));
+            // Ranges and digests are not of the manifest.
+            if kind > 2 {
+                scope.spawn(move || pass(kind, fault, Package::MANIFEST));
             }
-            let (outcome, _server) = play_from(&stream, move |request| {
-                let hit = if is_manifest { request.file == file } else { is_range(request, file) };
-                let first = hit && !done.swap(true, std::sync::atomic::Ordering::SeqCst);
-                if first { fault(request) } else { Answer::Well }
-            });
-            assert!(outcome.report.complete, "fault {kind} of {file}");
-            assert_eq!(named(&outcome), Vec::<String>::new(), "fault {kind} of {file}");
-            let failures: u64 = outcome.gops.iter().map(|gop| gop.failures).sum();
-            assert_eq!(failures, u64::from(!is_manifest), "fault {kind} of {file}");
         }
-    }
+    });
+}
+
+/// The first request for media of a file, or for the manifest, fails.
+fn pass(kind: usize, fault: fn(&Request) -> Answer, file: &'static str) {
+    let done = AtomicBool::new(false);
+    let is_manifest = file == Package::MANIFEST;
+    let (outcome, _server) = play_from(&mixed(), move |request| {
+        let hit = if is_manifest { request.file == file } else { is_range(request, file) };
+        let first = hit && !done.swap(true, Ordering::SeqCst);
+        if first { fault(request) } else { Answer::Well }
+    });
+    assert!(outcome.report.complete, "fault {kind} of {file}");
+    assert_eq!(named(&outcome), Vec::<String>::new(), "fault {kind} of {file}");
+    let failures: u64 = outcome.gops.iter().map(|gop| gop.failures).sum();
+    assert_eq!(failures, u64::from(!is_manifest), "fault {kind} of {file}");
 }
 
 #[test]
@@ -238,29 +254,54 @@ fn damaged_levels_are_fetched_once_more_and_dropped() {
     );
 }
 
+/// Where the levels of the base of the second GOP begin in its file.
+fn second_base(stream: &[u8]) -> Vec<usize> {
+    let package = package(stream, &Packaging::default());
+    let base = &package.manifest.gops[1].subsegments[0];
+    assert_eq!(base.representation, "s0");
+    base.levels.iter().map(|level| level.bytes.offset as usize).collect()
+}
+
+/// How often the client asked for ranges of `s0.mp4` that begin at an offset.
+fn asked(server: &Server, first: usize) -> usize {
+    let requests = server.requests.lock().unwrap();
+    requests
+        .iter()
+        .filter(|request| request.file == "s0.mp4" && request.range.is_some_and(|range| range.0 == first))
+        .count()
+}
+
 #[test]
 fn a_lost_base_is_skipped_and_named() {
     let stream = mixed();
-    let package = package(&stream, &Packaging::default());
-    let base = &package.manifest.gops[1].subsegments[0];
-    assert_eq!(base.representation, "s0");
-    let first = base.levels[0].bytes.offset as usize;
+    let first = second_base(&stream)[0];
+    for status in [502, 404] {
+        let behaviour = move |request: &Request| match request.range {
+            Some((start, _)) if request.file == "s0.mp4" && start == first => Answer::Status(status),
+            _ => Answer::Well,
+        };
+        let (outcome, server) = play_from(&stream, behaviour);
+        assert_eq!(named(&outcome), [format!("1 s0 r0: the server answers with status {status}")]);
+        assert!(outcome.gops[1].shown.is_none() && !outcome.report.complete);
+        assert_eq!(outcome.report.shown.len(), outcome.gops.len() - 1);
+        assert_eq!(asked(&server, first), 8);
+    }
+}
+
+#[test]
+fn levels_that_arrived_before_a_fault_are_not_fetched_again() {
+    let stream = mixed();
+    let starts = second_base(&stream);
+    let (first, length) = (starts[0], starts[1] - starts[0]);
     let behaviour = move |request: &Request| match request.range {
-        Some((start, _)) if request.file == "s0.mp4" && start == first => Answer::Status(502),
+        Some((start, last)) if request.file == "s0.mp4" && start == first && last > first + length => {
+            Answer::Short(length + 10)
+        }
         _ => Answer::Well,
     };
     let (outcome, server) = play_from(&stream, behaviour);
-    assert_eq!(named(&outcome), ["1 s0 r0: the server answers with status 502"]);
-    assert!(outcome.gops[1].shown.is_none() && !outcome.report.complete);
-    assert_eq!(outcome.report.shown.len(), outcome.gops.len() - 1);
-    let tried = server
-        .requests
-        .lock()
-        .unwrap()
-        .iter()
-        .filter(|request| request.range.is_some_and(|range| range.0 == first))
-        .count();
-    assert_eq!(tried, 8);
+    assert_eq!((named(&outcome), outcome.gops[1].failures), (Vec::new(), 1));
+    assert_eq!(starts.iter().map(|&start| asked(&server, start)).collect::<Vec<_>>(), [1, 1]);
 }
 
 #[test]

@@ -24,7 +24,7 @@ pub(crate) struct Request {
 pub(crate) enum Answer {
     Well,
     Status(u16),
-    /// So many bytes of the body, and the end of the connection.
+    /// So many bytes of the body but not the last, and the end of the connection.
     Short(usize),
     /// One bit of the body is another one.
     Flip,
@@ -148,7 +148,7 @@ fn answer(mut stream: &TcpStream, request: &Request, answer: Answer, content: &M
         Answer::Reset => return None,
         Answer::Late(time) => std::thread::sleep(time),
         Answer::Flip => *body.last_mut()? ^= 1,
-        Answer::Short(bytes) => body.truncate(bytes),
+        Answer::Short(bytes) => body.truncate(bytes.min(length - 1)),
         _ => {}
     }
     write!(stream, "HTTP/1.1 {head}\r\nETag: {tag}\r\nContent-Length: {length}\r\n\r\n").ok()?;
