@@ -32,6 +32,8 @@ pub(crate) enum Answer {
     Reset,
     /// After this time.
     Late(Duration),
+    /// A byte of the body after the other, with this time before each.
+    Slow(Duration),
     /// Without regard to ranges.
     Whole,
     /// Another range, of the same length.
@@ -152,6 +154,13 @@ fn answer(mut stream: &TcpStream, request: &Request, answer: Answer, content: &M
         _ => {}
     }
     write!(stream, "HTTP/1.1 {head}\r\nETag: {tag}\r\nContent-Length: {length}\r\n\r\n").ok()?;
+    if let Answer::Slow(pause) = answer {
+        for byte in &body {
+            std::thread::sleep(pause);
+            stream.write_all(&[*byte]).ok()?;
+        }
+        return Some(());
+    }
     stream.write_all(&body).ok()?;
     (body.len() == length).then_some(())
 }
