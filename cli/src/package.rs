@@ -36,7 +36,7 @@ pub(crate) struct PackageStream {
     #[arg(long)]
     live: bool,
     /// Measure what every operating point of every GOP looks like against everything, for players: PSNR and SSIM of
-    /// pictures of two of its frames go to the manifest.
+    /// pictures of its I frame and of a frame of each temporal layer go to the manifest.
     #[arg(long, conflicts_with = "live")]
     quality: bool,
     /// Replace a package that is in the directory.

@@ -1,4 +1,4 @@
-//! What operating points look like, for players: pictures of some frames of every GOP, against everything decoded.
+//! What operating points look like, for players: pictures of frames of every GOP, against everything decoded.
 
 use crate::cameras::CameraArgs;
 use crate::failure::Failure;
@@ -15,6 +15,7 @@ use splatstream_render::metrics::{Comparison, compare};
 use splatstream_render::{Camera, Rendering, render};
 use splatstream_stream::division::Division;
 use splatstream_stream::manifest::{GopInfo, Manifest, QualityInfo};
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 /// Rows of the pictures.
@@ -26,8 +27,8 @@ const VIEWS: usize = 2;
 /// PSNR in dB from which on nobody sees a difference; equal pictures have it.
 const MOST_DB: f64 = 50.0;
 
-/// The table of a manifest: every operating point of every GOP. The first frame of a GOP and the one in its middle are
-/// drawn; at points without a frame the one before stands still.
+/// The table of a manifest: every operating point of every GOP. The I frame of a GOP and a frame of each temporal layer are
+/// drawn, each for all of its kind; at points without a frame the one before stands still.
 pub(super) fn measure(
     stream: &StreamFile,
     manifest: &Manifest,
@@ -50,7 +51,7 @@ pub(super) fn measure(
         let references: Vec<Vec<Rendering>> = whole.iter().map(draw).collect();
         let row = |point: &OperatingPoint| {
             let pictures = decode(*point)?.iter().map(draw).collect::<Vec<_>>();
-            Ok(quality(*point, number, &references, &pictures))
+            Ok(quality(*point, number, &wanted, (&references, &pictures)))
         };
         table.extend(points.par_iter().map(row).collect::<Result<Vec<_>, Failure>>()?);
         progress.at(info.first_frame.saturating_add(info.frame_count));
@@ -70,10 +71,28 @@ fn points(manifest: &Manifest) -> Vec<OperatingPoint> {
     (0..info.spatial_layers).flat_map(of_spatial).collect()
 }
 
-/// The frames of a GOP that are drawn.
-fn samples(info: &GopInfo) -> Vec<u32> {
-    let mut samples = vec![info.first_frame, info.first_frame.saturating_add(info.frame_count / 2)];
-    samples.dedup();
+/// A frame that is drawn, and how many it stands for.
+struct Sample {
+    frame: u32,
+    count: usize,
+}
+
+/// The frames of a GOP that are drawn, in order: the middle one of the I frames and of each temporal layer.
+fn samples(info: &GopInfo) -> Vec<Sample> {
+    let mut kinds: BTreeMap<&str, Vec<u32>> = BTreeMap::new();
+    for one in &info.subsegments {
+        // Layers of I frames above the base have the same frames.
+        if one.representation == "s0" || one.representation.starts_with('t') {
+            let frames = one.frames.iter().map(|frame| frame.frame);
+            kinds.entry(&one.representation).or_default().extend(frames);
+        }
+    }
+    let sample = |mut frames: Vec<u32>| {
+        frames.sort_unstable();
+        frames.get(frames.len() / 2).map(|&frame| Sample { frame, count: frames.len() })
+    };
+    let mut samples: Vec<Sample> = kinds.into_values().filter_map(sample).collect();
+    samples.sort_by_key(|sample| sample.frame);
     samples
 }
 
@@ -81,7 +100,7 @@ fn samples(info: &GopInfo) -> Vec<u32> {
 fn decode(
     bytes: &[u8],
     gop: u64,
-    samples: &[u32],
+    samples: &[Sample],
     operating_point: OperatingPoint,
     limits: &Limits,
 ) -> Result<Vec<Option<GaussianFrame>>, Failure> {
@@ -89,7 +108,7 @@ fn decode(
     let (mut shown, mut failed) = (vec![None; samples.len()], None);
     let _summary = decode_stream_inside(bytes, gop, &options, |sequence, frame| {
         let index = frame.index;
-        if samples.iter().all(|&sample| index > sample) {
+        if samples.iter().all(|sample| index > sample.frame) {
             return ControlFlow::Break(());
         }
         if frame.is_lost {
@@ -97,7 +116,7 @@ fn decode(
         }
         match to_gaussians(frame.into_shown(), sequence) {
             Ok(gaussians) => {
-                let later = samples.iter().zip(&mut shown).filter(|(sample, _)| index <= **sample);
+                let later = samples.iter().zip(&mut shown).filter(|(sample, _)| index <= sample.frame);
                 later.for_each(|(_, shown)| *shown = Some(gaussians.clone()));
                 ControlFlow::Continue(())
             }
@@ -126,21 +145,42 @@ fn drawn(frame: Option<&GaussianFrame>, cameras: &[Camera], background: [f32; 3]
 fn quality(
     point: OperatingPoint,
     gop: u32,
-    references: &[Vec<Rendering>],
-    pictures: &[Vec<Rendering>],
+    samples: &[Sample],
+    (references, pictures): (&[Vec<Rendering>], &[Vec<Rendering>]),
 ) -> QualityInfo {
-    let pairs =
-        references.iter().zip(pictures).flat_map(|(references, pictures)| references.iter().zip(pictures));
-    // Of pictures that show nothing nothing can be said.
-    let seen = pairs.filter(|(reference, _)| reference.alpha.iter().any(|&alpha| alpha > 0.0));
-    let compared: Vec<Comparison> = seen
-        .map(|(reference, picture)| compare(&reference.colour, &reference.alpha, &picture.colour, None))
+    let pairs = samples.iter().zip(references.iter().zip(pictures));
+    let compared: Vec<(f64, f64, Option<f64>)> = pairs
+        .filter_map(|(sample, (references, pictures))| {
+            let mean = compared(references, pictures)?;
+            Some((sample.count as f64, mean.psnr_db.min(MOST_DB), mean.ssim))
+        })
         .collect();
-    let mean = Comparison::mean(&compared);
+    let psnr = mean(compared.iter().map(|(count, psnr, _)| (*count, *psnr)));
+    let ssim = mean(compared.iter().filter_map(|(count, _, ssim)| Some((*count, (*ssim)?))));
     QualityInfo {
         point: point.to_string(),
         gop: Some(gop),
-        psnr_db: mean.as_ref().map(|mean| (mean.psnr_db.min(MOST_DB) * 1000.0).round() / 1000.0),
-        ssim: mean.and_then(|mean| mean.ssim).map(|ssim| (ssim * 1e5).round() / 1e5),
+        psnr_db: psnr.map(|psnr| (psnr * 1000.0).round() / 1000.0),
+        ssim: ssim.map(|ssim| (ssim * 1e5).round() / 1e5),
     }
+}
+
+/// The views of a frame against those of another one.
+fn compared(references: &[Rendering], pictures: &[Rendering]) -> Option<Comparison> {
+    // Of pictures that show nothing nothing can be said.
+    let seen = references
+        .iter()
+        .zip(pictures)
+        .filter(|(reference, _)| reference.alpha.iter().any(|&alpha| alpha > 0.0));
+    let of_views: Vec<Comparison> = seen
+        .map(|(reference, picture)| compare(&reference.colour, &reference.alpha, &picture.colour, None))
+        .collect();
+    Comparison::mean(&of_views)
+}
+
+/// The mean of some values with weights; none of nothing.
+fn mean(values: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let (weight, sum) =
+        values.fold((0.0, 0.0), |(weight, sum), (own, value)| (weight + own, sum + own * value));
+    (weight > 0.0).then(|| sum / weight)
 }

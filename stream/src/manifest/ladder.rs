@@ -183,6 +183,7 @@ fn named(name: &str) -> Option<OperatingPoint> {
 mod tests {
     use super::super::QualityInfo;
     use super::*;
+    use crate::control::{Decision, Layered, Session, Settings};
     use crate::package::{Options, Package};
     use splatstream_format::Limits;
 
@@ -261,6 +262,35 @@ mod tests {
         // One point less, and all are estimates.
         manifest.quality.iter_mut().for_each(|table| table.truncate(5));
         assert_eq!(quality(&manifest, "s1,t1,r1"), Some(36.0));
+    }
+
+    #[test]
+    fn what_gains_most_by_the_table_is_fetched_first() {
+        let first = |motion: f64, refinement: f64| {
+            let mut manifest = manifest();
+            let row = |(spatial, temporal, level): (u8, u8, u8)| QualityInfo {
+                point: format!("s{spatial},t{temporal},r{level}"),
+                gop: None,
+                psnr_db: Some(20.0 + motion * f64::from(temporal) + refinement * f64::from(level)),
+                ssim: None,
+            };
+            let points = (0..8).map(|number| (number / 4, number / 2 % 2, number % 2));
+            manifest.quality = Some(points.map(row).collect());
+            let ladder = manifest.ladder().expect("it is complete");
+            let mut session = Session::new(ladder, Settings::default(), Layered::default(), 0);
+            let Decision::Fetch(fetch) = session.decide(0) else { panic!("there is nothing to wait for") };
+            let ranges: Vec<(usize, u8)> =
+                fetch.ranges().iter().map(|range| (range.representation, range.to)).collect();
+            ranges
+        };
+        // s0, s1, t0, t1: their base, then what is worth most.
+        let (motion, detail) = (first(20.0, 1.0), first(1.0, 20.0));
+        let place = |ranges: &[(usize, u8)], wanted: (usize, u8)| {
+            let found = ranges.iter().position(|range| range.0 == wanted.0 && range.1 >= wanted.1);
+            found.unwrap_or(ranges.len())
+        };
+        assert!(place(&motion, (3, 1)) < place(&motion, (0, 2)), "{motion:?}");
+        assert!(place(&detail, (0, 2)) < place(&detail, (3, 1)), "{detail:?}");
     }
 
     #[test]
