@@ -10,6 +10,7 @@ use crate::stream_file::{LimitArgs, StreamFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
+use splatstream_format::Limits;
 use splatstream_stream::Representation;
 use splatstream_stream::manifest::{Manifest, RepresentationInfo};
 use splatstream_stream::package::{Layout, Options, Package};
@@ -95,36 +96,11 @@ impl PackageStream {
             return live::run((&self.input, &self.out), &options, &self.limits.limits(), console);
         }
         let stream = StreamFile::read(&self.input)?;
-        let package = Package::of(&stream.bytes, &options, &self.limits.limits());
-        let mut package = package.map_err(|error| stream.fault(error))?;
-        if self.quality {
-            package.manifest.quality =
-                Some(quality::measure(&stream, &package.manifest, &self.limits.limits())?);
-        }
+        let package = package(&stream, &options, &self.limits.limits(), self.quality)?;
         self.clear(stale)?;
-        let sizes = self.write(&package)?;
+        let sizes = write(&package, &self.out, slice::from_ref(&self.input))?;
         let report = Report::new(&self.out, &package.manifest, sizes);
         console.report(&report, || report.text())
-    }
-
-    /// Writes all files, those that name others last; how many bytes they have.
-    fn write(&self, package: &Package<'_>) -> Result<u64, Failure> {
-        let mut bytes = 0;
-        for representation in &package.manifest.representations {
-            let path = self.out.join(&representation.file);
-            let mut file = OutputFile::create(&path, slice::from_ref(&self.input))?;
-            package
-                .write(&representation.file, &mut file)
-                .map_err(|error| Failure::file("write", &path, &error))?;
-            file.finish()?;
-            bytes += representation.bytes;
-        }
-        let manifest = package.manifest.to_json();
-        for (name, text) in [(Package::MANIFEST, &manifest), (Package::MPD, &package.mpd)] {
-            OutputFile::write_apart(&self.out.join(name), slice::from_ref(&self.input), text.as_bytes())?;
-            bytes += text.len() as u64;
-        }
-        Ok(bytes)
     }
 
     /// Makes the directory, without an earlier package.
@@ -150,6 +126,40 @@ impl PackageStream {
         stale.iter().try_for_each(|path| refuse_inputs(path, slice::from_ref(&self.input)))?;
         Ok(stale)
     }
+}
+
+/// A package of a stream, with the table of qualities if it is wanted.
+pub(crate) fn package<'a>(
+    stream: &'a StreamFile,
+    options: &Options,
+    limits: &Limits,
+    quality: bool,
+) -> Result<Package<'a>, Failure> {
+    let mut package = Package::of(&stream.bytes, options, limits).map_err(|error| stream.fault(error))?;
+    if quality {
+        package.manifest.quality = Some(quality::measure(stream, &package.manifest, limits)?);
+    }
+    Ok(package)
+}
+
+/// Writes all files to a directory, those that name others last; how many bytes they have. No input is overwritten.
+pub(crate) fn write(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Result<u64, Failure> {
+    let mut bytes = 0;
+    for representation in &package.manifest.representations {
+        let path = out.join(&representation.file);
+        let mut file = OutputFile::create(&path, inputs)?;
+        package
+            .write(&representation.file, &mut file)
+            .map_err(|error| Failure::file("write", &path, &error))?;
+        file.finish()?;
+        bytes += representation.bytes;
+    }
+    let manifest = package.manifest.to_json();
+    for (name, text) in [(Package::MANIFEST, &manifest), (Package::MPD, &package.mpd)] {
+        OutputFile::write_apart(&out.join(name), inputs, text.as_bytes())?;
+        bytes += text.len() as u64;
+    }
+    Ok(bytes)
 }
 
 /// Whether a file has a name that packages have.

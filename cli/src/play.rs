@@ -37,6 +37,9 @@ pub(crate) struct Play {
     /// Simulate a network with this bandwidth over time, in virtual time, in place of playing; for a directory.
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
+    /// Milliseconds from a request to its first byte, on the simulated network.
+    #[arg(long, value_name = "MS", default_value_t = 50, requires = "trace", value_parser = clap::value_parser!(u32).range(0..=60_000))]
+    latency: u32,
     /// Gaussians that the device can draw: points whose frames may have more are not played.
     #[arg(long, value_name = "N")]
     limit_gaussians: Option<u64>,
@@ -102,7 +105,12 @@ impl Play {
         let report = match trace {
             Some(trace) => {
                 let ladder = client.manifest().ladder().map_err(|error| Failure::other(error.to_string()))?;
-                let outcome = simulate(&ladder, &self.settings(), self.rule.rule(), &Link::new(trace));
+                let link = Link {
+                    latency_us: u64::from(self.latency) * 1000,
+                    requests: client.manifest().requests(),
+                    ..Link::new(trace)
+                };
+                let outcome = simulate(&ladder, &self.settings(), self.rule.rule(), &link);
                 Report::of_simulation(client.manifest(), &ladder, &outcome)
             }
             None => {

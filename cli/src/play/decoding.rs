@@ -4,11 +4,10 @@ use crate::failure::Failure;
 use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream_inside;
-use splatstream_format::{Error, ErrorKind, Limits};
+use splatstream_decoder::stream::{Step, StreamDecoder};
+use splatstream_format::Limits;
 use splatstream_stream::client::PlayedGop;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Instant;
@@ -87,19 +86,33 @@ fn decode(job: &Job, limits: &Limits) -> Decoded {
     let options = Options { limits: *limits, operating_point: job.point, ..Options::default() };
     let mut decoded = Decoded::default();
     let start = Instant::now();
-    let summary = decode_stream_inside(&job.bytes, job.head as u64, &options, |_, frame| {
-        if !frame.is_lost {
-            decoded.frames += 1;
-            decoded.gaussians += frame.planes.len() as u64;
+    let mut decoder = StreamDecoder::inside(job.head as u64, &options);
+    loop {
+        let at = decoder.position();
+        let rest = usize::try_from(at).ok().and_then(|at| job.bytes.get(at..)).unwrap_or_default();
+        // The end of the stream is only after its last GOP.
+        match decoder.next_step(rest, false) {
+            Ok(Step::Frame(frame)) => {
+                if !frame.is_lost {
+                    decoded.frames += 1;
+                    decoded.gaussians += frame.planes.len() as u64;
+                }
+                if job.intra {
+                    break;
+                }
+            }
+            // At another place there are other bytes.
+            Ok(Step::NeedMoreData(_)) if decoder.position() != at => {}
+            Ok(Step::NeedMoreData(_) | Step::End) => break,
+            Err(error) => {
+                decoded.errors.push(error.to_string());
+                break;
+            }
         }
-        if job.intra { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    }
     decoded.seconds = start.elapsed().as_secs_f64();
+    let summary = decoder.summary();
     decoded.lost = summary.lost.iter().map(|frames| (*frames.start(), *frames.end())).collect();
-    // No unit of the next GOP is there, and the end of the stream only after the last one.
-    let is_end = |error: &&Error| {
-        error.at == job.bytes.len() as u64 && error.kind == ErrorKind::Truncated { element: "unit_header" }
-    };
-    decoded.errors = summary.errors.iter().filter(|error| !is_end(error)).map(ToString::to_string).collect();
+    decoded.errors.extend(summary.errors.iter().map(ToString::to_string));
     decoded
 }
