@@ -12,14 +12,16 @@ use splatstream_stream::client::{Client, Options, PlayedGop};
 use splatstream_stream::control::{Layered, Settings};
 use splatstream_stream::package::Package;
 use splatstream_stream::qoe::Score;
-use splatstream_stream::server::{self, Bucket, Network, Server};
+use splatstream_stream::server::{self, Bucket, Network, Server, Stopper};
 use splatstream_stream::simulation::{Link, Report, Trace, simulate};
 use std::env;
 use std::error::Error;
 use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
@@ -77,14 +79,45 @@ fn settings() -> Settings {
     Settings { buffer_us: BUFFER_US, ..Settings::default() }
 }
 
-/// Plays from a server of its own.
-fn play(package: &Path, trace: &Trace, latency: Duration) -> Result<Figures> {
+/// A server in a thread of its own.
+fn serve(package: &Path, network: Network) -> Result<(SocketAddr, Stopper)> {
     let mut setup = server::Settings::new(package);
     setup.address.set_port(0);
-    setup.network = Network { bandwidth: Some(trace.clone()), latency, ..Network::default() };
+    setup.network = network;
     let server = Server::bind(&setup, |_| ())?;
-    let (url, stopper) = (format!("http://{}/", server.address()), server.stopper());
+    let (address, stopper) = (server.address(), server.stopper());
     thread::spawn(|| server.run());
+    Ok((address, stopper))
+}
+
+/// What the latency comes to on this machine: the median time of requests of a byte, on a network without other limits.
+fn measured(package: &Path, latency: Duration) -> Result<Duration> {
+    let (address, stopper) = serve(package, Network { latency, ..Network::default() })?;
+    let mut socket = BufReader::new(TcpStream::connect(address)?);
+    let mut times = Vec::new();
+    for _ in 0..31 {
+        let begun = Instant::now();
+        let request =
+            format!("GET /{} HTTP/1.1\r\nHost: {address}\r\nRange: bytes=0-0\r\n\r\n", Package::MANIFEST);
+        socket.get_mut().write_all(request.as_bytes())?;
+        let mut line = String::from("headers");
+        while !line.trim_end().is_empty() {
+            line.clear();
+            socket.read_line(&mut line)?;
+        }
+        socket.read_exact(&mut [0])?;
+        times.push(begun.elapsed());
+    }
+    stopper.stop();
+    times.sort();
+    Ok(times.get(times.len() / 2).copied().unwrap_or(latency))
+}
+
+/// Plays from a server of its own.
+fn play(package: &Path, trace: &Trace, latency: Duration) -> Result<Figures> {
+    let network = Network { bandwidth: Some(trace.clone()), latency, ..Network::default() };
+    let (address, stopper) = serve(package, network)?;
+    let url = format!("http://{address}/");
     let mut client = Client::open(&url, Options { settings: settings(), ..Options::default() })?;
     let outcome = client.play(Layered::default(), &mut |_: &PlayedGop<'_>| ())?;
     stopper.stop();
@@ -117,11 +150,13 @@ fn main() -> Result<()> {
         return Err("arguments: PACKAGE LATENCY_MS TRACE.csv...".into());
     };
     let (package, latency) = (Path::new(package), Duration::from_millis(latency.parse()?));
+    let own = measured(package, latency)?;
+    println!("a request of a byte takes {:.1} ms", own.as_secs_f64() * 1e3);
     let mut worst = 0.0_f64;
     let results: Vec<(&String, Result<(Figures, Figures)>)> = thread::scope(|scope| {
         let compare = |path: &String| {
             let trace = Trace::parse(&fs::read_to_string(path)?)?;
-            Ok((play(package, &trace, latency)?, virtually(package, &trace, latency)?))
+            Ok((play(package, &trace, latency)?, virtually(package, &trace, own)?))
         };
         // Each has a server and a link of its own, so that all can run at the same time.
         let running: Vec<_> = traces.iter().map(|path| (path, scope.spawn(move || compare(path)))).collect();
