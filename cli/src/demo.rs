@@ -102,30 +102,12 @@ impl Demo {
         Ok(Source { frames, summary })
     }
 
-    /// All that a stream can have, with little search.
-    fn settings(&self) -> Settings {
-        let structure = match self.frames {
-            1 => Structure::Intra,
-            _ => Structure::Predicted { layers: 2 },
-        };
-        Settings {
-            structure,
-            spatial_layers: 2,
-            refinements: vec![10, 30, 100],
-            gop: GOP,
-            preset: Preset::Fast,
-            psnr: Some(Quality::High.decibels()),
-            description: SceneDescription { up_axis: UpAxis::MinusY, ..SceneDescription::default() },
-            ..Settings::default()
-        }
-    }
-
     fn encode(&self, frames: &mut Vec<GaussianFrame>) -> Result<(Vec<u8>, Encoding, Vec<u64>), Failure> {
         let progress = Progress::frames("encoding", self.frames);
         let start = Instant::now();
         let mut stream = Vec::new();
         let Report { bytes, gaussians, digests, .. } =
-            encode(frames, &self.settings(), &mut stream, &mut |done, _| progress.at(done))
+            encode(frames, &settings(self.frames), &mut stream, &mut |done, _| progress.at(done))
                 .map_err(|error| Failure::other(error.to_string()))?;
         let seconds = start.elapsed().as_secs_f64();
         OutputFile::write(&self.out.join(STREAM), &stream)?;
@@ -197,6 +179,24 @@ impl Demo {
 
     fn fault(&self, error: splatstream_format::Error) -> Failure {
         Failure::stream(&self.out.join(STREAM), error)
+    }
+}
+
+/// All that a stream of so many frames can have, with little search.
+pub(crate) fn settings(frames: u32) -> Settings {
+    let structure = match frames {
+        1 => Structure::Intra,
+        _ => Structure::Predicted { layers: 2 },
+    };
+    Settings {
+        structure,
+        spatial_layers: 2,
+        refinements: vec![10, 30, 100],
+        gop: GOP,
+        preset: Preset::Fast,
+        psnr: Some(Quality::High.decibels()),
+        description: SceneDescription { up_axis: UpAxis::MinusY, ..SceneDescription::default() },
+        ..Settings::default()
     }
 }
 

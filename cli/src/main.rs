@@ -21,6 +21,7 @@ mod manual;
 mod numbers;
 mod output_file;
 mod package;
+mod play;
 mod progress;
 mod render;
 mod seek;
@@ -77,6 +78,7 @@ enum Command {
     Package(package::PackageStream),
     Unpackage(unpackage::Unpackage),
     Serve(serve::Serve),
+    Play(play::Play),
     Train(train::Train),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
@@ -152,6 +154,7 @@ impl Command {
             Self::Package(command) => command.run(console),
             Self::Unpackage(command) => command.run(console),
             Self::Serve(command) => command.run(console),
+            Self::Play(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),

@@ -1,6 +1,7 @@
 //! `splatstream package`: a stream as files for DASH.
 
 mod live;
+mod quality;
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -9,13 +10,14 @@ use crate::stream_file::{LimitArgs, StreamFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
+use splatstream_format::Limits;
 use splatstream_stream::Representation;
 use splatstream_stream::manifest::{Manifest, RepresentationInfo};
 use splatstream_stream::package::{Layout, Options, Package};
 use std::path::{Path, PathBuf};
 use std::slice;
 
-/// Write a stream as files for DASH: fragmented MP4, an MPD and a manifest. Nothing is decoded.
+/// Write a stream as files for DASH: fragmented MP4, an MPD and a manifest. Nothing is decoded without --quality.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream package talk.gss -o talk/\n\n\
     A file per spatial layer of the I frames and per temporal layer of the others, with a track per refinement.\n\
@@ -34,6 +36,10 @@ pub(crate) struct PackageStream {
     /// comes.
     #[arg(long)]
     live: bool,
+    /// Measure what every operating point of every GOP looks like against everything, for players: PSNR and SSIM of
+    /// pictures of its I frame and of a frame of each temporal layer go to the manifest.
+    #[arg(long, conflicts_with = "live")]
+    quality: bool,
     /// Replace a package that is in the directory.
     #[arg(long)]
     force: bool,
@@ -90,32 +96,11 @@ impl PackageStream {
             return live::run((&self.input, &self.out), &options, &self.limits.limits(), console);
         }
         let stream = StreamFile::read(&self.input)?;
-        let package = Package::of(&stream.bytes, &options, &self.limits.limits());
-        let package = package.map_err(|error| stream.fault(error))?;
+        let package = package(&stream, &options, &self.limits.limits(), self.quality)?;
         self.clear(stale)?;
-        let sizes = self.write(&package)?;
+        let sizes = write(&package, &self.out, slice::from_ref(&self.input))?;
         let report = Report::new(&self.out, &package.manifest, sizes);
         console.report(&report, || report.text())
-    }
-
-    /// Writes all files, those that name others last; how many bytes they have.
-    fn write(&self, package: &Package<'_>) -> Result<u64, Failure> {
-        let mut bytes = 0;
-        for representation in &package.manifest.representations {
-            let path = self.out.join(&representation.file);
-            let mut file = OutputFile::create(&path, slice::from_ref(&self.input))?;
-            package
-                .write(&representation.file, &mut file)
-                .map_err(|error| Failure::file("write", &path, &error))?;
-            file.finish()?;
-            bytes += representation.bytes;
-        }
-        let manifest = package.manifest.to_json();
-        for (name, text) in [(Package::MANIFEST, &manifest), (Package::MPD, &package.mpd)] {
-            OutputFile::write_apart(&self.out.join(name), slice::from_ref(&self.input), text.as_bytes())?;
-            bytes += text.len() as u64;
-        }
-        Ok(bytes)
     }
 
     /// Makes the directory, without an earlier package.
@@ -141,6 +126,40 @@ impl PackageStream {
         stale.iter().try_for_each(|path| refuse_inputs(path, slice::from_ref(&self.input)))?;
         Ok(stale)
     }
+}
+
+/// A package of a stream, with the table of qualities if it is wanted.
+pub(crate) fn package<'a>(
+    stream: &'a StreamFile,
+    options: &Options,
+    limits: &Limits,
+    quality: bool,
+) -> Result<Package<'a>, Failure> {
+    let mut package = Package::of(&stream.bytes, options, limits).map_err(|error| stream.fault(error))?;
+    if quality {
+        package.manifest.quality = Some(quality::measure(stream, &package.manifest, limits)?);
+    }
+    Ok(package)
+}
+
+/// Writes all files to a directory, those that name others last; how many bytes they have. No input is overwritten.
+pub(crate) fn write(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Result<u64, Failure> {
+    let mut bytes = 0;
+    for representation in &package.manifest.representations {
+        let path = out.join(&representation.file);
+        let mut file = OutputFile::create(&path, inputs)?;
+        package
+            .write(&representation.file, &mut file)
+            .map_err(|error| Failure::file("write", &path, &error))?;
+        file.finish()?;
+        bytes += representation.bytes;
+    }
+    let manifest = package.manifest.to_json();
+    for (name, text) in [(Package::MANIFEST, &manifest), (Package::MPD, &package.mpd)] {
+        OutputFile::write_apart(&out.join(name), inputs, text.as_bytes())?;
+        bytes += text.len() as u64;
+    }
+    Ok(bytes)
 }
 
 /// Whether a file has a name that packages have.

@@ -1,5 +1,6 @@
 //! `splatstream serve`: packages and streams over HTTP.
 
+mod built_in;
 mod network_args;
 
 use crate::console::Console;
@@ -14,17 +15,23 @@ use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use tempfile::TempDir;
 
 /// Serve the files of a directory over HTTP/1.1 and HTTP/2, until it is interrupted.
 #[derive(Args)]
-#[command(after_help = "Example:\n  splatstream serve talk/ --port 8080\n\n\
+#[command(
+    after_help = "Examples:\n  splatstream serve talk/ --port 8080\n  splatstream serve --built-in\n\n\
     Single ranges, conditions and pages of other origins are answered. Nothing outside the directory is served, nothing\n\
     hidden, and no listing. Any web server that answers ranges serves a package as well.\n\
-    The first line on standard error is the address; Ctrl-C lets answers in progress end, a second one does not.")]
+    The first line on standard error is the address; Ctrl-C lets answers in progress end, a second one does not."
+)]
 pub(crate) struct Serve {
     /// The directory.
-    #[arg(value_name = "DIR")]
-    directory: PathBuf,
+    #[arg(value_name = "DIR", required_unless_present = "built_in")]
+    directory: Option<PathBuf>,
+    /// Serve a package of the built-in moving scene, which is made first and removed at the end.
+    #[arg(long, conflicts_with = "directory")]
+    built_in: bool,
     /// The address to listen on; 0.0.0.0 lets other machines in.
     #[arg(long, value_name = "IP", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     bind: IpAddr,
@@ -77,7 +84,10 @@ struct Report<'a> {
 impl Serve {
     /// Serves until a signal comes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
-        let settings = self.settings()?;
+        let temporary = self.make()?;
+        let directory = self.directory.as_deref().or(temporary.as_ref().map(TempDir::path));
+        let directory = directory.unwrap_or(Path::new("."));
+        let settings = self.settings(directory)?;
         allow_open_files();
         let log = self.log;
         let server = Server::bind(&settings, move |entry| write(log, entry)).map_err(refused)?;
@@ -85,13 +95,24 @@ impl Serve {
         let url = format!("{scheme}://{}/", server.address());
         let stopper = server.stopper();
         unfinished::stop_by(move || stopper.stop())?;
-        console.complain(&format!("serving {} at {url}", self.directory.display()));
-        let report = Report { directory: &self.directory, url, statistics: server.run() };
+        console.complain(&format!("serving {} at {url}", directory.display()));
+        let report = Report { directory, url, statistics: server.run() };
         console.report(&report, || report.text())
     }
 
-    fn settings(&self) -> Result<Settings, Failure> {
-        let mut settings = Settings::new(&self.directory);
+    /// The built-in scene, if it is to be served.
+    fn make(&self) -> Result<Option<TempDir>, Failure> {
+        if !self.built_in {
+            return Ok(None);
+        }
+        let directory = tempfile::tempdir()
+            .map_err(|error| Failure::other(format!("cannot make a temporary directory: {error}")))?;
+        built_in::make(directory.path())?;
+        Ok(Some(directory))
+    }
+
+    fn settings(&self, directory: &Path) -> Result<Settings, Failure> {
+        let mut settings = Settings::new(directory);
         settings.address = SocketAddr::new(self.bind, self.port);
         settings.origins.clone_from(&self.origins);
         let pair = self.tls_cert.clone().zip(self.tls_key.clone());

@@ -82,6 +82,7 @@ fn reports_on_the_committed_stream_are_as_before() {
     let directory = directory();
     let at = directory.path();
     streams(at);
+    fs::write(at.join("trace.csv"), "t_s,mbps\n0,0.2\n1,0.05\n").unwrap();
     for (name, line) in [
         ("decode", "decode small.gss -o frames"),
         ("decode_spz", "decode small.gss -o packed/ --format spz --frames 0..1"),
@@ -98,6 +99,7 @@ fn reports_on_the_committed_stream_are_as_before() {
         ("extract_damaged", "extract damaged.gss --op s0,t0,r2 -o rest.gss"),
         ("package", "package small.gss -o package/"),
         ("unpackage", "unpackage package/ -o back.gss"),
+        ("simulate", "play package/ --trace trace.csv"),
         ("compare", "compare small.gss part.gss --cameras ring:2 --height 40"),
         ("render", "render small.gss -o pictures --camera ring:1 --height 20 --frames 0..1"),
     ] {

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{directory, fail, fixture, succeed, text};
+use common::{directory, fail, fixture, json, succeed, text};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -70,6 +70,32 @@ fn a_package_is_served_until_a_signal_comes() {
     );
     assert_eq!((&first["target"], &first["method"]), (&"/s0.mp4".into(), &"GET".into()));
     assert!(first["seconds"].as_f64().unwrap() >= 0.005, "{log}");
+}
+
+/// The two commands of README.md, on another port.
+#[test]
+fn the_built_in_scene_is_served_and_played() {
+    let readme = include_str!("../../README.md");
+    let (mut child, _stderr, address) = start(&["--built-in"]);
+    let url = format!("http://{address}/");
+    let report = json(&["play", &url]);
+    let ended = Command::new("kill").arg(child.id().to_string()).status().unwrap();
+    assert!(ended.success() && child.wait().unwrap().success());
+    assert_eq!((&report["totals"]["complete"], &report["quality_measured"]), (&true.into(), &true.into()));
+    assert_eq!(report["losses"], Value::Array(vec![]));
+    let gops = report["gops"].as_array().unwrap();
+    assert_eq!(gops.len(), 6);
+    assert!(gops.iter().all(|gop| gop["decoded"]["errors"] == Value::Array(vec![])));
+    assert!(gops.iter().all(|gop| gop["decoded"]["lost"] == Value::Array(vec![])), "{report}");
+    // The first GOP begins with its base; then there is time for more.
+    assert!(gops[0]["op"] == "s0,i,r0" || gops[0]["decoded"]["frames"].as_u64().unwrap() > 1, "{report}");
+    assert!(gops[5]["decoded"]["frames"].as_u64().unwrap() > 1, "{report}");
+    for command in ["serve --built-in", "play http://127.0.0.1:8080/"] {
+        assert!(
+            readme.contains(&format!("cargo run --release -p splatstream-cli -- {command}")),
+            "{command}"
+        );
+    }
 }
 
 #[test]

@@ -11,6 +11,8 @@
 )]
 
 mod boxes;
+#[cfg(feature = "client")]
+pub mod client;
 pub mod control;
 pub mod division;
 pub mod live;

@@ -3,6 +3,7 @@
 //! Servers are not trusted: [`Manifest::parse`] refuses what cannot be true before anybody acts on it.
 
 mod check;
+mod ladder;
 
 use serde::{Deserialize, Serialize};
 use std::fmt;

@@ -14,5 +14,5 @@ pub mod ladders;
 mod run;
 mod trace;
 
-pub use run::{Link, Report, simulate};
+pub use run::{Link, Report, Requests, simulate};
 pub use trace::{Trace, TraceError};

@@ -2,10 +2,6 @@
 
 use crate::simulation::Trace;
 
-/// Time that the bucket may be behind: what timers and threads cost in accuracy is caught up within it, and a link that was
-/// idle for longer starts with so much credit.
-const DEPTH_US: u64 = 20_000;
-
 /// Time that one grant should take, so that connections share the link evenly.
 const QUANTUM_US: u64 = 5_000;
 
@@ -20,6 +16,10 @@ pub struct Bucket {
 }
 
 impl Bucket {
+    /// Microseconds that the bucket may be behind: what timers and threads cost in accuracy is caught up within it, and a link
+    /// that was idle for longer starts with so much credit.
+    pub const DEPTH_US: u64 = 20_000;
+
     /// A link at time 0 of its trace; none if the trace never carries anything.
     pub fn new(trace: Trace) -> Option<Self> {
         (trace.mean() > 0).then_some(Self { trace, granted: 0 })
@@ -27,7 +27,7 @@ impl Bucket {
 
     /// Grants bytes: the time in microseconds, `now_us` or later, at which the link has carried them.
     pub fn grant(&mut self, bytes: u32, now_us: u64) -> u64 {
-        let forfeited = self.trace.carried(now_us.saturating_sub(DEPTH_US));
+        let forfeited = self.trace.carried(now_us.saturating_sub(Self::DEPTH_US));
         let carried = u128::from(bytes).saturating_mul(8_000_000);
         self.granted = self.granted.max(forfeited).saturating_add(carried);
         self.trace.time_of(self.granted).unwrap_or(u64::MAX).max(now_us)
@@ -86,7 +86,7 @@ mod tests {
                 for &(time, size) in &grants[first..] {
                     sent += size;
                     // What the first one needed may have been carried before it was granted.
-                    let start = grants[first].0.saturating_sub(DEPTH_US);
+                    let start = grants[first].0.saturating_sub(Bucket::DEPTH_US);
                     prop_assert!(trace.carried(time) - trace.carried(start) + grants[first].1 >= sent);
                 }
             }

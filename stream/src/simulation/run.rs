@@ -2,6 +2,7 @@
 
 use super::trace::Trace;
 use crate::control::{Decision, Fetch, Ladder, Playback, Rule, Session, Settings, Shown};
+use std::collections::BTreeSet;
 
 /// A network between a server and a player.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,12 +15,36 @@ pub struct Link {
     pub losses_us: Vec<u64>,
     /// Time at which the simulation ends in any case.
     pub limit_us: u64,
+    /// How fetches are sent.
+    pub requests: Requests,
+    /// A link that was idle for longer carries at once what it would have carried in so many microseconds.
+    pub credit_us: u64,
+}
+
+/// How a player sends fetches.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Requests {
+    /// As one request, whatever ranges they have.
+    #[default]
+    Together,
+    /// A request for each range, after the one before has ended, as the client of this crate does.
+    Apart {
+        /// Bytes of the initialisation segment of each Representation, which is requested before its first range.
+        inits: Vec<u64>,
+    },
 }
 
 impl Link {
-    /// A link with a latency of 50 ms and no losses, for at most 10,000 s.
+    /// A link with a latency of 50 ms, no losses and no credit, for at most 10,000 s, on which fetches are one request.
     pub fn new(trace: Trace) -> Self {
-        Self { trace, latency_us: 50_000, losses_us: Vec::new(), limit_us: 10_000_000_000 }
+        Self {
+            trace,
+            latency_us: 50_000,
+            losses_us: Vec::new(),
+            limit_us: 10_000_000_000,
+            requests: Requests::Together,
+            credit_us: 0,
+        }
     }
 }
 
@@ -70,6 +95,8 @@ pub fn simulate<R: Rule>(ladder: &Ladder, settings: &Settings, rule: R, link: &L
         now_us: 0,
         wake_us: 0,
         flow: None,
+        inits: BTreeSet::new(),
+        used: 0,
         report: Report {
             shown: Vec::new(),
             complete: false,
@@ -94,14 +121,31 @@ pub fn simulate<R: Rule>(ladder: &Ladder, settings: &Settings, rule: R, link: &L
     report
 }
 
-/// The running request on the network.
+/// The running fetch on the network.
 struct Flow {
-    /// Lengths of its pieces added up: where something new has arrived.
-    marks: Vec<u64>,
+    /// Its requests; the first one is running.
+    requests: Vec<Request>,
     first_us: u64,
     /// What the network has carried before it.
     before: u128,
+    /// Bytes of the running request, and of levels in those before it.
     bytes: u64,
+    done: u64,
+}
+
+/// A request of a fetch.
+#[derive(Clone, Default)]
+struct Request {
+    /// The Representation whose initialisation segment it is for, of which the session does not know.
+    init: Option<usize>,
+    /// Lengths of its pieces added up: where something new has arrived.
+    marks: Vec<u64>,
+}
+
+impl Request {
+    fn bytes(&self) -> u64 {
+        self.marks.last().copied().unwrap_or(0)
+    }
 }
 
 struct Run<'a, R> {
@@ -110,6 +154,10 @@ struct Run<'a, R> {
     now_us: u64,
     wake_us: u64,
     flow: Option<Flow>,
+    /// Representations whose initialisation segments have arrived.
+    inits: BTreeSet<usize>,
+    /// What the network had carried when it last carried something.
+    used: u128,
     report: Report,
 }
 
@@ -139,21 +187,40 @@ impl<R: Rule> Run<'_, R> {
     }
 
     fn send(&mut self, fetch: Fetch) {
-        let mut marks = Vec::new();
-        let mut bytes = 0_u64;
+        let requests = self.requests(&fetch);
+        self.begin(requests, 0);
+        self.report.fetches.push((self.now_us, fetch));
+    }
+
+    /// The first of some requests is sent, after so many bytes of levels have arrived.
+    fn begin(&mut self, requests: Vec<Request>, done: u64) {
+        let first_us = self.now_us.saturating_add(self.link.latency_us);
+        let before = self.used.max(self.link.trace.carried(first_us.saturating_sub(self.link.credit_us)));
+        self.flow = Some(Flow { requests, first_us, before, bytes: 0, done });
+        self.report.requests = self.report.requests.saturating_add(1);
+    }
+
+    /// What is requested for a fetch; nothing if it has no bytes.
+    fn requests(&self, fetch: &Fetch) -> Vec<Request> {
         let gop = self.session.state().ladder().gops().get(fetch.gop());
+        let (mut requests, mut request, mut seen) = (Vec::new(), Request::default(), self.inits.clone());
         for range in fetch.ranges() {
+            if let Requests::Apart { inits } = &self.link.requests {
+                let init = inits.get(range.representation).filter(|_| seen.insert(range.representation));
+                let init =
+                    init.map(|&bytes| Request { init: Some(range.representation), marks: vec![bytes] });
+                requests.extend([Some(request), init].into_iter().flatten());
+                request = Request::default();
+            }
             let pieces = gop.map_or(&[][..], |gop| gop.pieces(range.representation));
             let own = pieces.get(usize::from(range.from)..usize::from(range.to)).unwrap_or_default();
             for piece in own {
-                bytes = bytes.saturating_add(piece.bytes);
-                marks.push(bytes);
+                request.marks.push(request.bytes().saturating_add(piece.bytes));
             }
         }
-        let first_us = self.now_us.saturating_add(self.link.latency_us);
-        self.flow = Some(Flow { marks, first_us, before: self.link.trace.carried(first_us), bytes: 0 });
-        self.report.requests = self.report.requests.saturating_add(1);
-        self.report.fetches.push((self.now_us, fetch));
+        requests.push(request);
+        requests.retain(|request| request.bytes() > 0);
+        requests
     }
 
     /// Goes on to the next event.
@@ -164,7 +231,8 @@ impl<R: Rule> Run<'_, R> {
         }
         let loss = self.link.losses_us.iter().copied().find(|&loss| loss > self.now_us);
         if let Some(flow) = &self.flow {
-            let mark = flow.marks.iter().find(|&&mark| mark > flow.bytes).copied().unwrap_or(0);
+            let marks = flow.requests.first().map_or(&[][..], |request| &request.marks);
+            let mark = marks.iter().find(|&&mark| mark > flow.bytes).copied().unwrap_or(0);
             let carried = flow.before.saturating_add(u128::from(mark).saturating_mul(BYTE));
             let mark_us = self.link.trace.time_of(carried).unwrap_or(u64::MAX).max(flow.first_us);
             let event_us = if self.now_us < flow.first_us { flow.first_us } else { mark_us };
@@ -179,13 +247,21 @@ impl<R: Rule> Run<'_, R> {
         let Some(flow) = &mut self.flow else { return };
         if self.now_us >= flow.first_us {
             let carried = self.link.trace.carried(self.now_us).saturating_sub(flow.before);
-            let all = flow.marks.last().copied().unwrap_or(0);
+            let (init, all) =
+                flow.requests.first().map_or((None, 0), |request| (request.init, request.bytes()));
             let bytes = u64::try_from(carried / BYTE).unwrap_or(u64::MAX).min(all);
             self.report.bytes = self.report.bytes.saturating_add(bytes.saturating_sub(flow.bytes));
             flow.bytes = bytes;
-            self.session.received(self.now_us, bytes);
+            self.used = flow.before.saturating_add(u128::from(bytes).saturating_mul(BYTE));
+            let arrived = flow.done.saturating_add(if init.is_some() { 0 } else { bytes });
+            self.session.received(self.now_us, arrived);
             if bytes == all {
+                self.inits.extend(init);
+                let rest = flow.requests.get(1..).unwrap_or_default().to_vec();
                 self.flow = None;
+                if !rest.is_empty() {
+                    self.begin(rest, arrived);
+                }
                 return;
             }
         }

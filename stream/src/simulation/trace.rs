@@ -91,6 +91,20 @@ impl Trace {
         Self::new(&steps)
     }
 
+    /// The same from a time on.
+    #[must_use]
+    pub fn since(&self, start_us: u64) -> Self {
+        let at = start_us.checked_rem(self.period_us).unwrap_or(0);
+        let ends = self.steps.iter().skip(1).map(|step| step.0).chain([self.period_us]);
+        let steps = || self.steps.iter().zip(ends.clone()).map(|(&(start, rate), end)| (start, end, rate));
+        let after = steps().filter(|step| step.1 > at).map(|(start, end, rate)| (start.max(at), end, rate));
+        let before = steps().filter(|step| step.0 < at).map(|(start, end, rate)| (start, end.min(at), rate));
+        let durations: Vec<(u64, u64)> =
+            after.chain(before).map(|(start, end, rate)| (end.saturating_sub(start), rate)).collect();
+        // It has the steps of this one.
+        Self::new(&durations).unwrap_or_else(|_| self.clone())
+    }
+
     /// Duration after which it repeats, in microseconds.
     pub fn period_us(&self) -> u64 {
         self.period_us
@@ -161,6 +175,18 @@ mod tests {
         assert_eq!(trace.time_of(trace.carried(500_000)), Some(500_000));
         assert_eq!(trace.time_of(trace.carried(500_000) + 1), Some(2_000_001));
         assert_eq!(Trace::constant(0).time_of(1), None);
+    }
+
+    #[test]
+    fn a_trace_from_a_time_on_carries_the_rest() {
+        let trace = Trace::parse("t_s,mbps\n0.000,1.5\n0.5,0\n2,4\n").expect("it is a trace");
+        for start in [0, 1, 500_000, 1_999_999, 3_499_999, 3_500_000, 8_000_000] {
+            let rest = trace.since(start);
+            assert_eq!((rest.period_us(), rest.mean()), (trace.period_us(), trace.mean()));
+            for time in [0, 1, 400_000, 1_700_000, 9_000_000] {
+                assert_eq!(rest.carried(time), trace.carried(start + time) - trace.carried(start));
+            }
+        }
     }
 
     #[test]

@@ -1,0 +1,173 @@
+//! `splatstream play`: a package, from a server or a directory, as a player fetches and decodes it.
+
+mod decoding;
+mod report;
+
+use crate::console::{Console, to_json};
+use crate::failure::Failure;
+use crate::output_file::OutputFile;
+use crate::stream_file::LimitArgs;
+use clap::{Args, ValueEnum};
+use decoding::Decoding;
+use report::Report;
+use splatstream_stream::client::{Client, Options, PlayedGop};
+use splatstream_stream::control::{
+    Bola, BufferRule, Layered, Limits, Rule, Settings, Single, ThroughputRule,
+};
+use splatstream_stream::simulation::{Link, Trace, simulate};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Play a package: fetch ranges as the network allows, decode, and report on every GOP.
+///
+/// Every level is compared with its digest in the manifest, and every decoded frame with that in the stream. What cannot be
+/// had is named, and played without: refinements and layers, or the whole GOP if it is the base of one.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  splatstream play http://localhost:8080/talk/\n  \
+    splatstream play talk/ --no-wait --json\n  \
+    splatstream play talk/ --trace mobile.csv --rule bola -o bola.json\n\n\
+    A trace is CSV: a line of titles, then a time in seconds and the Mbit/s from then on.")]
+pub(crate) struct Play {
+    /// The package: the URL of its directory or of its manifest.json, or a directory.
+    #[arg(value_name = "URL_OR_DIR")]
+    location: String,
+    /// Who decides what is fetched.
+    #[arg(long, value_enum, default_value_t = RuleName::Layered)]
+    rule: RuleName,
+    /// Simulate a network with this bandwidth over time, in virtual time, in place of playing; for a directory.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Milliseconds from a request to its first byte, on the simulated network.
+    #[arg(long, value_name = "MS", default_value_t = 50, requires = "trace", value_parser = clap::value_parser!(u32).range(0..=60_000))]
+    latency: u32,
+    /// Gaussians that the device can draw: points whose frames may have more are not played.
+    #[arg(long, value_name = "N")]
+    limit_gaussians: Option<u64>,
+    /// Highest spatial and temporal layer to fetch.
+    #[arg(long, value_name = "sS,tT", value_parser = layers)]
+    limit_layers: Option<(u8, u8)>,
+    /// Seconds that are buffered at most.
+    #[arg(long, value_name = "SECONDS", default_value_t = 25.0, value_parser = seconds)]
+    buffer: f64,
+    /// Skip the time in which nothing is fetched: playback ends as soon as all is there.
+    #[arg(long)]
+    no_wait: bool,
+    /// Fetch and check only.
+    #[arg(long)]
+    no_decode: bool,
+    /// A file for the report as JSON.
+    #[arg(short, long = "out", value_name = "REPORT.json")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// Who decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum RuleName {
+    /// Layer-aware model predictive control.
+    Layered,
+    /// The highest rate below the measured throughput; like the two below it knows no layers and plays whole GOPs.
+    Throughput,
+    /// The rate that the level of the buffer stands for.
+    Buffer,
+    /// BOLA: the best utility for the level of the buffer.
+    Bola,
+}
+
+impl RuleName {
+    fn rule(self) -> Box<dyn Rule> {
+        match self {
+            Self::Layered => Box::new(Layered::default()),
+            Self::Throughput => Box::new(Single::whole(ThroughputRule)),
+            Self::Buffer => Box::new(Single::whole(BufferRule)),
+            Self::Bola => Box::new(Single::whole(Bola::default())),
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Layered => "layered",
+            Self::Throughput => "throughput",
+            Self::Buffer => "buffer",
+            Self::Bola => "bola",
+        }
+    }
+}
+
+impl Play {
+    /// Plays, or simulates, and reports.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        console.claim(self.out.as_deref())?;
+        let trace = self.trace.as_deref().map(|path| self.read_trace(path)).transpose()?;
+        let failed = |error| Failure::other(format!("{}: cannot play: {error}", self.location));
+        let mut client = Client::open(&self.location, self.options()).map_err(failed)?;
+        let report = match trace {
+            Some(trace) => {
+                let ladder = client.manifest().ladder().map_err(|error| Failure::other(error.to_string()))?;
+                let link = Link {
+                    latency_us: u64::from(self.latency) * 1000,
+                    requests: client.manifest().requests(),
+                    ..Link::new(trace)
+                };
+                let outcome = simulate(&ladder, &self.settings(), self.rule.rule(), &link);
+                Report::of_simulation(client.manifest(), &ladder, &outcome)
+            }
+            None => {
+                let mut decoding = Decoding::start(!self.no_decode, self.limits.limits())?;
+                let show = &mut |gop: &PlayedGop<'_>| {
+                    if !console.is_json() {
+                        console.complain(&report::line(gop));
+                    }
+                    decoding.show(gop);
+                };
+                let outcome = client.play(self.rule.rule(), show).map_err(failed)?;
+                Report::of_playback(client.manifest(), &outcome, decoding.finish())
+            }
+        };
+        let report = report.of(&self.location, self.rule.name());
+        if let Some(path) = &self.out {
+            OutputFile::write_apart(path, &[], to_json(&report)?.as_bytes())?;
+        }
+        console.report_beside(self.out.as_deref(), &report, || report.text())
+    }
+
+    fn read_trace(&self, path: &Path) -> Result<Trace, Failure> {
+        if self.location.contains("://") {
+            return Err(Failure::Usage(
+                "--trace simulates a network for the package in a directory; over a real one, the server shapes".into(),
+            ));
+        }
+        let text = fs::read_to_string(path).map_err(|error| Failure::file("read", path, &error))?;
+        Trace::parse(&text).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
+    }
+
+    fn options(&self) -> Options {
+        Options {
+            settings: self.settings(),
+            layers: self.limit_layers.unwrap_or((u8::MAX, u8::MAX)),
+            real_time: !self.no_wait,
+            ..Options::default()
+        }
+    }
+
+    fn settings(&self) -> Settings {
+        let gaussians = self.limit_gaussians.unwrap_or(u64::MAX);
+        let limits = Limits { gaussians, ..Limits::default() };
+        Settings { buffer_us: (self.buffer * 1e6) as u64, limits, ..Settings::default() }
+    }
+}
+
+/// Layers such as `s1,t0`.
+fn layers(text: &str) -> Result<(u8, u8), String> {
+    let layer = |part: Option<&str>, letter| part?.strip_prefix(letter)?.parse().ok();
+    let mut parts = text.split(',');
+    let found = layer(parts.next(), 's').zip(layer(parts.next(), 't')).filter(|_| parts.next().is_none());
+    found.ok_or_else(|| "layers are written like s1,t0".to_owned())
+}
+
+/// From a tenth of a second to a day.
+fn seconds(text: &str) -> Result<f64, String> {
+    let found = text.parse().ok().filter(|seconds| (0.1..=86_400.0).contains(seconds));
+    found.ok_or_else(|| "a number of seconds from 0.1 to 86400 is expected".to_owned())
+}

@@ -1,0 +1,246 @@
+//! What a playback was like.
+
+use super::decoding::Decoded;
+use serde::Serialize;
+use splatstream_chart::numbers::grouped;
+use splatstream_stream::client::{GopLog, Loss, Outcome, PlayedGop};
+use splatstream_stream::control::{Ladder, Shown};
+use splatstream_stream::manifest::Manifest;
+use splatstream_stream::qoe::Score;
+use splatstream_stream::simulation::Report as Simulated;
+use std::collections::BTreeMap;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+pub(super) struct Report {
+    location: String,
+    rule: &'static str,
+    /// Whether time and network were virtual.
+    simulated: bool,
+    /// Whether qualities are from the table of the manifest, and not estimates.
+    quality_measured: bool,
+    gops: Vec<GopReport>,
+    losses: Vec<LossReport>,
+    totals: Totals,
+}
+
+#[derive(Serialize)]
+struct GopReport {
+    gop: usize,
+    first_frame: u32,
+    frames: u32,
+    /// None if nothing of it could be had.
+    op: Option<String>,
+    quality_db: Option<f64>,
+    began_seconds: Option<f64>,
+    waited_seconds: Option<f64>,
+    buffer_seconds: Option<f64>,
+    switched: bool,
+    /// Of the operating point, and all that arrived.
+    bytes: u64,
+    fetched_bytes: u64,
+    requests: u64,
+    failures: u64,
+    abandoned: u64,
+    decoded: Option<Decoded>,
+}
+
+#[derive(Serialize)]
+struct LossReport {
+    gop: usize,
+    representation: String,
+    refinement: u8,
+    reason: String,
+}
+
+#[derive(Serialize)]
+struct Totals {
+    complete: bool,
+    seconds: f64,
+    bytes: u64,
+    unplayed_percent: f64,
+    requests: u64,
+    abandoned: u64,
+    startup_seconds: f64,
+    stalls: u64,
+    stalled_seconds: f64,
+    switches: u64,
+    quality_db: f64,
+    change_db_per_minute: f64,
+    experience_db: f64,
+    sabre_utility: f64,
+    sabre_rebuffering: f64,
+    sabre_score: f64,
+    lolp: f64,
+}
+
+impl Report {
+    /// Of a playback over a network, with what was decoded.
+    pub(super) fn of_playback(
+        manifest: &Manifest,
+        outcome: &Outcome,
+        decoded: Option<BTreeMap<usize, Decoded>>,
+    ) -> Self {
+        let mut decoded = decoded.unwrap_or_default();
+        let rows = outcome.gops.iter().enumerate();
+        let gops = rows.map(|(gop, log)| GopReport::new(gop, log, decoded.remove(&gop))).collect();
+        let losses = outcome.losses.iter().map(LossReport::from).collect();
+        Self { losses, ..Self::new(manifest, gops, &outcome.report, &outcome.score()) }
+    }
+
+    /// Of a simulated playback.
+    pub(super) fn of_simulation(manifest: &Manifest, ladder: &Ladder, simulated: &Simulated) -> Self {
+        let row = |(gop, info): (usize, &splatstream_stream::manifest::GopInfo)| {
+            let shown = simulated.shown.iter().find(|shown| shown.gop == gop).copied();
+            let requests = simulated.fetches.iter().filter(|(_, fetch)| fetch.gop() == gop).count();
+            let log = GopLog {
+                first_frame: info.first_frame,
+                frame_count: info.frame_count,
+                shown,
+                requests: requests as u64,
+                bytes: shown.map_or(0, |shown| shown.fetched),
+                ..GopLog::default()
+            };
+            GopReport { buffer_seconds: None, ..GopReport::new(gop, &log, None) }
+        };
+        let gops = manifest.gops.iter().enumerate().map(row).collect();
+        Self { simulated: true, ..Self::new(manifest, gops, simulated, &Score::of(ladder, simulated)) }
+    }
+
+    fn new(manifest: &Manifest, mut gops: Vec<GopReport>, report: &Simulated, score: &Score) -> Self {
+        let mut last = None;
+        for gop in gops.iter_mut().filter(|gop| gop.op.is_some()) {
+            gop.switched = last.is_some() && last != gop.op;
+            last.clone_from(&gop.op);
+        }
+        Self {
+            location: String::new(),
+            rule: "",
+            simulated: false,
+            quality_measured: manifest.quality.is_some(),
+            gops,
+            losses: Vec::new(),
+            totals: Totals::new(report, score),
+        }
+    }
+
+    /// The same with what was played, and by which rule.
+    pub(super) fn of(self, location: &str, rule: &'static str) -> Self {
+        Self { location: location.to_owned(), rule, ..self }
+    }
+
+    pub(super) fn text(&self) -> String {
+        let totals = &self.totals;
+        let mut text = String::new();
+        for loss in &self.losses {
+            let LossReport { gop, representation, refinement, reason } = loss;
+            text += &format!(
+                "GOP {gop}: {representation} is left out from refinement {refinement} on: {reason}\n"
+            );
+        }
+        for gop in &self.gops {
+            for error in gop.decoded.iter().flat_map(|decoded| &decoded.errors) {
+                text += &format!("GOP {}: {error}\n", gop.gop);
+            }
+        }
+        let shown = self.gops.iter().filter(|gop| gop.op.is_some()).count();
+        let kind = if self.quality_measured { "measured" } else { "estimated" };
+        text += &format!(
+            "{shown} of {} GOPs by the rule {}: start-up {:.3} s, {} stalls of {:.3} s, {} switches\n\
+             {} bytes in {} requests, {:.1} % not played; mean quality {:.2} dB ({kind})\n\
+             experience {:.2} dB, sabre {:.3}, LoL+ {:.3}\n",
+            self.gops.len(),
+            self.rule,
+            totals.startup_seconds,
+            totals.stalls,
+            totals.stalled_seconds,
+            totals.switches,
+            grouped(totals.bytes),
+            totals.requests,
+            totals.unplayed_percent,
+            totals.quality_db,
+            totals.experience_db,
+            totals.sabre_score,
+            totals.lolp,
+        );
+        text
+    }
+}
+
+impl GopReport {
+    fn new(gop: usize, log: &GopLog, decoded: Option<Decoded>) -> Self {
+        let of = |value: fn(&Shown) -> f64| log.shown.as_ref().map(value);
+        Self {
+            gop,
+            first_frame: log.first_frame,
+            frames: log.frame_count,
+            op: log.shown.map(|shown| shown.point.to_string()),
+            quality_db: of(|shown| shown.quality),
+            began_seconds: of(|shown| seconds(shown.began_us)),
+            waited_seconds: of(|shown| seconds(shown.waited_us)),
+            buffer_seconds: Some(seconds(log.buffer_us)),
+            switched: false,
+            bytes: log.shown.map_or(0, |shown| shown.bytes),
+            fetched_bytes: log.bytes,
+            requests: log.requests,
+            failures: log.failures,
+            abandoned: log.abandoned,
+            decoded,
+        }
+    }
+}
+
+impl From<&Loss> for LossReport {
+    fn from(loss: &Loss) -> Self {
+        let Loss { gop, representation, refinement, reason } = loss.clone();
+        Self { gop, representation, refinement, reason }
+    }
+}
+
+impl Totals {
+    fn new(report: &Simulated, score: &Score) -> Self {
+        Self {
+            complete: report.complete,
+            seconds: seconds(report.ended_us),
+            bytes: report.bytes,
+            unplayed_percent: 100.0 * score.unplayed,
+            requests: report.requests,
+            abandoned: report.abandoned,
+            startup_seconds: score.startup_seconds,
+            stalls: score.stalls,
+            stalled_seconds: score.stalled_seconds,
+            switches: score.switches,
+            quality_db: score.quality,
+            change_db_per_minute: score.change_per_minute,
+            experience_db: score.experience,
+            sabre_utility: score.sabre_utility,
+            sabre_rebuffering: score.sabre_rebuffering,
+            sabre_score: score.sabre_score,
+            lolp: score.lolp,
+        }
+    }
+}
+
+/// A GOP that begins, as a line.
+pub(super) fn line(gop: &PlayedGop<'_>) -> String {
+    let (number, log) = (gop.number, gop.log);
+    let Some(shown) = log.shown else {
+        return format!("GOP {number}: nothing of it could be had, {} requests failed", log.failures);
+    };
+    let waited = match shown.waited_us {
+        0 => String::new(),
+        us if number == 0 => format!(", after {:.3} s", seconds(us)),
+        us => format!(", stalled for {:.3} s", seconds(us)),
+    };
+    format!(
+        "GOP {number}: {}, {} bytes in {} requests, {:.1} s buffered{waited}",
+        shown.point,
+        grouped(shown.bytes),
+        log.requests,
+        seconds(log.buffer_us),
+    )
+}
+
+fn seconds(us: u64) -> f64 {
+    us as f64 / 1e6
+}

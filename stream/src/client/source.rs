@@ -1,0 +1,239 @@
+//! Where a package is: ranges of bytes of its files, from an HTTP server or a directory.
+
+use super::Options;
+use crate::package::Package;
+use std::collections::HashMap;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use ureq::Agent;
+use ureq::http::{HeaderMap, Response, StatusCode, header};
+
+/// Why a request was of no use.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Fault {
+    /// The server refuses with this status.
+    Status(u16),
+    /// The connection, the file or time failed, in words.
+    Failed(String),
+    /// The response ends early, after so many bytes.
+    Short(u64),
+    /// What was asked for is not what the response is, in words.
+    Wrong(&'static str),
+    /// The file is another one than before.
+    Changed,
+    /// The bytes are not those that were packaged.
+    Digest,
+}
+
+impl Fault {
+    /// Whether asking again is unlikely to help.
+    pub(super) const fn is_final(&self) -> bool {
+        matches!(self, Self::Status(401 | 403 | 404 | 410 | 451))
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Status(status) => write!(f, "the server answers with status {status}"),
+            Self::Failed(why) => f.write_str(why),
+            Self::Short(bytes) => write!(f, "the response ends after {bytes} bytes"),
+            Self::Wrong(what) => f.write_str(what),
+            Self::Changed => f.write_str("the file has changed"),
+            Self::Digest => f.write_str("the bytes do not have the digest in the manifest"),
+        }
+    }
+}
+
+impl From<io::Error> for Fault {
+    fn from(error: io::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+impl From<ureq::Error> for Fault {
+    fn from(error: ureq::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// A package. Clones share connections and what is known of files.
+#[derive(Debug, Clone)]
+pub(super) enum Source {
+    /// On a server.
+    Server(Server),
+    /// On this machine.
+    Directory(PathBuf),
+}
+
+impl Source {
+    pub(super) fn new(location: &str, options: &Options) -> Self {
+        if location.starts_with("http://") || location.starts_with("https://") {
+            return Self::Server(Server::new(location, options));
+        }
+        let path = PathBuf::from(location);
+        let is_manifest = path.file_name().is_some_and(|name| name == Package::MANIFEST);
+        Self::Directory(if is_manifest { path.parent().map(PathBuf::from).unwrap_or_default() } else { path })
+    }
+
+    /// How people call a file.
+    pub(super) fn place(&self, file: &str) -> String {
+        match self {
+            Self::Server(server) => server.url(file),
+            Self::Directory(path) => path.join(file).display().to_string(),
+        }
+    }
+
+    /// All bytes of a file that has at most so many.
+    pub(super) fn whole(&self, file: &str, most: usize) -> Result<Vec<u8>, Fault> {
+        let reader: Box<dyn Read> = match self {
+            Self::Server(server) => Box::new(server.whole(file)?),
+            Self::Directory(path) => Box::new(File::open(path.join(file))?),
+        };
+        let mut bytes = Vec::new();
+        let limit = u64::try_from(most).unwrap_or(u64::MAX);
+        reader.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+        if bytes.len() > most { Err(Fault::Wrong("the file is too large")) } else { Ok(bytes) }
+    }
+
+    /// A range of a file, which has one byte or more. The reader may have fewer bytes, and more.
+    pub(super) fn range(&self, file: &str, offset: u64, size: u64) -> Result<Box<dyn Read + Send>, Fault> {
+        match self {
+            Self::Server(server) => server.range(file, offset, size),
+            Self::Directory(path) => {
+                let mut file = File::open(path.join(file))?;
+                file.seek(SeekFrom::Start(offset))?;
+                Ok(Box::new(file.take(size)))
+            }
+        }
+    }
+
+    /// Forgets which versions of files were seen.
+    pub(super) fn forget(&self) {
+        if let Self::Server(server) = self {
+            server.tags.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        }
+    }
+}
+
+/// A package on an HTTP server.
+#[derive(Debug, Clone)]
+pub(super) struct Server {
+    agent: Agent,
+    /// Up to the names of files.
+    base: String,
+    /// From the question mark on.
+    query: String,
+    /// `ETag` of each file.
+    tags: Arc<Mutex<HashMap<String, String>>>,
+}
+
+impl Server {
+    fn new(location: &str, options: &Options) -> Self {
+        let location = location.split('#').next().unwrap_or_default();
+        let (path, query) = location.find('?').map_or((location, ""), |at| location.split_at(at));
+        let base = path.strip_suffix(Package::MANIFEST).unwrap_or(path).trim_end_matches('/');
+        let config = Agent::config_builder()
+            .http_status_as_error(false)
+            .max_redirects(options.redirects)
+            .max_redirects_will_error(true)
+            .timeout_connect(Some(options.connect_timeout))
+            .timeout_recv_response(Some(options.read_timeout))
+            .timeout_per_read(Some(options.read_timeout))
+            .timeout_recv_body(Some(options.response_timeout))
+            .max_idle_connections_per_host(4)
+            .user_agent(concat!("splatstream/", env!("CARGO_PKG_VERSION")))
+            .accept_encoding("identity");
+        Self {
+            agent: config.build().new_agent(),
+            base: format!("{base}/"),
+            query: query.to_owned(),
+            tags: Arc::default(),
+        }
+    }
+
+    fn url(&self, file: &str) -> String {
+        [&self.base, file, &self.query].concat()
+    }
+
+    fn whole(&self, file: &str) -> Result<impl Read + use<>, Fault> {
+        let response = self.agent.get(self.url(file)).header(header::CACHE_CONTROL, "no-cache").call()?;
+        match response.status() {
+            StatusCode::OK => Ok(response.into_body().into_reader()),
+            status => Err(Fault::Status(status.as_u16())),
+        }
+    }
+
+    fn range(&self, file: &str, offset: u64, size: u64) -> Result<Box<dyn Read + Send>, Fault> {
+        let last = offset.saturating_add(size.saturating_sub(1));
+        let known = self.tag(file);
+        let mut request =
+            self.agent.get(self.url(file)).header(header::RANGE, format!("bytes={offset}-{last}"));
+        // A weak tag says nothing about bytes.
+        if let Some(tag) = known.as_deref().filter(|tag| !tag.starts_with("W/")) {
+            request = request.header(header::IF_RANGE, tag);
+        }
+        let response = request.call()?;
+        self.check(file, &response, known.as_deref(), offset, last)?;
+        Ok(Box::new(response.into_body().into_reader()))
+    }
+
+    fn tag(&self, file: &str) -> Option<String> {
+        self.tags.lock().unwrap_or_else(PoisonError::into_inner).get(file).cloned()
+    }
+
+    /// Whether a response is the range asked for, of the file that was seen before.
+    fn check<B>(
+        &self,
+        file: &str,
+        response: &Response<B>,
+        known: Option<&str>,
+        first: u64,
+        last: u64,
+    ) -> Result<(), Fault> {
+        let tag = text(response.headers(), header::ETAG.as_str());
+        let is_other = known.is_some_and(|known| tag.is_some_and(|tag| tag != known));
+        match response.status() {
+            StatusCode::PARTIAL_CONTENT if is_other => return Err(Fault::Changed),
+            StatusCode::PARTIAL_CONTENT => {}
+            StatusCode::PRECONDITION_FAILED | StatusCode::RANGE_NOT_SATISFIABLE => {
+                return Err(Fault::Changed);
+            }
+            StatusCode::OK if is_other => return Err(Fault::Changed),
+            StatusCode::OK => return Err(Fault::Wrong("the server does not answer with ranges of bytes")),
+            status => return Err(Fault::Status(status.as_u16())),
+        }
+        let expected = format!("bytes {first}-{last}/");
+        if !text(response.headers(), header::CONTENT_RANGE.as_str())
+            .is_some_and(|range| range.starts_with(&expected))
+        {
+            return Err(Fault::Wrong("the server answers with another range of bytes"));
+        }
+        if let Some(tag) = tag {
+            let mut tags = self.tags.lock().unwrap_or_else(PoisonError::into_inner);
+            tags.insert(file.to_owned(), tag.to_owned());
+        }
+        Ok(())
+    }
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name)?.to_str().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn locations_are_of_directories_and_of_manifests() {
+        let place = |location: &str| Source::new(location, &Options::default()).place("s0.mp4");
+        assert_eq!(place("http://a/b"), "http://a/b/s0.mp4");
+        assert_eq!(place("http://a/b/"), "http://a/b/s0.mp4");
+        assert_eq!(place("https://a/b/manifest.json?key=1#x"), "https://a/b/s0.mp4?key=1");
+        assert_eq!(place("b/manifest.json"), PathBuf::from("b").join("s0.mp4").display().to_string());
+    }
+}
