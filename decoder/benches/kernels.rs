@@ -9,7 +9,8 @@ use core::fmt;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use splatstream_decoder::block::{CodedPlanes, decode_coded};
-use splatstream_decoder::coded_block::{Buffers, CodedBlock};
+use splatstream_decoder::buffers::Buffers;
+use splatstream_decoder::coded_block::CodedBlock;
 use splatstream_decoder::colour;
 use splatstream_decoder::context::plane_contexts;
 use splatstream_decoder::digest::{list_digest, lists_digest};
@@ -17,7 +18,7 @@ use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::{Layout, PlaneInfo, Section, ShCoding};
 use splatstream_decoder::output::to_gaussians;
-use splatstream_decoder::steps::StepRule;
+use splatstream_decoder::steps::{Exponents, StepRule};
 use splatstream_format::entropy::frequencies::Frequencies;
 use splatstream_format::entropy::model::{ContextAxis, PlaneModel, Source};
 use splatstream_format::entropy::reader::PlaneDecoder;
@@ -127,7 +128,7 @@ fn symbols(bencher: Bencher, case: Case) {
     }
     let bytes = writer.finish();
     let planes = CodedPlanes { lanes_log2: LANES_LOG2, layout: &layout, steps };
-    let mut buffers = Buffers::new(Interrupt::NEVER);
+    let mut buffers = Buffers::default();
     bencher
         .counter(ItemsCount::new(BLOCK * layout.planes().len()))
         .bench_local(|| decode_coded(black_box(&bytes), 0, BLOCK, &planes, &decoders, &mut buffers).unwrap());
@@ -148,8 +149,9 @@ fn colours(bencher: Bencher, rank: u8) {
     let components: Vec<Vec<i32>> = (0..rank).map(|_| plane(&mut random, BLOCK)).collect();
     let mut out = vec![vec![0; BLOCK]; dimension];
     bencher.counter(ItemsCount::new(BLOCK)).bench_local(|| {
-        let mut planes: Vec<&mut [i32]> = out.iter_mut().map(Vec::as_mut_slice).collect();
-        colour::add_inverse(&transform, black_box(&components), &mut planes, 0).unwrap();
+        let exponents = Exponents::Same(0);
+        colour::add_inverse(&transform, black_box(&components), &exponents, &mut out, Interrupt::NEVER, 0)
+            .unwrap();
     });
 }
 

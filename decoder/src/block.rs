@@ -1,6 +1,7 @@
 //! A block: coded planes in, integer attributes out. Blocks are independent, so all cores decode one frame.
 
-use crate::coded_block::{Buffers, CodedBlock};
+use crate::buffers::Buffers;
+use crate::coded_block::CodedBlock;
 use crate::colour::Colour;
 use crate::context::lanes::{DeltaContexts, PlaneContexts};
 use crate::frame::FrameSlice;
@@ -55,7 +56,7 @@ pub fn decode_block(
     at: u64,
     unit: &UnitParameters<'_>,
     decoders: &[PlaneDecoder],
-    buffers: &mut Buffers<'_>,
+    buffers: &mut Buffers,
     out: &mut FrameSlice<'_>,
 ) -> Result<()> {
     let count = out.planes.first().map_or(0, |plane| plane.len());
@@ -80,7 +81,7 @@ pub fn decode_coded(
     count: usize,
     unit: &CodedPlanes<'_>,
     decoders: &[PlaneDecoder],
-    buffers: &mut Buffers<'_>,
+    buffers: &mut Buffers,
 ) -> Result<CodedBlock> {
     decode_planes(bytes, at, count, unit, decoders, buffers, |_, _, _, _, _| ())
 }
@@ -93,8 +94,8 @@ fn decode_planes(
     count: usize,
     unit: &CodedPlanes<'_>,
     decoders: &[PlaneDecoder],
-    buffers: &mut Buffers<'_>,
-    mut take: impl FnMut(&mut CodedBlock, usize, PlaneInfo, i32, &mut Buffers<'_>),
+    buffers: &mut Buffers,
+    mut take: impl FnMut(&mut CodedBlock, usize, PlaneInfo, i32, &mut Buffers),
 ) -> Result<CodedBlock> {
     let mut reader = BlockReader::open(bytes, at, unit.lanes_log2)?;
     let mut deltas = core::mem::take(&mut buffers.deltas);

@@ -1,9 +1,8 @@
-//! The values of a block as they are coded, and the memory that blocks hand on.
+//! The values of a block as they are coded.
 
 use crate::attribute;
-use crate::components::Pair;
+use crate::buffers::Buffers;
 use crate::context::spacings;
-use crate::interrupt::Interrupt;
 use crate::layout::{Attribute, PlaneInfo, Section};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule};
@@ -90,7 +89,7 @@ impl CodedBlock {
         coded: Vec<i32>,
         bias: i32,
         has_sums: bool,
-        buffers: &mut Buffers<'_>,
+        buffers: &mut Buffers,
     ) {
         let last = self.magnitudes.last_mut().map(core::mem::take).unwrap_or_default();
         let is_first = info.index == 0;
@@ -102,17 +101,16 @@ impl CodedBlock {
                 self.push_with(Some(sums), info, coded, bias);
             }
             (false, _) => {
-                buffers.planes.extend((last.capacity() > 0).then_some(last));
+                buffers.take(last);
                 self.push_with(Some(Vec::new()), info, coded, bias);
             }
         }
     }
 
     /// Takes memory for what contexts need of the reconstruction.
-    pub(crate) fn reserve(&mut self, buffers: &mut Buffers<'_>) {
+    pub(crate) fn reserve(&mut self, buffers: &mut Buffers) {
         for plane in self.log_scale.iter_mut().chain([&mut self.opacity]) {
-            *plane = buffers.planes.pop().unwrap_or_default();
-            plane.clear();
+            *plane = buffers.plane(0);
         }
     }
 
@@ -208,6 +206,12 @@ impl CodedBlock {
         self.derived.spacings.get_or_init(|| spacings(&self.deltas))
     }
 
+    /// Its memory: that of the deltas, and of its planes.
+    pub(crate) fn into_planes(self) -> (Vec<u64>, impl Iterator<Item = Vec<i32>>) {
+        let Self { deltas, coded, log_scale, opacity, magnitudes, .. } = self;
+        (deltas, coded.into_iter().chain(log_scale).chain([opacity]).chain(magnitudes))
+    }
+
     /// Gaussians in the block.
     pub fn len(&self) -> usize {
         self.deltas.len()
@@ -216,42 +220,5 @@ impl CodedBlock {
     /// True if there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.deltas.is_empty()
-    }
-}
-
-/// Memory that blocks leave to the blocks after them: fresh memory costs more than what is done with it.
-#[derive(Debug)]
-pub struct Buffers<'i> {
-    planes: Vec<Vec<i32>>,
-    pub(crate) deltas: Vec<u64>,
-    pub(crate) components: Vec<Vec<Pair>>,
-    /// Ends the work on these blocks.
-    pub(crate) interrupt: &'i Interrupt,
-}
-
-impl<'i> Buffers<'i> {
-    /// No memory yet, for blocks on which the work ends where an interrupt is requested.
-    pub const fn new(interrupt: &'i Interrupt) -> Self {
-        Self { planes: Vec::new(), deltas: Vec::new(), components: Vec::new(), interrupt }
-    }
-
-    /// A plane of so many values, which mean nothing.
-    pub(crate) fn plane(&mut self, count: usize) -> Vec<i32> {
-        let mut plane = self.planes.pop().unwrap_or_default();
-        plane.resize(count, 0);
-        plane
-    }
-
-    /// Takes the memory of a plane, if there is one.
-    pub(crate) fn take(&mut self, plane: Option<&mut Vec<i32>>) {
-        self.planes.extend(plane.map(core::mem::take).filter(|plane| plane.capacity() > 0));
-    }
-
-    /// Takes the memory of a block.
-    pub(crate) fn recycle(&mut self, block: CodedBlock) {
-        let CodedBlock { deltas, coded, log_scale, opacity, magnitudes, .. } = block;
-        self.deltas = deltas;
-        let planes = coded.into_iter().chain(log_scale).chain([opacity]).chain(magnitudes);
-        self.planes.extend(planes.filter(|plane| plane.capacity() > 0));
     }
 }

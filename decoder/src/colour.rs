@@ -2,10 +2,12 @@
 
 use crate::attribute::in_range;
 use crate::components::{Components, Pair, TILE};
+use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::steps::Exponents;
 use crate::vector::{Task, vectorized};
 use core::ops::RangeInclusive;
+use rayon::prelude::*;
 use splatstream_format::entropy::machine::Machine;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::{Error, ErrorKind, Result};
@@ -15,6 +17,9 @@ pub const COMPONENT_RANGE: RangeInclusive<i32> = -8191..=8191;
 
 /// The values of colour in output steps.
 pub(crate) const COLOUR_RANGE: RangeInclusive<i32> = -(1 << 30)..=1 << 30;
+
+/// Gaussians whose colours one task transforms.
+const RUN: usize = 4096;
 
 /// Everything a unit needs to compute colour from components.
 #[derive(Debug, Clone, Copy)]
@@ -114,18 +119,39 @@ fn inverse(transform: &Transform, components: &Components, out: &mut [&mut [i32]
     planes.try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "colour", "7.6", at))
 }
 
-/// `out_j += Round(sum over k of basis[k][j] * component_k, 6)`: a residual on top of what `out` holds.
+/// `out_j += Round(sum over k of basis[k][j] * component_k, 6)`: a residual on top of what `out` holds. Components are
+/// `coded` times the steps of their Gaussians. Runs of Gaussians are transformed on all cores.
 ///
 /// # Errors
-/// Invalid if a component leaves -8191..=8191.
+/// Invalid if a component leaves -8191..=8191: the first of the first run that has one. Where an interrupt is requested,
+/// that.
 pub fn add_inverse(
     transform: &Transform,
-    components: &[Vec<i32>],
-    out: &mut [&mut [i32]],
+    coded: &[Vec<i32>],
+    exponents: &Exponents,
+    out: &mut [Vec<i32>],
+    interrupt: &Interrupt,
     at: u64,
 ) -> Result<()> {
-    let components = Components::known(components, at);
-    transformed(transform, &components, out, |predicted, _, change| predicted.wrapping_add(change))
+    let count = coded.first().map_or(0, Vec::len);
+    let mut runs: Vec<Vec<&mut [i32]>> =
+        (0..count.div_ceil(RUN)).map(|_| Vec::with_capacity(out.len())).collect();
+    for plane in out {
+        runs.iter_mut().zip(plane.chunks_mut(RUN)).for_each(|(run, chunk)| run.push(chunk));
+    }
+    let transform_run = |(index, mut out): (usize, Vec<&mut [i32]>)| {
+        interrupt.check()?;
+        let start = index.wrapping_mul(RUN);
+        let range = start..start.saturating_add(RUN).min(count);
+        let mut components =
+            Components::new(range.len(), coded.len(), &exponents.part(range.clone()), Vec::new());
+        for plane in coded {
+            components.add(plane.get(range.clone()).unwrap_or_default(), 0, at);
+        }
+        transformed(transform, &components, &mut out, |predicted, _, change| predicted.wrapping_add(change))
+    };
+    let results: Vec<Result<()>> = runs.into_par_iter().enumerate().map(transform_run).collect();
+    results.into_iter().collect()
 }
 
 /// Writes what `join` makes of the value in `out`, the mean and the transformed components.

@@ -52,14 +52,6 @@ impl Components {
         Self { pairs, of_tile, planes: 0, steps: Steps::new(exponents), error: None }
     }
 
-    /// Components that are known as they are.
-    pub(crate) fn known(planes: &[Vec<i32>], at: u64) -> Self {
-        let count = planes.first().map_or(0, Vec::len);
-        let mut components = Self::new(count, planes.len(), &Exponents::Same(0), Vec::new());
-        planes.iter().for_each(|plane| components.add(plane, 0, at));
-        components
-    }
-
     /// Adds the next component of all Gaussians: coded values and their bias. `at` goes into the error.
     pub(crate) fn add(&mut self, coded: &[i32], bias: i32, at: u64) {
         let (first, is_high) = (self.planes / 2, self.planes % 2 == 1);

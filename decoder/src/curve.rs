@@ -5,6 +5,7 @@
 //!
 //! What is added here counts points or is an index of one, so that no sum is above the number of points.
 
+use crate::interrupt::Interrupt;
 use crate::position::morton;
 use crate::vector::{Task, vectorized};
 use rayon::prelude::*;
@@ -47,11 +48,14 @@ impl Task for Codes<'_> {
     }
 }
 
-/// The indices of codes in the order of (code, index).
-pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>) -> Vec<(u64, u32)> {
+/// The indices of codes in the order of (code, index); where an interrupt is requested, the order means nothing.
+pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>, interrupt: &Interrupt) -> Vec<(u64, u32)> {
     let mut points: Vec<(u64, u32)> = codes.zip(0..).collect();
     if points.len() < FEW {
         points.sort_unstable();
+        return points;
+    }
+    if interrupt.is_requested() {
         return points;
     }
     let mut counts = vec![[0_u32; VALUES]; DIGITS];
@@ -65,6 +69,9 @@ pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>) -> Vec<(u64, u32)
     let mut sorted = vec![(0, 0); points.len()];
     for (position, counts) in (0_u32..).zip(&mut counts) {
         let most = counts.iter().copied().max().map_or(0, |most| most as usize);
+        if interrupt.is_requested() {
+            break;
+        }
         if most == points.len() {
             // All points have the same digit.
             continue;
@@ -106,7 +113,7 @@ mod tests {
             codes.iter_mut().for_each(|code| *code >>= shift);
             let mut expected: Vec<(u64, u32)> = codes.iter().copied().zip(0..).collect();
             expected.sort_unstable();
-            prop_assert_eq!(order(codes.into_iter()), expected);
+            prop_assert_eq!(order(codes.into_iter(), Interrupt::NEVER), expected);
         }
     }
 }

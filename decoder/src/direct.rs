@@ -5,11 +5,10 @@
 //! whose units only add Gaussians: all frames of static content, and I frames of one spatial layer.
 
 use crate::block::{UnitParameters, decode_block};
-use crate::coded_block::Buffers;
+use crate::buffers::{Buffers, Workspace};
 use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, blocks_of};
-use crate::interrupt::Interrupt;
 use rayon::prelude::*;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::SectionModels;
@@ -48,7 +47,7 @@ struct Task<'t, 'f, 'a> {
 pub(crate) fn decode(
     units: &[DirectUnit<'_, '_>],
     sequence: &SequenceParameters,
-    interrupt: &Interrupt,
+    workspace: Workspace<'_>,
 ) -> (QuantizedFrame, Vec<Result<usize>>) {
     let sections: Vec<Option<(&CodedSection<'_>, &SectionModels)>> =
         units.iter().map(|unit| unit.prepared.sections().next()).collect();
@@ -66,7 +65,8 @@ pub(crate) fn decode(
         .collect();
     let lengths: Vec<usize> = blocks.iter().map(|&(.., count)| count).collect();
     let total = lengths.iter().copied().fold(0, usize::saturating_add);
-    let mut planes = QuantizedFrame::zeroed(total, usize::from(sequence.sh_dimension()));
+    let mut planes =
+        QuantizedFrame::zeroed_unless(workspace.interrupt, total, usize::from(sequence.sh_dimension()));
     let task = |((unit, bytes, at, _), out)| {
         let (coded, models) = sections.get(unit).copied().flatten()?;
         let parameters = parameters(units.get(unit)?, coded, models, sequence);
@@ -75,7 +75,7 @@ pub(crate) fn decode(
     let tasks: Vec<Task<'_, '_, '_>> =
         blocks.into_iter().zip(planes.slices(&lengths)).filter_map(task).collect();
     let decoded: Vec<(usize, Result<usize>)> =
-        tasks.into_par_iter().map_init(|| Buffers::new(interrupt), run).collect();
+        tasks.into_par_iter().map(|task| workspace.run(|buffers| run(buffers, task))).collect();
     let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (unit, block) in decoded {
         let Some(slot) = results.get_mut(unit) else { continue };
@@ -84,7 +84,7 @@ pub(crate) fn decode(
     (planes, results)
 }
 
-fn run(buffers: &mut Buffers<'_>, task: Task<'_, '_, '_>) -> (usize, Result<usize>) {
+fn run(buffers: &mut Buffers, task: Task<'_, '_, '_>) -> (usize, Result<usize>) {
     let Task { unit, parameters, decoders, bytes, at, mut out } = task;
     let count = out.planes.first().map_or(0, |plane| plane.len());
     (unit, decode_block(bytes, at, &parameters, decoders, buffers, &mut out).map(|()| count))

@@ -53,14 +53,20 @@ fn take<'a, T>(rest: &mut &'a mut [T], length: usize) -> &'a mut [T] {
 impl QuantizedFrame {
     /// A frame of `count` Gaussians, every integer 0, with `sh_planes` SH planes.
     pub fn zeroed(count: usize, sh_planes: usize) -> Self {
-        let planes = || [(); 3].map(|()| vec![0; count]);
+        Self::zeroed_unless(Interrupt::NEVER, count, sh_planes)
+    }
+
+    /// The same; where an interrupt is requested, planes are empty.
+    pub(crate) fn zeroed_unless(interrupt: &Interrupt, count: usize, sh_planes: usize) -> Self {
+        let count = || if interrupt.is_requested() { 0 } else { count };
+        let planes = || [(); 3].map(|()| vec![0; count()]);
         Self {
-            position: [(); 3].map(|()| vec![0; count]),
+            position: [(); 3].map(|()| vec![0; count()]),
             log_scale: planes(),
-            opacity: vec![0; count],
+            opacity: vec![0; count()],
             rotation: planes(),
             dc: planes(),
-            sh: (0..sh_planes).map(|_| vec![0; count]).collect(),
+            sh: (0..sh_planes).into_par_iter().map(|_| vec![0; count()]).collect(),
         }
     }
 
@@ -143,18 +149,24 @@ impl QuantizedFrame {
 
     /// Keeps the Gaussians whose flag is set.
     pub fn retain(&mut self, keep: &[bool]) {
-        self.position.iter_mut().for_each(|plane| retain(plane, keep));
-        self.signed_planes_mut().for_each(|plane| retain(plane, keep));
+        self.position.par_iter_mut().for_each(|plane| retain(plane, keep));
+        let planes: Vec<&mut Vec<i32>> = self.signed_planes_mut().collect();
+        planes.into_par_iter().for_each(|plane| retain(plane, keep));
     }
 
     /// Appends the Gaussians of another frame with as many SH planes.
     pub fn append(&mut self, other: &Self) {
+        self.append_unless(Interrupt::NEVER, other);
+    }
+
+    /// The same; where an interrupt is requested, planes are missing.
+    pub(crate) fn append_unless(&mut self, interrupt: &Interrupt, other: &Self) {
         for (plane, more) in self.position.iter_mut().zip(&other.position) {
             plane.extend_from_slice(more);
         }
-        for (plane, more) in self.signed_planes_mut().zip(other.signed_planes()) {
-            plane.extend_from_slice(more);
-        }
+        let planes: Vec<_> = self.signed_planes_mut().zip(other.signed_planes()).collect();
+        let planes = planes.into_par_iter().filter(|_| !interrupt.is_requested());
+        planes.for_each(|(plane, more)| plane.extend_from_slice(more));
     }
 
     /// The Gaussians of several frames, which have `sh_planes` SH planes, one after the other. Where an interrupt is

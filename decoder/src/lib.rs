@@ -44,6 +44,7 @@ pub use splatstream_format::entropy::layout;
 pub mod attribute;
 pub mod block;
 pub mod budget;
+pub mod buffers;
 mod carried;
 pub mod cell;
 pub mod coded_block;

@@ -210,7 +210,12 @@ impl GaussianList {
 
     /// Appends new Gaussians.
     pub fn append(&mut self, other: &Self) {
-        self.planes.append(&other.planes);
+        self.append_unless(Interrupt::NEVER, other);
+    }
+
+    /// The same; where an interrupt is requested, planes are missing.
+    pub(crate) fn append_unless(&mut self, interrupt: &Interrupt, other: &Self) {
+        self.planes.append_unless(interrupt, &other.planes);
         let ours = self.position_fine.iter_mut().chain(&mut self.rotation_fine);
         for (plane, more) in ours.zip(other.position_fine.iter().chain(&other.rotation_fine)) {
             plane.extend_from_slice(more);

@@ -6,6 +6,7 @@
 //! found in parallel (`candidates`); the motions follow one after the other, in the order of the parents.
 
 use crate::curve;
+use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
 use crate::vector::vectorized;
 use candidates::{Candidates, NEVER, Neighbours, Search};
@@ -129,6 +130,8 @@ pub struct MoveSpace {
     kept: Vec<Vec<bool>>,
     /// All parents along the curve.
     order: Vec<Place>,
+    /// Ends the work; what it leaves means nothing.
+    interrupt: Interrupt,
     /// Memory of other frames.
     spare_lists: Vec<Vec<Parent>>,
     spare_order: Vec<Place>,
@@ -138,13 +141,14 @@ impl MoveSpace {
     /// Of a frame without increments.
     pub fn new(ratio: SpanRatio, position_bits: u8) -> Self {
         let mut space = Self::default();
-        space.restart(ratio, position_bits);
+        space.restart(ratio, position_bits, Interrupt::NEVER);
         space
     }
 
     /// Becomes that of another frame without increments.
-    pub(crate) fn restart(&mut self, ratio: SpanRatio, position_bits: u8) {
+    pub(crate) fn restart(&mut self, ratio: SpanRatio, position_bits: u8, interrupt: &Interrupt) {
         self.ratio = ratio;
+        self.interrupt = interrupt.clone();
         self.last = 1_i32.wrapping_shl(position_bits.into()).wrapping_sub(1).wrapping_shl(6);
         self.spare_lists = core::mem::take(&mut self.lists);
         self.spare_lists.reverse();
@@ -169,16 +173,21 @@ impl MoveSpace {
         let mut parents = self.spare_lists.pop().unwrap_or_default();
         parents.clear();
         parents.resize(displaced.len(), Parent::default());
-        let Self { order, spare_order, ratio, .. } = self;
+        let Self { order, spare_order, ratio, interrupt, .. } = self;
+        let requested = &*interrupt;
         let sort = || {
             let positions = displaced.planes.position.each_ref().map(Vec::as_slice);
-            let sorted = curve::order(curve::codes(positions).into_iter());
+            let sorted = curve::order(curve::codes(positions).into_iter(), requested);
+            if requested.is_requested() {
+                return;
+            }
             let own = sorted.into_iter().map(|(code, row)| Place { code, list, row });
             merge(order, own, spare_order);
             core::mem::swap(order, spare_order);
         };
         let fill_in = || {
-            parents.par_chunks_mut(RUN).enumerate().for_each(|(run, parents)| {
+            let runs = parents.par_chunks_mut(RUN).enumerate();
+            runs.filter(|_| !requested.is_requested()).for_each(|(run, parents)| {
                 gather(parents, run.wrapping_mul(RUN), reference, displaced, *ratio);
             });
         };
@@ -227,19 +236,18 @@ impl MoveSpace {
     ) -> Vec<Neighbours> {
         let candidates = Candidates::new(self, modes);
         let mut neighbours = vec![Neighbours::default(); rows.len()];
-        neighbours.par_chunks_mut(RUN).zip(rows.par_chunks(RUN)).enumerate().for_each(
-            |(run, (neighbours, rows))| {
-                let first = run.wrapping_mul(RUN);
-                vectorized(Search {
-                    candidates: &candidates,
-                    order: &self.order,
-                    rows,
-                    first,
-                    wanted,
-                    neighbours,
-                });
-            },
-        );
+        let runs = neighbours.par_chunks_mut(RUN).zip(rows.par_chunks(RUN)).enumerate();
+        runs.filter(|_| !self.interrupt.is_requested()).for_each(|(run, (neighbours, rows))| {
+            let first = run.wrapping_mul(RUN);
+            vectorized(Search {
+                candidates: &candidates,
+                order: &self.order,
+                rows,
+                first,
+                wanted,
+                neighbours,
+            });
+        });
         neighbours
     }
 

@@ -46,12 +46,17 @@ struct Point {
 impl NeighbourSearch {
     /// A search among points, given by their planes x, y, z of one length. Coordinates are below 2^21.
     pub fn new(points: [&[u32]; 3]) -> Self {
+        Self::new_unless(Interrupt::NEVER, points)
+    }
+
+    /// The same; where an interrupt is requested, what is found means nothing.
+    pub(crate) fn new_unless(interrupt: &Interrupt, points: [&[u32]; 3]) -> Self {
         let [xs, ys, zs] = points;
         let codes = curve::codes(points);
         let coordinate = |plane: &[u32], index: u32| plane.get(index as usize).copied().unwrap_or(0);
         let point =
             |(code, index)| Point { code, index, at: [xs, ys, zs].map(|plane| coordinate(plane, index)) };
-        Self { points: curve::order(codes.into_iter()).into_par_iter().map(point).collect() }
+        Self { points: curve::order(codes.into_iter(), interrupt).into_par_iter().map(point).collect() }
     }
 
     /// Points searched.
@@ -104,8 +109,14 @@ impl NeighbourSearch {
     ) -> Vec<Neighbour> {
         let [xs, ys, zs] = points;
         let wanted = count.min(self.len());
-        let mut all = vec![Neighbour::default(); xs.len().wrapping_mul(wanted)];
-        if wanted == 0 {
+        let mut all = Vec::with_capacity(xs.len().wrapping_mul(wanted));
+        for run in xs.chunks(RUN) {
+            if wanted == 0 || interrupt.is_requested() {
+                return all;
+            }
+            all.resize(all.len().saturating_add(run.len().wrapping_mul(wanted)), Neighbour::default());
+        }
+        if all.is_empty() {
             return all;
         }
         all.par_chunks_mut(RUN.wrapping_mul(wanted))

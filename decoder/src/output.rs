@@ -28,16 +28,23 @@ pub fn to_gaussians(
     let rotation_step = sequence.rotation_step();
     let dc_step = sequence.dc_step() * COLOUR_FRACTION;
     let sh_step = sequence.sh_step() * COLOUR_FRACTION;
-    let mut planes = Planes {
-        position: scene_positions(position, sequence),
-        log_scale: log_scale.map(|plane| affine(plane, log_scale_offset, log_scale_step)),
-        rotation: [const { Vec::new() }; 4],
-        opacity_logit: affine(opacity, opacity_offset, opacity_step),
-        dc: dc.map(|plane| scaled(plane, dc_step)),
-        sh: sh.into_par_iter().map(|plane| scaled(plane, sh_step)).collect(),
+    let quaternions = || {
+        let [x, y, z] = each(rotation, |plane| scaled(plane, rotation_step));
+        [unit_w(&x, &y, &z), x, y, z]
     };
-    let [x, y, z] = rotation.map(|plane| scaled(plane, rotation_step));
-    planes.rotation = [unit_w(&x, &y, &z), x, y, z];
+    let colours = || {
+        let of_sh = || sh.into_par_iter().map(|plane| scaled(plane, sh_step)).collect();
+        rayon::join(|| each(dc, |plane| scaled(plane, dc_step)), of_sh)
+    };
+    let shapes = || {
+        let of_opacity = || affine(opacity, opacity_offset, opacity_step);
+        rayon::join(|| each(log_scale, |plane| affine(plane, log_scale_offset, log_scale_step)), of_opacity)
+    };
+    let ((position, rotation), ((log_scale, opacity_logit), (dc, sh))) = rayon::join(
+        || rayon::join(|| scene_positions(position, sequence), quaternions),
+        || rayon::join(shapes, colours),
+    );
+    let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh };
     let frame = GaussianFrame::from_planes(sequence.sh_degree, planes)?;
     Ok(frame.with_antialiased(sequence.antialiased()))
 }
@@ -46,10 +53,16 @@ fn scene_positions(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [V
     let (step, companding) = (sequence.position_step(), Companding::new(sequence));
     let [x, y, z] = position;
     let [of_x, of_y, of_z] = sequence.position_offset();
-    [(x, of_x), (y, of_y), (z, of_z)].map(|(plane, offset)| match companding.is_linear() {
+    each([(x, of_x), (y, of_y), (z, of_z)], |(plane, offset)| match companding.is_linear() {
         true => plane.into_iter().map(|q| offset + step * q as f32).collect(),
         false => plane.into_iter().map(|q| offset + step * companding.expand(q) as f32).collect(),
     })
+}
+
+/// What `f` makes of each of three planes, on all cores.
+fn each<T: Send, U: Send>([x, y, z]: [T; 3], f: impl Fn(T) -> U + Sync) -> [U; 3] {
+    let (x, (y, z)) = rayon::join(|| f(x), || rayon::join(|| f(y), || f(z)));
+    [x, y, z]
 }
 
 fn affine(plane: Vec<i32>, offset: f32, step: f32) -> Vec<f32> {

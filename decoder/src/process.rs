@@ -6,6 +6,7 @@
 //! are discarded up to a gop_header from which decoding can go on.
 
 use crate::budget::{Budget, Spent};
+use crate::buffers::BufferPool;
 use crate::gop::Gop;
 use crate::interrupt::Interrupt;
 use crate::operating_point::{OperatingPoint, Tally};
@@ -102,6 +103,8 @@ pub struct Decoder {
     /// That of the frame that has ended last.
     frame_point: OperatingPoint,
     interrupt: Interrupt,
+    /// Memory of tasks that decode blocks.
+    buffers: BufferPool,
     spent: Spent,
     /// Whether the budget does not suffice.
     is_exhausted: bool,
@@ -145,6 +148,7 @@ impl Decoder {
             wanted_point: options.operating_point,
             frame_point: options.operating_point,
             interrupt: Interrupt::default(),
+            buffers: BufferPool::default(),
             spent: Spent::default(),
             is_exhausted: false,
             next_identity: 0,
@@ -355,8 +359,8 @@ impl Decoder {
     fn context(&self, reference: Option<usize>) -> Option<Context<'_>> {
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };
         let reference = reference.and_then(|layer| self.references.get(layer));
-        let (options, interrupt) = (&self.options, &self.interrupt);
-        Some(Context { options, interrupt, profile: self.profile, sequence, gop, reference })
+        let Self { options, interrupt, buffers, profile, .. } = self;
+        Some(Context { options, interrupt, buffers, profile: *profile, sequence, gop, reference })
     }
 
     /// Whether a unit belongs to the operating point (7.2).
@@ -433,6 +437,7 @@ impl Decoder {
         let context = Context {
             options: &self.options,
             interrupt: &self.interrupt,
+            buffers: &self.buffers,
             profile: self.profile,
             sequence,
             gop,

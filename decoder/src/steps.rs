@@ -259,6 +259,14 @@ impl Exponents {
         }
     }
 
+    /// Those of the Gaussians in a range.
+    pub(crate) fn part(&self, range: core::ops::Range<usize>) -> Self {
+        match self {
+            Self::Same(exponent) => Self::Same(*exponent),
+            Self::Each(exponents) => Self::Each(exponents.get(range).unwrap_or_default().to_vec()),
+        }
+    }
+
     /// Values times the steps.
     pub fn scaled(&self, values: &[i32]) -> Vec<i32> {
         let mut scaled = values.to_vec();

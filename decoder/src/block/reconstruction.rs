@@ -3,7 +3,8 @@
 
 use super::UnitParameters;
 use crate::attribute::{self, ATTRIBUTE_RANGE, in_range};
-use crate::coded_block::{Buffers, CodedBlock};
+use crate::buffers::Buffers;
+use crate::coded_block::CodedBlock;
 use crate::colour::ShValues;
 use crate::components::Components;
 use crate::frame::FrameSlice;
@@ -41,7 +42,7 @@ impl<'u, 'o, 'f> Reconstruction<'u, 'o, 'f> {
         plane: usize,
         info: PlaneInfo,
         bias: i32,
-        buffers: &mut Buffers<'_>,
+        buffers: &mut Buffers,
     ) {
         let has_indices = matches!(self.unit.colour.mode, ShCoding::VectorQuantised { .. });
         match info.attribute {
@@ -51,7 +52,8 @@ impl<'u, 'o, 'f> Reconstruction<'u, 'o, 'f> {
             _ => return,
         }
         // What is left are the log-scales and opacities, which the block has besides, and indices.
-        buffers.take(plane.checked_sub(1).and_then(|before| block.coded.get_mut(before)));
+        let before = plane.checked_sub(1).and_then(|before| block.coded.get_mut(before));
+        buffers.take(before.map(core::mem::take).unwrap_or_default());
     }
 
     fn rotation(&mut self, block: &CodedBlock, plane: usize, info: PlaneInfo, bias: i32) {
@@ -69,7 +71,7 @@ impl<'u, 'o, 'f> Reconstruction<'u, 'o, 'f> {
         plane: usize,
         stage: Stage,
         bias: i32,
-        buffers: &mut Buffers<'_>,
+        buffers: &mut Buffers,
     ) {
         let [dc, sh] = &mut self.components;
         let (components, attribute) =
@@ -87,7 +89,7 @@ impl<'u, 'o, 'f> Reconstruction<'u, 'o, 'f> {
     ///
     /// # Errors
     /// Invalid if a value is out of range.
-    pub(super) fn finish(self, block: &CodedBlock, buffers: &mut Buffers<'_>) -> Result<()> {
+    pub(super) fn finish(self, block: &CodedBlock, buffers: &mut Buffers) -> Result<()> {
         let Self { unit, at, out, components, rotations } = self;
         position::positions(&block.deltas, unit.position_bits, unit.position_shift, &mut out.position, at)?;
         let log_scale = block.log_scale.each_ref().map(Vec::as_slice);

@@ -51,8 +51,6 @@ pub struct Unit<'a> {
     pub network: Option<&'a Network>,
     /// How many new Gaussians the network may predict (A.2).
     pub max_learned: u32,
-    /// Ends the work on the unit.
-    pub interrupt: &'a Interrupt,
     /// Absolute offset of the payload, for errors.
     pub at: u64,
 }
@@ -151,33 +149,33 @@ pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) 
     let codes = unit.values.plane(Section::Predictors, 0);
     let is_predicted = codes.iter().any(|&code| code != Predictor::None.code());
     let before = (situation.temporal.is_some() && is_predicted)
-        .then(|| reference_set_unless(unit.interrupt, situation, &list.planes));
+        .then(|| reference_set_unless(unit.coding.interrupt, situation, &list.planes));
     if let Some(temporal) = situation.temporal.as_ref().filter(|_| unit.header.extrapolates_opacity) {
         extrapolate(&mut list, temporal);
     }
-    unit.interrupt.check()?;
+    unit.coding.interrupt.check()?;
     let keep = change_parents(unit, &mut list, situation.temporal.as_ref())?;
-    unit.interrupt.check()?;
+    unit.coding.interrupt.check()?;
     let predictors = predictors(unit)?;
     if let Some(temporal) = &situation.temporal {
         list.follow_change(temporal.reference);
     }
-    unit.interrupt.check()?;
+    unit.coding.interrupt.check()?;
     list.retain(&keep);
-    unit.interrupt.check()?;
+    unit.coding.interrupt.check()?;
     let set = match before {
         Some(set) => set,
-        None if is_predicted => reference_set_unless(unit.interrupt, situation, &list.planes),
+        None if is_predicted => reference_set_unless(unit.coding.interrupt, situation, &list.planes),
         None => QuantizedFrame::default(),
     };
-    unit.interrupt.check()?;
+    unit.coding.interrupt.check()?;
     if !set.is_empty() {
         check_learned(unit, &predictors)?;
     }
     let position = new_positions(unit)?;
     let added = new_gaussians(unit, situation.temporal.is_none(), position, &predictors, &set)?;
-    unit.interrupt.check()?;
-    list.append(&added);
+    unit.coding.interrupt.check()?;
+    list.append_unless(unit.coding.interrupt, &added);
     Ok(Applied { list, added: added.planes, keep })
 }
 
@@ -224,16 +222,16 @@ fn change_parents(
         None => move_parents(unit, list, &moved)?,
     }
     if !updated.is_empty() {
-        let mut attributes = Attributes::of_list(list, &updated);
+        let mut attributes = Attributes::of_list_unless(unit.coding.interrupt, list, &updated);
         let values = AttributeValues(&unit.values.section(Section::Updates).planes);
         for stage in Stage::ALL {
-            unit.interrupt.check()?;
+            unit.coding.interrupt.check()?;
             attributes.add_stage(stage, values, &unit.coding, unit.at)?;
         }
-        unit.interrupt.check()?;
-        attributes.write_to(list, &updated);
+        unit.coding.interrupt.check()?;
+        attributes.write_to(list, &updated, unit.coding.interrupt);
     }
-    unit.interrupt.check()?;
+    unit.coding.interrupt.check()?;
     list.settle_rows(&[&moved, &updated]);
     Ok(modes.iter().map(|&mode| mode != REMOVED).collect())
 }
@@ -325,7 +323,7 @@ fn move_predicted(unit: &Unit<'_>, list: &mut GaussianList, space: &MoveSpace, m
     let grid = MoveGrid::new(unit);
     for number in 0..moves.rows().len() {
         if number.is_multiple_of(RUN) {
-            unit.interrupt.check()?;
+            unit.coding.interrupt.check()?;
         }
         let mut position = moves.predicted(number, predictor_of(number));
         for (coordinate, values) in position.iter_mut().zip(planes) {
@@ -405,7 +403,7 @@ fn new_gaussians(
         colour: unit.coding.colour,
         network: unit.network,
         feature_shift: unit.sequence.feature_shift,
-        interrupt: unit.interrupt,
+        interrupt: unit.coding.interrupt,
     };
     let prediction = Prediction::new(set, position.each_ref().map(Vec::as_slice), predictors, &by);
     let attributes = match prediction {
@@ -421,7 +419,7 @@ fn new_gaussians(
     let mut list =
         GaussianList::of_planes(QuantizedFrame { position, log_scale, opacity, rotation, dc, sh }, anchor);
     list.rotation_fine = rotation_fine;
-    unit.interrupt.check()?;
+    unit.coding.interrupt.check()?;
     list.settle();
     Ok(list)
 }
@@ -430,7 +428,7 @@ fn new_gaussians(
 /// reconstructed on all cores.
 fn unpredicted(count: usize, sh_planes: usize, values: &[Vec<i32>], unit: &Unit<'_>) -> Result<Attributes> {
     let run = |start: usize| {
-        unit.interrupt.check()?;
+        unit.coding.interrupt.check()?;
         let range = start..count.min(start.saturating_add(RUN));
         let part: Vec<Vec<i32>> =
             values.iter().map(|plane| plane.get(range.clone()).unwrap_or_default().to_vec()).collect();
@@ -443,7 +441,7 @@ fn unpredicted(count: usize, sh_planes: usize, values: &[Vec<i32>], unit: &Unit<
     let mut all = Attributes::unpredicted(0, &unit.coding.colour, sh_planes);
     for attributes in runs {
         let attributes = attributes?;
-        unit.interrupt.check()?;
+        unit.coding.interrupt.check()?;
         for stage in Stage::ALL {
             for (plane, part) in all.stage_mut(stage).iter_mut().zip(attributes.stage(stage)) {
                 plane.extend_from_slice(part);

@@ -96,13 +96,17 @@ impl<'s> Prediction<'s> {
         let pick = |plane: &[u32]| -> Vec<u32> { items.iter().map(|item| at(plane, item.row)).collect() };
         let position = [pick(x), pick(y), pick(z)];
         let count = usize::from(header.neighbour_count).min(set.len());
-        let search = NeighbourSearch::new(set.position.each_ref().map(Vec::as_slice));
+        let search = NeighbourSearch::new_unless(by.interrupt, set.position.each_ref().map(Vec::as_slice));
         let neighbours = search.nearest_unless(by.interrupt, position.each_ref().map(Vec::as_slice), count);
+        if by.interrupt.is_requested() {
+            return None;
+        }
         let features = vec![0; neighbours.len()];
         let falloff = [header.bilateral_spatial, header.bilateral_feature];
         let network = by.network.filter(|_| predictors.contains(&Predictor::Transformer));
         let network = network.map(LaneNetwork::new);
-        let (rows, colour, feature_shift) = (Rows::new(set, &neighbours), by.colour, by.feature_shift);
+        let (rows, colour, feature_shift) =
+            (Rows::new_unless(by.interrupt, set, &neighbours), by.colour, by.feature_shift);
         Some(Self {
             set,
             colour,
@@ -236,11 +240,17 @@ impl<'s> Prediction<'s> {
                 weighted.of_rows(rows, means);
             }
         });
-        for (item, means) in self.items.iter().zip(means.chunks_exact(out.len().max(1))) {
-            if !(colour && item.predictor == Predictor::Transformer) {
-                set_row(out, item.row, means.iter().map(|mean| mean.wrapping_mul(unit)));
+        let width = out.len();
+        let planes = out.par_iter_mut().enumerate().filter(|_| !self.interrupt.is_requested());
+        planes.for_each(|(number, plane)| {
+            let column = means.iter().skip(number).step_by(width);
+            for (item, mean) in self.items.iter().zip(column) {
+                let is_learned = colour && item.predictor == Predictor::Transformer;
+                if let Some(slot) = plane.get_mut(item.row as usize).filter(|_| !is_learned) {
+                    *slot = mean.wrapping_mul(unit);
+                }
             }
-        }
+        });
     }
 
     /// Adds the squares of the differences between the items and their neighbours in an attribute, rounded to steps of

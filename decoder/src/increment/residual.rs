@@ -2,6 +2,7 @@
 
 use crate::attribute::{ATTRIBUTE_RANGE, in_range, unsorted};
 use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
+use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::list::{FINE, FRACTION_BITS, GaussianList};
 use crate::stage::Stage;
@@ -23,6 +24,8 @@ pub struct AttributeCoding<'a> {
     pub canonical_axes: bool,
     /// How components become colour.
     pub colour: Colour<'a>,
+    /// Ends the work between runs of Gaussians.
+    pub interrupt: &'a Interrupt,
 }
 
 /// The attributes of a run of Gaussians: predictions at first, then what the residuals make of them.
@@ -121,9 +124,15 @@ impl Attributes {
 
     /// The attributes of some Gaussians of a list, which predict themselves.
     pub fn of_list(list: &GaussianList, rows: &[u32]) -> Self {
+        Self::of_list_unless(Interrupt::NEVER, list, rows)
+    }
+
+    /// The same; where an interrupt is requested, the attributes mean nothing.
+    pub(crate) fn of_list_unless(interrupt: &Interrupt, list: &GaussianList, rows: &[u32]) -> Self {
         let pick = |plane: &Vec<i32>| -> Vec<i32> {
             let value = |&row: &u32| usize::try_from(row).ok().and_then(|row| plane.get(row)).copied();
-            rows.iter().map(|row| value(row).unwrap_or(0)).collect()
+            let wanted = if interrupt.is_requested() { &[] } else { rows };
+            wanted.iter().map(|row| value(row).unwrap_or(0)).collect()
         };
         let planes = &list.planes;
         let shapes =
@@ -139,7 +148,7 @@ impl Attributes {
     }
 
     /// Writes the attributes back to the Gaussians of the list; [`GaussianList::settle`] has to follow.
-    pub fn write_to(&self, list: &mut GaussianList, rows: &[u32]) {
+    pub(crate) fn write_to(&self, list: &mut GaussianList, rows: &[u32], interrupt: &Interrupt) {
         let write = |(plane, values): (&mut Vec<i32>, &Vec<i32>)| {
             for (&row, &value) in rows.iter().zip(values) {
                 if let Some(slot) = usize::try_from(row).ok().and_then(|row| plane.get_mut(row)) {
@@ -153,7 +162,7 @@ impl Attributes {
         let from = self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation_fine);
         let from = from.chain(&self.dc).chain(&self.sh);
         let planes: Vec<(&mut Vec<i32>, &Vec<i32>)> = to.zip(from).collect();
-        planes.into_par_iter().for_each(write);
+        planes.into_par_iter().filter(|_| !interrupt.is_requested()).for_each(write);
     }
 
     /// Adds the residuals of all attributes.
@@ -266,8 +275,8 @@ impl Attributes {
         at: u64,
     ) -> Result<()> {
         let exponents = self.exponents(Stage::Opacity, &coding.steps);
-        for residual in scaled(values.of_stage(Stage::Opacity, &coding.colour), &exponents) {
-            add(&mut self.opacity, &residual);
+        for residual in values.of_stage(Stage::Opacity, &coding.colour) {
+            add(&mut self.opacity, &exponents.scaled(residual));
         }
         in_range(&self.opacity, &ATTRIBUTE_RANGE, "opacity", "7.6", at)
     }
@@ -314,9 +323,8 @@ impl Attributes {
     /// Invalid if a value leaves its range.
     fn add_dc(&mut self, values: AttributeValues<'_>, coding: &AttributeCoding<'_>, at: u64) -> Result<()> {
         let exponents = self.exponents(Stage::Dc, &coding.steps);
-        let components = scaled(values.of_stage(Stage::Dc, &coding.colour), &exponents);
-        let mut out: Vec<&mut [i32]> = self.dc.iter_mut().map(Vec::as_mut_slice).collect();
-        add_inverse(coding.colour.dc, &components, &mut out, at)?;
+        let coded = values.of_stage(Stage::Dc, &coding.colour);
+        add_inverse(coding.colour.dc, coded, &exponents, &mut self.dc, coding.interrupt, at)?;
         self.dc.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "dc", "7.6", at))
     }
 
@@ -328,16 +336,16 @@ impl Attributes {
         let planes = values.of_stage(Stage::Sh, &coding.colour);
         let Some(transform) = coding.colour.sh else { return Ok(()) };
         let exponents = self.exponents(Stage::Sh, &coding.steps);
-        let components = match coding.colour.mode {
+        let entries;
+        let coded = match coding.colour.mode {
             ShCoding::None => return Ok(()),
-            ShCoding::Coefficients { .. } => scaled(planes, &exponents),
+            ShCoding::Coefficients { .. } => planes,
             ShCoding::VectorQuantised { .. } => {
-                let entries = coding.colour.entries(planes, usize::from(transform.header.rank), at)?;
-                scaled(&entries, &exponents)
+                entries = coding.colour.entries(planes, usize::from(transform.header.rank), at)?;
+                entries.as_slice()
             }
         };
-        let mut out: Vec<&mut [i32]> = self.sh.iter_mut().map(Vec::as_mut_slice).collect();
-        add_inverse(transform, &components, &mut out, at)?;
+        add_inverse(transform, coded, &exponents, &mut self.sh, coding.interrupt, at)?;
         self.sh.iter().try_for_each(|plane| in_range(plane, &COLOUR_RANGE, "sh", "7.6", at))
     }
 }
@@ -345,11 +353,6 @@ impl Attributes {
 /// The first sh plane.
 fn first_sh(colour: &Colour<'_>) -> usize {
     DC.saturating_add(usize::from(colour.dc.header.rank))
-}
-
-/// Planes times the steps of their attribute.
-fn scaled(planes: &[Vec<i32>], exponents: &Exponents) -> Vec<Vec<i32>> {
-    planes.iter().map(|plane| exponents.scaled(plane)).collect()
 }
 
 fn add(plane: &mut [i32], residual: &[i32]) {

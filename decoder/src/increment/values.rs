@@ -2,8 +2,8 @@
 
 use crate::attribute;
 use crate::block::{CodedPlanes, decode_coded};
-use crate::coded_block::{Buffers, CodedBlock};
-use crate::interrupt::Interrupt;
+use crate::buffers::Workspace;
+use crate::coded_block::CodedBlock;
 use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::Result;
@@ -120,13 +120,11 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
     ///
     /// # Errors
     /// Malformed; of several faults, that of the first block.
-    pub fn decode(&self, sequence: &SequenceParameters, interrupt: &Interrupt) -> Result<UnitValues> {
+    pub fn decode(&self, sequence: &SequenceParameters, workspace: Workspace<'_>) -> Result<UnitValues> {
         let mut values = UnitValues::default();
         for (coded, models) in self.sections() {
-            values.set(
-                coded.section,
-                joined(self.blocks(coded, models, sequence, interrupt)?, models, sequence),
-            );
+            let blocks = self.blocks(coded, models, sequence, workspace)?;
+            values.set(coded.section, joined(blocks, models, sequence, workspace)?);
         }
         Ok(values)
     }
@@ -140,14 +138,14 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
         coded: &CodedSection<'a>,
         models: &SectionModels,
         sequence: &SequenceParameters,
-        interrupt: &Interrupt,
+        workspace: Workspace<'_>,
     ) -> Result<Vec<CodedBlock>> {
         let decoders: Vec<PlaneDecoder> = models.models.iter().map(PlaneDecoder::new).collect();
         let planes = CodedPlanes { lanes_log2: coded.lanes_log2, layout: &models.layout, steps: self.steps };
         let decoded: Vec<Result<CodedBlock>> = blocks_of(coded, sequence)
             .into_par_iter()
             .map(|(bytes, at, count)| {
-                decode_coded(bytes, at, count, &planes, &decoders, &mut Buffers::new(interrupt))
+                workspace.run(|buffers| decode_coded(bytes, at, count, &planes, &decoders, buffers))
             })
             .collect();
         decoded.into_iter().collect()
@@ -175,7 +173,12 @@ fn block_size(sequence: &SequenceParameters) -> usize {
 }
 
 /// The blocks of a section one after the other, biases added. The memory of the first block is used again.
-fn joined(blocks: Vec<CodedBlock>, models: &SectionModels, sequence: &SequenceParameters) -> SectionValues {
+fn joined(
+    blocks: Vec<CodedBlock>,
+    models: &SectionModels,
+    sequence: &SequenceParameters,
+    workspace: Workspace<'_>,
+) -> Result<SectionValues> {
     let has_deltas = models.layout.planes().first().is_some_and(|plane| plane.is_position());
     let mut blocks = blocks.into_iter();
     let mut values = SectionValues { block: block_size(sequence), ..SectionValues::default() };
@@ -183,10 +186,12 @@ fn joined(blocks: Vec<CodedBlock>, models: &SectionModels, sequence: &SequencePa
         (values.deltas, values.planes) = (first.deltas, first.coded);
     }
     for block in blocks {
+        workspace.interrupt.check()?;
         values.deltas.extend_from_slice(&block.deltas);
         for (plane, more) in values.planes.iter_mut().zip(&block.coded) {
             plane.extend_from_slice(more);
         }
+        workspace.buffers.recycle(block);
     }
     for (plane, model) in values.planes.iter_mut().zip(&models.models) {
         attribute::unbias(plane, model.bias);
@@ -195,5 +200,5 @@ fn joined(blocks: Vec<CodedBlock>, models: &SectionModels, sequence: &SequencePa
         true => drop(values.planes.drain(..1)),
         false => values.deltas = Vec::new(),
     }
-    values
+    Ok(values)
 }

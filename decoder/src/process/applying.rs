@@ -78,7 +78,7 @@ impl FrameInProgress {
         interrupt.check()?;
         let mut moves = None;
         if unit.header.move_predictor_count() > 0 {
-            let mut space = self.moves_before(r, reference, ratio, unit.sequence.position_bits);
+            let mut space = self.moves_before(r, reference, ratio, unit.sequence.position_bits, interrupt);
             interrupt.check()?;
             space.push(before, &parents);
             moves = Some(space);
@@ -143,14 +143,18 @@ impl FrameInProgress {
         reference: &FrameState,
         ratio: SpanRatio,
         position_bits: u8,
+        interrupt: &Interrupt,
     ) -> MoveSpace {
         let mut space = core::mem::take(&mut self.lists.spares.moves);
         if !core::mem::take(&mut self.lists.has_moves) {
-            space.restart(ratio, position_bits);
+            space.restart(ratio, position_bits, interrupt);
         }
         let units = reference.lists.iter().zip(&self.lists.displaced).zip(&self.lists.lists);
         let units = units.zip(&self.lists.kept).take(r).skip(space.len());
         for (((before, displaced), list), keep) in units {
+            if interrupt.is_requested() {
+                break;
+            }
             space.push(before, displaced);
             space.settle(list, keep);
         }

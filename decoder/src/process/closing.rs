@@ -146,7 +146,7 @@ fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried, interrupt: &I
         if interrupt.is_requested() {
             return;
         }
-        decoded.planes.append(&list.planes);
+        decoded.planes.append_unless(interrupt, &list.planes);
         decoded.identities.extend_from_slice(identities);
         decoded.carried_lists = decoded.carried_lists.saturating_add(1);
     }

@@ -229,7 +229,8 @@ impl FrameInProgress {
         let coding = SectionCoding { dc_rank: transforms.dc.header.rank, sh, steps };
         let sections = PreparedSections::new(sections, &coding, &mut models, &mut ())?;
         in_force.follow(unit.refinement, models.clone());
-        let coding = AttributeCoding { steps, canonical_axes: context.sequence.canonical_axes(), colour };
+        let canonical_axes = context.sequence.canonical_axes();
+        let coding = AttributeCoding { steps, canonical_axes, colour, interrupt: context.interrupt };
         Ok(Prepared { unit, sections, coding, models })
     }
 
@@ -256,7 +257,7 @@ impl FrameInProgress {
                 coding: *coding,
             })
             .collect();
-        let (mut planes, results) = direct::decode(&units, context.sequence, context.interrupt);
+        let (mut planes, results) = direct::decode(&units, context.sequence, context.workspace());
         let mut results = results.into_iter();
         let mut kept = 0_usize;
         for (unit, prepared) in group {
@@ -280,7 +281,7 @@ impl FrameInProgress {
         planes.truncate(kept);
         match self.lists.planes.is_empty() {
             true => self.lists.planes = planes,
-            false => self.lists.planes.append(&planes),
+            false => self.lists.planes.append_unless(context.interrupt, &planes),
         }
     }
 
@@ -293,7 +294,7 @@ impl FrameInProgress {
     ) {
         let values: Vec<Result<UnitValues>> = group
             .par_iter()
-            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence, context.interrupt))
+            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence, context.workspace()))
             .collect();
         for ((unit, prepared), values) in group.iter().zip(values) {
             if unit.refinement >= self.decoded.limit {
@@ -323,7 +324,6 @@ impl FrameInProgress {
             sequence: context.sequence,
             network: context.gop.network(),
             max_learned: context.options.limits.max_learned,
-            interrupt: context.interrupt,
             at: pending.payload_at,
         };
         let Outcome { list, added, keep } = self.applied(&unit, pending.refinement, context)?;

@@ -8,6 +8,7 @@
 use super::Options;
 use super::decoding::Lists;
 use super::phase::{same, unexpected};
+use crate::buffers::{BufferPool, Workspace};
 use crate::displacement::CellField;
 use crate::entropy_state::UnitEntropy;
 use crate::frame_state::FrameState;
@@ -27,11 +28,19 @@ use std::sync::Arc;
 pub(super) struct Context<'d> {
     pub(super) options: &'d Options,
     pub(super) interrupt: &'d Interrupt,
+    pub(super) buffers: &'d BufferPool,
     pub(super) profile: Profile,
     pub(super) sequence: &'d SequenceParameters,
     pub(super) gop: &'d Gop,
     /// The reference frame of a P or B frame, if its header was decoded.
     pub(super) reference: Option<&'d FrameState>,
+}
+
+impl Context<'_> {
+    /// What tasks that decode its blocks share.
+    pub(super) fn workspace(&self) -> Workspace<'_> {
+        Workspace { buffers: self.buffers, interrupt: self.interrupt }
+    }
 }
 
 /// A frame whose units are arriving.

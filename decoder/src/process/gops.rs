@@ -203,7 +203,7 @@ impl Context<'_> {
         let steps = StepRule::new(self.sequence, [0; 5]);
         let coding = SectionCoding { dc_rank: 0, sh: ShCoding::None, steps };
         let prepared = PreparedSections::new(sections, &coding, &mut moved.models, &mut ())?;
-        let values = prepared.decode(self.sequence, self.interrupt)?;
+        let values = prepared.decode(self.sequence, self.workspace())?;
         moved.field = field(values.section(Section::Cells), cells.cell_log2, self.sequence, at)?;
         if self.options.entropy {
             moved.entropy = of_sections(sections, &values).map(|state| UnitEntropy { payload_at: at, state });

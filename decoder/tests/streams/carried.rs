@@ -1,6 +1,7 @@
 //! Clause 7.8: what is carried, shown and compensated.
 
 use crate::write::{Plan, decoded};
+use splatstream_decoder::buffers::{BufferPool, Workspace};
 use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::increment::field;
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
@@ -35,7 +36,8 @@ fn fields(plan: &Plan) -> Vec<CellField> {
         let coding =
             SectionCoding { dc_rank: 0, sh: ShCoding::None, steps: StepRule::new(&sequence, [0; 5]) };
         let prepared = PreparedSections::new(sections, &coding, &mut models, &mut ()).unwrap();
-        let values = prepared.decode(&sequence, Interrupt::NEVER).unwrap();
+        let workspace = Workspace { buffers: &BufferPool::default(), interrupt: Interrupt::NEVER };
+        let values = prepared.decode(&sequence, workspace).unwrap();
         fields.push(field(values.section(Section::Cells), cells.cell_log2, &sequence, 0).unwrap());
     }
     fields

@@ -125,6 +125,7 @@ impl UnitCoder<'_> {
             steps: self.steps(attribute_step),
             canonical_axes: self.sequence.canonical_axes(),
             colour: self.colour,
+            interrupt: Interrupt::NEVER,
         }
     }
 
@@ -144,7 +145,6 @@ impl UnitCoder<'_> {
         situation: &Situation<'_>,
     ) -> Result<Applied, Error> {
         let unit = Unit {
-            interrupt: Interrupt::NEVER,
             header: &draft.header,
             values: &draft.values,
             coding: self.coding(draft.header.attribute_step),

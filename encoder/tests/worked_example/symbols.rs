@@ -1,5 +1,6 @@
 //! Clause 8.4 step by step, written again: the table of D.4, and a check of the fast reader.
 
+use splatstream_decoder::buffers::{BufferPool, Workspace};
 use splatstream_decoder::context::{delta_contexts, plane_contexts};
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
 use splatstream_decoder::interrupt::Interrupt;
@@ -39,7 +40,8 @@ pub(crate) fn blocks(text: &mut String, bytes: &[u8]) {
                 let prepared =
                     PreparedSections::new(&increment.sections, &coding, &mut in_force, &mut ()).unwrap();
                 let (coded, models) = prepared.sections().next().unwrap();
-                let fast = prepared.blocks(coded, models, sequence, Interrupt::NEVER).unwrap();
+                let workspace = Workspace { buffers: &BufferPool::default(), interrupt: Interrupt::NEVER };
+                let fast = prepared.blocks(coded, models, sequence, workspace).unwrap();
                 let ([fast], [(block, _)]) = (fast.as_slice(), coded.blocks.as_slice()) else {
                     panic!("one block")
                 };

@@ -2,6 +2,7 @@
 
 use super::symbols::BitsOfPlanes;
 use super::{Planes, Statistics};
+use splatstream_decoder::buffers::{BufferPool, Workspace};
 use splatstream_decoder::gop::{Gop, Transforms};
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
 use splatstream_decoder::interrupt::Interrupt;
@@ -83,7 +84,8 @@ fn add(
     let mut bits = trace.bits.as_slice();
     for (coded, models) in prepared.sections() {
         let (here, after) = bits.split_at_checked(models.models.len()).unwrap_or((bits, &[]));
-        let blocks = prepared.blocks(coded, models, sequence, Interrupt::NEVER)?;
+        let workspace = Workspace { buffers: &BufferPool::default(), interrupt: Interrupt::NEVER };
+        let blocks = prepared.blocks(coded, models, sequence, workspace)?;
         let planes = Planes { layout: &models.layout, models: &models.models, blocks: &blocks };
         statistics.add(coded.count, &planes, here);
         bits = after;

@@ -92,9 +92,11 @@ impl Learned<'_> {
         let start = self.rows.columns(Stage::Dc).start;
         let mut components = vec![[0; OUTPUTS_MAX]; self.rows.len()];
         let each = components.par_iter_mut().zip(self.rows.all()).zip(used).with_min_len(RUN);
-        each.filter(|(_, used)| *used).for_each(|((components, row), _)| {
-            *components = self.projection.components(row.get(start..).unwrap_or_default());
-        });
+        each.filter(|(_, used)| *used && !self.interrupt.is_requested()).for_each(
+            |((components, row), _)| {
+                *components = self.projection.components(row.get(start..).unwrap_or_default());
+            },
+        );
         components
     }
 

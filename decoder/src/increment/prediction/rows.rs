@@ -2,6 +2,7 @@
 
 use super::at;
 use crate::frame::QuantizedFrame;
+use crate::interrupt::Interrupt;
 use crate::neighbours::Neighbour;
 use crate::stage::Stage;
 use core::ops::Range;
@@ -23,8 +24,8 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Gathers the neighbours out of a set.
-    pub(super) fn new(set: &QuantizedFrame, neighbours: &[Neighbour]) -> Self {
+    /// Gathers the neighbours out of a set; where an interrupt is requested, the rows mean nothing.
+    pub(super) fn new_unless(interrupt: &Interrupt, set: &QuantizedFrame, neighbours: &[Neighbour]) -> Self {
         let mut used = vec![false; set.len()];
         for neighbour in neighbours {
             if let Some(used) = used.get_mut(neighbour.index as usize) {
@@ -39,11 +40,14 @@ impl Rows {
                 *slot = row;
             }
         }
-        let indices = neighbours.iter().map(|neighbour| at(&row_of, neighbour.index)).collect();
         let width = BEFORE_SH.wrapping_add(set.sh.len());
+        if interrupt.is_requested() {
+            return Self { width, values: Vec::new(), indices: Vec::new() };
+        }
+        let indices = neighbours.iter().map(|neighbour| at(&row_of, neighbour.index)).collect();
         let mut values = vec![0; used_indices.len().wrapping_mul(width)];
         let runs = values.par_chunks_mut(width.wrapping_mul(RUN)).zip(used_indices.par_chunks(RUN));
-        runs.for_each(|(values, indices)| {
+        runs.filter(|_| !interrupt.is_requested()).for_each(|(values, indices)| {
             for (column, plane) in set.signed_planes().enumerate() {
                 let slots = values.iter_mut().skip(column).step_by(width);
                 slots.zip(indices).for_each(|(slot, &index)| *slot = at(plane, index));

@@ -8,6 +8,7 @@ use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::residual::AttributeCoding;
 use splatstream_decoder::increment::values::UnitValues;
 use splatstream_decoder::increment::{Situation, Temporal, Unit, apply, field, reference_set};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::moves::SpanRatio;
@@ -53,6 +54,7 @@ impl Common {
             steps: StepRule::new(&self.sequence, header.attribute_step),
             canonical_axes: self.sequence.canonical_axes(),
             colour: Colour { dc: &self.transform, sh: None, mode: ShCoding::None, codebooks: [None; 4] },
+            interrupt: Interrupt::NEVER,
         }
     }
 
@@ -81,7 +83,6 @@ impl Common {
     ) {
         let intra = frame.reference.is_none();
         let unit = Unit {
-            interrupt: splatstream_decoder::interrupt::Interrupt::NEVER,
             header: &header,
             values: &values,
             coding: self.coding(&header),

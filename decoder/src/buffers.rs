@@ -1,0 +1,74 @@
+//! Memory that blocks leave to the blocks after them: fresh memory costs more than what is done with it.
+
+use crate::coded_block::CodedBlock;
+use crate::components::Pair;
+use crate::interrupt::Interrupt;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Memory of the blocks of a task.
+#[derive(Debug, Default)]
+pub struct Buffers {
+    planes: Vec<Vec<i32>>,
+    pub(crate) deltas: Vec<u64>,
+    pub(crate) components: Vec<Vec<Pair>>,
+    /// Ends the work on these blocks.
+    pub(crate) interrupt: Interrupt,
+}
+
+impl Buffers {
+    /// A plane of so many values, which mean nothing.
+    pub(crate) fn plane(&mut self, count: usize) -> Vec<i32> {
+        let mut plane = self.planes.pop().unwrap_or_default();
+        plane.resize(count, 0);
+        plane
+    }
+
+    /// Takes the memory of a plane.
+    pub(crate) fn take(&mut self, plane: Vec<i32>) {
+        self.planes.extend(Some(plane).filter(|plane| plane.capacity() > 0));
+    }
+
+    /// Takes the memory of a block.
+    pub(crate) fn recycle(&mut self, block: CodedBlock) {
+        let (deltas, planes) = block.into_planes();
+        self.deltas = deltas;
+        self.planes.extend(planes.filter(|plane| plane.capacity() > 0));
+    }
+}
+
+/// Buffers that no task has: there are as many as tasks have run at a time.
+#[derive(Debug, Default)]
+pub struct BufferPool(Mutex<Vec<Buffers>>);
+
+impl BufferPool {
+    /// Takes the memory of a block that a task has given away.
+    pub(crate) fn recycle(&self, block: CodedBlock) {
+        if let Some(buffers) = self.idle().last_mut() {
+            buffers.recycle(block);
+        }
+    }
+
+    fn idle(&self) -> MutexGuard<'_, Vec<Buffers>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What tasks that decode blocks share.
+#[derive(Debug, Clone, Copy)]
+pub struct Workspace<'w> {
+    /// Their memory.
+    pub buffers: &'w BufferPool,
+    /// Ends them.
+    pub interrupt: &'w Interrupt,
+}
+
+impl Workspace<'_> {
+    /// Runs a task with buffers of its own.
+    pub(crate) fn run<R>(&self, task: impl FnOnce(&mut Buffers) -> R) -> R {
+        let mut buffers = self.buffers.idle().pop().unwrap_or_default();
+        buffers.interrupt = self.interrupt.clone();
+        let result = task(&mut buffers);
+        self.buffers.idle().push(buffers);
+        result
+    }
+}
