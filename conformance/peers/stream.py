@@ -23,6 +23,8 @@ def main():
     parser.add_argument("--buffer", type=float, default=25, metavar="SECONDS", help="that are buffered at most")
     parser.add_argument("--latency", type=float, default=0.05, metavar="SECONDS", help="from a request to its first byte")
     parser.add_argument("--live", type=float, metavar="SECONDS", help="live, with this time from capture to display")
+    parser.add_argument("--package", action="append", default=[], metavar="NAME=MANIFEST",
+                        help="play this package, which has measured qualities (splatstream package --quality)")
     parser.add_argument("--csv", metavar="FILE", help="a line for each playback")
     arguments = parser.parse_args()
     command = ["cargo", "run", "--quiet", "--release", "-p", "splatstream-stream", "--example", "qoe", "--",
@@ -30,6 +32,9 @@ def main():
                "--latency", str(arguments.latency)]
     if arguments.live:
         command += ["--live", str(arguments.live)]
+    for package in arguments.package:
+        name, _, manifest = package.partition("=")
+        command += ["--package", f"{name}={os.path.abspath(manifest)}"]
     if arguments.csv:
         command += ["--csv", os.path.abspath(arguments.csv)]
     return subprocess.call(command + peers(arguments), cwd=HERE)

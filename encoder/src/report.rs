@@ -1,9 +1,11 @@
 //! What was written, what was chosen, and why.
 
 use crate::isolated::Isolated;
+use crate::laws::Laws;
 use crate::sequence::Analysis;
 use crate::settings::{Importance, Settings};
 use crate::steps::Steps;
+
 use splatstream_format::syntax::{FrameType, IncrementHeader};
 use splatstream_gaussians::Defect;
 
@@ -38,6 +40,8 @@ pub struct Report {
     pub sh_trial: Option<[(f64, f64); 2]>,
     /// Quantiser steps.
     pub steps: Option<Steps>,
+    /// How steps follow from what is known of a Gaussian.
+    pub laws: Option<Laws>,
     /// What ordered the Gaussians.
     pub importance: Option<Importance>,
     /// Reconstruction digest of each frame, all refinements.
@@ -68,6 +72,7 @@ impl Report {
             position_step: sequence.position_step(),
             canonical_axes: (sequence.canonical_axes(), analysis.axes_trial),
             steps: Some(settings.steps),
+            laws: Some(settings.laws),
             importance: Some(importance),
             ..Self::default()
         }

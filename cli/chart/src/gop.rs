@@ -17,6 +17,7 @@ use decoded::{Shown, label, shown};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{Anchor, Settings, Structure, encode};
 use splatstream_gaussians::GaussianFrame;
+use std::io;
 pub(crate) use tools::ToolRow;
 
 /// Spatial layers: the paper's 540, 720 and 1080 lines.
@@ -46,17 +47,10 @@ pub(crate) struct Gop {
 }
 
 /// The settings of the GOP: those of the baseline, with the structure of the paper's experiment, whatever would be
-/// smaller for the quality.
+/// smaller.
 pub(crate) fn settings(baseline: Settings, frames: u32) -> Settings {
     let structure = Structure::Predicted { layers: TEMPORAL };
-    Settings {
-        structure,
-        anchor: Anchor::Whole,
-        spatial_layers: SPATIAL,
-        gop: frames,
-        psnr: None,
-        ..baseline
-    }
+    Settings { structure, anchor: Anchor::Whole, spatial_layers: SPATIAL, gop: frames, ..baseline }
 }
 
 /// Whether a scene has a second frame in its first GOP.
@@ -75,6 +69,7 @@ pub(crate) fn measure(
     let of_gop = scene.frames.iter().take(settings.gop as usize).cloned();
     let mut frames: Vec<GaussianFrame> = of_gop.collect();
     progress.step(format!("{}: operating points of the first GOP", scene.name));
+    let settings = &fitted(&mut frames, settings)?;
     let stream = encoded(&mut frames, settings)?;
     let whole = OperatingPoint { spatial: SPATIAL - 1, temporal: TEMPORAL - 1, refinement: 0 };
     let refinements = settings.refinements.iter().zip(0..);
@@ -94,6 +89,15 @@ pub(crate) fn measure(
         if ablation { ablation::rows(&mut frames, settings, judge, progress)? } else { Vec::new() };
     let rows = levels.iter().zip(subsets).map(|((percent, shown), subset)| level(*percent, shown, subset));
     Ok(Gop { frames: frames.len(), modes, levels: rows.collect::<Result<_, _>>()?, tools, ablation })
+}
+
+/// Settings with the steps that the GOP reaches its PSNR with: everything is measured with the same.
+fn fitted(frames: &mut Vec<GaussianFrame>, settings: &Settings) -> Result<Settings, Error> {
+    let report = encode(frames, settings, &mut io::sink(), &mut |_, _| {})
+        .map_err(|error| Error::other(error.to_string()))?;
+    let steps = report.steps.unwrap_or(settings.steps);
+    let laws = report.laws.unwrap_or(settings.laws);
+    Ok(Settings { steps, laws, psnr: None, ..settings.clone() })
 }
 
 fn encoded(frames: &mut Vec<GaussianFrame>, settings: &Settings) -> Result<Vec<u8>, Error> {

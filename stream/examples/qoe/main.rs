@@ -2,8 +2,12 @@
 //!
 //! ```text
 //! cargo run --release -p splatstream-stream --example qoe -- TRACES [--csv FILE] [--gops N] [--buffer SECONDS]
-//!     [--latency SECONDS] [--live SECONDS] [--peer NAME=COMMAND]... [--partial-peer NAME=COMMAND]...
+//!     [--latency SECONDS] [--live SECONDS] [--package NAME=MANIFEST]... [--peer NAME=COMMAND]...
+//!     [--partial-peer NAME=COMMAND]...
 //! ```
+//!
+//! Plays packages again and again, with the qualities that their manifests have measured, or ladders that are made up of sizes
+//! of real streams, if no package is given.
 //!
 //! `TRACES` has CSV files of lines `seconds,Mbit/s`, whose names say the class of the network: 3G..., 4G..., hd... for
 //! broadband, 5g... . Weights of our rule were tuned on every other trace of each class, in the order of names; the rest is
@@ -23,6 +27,7 @@ use std::time::Instant;
 use splatstream_stream::control::{
     Bola, BufferRule, Gop, Ladder, Layered, Live, Rule, Settings, Single, ThroughputRule,
 };
+use splatstream_stream::manifest::{GopInfo, Manifest, QualityInfo};
 use splatstream_stream::qoe::Score;
 use splatstream_stream::simulation::{Link, Report, Trace, ladders, simulate};
 
@@ -32,7 +37,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 /// One playback.
 struct Row {
-    ladder: &'static str,
+    ladder: String,
     class: &'static str,
     trace: String,
     held_out: bool,
@@ -58,6 +63,7 @@ struct Arguments {
     latency_us: u64,
     live_us: Option<u64>,
     peers: Vec<Candidate>,
+    packages: Vec<(String, PathBuf)>,
 }
 
 fn main() -> Result<()> {
@@ -68,7 +74,7 @@ fn main() -> Result<()> {
     for (class, held_out, path) in classes(&arguments.traces)? {
         let trace = Trace::parse(&std::fs::read_to_string(&path)?)?;
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        for (ladder, presentation) in presentations(class, arguments.gops) {
+        for (ladder, presentation) in presentations(class, &arguments)? {
             for (rule, made) in rules(&arguments.peers)? {
                 let start = Instant::now();
                 let report = play(&presentation, made, &trace, &arguments);
@@ -78,7 +84,7 @@ fn main() -> Result<()> {
                 let score = Score::of(&presentation, &report);
                 let (requests, abandoned) = (report.requests, report.abandoned);
                 rows.push(Row {
-                    ladder,
+                    ladder: ladder.clone(),
                     class,
                     trace: name.clone(),
                     held_out,
@@ -128,12 +134,32 @@ fn rules(peers: &[Candidate]) -> Result<Vec<(String, Box<dyn Rule>)>> {
     Ok(rules)
 }
 
-/// What is played on a class of networks.
-fn presentations(class: &str, gops: usize) -> Vec<(&'static str, Ladder)> {
-    match class {
-        "5G" => vec![("large", ladders::large(gops)), ("paper", ladders::paper(gops))],
-        _ => vec![("small", ladders::small(gops))],
+/// What is played on a class of networks: the packages, if some are given.
+fn presentations(class: &str, arguments: &Arguments) -> Result<Vec<(String, Ladder)>> {
+    let gops = arguments.gops;
+    let known = match class {
+        _ if !arguments.packages.is_empty() => Vec::new(),
+        "5G" => vec![("large".into(), ladders::large(gops)), ("paper".into(), ladders::paper(gops))],
+        _ => vec![("small".into(), ladders::small(gops))],
+    };
+    let packaged = |(name, path): &(String, PathBuf)| Ok((name.clone(), repeated(path, gops)?));
+    known.into_iter().map(Ok).chain(arguments.packages.iter().map(packaged)).collect()
+}
+
+/// The GOPs of a package again and again, with their qualities.
+fn repeated(manifest: &Path, gops: usize) -> Result<Ladder> {
+    let mut manifest = Manifest::parse(&std::fs::read(manifest)?)?;
+    let measured = manifest.quality.take().unwrap_or_default();
+    let (mut repeats, mut qualities, mut first_frame) = (Vec::new(), Vec::new(), 0);
+    for (gop, number) in manifest.gops.iter().cycle().take(gops).zip(0..) {
+        let of_gop = measured.iter().filter(|one| one.gop == Some(gop.index));
+        qualities.extend(of_gop.map(|one| QualityInfo { gop: Some(number), ..one.clone() }));
+        repeats.push(GopInfo { index: number, first_frame, ..gop.clone() });
+        first_frame += gop.frame_count;
     }
+    qualities.extend(measured.into_iter().filter(|one| one.gop.is_none()));
+    (manifest.gops, manifest.quality) = (repeats, Some(qualities));
+    Ok(manifest.ladder()?)
 }
 
 /// The traces with their classes, and whether they are held out.
@@ -176,6 +202,11 @@ fn parse() -> Result<Arguments> {
             "--gops" => arguments.gops = value()?.parse()?,
             "--buffer" => arguments.buffer_us = microseconds(&value()?)?,
             "--live" => arguments.live_us = Some(microseconds(&value()?)?),
+            "--package" => {
+                let package = value()?;
+                let (name, manifest) = package.split_once('=').ok_or("a package is NAME=MANIFEST")?;
+                arguments.packages.push((name.into(), manifest.into()));
+            }
             "--latency" => arguments.latency_us = microseconds(&value()?)?,
             "--peer" | "--partial-peer" => {
                 let peer = value()?;

@@ -29,8 +29,8 @@ const COLUMNS: [Column; 13] = [
 pub(crate) fn print(out: &mut impl Write, rows: &[Row]) -> Result<()> {
     let mut groups: Vec<(&str, &str)> = Vec::new();
     for row in rows {
-        if !groups.contains(&(row.ladder, row.class)) {
-            groups.push((row.ladder, row.class));
+        if !groups.contains(&(row.ladder.as_str(), row.class)) {
+            groups.push((&row.ladder, row.class));
         }
     }
     for (ladder, class) in groups {
