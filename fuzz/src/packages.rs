@@ -32,9 +32,11 @@ fn comes_back(stream: &[u8]) {
     for layout in [Layout::Gop, Layout::Frame] {
         let options = Options { layout, ..Options::default() };
         let Ok(package) = Package::of(stream, &options, &LIMITS) else { return };
-        let back = unpackage(&given(&files(&package)), &LIMITS);
+        let own = files(&package);
+        let back = unpackage(&given(&own), &LIMITS);
         assert!(back.as_deref() == Ok(stream), "the stream came back different: {:?}", back.err());
         described(package.manifest.to_json().as_bytes());
+        presented(own.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())));
         let manifest = Manifest::parse(package.manifest.to_json().as_bytes());
         assert!(manifest.is_ok_and(|manifest| manifest.describes(stream)), "its manifest is refused");
         let (mut live, mut changes) = (Live::new(&options, &LIMITS, ""), Vec::new());
@@ -42,9 +44,27 @@ fn comes_back(stream: &[u8]) {
             changes.extend(live.push(piece, "").expect("the whole stream was packaged"));
         }
         changes.extend(live.finish("").expect("the whole stream was packaged"));
+        presented(changes.iter().map(|change| (change.name.as_str(), change.bytes.as_slice())));
         let bytes: usize = changes.iter().map(|change| change.bytes.len()).sum();
         assert!(bytes >= stream.len(), "bytes are lost");
     }
+}
+
+/// MPDs are XML, in which what refers to a Representation names one.
+fn presented<'a>(files: impl Iterator<Item = (&'a str, &'a [u8])>) {
+    for (name, bytes) in files.filter(|(name, _)| name.ends_with(".mpd")) {
+        let text = core::str::from_utf8(bytes).expect("an MPD is text");
+        let document = roxmltree::Document::parse(text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let ids: Vec<&str> = with_attribute(&document, "id").collect();
+        let needed = with_attribute(&document, "dependencyId").flat_map(str::split_whitespace);
+        needed.for_each(|id| assert!(ids.contains(&id), "{name}: there is no Representation {id}"));
+    }
+}
+
+/// The values of an attribute of Representations.
+fn with_attribute<'a>(document: &'a roxmltree::Document<'_>, name: &'a str) -> impl Iterator<Item = &'a str> {
+    let representations = document.descendants().filter(|node| node.has_tag_name("Representation"));
+    representations.filter_map(move |node| node.attribute(name))
 }
 
 /// Files give a stream, which packages again, or an error.
