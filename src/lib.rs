@@ -72,6 +72,12 @@ pub use splatstream_encoder::{Encoder, Error as EncodeError, FrameSource, Report
 pub use splatstream_format::Error as StreamError;
 pub use splatstream_gaussians::{GaussianFrame, Planes};
 
+/// What a stream says of its scene.
+pub mod scene {
+    pub use splatstream_format::payload::{ColourSpace, SceneDescription, Sorting, UpAxis};
+    pub use splatstream_format::syntax::Camera;
+}
+
 /// What the fields of [`Settings`] hold.
 #[cfg(feature = "encode")]
 pub mod settings {
