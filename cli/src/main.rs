@@ -33,6 +33,7 @@ mod unfinished;
 mod unpackage;
 mod up_guess;
 mod validate;
+mod view;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::Console;
@@ -77,6 +78,7 @@ enum Command {
     Package(package::PackageStream),
     Unpackage(unpackage::Unpackage),
     Serve(serve::Serve),
+    View(view::View),
     Train(train::Train),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
@@ -152,6 +154,7 @@ impl Command {
             Self::Package(command) => command.run(console),
             Self::Unpackage(command) => command.run(console),
             Self::Serve(command) => command.run(console),
+            Self::View(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),
