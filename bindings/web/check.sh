@@ -3,10 +3,11 @@
 # Node and in Chromium, of which pictures stay in target/web. Says what it skips where a tool is not there.
 set -euo pipefail
 cd "$(dirname "$0")"
-mkdir -p "${CARGO_TARGET_DIR:=../../target}/web" "$CARGO_TARGET_DIR/tools"
+mkdir -p "${CARGO_TARGET_DIR:=../../target}/tools"
 CARGO_TARGET_DIR=$(cd "$CARGO_TARGET_DIR" && pwd)
 export CARGO_TARGET_DIR SPLATSTREAM=$CARGO_TARGET_DIR/release/splatstream WEB_TESTS=$CARGO_TARGET_DIR/web
 tools=$CARGO_TARGET_DIR/tools/web
+rm -rf "$WEB_TESTS" && mkdir "$WEB_TESTS"
 
 # Bytes of a file, or of what is piped in, are at most so many.
 at_most() {
@@ -27,9 +28,8 @@ sizes() {
     at_most 'the module' 920000 decoder/splatstream.wasm
     gzip -9c decoder/splatstream.wasm | at_most 'the module, compressed' 320000
     cat player/*.js | at_most 'the player' 100000
-    "$SPLATSTREAM" view "$CARGO_TARGET_DIR/web/scene/demo.gss" -o "$WEB_TESTS/page.html"
-    "$SPLATSTREAM" view "${demo:-../../target/demo/demo.gss}" -o "$WEB_TESTS/demo.html"
-    at_most 'a page of the moving scene' 1000000 "$WEB_TESTS/demo.html"
+    "$SPLATSTREAM" demo --out "$WEB_TESTS/demo" >/dev/null
+    at_most 'a page of the moving scene' 1000000 "$WEB_TESTS/demo/demo.html"
 }
 
 # npm packages of some names and versions, in $tools.
@@ -49,10 +49,11 @@ browser() {
         echo "skipped: Chromium is not there"
         return
     fi
-    CHROMIUM=$chromium PLAYWRIGHT=$tools/node_modules/playwright-core node --test --test-timeout=300000 tests/browser.test.mjs
+    CHROMIUM=$chromium PLAYWRIGHT=$tools/node_modules/playwright-core node --test tests/browser.test.mjs
 }
 
 wasm
+cargo build --quiet --release -p splatstream-cli
 if ! command -v node >/dev/null; then
     echo "skipped: the packages, for which Node is not there"
     exit

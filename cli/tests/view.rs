@@ -34,7 +34,7 @@ fn what_cannot_be_viewed_is_refused() {
     fail(10, &["view", text(&other), "-o", text(&page)]);
     assert!(!page.exists());
     fail(2, &["view", text(&fixture()), "-o", text(&page), "--port", "1"]);
-    fail(1, &["view", text(&fixture()), "-o", text(&fixture())]);
+    fail(2, &["view", text(&fixture()), "-o", text(&fixture())]);
 }
 
 #[cfg(unix)]

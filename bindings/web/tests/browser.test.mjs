@@ -12,7 +12,7 @@ import { FRAMES, POINTS, at, damaged, nativeDigests, pointOf, splatstream, strea
 const { chromium } = await import(pathToFileURL(join(process.env.PLAYWRIGHT, 'index.mjs')));
 const FLAGS = ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
   '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
-const SIZE = { width: 640, height: 360 };
+const SIZE = { width: 480, height: 270 };
 let server, browser;
 
 before(async () => {
@@ -114,7 +114,7 @@ test('pictures are those of the renderer of the repository', async () => {
   for (const [id, camera] of cameras.entries()) {
     const expected = readFileSync(at('native', `frame_0005_view_${id}.png`)).toString('base64');
     const [decibels, mean] = await page.evaluate(compare, { camera, expected });
-    console.log(`view ${id}: ${decibels.toFixed(1)} dB`);
+    console.log(`view ${id}: ${decibels.toFixed(2)} dB`);
     assert.ok(mean > 8, 'the picture is empty');
     assert.ok(decibels > 35, `${decibels} dB`);
   }
@@ -125,7 +125,7 @@ test('pictures are those of the renderer of the repository', async () => {
 async function compare({ camera, expected }) {
   await player.seek(5);
   player.camera = camera;
-  await new Promise((resolve) => setTimeout(resolve, 1200));
+  await new Promise((resolve) => setTimeout(resolve, 800));
   const pixels = async (source) => {
     const bitmap = await createImageBitmap(source);
     const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
@@ -135,6 +135,7 @@ async function compare({ camera, expected }) {
   player.backgroundColour = [0, 0, 0];
   const shown = await pixels(await player.snapshot());
   const wanted = await pixels(await (await fetch(`data:image/png;base64,${expected}`)).blob());
+  if (shown.width !== wanted.width || shown.height !== wanted.height) throw new Error('the pictures have different sizes');
   let squares = 0, sum = 0;
   for (let place = 0; place < wanted.data.length; place++) {
     if (place % 4 === 3) continue;
@@ -154,18 +155,18 @@ test('a damaged stream keeps playing and says what was lost', async () => {
   assert.equal(result.index, FRAMES - 1);
   assert.ok(result.losses.length > 0);
   assert.ok(await page.locator('#lost').isVisible());
-  await page.screenshot({ path: at('damaged.png') });
+  await page.screenshot({ path: at('damaged.png'), timeout: 120_000 });
   await page.finish();
 });
 
 test('it plays, loops, and keys work', async () => {
-  const page = await player();
+  const page = await player({ size: { width: 160, height: 90 } });
   await page.evaluate(() => {
     window.seen = [];
     player.addEventListener('frame', ({ detail }) => seen.push(detail.index));
     player.play();
   });
-  await page.waitForFunction(() => seen.some((index, place) => place > 0 && index < seen[place - 1]), null, { timeout: 60_000 });
+  await page.waitForFunction(() => seen.some((index, place) => place > 0 && index < seen[place - 1]), null, { timeout: 120_000 });
   await page.locator('splat-player').locator('canvas').focus();
   await page.keyboard.press('Space');
   assert.equal(await page.evaluate(() => player.isPlaying), false);
@@ -210,7 +211,7 @@ test('four moments are drawn', async () => {
     for (const key of keys) await page.evaluate((id) => player.press(id), key);
     await page.evaluate(() => player.seek(12));
     await page.waitForTimeout(1500);
-    const picture = await page.screenshot({ path: at(name) });
+    const picture = await page.screenshot({ path: at(name), timeout: 120_000 });
     assert.ok(picture.length > 20_000, `${name} is empty`);
     await page.finish();
   }
