@@ -6,19 +6,20 @@ import { FRAGMENT, VERTEX } from './shaders.js';
 /** Texels of a Gaussian in the base texture, and in that of the spherical harmonics by their degree. */
 const BASE_TEXELS = 2;
 const SH_TEXELS = [0, 2, 3, 6];
+/** Slots in a row of the texture of the order, and Gaussians of an instance: few vertices keep a GPU waiting. */
+const ORDER_ROW = 1024;
+const BATCH = 128;
 
 /** The Gaussians of one stream on the GPU. */
 export class Scene {
   #gl;
   #base = null;
   #sh = null;
-  #buffer;
+  #order = null;
   #slots = 0;
 
   constructor(renderer) {
     this.#gl = renderer.gl;
-    this.#buffer = this.#gl.createBuffer();
-    this.array = this.#arrayOf(this.#buffer);
     this.count = 0;
     this.near = 0;
     this.shDegree = 0;
@@ -35,49 +36,49 @@ export class Scene {
   /** Takes an order to draw in. */
   setOrder({ slots, near }) {
     const gl = this.#gl;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.#buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, slots, gl.DYNAMIC_DRAW);
-    this.count = slots.length;
+    this.count = Math.min(slots.length, this.#slots);
     this.near = near;
+    if (this.count === 0) return;
+    gl.bindTexture(gl.TEXTURE_2D, this.#order);
+    const rows = Math.floor(this.count / ORDER_ROW);
+    const put = (row, width, height, from) =>
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, slots, from);
+    if (rows > 0) put(0, ORDER_ROW, rows, 0);
+    if (this.count > rows * ORDER_ROW) put(rows, this.count - rows * ORDER_ROW, 1, rows * ORDER_ROW);
   }
 
-  /** Binds the textures: the base to unit 0, the spherical harmonics to unit 1. */
+  /** Binds the textures: the base to unit 0, the spherical harmonics to unit 1, the order to unit 2. */
   bind() {
     const gl = this.#gl;
-    for (const [unit, texture] of [this.#base, this.#sh ?? this.#base].entries()) {
+    for (const [unit, texture] of [this.#base, this.#sh ?? this.#base, this.#order].entries()) {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
     }
-    gl.bindVertexArray(this.array);
   }
 
   /** Frees what it has on the GPU. */
   delete() {
-    const gl = this.#gl;
-    gl.deleteTexture(this.#base);
-    gl.deleteTexture(this.#sh);
-    gl.deleteBuffer(this.#buffer);
-    gl.deleteVertexArray(this.array);
+    for (const texture of [this.#base, this.#sh, this.#order]) this.#gl.deleteTexture(texture);
   }
 
   #allocate(slots, shDegree) {
     const gl = this.#gl;
-    gl.deleteTexture(this.#base);
-    gl.deleteTexture(this.#sh);
+    this.delete();
     const rows = slots / ROW;
     const limit = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     if (rows > limit) throw new Error(`${slots} Gaussians are more than this GPU takes: ${limit * ROW}`);
-    this.#base = this.#texture(BASE_TEXELS, rows);
-    this.#sh = shDegree > 0 ? this.#texture(SH_TEXELS[shDegree], rows) : null;
+    this.#base = this.#texture(gl.RGBA32UI, ROW * BASE_TEXELS, rows);
+    this.#sh = shDegree > 0 ? this.#texture(gl.RGBA32UI, ROW * SH_TEXELS[shDegree], rows) : null;
+    this.#order = this.#texture(gl.R32UI, ORDER_ROW, Math.ceil(slots / ORDER_ROW));
     this.#slots = slots;
     this.shDegree = shDegree;
   }
 
-  #texture(texels, rows) {
+  #texture(format, width, height) {
     const gl = this.#gl;
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32UI, ROW * texels, rows);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     return texture;
@@ -93,24 +94,14 @@ export class Scene {
     }
     return bytes;
   }
-
-  #arrayOf(buffer) {
-    const gl = this.#gl;
-    const array = gl.createVertexArray();
-    gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(0, 1);
-    gl.bindVertexArray(null);
-    return array;
-  }
 }
 
 /** Draws scenes into a canvas. */
 export class Renderer {
   #program;
   #uniforms = {};
+  /** The triangles of an instance. */
+  #triangles;
 
   constructor(canvas) {
     const gl = canvas.getContext('webgl2', { antialias: false, depth: false, powerPreference: 'high-performance' });
@@ -124,8 +115,9 @@ export class Renderer {
   prepare() {
     const gl = this.gl;
     this.#program = link(gl, VERTEX, FRAGMENT);
-    const names = ['base', 'harmonics', 'shDegree', 'isAntialiased', 'position', 'axes', 'focal', 'size', 'near'];
+    const names = ['base', 'harmonics', 'shDegree', 'isAntialiased', 'position', 'axes', 'focal', 'size', 'near', 'order', 'count'];
     for (const name of names) this.#uniforms[name] = gl.getUniformLocation(this.#program, name);
+    this.#triangles = triangles(gl);
     gl.disable(gl.DEPTH_TEST);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
@@ -159,8 +151,9 @@ export class Renderer {
     const uniforms = this.#uniforms;
     gl.useProgram(this.#program);
     scene.bind();
-    gl.uniform1i(uniforms.base, 0);
-    gl.uniform1i(uniforms.harmonics, 1);
+    gl.bindVertexArray(this.#triangles);
+    for (const [unit, name] of ['base', 'harmonics', 'order'].entries()) gl.uniform1i(uniforms[name], unit);
+    gl.uniform1i(uniforms.count, scene.count);
     gl.uniform1i(uniforms.shDegree, scene.shDegree);
     gl.uniform1i(uniforms.isAntialiased, scene.isAntialiased ? 1 : 0);
     gl.uniform3fv(uniforms.position, position);
@@ -168,9 +161,20 @@ export class Renderer {
     gl.uniform2f(uniforms.focal, focal, focal);
     gl.uniform2fv(uniforms.size, size);
     gl.uniform1f(uniforms.near, scene.near);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, scene.count);
+    gl.drawElementsInstanced(gl.TRIANGLES, 6 * BATCH, gl.UNSIGNED_SHORT, 0, Math.ceil(scene.count / BATCH));
     gl.bindVertexArray(null);
   }
+}
+
+/** The vertex array of an instance: two triangles for each of its Gaussians. */
+function triangles(gl) {
+  const indices = Uint16Array.from({ length: 6 * BATCH }, (_, at) => 4 * Math.floor(at / 6) + [0, 1, 2, 2, 1, 3][at % 6]);
+  const array = gl.createVertexArray();
+  gl.bindVertexArray(array);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+  gl.bindVertexArray(null);
+  return array;
 }
 
 function link(gl, vertex, fragment) {

@@ -8,6 +8,8 @@ precision highp usampler2D;
 
 uniform usampler2D base;
 uniform usampler2D harmonics;
+uniform usampler2D order;
+uniform int count;
 uniform int shDegree;
 uniform bool isAntialiased;
 uniform vec3 position;
@@ -16,17 +18,19 @@ uniform vec2 focal;     // pixels
 uniform vec2 size;      // pixels
 uniform float near;
 
-layout(location = 0) in uint slot;
 out vec2 offset;
 flat out vec4 colour;
 
 const int ROW = 512;
+const int ORDER_ROW = 1024;
+const int BATCH = 128;
 const float LOW_PASS = 0.3;
 const float SQRT_HALF = 0.70710678;
 
+int slot;
+
 uvec4 texel(usampler2D from, int number, int perGaussian) {
-  int index = int(slot);
-  return texelFetch(from, ivec2((index % ROW) * perGaussian + number, index / ROW), 0);
+  return texelFetch(from, ivec2((slot % ROW) * perGaussian + number, slot / ROW), 0);
 }
 
 vec4 quaternion(uint pair, uint last) {
@@ -78,6 +82,9 @@ vec3 harmonicColour(vec3 direction) {
 
 void main() {
   gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
+  int rank = gl_InstanceID * BATCH + gl_VertexID / 4;
+  if (rank >= count) return;
+  slot = int(texelFetch(order, ivec2(rank % ORDER_ROW, rank / ORDER_ROW), 0).x);
   uvec4 low = texel(base, 0, 2);
   uvec4 high = texel(base, 1, 2);
   vec3 away = uintBitsToFloat(low.xyz) - position;
@@ -109,7 +116,7 @@ void main() {
   float most = middle + apart;
   vec2 along = wide >= tall ? vec2(most - tall, xy) : vec2(xy, most - wide);
   along = apart > 1e-6 * middle ? normalize(along) : vec2(1.0, 0.0);
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0;
   offset = corner * sqrt(reach);
   vec2 centre = focal * (at.xy / at.z) + 0.5 * size;
   vec2 place = centre + along * (sqrt(most) * offset.x) + vec2(-along.y, along.x) * (sqrt(determinant / most) * offset.y);
