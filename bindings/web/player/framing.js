@@ -4,6 +4,8 @@ import { add, columns, normalize, scale, subtract } from './vectors.js';
 
 /** Vertical angle of view of a camera that is made, radians: 40 degrees. */
 const FIELD = (40 / 180) * Math.PI;
+/** How much further away it stands than the sphere around the subject asks for: room for the bar and for strays. */
+const MARGIN = 1.15;
 /** How far above the subject a camera stands that is made, radians: 5 degrees. */
 const ELEVATION = (5 / 180) * Math.PI;
 /** Opacity below which Gaussians say nothing of where the scene is, as its code in the texture. */
@@ -73,5 +75,5 @@ function axesOf({ rotation }) {
 
 function seenFrom(middle, radius, [, up, front]) {
   const towards = add(scale(front, Math.cos(ELEVATION)), scale(up, Math.sin(ELEVATION)));
-  return { position: add(middle, scale(towards, radius / Math.sin(FIELD / 2))), ahead: normalize(scale(towards, -1)) };
+  return { position: add(middle, scale(towards, (MARGIN * radius) / Math.sin(FIELD / 2))), ahead: normalize(scale(towards, -1)) };
 }

@@ -121,7 +121,7 @@ export class Track extends EventTarget {
     const isUrgent = this.#asked?.isUrgent || this.#next !== null || answer.wanted !== this.#asked?.index;
     if (answer.wanted === this.#asked?.index) this.#asked = null;
     this.#emit('warnings', { warnings: answer.frame.warnings, index: answer.frame.index });
-    if (isUrgent) this.#show(answer);
+    if (isUrgent) this.#show(answer, true);
     else this.#held = answer;
     this.#askNext();
     this.#emit('arrived', answer.frame);
@@ -134,12 +134,13 @@ export class Track extends EventTarget {
     this.#ask(index, true);
   }
 
-  #show({ frame, update, order, times, memory }) {
+  /** Shows an answer. A frame that was sought says nothing of the rate of the stream. */
+  #show({ frame, update, order, times, memory }, isSought = false) {
     const start = performance.now();
     const uploaded = this.scene.update(update);
     this.scene.setOrder(order);
     const upload = performance.now() - start;
-    const seconds = this.frame ? frame.time - this.frame.time : 0;
+    const seconds = this.frame && !isSought ? frame.time - this.frame.time : 0;
     const entry = { ...times, upload, uploaded, memory, seconds: Math.max(0, seconds), bytes: seconds > 0 ? frame.bytes : 0 };
     this.#history = [...this.#history, entry].slice(-AVERAGED);
     this.frame = frame;

@@ -116,7 +116,8 @@ test('pictures are those of the renderer of the repository', async () => {
     const [decibels, mean] = await page.evaluate(compare, { camera, expected });
     console.log(`view ${id}: ${decibels.toFixed(2)} dB`);
     assert.ok(mean > 8, 'the picture is empty');
-    assert.ok(decibels > 35, `${decibels} dB`);
+    // Of a neighbouring frame one of them has less than 45 dB.
+    assert.ok(decibels > 45, `${decibels} dB`);
   }
   await page.finish();
 });
