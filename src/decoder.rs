@@ -2,13 +2,14 @@
 
 use crate::Cancel;
 use crate::error::{Error, Result, Warning};
-use crate::frame::Frame;
+use crate::frame::{Frame, highest_point, time_of};
 use crate::limits::Limits;
 use crate::source::{Source, Window};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::{Step, StreamDecoder};
 use splatstream_format::Class;
+use splatstream_format::payload::SceneDescription;
 use splatstream_format::seek::gop_of;
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -80,7 +81,9 @@ impl Decoder {
         Self::of(Source::Shared(bytes.into()))
     }
 
-    /// A decoder of anything that can be read at any place.
+    /// A decoder of anything that can be read at any place. A reader that has not got all bytes yet fails with
+    /// [`WouldBlock`](std::io::ErrorKind::WouldBlock) at its end: then there is [no frame](Decoder::next_frame) until it has
+    /// more. Such a decoder seeks, unlike one that bytes are pushed to.
     pub fn from_reader(reader: impl Read + Seek + Send + 'static) -> Self {
         Self::of(Source::Reader(Box::new(reader), Window::default()))
     }
@@ -168,7 +171,7 @@ impl Decoder {
         self.source.end();
     }
 
-    /// The next frame. None if more bytes have to be pushed, or after the last one: see [`Decoder::is_finished`].
+    /// The next frame. None if more bytes have to come, or after the last one: see [`Decoder::is_finished`].
     ///
     /// # Errors
     /// A stream that cannot be decoded at all or not within the limits, a file that cannot be read, a cancellation; and
@@ -313,6 +316,21 @@ impl Decoder {
             self.stream.sequence().map_or((1, 1), |all| (all.ticks_per_second, all.ticks_per_frame));
         let frames = time.as_nanos() * u128::from(rate) / 1_000_000_000 / u128::from(ticks.max(1));
         Ok(u32::try_from(frames).unwrap_or(u32::MAX))
+    }
+
+    /// What the stream says of its scene, for viewers: what points up, cameras, the background. None before it has come.
+    pub fn description(&self) -> Option<&SceneDescription> {
+        self.stream.decoder().and_then(|decoder| decoder.scene())
+    }
+
+    /// The operating point of everything that the stream has, once the sequence parameters have come.
+    pub fn highest_point(&self) -> Option<OperatingPoint> {
+        self.stream.sequence().map(highest_point)
+    }
+
+    /// From a frame to the next at the full frame rate, once the sequence parameters have come.
+    pub fn frame_duration(&self) -> Option<Duration> {
+        self.stream.sequence().map(|sequence| time_of(1, sequence))
     }
 
     /// Frames in the stream, once the sequence parameters have come, if these say it.

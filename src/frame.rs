@@ -30,6 +30,8 @@ pub struct Frame {
     refinements: u8,
     carried: usize,
     sequence: SequenceParameters,
+    digest: Option<u64>,
+    bytes: u64,
     integers: QuantizedFrame,
     identities: Vec<u32>,
     gaussians: OnceLock<GaussianFrame>,
@@ -47,11 +49,9 @@ impl Frame {
         Ok(Self {
             index: decoded.index,
             kind: decoded.frame_type,
-            point: point.at_most(OperatingPoint {
-                spatial: sequence.spatial_layer_count.saturating_sub(1),
-                temporal: sequence.temporal_layer_count.saturating_sub(1),
-                refinement: sequence.refinement_count.saturating_sub(1),
-            }),
+            point: point.at_most(highest_point(&sequence)),
+            digest: decoded.digest,
+            bytes: decoded.bytes,
             refinements: decoded.level,
             carried: decoded.carried,
             sequence,
@@ -69,10 +69,7 @@ impl Frame {
 
     /// When it is shown, from the start of the stream.
     pub fn time(&self) -> Duration {
-        let ticks = u64::from(self.index) * u64::from(self.sequence.ticks_per_frame);
-        let per_second = u64::from(self.sequence.ticks_per_second.max(1));
-        let nanoseconds = u128::from(ticks % per_second) * 1_000_000_000 / u128::from(per_second);
-        Duration::new(ticks / per_second, nanoseconds as u32)
+        time_of(self.index, &self.sequence)
     }
 
     /// Whether it refers to no other frame.
@@ -106,6 +103,11 @@ impl Frame {
         self.integers.is_empty()
     }
 
+    /// Bytes of its units that were decoded, headers included.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
     /// The Gaussians as f32. The first call computes them, beside the integers; [`Frame::into_gaussians`] needs no second
     /// copy.
     pub fn gaussians(&self) -> &GaussianFrame {
@@ -128,6 +130,12 @@ impl Frame {
         self.integers
     }
 
+    /// The digest of the Gaussians that it shows exactly, as clause 7.9 of the specification defines it: equal digests mean
+    /// equal frames, on any machine. It agrees with that of the stream. None where nothing is exact.
+    pub fn digest(&self) -> Option<u64> {
+        self.digest
+    }
+
     /// The identity of each Gaussian: the same in two frames for the same Gaussian. [`Slots`](crate::Slots) uses them.
     pub fn identities(&self) -> &[u32] {
         &self.identities
@@ -138,6 +146,23 @@ impl Frame {
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
+}
+
+/// The operating point of everything that a stream has.
+pub(crate) fn highest_point(sequence: &SequenceParameters) -> OperatingPoint {
+    OperatingPoint {
+        spatial: sequence.spatial_layer_count.saturating_sub(1),
+        temporal: sequence.temporal_layer_count.saturating_sub(1),
+        refinement: sequence.refinement_count.saturating_sub(1),
+    }
+}
+
+/// When a frame is shown, from the start of the stream.
+pub(crate) fn time_of(index: u32, sequence: &SequenceParameters) -> Duration {
+    let ticks = u64::from(index) * u64::from(sequence.ticks_per_frame);
+    let per_second = u64::from(sequence.ticks_per_second.max(1));
+    let nanoseconds = u128::from(ticks % per_second) * 1_000_000_000 / u128::from(per_second);
+    Duration::new(ticks / per_second, nanoseconds as u32)
 }
 
 /// The output of 7.10 of planes that [`Frame::new`] has checked.

@@ -41,7 +41,8 @@
 //! (group of pictures) that it is in.
 //!
 //! Programs in C and C++ use the same decoder through `bindings/c` of the repository: a static or shared library, and the
-//! header `splatstream.h`. Compiled for wasm32-unknown-unknown it imports nothing.
+//! header `splatstream.h`. Compiled for wasm32-unknown-unknown it imports nothing; `bindings/web` has it as an npm package,
+//! and a player for web pages.
 //!
 //! The format is specified in the `spec/` folder of the repository. The crates below this one are its parts, for
 //! inspectors and for other encoders; their interfaces change more often.
@@ -71,6 +72,12 @@ pub use splatstream_encoder::{Encoder, Error as EncodeError, FrameSource, Report
 /// What is wrong with the bytes of a stream: where, by which clause, and what.
 pub use splatstream_format::Error as StreamError;
 pub use splatstream_gaussians::{GaussianFrame, Planes};
+
+/// What a stream says of its scene.
+pub mod scene {
+    pub use splatstream_format::payload::{ColourSpace, SceneDescription, Sorting, UpAxis};
+    pub use splatstream_format::syntax::Camera;
+}
 
 /// What the fields of [`Settings`] hold.
 #[cfg(feature = "encode")]

@@ -6,6 +6,7 @@ use core::hash::{BuildHasherDefault, Hasher};
 use core::ops::Range;
 use splatstream_gaussians::{Planes, sh_coefficients};
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// Planes of a fixed number of slots. A Gaussian has the same slot in every frame from the one that it appears in to the
 /// one that it disappears in; a slot without a Gaussian has opacity 0 (its logit is minus infinity) and is 0 otherwise.
@@ -29,10 +30,10 @@ pub struct Slots {
     capacity: usize,
     sh_degree: u8,
     planes: Planes,
-    /// The slot of each identity in the last frame.
-    slot_of: HashMap<u32, usize, BuildHasherDefault<Spread>>,
-    /// Slots of Gaussians whose identity another one of the last frame has: identities are numbers of 32 bits.
-    doubled: Vec<usize>,
+    /// The Gaussians of the last frame, row by row: their identities and their slots.
+    rows: Vec<(u32, usize)>,
+    /// The slot of each identity, once somebody asks.
+    slot_of: OnceLock<ByIdentity>,
     /// Slots without a Gaussian; the lowest is taken first.
     free: Vec<usize>,
     is_dirty: Vec<bool>,
@@ -55,6 +56,13 @@ pub struct Update {
     pub has_new_planes: bool,
 }
 
+/// Numbers by identity.
+type ByIdentity = HashMap<u32, usize, BuildHasherDefault<Spread>>;
+
+/// Rows of the last frame that are looked at for the next Gaussian. Most keep their order, and few disappear at once; the
+/// others are found by their identity.
+const AHEAD: usize = 16;
+
 /// Opacity before the sigmoid of a slot without a Gaussian.
 const ABSENT: f32 = f32::NEG_INFINITY;
 
@@ -65,8 +73,8 @@ impl Slots {
             capacity,
             sh_degree: 0,
             planes: empty(capacity),
-            slot_of: HashMap::default(),
-            doubled: Vec::new(),
+            rows: Vec::new(),
+            slot_of: OnceLock::new(),
             free: (0..capacity).rev().collect(),
             is_dirty: vec![false; capacity],
         }
@@ -84,7 +92,7 @@ impl Slots {
 
     /// The slot of the Gaussian with an identity, if it is in the last frame.
     pub fn slot(&self, identity: u32) -> Option<usize> {
-        self.slot_of.get(&identity).copied()
+        self.slot_of.get_or_init(|| self.rows.iter().copied().collect()).get(&identity).copied()
     }
 
     /// Shows a frame.
@@ -102,11 +110,8 @@ impl Slots {
             let count = 3 * sh_coefficients(self.sh_degree);
             self.planes.sh.resize_with(count, || vec![0.0; self.capacity]);
         }
-        let mut before = core::mem::take(&mut self.slot_of);
-        let slots: Vec<Option<usize>> =
-            frame.identities().iter().map(|identity| before.remove(identity)).collect();
+        let (slots, gone) = self.found(frame.identities());
         let kept = slots.iter().flatten().count();
-        let gone: Vec<usize> = before.into_values().chain(core::mem::take(&mut self.doubled)).collect();
         gone.iter().for_each(|&slot| self.clear(slot));
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.place(frame.identities(), slots);
@@ -115,17 +120,45 @@ impl Slots {
         Ok(Update { dirty: self.take_dirty(), kept, appeared, disappeared, has_new_planes })
     }
 
+    /// The slots of those identities that were in the last frame, and the slots of Gaussians that are gone.
+    fn found(&self, identities: &[u32]) -> (Vec<Option<usize>>, Vec<usize>) {
+        let mut slots = vec![None; identities.len()];
+        let (mut left, mut missing) = (Vec::new(), Vec::new());
+        let mut rest = self.rows.as_slice();
+        for (&identity, slot) in identities.iter().zip(&mut slots) {
+            match rest.iter().take(AHEAD).position(|(other, _)| *other == identity) {
+                Some(skipped) => {
+                    let (passed, from) = rest.split_at(skipped);
+                    left.extend_from_slice(passed);
+                    if let Some((&(_, found), after)) = from.split_first() {
+                        *slot = Some(found);
+                        rest = after;
+                    }
+                }
+                None => missing.push((identity, slot)),
+            }
+        }
+        left.extend_from_slice(rest);
+        let mut gone = Vec::new();
+        let mut others = ByIdentity::default();
+        for (identity, slot) in left {
+            // Identities are numbers of 32 bits: two Gaussians may have the same one.
+            gone.extend(others.insert(identity, slot));
+        }
+        missing.into_iter().for_each(|(identity, slot)| *slot = others.remove(&identity));
+        gone.extend(others.into_values());
+        (slots, gone)
+    }
+
     /// Gives the Gaussians that have none a slot.
     fn place(&mut self, identities: &[u32], slots: Vec<Option<usize>>) -> Vec<usize> {
-        self.slot_of.reserve(identities.len());
-        let mut placed = Vec::with_capacity(slots.len());
-        for (&identity, slot) in identities.iter().zip(slots) {
-            // There are as many as are needed: the frame fits.
-            let slot = slot.or_else(|| self.free.pop()).unwrap_or(usize::MAX);
-            self.doubled.extend(self.slot_of.insert(identity, slot));
-            placed.push(slot);
-        }
-        placed
+        self.slot_of.take();
+        // There are as many as are needed: the frame fits.
+        let slots: Vec<usize> =
+            slots.into_iter().map(|slot| slot.or_else(|| self.free.pop()).unwrap_or(usize::MAX)).collect();
+        self.rows.clear();
+        self.rows.extend(identities.iter().copied().zip(slots.iter().copied()));
+        slots
     }
 
     fn clear(&mut self, slot: usize) {

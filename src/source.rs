@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use splatstream_format::seek::ReadAt;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::sync::Arc;
 
 /// Bytes that a file is read by at a time, at least.
@@ -88,7 +88,7 @@ impl Source {
         }
     }
 
-    /// Gets at least so many more bytes; false if they have to be pushed.
+    /// Gets at least so many more bytes; false if they have to come first.
     ///
     /// # Errors
     /// A file that cannot be read, no memory.
@@ -97,8 +97,13 @@ impl Source {
         let more = usize::try_from(more).unwrap_or(usize::MAX).max(CHUNK);
         reader.seek(SeekFrom::Start(window.end()))?;
         // Room grows with the bytes that are there, whatever the stream announces.
-        let read = reader.take(more as u64).read_to_end(&mut window.bytes)?;
-        window.is_end = read < more;
+        let before = window.bytes.len();
+        match reader.take(more as u64).read_to_end(&mut window.bytes) {
+            Ok(read) => window.is_end = read < more,
+            // What was there has been read.
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(window.bytes.len() > before),
+            Err(error) => return Err(error.into()),
+        }
         Ok(true)
     }
 

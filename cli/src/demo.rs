@@ -23,6 +23,7 @@ use splatstream_files::ply;
 use splatstream_format::Limits;
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_gaussians::GaussianFrame;
+use splatstream_web::page_with;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -30,7 +31,7 @@ use std::time::{Duration, Instant};
 /// Try everything without any input: make a moving scene, encode it, decode it at every operating point, verify, draw.
 ///
 /// The stream has two spatial layers, two temporal layers with predicted frames, and three refinements. Writes the frames of
-/// the source, the stream, the decoded frames, a picture of each operating point, and a report.
+/// the source, the stream, the decoded frames, a picture of each operating point, a web page that plays it, and a report.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream demo --out first-look")]
 pub(crate) struct Demo {
@@ -52,6 +53,8 @@ pub(crate) struct Demo {
 
 /// The stream's name in the directory of the demo.
 const STREAM: &str = "demo.gss";
+/// The name of the page that plays it.
+const PAGE: &str = "demo.html";
 
 /// Frames of a GOP.
 const GOP: u32 = 8;
@@ -73,8 +76,11 @@ impl Demo {
         let mut everything = Everything::start(self.out.join("decoded"), source.frames.first())?;
         let points = self.points(&stream, &source.frames, &mut everything)?;
         let errors = everything.verified(&digests)?;
+        let page = page_with("SplatStream demo", &stream);
+        OutputFile::write(&self.out.join(PAGE), page.as_bytes())?;
         let demonstration = Demonstration {
             directory: self.out.clone(),
+            page: PAGE,
             scene: source.summary,
             encoding,
             operating_points: points,

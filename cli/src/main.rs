@@ -34,6 +34,7 @@ mod unfinished;
 mod unpackage;
 mod up_guess;
 mod validate;
+mod view;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::Console;
@@ -79,6 +80,7 @@ enum Command {
     Unpackage(unpackage::Unpackage),
     Serve(serve::Serve),
     Play(play::Play),
+    View(view::View),
     Train(train::Train),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
@@ -155,6 +157,7 @@ impl Command {
             Self::Unpackage(command) => command.run(console),
             Self::Serve(command) => command.run(console),
             Self::Play(command) => command.run(console),
+            Self::View(command) => command.run(console),
             Self::Train(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),

@@ -19,9 +19,14 @@ fn the_demo_writes_stream_frames_and_report() {
     assert!(points.iter().all(|point| out.join(point["picture"].as_str().unwrap()).is_file()));
     let written = std::fs::read_to_string(out.join("report.json")).unwrap();
     assert_eq!(serde_json::from_str::<serde_json::Value>(&written).unwrap(), report);
-    for file in
-        ["demo.gss", "report.txt", "source/frame_0001.ply", "decoded/frame_0001.ply", "pictures/source.png"]
-    {
+    for file in [
+        "demo.gss",
+        "demo.html",
+        "report.txt",
+        "source/frame_0001.ply",
+        "decoded/frame_0001.ply",
+        "pictures/source.png",
+    ] {
         assert!(out.join(file).is_file(), "{file}");
     }
     succeed(&["validate", text(&out.join("demo.gss"))]);

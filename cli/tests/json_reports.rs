@@ -153,6 +153,7 @@ fn reports_of_encoders_have_the_keys_they_had() {
     for (name, line) in [
         ("demo", "demo --out demo --gaussians 300 --frames 3"),
         ("encode", "encode frames -o talk.gss --preset fast --psnr 40 --gop 3"),
+        ("view", "view talk.gss -o talk.html"),
         ("encode_size", "encode still.ply -o still.gss --preset fast --target-bpg 40"),
         ("encode_each", "encode still.ply other.ply no-such.ply --each -o streams --preset fast --psnr 40"),
         ("chart", "chart --builtin --quick -o report"),

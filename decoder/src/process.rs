@@ -131,6 +131,8 @@ pub struct Decoder {
     counted: Counted,
     /// Whether a scene_description came in phase SEQUENCE, with a fault or without.
     has_scene: bool,
+    /// The scene description, if one has come without a fault.
+    scene: Option<Box<SceneDescription>>,
     /// Whether some unit did not belong to the operating point.
     has_discarded: bool,
     tally: Tally,
@@ -168,6 +170,7 @@ impl Decoder {
             has_stopped: false,
             counted: Counted::default(),
             has_scene: false,
+            scene: None,
             has_discarded: false,
             tally: Tally::new(profile),
         }
@@ -297,7 +300,7 @@ impl Decoder {
         unit.check_payload()?;
         match unit.header.unit_type() {
             UnitType::SequenceParameters => self.sequence_parameters(unit),
-            UnitType::SceneDescription => SceneDescription::parse(unit.payload, unit.payload_at).map(drop),
+            UnitType::SceneDescription => self.scene_description(unit),
             UnitType::GopHeader => self.gop_header(unit, was_lost),
             UnitType::Transform | UnitType::Codebook | UnitType::Weights => self.gop_tool(unit),
             UnitType::FrameHeader => {

@@ -1,5 +1,6 @@
 //! Loops compiled for the vectors of the machine. What they compute is the same everywhere.
 
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use pulp::{Simd, WithSimd};
 use splatstream_format::entropy::machine::{Machine, Portable};
 
@@ -9,8 +10,10 @@ pub(crate) trait Task {
     fn run(self, machine: impl Machine);
 }
 
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 struct OnMachine<T, M>(T, M);
 
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 impl<T: Task, M: Machine> WithSimd for OnMachine<T, M> {
     type Output = ();
 

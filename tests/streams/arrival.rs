@@ -6,8 +6,9 @@ use splatstream::{Decoder, Error, Frame, Limits, Position};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::Frames;
 use splatstream_format::Class;
-use std::io::Cursor;
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Everything that a decoder says.
 #[derive(Debug, PartialEq)]
@@ -210,4 +211,64 @@ fn bytes_go_only_where_they_are_expected() {
     assert!(matches!(decoder.push(&[1]), Err(Error::NotPushed)));
     let mut decoder = Decoder::new().with_limits(Limits { max_memory: 10, ..Limits::default() });
     assert!(matches!(decoder.push(&[0; 11]), Err(Error::TooMuchInput { waiting: 11, allowed: 10 })));
+}
+
+/// A file of which some bytes are there.
+struct Partial {
+    bytes: Vec<u8>,
+    there: Arc<AtomicUsize>,
+    at: usize,
+}
+
+impl Read for Partial {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let there = self.there.load(Ordering::Relaxed);
+        let rest = self.bytes[..there].get(self.at..).unwrap_or_default();
+        let count = rest.len().min(to.len());
+        if count == 0 && there < self.bytes.len() {
+            return Err(io::ErrorKind::WouldBlock.into());
+        }
+        to[..count].copy_from_slice(&rest[..count]);
+        self.at += count;
+        Ok(count)
+    }
+}
+
+impl Seek for Partial {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.at = match to {
+            SeekFrom::Start(at) => at as usize,
+            _ => self.there.load(Ordering::Relaxed),
+        };
+        Ok(self.at as u64)
+    }
+}
+
+#[test]
+fn a_file_that_is_still_coming_gives_what_is_there_and_can_be_sought_in() {
+    let bytes = vectors::talk();
+    let there = Arc::new(AtomicUsize::new(0));
+    let mut decoder = Decoder::from_reader(Partial { bytes: bytes.to_vec(), there: there.clone(), at: 0 });
+    let mut indices = Vec::new();
+    for end in (0..=bytes.len()).step_by(700).chain([bytes.len()]) {
+        there.store(end, Ordering::Relaxed);
+        indices.extend(decoder.by_ref().map(|frame| frame.unwrap().index()));
+        if indices.len() == 3 {
+            decoder.seek(Position::Frame(1)).unwrap();
+            assert_eq!(decoder.next_frame().unwrap().map(|frame| frame.index()), Some(1));
+            decoder.seek(Position::Frame(3)).unwrap();
+        }
+    }
+    assert_eq!(indices, (0..12).collect::<Vec<u32>>());
+    assert!(decoder.is_finished());
+}
+
+#[test]
+fn a_stream_says_how_large_it_is_and_how_fast() {
+    let mut decoder = Decoder::from_bytes(vectors::talk());
+    assert_eq!((decoder.highest_point(), decoder.frame_duration()), (None, None));
+    let frame = decoder.next_frame().unwrap().unwrap();
+    assert_eq!(decoder.highest_point(), "s0,t1,r2".parse().ok());
+    assert_eq!(decoder.frame_duration(), Some(std::time::Duration::from_nanos(33_333_333)));
+    assert!(frame.digest().is_some() && frame.bytes() > 0);
 }

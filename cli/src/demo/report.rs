@@ -13,6 +13,8 @@ use std::path::PathBuf;
 #[derive(Serialize)]
 pub(super) struct Demonstration {
     pub(super) directory: PathBuf,
+    /// The file that plays the stream in a browser.
+    pub(super) page: &'static str,
     pub(super) scene: Scene,
     pub(super) encoding: Encoding,
     pub(super) operating_points: Vec<Point>,
@@ -77,7 +79,7 @@ impl Demonstration {
     pub(super) fn text(&self) -> String {
         let Scene { frames, gaussians, sh_degree, ply_bytes } = &self.scene;
         let Encoding { bytes, bpg, seconds, gaussians_per_second: rate, .. } = &self.encoding;
-        let place = self.directory.display();
+        let (place, page) = (self.directory.display(), self.page);
         let moment = self.operating_points.iter().find_map(|point| point.drawn.as_ref());
         let moment = moment.map_or(0, |drawn| drawn.frame);
         format!(
@@ -88,8 +90,9 @@ impl Demonstration {
              {}\nsS: spatial layers up to S, tT: temporal layers up to T, rR: refinements up to R; dB: PSNR of the picture \
              against the source\n\n\
              errors of frame 0 with everything decoded\n{}\n\
-             files     {place}: demo.gss, source/, decoded/, pictures/, report.txt, report.json\n\
-             try next  splatstream inspect --stats {place}/demo.gss\n",
+             files     {place}: demo.gss, {page}, source/, decoded/, pictures/, report.txt, report.json\n\
+             try next  splatstream inspect --stats {place}/demo.gss\n\
+             watch it  open {place}/{page} in a browser\n",
             counted(*frames),
             grouped(*gaussians),
             grouped(*ply_bytes),

@@ -14,13 +14,23 @@ use crate::increment::values::{PreparedSections, SectionCoding};
 use crate::layout::{Section, ShCoding};
 use crate::steps::StepRule;
 use splatstream_format::entropy::in_force::ModelsInForce;
-use splatstream_format::payload::{Cells, FramePayload};
+use splatstream_format::payload::{Cells, FramePayload, SceneDescription};
 use splatstream_format::syntax::{FrameHeader, FrameRole, GopHeader, SequenceParameters, UnitHeader};
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Result};
 use std::sync::Arc;
 
 impl Decoder {
+    /// What the stream says of its scene, once that has come.
+    pub fn scene(&self) -> Option<&SceneDescription> {
+        self.scene.as_deref()
+    }
+
+    pub(super) fn scene_description(&mut self, unit: &Unit<'_>) -> Result<()> {
+        self.scene = Some(Box::new(SceneDescription::parse(unit.payload, unit.payload_at)?));
+        Ok(())
+    }
+
     /// The first sequence_parameters count; copies are the same, byte for byte.
     pub(super) fn sequence_parameters(&mut self, unit: &Unit<'_>) -> Result<()> {
         let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at, self.profile)?;

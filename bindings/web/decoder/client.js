@@ -1,0 +1,78 @@
+// The page's side of the worker: asks for frames, and hands on what the worker posts.
+
+/** Where the worker is, if nothing else is said: beside this file. */
+const workerBeside = () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+
+/**
+ * Decodes and sorts in a worker. Events, whose `detail` index.d.ts describes: `description`, `frame`, `order`, `received`,
+ * `waiting` (for bytes), `end`, `error`.
+ */
+export class DecoderWorker extends EventTarget {
+  #worker;
+  #isSorting = false;
+  #nextSort = null;
+
+  /**
+   * Starts to decode a source: `{ url }`, `{ bytes }`, or `{}` where chunks are pushed. `module` is the WebAssembly module
+   * or its bytes, by default the file beside the worker; `startWorker` makes the worker in pages that have no file of it.
+   */
+  constructor(source, { point = {}, module = null, startWorker = workerBeside } = {}) {
+    super();
+    this.#worker = startWorker();
+    this.#worker.addEventListener('message', ({ data }) => this.#take(data));
+    this.#worker.addEventListener('error', (event) => this.#emit('error', { message: event.message ?? 'the worker cannot be started' }));
+    this.#worker.postMessage({ type: 'open', module, point, source });
+  }
+
+  /** The next bytes of a source that is pushed; `total` is the length of the stream, if that is known. */
+  push(bytes, total = null) {
+    this.#worker.postMessage({ type: 'push', bytes, total });
+  }
+
+  /** No more bytes will be pushed. */
+  finish() {
+    this.#worker.postMessage({ type: 'finish' });
+  }
+
+  /** Asks for a frame, sorted for a view. The answer is `frame` with this index or a higher one, or `end`. */
+  show(index, view) {
+    this.#worker.postMessage({ type: 'show', index, view });
+  }
+
+  /** Sorts the frame that was given last for another view. Of views that come faster than they are sorted for, the last counts. */
+  sort(view) {
+    if (this.#isSorting) {
+      this.#nextSort = view;
+      return;
+    }
+    this.#isSorting = true;
+    this.#worker.postMessage({ type: 'sort', view });
+  }
+
+  /** Changes the operating point; frames that are asked for after this have it. */
+  setPoint(point) {
+    this.#worker.postMessage({ type: 'point', point });
+  }
+
+  /** Ends the worker. */
+  close() {
+    this.#worker.terminate();
+  }
+
+  #take({ type, ...detail }) {
+    if (type === 'order' || type === 'frame') this.#sortNext(type);
+    this.#emit(type, detail);
+  }
+
+  #sortNext(type) {
+    if (type === 'order') this.#isSorting = false;
+    if (this.#isSorting || this.#nextSort === null) return;
+    const view = this.#nextSort;
+    this.#nextSort = null;
+    this.sort(view);
+  }
+
+  #emit(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+}

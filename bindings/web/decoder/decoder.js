@@ -1,0 +1,158 @@
+// The decoder in the thread that calls it: bytes in, frames as texels out. `worker.js` runs it beside a page; programs of
+// Node use it as it is.
+
+const VERSION = 1;
+const DONE = 0, NEED_BYTES = 1, END = 2, INCOMPLETE = 3;
+/** Bytes that are handed to the decoder at a time. */
+const PIECE = 1 << 20;
+/** Gaussians in a row of a texture, and words of a Gaussian in the base texture. */
+export const ROW = 512;
+const BASE_WORDS = 8;
+
+/** A module with an instruction of 128 bits: i8x16.splat of 0, dropped. */
+const SIMD_PROBE = new Uint8Array([0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 0, 3, 2, 1, 0, 10, 9, 1, 7, 0, 65, 0, 253, 15, 26, 11]);
+
+/** Whether this engine has the instructions that the faster module uses. */
+export const hasSimd = () => WebAssembly.validate(SIMD_PROBE);
+
+/** The module for this engine, from the files beside this one. */
+export async function loadModule() {
+  const url = new URL(hasSimd() ? './splatstream.wasm' : './splatstream-plain.wasm', import.meta.url);
+  if (url.protocol === 'file:') {
+    const { readFile } = await import('node:fs/promises');
+    return WebAssembly.compile(await readFile(url));
+  }
+  const response = await fetch(url);
+  if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);
+  return WebAssembly.compile(await response.arrayBuffer());
+}
+
+/** Decodes one stream. */
+export class Decoder {
+  #exports;
+
+  constructor(module) {
+    this.#exports = new WebAssembly.Instance(module, {}).exports;
+    if (this.#exports.gss_version() !== VERSION) throw new Error('the WebAssembly module belongs to another version');
+  }
+
+  /** A decoder with the module for this engine. */
+  static async load() {
+    return new Decoder(await loadModule());
+  }
+
+  /** Bytes of memory that the decoder has taken. */
+  get memory() {
+    return this.#exports.memory.buffer.byteLength;
+  }
+
+  /** Takes the next bytes of the stream. */
+  push(bytes) {
+    for (let at = 0; at < bytes.length; at += PIECE) {
+      const piece = bytes.subarray(at, at + PIECE);
+      const room = this.#exports.gss_room(piece.length);
+      if (room === 0) throw new Error('the stream is longer than the decoder keeps, or there is no memory');
+      new Uint8Array(this.#exports.memory.buffer, room, piece.length).set(piece);
+      this.#exports.gss_filled(piece.length);
+    }
+  }
+
+  /** No more bytes will come. */
+  end() {
+    this.#exports.gss_end();
+  }
+
+  /** Decodes the next frame: see Frame in index.d.ts. `null` if more bytes have to come first. */
+  next() {
+    const status = this.#exports.gss_next();
+    const warnings = this.#text().split('\n').filter(Boolean);
+    if (status === NEED_BYTES) return null;
+    if (status === END || status === INCOMPLETE) return { isEnd: true, warnings };
+    if (status !== DONE) throw new Error(this.#text());
+    const [index, time, gaussians, carried, refinements, isKeyframe, spatial, temporal, refinement, hasDigest, high, low, bytes] =
+      this.#numbers();
+    const digest = hasDigest ? hex(high) + hex(low) : null;
+    const point = { spatial, temporal, refinement };
+    return { isEnd: false, index, time, gaussians, carried, refinements, isKeyframe: isKeyframe === 1, point, digest, bytes, warnings };
+  }
+
+  /** Puts the frame that was decoded last into the textures: see Update in index.d.ts. */
+  show() {
+    this.#check(this.#exports.gss_show());
+    const [slots, isNew, shDegree, isAntialiased, kept, appeared, disappeared] = this.#numbers();
+    const shWords = [0, 8, 12, 24][shDegree];
+    return {
+      slots,
+      isNew: isNew === 1,
+      shDegree,
+      isAntialiased: isAntialiased === 1,
+      kept,
+      appeared,
+      disappeared,
+      base: this.#changed(0, ROW * BASE_WORDS),
+      sh: this.#changed(1, ROW * shWords),
+    };
+  }
+
+  /** Sorts for a camera: the slots to draw, farthest first, and the depth from which they are drawn. */
+  sort([x, y, z], [aheadX, aheadY, aheadZ]) {
+    const count = this.#exports.gss_sort(x, y, z, aheadX, aheadY, aheadZ);
+    const slots = new Uint32Array(this.#exports.memory.buffer, this.#exports.gss_order(), count).slice();
+    return { slots, near: this.#exports.gss_near() };
+  }
+
+  /** Goes to a frame: the next one has this index, or a higher one where that is missing. */
+  seek(index) {
+    this.#check(this.#exports.gss_seek(index));
+  }
+
+  /** Changes the operating point, from the next GOP on, and where it is lower on some axis, from the next frame on. */
+  setPoint({ spatial = 255, temporal = 255, refinement = 255 }) {
+    this.#exports.gss_set_point(spatial, temporal, refinement);
+  }
+
+  /** What the stream says of itself, once a frame has come: see Description in index.d.ts. */
+  describe() {
+    if (this.#exports.gss_describe() !== DONE) return null;
+    const title = this.#text();
+    const [frames, frameSeconds, spatial, temporal, refinement, up, hasBackground, red, green, blue, ...poses] = this.#numbers();
+    const cameras = [];
+    for (let at = 0; at + 8 <= poses.length; at += 8) {
+      const [x, y, z, a, b, c, d, field] = poses.slice(at, at + 8);
+      cameras.push({ position: [x, y, z], rotation: [a, b, c, d], field });
+    }
+    const background = hasBackground ? [red, green, blue] : null;
+    const upAxis = ['unknown', '+x', '-x', '+y', '-y', '+z', '-z'][up];
+    return { title, frames, frameSeconds, highest: { spatial, temporal, refinement }, upAxis, background, cameras };
+  }
+
+  #check(status) {
+    if (status !== DONE) throw new Error(this.#text() || 'there is no frame');
+  }
+
+  /** The rows of a texture that have changed, one copy for each run of rows. */
+  #changed(texture, rowWords) {
+    const { buffer } = this.#exports.memory;
+    const runs = new Uint32Array(buffer, this.#exports.gss_dirty(texture), this.#exports.gss_dirty_length(texture));
+    const start = this.#exports.gss_texels(texture);
+    const changed = [];
+    for (let at = 0; at < runs.length; at += 2) {
+      const [row, end] = [runs[at], runs[at + 1]];
+      const words = new Uint32Array(buffer, start + 4 * row * rowWords, (end - row) * rowWords).slice();
+      changed.push({ row, rows: end - row, words });
+    }
+    return changed;
+  }
+
+  #numbers() {
+    const at = this.#exports.gss_numbers();
+    return [...new Float64Array(this.#exports.memory.buffer, at, this.#exports.gss_numbers_length())];
+  }
+
+  #text() {
+    const at = this.#exports.gss_text();
+    return new TextDecoder().decode(new Uint8Array(this.#exports.memory.buffer, at, this.#exports.gss_text_length()));
+  }
+}
+
+const hex = (half) => half.toString(16).padStart(8, '0');

@@ -1,0 +1,495 @@
+// <splat-player>: plays a stream of SplatStream. README.md has its attributes, properties and events.
+
+import { Controls } from './controls.js';
+import { framing } from './framing.js';
+import { icon } from './icons.js';
+import { listenToKeys } from './keys.js';
+import { Losses } from './losses.js';
+import { figures, pointPanel, trackFigures } from './panel.js';
+import { Playback } from './playback.js';
+import { Splitter } from './splitter.js';
+import { Stage } from './stage.js';
+import { TEMPLATE } from './template.js';
+import { Track } from './track.js';
+
+/** Radians that an arrow key turns by. */
+const STEP = 0.07;
+/** Milliseconds between two updates of the figures. */
+const FIGURES = 250;
+const SPEEDS = [0.25, 0.5, 1, 2];
+const LOWEST = { spatial: 0, temporal: 0, refinement: 0 };
+
+const clock = (seconds) => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, '0')}`;
+
+/** What a text such as s0,t1,r2 names. */
+function pointOf(text) {
+  const found = /^s(\d+),t(\d+),r(\d+)$/.exec(text ?? '');
+  return found ? { spatial: Number(found[1]), temporal: Number(found[2]), refinement: Number(found[3]) } : {};
+}
+
+export class SplatPlayer extends HTMLElement {
+  static observedAttributes = ['src'];
+  /** Given to the worker: see DecoderWorker. Pages that hold everything themselves set them. */
+  module = null;
+  startWorker = undefined;
+  #tracks = [];
+  #playback = null;
+  #stage = null;
+  #controls = null;
+  #source = null;
+  #description = null;
+  #framing = null;
+  #received = { bytes: 0, total: null };
+  #losses = null;
+  #interval = null;
+  #openPanel = null;
+  #figuresAt = 0;
+  #isReady = false;
+  #drawn = null;
+  #background = null;
+
+  constructor() {
+    super();
+    this.attachShadow({ mode: 'open' }).innerHTML = TEMPLATE;
+  }
+
+  connectedCallback() {
+    if (!this.#stage && !this.#setUp()) return;
+    const source = this.getAttribute('src');
+    if (source) this.open({ url: new URL(source, document.baseURI).href });
+    else this.#invite();
+  }
+
+  disconnectedCallback() {
+    this.#close();
+  }
+
+  attributeChangedCallback(name, before, value) {
+    if (this.isConnected && this.#stage && value !== null && before !== value) this.open({ url: new URL(value, document.baseURI).href });
+  }
+
+  /** The frame that is shown: see Frame of the decoder; null before the first. */
+  get frame() {
+    return this.#tracks[0]?.frame ?? null;
+  }
+
+  /** What the stream says of itself; null before the first frame. */
+  get description() {
+    return this.#description;
+  }
+
+  /** What was lost, line by line. */
+  get losses() {
+    return this.#losses?.lines ?? [];
+  }
+
+  get isPlaying() {
+    return this.#playback?.isPlaying ?? false;
+  }
+
+  /** The operating point; axes that are left out are at their highest. */
+  get operatingPoint() {
+    return this.#tracks[0]?.point ?? {};
+  }
+
+  set operatingPoint(point) {
+    this.#tracks[0]?.setPoint(point, this.#playback.index);
+    if (this.#openPanel === 'quality') this.#fillSide();
+  }
+
+  /** A camera { position, axes, field } in place of the viewer's; null gives it back. */
+  set camera(camera) {
+    this.#controls.fixed = camera;
+    this.#moved();
+  }
+
+  /** The colour around the scene, red, green and blue from 0 to 1; null: that of the stream, or else of the page. */
+  set backgroundColour(colour) {
+    this.#background = colour;
+    this.#retheme();
+  }
+
+  /** Figures of decoding and of drawing. */
+  get statistics() {
+    return { ...this.#tracks[0]?.statistics, interval: this.#interval, ...this.#received };
+  }
+
+  /** Opens a source: { url }, { bytes }, or {} if chunks are pushed. */
+  open(source) {
+    this.#close();
+    this.#source = source;
+    this.#say('', true);
+    this.#find('bar').hidden = true;
+    const first = this.#addTrack(pointOf(this.getAttribute('operating-point')));
+    this.#playback = new Playback(this.#tracks);
+    this.#playback.isLooping = this.#find('loop').getAttribute('aria-pressed') === 'true';
+    this.#playback.speed = Number(this.#find('speed').value);
+    first.addEventListener('description', ({ detail }) => this.#describe(detail.description));
+    first.addEventListener('received', ({ detail }) => this.#receive(detail));
+    first.addEventListener('ended', () => this.#ended(first));
+  }
+
+  /** The next bytes of a source that is pushed; `total` is the length of the stream, if that is known. */
+  push(bytes, total = null) {
+    this.#tracks[0].push(bytes, total);
+  }
+
+  /** No more bytes will be pushed. */
+  finish() {
+    this.#tracks[0].finish();
+  }
+
+  play() {
+    this.#playback?.play();
+    this.#stage?.invalidate();
+    this.#showPlay();
+  }
+
+  pause() {
+    this.#playback?.pause();
+    this.#showPlay();
+  }
+
+  togglePlay() {
+    if (this.isPlaying) this.pause();
+    else this.play();
+  }
+
+  /** Goes to a frame; resolves with the frame that is shown then. */
+  async seek(index) {
+    this.#playback.seek(index);
+    const [track] = this.#tracks;
+    await new Promise((resolve) => {
+      const listen = () => {
+        if (!track.isSettled) return;
+        for (const name of ['shown', 'ended', 'failed']) track.removeEventListener(name, listen);
+        resolve();
+      };
+      for (const name of ['shown', 'ended', 'failed']) track.addEventListener(name, listen);
+    });
+    return this.frame;
+  }
+
+  /** Pauses and goes some frames on or back. */
+  step(frames) {
+    this.pause();
+    this.#playback?.seek((this.frame?.index ?? 0) + frames);
+  }
+
+  look(right, up) {
+    this.#controls.turn(right * STEP, up * STEP);
+  }
+
+  changeSpeed(by) {
+    const select = this.#find('speed');
+    const place = SPEEDS.indexOf(Number(select.value)) + by;
+    if (!(place in SPEEDS)) return;
+    select.value = SPEEDS[place];
+    this.#playback.speed = SPEEDS[place];
+  }
+
+  /** Presses one of the keys of the bar by its id. */
+  press(id) {
+    this.#find(id).click();
+  }
+
+  /** Draws at once and gives the pixels as a PNG, as many as the picture has on the screen. */
+  async snapshot() {
+    this.#stage.draw();
+    return new Promise((resolve) => this.#find('canvas').toBlob(resolve));
+  }
+
+  /** Makes what lasts as long as the element; false if it cannot draw. */
+  #setUp() {
+    const canvas = this.#find('canvas');
+    this.#controls = new Controls(canvas);
+    try {
+      this.#stage = new Stage(canvas, this.#controls, () => this.#tracks.map((track) => track.scene));
+    } catch (error) {
+      this.#say(error.message);
+      return false;
+    }
+    this.#stage.isAdaptive = this.getAttribute('resolution') !== 'full';
+    this.#stage.ontick = (now) => this.#tick(now);
+    this.#stage.ondraw = (interval) => this.#drewPicture(interval);
+    this.#controls.onchange = () => this.#moved();
+    this.#losses = new Losses(this.#find('lost'), this.#find('lost-count'), this.#find('lost-list'));
+    this.splitter = new Splitter(this.shadowRoot, this.#stage);
+    canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
+    canvas.addEventListener('webglcontextrestored', () => this.#restore());
+    this.#listen();
+    return true;
+  }
+
+  /** After the GPU has lost everything. */
+  #restore() {
+    this.#stage.renderer.prepare();
+    if (this.#source?.url || this.#source?.bytes) this.open(this.#source);
+  }
+
+  #find(id) {
+    return this.shadowRoot.getElementById(id);
+  }
+
+  #addTrack(point) {
+    const options = { point, module: this.module, startWorker: this.startWorker };
+    const track = new Track(this.#source, options, this.#stage.renderer, this.#controls);
+    this.#tracks.push(track);
+    const on = (type, handler) => track.addEventListener(type, handler);
+    on('shown', ({ detail }) => this.#shown(track, detail));
+    for (const type of ['arrived', 'sorted', 'ended']) on(type, () => this.#stage.invalidate());
+    on('warnings', ({ detail }) => this.#lost(detail));
+    on('failed', ({ detail }) => this.#fail(detail.message));
+    return track;
+  }
+
+  #close() {
+    for (const track of this.#tracks.splice(0)) track.close();
+    this.#playback = null;
+    this.#description = null;
+    this.#framing = null;
+    this.#isReady = false;
+    this.#losses?.clear();
+    this.#showSide(null);
+    this.splitter?.hide();
+    this.#find('compare').setAttribute('aria-pressed', 'false');
+  }
+
+  #describe(description) {
+    this.#description = description;
+    const title = this.#find('title');
+    title.textContent = description.title;
+    title.hidden = !description.title;
+    this.#playback.frames = description.frames;
+    this.#playback.frameSeconds = description.frameSeconds || 1 / 30;
+    this.#retheme();
+    this.#tracks[0].point = { ...description.highest, ...this.#tracks[0].point };
+    this.#find('compare').hidden = Object.values(description.highest).every((value) => value === 0);
+    this.#find('quality').hidden = this.#find('compare').hidden;
+  }
+
+  /** The colour around scenes that say none: that of the page. */
+  #surround() {
+    const [red, green, blue] = getComputedStyle(this).backgroundColor.match(/[\d.]+/g) ?? [0, 0, 0];
+    return [red, green, blue].map((part) => part / 255);
+  }
+
+  #shown(track, { frame, update }) {
+    if (!this.#framing && this.#description && update.isNew) this.#frameScene(update);
+    this.#stage.invalidate();
+    if (!this.#isReady && track === this.#tracks[0]) this.#begin();
+    this.#showPlace();
+    if (track === this.#tracks[0]) this.#emit('frame', frame);
+  }
+
+  #frameScene({ base }) {
+    this.#framing = framing(this.#description, base[0].words);
+    this.#controls.place(this.#framing, this.#framing.cameras[0]);
+  }
+
+  /** The first picture is there. */
+  #begin() {
+    this.#isReady = true;
+    this.#say('');
+    const isMoving = this.#playback.frames !== 1;
+    this.#find('bar').hidden = this.getAttribute('controls') === 'none';
+    for (const id of ['timeline', 'play', 'time', 'speed', 'loop']) this.#find(id).hidden = !isMoving;
+    const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
+    if (isMoving && !calm && this.getAttribute('autoplay') !== 'no') this.play();
+    this.#showPlay();
+    this.#emit('ready', this.#description);
+  }
+
+  #receive({ bytes, total }) {
+    this.#received = { bytes, total };
+    const share = total ? bytes / total : 0;
+    this.#find('place').style.setProperty('--there', `${100 * share}%`);
+  }
+
+  #ended(track) {
+    // The stream did not say how many frames it has, or does not have as many.
+    const last = (track.frame?.index ?? -1) + 1;
+    if (this.#playback && last > 0 && this.#playback.frames === 0) this.#playback.frames = last;
+    if (!this.#isReady) this.#fail('There is no frame in it.');
+  }
+
+  #lost({ warnings, index }) {
+    if (warnings.length === 0) return;
+    this.#losses.add(warnings, index);
+    this.#emit('lost', { warnings, index });
+  }
+
+  #fail(message) {
+    if (this.#isReady) this.#losses.add([message], null);
+    else {
+      this.#say(`This cannot be played: ${message}`);
+      this.#find('open').hidden = false;
+    }
+    this.#emit('failed', { message });
+  }
+
+  #emit(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+
+  #say(text, isBusy = false) {
+    this.#find('said').textContent = text;
+    this.#find('ring').hidden = !isBusy;
+    this.#find('open').hidden = true;
+    this.#find('message').hidden = !text && !isBusy;
+  }
+
+  #invite() {
+    this.#say('Drop a stream here, or choose one. It stays on this device.');
+    this.#find('open').hidden = false;
+  }
+
+  #moved() {
+    for (const track of this.#tracks) track.sort();
+    this.#stage?.invalidate();
+  }
+
+  #tick(now) {
+    const passed = this.#drawn === null ? 0 : (now - this.#drawn) / 1000;
+    this.#drawn = now;
+    this.#controls.tick(Math.min(0.1, passed));
+    const wasPlaying = this.isPlaying;
+    this.#playback?.tick(now);
+    if (wasPlaying !== this.isPlaying) this.#showPlay();
+    if (this.isPlaying) this.#showPlace();
+    const isMoving = this.isPlaying || this.#controls.isMoving;
+    if (!isMoving) this.#drawn = null;
+    return isMoving;
+  }
+
+  #drewPicture(interval) {
+    this.#interval = interval ?? this.#interval;
+    const now = performance.now();
+    if (this.#openPanel === 'info' && now - this.#figuresAt > FIGURES) {
+      this.#figuresAt = now;
+      this.#fillSide();
+    }
+  }
+
+  #showPlay() {
+    const [key, name] = [this.#find('play'), this.isPlaying ? 'Pause (space)' : 'Play (space)'];
+    key.innerHTML = icon(this.isPlaying ? 'pause' : 'play');
+    key.title = name;
+    key.setAttribute('aria-label', name);
+  }
+
+  #showPlace() {
+    const { frames, frameSeconds, duration, time } = this.#playback;
+    const place = this.#find('place');
+    const index = this.isPlaying ? Math.round(time / frameSeconds) : (this.frame?.index ?? 0);
+    const shown = frames > 0 ? Math.min(index, frames - 1) : index;
+    place.max = Math.max(1, frames - 1);
+    if (!place.matches(':active')) place.value = shown;
+    place.style.setProperty('--done', `${(100 * place.value) / place.max}%`);
+    const text = `${clock(shown * frameSeconds)} <span>/ ${clock(duration)}</span>`;
+    if (this.#find('time').innerHTML !== text) this.#find('time').innerHTML = text;
+    place.setAttribute('aria-valuetext', `frame ${shown} of ${frames}`);
+  }
+
+  #showSide(name) {
+    this.#openPanel = name;
+    for (const id of ['quality', 'info']) this.#find(id).setAttribute('aria-expanded', String(id === name));
+    this.#fillSide();
+  }
+
+  #fillSide() {
+    const side = this.#find('side');
+    const panels = [];
+    const isCompared = this.#tracks.length > 1;
+    this.#tracks.forEach((track, place) => {
+      const where = isCompared ? [' on the left', ' on the right'][place] : '';
+      if (this.#openPanel === 'quality') panels.push(this.#pointPanel(track, `Operating point${where}`));
+      if (this.#openPanel === 'info') panels.push(this.#infoPanel(track, isCompared ? `Figures${where}` : 'Figures'));
+    });
+    side.replaceChildren(...panels.filter(Boolean));
+    side.hidden = panels.length === 0;
+  }
+
+  #pointPanel(track, title) {
+    return pointPanel(title, this.#description, track.point, (point) => {
+      track.setPoint(point, this.#playback.index);
+      this.splitter.name(this.#tracks);
+    });
+  }
+
+  #infoPanel(track, title) {
+    const panel = document.createElement('section');
+    panel.className = 'panel';
+    const heading = document.createElement('h2');
+    heading.textContent = title;
+    const canvas = this.#find('canvas');
+    const { bytes, total } = this.#received;
+    const shared = { interval: this.#interval, pixels: [canvas.width, canvas.height], received: bytes, total };
+    panel.append(heading, figures(trackFigures(track, shared)));
+    return panel;
+  }
+
+  #compare() {
+    const isOn = this.#tracks.length > 1;
+    if (isOn) {
+      this.#tracks.pop().close();
+      this.splitter.hide();
+    } else {
+      this.#addTrack(LOWEST);
+      this.splitter.show(this.#tracks);
+    }
+    this.#find('compare').setAttribute('aria-pressed', String(!isOn));
+    if (!isOn && this.#openPanel === null) this.#showSide('quality');
+    else this.#fillSide();
+    this.#playback.seek(this.#playback.index);
+    this.#stage.invalidate();
+  }
+
+  #listen() {
+    listenToKeys(this, this.shadowRoot);
+    const on = (id, type, handler) => this.#find(id).addEventListener(type, handler);
+    on('play', 'click', () => this.togglePlay());
+    on('place', 'input', ({ target }) => this.#playback.seek(Number(target.value)));
+    on('speed', 'change', ({ target }) => (this.#playback.speed = Number(target.value)));
+    on('loop', 'click', ({ currentTarget }) => (this.#playback.isLooping = flip(currentTarget)));
+    on('fly', 'click', ({ currentTarget }) => (this.#controls.mode = flip(currentTarget) ? 'fly' : 'orbit'));
+    on('compare', 'click', () => this.#compare());
+    on('home', 'click', () => this.#framing && this.#controls.place(this.#framing, this.#framing.cameras[0]));
+    on('full', 'click', () => (document.fullscreenElement ? document.exitFullscreen() : this.requestFullscreen()));
+    for (const id of ['quality', 'info']) on(id, 'click', () => this.#showSide(this.#openPanel === id ? null : id));
+    on('open', 'click', () => this.#find('file').click());
+    on('file', 'change', ({ target }) => this.#openFile(target.files[0]));
+    this.#listenToDrops();
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.#retheme());
+  }
+
+  #retheme() {
+    if (!this.#stage) return;
+    this.#stage.background = this.#background ?? this.#description?.background ?? this.#surround();
+    this.#stage.invalidate();
+  }
+
+  #listenToDrops() {
+    const mark = (isOver) => (event) => {
+      event.preventDefault();
+      this.#find('drop').hidden = !isOver;
+    };
+    this.addEventListener('dragover', mark(true));
+    this.addEventListener('dragleave', mark(false));
+    this.addEventListener('drop', (event) => {
+      mark(false)(event);
+      this.#openFile(event.dataTransfer.files[0]);
+    });
+  }
+
+  async #openFile(file) {
+    if (file) this.open({ bytes: new Uint8Array(await file.arrayBuffer()) });
+  }
+}
+
+/** Presses a toggle; whether it is on then. */
+function flip(key) {
+  const isOn = key.getAttribute('aria-pressed') !== 'true';
+  key.setAttribute('aria-pressed', String(isOn));
+  return isOn;
+}

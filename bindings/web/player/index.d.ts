@@ -1,0 +1,122 @@
+import type { Description, Frame, OperatingPoint, Order, Source, Update, Vector, View } from '@splatstream/decoder';
+
+/** A camera of a picture. */
+export interface Camera {
+  position: Vector;
+  /** Right, down and ahead of the camera in the world. */
+  axes: [Vector, Vector, Vector];
+  /** Focal length, pixels. */
+  focal: number;
+}
+
+/** A camera by its vertical angle of view, radians. */
+export interface FixedCamera {
+  position: Vector;
+  axes: [Vector, Vector, Vector];
+  field: number;
+}
+
+/** The element <splat-player>. README.md has its attributes; events are CustomEvents: `ready` (Description), `frame`
+ * (Frame), `lost` ({ warnings, index }), `failed` ({ message }). */
+export class SplatPlayer extends HTMLElement {
+  /** The decoder's module or its bytes, for pages without its file. */
+  module: WebAssembly.Module | Uint8Array | null;
+  /** Makes a worker, for pages without its file. */
+  startWorker: (() => Worker) | undefined;
+  readonly frame: Frame | null;
+  readonly description: Description | null;
+  readonly losses: string[];
+  readonly isPlaying: boolean;
+  operatingPoint: OperatingPoint;
+  /** A camera in place of the viewer's; null gives it back. */
+  set camera(camera: FixedCamera | null);
+  /** Red, green and blue, 0 to 1; null: that of the stream, or else of the page. */
+  set backgroundColour(colour: Vector | null);
+  readonly statistics: {
+    /** Milliseconds, means of the last frames. */
+    decode: number;
+    pack: number;
+    sort: number;
+    upload: number;
+    /** Bytes copied to the GPU per frame. */
+    uploaded: number;
+    /** Bytes a second of the stream. */
+    rate: number;
+    /** Bytes of memory of the decoder. */
+    memory: number;
+    /** Milliseconds from picture to picture. */
+    interval: number | null;
+    bytes: number;
+    total: number | null;
+  };
+  open(source: Source): void;
+  push(bytes: Uint8Array, total?: number | null): void;
+  finish(): void;
+  play(): void;
+  pause(): void;
+  togglePlay(): void;
+  /** Goes to a frame; resolves with the frame that is shown then. */
+  seek(index: number): Promise<Frame | null>;
+  /** Pauses and goes some frames on or back. */
+  step(frames: number): void;
+  /** Turns by steps to the right and upwards. */
+  look(right: number, up: number): void;
+  changeSpeed(by: 1 | -1): void;
+  /** Presses a key of the bar: play, loop, quality, compare, info, fly, home, full. */
+  press(id: string): void;
+  /** Draws at once and gives the pixels as a PNG. */
+  snapshot(): Promise<Blob | null>;
+}
+
+/** Draws scenes into a canvas with WebGL 2. */
+export class Renderer {
+  readonly gl: WebGL2RenderingContext;
+  readonly canvas: HTMLCanvasElement;
+  constructor(canvas: HTMLCanvasElement);
+  resize(width: number, height: number): void;
+  /** Draws a scene over a background, in a part of the width: from and to, 0 to 1. */
+  draw(scene: Scene, camera: Camera, background: Vector, part?: [number, number]): void;
+}
+
+/** The Gaussians of one stream on the GPU. */
+export class Scene {
+  readonly count: number;
+  constructor(renderer: Renderer);
+  /** Takes what a frame has changed; gives the bytes that were copied. */
+  update(update: Update): number;
+  setOrder(order: Order): void;
+  delete(): void;
+}
+
+/** A camera that pointers, touches, the wheel and keys move. */
+export class Controls {
+  mode: 'orbit' | 'fly';
+  onchange: () => void;
+  fixed: FixedCamera | null;
+  constructor(target: HTMLElement);
+  place(views: Views, camera: Views['cameras'][number]): void;
+  camera(width: number, height: number): Camera;
+  view(): View;
+  /** Moves by the keys that are held for so many seconds. */
+  tick(seconds: number): void;
+  turn(yaw: number, pitch: number): void;
+  zoom(factor: number): void;
+}
+
+/** From where a scene is looked at. */
+export interface Views {
+  /** Right, up and front of the world. */
+  axes: [Vector, Vector, Vector];
+  middle: Vector;
+  radius: number;
+  cameras: { position: Vector; axes: [Vector, Vector, Vector] | null; ahead?: Vector; field: number }[];
+}
+
+/** The views of a scene; `words` is the whole base texture of its first frame. */
+export function framing(description: Description, words: Uint32Array): Views;
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'splat-player': SplatPlayer;
+  }
+}

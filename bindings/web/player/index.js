@@ -1,0 +1,8 @@
+import { SplatPlayer } from './element.js';
+
+export { SplatPlayer } from './element.js';
+export { Renderer, Scene } from './renderer.js';
+export { Controls } from './controls.js';
+export { framing } from './framing.js';
+
+if (!customElements.get('splat-player')) customElements.define('splat-player', SplatPlayer);

@@ -1,0 +1,109 @@
+// The clock: which frame is due. It knows nothing of pages.
+
+/** Frames that are left out at once, at most, where decoding is slower than the clock. */
+const MOST_SKIPPED = 6;
+/** The clock waits for frames that are later than this, seconds. */
+const LATEST = 0.25;
+
+/** Plays tracks by one clock. Times are seconds of the stream; with a loop they go on counting in the next round. */
+export class Playback {
+  isPlaying = false;
+  isLooping = true;
+  speed = 1;
+  /** Seconds of a frame, and frames in the stream; 0 as long as that is not known. */
+  frameSeconds = 1 / 30;
+  frames = 0;
+  #tracks;
+  /** Where the clock stands, and when it was looked at last, milliseconds. */
+  #time = 0;
+  #last = null;
+  /** Of each track the round of the frame that comes next, and when the one that is there was due. */
+  #places = new Map();
+
+  constructor(tracks) {
+    this.#tracks = tracks;
+    this.#rewind();
+  }
+
+  #rewind() {
+    for (const track of this.#tracks) this.#places.set(track, { round: 0, shownAt: this.#time });
+  }
+
+  /** Seconds of the whole stream; 0 as long as that is not known. */
+  get duration() {
+    return this.frames * this.frameSeconds;
+  }
+
+  /** Where the clock stands in the stream, seconds. */
+  get time() {
+    return this.duration > 0 ? this.#time % this.duration : this.#time;
+  }
+
+  /** The frame that is due. */
+  get index() {
+    return Math.floor(this.time / this.frameSeconds + 1e-6);
+  }
+
+  play() {
+    if (this.frames === 1) return;
+    if (!this.isLooping && this.frames > 0 && this.index >= this.frames - 1) this.seek(0);
+    this.isPlaying = true;
+    this.#last = null;
+  }
+
+  pause() {
+    this.isPlaying = false;
+  }
+
+  /** Goes to a frame, which is shown as soon as it is there. */
+  seek(index) {
+    const last = this.frames > 0 ? this.frames - 1 : index;
+    const frame = Math.max(0, Math.min(index, last));
+    this.#time = frame * this.frameSeconds;
+    this.#rewind();
+    for (const track of this.#tracks) track.seek(frame);
+  }
+
+  /** Shows what is due, and asks for what comes next. `now` is in milliseconds. */
+  tick(now) {
+    const passed = this.#last === null ? 0 : (now - this.#last) / 1000;
+    this.#last = now;
+    if (!this.isPlaying) return;
+    if (this.#tracks.some((track) => track.frame === null)) return;
+    this.#time += passed * this.speed;
+    for (const track of this.#tracks) this.#serve(track);
+    if (this.#tracks.every((track) => track.isEnded && track.heldTime === null)) this.#finish();
+  }
+
+  #serve(track) {
+    const place = this.#places.get(track);
+    if (track.heldTime !== null) {
+      const due = track.heldTime + place.round * this.duration;
+      if (due > this.#time) return;
+      track.release();
+      // Frames that come late hold the clock.
+      if (this.#time - due > LATEST) this.#time = due;
+      place.shownAt = due;
+    }
+    if (track.isBusy) {
+      this.#time = Math.min(this.#time, place.shownAt + LATEST + 8 * this.frameSeconds);
+    } else if (!track.isEnded) {
+      track.prefetch(this.#nextIndex(track));
+    } else if (this.isLooping && this.duration > 0 && !track.error) {
+      place.round += 1;
+      track.isEnded = false;
+      track.prefetch(0);
+    }
+  }
+
+  #nextIndex(track) {
+    const next = track.frame.index + 1;
+    return Math.max(next, Math.min(this.index, next + MOST_SKIPPED));
+  }
+
+  #finish() {
+    if (this.isLooping) return;
+    this.isPlaying = false;
+    this.#time = Math.max(0, this.duration - this.frameSeconds);
+  }
+}

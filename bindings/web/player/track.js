@@ -1,0 +1,182 @@
+// One stream at one operating point: its worker, its Gaussians on the GPU, and the frames between them.
+
+import { DecoderWorker } from '@splatstream/decoder';
+import { Scene } from './renderer.js';
+
+/** Frames over which times and rates are averaged. */
+const AVERAGED = 12;
+
+/**
+ * Asks for one frame at a time and shows it when it is due. Every answer of the worker is applied, in the order in which
+ * they come: each holds what has changed since the one before.
+ */
+export class Track extends EventTarget {
+  #renderer;
+  #controls;
+  #worker;
+  /** The index that the worker has been asked for; the one to ask for after that, at once; a frame that is not due yet. */
+  #asked = null;
+  #next = null;
+  #held = null;
+  #history = [];
+
+  constructor(source, options, renderer, controls) {
+    super();
+    this.#renderer = renderer;
+    this.#controls = controls;
+    this.scene = new Scene(renderer);
+    this.frame = null;
+    this.isEnded = false;
+    this.error = null;
+    this.point = options.point ?? {};
+    this.#worker = new DecoderWorker(source, options);
+    const on = (type, handler) => this.#worker.addEventListener(type, ({ detail }) => handler(detail));
+    on('frame', (answer) => this.#take(answer));
+    on('order', ({ order }) => this.#sorted(order));
+    on('end', ({ warnings }) => this.#end(warnings));
+    on('waiting', () => this.#wait());
+    on('error', ({ message }) => this.#fail(message));
+    for (const type of ['description', 'received']) on(type, (detail) => this.#emit(type, detail));
+    this.seek(0);
+  }
+
+  /** Whether a frame is on its way. */
+  get isBusy() {
+    return this.#asked !== null;
+  }
+
+  /** Whether the frame is there that was sought last. */
+  get isSettled() {
+    return this.#asked === null && this.#next === null;
+  }
+
+  /** When the frame is due that is held back, seconds from the start; null if there is none. */
+  get heldTime() {
+    return this.#held?.frame.time ?? null;
+  }
+
+  /** Times of the last frames in milliseconds, bytes a second of the stream, and bytes of memory. */
+  get statistics() {
+    const mean = (part) => this.#history.reduce((sum, entry) => sum + entry[part], 0) / (this.#history.length || 1);
+    const seconds = this.#history.reduce((sum, entry) => sum + entry.seconds, 0);
+    const bytes = this.#history.reduce((sum, entry) => sum + entry.bytes, 0);
+    const times = { decode: mean('decode'), pack: mean('pack'), sort: mean('sort'), upload: mean('upload') };
+    return { ...times, uploaded: mean('uploaded'), rate: seconds > 0 ? bytes / seconds : 0, memory: this.#history.at(-1)?.memory ?? 0 };
+  }
+
+  /** Shows a frame as soon as it is there. */
+  seek(index) {
+    this.release();
+    this.isEnded = false;
+    if (this.#asked === null) this.#ask(index, true);
+    else this.#next = index;
+  }
+
+  /** Asks for a frame that is shown when it is released. */
+  prefetch(index) {
+    if (this.#asked === null && this.#held === null) this.#ask(index, false);
+  }
+
+  /** Shows the frame that is held back. */
+  release() {
+    const held = this.#held;
+    this.#held = null;
+    if (held) this.#show(held);
+  }
+
+  /** Changes the operating point and shows the frame with an index again. */
+  setPoint(point, index) {
+    this.point = point;
+    this.#history = [];
+    this.#worker.setPoint(point);
+    this.seek(index);
+  }
+
+  /** Sorts again, since the camera has moved. */
+  sort() {
+    this.#worker.sort(this.#controls.view());
+  }
+
+  /** The next bytes of a source that is pushed. */
+  push(bytes, total) {
+    this.#worker.push(bytes, total);
+  }
+
+  /** No more bytes will be pushed. */
+  finish() {
+    this.#worker.finish();
+  }
+
+  close() {
+    this.#worker.close();
+    this.scene.delete();
+  }
+
+  #ask(index, isUrgent) {
+    this.#asked = { index, isUrgent };
+    this.#worker.show(index, this.#controls.view());
+  }
+
+  #take(answer) {
+    const isUrgent = this.#asked?.isUrgent || this.#next !== null || answer.wanted !== this.#asked?.index;
+    if (answer.wanted === this.#asked?.index) this.#asked = null;
+    this.#emit('warnings', { warnings: answer.frame.warnings, index: answer.frame.index });
+    if (isUrgent) this.#show(answer, true);
+    else this.#held = answer;
+    this.#askNext();
+    this.#emit('arrived', answer.frame);
+  }
+
+  #askNext() {
+    if (this.#next === null || this.#asked !== null) return;
+    const index = this.#next;
+    this.#next = null;
+    this.#ask(index, true);
+  }
+
+  /** Shows an answer. A frame that was sought says nothing of the rate of the stream. */
+  #show({ frame, update, order, times, memory }, isSought = false) {
+    const start = performance.now();
+    const uploaded = this.scene.update(update);
+    this.scene.setOrder(order);
+    const upload = performance.now() - start;
+    const seconds = this.frame && !isSought ? frame.time - this.frame.time : 0;
+    const entry = { ...times, upload, uploaded, memory, seconds: Math.max(0, seconds), bytes: seconds > 0 ? frame.bytes : 0 };
+    this.#history = [...this.#history, entry].slice(-AVERAGED);
+    this.frame = frame;
+    this.#emit('shown', { frame, update });
+  }
+
+  #sorted(order) {
+    this.scene.setOrder(order);
+    this.#emit('sorted');
+  }
+
+  #end(warnings) {
+    this.#asked = null;
+    this.isEnded = true;
+    this.#emit('warnings', { warnings, index: null });
+    this.#askNext();
+    this.#emit('ended');
+  }
+
+  /** The worker waits for bytes: it can be asked for another frame instead. */
+  #wait() {
+    if (this.#next !== null) {
+      this.#asked = null;
+      this.#askNext();
+    }
+    this.#emit('waiting');
+  }
+
+  #fail(message) {
+    this.#asked = null;
+    this.isEnded = true;
+    this.error = message;
+    this.#emit('failed', { message });
+  }
+
+  #emit(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+}

@@ -1,0 +1,228 @@
+// The player in Chromium: node --test browser.test.mjs, with the variables of setting.mjs, CHROMIUM, and PLAYWRIGHT, the
+// folder of playwright-core. Pictures of four moments stay in the folder of the tests.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import test, { after, before } from 'node:test';
+import { pathToFileURL } from 'node:url';
+import { Decoder } from '../decoder/index.js';
+import { serve } from './server.mjs';
+import { FRAMES, POINTS, at, damaged, nativeDigests, pointOf, splatstream, stream, streamPath, writeCameras } from './setting.mjs';
+
+const { chromium } = await import(pathToFileURL(join(process.env.PLAYWRIGHT, 'index.mjs')));
+const FLAGS = ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
+  '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+const SIZE = { width: 480, height: 270 };
+let server, browser;
+
+before(async () => {
+  server = await serve({ '/scene.gss': stream, '/damaged.gss': Buffer.from(damaged()) });
+  browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args: FLAGS });
+});
+
+after(async () => {
+  await browser?.close();
+  server?.close();
+});
+
+/** A page with a player that has shown its first picture and waits; whatever goes to the console fails the test at `close`. */
+async function player({ attributes = {}, size = SIZE, scheme = 'dark', source = '/scene.gss' } = {}) {
+  const page = await browser.newPage({ viewport: size, colorScheme: scheme });
+  const said = [];
+  page.on('console', (message) => said.push(message.text()));
+  page.on('pageerror', (error) => said.push(error.stack));
+  await page.goto(server.url);
+  await page.evaluate(({ all, isAwaited }) => new Promise((resolve, reject) => {
+    const element = document.createElement('splat-player');
+    for (const [name, value] of Object.entries(all)) element.setAttribute(name, value);
+    element.addEventListener('ready', resolve);
+    element.addEventListener('failed', ({ detail }) => reject(new Error(detail.message)));
+    document.body.append(element);
+    window.player = element;
+    if (!isAwaited) resolve();
+  }), { all: { autoplay: 'no', resolution: 'full', ...(source && { src: source }), ...attributes }, isAwaited: source !== null });
+  page.finish = async () => {
+    await page.close();
+    assert.deepEqual(said, []);
+  };
+  return page;
+}
+
+for (const point of POINTS) {
+  test(`the browser shows frames at ${point} with the digests of the native decoder`, async () => {
+    const page = await player({ attributes: { 'operating-point': point } });
+    const found = await page.evaluate(async (frames) => {
+      const digests = [];
+      for (let index = 0; index < frames; ) {
+        const frame = await player.seek(index);
+        digests.push(frame.digest);
+        index = frame.index + 1;
+        if (player.frame.index >= frames - 1 || frame.index < digests.length - 1) break;
+      }
+      return digests;
+    }, pointOf(point).temporal === 0 ? FRAMES - 1 : FRAMES);
+    assert.deepEqual(found, nativeDigests(point));
+    await page.finish();
+  });
+}
+
+test('the first picture comes from the smallest prefix', async () => {
+  const decoder = await Decoder.load();
+  const point = pointOf('s0,t0,r0');
+  decoder.setPoint(point);
+  let needed = 0;
+  while (decoder.next() === null) {
+    decoder.push(stream.subarray(needed, needed + 64));
+    needed += 64;
+  }
+  assert.ok(needed < stream.length / 10, `${needed} of ${stream.length}`);
+  const page = await player({ attributes: { 'operating-point': 's0,t0,r0' }, source: null });
+  const shown = await page.evaluate(async ({ bytes, prefix }) => {
+    const all = Uint8Array.from(bytes);
+    player.open({});
+    const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
+    let isReady = false;
+    player.addEventListener('ready', () => (isReady = true));
+    for (let place = 0; place < prefix - 64; place += 500) player.push(all.slice(place, Math.min(place + 500, prefix - 64)), all.length);
+    await pause(1500);
+    const before = isReady;
+    player.push(all.slice(prefix - 64, prefix), all.length);
+    for (let wait = 0; wait < 100 && !isReady; wait++) await pause(50);
+    return { before, after: isReady, digest: player.frame?.digest };
+  }, { bytes: [...stream.subarray(0, needed)], prefix: needed });
+  assert.deepEqual(shown, { before: false, after: true, digest: nativeDigests('s0,t0,r0')[0] });
+  await page.finish();
+});
+
+test('seeks to five places show the frames there', async () => {
+  const page = await player();
+  const expected = nativeDigests(POINTS[2]);
+  const places = [17, 3, 23, 8, 12];
+  const found = await page.evaluate(async (indices) => {
+    const shown = [];
+    for (const index of indices) shown.push(await player.seek(index));
+    return shown.map(({ index, digest }) => [index, digest]);
+  }, places);
+  assert.deepEqual(found, places.map((index) => [index, expected[index]]));
+  await page.finish();
+});
+
+test('pictures are those of the renderer of the repository', async () => {
+  const cameras = [0.3, 2.2, 4.4].map((turn) => lookAt([3.4 * Math.sin(turn), -0.9, -3.4 * Math.cos(turn)], [0, 0, 0], 0.7));
+  splatstream('render', streamPath, '--camera', writeCameras(cameras, SIZE.width, SIZE.height), '-o', at('native'), '--frames', '5..6');
+  const page = await player({ attributes: { controls: 'none' } });
+  for (const [id, camera] of cameras.entries()) {
+    const expected = readFileSync(at('native', `frame_0005_view_${id}.png`)).toString('base64');
+    const [decibels, mean] = await page.evaluate(compare, { camera, expected });
+    console.log(`view ${id}: ${decibels.toFixed(2)} dB`);
+    assert.ok(mean > 8, 'the picture is empty');
+    // Of a neighbouring frame one of them has less than 45 dB.
+    assert.ok(decibels > 45, `${decibels} dB`);
+  }
+  await page.finish();
+});
+
+/** In the page: PSNR of the picture of a camera against a PNG, and the mean of the pixels of that. */
+async function compare({ camera, expected }) {
+  await player.seek(5);
+  player.camera = camera;
+  await new Promise((resolve) => setTimeout(resolve, 800));
+  const pixels = async (source) => {
+    const bitmap = await createImageBitmap(source);
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    return context.getImageData(0, 0, bitmap.width, bitmap.height);
+  };
+  player.backgroundColour = [0, 0, 0];
+  const shown = await pixels(await player.snapshot());
+  const wanted = await pixels(await (await fetch(`data:image/png;base64,${expected}`)).blob());
+  if (shown.width !== wanted.width || shown.height !== wanted.height) throw new Error('the pictures have different sizes');
+  let squares = 0, sum = 0;
+  for (let place = 0; place < wanted.data.length; place++) {
+    if (place % 4 === 3) continue;
+    squares += (shown.data[place] - wanted.data[place]) ** 2;
+    sum += wanted.data[place];
+  }
+  const count = 0.75 * wanted.data.length;
+  return [10 * Math.log10(255 ** 2 / (squares / count)), sum / count];
+}
+
+test('a damaged stream keeps playing and says what was lost', async () => {
+  const page = await player({ source: '/damaged.gss' });
+  const result = await page.evaluate(async (last) => {
+    for (let index = 0; index <= last; index++) await player.seek(index);
+    return { index: player.frame.index, losses: player.losses };
+  }, FRAMES - 1);
+  assert.equal(result.index, FRAMES - 1);
+  assert.ok(result.losses.length > 0);
+  assert.ok(await page.locator('#lost').isVisible());
+  await page.screenshot({ path: at('damaged.png'), timeout: 120_000 });
+  await page.finish();
+});
+
+test('it plays, loops, and keys work', async () => {
+  const page = await player({ size: { width: 160, height: 90 } });
+  await page.evaluate(() => {
+    window.seen = [];
+    player.addEventListener('frame', ({ detail }) => seen.push(detail.index));
+    player.play();
+  });
+  await page.waitForFunction(() => seen.some((index, place) => place > 0 && index < seen[place - 1]), null, { timeout: 120_000 });
+  await page.locator('splat-player').locator('canvas').focus();
+  await page.keyboard.press('Space');
+  assert.equal(await page.evaluate(() => player.isPlaying), false);
+  await page.keyboard.press('Home');
+  await page.waitForFunction(() => player.frame.index === 0);
+  await page.keyboard.press('Period');
+  await page.waitForFunction(() => player.frame.index === 1);
+  await page.finish();
+});
+
+test('a page that the command has written plays from a file and asks nobody for anything', async () => {
+  splatstream('view', streamPath, '-o', at('page.html'));
+  const page = await browser.newPage({ viewport: SIZE });
+  const [said, asked] = [[], []];
+  page.on('console', (message) => said.push(message.text()));
+  page.on('pageerror', (error) => said.push(error.stack));
+  page.on('request', (request) => asked.push(request.url()));
+  const url = pathToFileURL(at('page.html')).href;
+  await page.goto(url);
+  const first = page.locator('splat-player');
+  await first.waitFor({ timeout: 60_000 });
+  await page.waitForFunction(() => document.querySelector('splat-player').frame, null, { timeout: 60_000 });
+  const digest = await first.evaluate(async (element) => {
+    element.pause();
+    return (await element.seek(9)).digest;
+  });
+  assert.equal(digest, nativeDigests(POINTS[2])[9]);
+  assert.deepEqual(said, []);
+  assert.deepEqual(asked.filter((other) => other !== url && !other.startsWith('blob:') && !other.startsWith('data:')), []);
+  await page.close();
+});
+
+test('four moments are drawn', async () => {
+  const moments = [
+    ['dark.png', { size: { width: 1280, height: 720 } }, []],
+    ['light-compare.png', { size: { width: 1280, height: 720 }, scheme: 'light' }, ['compare']],
+    ['phone.png', { size: { width: 390, height: 844 } }, ['quality']],
+    ['figures.png', { size: { width: 1280, height: 720 }, scheme: 'light' }, ['info']],
+  ];
+  for (const [name, options, keys] of moments) {
+    const page = await player(options);
+    for (const key of keys) await page.evaluate((id) => player.press(id), key);
+    await page.evaluate(() => player.seek(12));
+    await page.waitForTimeout(1500);
+    const picture = await page.screenshot({ path: at(name), timeout: 120_000 });
+    assert.ok(picture.length > 20_000, `${name} is empty`);
+    await page.finish();
+  }
+});
+
+/** A camera at a place that looks at another one, y downwards. */
+function lookAt(position, target, field) {
+  const unit = (vector) => vector.map((part) => part / Math.hypot(...vector));
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const ahead = unit(target.map((part, axis) => part - position[axis]));
+  const right = unit(cross([0, 1, 0], ahead));
+  return { position, axes: [right, cross(ahead, right), ahead], field };
+}

@@ -1,0 +1,121 @@
+// The decoder in Node: node --test node.test.mjs, with the variables of setting.mjs.
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { Decoder, hasSimd } from '../decoder/index.js';
+import { FRAMES, POINTS, damaged, nativeDigests, pointOf, stream } from './setting.mjs';
+
+/** Decodes to the end; gives the digest of every frame, and calls `each` with the decoder and the frame. */
+function digests(decoder, each = () => {}) {
+  const found = [];
+  for (let frame = decoder.next(); frame && !frame.isEnd; frame = decoder.next()) {
+    found.push(frame.digest);
+    each(decoder, frame);
+  }
+  return found;
+}
+
+async function opened(bytes = stream, point = {}) {
+  const decoder = await Decoder.load();
+  decoder.setPoint(point);
+  decoder.push(bytes);
+  decoder.end();
+  return decoder;
+}
+
+for (const point of POINTS) {
+  test(`frames at ${point} have the digests of the native decoder`, async () => {
+    const expected = nativeDigests(point);
+    assert.ok(expected.length > 0);
+    assert.deepEqual(digests(await opened(stream, pointOf(point))), expected);
+  });
+}
+
+test('pieces give the same frames, and none comes before its bytes', async () => {
+  const decoder = await Decoder.load();
+  const found = [];
+  for (let at = 0; at < stream.length; at += 333) {
+    decoder.push(stream.subarray(at, at + 333));
+    found.push(...digests(decoder));
+    if (at < 1000) assert.equal(found.length, 0);
+  }
+  decoder.end();
+  found.push(...digests(decoder));
+  assert.deepEqual(found, digests(await opened()));
+});
+
+test('a seek gives the frame that was sought, also backwards and after the end', async () => {
+  const whole = digests(await opened());
+  const decoder = await opened();
+  for (const index of [17, 3, 23, 0, 8, 11]) {
+    decoder.seek(index);
+    const frame = decoder.next();
+    assert.deepEqual([frame.index, frame.digest], [index, whole[index]]);
+  }
+  digests(decoder);
+  decoder.seek(5);
+  assert.equal(decoder.next().index, 5);
+});
+
+test('damage is said, costs at most its GOP, and leaves the other frames as they are', async () => {
+  const whole = digests(await opened());
+  const warnings = [];
+  const shown = new Map();
+  digests(await opened(damaged()), (_, frame) => {
+    warnings.push(...frame.warnings);
+    shown.set(frame.index, frame.digest);
+  });
+  assert.ok(warnings.length > 0);
+  const differing = whole.map((digest, index) => [index, digest]).filter(([index, digest]) => shown.get(index) !== digest);
+  assert.ok(differing.length > 0 && differing.length <= 8);
+  assert.ok(differing.every(([index]) => Math.floor(index / 8) === Math.floor(differing[0][0] / 8)));
+});
+
+test('what is no stream is refused with a reason', async () => {
+  const decoder = await opened(new TextEncoder().encode('This is no stream of SplatStream at all.'));
+  assert.throws(() => decoder.next(), /./);
+});
+
+test('only changed rows are copied, and slots are stable', async () => {
+  const decoder = await opened();
+  let copied = 0, whole = 0;
+  digests(decoder, (_, frame) => {
+    const update = decoder.show();
+    assert.ok(update.slots >= frame.gaussians);
+    assert.equal(update.isNew, frame.index === 0);
+    if (frame.index > 0) assert.ok(update.kept + update.appeared === frame.gaussians);
+    copied += update.base.reduce((sum, { rows }) => sum + rows, 0);
+    whole += update.slots / 512;
+  });
+  assert.ok(copied <= whole);
+});
+
+test('the order is that of the depth, farthest first', async () => {
+  const decoder = await opened();
+  decoder.next();
+  const { base } = decoder.show();
+  const places = new Float32Array(base[0].words.buffer);
+  const { slots, near } = decoder.sort([0, 0, -5], [0, 0, 1]);
+  assert.ok(near > 0 && slots.length > 3000);
+  const depths = [...slots].map((slot) => places[8 * slot + 2] + 5);
+  assert.ok(depths.every((depth, at) => at === 0 || depth <= depths[at - 1] * 1.001));
+});
+
+test('memory does not grow from round to round', async () => {
+  const decoder = await opened();
+  const rounds = Array.from({ length: 6 }, () => {
+    decoder.seek(0);
+    assert.equal(digests(decoder, () => decoder.show()).length, FRAMES);
+    return decoder.memory;
+  });
+  assert.equal(rounds[5], rounds[2]);
+});
+
+test('the description says what the stream holds', async () => {
+  const decoder = await opened();
+  decoder.next();
+  const { frames, frameSeconds, highest, upAxis } = decoder.describe();
+  assert.deepEqual([frames, highest, upAxis], [FRAMES, { spatial: 1, temporal: 1, refinement: 2 }, '-y']);
+  assert.ok(Math.abs(frameSeconds - 1 / 30) < 1e-6);
+});
+
+test('this engine takes the module with SIMD', () => assert.ok(hasSimd()));
