@@ -82,6 +82,29 @@ fn another_unpackager_is_tested_on_the_packages() {
 }
 
 #[test]
+fn another_packager_is_tested_on_the_streams() {
+    let packages = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/packages");
+    let run = ["conformance", "packages", "--packages", text(&packages), "--packager"];
+    let this = env!("CARGO_BIN_EXE_splatstream");
+    let report = json(&[&run[..], &[&format!("'{this}' package {{in}} -o {{out}} --layout frame")]].concat());
+    assert!(report["failed"] == 0 && report["passed"].as_u64() > Some(5), "{report}");
+    // Ones that package something else, nothing, and refuse.
+    let other = packages.join("valid/temporal-gops-mixed");
+    for (command, message) in [
+        (
+            format!("sh -c 'cp -r \"$2\" \"$1\"' sh {{out}} '{}' {{in}}", text(&other)),
+            "of its package, its stream has",
+        ),
+        ("sh -c 'mkdir \"$1\"' sh {out} {in}".to_owned(), "of its package, it refused a valid package"),
+        ("false {in} {out}".to_owned(), "it refused a valid stream with exit code 1"),
+    ] {
+        let said = run_with(&[&run[..], &[command.as_str()]].concat(), b"");
+        let said = String::from_utf8(said.stdout).unwrap();
+        assert!(said.contains(message), "{command}: {said}");
+    }
+}
+
+#[test]
 fn damage_is_said() {
     let directory = directory();
     let (out, back) = (directory.path().join("out"), directory.path().join("back.gss"));

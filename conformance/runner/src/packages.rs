@@ -1,4 +1,5 @@
-//! Packages (annex C) through an unpackager: what it makes of the files, and how it refuses those with a fault.
+//! Packages (annex C) through an unpackager: what it makes of the files, and how it refuses those with a fault; and their
+//! streams through a packager, whose packages are unpackaged again.
 
 use crate::answer::{Answer, Ending};
 use crate::cancel::Cancel;
@@ -71,16 +72,61 @@ pub fn run(
 ) -> Result<Vec<PackageResult>> {
     let decoder = Decoder::Once(template);
     let mut session = Session::new(&decoder, limits, cancel)?;
+    each(folder, &["invalid", "valid"], cancel, |path, record| {
+        let (answer, out) = session.ask_file(path, "out.gss")?;
+        Ok(judge(&record.expect, &answer, &out))
+    })
+}
+
+/// Runs a packager on the stream of every valid package of a folder, in order of their names. An unpackager that is
+/// right gets the streams out of the packages, and out of what the packager writes.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_packager(
+    folder: &Path,
+    packager: Template,
+    unpackager: Template,
+    limits: &Limits,
+    cancel: &Cancel,
+) -> Result<Vec<PackageResult>> {
+    let (packager, unpackager) = (Decoder::Once(packager), Decoder::Once(unpackager));
+    let mut tested = Session::new(&packager, limits, cancel)?;
+    let mut reference = Session::new(&unpackager, limits, cancel)?;
+    each(folder, &["valid"], cancel, |path, record| {
+        let (answer, stream) = reference.ask_file(path, "in.gss")?;
+        if let Err(message) = judge(&record.expect, &answer, &stream) {
+            return Ok(Err(format!("the unpackager is wrong, not the packager: {message}")));
+        }
+        let (answer, package) = tested.ask_file(&stream, "package")?;
+        match (answer.ending, answer.fault) {
+            (Ending::Code(0), _) => {}
+            (Ending::Code(code), _) => {
+                return Ok(Err(format!("it refused a valid stream with exit code {code}")));
+            }
+            (_, fault) => return Ok(Err(fault.unwrap_or_else(|| "it ended by a signal".to_owned()))),
+        }
+        let (answer, back) = reference.ask_file(&package, "out.gss")?;
+        Ok(judge(&record.expect, &answer, &back).map_err(|message| format!("of its package, {message}")))
+    })
+}
+
+/// What `test` says of each package of some kinds.
+fn each(
+    folder: &Path,
+    kinds: &[&str],
+    cancel: &Cancel,
+    mut test: impl FnMut(&Path, &Record) -> Result<std::result::Result<(), String>>,
+) -> Result<Vec<PackageResult>> {
     let mut results = Vec::new();
-    for kind in ["invalid", "valid"] {
+    for kind in kinds {
         for path in entries(&folder.join(kind))? {
             if cancel.is_set() {
                 return Ok(results);
             }
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             let record = read(&path.join("package.json"))?;
-            let (answer, out) = session.ask_file(&path, "out.gss")?;
-            let message = judge(&record.expect, &answer, &out).err().unwrap_or_default();
+            let message = test(&path, &record)?.err().unwrap_or_default();
             results.push(PackageResult {
                 package: format!("{kind}/{name}"),
                 requirements: record.requirements,
