@@ -23,28 +23,27 @@ pub fn to_gaussians(
     sequence: &SequenceParameters,
 ) -> Result<GaussianFrame, FrameError> {
     let QuantizedFrame { position, log_scale, opacity, rotation, dc, sh } = frame;
-    let [log_scale_offset, opacity_offset] = [sequence.log_scale_offset(), sequence.opacity_offset()];
-    let [log_scale_step, opacity_step] = [sequence.log_scale_step(), sequence.opacity_step()];
-    let rotation_step = sequence.rotation_step();
     let dc_step = sequence.dc_step() * COLOUR_FRACTION;
     let sh_step = sequence.sh_step() * COLOUR_FRACTION;
-    let quaternions = || {
-        let [x, y, z] = each(rotation, |plane| scaled(plane, rotation_step));
-        [unit_w(&x, &y, &z), x, y, z]
-    };
-    let colours = || {
-        let of_sh = || sh.into_par_iter().map(|plane| scaled(plane, sh_step)).collect();
-        rayon::join(|| each(dc, |plane| scaled(plane, dc_step)), of_sh)
-    };
-    let shapes = || {
-        let of_opacity = || affine(opacity, opacity_offset, opacity_step);
-        rayon::join(|| each(log_scale, |plane| affine(plane, log_scale_offset, log_scale_step)), of_opacity)
-    };
-    let ((position, rotation), ((log_scale, opacity_logit), (dc, sh))) = rayon::join(
-        || rayon::join(|| scene_positions(position, sequence), quaternions),
-        || rayon::join(shapes, colours),
-    );
-    let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh };
+    // In the order in which they are taken out below.
+    let shapes = log_scale.map(|plane| (plane, Some(sequence.log_scale_offset()), sequence.log_scale_step()));
+    let rotations = rotation.map(|plane| (plane, None, sequence.rotation_step()));
+    let opacities = [(opacity, Some(sequence.opacity_offset()), sequence.opacity_step())];
+    let colours = dc.map(|plane| (plane, None, dc_step));
+    let harmonics = sh.into_iter().map(|plane| (plane, None, sh_step));
+    let integers: Vec<(Vec<i32>, Option<f32>, f32)> =
+        shapes.into_iter().chain(rotations).chain(opacities).chain(colours).chain(harmonics).collect();
+    let convert =
+        || integers.into_par_iter().map(|(plane, offset, step)| affine(plane, offset, step)).collect();
+    let (position, planes): (_, Vec<Vec<f32>>) = rayon::join(|| scene_positions(position, sequence), convert);
+    let mut planes = planes.into_iter();
+    let mut next = || planes.next().unwrap_or_default();
+    let log_scale = [next(), next(), next()];
+    let [x, y, z] = [next(), next(), next()];
+    let rotation = [unit_w(&x, &y, &z), x, y, z];
+    let opacity_logit = next();
+    let dc = [next(), next(), next()];
+    let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh: planes.collect() };
     let frame = GaussianFrame::from_planes(sequence.sh_degree, planes)?;
     Ok(frame.with_antialiased(sequence.antialiased()))
 }
@@ -53,24 +52,17 @@ fn scene_positions(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [V
     let (step, companding) = (sequence.position_step(), Companding::new(sequence));
     let [x, y, z] = position;
     let [of_x, of_y, of_z] = sequence.position_offset();
-    each([(x, of_x), (y, of_y), (z, of_z)], |(plane, offset)| match companding.is_linear() {
+    [(x, of_x), (y, of_y), (z, of_z)].map(|(plane, offset)| match companding.is_linear() {
         true => plane.into_iter().map(|q| offset + step * q as f32).collect(),
         false => plane.into_iter().map(|q| offset + step * companding.expand(q) as f32).collect(),
     })
 }
 
-/// What `f` makes of each of three planes, on all cores.
-fn each<T: Send, U: Send>([x, y, z]: [T; 3], f: impl Fn(T) -> U + Sync) -> [U; 3] {
-    let (x, (y, z)) = rayon::join(|| f(x), || rayon::join(|| f(y), || f(z)));
-    [x, y, z]
-}
-
-fn affine(plane: Vec<i32>, offset: f32, step: f32) -> Vec<f32> {
-    plane.into_iter().map(|q| offset + step * q as f32).collect()
-}
-
-fn scaled(plane: Vec<i32>, step: f32) -> Vec<f32> {
-    plane.into_iter().map(|q| step * q as f32).collect()
+fn affine(plane: Vec<i32>, offset: Option<f32>, step: f32) -> Vec<f32> {
+    match offset {
+        Some(offset) => plane.into_iter().map(|q| offset + step * q as f32).collect(),
+        None => plane.into_iter().map(|q| step * q as f32).collect(),
+    }
 }
 
 /// w is what makes the quaternion a unit, 0 if x, y, z are already longer than one.
