@@ -41,13 +41,6 @@ impl Buffers {
 pub struct BufferPool(Mutex<Vec<Buffers>>);
 
 impl BufferPool {
-    /// Takes the memory of a block that a task has given away.
-    pub(crate) fn recycle(&self, block: CodedBlock) {
-        if let Some(buffers) = self.idle().last_mut() {
-            buffers.recycle(block);
-        }
-    }
-
     fn idle(&self) -> MutexGuard<'_, Vec<Buffers>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

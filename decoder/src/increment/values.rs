@@ -4,6 +4,7 @@ use crate::attribute;
 use crate::block::{CodedPlanes, decode_coded};
 use crate::buffers::Workspace;
 use crate::coded_block::CodedBlock;
+use crate::interrupt::Interrupt;
 use crate::steps::StepRule;
 use rayon::prelude::*;
 use splatstream_format::Result;
@@ -124,7 +125,7 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
         let mut values = UnitValues::default();
         for (coded, models) in self.sections() {
             let blocks = self.blocks(coded, models, sequence, workspace)?;
-            values.set(coded.section, joined(blocks, models, sequence, workspace)?);
+            values.set(coded.section, joined(blocks, models, sequence, workspace.interrupt)?);
         }
         Ok(values)
     }
@@ -177,7 +178,7 @@ fn joined(
     blocks: Vec<CodedBlock>,
     models: &SectionModels,
     sequence: &SequenceParameters,
-    workspace: Workspace<'_>,
+    interrupt: &Interrupt,
 ) -> Result<SectionValues> {
     let has_deltas = models.layout.planes().first().is_some_and(|plane| plane.is_position());
     let mut blocks = blocks.into_iter();
@@ -186,12 +187,11 @@ fn joined(
         (values.deltas, values.planes) = (first.deltas, first.coded);
     }
     for block in blocks {
-        workspace.interrupt.check()?;
+        interrupt.check()?;
         values.deltas.extend_from_slice(&block.deltas);
         for (plane, more) in values.planes.iter_mut().zip(&block.coded) {
             plane.extend_from_slice(more);
         }
-        workspace.buffers.recycle(block);
     }
     for (plane, model) in values.planes.iter_mut().zip(&models.models) {
         attribute::unbias(plane, model.bias);
