@@ -90,13 +90,9 @@ impl Serve {
         let settings = self.settings(directory)?;
         allow_open_files();
         let log = self.log;
-        let server = Server::bind(&settings, move |entry| write(log, entry)).map_err(refused)?;
-        let scheme = if settings.tls.is_some() { "https" } else { "http" };
-        let url = format!("{scheme}://{}/", server.address());
-        let stopper = server.stopper();
-        unfinished::stop_by(move || stopper.stop())?;
-        console.complain(&format!("serving {} at {url}", directory.display()));
-        let report = Report { directory, url, statistics: server.run() };
+        let announce = |url: &str| console.complain(&format!("serving {} at {url}", directory.display()));
+        let (url, statistics) = until_interrupted(&settings, move |entry| write(log, entry), announce)?;
+        let report = Report { directory, url, statistics };
         console.report(&report, || report.text())
     }
 
@@ -124,6 +120,21 @@ impl Serve {
         settings.threads = Some(rayon::current_num_threads());
         Ok(settings)
     }
+}
+
+/// Serves until a signal comes, once the address has been announced; gives the address and what was served.
+pub(crate) fn until_interrupted(
+    settings: &Settings,
+    log: impl Fn(&Entry) + Send + Sync + 'static,
+    announce: impl FnOnce(&str),
+) -> Result<(String, Statistics), Failure> {
+    let server = Server::bind(settings, log).map_err(refused)?;
+    let scheme = if settings.tls.is_some() { "https" } else { "http" };
+    let url = format!("{scheme}://{}/", server.address());
+    let stopper = server.stopper();
+    unfinished::stop_by(move || stopper.stop())?;
+    announce(&url);
+    Ok((url, server.run()))
 }
 
 /// Every connection is an open file, and so is what it asks for.

@@ -3,13 +3,13 @@
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output_file::{OutputFile, refuse_inputs};
+use crate::serve::until_interrupted;
 use crate::stream_file::{LimitArgs, StreamFile};
-use crate::unfinished;
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;
 use splatstream_format::unit::Stream;
-use splatstream_stream::server::{Server, Settings};
+use splatstream_stream::server::Settings;
 use splatstream_web::{page_beside, page_with};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -90,16 +90,8 @@ impl View {
             .map_err(|error| Failure::other(format!("a temporary directory cannot be written: {error}")))?;
         let mut settings = Settings::new(directory.path());
         settings.address = SocketAddr::new(self.bind, self.port);
-        let server = Server::bind(&settings, |_| {}).map_err(|error| {
-            Failure::other(format!(
-                "{error}\n  choose another port, or 0 for any free one; check the address"
-            ))
-        })?;
-        let url = format!("http://{}/", server.address());
-        let stopper = server.stopper();
-        unfinished::stop_by(move || stopper.stop())?;
-        console.complain(&format!("{} is at {url}", self.input.display()));
-        server.run();
+        let announce = |url: &str| console.complain(&format!("{} is at {url}", self.input.display()));
+        let (url, _) = until_interrupted(&settings, |_| {}, announce)?;
         let report = Report::new(None, Some(url), &page, stream);
         console.report(&report, || report.text())
     }
