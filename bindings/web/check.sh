@@ -24,6 +24,17 @@ wasm() {
     return $status
 }
 
+# The vectors of WebAssembly calculate as the portable ones do.
+vectors() {
+    local target=wasm32-wasip1
+    if [ ! -d "$(rustc --print target-libdir --target $target)" ]; then
+        echo "skipped: tests of vectors in WebAssembly, for which the Rust target is not there: rustup target add $target"
+        return
+    fi
+    CARGO_ENCODED_RUSTFLAGS=-Ctarget-feature=+simd128 CARGO_TARGET_WASM32_WASIP1_RUNNER="node --no-warnings $PWD/tests/wasi.mjs" \
+        cargo test --quiet -p splatstream-format --lib --target $target machine
+}
+
 sizes() {
     at_most 'the module' 920000 decoder/splatstream.wasm
     gzip -9c decoder/splatstream.wasm | at_most 'the module, compressed' 320000
@@ -58,6 +69,7 @@ if ! command -v node >/dev/null; then
     echo "skipped: the packages, for which Node is not there"
     exit
 fi
+vectors
 node --test tests/node.test.mjs
 sizes
 node tests/speed.mjs "$WEB_TESTS/scene/demo.gss"

@@ -8,7 +8,8 @@ use crate::steps::Exponents;
 use crate::vector::{Task, vectorized};
 use core::ops::RangeInclusive;
 use rayon::prelude::*;
-use splatstream_format::entropy::machine::Machine;
+use splatstream_format::entropy::machine::{Machine, WIDE};
+use splatstream_format::entropy::reader::{signed, vector};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::{Error, ErrorKind, Result};
 
@@ -198,21 +199,25 @@ struct Tiles<'t, 'o, F> {
 
 impl<F: Fn(i32, i32, i32) -> i32> Task for Tiles<'_, '_, F> {
     #[inline(always)]
-    fn run(self, _: impl Machine) {
+    fn run(self, machine: impl Machine) {
         let Self { weights, means, components, out, join } = self;
         let mut start = 0_usize;
         for tile in components.tiles() {
             for ((plane, &mean), weights) in out.iter_mut().zip(means).zip(weights) {
-                let sums = tile_sums(weights, tile);
+                let sums = tile_sums(machine, weights, tile);
                 let slots = plane.get_mut(start..).unwrap_or_default();
                 match slots.first_chunk_mut::<TILE>() {
                     Some(slots) => {
-                        for (slot, sum) in slots.iter_mut().zip(sums) {
-                            *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
+                        let (slots, _) = slots.as_chunks_mut::<WIDE>();
+                        for (slots, sums) in slots.iter_mut().zip(sums) {
+                            for (slot, sum) in slots.iter_mut().zip(signed(machine, sums)) {
+                                *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
+                            }
                         }
                     }
                     None => {
-                        for (slot, sum) in slots.iter_mut().zip(sums) {
+                        let sums = sums.map(|sums| signed(machine, sums));
+                        for (slot, &sum) in slots.iter_mut().zip(sums.as_flattened()) {
                             *slot = join(*slot, mean, sum.wrapping_add(32) >> 6);
                         }
                     }
@@ -226,19 +231,14 @@ impl<F: Fn(i32, i32, i32) -> i32> Task for Tiles<'_, '_, F> {
 /// The sums of the products of weights and components. With |weights| at most 4096 and at most 45 components they stay
 /// below 2^31.
 #[inline(always)]
-fn tile_sums(weights: &[i32], tile: &[Pair]) -> [i32; TILE] {
-    let mut sums = [0_i32; TILE];
+fn tile_sums<M: Machine>(machine: M, weights: &[i32], tile: &[Pair]) -> [M::V; TILE / WIDE] {
+    let mut sums = [machine.splat(0); TILE / WIDE];
     for (&weights, components) in weights.iter().zip(tile) {
-        for (sum, &pair) in sums.iter_mut().zip(components) {
-            let low = low(pair).wrapping_mul(low(weights));
-            *sum = sum.wrapping_add(low.wrapping_add((pair >> 16).wrapping_mul(weights >> 16)));
+        let weights = machine.splat(weights.cast_unsigned());
+        let (components, _) = components.as_chunks();
+        for (sum, components) in sums.iter_mut().zip(components) {
+            *sum = machine.add(*sum, machine.dot(vector(machine, components), weights));
         }
     }
     sums
-}
-
-/// The low half of a pair.
-#[inline(always)]
-fn low(pair: i32) -> i32 {
-    pair.wrapping_shl(16) >> 16
 }

@@ -163,16 +163,18 @@ impl Pack<'_> {
     fn pack(self, join: impl Fn(i32, i32) -> i32) {
         let Self { coded, bias, steps, slots, of_tile, greatest } = self;
         let tiles = slots.chunks_mut(of_tile.max(1)).filter_map(<[Pair]>::first_mut);
+        let (same, each): (_, &[i32]) = match steps {
+            Steps::Same(step) => ([*step; TILE], &[]),
+            Steps::Each(steps) => ([0; TILE], steps),
+        };
         let mut magnitudes = [0_u32; TILE];
         let mut start = 0_usize;
         for slots in tiles {
-            let values: [i32; TILE] = tile(coded, start);
-            let steps: [i32; TILE] = match steps {
-                Steps::Same(step) => [*step; TILE],
-                Steps::Each(steps) => tile(steps, start),
-            };
+            let (mut last_values, mut last_steps) = ([0; TILE], same);
+            let values = tile(coded, start, &mut last_values);
+            let steps = tile(each, start, &mut last_steps);
             let places = slots.iter_mut().zip(&mut magnitudes);
-            for ((slot, magnitude), (value, step)) in places.zip(values.into_iter().zip(steps)) {
+            for ((slot, magnitude), (&value, &step)) in places.zip(values.iter().zip(steps)) {
                 let value = value.wrapping_add(bias).wrapping_mul(step);
                 *magnitude = value.unsigned_abs().max(*magnitude);
                 *slot = join(*slot, value);
@@ -183,19 +185,20 @@ impl Pack<'_> {
     }
 }
 
-/// The values of a tile; the last one again where there are none.
+/// The values of a tile where they are, or if there are fewer in `copy`: the last one again where there are none, and what
+/// `copy` holds without any.
 #[inline(always)]
-fn tile(plane: &[i32], start: usize) -> [i32; TILE] {
+fn tile<'p>(plane: &'p [i32], start: usize, copy: &'p mut [i32; TILE]) -> &'p [i32; TILE] {
     let rest = plane.get(start..).unwrap_or_default();
     match rest.first_chunk() {
-        Some(values) => *values,
-        None => last(rest),
+        Some(values) => values,
+        None => last(rest, copy),
     }
 }
 
 #[cold]
-fn last(rest: &[i32]) -> [i32; TILE] {
-    let mut values = [rest.last().copied().unwrap_or(0); TILE];
-    values.iter_mut().zip(rest).for_each(|(slot, &value)| *slot = value);
-    values
+fn last<'p>(rest: &[i32], copy: &'p mut [i32; TILE]) -> &'p [i32; TILE] {
+    rest.last().into_iter().for_each(|&value| copy.fill(value));
+    copy.iter_mut().zip(rest).for_each(|(slot, &value)| *slot = value);
+    copy
 }

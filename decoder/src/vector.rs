@@ -2,7 +2,7 @@
 
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use pulp::{Simd, WithSimd};
-use splatstream_format::entropy::machine::{Machine, Portable};
+use splatstream_format::entropy::machine::Machine;
 
 /// A loop. What it calls is compiled for each kind of machine as far as it is inlined.
 pub(crate) trait Task {
@@ -36,5 +36,8 @@ pub(crate) fn vectorized(task: impl Task) {
             return Simd::vectorize(v3, OnMachine(task, Avx2(v3)));
         }
     }
-    task.run(Portable);
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+    task.run(splatstream_format::entropy::machine::Simd128);
+    #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable"))))]
+    task.run(splatstream_format::entropy::machine::Portable);
 }

@@ -149,6 +149,24 @@ impl AxisLookup {
         values: &[M::V; COUNT],
         contexts: &mut [M::V; COUNT],
     ) {
+        let (pairs, last) = values.as_chunks::<2>();
+        let (of_pairs, of_last) = contexts.as_chunks_mut::<2>();
+        for (values, contexts) in pairs.iter().zip(of_pairs) {
+            self.add_some(machine, values, contexts);
+        }
+        for (value, context) in last.iter().zip(of_last) {
+            self.add_some(machine, core::array::from_ref(value), core::array::from_mut(context));
+        }
+    }
+
+    /// [`AxisLookup::add`] of so many vectors that all of it is in registers.
+    #[inline(always)]
+    fn add_some<M: Machine, const COUNT: usize>(
+        &self,
+        machine: M,
+        values: &[M::V; COUNT],
+        contexts: &mut [M::V; COUNT],
+    ) {
         let mut counts = [machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0)); COUNT];
         for &threshold in &self.thresholds {
             let threshold = machine.splat(threshold.cast_unsigned());

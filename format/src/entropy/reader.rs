@@ -404,37 +404,35 @@ impl<'a> BlockReader<'a> {
         active: usize,
     ) -> [[S::Stored; WIDE]; GROUPS] {
         let machine = plane.machine;
-        let mut symbols = [([0_u32; WIDE], [0_u32; WIDE]); GROUPS];
-        for ((symbols, states), contexts) in symbols.iter_mut().zip(&self.states).zip(contexts) {
-            let slots = machine.store(machine.and(machine.load(*states), machine.splat(0xFFF)));
-            *symbols = plane.find(slots, machine.store(contexts));
-        }
+        let mut symbols = [[0_u32; WIDE]; GROUPS];
+        let mut values = [[S::Stored::default(); WIDE]; GROUPS];
         let mut lane_of_group = machine.load([0, 1, 2, 3, 4, 5, 6, 7]);
         let active_lanes = machine.splat(u32::try_from(active).unwrap_or(0));
         let mut is_split = machine.splat(0);
         let last_direct = machine.splat(plane.decoder.direct.wrapping_sub(1));
-        for (states, (tokens, intervals)) in self.states.iter_mut().zip(&symbols) {
+        let parts = symbols.iter_mut().zip(&mut values).zip(&mut self.states).zip(contexts);
+        for (((symbols, values), states), contexts) in parts {
             let state = machine.load(*states);
-            let interval = machine.load(*intervals);
+            let slots = machine.and(state, machine.splat(0xFFF));
+            let (tokens, intervals) = plane.find(machine.store(slots), machine.store(contexts));
+            *symbols = tokens;
+            let interval = machine.load(intervals);
             let first = machine.and(interval, machine.splat(0xFFFF));
-            let rest = machine.sub(machine.and(state, machine.splat(0xFFF)), first);
+            let rest = machine.sub(slots, first);
             let product = machine
                 .mul(machine.shr::<16>(interval), machine.shr::<{ FREQUENCY_BITS.cast_signed() }>(state));
             let mask = machine.greater(active_lanes, lane_of_group);
             let (next, taken) = machine.advance(state, machine.add(product, rest), mask, &self.words.ahead());
             *states = machine.store(next);
             self.words.next = self.words.next.wrapping_add(taken);
-            let split = machine.greater(machine.load(*tokens), last_direct);
+            let tokens = machine.load(tokens);
+            let split = machine.greater(tokens, last_direct);
             is_split = machine.or(is_split, machine.and(split, mask));
             lane_of_group = machine.add(lane_of_group, machine.splat(8));
-        }
-        let mut values = [[S::Stored::default(); WIDE]; GROUPS];
-        for (values, (tokens, _)) in values.iter_mut().zip(&symbols) {
-            *values = S::of_tokens(machine, machine.load(*tokens));
+            *values = S::of_tokens(machine, tokens);
         }
         if machine.any(is_split) {
-            let tokens = symbols.iter().flat_map(|(tokens, _)| tokens);
-            let split = values.as_flattened_mut().iter_mut().zip(tokens).take(active);
+            let split = values.as_flattened_mut().iter_mut().zip(symbols.as_flattened()).take(active);
             for (value, &token) in split.filter(|&(_, &token)| token >= plane.decoder.direct) {
                 let (least, raw_bits) = plane.decoder.value(token);
                 *value = S::of_value(least.wrapping_add(self.raw.bits(raw_bits)));

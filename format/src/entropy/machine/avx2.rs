@@ -1,0 +1,152 @@
+//! The machine of x86 processors with AVX2.
+
+use super::{Machine, WIDE};
+use core::arch::x86_64::{__m128i, __m256i};
+use pulp::cast;
+use pulp::core_arch::x86::Avx2 as Instructions;
+use pulp::x86::V3;
+
+/// A machine with AVX2.
+#[derive(Debug, Clone, Copy)]
+pub struct Avx2(pub V3);
+
+/// For each set of lanes, as bits, how many lanes of the set come before each lane.
+static BEFORE: [[u8; WIDE]; 256] = before();
+
+#[expect(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "evaluated when compiled")]
+const fn before() -> [[u8; WIDE]; 256] {
+    let mut table = [[0; WIDE]; 256];
+    let mut set = 0;
+    while set < table.len() {
+        let (mut lane, mut count) = (0, 0);
+        while lane < WIDE {
+            table[set][lane] = count;
+            if set >> lane & 1 == 1 {
+                count += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+}
+
+/// The columns of four rows, in each half of 128 bits by itself.
+#[inline(always)]
+fn transpose_four(avx2: Instructions, [a, b, c, d]: [__m256i; 4]) -> [__m256i; 4] {
+    let (low_ab, high_ab) = (avx2._mm256_unpacklo_epi32(a, b), avx2._mm256_unpackhi_epi32(a, b));
+    let (low_cd, high_cd) = (avx2._mm256_unpacklo_epi32(c, d), avx2._mm256_unpackhi_epi32(c, d));
+    [
+        avx2._mm256_unpacklo_epi64(low_ab, low_cd),
+        avx2._mm256_unpackhi_epi64(low_ab, low_cd),
+        avx2._mm256_unpacklo_epi64(high_ab, high_cd),
+        avx2._mm256_unpackhi_epi64(high_ab, high_cd),
+    ]
+}
+
+impl Machine for Avx2 {
+    type V = __m256i;
+
+    #[inline(always)]
+    fn load(self, values: [u32; WIDE]) -> __m256i {
+        cast(values)
+    }
+
+    #[inline(always)]
+    fn store(self, vector: __m256i) -> [u32; WIDE] {
+        cast(vector)
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_add_epi32(a, b)
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_sub_epi32(a, b)
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_mullo_epi32(a, b)
+    }
+
+    #[inline(always)]
+    fn dot(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_madd_epi16(a, b)
+    }
+
+    #[inline(always)]
+    fn and(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_and_si256(a, b)
+    }
+
+    #[inline(always)]
+    fn or(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_or_si256(a, b)
+    }
+
+    #[inline(always)]
+    fn xor(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_xor_si256(a, b)
+    }
+
+    #[inline(always)]
+    fn shr<const BITS: i32>(self, a: __m256i) -> __m256i {
+        self.0.avx2._mm256_srli_epi32::<BITS>(a)
+    }
+
+    #[inline(always)]
+    fn greater(self, a: __m256i, b: __m256i) -> __m256i {
+        self.0.avx2._mm256_cmpgt_epi32(a, b)
+    }
+
+    #[inline(always)]
+    fn magnitude(self, a: __m256i) -> __m256i {
+        self.0.avx2._mm256_abs_epi32(a)
+    }
+
+    #[inline(always)]
+    fn any(self, a: __m256i) -> bool {
+        self.0.avx._mm256_testz_si256(a, a) == 0
+    }
+
+    #[inline(always)]
+    fn transpose(self, rows: [__m256i; WIDE]) -> [__m256i; WIDE] {
+        let avx2 = self.0.avx2;
+        let [a, b, c, d, e, f, g, h] = rows;
+        // Pairs of rows, then of pairs, then of fours: in each half of 128 bits the columns of four rows.
+        let four = (transpose_four(avx2, [a, b, c, d]), transpose_four(avx2, [e, f, g, h]));
+        let ([a, b, c, d], [e, f, g, h]) = four;
+        [
+            avx2._mm256_permute2x128_si256::<0x20>(a, e),
+            avx2._mm256_permute2x128_si256::<0x20>(b, f),
+            avx2._mm256_permute2x128_si256::<0x20>(c, g),
+            avx2._mm256_permute2x128_si256::<0x20>(d, h),
+            avx2._mm256_permute2x128_si256::<0x31>(a, e),
+            avx2._mm256_permute2x128_si256::<0x31>(b, f),
+            avx2._mm256_permute2x128_si256::<0x31>(c, g),
+            avx2._mm256_permute2x128_si256::<0x31>(d, h),
+        ]
+    }
+
+    #[inline(always)]
+    fn advance(self, states: __m256i, next: __m256i, mask: __m256i, words: &[u16; WIDE]) -> (__m256i, usize) {
+        let (avx, avx2) = (self.0.avx, self.0.avx2);
+        let high = avx2._mm256_srli_epi32::<16>(next);
+        let low = avx2._mm256_cmpeq_epi32(high, avx._mm256_setzero_si256());
+        let takes = avx2._mm256_and_si256(low, mask);
+        let [set, ..] = avx._mm256_movemask_ps(avx._mm256_castsi256_ps(takes)).to_le_bytes();
+        let before = BEFORE.get(usize::from(set)).copied().unwrap_or_default();
+        let places: __m128i = cast([u64::from_le_bytes(before), 0]);
+        let own = avx2._mm256_permutevar8x32_epi32(
+            avx2._mm256_cvtepu16_epi32(cast(*words)),
+            avx2._mm256_cvtepu8_epi32(places),
+        );
+        let filled = avx2._mm256_or_si256(avx2._mm256_slli_epi32::<16>(next), own);
+        let next = avx2._mm256_blendv_epi8(next, filled, takes);
+        let states = avx2._mm256_blendv_epi8(states, next, mask);
+        (states, usize::try_from(set.count_ones()).unwrap_or(0))
+    }
+}

@@ -1,0 +1,168 @@
+//! The machine of WebAssembly with vectors of 128 bits, of which two make one of eight lanes.
+
+use super::{Machine, WIDE};
+use core::arch::wasm32::{
+    i32x4_abs, i32x4_add, i32x4_bitmask, i32x4_dot_i16x8, i32x4_eq, i32x4_gt, i32x4_mul, i32x4_shuffle,
+    i32x4_sub, i64x2_shuffle, u8x16_add_sat, u8x16_splat, u8x16_swizzle, u32x4_shl, u32x4_shr, u32x4_splat,
+    v128, v128_and, v128_any_true, v128_bitselect, v128_or, v128_xor,
+};
+use pulp::cast;
+
+/// A machine with vectors of 128 bits.
+#[derive(Debug, Clone, Copy)]
+pub struct Simd128;
+
+/// For each set of four lanes, as bits, the bytes of the word that each lane takes of a vector of words: as many words come
+/// before it as lanes of the set. 255 is no byte.
+static OWN_WORD: [[u8; 16]; 16] = own_word();
+
+#[expect(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "evaluated when compiled")]
+const fn own_word() -> [[u8; 16]; 16] {
+    let mut table = [[u8::MAX; 16]; 16];
+    let mut set = 0;
+    while set < table.len() {
+        let (mut lane, mut count) = (0, 0);
+        while lane < 4 {
+            table[set][4 * lane] = 2 * count;
+            table[set][4 * lane + 1] = 2 * count + 1;
+            if set >> lane & 1 == 1 {
+                count += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+}
+
+/// What a function makes of both halves.
+#[inline(always)]
+fn halves(a: [v128; 2], b: [v128; 2], make: impl Fn(v128, v128) -> v128) -> [v128; 2] {
+    let ([a, c], [b, d]) = (a, b);
+    [make(a, b), make(c, d)]
+}
+
+/// The columns of four rows.
+#[inline(always)]
+fn transpose_four([a, b, c, d]: [v128; 4]) -> [v128; 4] {
+    let (low_ab, high_ab) = (i32x4_shuffle::<0, 4, 1, 5>(a, b), i32x4_shuffle::<2, 6, 3, 7>(a, b));
+    let (low_cd, high_cd) = (i32x4_shuffle::<0, 4, 1, 5>(c, d), i32x4_shuffle::<2, 6, 3, 7>(c, d));
+    [
+        i64x2_shuffle::<0, 2>(low_ab, low_cd),
+        i64x2_shuffle::<1, 3>(low_ab, low_cd),
+        i64x2_shuffle::<0, 2>(high_ab, high_cd),
+        i64x2_shuffle::<1, 3>(high_ab, high_cd),
+    ]
+}
+
+/// Gives four lanes with a mask their next state, with words after the first `skipped`; also how many were taken.
+#[inline(always)]
+fn advance_four(state: v128, next: v128, mask: v128, words: v128, skipped: u8) -> (v128, u8) {
+    let low = i32x4_eq(u32x4_shr(next, 16), u32x4_splat(0));
+    let takes = v128_and(low, mask);
+    let set = i32x4_bitmask(takes);
+    let own = OWN_WORD.get(usize::from(set & 15)).copied().unwrap_or_default();
+    let places = u8x16_add_sat(cast(own), u8x16_splat(skipped.wrapping_mul(2)));
+    let filled = v128_or(u32x4_shl(next, 16), u8x16_swizzle(words, places));
+    let next = v128_bitselect(filled, next, takes);
+    let taken = u8::try_from(set.count_ones()).unwrap_or(0);
+    (v128_bitselect(next, state, mask), taken)
+}
+
+impl Machine for Simd128 {
+    type V = [v128; 2];
+
+    #[inline(always)]
+    fn load(self, values: [u32; WIDE]) -> [v128; 2] {
+        cast(values)
+    }
+
+    #[inline(always)]
+    fn store(self, vector: [v128; 2]) -> [u32; WIDE] {
+        cast(vector)
+    }
+
+    #[inline(always)]
+    fn splat(self, value: u32) -> [v128; 2] {
+        [u32x4_splat(value); 2]
+    }
+
+    #[inline(always)]
+    fn add(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| i32x4_add(a, b))
+    }
+
+    #[inline(always)]
+    fn sub(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| i32x4_sub(a, b))
+    }
+
+    #[inline(always)]
+    fn mul(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| i32x4_mul(a, b))
+    }
+
+    #[inline(always)]
+    fn dot(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| i32x4_dot_i16x8(a, b))
+    }
+
+    #[inline(always)]
+    fn and(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| v128_and(a, b))
+    }
+
+    #[inline(always)]
+    fn or(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| v128_or(a, b))
+    }
+
+    #[inline(always)]
+    fn xor(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| v128_xor(a, b))
+    }
+
+    #[inline(always)]
+    fn shr<const BITS: i32>(self, a: [v128; 2]) -> [v128; 2] {
+        a.map(|half| u32x4_shr(half, BITS.cast_unsigned()))
+    }
+
+    #[inline(always)]
+    fn greater(self, a: [v128; 2], b: [v128; 2]) -> [v128; 2] {
+        halves(a, b, |a, b| i32x4_gt(a, b))
+    }
+
+    #[inline(always)]
+    fn magnitude(self, a: [v128; 2]) -> [v128; 2] {
+        a.map(|half| i32x4_abs(half))
+    }
+
+    #[inline(always)]
+    fn any(self, [low, high]: [v128; 2]) -> bool {
+        v128_any_true(v128_or(low, high))
+    }
+
+    #[inline(always)]
+    fn transpose(self, rows: [[v128; 2]; WIDE]) -> [[v128; 2]; WIDE] {
+        let [[a, i], [b, j], [c, k], [d, l], [e, m], [f, n], [g, o], [h, p]] = rows;
+        // The quarters: columns of the upper four rows and of the lower four, each of the left and the right half.
+        let ([a, b, c, d], [e, f, g, h]) = (transpose_four([a, b, c, d]), transpose_four([e, f, g, h]));
+        let ([i, j, k, l], [m, n, o, p]) = (transpose_four([i, j, k, l]), transpose_four([m, n, o, p]));
+        [[a, e], [b, f], [c, g], [d, h], [i, m], [j, n], [k, o], [l, p]]
+    }
+
+    #[inline(always)]
+    fn advance(
+        self,
+        states: [v128; 2],
+        next: [v128; 2],
+        mask: [v128; 2],
+        words: &[u16; WIDE],
+    ) -> ([v128; 2], usize) {
+        let words = cast(*words);
+        let ([state, high_state], [next, high_next], [mask, high_mask]) = (states, next, mask);
+        let (low, first) = advance_four(state, next, mask, words, 0);
+        let (high, second) = advance_four(high_state, high_next, high_mask, words, first);
+        ([low, high], usize::from(first.wrapping_add(second)))
+    }
+}
