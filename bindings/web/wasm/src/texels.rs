@@ -22,8 +22,15 @@ pub const ROW: usize = 512;
 const TEXEL: usize = 4;
 /// Words of a Gaussian without spherical harmonics.
 const WORDS: usize = 2 * TEXEL;
+/// Gaussians that are written at a time: loops over so many become vectors.
+const BLOCK: usize = 16;
 /// The constant basis function of the spherical harmonics, 1 / (2 √π).
 const SH_C0: f32 = 0.282_094_8;
+
+/// Values of a block.
+type Floats = [f32; BLOCK];
+/// Words of a block.
+type Codes = [u32; BLOCK];
 
 /// The texels of all slots.
 #[derive(Default)]
@@ -32,6 +39,7 @@ pub struct Texels {
     pub base: Texture,
     /// Spherical harmonics; empty at degree 0.
     pub sh: Texture,
+    opacities: Vec<Opacities>,
 }
 
 /// A texture and what has changed in it.
@@ -52,19 +60,28 @@ impl Texture {
         self.words.resize(gaussians * stride, 0);
     }
 
-    /// Writes a Gaussian; whether that changes it.
-    fn write(&mut self, slot: usize, words: &[u32]) -> bool {
-        let at = slot * self.stride;
-        let Some(place) = self.words.get_mut(at..at + words.len()) else { return false };
-        let is_new = *place != *words;
-        place.copy_from_slice(words);
-        is_new
+    /// The texels of a block, Gaussian by Gaussian.
+    fn block(&mut self, block: usize) -> &mut [u32] {
+        let words = BLOCK * self.stride;
+        self.words.get_mut(block * words..(block + 1) * words).unwrap_or_default()
     }
 
-    /// Adds a row, at or after the last one, to those that have changed.
-    fn mark(&mut self, row: u32) {
+    /// Writes word `number` of each Gaussian of a block; the bits that change.
+    fn write(texels: &mut [u32], stride: usize, number: usize, codes: &Codes) -> u32 {
+        let mut changed = 0;
+        for (word, &code) in texels.iter_mut().skip(number).step_by(stride).zip(codes) {
+            changed |= *word ^ code;
+            *word = code;
+        }
+        changed
+    }
+
+    /// Adds the row of a block, at or after the last one, to those that have changed.
+    fn mark(&mut self, block: usize) {
+        let row = (block * BLOCK / ROW) as u32;
         match self.dirty.last_mut() {
-            Some(end) if *end >= row => *end = row + 1,
+            Some(end) if *end > row => {}
+            Some(end) if *end == row => *end = row + 1,
             _ => self.dirty.extend([row, row + 1]),
         }
     }
@@ -84,94 +101,148 @@ impl Texels {
         planes.div_ceil(2).next_multiple_of(TEXEL)
     }
 
-    /// Writes the slots of some ranges, increasing. With `is_new`, the number of slots or of planes has changed, and
-    /// everything counts as changed.
+    /// Writes the slots of some ranges, increasing. With `is_new`, the number of slots, a multiple of [`ROW`], or of planes
+    /// has changed, and everything counts as changed.
     pub fn write(&mut self, planes: &Planes, ranges: &[Range<usize>], is_new: bool) {
         if is_new {
             let slots = planes.opacity_logit.len();
             self.base.resize(slots, WORDS);
             self.sh.resize(slots, Self::sh_words(planes.sh.len()));
+            self.opacities.clear();
+            self.opacities.resize_with(slots / BLOCK, Opacities::default);
         }
         self.base.dirty.clear();
         self.sh.dirty.clear();
-        let stride = self.sh.stride;
-        let mut harmonics = [0; 24];
-        for slot in ranges.iter().cloned().flatten() {
-            let row = (slot / ROW) as u32;
-            if self.base.write(slot, &base(planes, slot)) {
-                self.base.mark(row);
+        let mut next = 0;
+        for range in ranges {
+            let end = range.end.div_ceil(BLOCK);
+            for block in next.max(range.start / BLOCK)..end {
+                self.write_block(planes, block);
             }
-            if let Some(words) = harmonics.get_mut(..stride).filter(|words| !words.is_empty()) {
-                pack_sh(planes, slot, words);
-                if self.sh.write(slot, words) {
-                    self.sh.mark(row);
-                }
-            }
+            next = next.max(end);
         }
         if is_new {
             self.base.mark_all();
             self.sh.mark_all();
         }
     }
-}
 
-/// The words of a slot.
-fn base(planes: &Planes, slot: usize) -> [u32; WORDS] {
-    let of = |plane: &Vec<f32>| plane.get(slot).copied().unwrap_or_default();
-    let [x, y, z] = planes.position.each_ref().map(|plane| of(plane).to_bits());
-    let [a, b, c] = planes.log_scale.each_ref().map(|plane| fixed((of(plane) + 32.0) * 1024.0, 65535.0));
-    let opacity = fixed(65535.0 / (1.0 + (-of(&planes.opacity_logit)).exp()), 65535.0);
-    let (pair, last) = rotation(planes.rotation.each_ref().map(of));
-    let [red, green, blue] = planes.dc.each_ref().map(|plane| half(0.5 + SH_C0 * of(plane)));
-    [x, y, z, a | b << 16, c | opacity << 16, pair, last | red << 16, green | blue << 16]
-}
-
-fn pack_sh(planes: &Planes, slot: usize, words: &mut [u32]) {
-    words.fill(0);
-    for (number, plane) in planes.sh.iter().enumerate() {
-        let value = half(plane.get(slot).copied().unwrap_or_default());
-        if let Some(word) = words.get_mut(number / 2) {
-            *word |= value << (16 * (number % 2));
+    fn write_block(&mut self, planes: &Planes, block: usize) {
+        let Some(opacities) = self.opacities.get_mut(block) else { return };
+        let codes = base(planes, block, opacities);
+        let texels = self.base.block(block);
+        let changed = codes
+            .iter()
+            .enumerate()
+            .map(|(number, codes)| Texture::write(texels, WORDS, number, codes))
+            .fold(0, core::ops::BitOr::bitor);
+        if changed != 0 {
+            self.base.mark(block);
+        }
+        let stride = self.sh.stride;
+        let texels = self.sh.block(block);
+        let mut changed = 0;
+        for (number, pair) in planes.sh.chunks(2).enumerate() {
+            let [low, high] = [0, 1].map(|of| pair.get(of).map_or([0.0; BLOCK], |plane| *part(plane, block)));
+            changed |= Texture::write(texels, stride, number, &joined(&low.map(half), &high.map(half)));
+        }
+        if changed != 0 {
+            self.sh.mark(block);
         }
     }
 }
 
-/// A unit quaternion w, x, y, z as words 5 and 6 have it, without red.
-fn rotation(quaternion: [f32; 4]) -> (u32, u32) {
-    let mut largest = 0;
-    for (place, part) in quaternion.iter().enumerate() {
-        if part.abs() > quaternion.get(largest).map_or(0.0, |most: &f32| most.abs()) {
-            largest = place;
+/// The opacities of a block before the sigmoid, and their codes: opacities seldom change, and exponentials take long.
+#[derive(Default)]
+struct Opacities {
+    logits: Floats,
+    codes: Codes,
+    is_known: bool,
+}
+
+impl Opacities {
+    fn codes(&mut self, logits: &Floats) -> &Codes {
+        if !self.is_known || self.logits != *logits {
+            self.logits = *logits;
+            self.codes = logits.map(|logit| fixed(65535.0 / (1.0 + (-logit).exp()), 65535.0));
+            self.is_known = true;
         }
+        &self.codes
     }
-    let sign = if quaternion.get(largest).is_some_and(|most| *most < 0.0) { -1.0 } else { 1.0 };
-    let mut others = quaternion.iter().enumerate().filter(|(place, _)| *place != largest);
-    let mut code = |most: f32| {
-        let part = others.next().map_or(0.0, |(_, part)| sign * part);
-        fixed((part * core::f32::consts::FRAC_1_SQRT_2 + 0.5) * most, most)
-    };
-    let (a, b, c) = (code(32767.0), code(32767.0), code(65535.0));
-    (a | b << 15 | (largest as u32) << 30, c)
+}
+
+/// The values of a block; 0 if the plane has fewer.
+fn part(plane: &[f32], block: usize) -> &Floats {
+    plane.as_chunks().0.get(block).unwrap_or(&[0.0; BLOCK])
+}
+
+/// Words with these low and high halves.
+fn joined(low: &Codes, high: &Codes) -> Codes {
+    let mut words = *low;
+    words.iter_mut().zip(high).for_each(|(word, &high)| *word |= high << 16);
+    words
+}
+
+/// The words of a block.
+fn base(planes: &Planes, block: usize, opacities: &mut Opacities) -> [Codes; WORDS] {
+    let [x, y, z] = planes.position.each_ref().map(|plane| part(plane, block).map(f32::to_bits));
+    let log_scale =
+        |plane: &Vec<f32>| part(plane, block).map(|value| fixed((value + 32.0) * 1024.0, 65535.0));
+    let [a, b, c] = planes.log_scale.each_ref().map(log_scale);
+    let opacity = opacities.codes(part(&planes.opacity_logit, block));
+    let (pair, last) = rotations(planes.rotation.each_ref().map(|plane| part(plane, block)));
+    let colour = |plane: &Vec<f32>| part(plane, block).map(|value| half(0.5 + SH_C0 * value));
+    let [red, green, blue] = planes.dc.each_ref().map(colour);
+    [x, y, z, joined(&a, &b), joined(&c, opacity), pair, joined(&last, &red), joined(&green, &blue)]
+}
+
+/// Words 5 and 6 of a block, without red, of unit quaternions w, x, y, z.
+fn rotations([w, x, y, z]: [&Floats; 4]) -> (Codes, Codes) {
+    let (mut pairs, mut lasts) = ([0; BLOCK], [0; BLOCK]);
+    let quaternions = w.iter().zip(x).zip(y.iter().zip(z));
+    for ((pair, last), ((&w, &x), (&y, &z))) in pairs.iter_mut().zip(&mut lasts).zip(quaternions) {
+        (*pair, *last) = rotation([w, x, y, z]);
+    }
+    (pairs, lasts)
+}
+
+/// Words 5 and 6 of a unit quaternion, without red. Choices of values, not branches, so that loops become vectors.
+#[inline(always)]
+fn rotation([w, x, y, z]: [f32; 4]) -> (u32, u32) {
+    let (mut largest, mut value) = (0, w);
+    for (place, part) in [(1, x), (2, y), (3, z)] {
+        let is_larger = part.abs() > value.abs();
+        largest = if is_larger { place } else { largest };
+        value = if is_larger { part } else { value };
+    }
+    let sign = if value < 0.0 { -1.0 } else { 1.0 };
+    let others = [
+        if largest == 0 { x } else { w },
+        if largest <= 1 { y } else { x },
+        if largest <= 2 { z } else { y },
+    ];
+    let [a, b, c] = others.map(|part| sign * part * core::f32::consts::FRAC_1_SQRT_2 + 0.5);
+    let (a, b, c) = (fixed(a * 32767.0, 32767.0), fixed(b * 32767.0, 32767.0), fixed(c * 65535.0, 65535.0));
+    (a | b << 15 | largest << 30, c)
 }
 
 /// The nearest code from 0 to `most`; 0 of what is no number.
+#[inline(always)]
 fn fixed(value: f32, most: f32) -> u32 {
     (value.clamp(0.0, most) + 0.5) as u32
 }
 
-/// The nearest binary16, in the low half; the largest one of what is beyond it.
+/// The nearest binary16, in the low half; the largest one of what is beyond it. Choices of values, not branches.
+#[inline(always)]
 fn half(value: f32) -> u32 {
     let bits = value.to_bits();
-    let sign = bits >> 16 & 0x8000;
     let magnitude = f32::from_bits(bits & 0x7fff_ffff);
-    if magnitude >= 65504.0 || magnitude.is_nan() {
-        return sign | 0x7bff;
-    }
     // Below 2^-14 the codes are equidistant.
-    if magnitude < 6.103_515_6e-5 {
-        return sign | (magnitude * 16_777_216.0 + 0.5) as u32;
-    }
-    sign | (magnitude.to_bits() - (112 << 23) + 0x1000) >> 13
+    let small = (magnitude * 16_777_216.0 + 0.5) as u32;
+    let normal = magnitude.to_bits().wrapping_sub(112 << 23).wrapping_add(0x1000) >> 13;
+    let code = if magnitude < 6.103_515_6e-5 { small } else { normal };
+    let code = if magnitude < 65504.0 { code } else { 0x7bff };
+    bits >> 16 & 0x8000 | code
 }
 
 #[cfg(test)]
