@@ -2,6 +2,7 @@
 
 mod choices;
 mod each;
+mod output;
 mod pictures;
 pub(crate) mod warnings;
 
@@ -11,7 +12,7 @@ use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::input_args::InputArgs;
 use crate::numbers::{hex_digest, parse_frame_rate};
-use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
+use crate::output_file::refuse_inputs;
 use crate::progress::Progress;
 use crate::setting_names::{
     AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
@@ -19,6 +20,7 @@ use crate::setting_names::{
 use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
+use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
@@ -43,12 +45,14 @@ use warnings::{Warning, unlike_frames, warnings};
 #[command(after_help = "Examples:\n  splatstream encode frames/ -o talk.gss --fps 30\n  \
     splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small\n  \
     splatstream encode garden.ply -o garden.gss --target-mb 8\n  \
+    splatstream encode frames/ -o talk.html\n  \
     splatstream encode garden.ply plant.spz talk/ --each -o streams/")]
 pub(crate) struct Encode {
     /// Files, or one directory of frames; - is one .ply, .spz or .sog file on standard input.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// The stream to write; - is standard output.
+    /// The stream to write; - is standard output. A name that ends in .html is a web page that plays it, with the stream
+    /// inside.
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
     /// Every input is a scene of its own: encode each to a stream of its name in the directory OUT.
@@ -244,7 +248,10 @@ impl NetworkName {
 #[derive(Serialize)]
 struct Encoded {
     output: PathBuf,
+    /// Of the stream.
     bytes: u64,
+    /// Of the page that holds it; none if a stream was written.
+    page_bytes: Option<u64>,
     frames: u32,
     gaussians: u64,
     bpg: f64,
@@ -267,7 +274,7 @@ impl Encode {
         }
         console.claim(Some(&self.out))?;
         refuse_inputs(&self.out, &self.inputs)?;
-        check_stream_name(&self.out)?;
+        check_name(&self.out)?;
         let encoded = self.one(console, &self.inputs, &self.out)?;
         console.report_beside(Some(&self.out), &encoded, || encoded.text())
     }
@@ -279,14 +286,15 @@ impl Encode {
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
         let (settings, guess) = self.settings(&mut source)?;
-        let mut file = OutputFile::create(out, &read)?;
+        let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
         let report = encode(&mut source, &settings, &mut file, &mut |done, _| progress.at(done))
             .map_err(|error| failed(&source, out, &error))?;
         drop(progress);
-        file.finish()?;
+        let page_bytes = file.finish()?;
         let mut encoded = Encoded::new(out, &report, &settings, &source, start.elapsed().as_secs_f64());
+        encoded.page_bytes = page_bytes;
         encoded.chosen.extend(guess.map(choices::up));
         if inputs.len() > 1 {
             encoded.warnings.extend(unlike_frames(source.counts()));
@@ -439,6 +447,7 @@ impl Encoded {
         Self {
             output: out.to_path_buf(),
             bytes: report.bytes,
+            page_bytes: None,
             frames: report.frames,
             gaussians: report.gaussians,
             bpg: bits_per_gaussian(report.bytes, report.gaussians),
@@ -454,8 +463,10 @@ impl Encoded {
 
     fn text(&self) -> String {
         let chosen: String = self.chosen.iter().map(Choice::text).collect();
+        let page =
+            self.page_bytes.map(|bytes| format!(", in a page of {}", grouped(bytes))).unwrap_or_default();
         format!(
-            "{}\n  frames             {}\n  Gaussians          {}\n  bytes              {}\n  \
+            "{}\n  frames             {}\n  Gaussians          {}\n  bytes              {}{page}\n  \
              bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}chosen\n{chosen}",
             self.output.display(),
             grouped(self.frames.into()),

@@ -107,7 +107,7 @@ fn directory_of(page: &str, stream: &StreamFile) -> io::Result<tempfile::TempDir
 }
 
 /// The name of a file without its extension.
-fn name_of(path: &Path) -> String {
+pub(crate) fn name_of(path: &Path) -> String {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     stem.filter(|stem| stem != "-").unwrap_or_else(|| "SplatStream".to_owned())
 }

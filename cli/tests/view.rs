@@ -5,6 +5,7 @@ mod common;
 
 use common::{directory, fail, fixture, json, succeed, text};
 use std::fs;
+use std::path::PathBuf;
 
 #[test]
 fn a_page_holds_the_stream_and_asks_nobody_for_anything() {
@@ -70,4 +71,18 @@ fn a_page_is_served_with_its_stream_until_a_signal_comes() {
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["url"], format!("http://{address}/"));
     assert!(report["output"].is_null());
+}
+
+#[test]
+fn frames_become_a_page_in_one_command() {
+    let directory = directory();
+    let scene = common::write_still(directory.path());
+    let [stream, page] = ["a.gss", "a.html"].map(|name| directory.path().join(name));
+    let encode = |out: &PathBuf| json(&["encode", text(&scene), "-o", text(out), "--title", "A & b"]);
+    let [of_stream, of_page] = [&stream, &page].map(encode);
+    assert!(of_stream["page_bytes"].is_null());
+    assert_eq!(of_page["page_bytes"], fs::metadata(&page).unwrap().len());
+    assert_eq!(of_page["bytes"], fs::metadata(&stream).unwrap().len());
+    // The page is what `view` makes of the stream.
+    assert_eq!(fs::read_to_string(&page).unwrap(), succeed(&["view", text(&stream), "-o", "-"]));
 }
