@@ -146,8 +146,8 @@ impl<R: Rule> Session<R> {
         }
     }
 
-    /// Moves the playhead to the present.
-    fn advance(&mut self, now_us: u64) {
+    /// Moves the playhead to the present, without asking for a decision.
+    pub fn advance(&mut self, now_us: u64) {
         while let Some(end_us) = self.state.gop_end_us().filter(|&end_us| end_us <= now_us) {
             self.state.now_us = end_us.max(self.state.now_us);
             self.state.current = self.state.current.saturating_add(1);
