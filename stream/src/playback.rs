@@ -43,6 +43,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod driven;
 mod fault;
 mod parts;
 mod report;
@@ -52,9 +53,10 @@ mod store;
 use crate::control::number::size;
 use crate::control::{Decision, Fetch, Gop, Ladder, OperatingPoint, Rule, Session, Settings, State};
 use crate::manifest::{GopInfo, Manifest};
+use driven::Viewer;
 use parts::{Kind, Part, parts, requests};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
+use std::{fmt, mem};
 use store::Store;
 
 pub use fault::Fault;
@@ -155,8 +157,9 @@ pub struct Player<R> {
     renewal: Renewal,
     /// Per GOP, Representation and piece: requests that were of no use, and those among them that brought damaged bytes.
     faults: BTreeMap<(usize, usize, u8), (u32, u32)>,
-    /// Representations whose files the server refuses.
+    /// Representations whose files the server refuses, and how often in a row it did so.
     refused: BTreeSet<usize>,
+    refusals: BTreeMap<usize, u32>,
     /// The next GOP to show.
     presented: usize,
     /// Units of the GOP that was shown last.
@@ -168,6 +171,8 @@ pub struct Player<R> {
     streak: u32,
     /// The fetch that was decided last.
     fetch: Option<Fetch>,
+    /// Set where the caller has the playhead.
+    viewer: Option<Viewer>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -198,6 +203,7 @@ impl<R: Rule> Player<R> {
             renewal: Renewal::None,
             faults: BTreeMap::new(),
             refused: BTreeSet::new(),
+            refusals: BTreeMap::new(),
             presented: 0,
             units: Vec::new(),
             logs,
@@ -205,6 +211,7 @@ impl<R: Rule> Player<R> {
             decisions: 0,
             streak: 0,
             fetch: None,
+            viewer: None,
         })
     }
 
@@ -245,6 +252,9 @@ impl<R: Rule> Player<R> {
 
     /// What to do now.
     pub fn decide(&mut self, now_us: u64) -> Command {
+        if self.viewer.as_mut().is_some_and(|viewer| mem::take(&mut viewer.abandons)) {
+            return Command::Abandon;
+        }
         match self.renewal {
             Renewal::Wanted => {
                 self.renewal = Renewal::Asked;
@@ -345,13 +355,14 @@ impl<R: Rule> Player<R> {
             if size(running.buffer.len()) < part.range.size {
                 break;
             }
-            let whole = std::mem::take(&mut running.buffer);
+            let whole = mem::take(&mut running.buffer);
             if !part.range.holds(&whole) {
                 return self.failed(now_us, &Fault::Digest);
             }
             if self.store.insert(part, whole).is_err() {
                 return self.failed(now_us, &Fault::Wrong("the file was packaged wrongly"));
             }
+            self.refusals.remove(&part.representation);
             if matches!(part.kind, Kind::Level { .. }) {
                 running.before = running.before.saturating_add(part.range.size);
             }
@@ -362,6 +373,7 @@ impl<R: Rule> Player<R> {
             self.running = None;
         }
         self.session.received(now_us, counted);
+        self.trim();
     }
 
     /// The running fetch has failed: its requests end here. What has failed too often is left out.
@@ -384,13 +396,16 @@ impl<R: Rule> Player<R> {
         if *fault == Fault::Digest {
             *damaged = damaged.saturating_add(1);
         }
+        let refusals = self.refusals.entry(part.representation).or_default();
+        *refusals = if fault.is_final() { refusals.saturating_add(1) } else { 0 };
         let is_base = part.representation == 0 && part.piece == 0;
+        let is_gone = !is_base && *refusals >= self.options.attempts;
         let most = match (is_base, self.refused.contains(&part.representation) && fault.is_final()) {
             (_, true) => 1,
             (true, false) => self.options.base_attempts,
             (false, false) => self.options.attempts,
         };
-        *all >= most || *damaged >= DAMAGED
+        *all >= most || *damaged >= DAMAGED || is_gone
     }
 
     fn leave_out(&mut self, now_us: u64, part: &Part, fault: &Fault) {
@@ -436,14 +451,10 @@ impl<R: Rule> Player<R> {
 
     /// The next GOP that has begun and was not taken yet. To be asked until there is none.
     pub fn show(&mut self) -> Option<PlayedGop<'_>> {
-        let number = self.presented;
-        self.store.drop_before(number);
-        if number >= self.session.state().first_open() {
-            return None;
-        }
-        self.presented = number.saturating_add(1);
+        let number = if self.viewer.is_some() { self.driven_gop()? } else { self.next_gop()? };
         let state = self.session.state();
         let shown = state.shown().iter().rev().find(|shown| shown.gop == number).copied();
+        let shown = shown.filter(|_| !state.is_lost(number));
         let buffer_us = state
             .media_until(state.first_missing())
             .saturating_sub(state.media_until(number.saturating_add(1)));
@@ -459,6 +470,17 @@ impl<R: Rule> Player<R> {
         self.count(number, |log| (log.shown, log.buffer_us) = (shown, buffer_us));
         let log = self.logs.get(number)?;
         Some(PlayedGop { number, point, head: self.store.head(), units: &self.units, log })
+    }
+
+    /// The next GOP that has begun by the clock. Those before it go away.
+    fn next_gop(&mut self) -> Option<usize> {
+        let number = self.presented;
+        self.store.drop_before(number);
+        if number >= self.session.state().first_open() {
+            return None;
+        }
+        self.presented = number.saturating_add(1);
+        Some(number)
     }
 
     /// Names Representations whose bytes are what was packaged, and malformed nevertheless.
