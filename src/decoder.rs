@@ -130,6 +130,14 @@ impl Decoder {
         self
     }
 
+    /// The same from the GOP on whose header stands at an offset, as an index or a package gives it. What stands before it is
+    /// not looked at, but for the units up to the first sequence parameters. To be called before anything has been decoded.
+    #[must_use]
+    pub fn starting_at(mut self, gop: u64) -> Self {
+        self.stream.go_to(gop);
+        self
+    }
+
     /// Changes the operating point: from the next GOP on, and where it is lower on some axis, from the next frame on.
     pub fn set_operating_point(&mut self, point: OperatingPoint) {
         self.point = point;

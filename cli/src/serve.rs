@@ -10,7 +10,9 @@ use clap::{Args, ValueEnum};
 use network_args::NetworkArgs;
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;
+use splatstream_stream::package::Package;
 use splatstream_stream::server::{Entry, Server, ServerError, Settings, Statistics, Tls};
+use splatstream_web::page_of_package;
 use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -20,7 +22,7 @@ use tempfile::TempDir;
 /// Serve the files of a directory over HTTP/1.1 and HTTP/2, until it is interrupted.
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  splatstream serve talk/ --port 8080\n  splatstream serve --built-in\n\n\
+    after_help = "Examples:\n  splatstream serve talk/ --port 8080\n  splatstream serve talk/ --player\n  splatstream serve --built-in --player\n\n\
     Single ranges, conditions and pages of other origins are answered. Nothing outside the directory is served, nothing\n\
     hidden, and no listing. Any web server that answers ranges serves a package as well.\n\
     The first line on standard error is the address; Ctrl-C lets answers in progress end, a second one does not."
@@ -32,6 +34,9 @@ pub(crate) struct Serve {
     /// Serve a package of the built-in moving scene, which is made first and removed at the end.
     #[arg(long, conflicts_with = "directory")]
     built_in: bool,
+    /// Answer / with a page that plays the package of the directory, as the network allows.
+    #[arg(long)]
+    player: bool,
     /// The address to listen on; 0.0.0.0 lets other machines in.
     #[arg(long, value_name = "IP", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     bind: IpAddr,
@@ -118,7 +123,22 @@ impl Serve {
         settings.limits.shutdown = Duration::from_secs(self.grace.into());
         settings.network = self.network.network()?;
         settings.threads = Some(rayon::current_num_threads());
+        settings.page = self.player.then(|| self.page_of(directory)).transpose()?;
         Ok(settings)
+    }
+
+    /// A page that plays the package of the directory.
+    fn page_of(&self, directory: &Path) -> Result<String, Failure> {
+        if !directory.join(Package::MANIFEST).is_file() {
+            let (directory, name) = (directory.display(), Package::MANIFEST);
+            let message =
+                format!("{directory}: there is no {name}\n  make a package with splatstream package");
+            return Err(Failure::other(message));
+        }
+        let path = directory.canonicalize().ok();
+        let name = path.as_deref().and_then(Path::file_name).filter(|_| !self.built_in);
+        let title = name.map_or_else(|| "SplatStream".to_owned(), |name| name.to_string_lossy().into_owned());
+        Ok(page_of_package(&title, Package::MANIFEST))
     }
 }
 

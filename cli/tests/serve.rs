@@ -38,6 +38,22 @@ fn get(address: &str, target: &str) -> Vec<u8> {
 }
 
 #[test]
+fn the_player_of_a_package_is_at_its_address() {
+    let directory = directory();
+    let out = directory.path().join("talk");
+    succeed(&["package", text(&fixture()), "-o", text(&out)]);
+    let (mut child, _stderr, address) = start(&[text(&out), "--player"]);
+    let page = String::from_utf8_lossy(&get(&address, "/")).into_owned();
+    assert!(page.starts_with("HTTP/1.1 200") && page.contains("content-type: text/html"), "{:.200}", page);
+    assert!(page.contains("<title>talk</title>") && page.contains("data-url=\"manifest.json\""));
+    assert!(get(&address, "/manifest.json").starts_with(b"HTTP/1.1 206"));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let refused = fail(1, &["serve", text(directory.path()), "--port", "0", "--player"]);
+    assert!(refused.contains("there is no manifest.json"), "{refused}");
+}
+
+#[test]
 fn a_package_is_served_until_a_signal_comes() {
     let directory = directory();
     let out = directory.path().join("talk");

@@ -17,20 +17,20 @@
 
 mod clock;
 mod download;
-mod parts;
 mod player;
 mod report;
 mod source;
-mod store;
 
 use crate::control::Settings;
 use crate::manifest::{Manifest, ManifestError};
 use crate::package::Package;
+use crate::playback::PlaybackError;
 use source::Source;
 use std::fmt;
 use std::time::Duration;
 
-pub use report::{GopLog, Loss, Outcome, PlayedGop, Screen};
+pub use crate::playback::{GopLog, Loss, PlayedGop};
+pub use report::{Outcome, Screen};
 
 /// How a client plays, and what it takes from a server.
 #[derive(Clone, Debug)]
@@ -95,16 +95,22 @@ impl fmt::Display for ClientError {
         match self {
             Self::Unreachable(place, why) => write!(f, "{place}: {why}"),
             Self::Manifest(error) => write!(f, "the manifest is refused: {error}"),
-            Self::Changed(None) => write!(f, "the package was replaced by another one while it was played"),
-            Self::Changed(Some(gop)) => {
-                write!(f, "the package changed while it was played, from GOP {gop} on")
-            }
-            Self::TooLarge(bytes) => write!(f, "a GOP of {bytes} bytes is too large to be buffered"),
+            Self::Changed(gop) => PlaybackError::Changed(*gop).fmt(f),
+            Self::TooLarge(bytes) => PlaybackError::TooLarge(*bytes).fmt(f),
         }
     }
 }
 
 impl std::error::Error for ClientError {}
+
+impl From<PlaybackError> for ClientError {
+    fn from(error: PlaybackError) -> Self {
+        match error {
+            PlaybackError::Changed(gop) => Self::Changed(gop),
+            PlaybackError::TooLarge(bytes) => Self::TooLarge(bytes),
+        }
+    }
+}
 
 impl From<ManifestError> for ClientError {
     fn from(error: ManifestError) -> Self {

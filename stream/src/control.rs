@@ -21,6 +21,7 @@
 //! ```
 
 mod baselines;
+mod driven;
 pub(crate) mod ladder;
 mod layered;
 pub(crate) mod number;

@@ -19,6 +19,7 @@ pub mod live;
 pub mod manifest;
 pub mod mpd;
 pub mod package;
+pub mod playback;
 pub mod qoe;
 mod representation;
 pub mod segments;

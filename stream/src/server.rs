@@ -66,6 +66,8 @@ pub struct Settings {
     pub network: Network,
     /// Threads that serve; none is one per processor.
     pub threads: Option<usize>,
+    /// A page in HTML that `/` is answered with, in place of the folder's `index.html`. The network does not hold it up.
+    pub page: Option<String>,
 }
 
 impl Settings {
@@ -79,6 +81,7 @@ impl Settings {
             limits: Limits::default(),
             network: Network::default(),
             threads: None,
+            page: None,
         }
     }
 }
@@ -193,6 +196,7 @@ pub struct Server {
 /// What all connections have in common.
 struct Shared {
     folder: Folder,
+    page: Option<String>,
     tls: Option<TlsAcceptor>,
     limits: Limits,
     network: Network,
@@ -221,6 +225,7 @@ impl Server {
         }
         let shared = Arc::new(Shared {
             folder,
+            page: settings.page.clone(),
             tls: settings.tls.as_ref().map(Tls::acceptor).transpose()?,
             limits: settings.limits.clone(),
             network: settings.network.clone(),

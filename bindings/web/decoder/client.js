@@ -5,7 +5,7 @@ const workerBeside = () => new Worker(new URL('./worker.js', import.meta.url), {
 
 /**
  * Decodes and sorts in a worker. Events, whose `detail` index.d.ts describes: `description`, `frame`, `order`, `received`,
- * `waiting` (for bytes), `end`, `error`.
+ * `waiting` (for bytes), `end`, `error`; of packages also `package` and `better`.
  */
 export class DecoderWorker extends EventTarget {
   #worker;
@@ -13,7 +13,7 @@ export class DecoderWorker extends EventTarget {
   #nextSort = null;
 
   /**
-   * Starts to decode a source: `{ url }`, `{ bytes }`, or `{}` where chunks are pushed. `module` is the WebAssembly module
+   * Starts to decode a source: `{ url }`, `{ package: url }`, `{ bytes }`, or `{}` where chunks are pushed. `module` is the WebAssembly module
    * or its bytes, by default the file beside the worker; `startWorker` makes the worker in pages that have no file of it.
    */
   constructor(source, { point = {}, module = null, startWorker = workerBeside } = {}) {
@@ -52,6 +52,11 @@ export class DecoderWorker extends EventTarget {
   /** Changes the operating point; frames that are asked for after this have it. */
   setPoint(point) {
     this.#worker.postMessage({ type: 'point', point });
+  }
+
+  /** Says how fast a package is played, 1 being its own speed; 0 while it stands still, in which time what is shown gets better. */
+  run(speed) {
+    this.#worker.postMessage({ type: 'run', speed });
   }
 
   /** Ends the worker. */

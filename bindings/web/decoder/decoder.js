@@ -1,7 +1,7 @@
 // The decoder in the thread that calls it: bytes in, frames as texels out. `worker.js` runs it beside a page; programs of
 // Node use it as it is.
 
-const VERSION = 1;
+const VERSION = 2;
 const DONE = 0, NEED_BYTES = 1, END = 2, INCOMPLETE = 3;
 /** Bytes that are handed to the decoder at a time. */
 const PIECE = 1 << 20;
@@ -15,9 +15,9 @@ const SIMD_PROBE = new Uint8Array([0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 
 /** Whether this engine has the instructions that the faster module uses. */
 export const hasSimd = () => WebAssembly.validate(SIMD_PROBE);
 
-/** The module for this engine, from the files beside this one. */
-export async function loadModule() {
-  const url = new URL(hasSimd() ? './splatstream.wasm' : './splatstream-plain.wasm', import.meta.url);
+/** The module for this engine, from the files beside this one: for streams, or for packages too. */
+export async function loadModule({ packages = false } = {}) {
+  const url = new URL(`./splatstream${packages ? '-packages' : ''}${hasSimd() ? '' : '-plain'}.wasm`, import.meta.url);
   if (url.protocol === 'file:') {
     const { readFile } = await import('node:fs/promises');
     return WebAssembly.compile(await readFile(url));
@@ -69,11 +69,11 @@ export class Decoder {
     if (status === NEED_BYTES) return null;
     if (status === END || status === INCOMPLETE) return { isEnd: true, warnings };
     if (status !== DONE) throw new Error(this.#text());
-    const [index, time, gaussians, carried, refinements, isKeyframe, spatial, temporal, refinement, hasDigest, high, low, bytes] =
+    const [index, time, gaussians, carried, refinements, isKeyframe, spatial, temporal, refinement, hasDigest, high, low, bytes, until] =
       this.#numbers();
     const digest = hasDigest ? hex(high) + hex(low) : null;
     const point = { spatial, temporal, refinement };
-    return { isEnd: false, index, time, gaussians, carried, refinements, isKeyframe: isKeyframe === 1, point, digest, bytes, warnings };
+    return { isEnd: false, index, time, gaussians, carried, refinements, isKeyframe: isKeyframe === 1, point, digest, bytes, until, warnings };
   }
 
   /** Puts the frame that was decoded last into the textures: see Update in index.d.ts. */
@@ -124,6 +124,92 @@ export class Decoder {
     const background = hasBackground ? [red, green, blue] : null;
     const upAxis = ['unknown', '+x', '-x', '+y', '-y', '+z', '-z'][up];
     return { title, frames, frameSeconds, highest: { spatial, temporal, refinement }, upAxis, background, cameras };
+  }
+
+  /** Whether the module plays packages. */
+  get hasPackages() {
+    return 'gss_package_open' in this.#exports;
+  }
+
+  /** Opens the package with a manifest. All that follows here is for packages: `Fetcher` calls it. */
+  openPackage(manifest, now) {
+    if (!this.hasPackages) throw new Error('this page plays streams, not packages');
+    this.#write(manifest);
+    this.#check(this.#exports.gss_package_open(1000 * now));
+  }
+
+  /** Takes the manifest as it is now; throws if it is that of another package. */
+  renewPackage(manifest) {
+    this.#write(manifest);
+    this.#check(this.#exports.gss_package_renew());
+  }
+
+  /** Says what time it is, in milliseconds. */
+  clock(now) {
+    this.#exports.gss_package_clock(1000 * now);
+  }
+
+  /** What to do now: wait, fetch, abandon, or read the manifest again. */
+  decide() {
+    const type = ['wait', 'fetch', 'abandon', 'manifest'][this.#exports.gss_package_decide()];
+    const numbers = this.#numbers();
+    if (type === 'wait') return { type, until: numbers[0] / 1000 };
+    const names = this.#text().split('\n').filter(Boolean);
+    return { type, requests: names.map((file, at) => ({ file, offset: numbers[2 * at], size: numbers[2 * at + 1] })) };
+  }
+
+  /** A request is sent. */
+  sent() {
+    this.#exports.gss_package_sent();
+  }
+
+  /** Its response begins. */
+  begun() {
+    this.#exports.gss_package_begun();
+  }
+
+  /** Bytes of the response have come; whether they are what was packaged. */
+  received(bytes) {
+    this.#write(bytes);
+    return this.#exports.gss_package_received() === 1;
+  }
+
+  /** The requests have failed: see Fault of `fetcher.js`. */
+  failed({ kind, value = 0, message = '' }) {
+    this.#write(new TextEncoder().encode(message));
+    this.#exports.gss_package_failed(kind, value);
+  }
+
+  /** Whether what was requested is still wanted. */
+  get isFetching() {
+    return this.#exports.gss_package_is_fetching() === 1;
+  }
+
+  /** Whether the frame that was given last can be had better. */
+  get isBetter() {
+    return this.#exports.gss_package_is_better() === 1;
+  }
+
+  /** Playback moves at a speed, or stands still at 0. */
+  run(speed) {
+    this.#exports.gss_package_run(Math.round(1000 * speed));
+  }
+
+  /** What is known of playback: see PackageState in index.d.ts. */
+  packageState() {
+    this.#exports.gss_package_report();
+    const [isWaiting, gop, buffer, throughput, latency, stalls, stalled, bytes, requests, failures, abandoned, ...rest] = this.#numbers();
+    const [spatial, temporal, refinement, quality, rate, buffered] = rest;
+    const point = spatial < 0 ? null : { spatial, temporal: temporal < 0 ? null : temporal, refinement };
+    const counts = { stalls, stalled, bytes, requests, failures, abandoned };
+    return { isWaiting: isWaiting === 1, gop, buffer, buffered, throughput, latency, point, quality, rate, ...counts };
+  }
+
+  /** Hands bytes to the next call. */
+  #write(bytes) {
+    const room = this.#exports.gss_package_room(bytes.length);
+    if (room === 0) throw new Error('there is no memory');
+    new Uint8Array(this.#exports.memory.buffer, room, bytes.length).set(bytes);
   }
 
   #check(status) {

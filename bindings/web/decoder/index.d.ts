@@ -25,6 +25,8 @@ export interface Frame {
   digest: string | null;
   /** Bytes of the units that were decoded; from the worker, of all frames since the one given before. */
   bytes: number;
+  /** The frame stands until the one with this index: `index + 1`, of packages that of the next frame at the operating point. */
+  until: number;
   /** What was lost since the frame before, in English. */
   warnings: string[];
 }
@@ -99,8 +101,8 @@ export const ROW: number;
 /** Whether this engine has the instructions that the faster module uses. */
 export function hasSimd(): boolean;
 
-/** The module for this engine, from the files of the package. */
-export function loadModule(): Promise<WebAssembly.Module>;
+/** The module for this engine, from the files of the package: for streams, or for packages too. */
+export function loadModule(options?: { packages?: boolean }): Promise<WebAssembly.Module>;
 
 /** Decodes one stream in the thread that calls. */
 export class Decoder {
@@ -127,8 +129,40 @@ export class Decoder {
   describe(): Description | null;
 }
 
-/** A stream: at an address, in memory, or pushed in pieces. */
-export type Source = { url: string } | { bytes: Uint8Array } | Record<string, never>;
+/**
+ * A stream: at an address, in memory, or pushed in pieces. Or a package for DASH: at the address of its `manifest.json`, of its
+ * folder, or of its MPD. `url` takes both: a folder ends with a slash, an MPD with `.mpd`, and anything else is a package if it
+ * is JSON. `package` needs no slash.
+ */
+export type Source = { url: string } | { package: string } | { bytes: Uint8Array } | Record<string, never>;
+
+/** What is known of the playback of a package. */
+export interface PackageState {
+  /** The playhead waits for bytes. */
+  isWaiting: boolean;
+  /** The GOP that the playhead is in. */
+  gop: number;
+  /** Seconds that are buffered. */
+  buffer: number;
+  /** Display index up to which frames are buffered. */
+  buffered: number;
+  /** Bits a second that the network carried in the last seconds, 0 if that is not known; seconds to the first byte. */
+  throughput: number;
+  latency: number;
+  /** What is shown of the GOP that began last: without a temporal layer one picture stands for all of it. */
+  point: { spatial: number; temporal: number | null; refinement: number } | null;
+  /** Its quality as the manifest says it, dB, and its bits a second. */
+  quality: number;
+  rate: number;
+  /** Times that playback stood still between two GOPs, and seconds of these. */
+  stalls: number;
+  stalled: number;
+  bytes: number;
+  requests: number;
+  failures: number;
+  /** Fetches that were given up for others. */
+  abandoned: number;
+}
 
 /** From where a scene is seen; `ahead` is a unit vector. */
 export interface View {
@@ -137,6 +171,7 @@ export interface View {
 }
 
 export interface WorkerOptions {
+  /** Without any axis: everything, and of a package what the network allows. */
   point?: OperatingPoint;
   /** The module or its bytes; by default the file of the package. */
   module?: WebAssembly.Module | Uint8Array | null;
@@ -160,6 +195,10 @@ export interface WorkerEvents {
   received: { bytes: number; total: number | null };
   /** More bytes have to come before the frame that was asked for. */
   waiting: Record<string, never>;
+  /** Several times a second, of a package. */
+  package: { state: PackageState };
+  /** The frame that stands still can be had better: ask for it again. */
+  better: { index: number };
   end: { wanted: number; warnings: string[] };
   error: { message: string };
 }
@@ -175,8 +214,10 @@ export class DecoderWorker extends EventTarget {
   show(index: number, view: View): void;
   /** Sorts the frame that was given last for another view. */
   sort(view: View): void;
-  /** Changes the operating point; frames that are asked for after this have it. */
+  /** Changes the operating point; frames that are asked for after this have it. `{}` leaves that of a package to the network. */
   setPoint(point: OperatingPoint): void;
+  /** Says how fast a package is played, 1 being its own speed; 0 while it stands still, in which time what is shown gets better. */
+  run(speed: number): void;
   /** Ends the worker. */
   close(): void;
 }

@@ -5,7 +5,7 @@ import { framing } from './framing.js';
 import { icon } from './icons.js';
 import { listenToKeys } from './keys.js';
 import { Losses } from './losses.js';
-import { figures, pointPanel, trackFigures } from './panel.js';
+import { figures, pointPanel, pointText, trackFigures } from './panel.js';
 import { Playback } from './playback.js';
 import { Splitter } from './splitter.js';
 import { Stage } from './stage.js';
@@ -47,6 +47,7 @@ export class SplatPlayer extends HTMLElement {
   #isReady = false;
   #drawn = null;
   #background = null;
+  #pointShown = null;
 
   constructor() {
     super();
@@ -87,13 +88,14 @@ export class SplatPlayer extends HTMLElement {
     return this.#playback?.isPlaying ?? false;
   }
 
-  /** The operating point; axes that are left out are at their highest. */
+  /** The operating point; axes that are left out are at their highest. Null if a package is played at what the network allows. */
   get operatingPoint() {
-    return this.#tracks[0]?.point ?? {};
+    const [track] = this.#tracks;
+    return track?.isAutomatic ? null : track?.point ?? {};
   }
 
   set operatingPoint(point) {
-    this.#tracks[0]?.setPoint(point, this.#playback.index);
+    this.#tracks[0]?.setPoint(point ?? {}, this.#playback.index);
     if (this.#openPanel === 'quality') this.#fillSide();
   }
 
@@ -111,10 +113,11 @@ export class SplatPlayer extends HTMLElement {
 
   /** Figures of decoding and of drawing. */
   get statistics() {
-    return { ...this.#tracks[0]?.statistics, interval: this.#interval, ...this.#received };
+    const [track] = this.#tracks;
+    return { ...track?.statistics, interval: this.#interval, ...this.#received, package: track?.package ?? null };
   }
 
-  /** Opens a source: { url }, { bytes }, or {} if chunks are pushed. */
+  /** Opens a source: { url } of a stream or a package, { package: url }, { bytes }, or {} if chunks are pushed. */
   open(source) {
     this.#close();
     this.#source = source;
@@ -224,7 +227,7 @@ export class SplatPlayer extends HTMLElement {
   /** After the GPU has lost everything. */
   #restore() {
     this.#stage.renderer.prepare();
-    if (this.#source?.url || this.#source?.bytes) this.open(this.#source);
+    if (Object.keys(this.#source ?? {}).length > 0) this.open(this.#source);
   }
 
   #find(id) {
@@ -238,6 +241,8 @@ export class SplatPlayer extends HTMLElement {
     const on = (type, handler) => track.addEventListener(type, handler);
     on('shown', ({ detail }) => this.#shown(track, detail));
     for (const type of ['arrived', 'sorted', 'ended']) on(type, () => this.#stage.invalidate());
+    on('package', ({ detail }) => this.#showPackage(track, detail));
+    on('better', () => this.#playback.improve(track));
     on('warnings', ({ detail }) => this.#lost(detail));
     on('failed', ({ detail }) => this.#fail(detail.message));
     return track;
@@ -263,7 +268,8 @@ export class SplatPlayer extends HTMLElement {
     this.#playback.frames = description.frames;
     this.#playback.frameSeconds = description.frameSeconds || 1 / 30;
     this.#retheme();
-    this.#tracks[0].point = { ...description.highest, ...this.#tracks[0].point };
+    const [track] = this.#tracks;
+    track.point = { ...description.highest, ...(track.isAutomatic ? track.frame?.point : track.point) };
     this.#find('compare').hidden = Object.values(description.highest).every((value) => value === 0);
     this.#find('quality').hidden = this.#find('compare').hidden;
   }
@@ -296,6 +302,7 @@ export class SplatPlayer extends HTMLElement {
     for (const id of ['timeline', 'play', 'time', 'speed', 'loop']) this.#find(id).hidden = !isMoving;
     const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
     if (isMoving && !calm && this.getAttribute('autoplay') !== 'no') this.play();
+    else this.#playback.pace();
     this.#showPlay();
     this.#emit('ready', this.#description);
   }
@@ -304,6 +311,19 @@ export class SplatPlayer extends HTMLElement {
     this.#received = { bytes, total };
     const share = total ? bytes / total : 0;
     this.#find('place').style.setProperty('--there', `${100 * share}%`);
+  }
+
+  /** What a package reports: how far it is buffered, whether it waits, and the operating point. */
+  #showPackage(track, state) {
+    if (track !== this.#tracks[0]) return;
+    this.#received = { bytes: state.bytes, total: null };
+    const { frames } = this.#playback;
+    if (frames > 0) this.#find('place').style.setProperty('--there', `${(100 * state.buffered) / frames}%`);
+    if (this.#isReady) this.#say('', state.isWaiting);
+    const point = state.point && pointText(state.point);
+    if (this.#openPanel === 'quality' && track.isAutomatic && point !== this.#pointShown) this.#fillSide();
+    this.#pointShown = point;
+    this.#emit('package', state);
   }
 
   #ended(track) {
@@ -411,10 +431,13 @@ export class SplatPlayer extends HTMLElement {
   }
 
   #pointPanel(track, title) {
-    return pointPanel(title, this.#description, track.point, (point) => {
+    const onchange = (point) => {
       track.setPoint(point, this.#playback.index);
       this.splitter.name(this.#tracks);
-    });
+      if (track.isAutomatic) this.#fillSide();
+    };
+    const point = { ...this.#description.highest, ...track.point };
+    return pointPanel(title, this.#description, point, onchange, track.package ? track.isAutomatic : null);
   }
 
   #infoPanel(track, title) {

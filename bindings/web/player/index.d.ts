@@ -1,4 +1,4 @@
-import type { Description, Frame, OperatingPoint, Order, Source, Update, Vector, View } from '@splatstream/decoder';
+import type { Description, Frame, OperatingPoint, Order, PackageState, Source, Update, Vector, View } from '@splatstream/decoder';
 
 /** A camera of a picture. */
 export interface Camera {
@@ -17,7 +17,7 @@ export interface FixedCamera {
 }
 
 /** The element <splat-player>. README.md has its attributes; events are CustomEvents: `ready` (Description), `frame`
- * (Frame), `lost` ({ warnings, index }), `failed` ({ message }). */
+ * (Frame), `lost` ({ warnings, index }), `failed` ({ message }), of packages `package` (PackageState). */
 export class SplatPlayer extends HTMLElement {
   /** The decoder's module or its bytes, for pages without its file. */
   module: WebAssembly.Module | Uint8Array | null;
@@ -27,7 +27,8 @@ export class SplatPlayer extends HTMLElement {
   readonly description: Description | null;
   readonly losses: string[];
   readonly isPlaying: boolean;
-  operatingPoint: OperatingPoint;
+  /** Null: what the network allows, of a package. */
+  operatingPoint: OperatingPoint | null;
   /** A camera in place of the viewer's; null gives it back. */
   set camera(camera: FixedCamera | null);
   /** Red, green and blue, 0 to 1; null: that of the stream, or else of the page. */
@@ -48,6 +49,8 @@ export class SplatPlayer extends HTMLElement {
     interval: number | null;
     bytes: number;
     total: number | null;
+    /** Of a package; null of a stream. */
+    package: PackageState | null;
   };
   open(source: Source): void;
   push(bytes: Uint8Array, total?: number | null): void;

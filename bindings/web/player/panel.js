@@ -25,8 +25,11 @@ function stepText(axis, value, { highest, frameSeconds }) {
   return `${value + 1} of ${highest[axis] + 1}`;
 }
 
-/** Sliders for an operating point. `onchange` is given the new one. Axes of one step are left out; null if all are. */
-export function pointPanel(title, description, point, onchange) {
+/**
+ * Sliders for an operating point. `onchange` is given the new one. Axes of one step are left out; null if all are. Of a package
+ * `isAutomatic` says whether the network decides, and `onchange` is given an empty point if it shall.
+ */
+export function pointPanel(title, description, point, onchange, isAutomatic = null) {
   const axes = AXES.filter(([axis]) => description.highest[axis] > 0);
   if (axes.length === 0) return null;
   const panel = document.createElement('section');
@@ -35,9 +38,30 @@ export function pointPanel(title, description, point, onchange) {
   const heading = document.createElement('h2');
   heading.textContent = title;
   panel.append(heading);
+  const key = isAutomatic === null ? null : automaticKey(isAutomatic, () => onchange({}));
+  if (key) panel.append(key);
   const chosen = { ...point };
-  for (const [axis, name] of axes) panel.append(axisSlider(axis, name, description, chosen, onchange));
+  const onmove = (moved) => {
+    if (key) markAutomatic(key, false);
+    onchange(moved);
+  };
+  for (const [axis, name] of axes) panel.append(axisSlider(axis, name, description, chosen, onmove));
   return panel;
+}
+
+/** A key that leaves the operating point to the network. */
+function automaticKey(isAutomatic, onpress) {
+  const key = document.createElement('button');
+  key.className = 'automatic';
+  key.id = 'automatic';
+  markAutomatic(key, isAutomatic);
+  key.addEventListener('click', onpress);
+  return key;
+}
+
+function markAutomatic(key, isAutomatic) {
+  key.textContent = isAutomatic ? 'Automatic: what the network allows' : 'Choose automatically';
+  key.setAttribute('aria-pressed', String(isAutomatic));
 }
 
 function axisSlider(axis, name, description, chosen, onchange) {
@@ -75,11 +99,30 @@ export function figures(rows) {
   return list;
 }
 
+/** An operating point as text. Without a temporal layer one picture stands for a GOP. */
+export const pointText = ({ spatial, temporal, refinement }) => `s${spatial},${temporal === null ? 'i' : `t${temporal}`},r${refinement}`;
+
+/** The figures of a package. */
+function packageFigures({ package: state, isAutomatic }) {
+  const { point, quality, rate, throughput, buffer, stalls, stalled, requests, failures, abandoned } = state;
+  const shown = point ? `${pointText(point)}${isAutomatic ? ', automatic' : ''}` : '–';
+  return [
+    ['Operating point', shown],
+    ['Quality', point ? `${number(quality, 1)} dB` : '–'],
+    ['Bit rate of the GOP', point ? rateText(rate / 8) : '–'],
+    ['Network', throughput > 0 ? rateText(throughput / 8) : '–'],
+    ['Buffered', `${number(buffer, 1)} s`],
+    ['Stalls', stalls > 0 ? `${number(stalls)}, ${number(stalled, 1)} s` : '0'],
+    ['Requests', `${number(requests)}${failures ? `, ${number(failures)} failed` : ''}${abandoned ? `, ${number(abandoned)} given up` : ''}`],
+  ];
+}
+
 /** The figures of a track, and of drawing. */
 export function trackFigures(track, { interval, pixels, received, total }) {
   const { frame, statistics: times } = track;
   const milliseconds = (value) => `${number(value, 1)} ms`;
   return [
+    ...(track.package ? packageFigures(track) : []),
     ['Gaussians decoded', frame ? number(frame.gaussians) : '–'],
     ['Gaussians drawn', number(track.scene.count)],
     ['Carried over', frame ? number(frame.carried) : '–'],

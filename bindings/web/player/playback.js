@@ -5,15 +5,18 @@ const MOST_SKIPPED = 6;
 /** The clock waits for frames that are later than this, seconds. */
 const LATEST = 0.25;
 
+/** A frame that stands for others is followed by the next one so many frames before that is due. */
+const AHEAD = 2;
+
 /** Plays tracks by one clock. Times are seconds of the stream; with a loop they go on counting in the next round. */
 export class Playback {
   isPlaying = false;
   isLooping = true;
-  speed = 1;
   /** Seconds of a frame, and frames in the stream; 0 as long as that is not known. */
   frameSeconds = 1 / 30;
   frames = 0;
   #tracks;
+  #speed = 1;
   /** Where the clock stands, and when it was looked at last, milliseconds. */
   #time = 0;
   #last = null;
@@ -44,15 +47,36 @@ export class Playback {
     return Math.floor(this.time / this.frameSeconds + 1e-6);
   }
 
+  get speed() {
+    return this.#speed;
+  }
+
+  set speed(speed) {
+    this.#speed = speed;
+    this.pace();
+  }
+
+  /** Says how fast packages are played. */
+  pace() {
+    for (const track of this.#tracks) track.run(this.isPlaying ? this.#speed : 0);
+  }
+
   play() {
     if (this.frames === 1) return;
     if (!this.isLooping && this.frames > 0 && this.index >= this.frames - 1) this.seek(0);
     this.isPlaying = true;
     this.#last = null;
+    this.pace();
   }
 
   pause() {
     this.isPlaying = false;
+    this.pace();
+  }
+
+  /** A frame that stands still can be had better: shows the one that is due. */
+  improve(track) {
+    if (track.frame && !track.isBusy) track.seek(this.index);
   }
 
   /** Goes to a frame, which is shown as soon as it is there. */
@@ -70,7 +94,7 @@ export class Playback {
     this.#last = now;
     if (!this.isPlaying) return;
     if (this.#tracks.some((track) => track.frame === null)) return;
-    this.#time += passed * this.speed;
+    this.#time += passed * this.#speed;
     for (const track of this.#tracks) this.#serve(track);
     if (this.#tracks.every((track) => track.isEnded && track.heldTime === null)) this.#finish();
   }
@@ -87,6 +111,8 @@ export class Playback {
     }
     if (track.isBusy) {
       this.#time = Math.min(this.#time, place.shownAt + LATEST + 8 * this.frameSeconds);
+    } else if (!track.isEnded && track.frame.until > track.frame.index + 1 && this.index + AHEAD < track.frame.until) {
+      place.shownAt = this.#time;
     } else if (!track.isEnded) {
       track.prefetch(this.#nextIndex(track));
     } else if (this.isLooping && this.duration > 0 && !track.error) {
@@ -97,13 +123,13 @@ export class Playback {
   }
 
   #nextIndex(track) {
-    const next = track.frame.index + 1;
+    const next = track.frame.until;
     return Math.max(next, Math.min(this.index, next + MOST_SKIPPED));
   }
 
   #finish() {
     if (this.isLooping) return;
-    this.isPlaying = false;
+    this.pause();
     this.#time = Math.max(0, this.duration - this.frameSeconds);
   }
 }

@@ -1,6 +1,6 @@
 // The line between two pictures that are compared, and what stands on either side.
 
-const pointText = ({ spatial, temporal, refinement }) => `s${spatial},t${temporal},r${refinement}`;
+import { pointText } from './panel.js';
 
 export class Splitter {
   #line;

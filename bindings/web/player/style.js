@@ -75,6 +75,7 @@ input[type="range"]::-moz-range-thumb { width: 12px; height: 12px; border-radius
 .side { position: absolute; right: 14px; bottom: calc(max(14px, env(safe-area-inset-bottom)) + 100px); width: 280px; display: grid; gap: 10px; max-height: calc(100% - 180px); overflow: auto; }
 .side .panel { padding: 12px 14px; box-shadow: none; }
 .side h2 { margin: 0 0 6px; font-size: 12px; font-weight: 600; letter-spacing: .02em; color: var(--faint); }
+.automatic { width: 100%; margin: 0 0 4px; padding: 6px 8px; text-align: left; font-size: 12px; }
 .axis { display: grid; grid-template-columns: 1fr auto; gap: 0 8px; padding: 4px 0; }
 .axis input { grid-column: 1 / -1; }
 .axis output { font-variant-numeric: tabular-nums; color: var(--faint); }

@@ -29,6 +29,10 @@ export class Track extends EventTarget {
     this.isEnded = false;
     this.error = null;
     this.point = options.point ?? {};
+    /** What was asked for: without axes it is everything, and of a package what the network allows. */
+    this.chosen = this.point;
+    /** What is known of a package: see PackageState of the decoder; null of a stream. */
+    this.package = null;
     this.#worker = new DecoderWorker(source, options);
     const on = (type, handler) => this.#worker.addEventListener(type, ({ detail }) => handler(detail));
     on('frame', (answer) => this.#take(answer));
@@ -36,7 +40,8 @@ export class Track extends EventTarget {
     on('end', ({ warnings }) => this.#end(warnings));
     on('waiting', () => this.#wait());
     on('error', ({ message }) => this.#fail(message));
-    for (const type of ['description', 'received']) on(type, (detail) => this.#emit(type, detail));
+    on('package', ({ state }) => this.#report(state));
+    for (const type of ['description', 'received', 'better']) on(type, (detail) => this.#emit(type, detail));
     this.seek(0);
   }
 
@@ -48,6 +53,11 @@ export class Track extends EventTarget {
   /** Whether the frame is there that was sought last. */
   get isSettled() {
     return this.#asked === null && this.#next === null;
+  }
+
+  /** Whether the operating point is left to the network. */
+  get isAutomatic() {
+    return this.package !== null && Object.keys(this.chosen).length === 0;
   }
 
   /** When the frame is due that is held back, seconds from the start; null if there is none. */
@@ -86,7 +96,7 @@ export class Track extends EventTarget {
 
   /** Changes the operating point and shows the frame with an index again. */
   setPoint(point, index) {
-    this.point = point;
+    [this.point, this.chosen] = [point, point];
     this.#history = [];
     this.#worker.setPoint(point);
     this.seek(index);
@@ -95,6 +105,11 @@ export class Track extends EventTarget {
   /** Sorts again, since the camera has moved. */
   sort() {
     this.#worker.sort(this.#controls.view());
+  }
+
+  /** Says how fast a package is played; 0 while it stands still. */
+  run(speed) {
+    this.#worker.run(speed);
   }
 
   /** The next bytes of a source that is pushed. */
@@ -145,6 +160,12 @@ export class Track extends EventTarget {
     this.#history = [...this.#history, entry].slice(-AVERAGED);
     this.frame = frame;
     this.#emit('shown', { frame, update });
+  }
+
+  #report(state) {
+    this.package = state;
+    if (this.isAutomatic && this.frame) this.point = this.frame.point;
+    this.#emit('package', state);
   }
 
   #sorted(order) {

@@ -18,6 +18,8 @@ use std::io::Write;
 
 const TEMPLATE: &str = include_str!("../page/page.html");
 const WASM: &[u8] = include_bytes!("../decoder/splatstream.wasm");
+/// The same with what plays packages.
+const PACKAGES: &[u8] = include_bytes!("../decoder/splatstream-packages.wasm");
 
 /// Lists modules by their paths from the root of this crate.
 macro_rules! modules {
@@ -30,6 +32,7 @@ macro_rules! modules {
 const MODULES: &[Module<'static>] = modules![
     "decoder/client.js",
     "decoder/decoder.js",
+    "decoder/fetcher.js",
     "decoder/index.js",
     "decoder/worker.js",
     "page/start.js",
@@ -54,19 +57,24 @@ const MODULES: &[Module<'static>] = modules![
 
 /// A page that plays a stream which it holds. It connects to nothing.
 pub fn page_with(title: &str, stream: &[u8]) -> String {
-    page(title, &STANDARD.encode(stream), "", "'none'")
+    page(title, WASM, &STANDARD.encode(stream), "", "'none'")
 }
 
 /// A page that plays a stream of its own server, at an address relative to the page, while it is received.
 pub fn page_beside(title: &str, url: &str) -> String {
-    page(title, "", url, "'self'")
+    page(title, WASM, "", url, "'self'")
 }
 
-fn page(title: &str, stream: &str, url: &str, connect: &str) -> String {
+/// A page that plays a package of its own server: the manifest is at an address relative to the page.
+pub fn page_of_package(title: &str, manifest: &str) -> String {
+    page(title, PACKAGES, "", manifest, "'self'")
+}
+
+fn page(title: &str, module: &[u8], stream: &str, url: &str, connect: &str) -> String {
     let parts = [
         ("{connect}", connect),
         ("{title}", &escaped(title)),
-        ("{module}", &STANDARD.encode(compressed(WASM))),
+        ("{module}", &STANDARD.encode(compressed(module))),
         ("{worker}", &link(MODULES, "decoder/worker.js")),
         ("{url}", &escaped(url)),
         ("{stream}", stream),
@@ -114,6 +122,13 @@ mod tests {
     fn a_page_may_have_its_stream_beside_it() {
         let page = page_beside("", "stream.gss");
         assert!(page.contains("data-url=\"stream.gss\"></script>") && page.contains("connect-src 'self'"));
+    }
+
+    #[test]
+    fn a_page_of_a_package_has_the_module_for_packages() {
+        let (package, stream) = (page_of_package("", "manifest.json"), page_beside("", "manifest.json"));
+        assert!(package.contains("data-url=\"manifest.json\"></script>"));
+        assert!(package.len() > stream.len() + 50_000 && package.len() < 800_000, "{} bytes", package.len());
     }
 
     #[test]

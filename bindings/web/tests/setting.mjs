@@ -23,11 +23,11 @@ if (!existsSync(scene)) splatstream('demo', '--out', at('scene'), '--gaussians',
 export const stream = readFileSync(scene);
 export const streamPath = scene;
 
-/** Digests that the native decoder gives, frame by frame. */
-export function nativeDigests(point) {
+/** Digests that the native decoder gives of a stream, frame by frame. */
+export function nativeDigests(point, path = scene) {
   const out = at('frames');
   rmSync(out, { recursive: true, force: true });
-  const report = JSON.parse(splatstream('decode', scene, '-o', out, '--op', point, '--json'));
+  const report = JSON.parse(splatstream('decode', path, '-o', out, '--op', point, '--json'));
   return report.digests;
 }
 

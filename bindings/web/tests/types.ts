@@ -24,9 +24,21 @@ export function play(url: string, canvas: HTMLCanvasElement): void {
   worker.show(0, { position: [0, 0, -5], ahead: [0, 0, 1] });
 }
 
+/** A package of one's own; gives the seconds that are buffered. */
+export function stream(url: string): () => number {
+  let buffered = 0;
+  const worker = new DecoderWorker({ package: url });
+  worker.addEventListener('package', (event) => {
+    buffered = (event as CustomEvent<WorkerEvents['package']>).detail.state.buffer;
+  });
+  worker.run(0.5);
+  return () => buffered;
+}
+
 /** The element. */
 export async function last(player: SplatPlayer): Promise<string | null> {
   player.operatingPoint = { refinement: 0 };
+  player.operatingPoint = (player.statistics.package?.stalls ?? 0) > 0 ? { spatial: 0 } : null;
   const frame = await player.seek((player.description?.frames ?? 1) - 1);
   return frame?.digest ?? null;
 }

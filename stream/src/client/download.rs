@@ -1,7 +1,7 @@
 //! Requests that run beside playback, one after the other.
 
-use super::parts::Job;
-use super::source::{Fault, Source};
+use super::source::Source;
+use crate::playback::{ByteRequest, Fault};
 use std::io::{ErrorKind, Read};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
@@ -33,12 +33,12 @@ pub(super) struct Download {
 
 impl Download {
     /// Begins to fetch.
-    pub(super) fn start(source: Source, jobs: Vec<Job>) -> Self {
+    pub(super) fn start(source: Source, requests: Vec<ByteRequest>) -> Self {
         let (sender, events) = sync_channel(WAITING);
         let failed = sender.clone();
         let work = move || {
-            for job in &jobs {
-                match fetch(&source, job, &sender) {
+            for request in &requests {
+                match fetch(&source, request, &sender) {
                     Ok(true) => {}
                     Ok(false) => return,
                     Err(fault) => {
@@ -66,11 +66,11 @@ impl Download {
 }
 
 /// One request. Gives false if nobody wants it any more.
-fn fetch(source: &Source, job: &Job, sender: &SyncSender<Event>) -> Result<bool, Fault> {
+fn fetch(source: &Source, request: &ByteRequest, sender: &SyncSender<Event>) -> Result<bool, Fault> {
     if sender.send(Event::Sent).is_err() {
         return Ok(false);
     }
-    let mut reader = source.range(&job.file, job.offset, job.size)?;
+    let mut reader = source.range(&request.file, request.offset, request.size)?;
     if sender.send(Event::Begun).is_err() {
         return Ok(false);
     }
@@ -85,10 +85,10 @@ fn fetch(source: &Source, job: &Job, sender: &SyncSender<Event>) -> Result<bool,
         };
         // To read to the end lets the next request have the connection.
         if count == 0 {
-            return if got == job.size { Ok(true) } else { Err(Fault::Short(got)) };
+            return if got == request.size { Ok(true) } else { Err(Fault::Short(got)) };
         }
         got = got.saturating_add(u64::try_from(count).unwrap_or(u64::MAX));
-        if got > job.size {
+        if got > request.size {
             return Err(Fault::Wrong("the response has more bytes than were asked for"));
         }
         chunk.truncate(count);

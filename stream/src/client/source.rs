@@ -2,51 +2,14 @@
 
 use super::Options;
 use crate::package::Package;
+use crate::playback::Fault;
 use std::collections::HashMap;
-use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use ureq::Agent;
 use ureq::http::{HeaderMap, Response, StatusCode, header};
-
-/// Why a request was of no use.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Fault {
-    /// The server refuses with this status.
-    Status(u16),
-    /// The connection, the file or time failed, in words.
-    Failed(String),
-    /// The response ends early, after so many bytes.
-    Short(u64),
-    /// What was asked for is not what the response is, in words.
-    Wrong(&'static str),
-    /// The file is another one than before.
-    Changed,
-    /// The bytes are not those that were packaged.
-    Digest,
-}
-
-impl Fault {
-    /// Whether asking again is unlikely to help.
-    pub(super) const fn is_final(&self) -> bool {
-        matches!(self, Self::Status(401 | 403 | 404 | 410 | 451))
-    }
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Status(status) => write!(f, "the server answers with status {status}"),
-            Self::Failed(why) => f.write_str(why),
-            Self::Short(bytes) => write!(f, "the response ends after {bytes} bytes"),
-            Self::Wrong(what) => f.write_str(what),
-            Self::Changed => f.write_str("the file has changed"),
-            Self::Digest => f.write_str("the bytes do not have the digest in the manifest"),
-        }
-    }
-}
 
 impl From<io::Error> for Fault {
     fn from(error: io::Error) -> Self {

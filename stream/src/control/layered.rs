@@ -72,13 +72,15 @@ impl Layered {
             super::ladder::quality_range(horizon(state, state.first_missing(), weights.horizon));
         let sustainable = state.network().mean(weights.memory).unwrap_or(weights.first_guess);
         let range = (most - least).max(1.0);
-        let price = price(state, sustainable).unwrap_or(range / 100.0) * self.eagerness(state);
+        let price =
+            price(state, sustainable / state.speed()).unwrap_or(range / 100.0) * self.eagerness(state);
         // Live, no more can be buffered than has been captured.
         let captured_us = state.settings().live.map_or(u64::MAX, |live| live.target_us);
         let full = seconds(state.settings().buffer_us.min(captured_us));
         Outlook {
-            throughput: state.network().robust().unwrap_or(weights.first_guess),
-            latency: state.network().latency(),
+            // In media time.
+            throughput: state.network().robust().unwrap_or(weights.first_guess) / state.speed(),
+            latency: state.network().latency() * state.speed(),
             buffer: seconds(state.buffer_us()),
             full,
             before: state.quality_before(state.first_missing()),
@@ -116,7 +118,7 @@ impl Layered {
         let mut found: Option<(f64, usize, Levels)> = None;
         for index in state.first_open()..state.first_missing() {
             let gop = state.ladder().gops().get(index)?;
-            let until = seconds(state.media_until(index)) * self.weights.haste;
+            let until = time_until(state, index) * self.weights.haste;
             let options = state.choices(index);
             let Some(now) = options.first().cloned() else { continue };
             let around = [state.quality_before(index), state.quality(index.saturating_add(1)).or(next)];
@@ -142,6 +144,9 @@ impl Layered {
 
     /// The next request, or when to look for one again.
     fn fetch(&self, state: &State) -> Decision {
+        if let Some(fetch) = improvement(state) {
+            return Decision::Fetch(fetch);
+        }
         let outlook = self.outlook(state);
         let next = state.first_missing();
         let plan = self.extend(state, &outlook);
@@ -169,16 +174,23 @@ impl Layered {
         }
         let next = state.first_missing();
         let Some(base) = base_bytes(state, next) else { return false };
-        if gop == next || state.playback() != Playback::Playing {
+        if gop == next || state.playback() != Playback::Playing || state.viewer.holds {
             return false;
         }
         let left = request.fetch.bytes().saturating_sub(request.progress.bytes);
         let rate = current_rate(state, request).unwrap_or(self.weights.first_guess);
         let time = |bytes: u64| real(bytes) * 8.0 / rate.max(1.0);
         let need = (state.network().latency() + time(base) * MARGIN).max(0.5);
-        let buffer = seconds(state.buffer_us());
+        let buffer = seconds(state.buffer_us()) / state.speed();
         time(left) + need > buffer && left > base && buffer < 4.0 * need
     }
+}
+
+/// All that is missing of what stands still, in the order of what it gains: nothing else is looked at.
+fn improvement(state: &State) -> Option<Fetch> {
+    let gop = state.viewer.holds.then(|| state.current())?;
+    let best = state.choices(gop).pop()?;
+    if state.is_ready(gop) { Fetch::towards(state, gop, &best.levels) } else { None }
 }
 
 /// The base of the next GOP is planned to take so many times as long as predicted.
@@ -193,12 +205,17 @@ const LEISURE: f64 = 0.25;
 /// Requests what is missing, in few ranges if there is time.
 fn request(state: &State, outlook: &Outlook, gop: usize, wanted: &Levels) -> Option<Fetch> {
     let fetch = Fetch::towards(state, gop, wanted)?;
-    let until = seconds(state.media_until(gop));
+    let until = time_until(state, gop);
     if outlook.time(fetch.bytes()) > LEISURE * until {
         Some(fetch)
     } else {
         Fetch::at_leisure(state, gop, wanted)
     }
+}
+
+/// Media seconds until a GOP begins; without end while the playhead stands still.
+fn time_until(state: &State, gop: usize) -> f64 {
+    if state.viewer.holds { f64::INFINITY } else { seconds(state.media_until(gop)) }
 }
 
 /// A rule that waits looks again after this time.

@@ -11,7 +11,7 @@ use super::throughput::Transfer;
 /// Times are microseconds on the caller's clock and never go back.
 #[derive(Debug)]
 pub struct Session<R> {
-    state: State,
+    pub(super) state: State,
     rule: R,
 }
 
@@ -96,6 +96,7 @@ impl<R: Rule> Session<R> {
             self.end_request(true);
         }
         self.resume();
+        self.improve();
     }
 
     /// Says that the running request has failed. What has arrived of it stays, unless the rule plays whole GOPs only. The
@@ -130,7 +131,7 @@ impl<R: Rule> Session<R> {
         self.resume();
     }
 
-    fn end_request(&mut self, wanted: bool) {
+    pub(super) fn end_request(&mut self, wanted: bool) {
         let state = &mut self.state;
         let Some(request) = state.request.take() else { return };
         state.network.add(request.progress);
@@ -146,8 +147,8 @@ impl<R: Rule> Session<R> {
         }
     }
 
-    /// Moves the playhead to the present.
-    fn advance(&mut self, now_us: u64) {
+    /// Moves the playhead to the present, without asking for a decision.
+    pub fn advance(&mut self, now_us: u64) {
         while let Some(end_us) = self.state.gop_end_us().filter(|&end_us| end_us <= now_us) {
             self.state.now_us = end_us.max(self.state.now_us);
             self.state.current = self.state.current.saturating_add(1);
@@ -155,7 +156,7 @@ impl<R: Rule> Session<R> {
             self.begin();
         }
         let state = &mut self.state;
-        if state.playback == Playback::Playing {
+        if state.playback == Playback::Playing && !state.viewer.drives {
             let passed = now_us.saturating_sub(state.now_us);
             state.offset_ns =
                 state.offset_ns.saturating_add(passed.saturating_mul(u64::from(state.rate_milli)));
@@ -164,7 +165,7 @@ impl<R: Rule> Session<R> {
     }
 
     /// Begins the current GOP right after the one before, or stalls.
-    fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         let state = &mut self.state;
         state.waiting_since_us = state.now_us;
         if state.current >= state.ladder.gops().len() {
@@ -177,7 +178,7 @@ impl<R: Rule> Session<R> {
     }
 
     /// Begins the current GOP after a start-up or a stall, as soon as enough is buffered.
-    fn resume(&mut self) {
+    pub(super) fn resume(&mut self) {
         let state = &self.state;
         let still = matches!(state.playback, Playback::Starting | Playback::Stalled);
         let missing = state.first_missing();
@@ -187,7 +188,7 @@ impl<R: Rule> Session<R> {
         }
     }
 
-    fn show(&mut self) {
+    pub(super) fn show(&mut self) {
         let state = &mut self.state;
         let gop = state.current;
         let running = state.request.as_ref().filter(|request| request.fetch.gop() == gop);
@@ -197,8 +198,7 @@ impl<R: Rule> Session<R> {
             state.playback = Playback::Playing;
             return;
         }
-        let known = state.ladder.gops().get(gop).zip(state.arrived.get(gop));
-        let Some(point) = known.and_then(|(known, arrived)| known.playable(arrived)) else { return };
+        let Some(point) = state.showable(gop).cloned() else { return };
         state.playback = Playback::Playing;
         state.shown.push(Shown {
             gop,

@@ -1,6 +1,6 @@
 //! What a session knows at one time: what has arrived, what is playing, what is being fetched.
 
-use super::ladder::{Gop, Ladder, Levels, OperatingPoint};
+use super::ladder::{Gop, Ladder, Levels, OperatingPoint, Point};
 use super::options::{Choice, Limits, available_choices};
 use super::rule::Fetch;
 use super::throughput::{Network, Transfer};
@@ -113,6 +113,20 @@ pub struct State {
     pub(super) retry_us: u64,
     pub(super) network: Network,
     pub(super) shown: Vec<Shown>,
+    pub(super) viewer: Viewer,
+}
+
+/// What somebody who looks at the presentation has asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Viewer {
+    /// GOPs begin when the caller says so, not by the clock.
+    pub(super) drives: bool,
+    /// The playhead stands still: what is shown can still be improved.
+    pub(super) holds: bool,
+    /// The operating point that is wanted, in place of what the rule finds best.
+    pub(super) chosen: Option<OperatingPoint>,
+    /// Media time that passes in a second of the clock, in thousandths, apart from [`State::rate_milli`].
+    pub(super) speed_milli: u32,
 }
 
 impl State {
@@ -136,6 +150,7 @@ impl State {
             retry_us: now_us,
             network: Network::default(),
             shown: Vec::new(),
+            viewer: Viewer { drives: false, holds: false, chosen: None, speed_milli: 1000 },
         };
         state.grow();
         state
@@ -178,6 +193,11 @@ impl State {
         }
     }
 
+    /// The GOP that is played, or that playback waits for; the number of GOPs at the end.
+    pub fn current(&self) -> usize {
+        self.current
+    }
+
     /// Rate of playback, in thousandths.
     pub fn rate_milli(&self) -> u32 {
         self.rate_milli
@@ -211,6 +231,7 @@ impl State {
     /// The first GOP that has not begun: pieces of earlier ones are of no use any more.
     pub fn first_open(&self) -> usize {
         match self.playback {
+            Playback::Playing if self.is_improved() => self.current,
             Playback::Playing => self.current.saturating_add(1),
             Playback::Ended => self.ladder.gops().len(),
             Playback::Starting | Playback::Stalled => self.current,
@@ -234,9 +255,53 @@ impl State {
     pub fn choices(&self, gop: usize) -> Vec<Choice> {
         let of = |known: &Gop| {
             let (arrived, available) = self.arrived.get(gop).zip(self.available.get(gop))?;
-            Some(available_choices(known, arrived, available, &self.settings.limits))
+            Some(match self.target(gop) {
+                Some(target) => vec![Choice {
+                    levels: arrived.union(&target.levels),
+                    bytes: known.missing_bytes(&target.levels, arrived),
+                    quality: target.quality,
+                }],
+                None => available_choices(known, arrived, available, &self.settings.limits),
+            })
         };
         self.ladder.gops().get(gop).and_then(of).unwrap_or_default()
+    }
+
+    /// Whether what is shown is shown again as soon as more of it has arrived: where a viewer has the playhead, as long as that
+    /// stands still or is in the first quarter of the GOP.
+    pub(super) fn is_improved(&self) -> bool {
+        let duration_us = self.ladder.gops().get(self.current).map_or(0, Gop::duration_us);
+        let is_early = self.offset_ns / 250 < duration_us;
+        self.viewer.drives && self.playback == Playback::Playing && (self.viewer.holds || is_early)
+    }
+
+    /// Of the points of a GOP up to the one that a viewer has chosen, the best that can be had; none if none is chosen, or
+    /// the GOP is lost.
+    pub(super) fn target(&self, gop: usize) -> Option<&Point> {
+        let most = self.viewer.chosen?;
+        let (known, available) = self.ladder.gops().get(gop).zip(self.available.get(gop))?;
+        let is_within = |name: &OperatingPoint| {
+            name.spatial <= most.spatial
+                && name.temporal <= most.temporal
+                && name.refinement <= most.refinement
+        };
+        let points = known.points().iter().filter(|point| available.contains(&point.levels));
+        let within = points.clone().filter(|point| is_within(&point.name));
+        within.max_by(|a, b| a.quality.total_cmp(&b.quality)).or_else(|| points.clone().next())
+    }
+
+    /// What would be shown of a GOP now; none if it cannot be played.
+    pub(super) fn showable(&self, gop: usize) -> Option<&Point> {
+        let (known, arrived) = self.ladder.gops().get(gop).zip(self.arrived.get(gop))?;
+        match self.target(gop) {
+            Some(target) => Some(target).filter(|target| arrived.contains(&target.levels)),
+            None => known.playable(arrived),
+        }
+    }
+
+    /// Media seconds in a second of the clock.
+    pub(super) fn speed(&self) -> f64 {
+        f64::from(self.viewer.speed_milli) / 1000.0
     }
 
     /// Whether a GOP can be played.
@@ -246,16 +311,12 @@ impl State {
         }
         let running = self.request.as_ref().is_some_and(|request| request.fetch.gop() == gop);
         let whole = !self.only_whole || (!running && self.settled.get(gop) == Some(&true));
-        let Some((gop, arrived)) = self.ladder.gops().get(gop).zip(self.arrived.get(gop)) else {
-            return false;
-        };
-        whole && gop.playable(arrived).is_some()
+        whole && self.showable(gop).is_some()
     }
 
     /// Quality of a GOP as it would be played now; none if it cannot be.
     pub fn quality(&self, gop: usize) -> Option<f64> {
-        let (gop, arrived) = self.ladder.gops().get(gop).zip(self.arrived.get(gop))?;
-        Some(gop.playable(arrived)?.quality)
+        Some(self.showable(gop)?.quality)
     }
 
     /// Quality of what is before an open GOP: that of the GOP before it; none before the first.
@@ -304,7 +365,7 @@ impl State {
 
     /// When the GOP that is playing ends; none while playback stands still.
     pub fn gop_end_us(&self) -> Option<u64> {
-        if self.playback != Playback::Playing {
+        if self.playback != Playback::Playing || self.viewer.drives {
             return None;
         }
         let gop = self.ladder.gops().get(self.current)?;

@@ -24,6 +24,10 @@ pub(super) async fn answer(
     request: Request,
 ) -> Response {
     let transfer = Transfer::begin(shared, connection, &request);
+    if let Some(page) = transfer.shared.page.clone().filter(|_| is_for_page(&request)) {
+        let headers = [(CACHE_CONTROL, "no-cache"), (CONTENT_TYPE, "text/html; charset=utf-8")];
+        return respond(transfer, StatusCode::OK, &headers, Content::Text(page));
+    }
     let network = &transfer.shared.network;
     if !network.latency.is_zero() {
         tokio::time::sleep(network.latency).await;
@@ -40,6 +44,11 @@ pub(super) async fn answer(
         // Most likely there are too many open files.
         Err(_) => refuse(transfer, StatusCode::SERVICE_UNAVAILABLE, &[(RETRY_AFTER, "1")]),
     }
+}
+
+/// Whether a request is for the page in place of the folder's own.
+fn is_for_page(request: &Request) -> bool {
+    request.method() == Method::GET && request.uri().path() == "/"
 }
 
 /// Looks where waiting for a disk holds up nobody.

@@ -9,14 +9,14 @@ thread_local! {
     static SESSION: RefCell<Session> = RefCell::new(Session::default());
 }
 
-fn with<T>(work: impl FnOnce(&mut Session) -> T) -> T {
+pub(crate) fn with<T>(work: impl FnOnce(&mut Session) -> T) -> T {
     SESSION.with_borrow_mut(work)
 }
 
 /// The version of this interface, which `decoder.js` compares.
 #[unsafe(no_mangle)]
 pub extern "C" fn gss_version() -> u32 {
-    1
+    2
 }
 
 /// Where the next `count` bytes of the stream are to be written; 0 if they are too many.

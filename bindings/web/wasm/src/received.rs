@@ -21,6 +21,13 @@ struct Shared {
 }
 
 impl Received {
+    /// Bytes after which none come.
+    pub fn whole(bytes: Vec<u8>) -> Self {
+        let length = bytes.len();
+        let shared = Shared { bytes, length, is_end: true };
+        Self { shared: Arc::new(Mutex::new(shared)), at: 0 }
+    }
+
     fn lock(&self) -> MutexGuard<'_, Shared> {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }

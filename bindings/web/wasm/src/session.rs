@@ -1,6 +1,8 @@
 //! Bytes in, frames out.
 
 use crate::order::Order;
+#[cfg(feature = "packages")]
+use crate::package::Package;
 use crate::received::Received;
 use crate::texels::{ROW, Texels};
 use splatstream::scene::SceneDescription;
@@ -27,8 +29,11 @@ pub enum Status {
     Failed = 4,
 }
 
-/// Decodes one stream.
+/// Decodes one stream, or plays one package.
 pub struct Session {
+    /// The package that is played, if it is one.
+    #[cfg(feature = "packages")]
+    pub package: Option<Package>,
     received: Received,
     decoder: Decoder,
     frame: Option<Frame>,
@@ -47,6 +52,8 @@ impl Default for Session {
     fn default() -> Self {
         let received = Received::default();
         Self {
+            #[cfg(feature = "packages")]
+            package: None,
             decoder: decoder(&received),
             received,
             frame: None,
@@ -59,7 +66,7 @@ impl Default for Session {
     }
 }
 
-fn decoder(received: &Received) -> Decoder {
+pub(crate) fn decoder(received: &Received) -> Decoder {
     Decoder::from_reader(received.clone()).with_limits(Limits {
         max_memory: MAX_MEMORY,
         // A page plays a stream as often as somebody looks at it.
@@ -91,9 +98,16 @@ impl Session {
 
     /// Decodes the next frame. Numbers: index, seconds from the start, Gaussians, how many of these are carried over from
     /// an earlier frame in place of missing refinements, refinements shown, whether it is a keyframe, the operating point
-    /// (spatial, temporal, refinement), whether it has a digest, its high and its low half, bytes of its units.
+    /// (spatial, temporal, refinement), whether it has a digest, its high and its low half, bytes of its units, the index
+    /// up to which it stands, which is its own and 1 where frames that follow are decoded.
     pub fn decode(&mut self) -> Status {
         self.clear();
+        #[cfg(feature = "packages")]
+        if let Some(mut package) = self.package.take() {
+            let status = self.decode_package(&mut package);
+            self.package = Some(package);
+            return status;
+        }
         let frame = match self.decoder.next_frame() {
             Ok(Some(frame)) => frame,
             Ok(None) if self.decoder.is_finished() => return Status::End,
@@ -105,6 +119,32 @@ impl Session {
             Err(error) => return self.fail(&error),
         };
         self.say(frame.warnings().iter());
+        let until = frame.index().saturating_add(1);
+        self.give(frame, until)
+    }
+
+    /// The next frame of a package.
+    #[cfg(feature = "packages")]
+    fn decode_package(&mut self, package: &mut Package) -> Status {
+        match package.next_frame() {
+            Ok(Some((frame, until))) => {
+                self.say(package.warnings.drain(..));
+                self.give(frame, until)
+            }
+            Ok(None) if !package.is_ended() => Status::NeedBytes,
+            Ok(None) if package.warnings.is_empty() => Status::End,
+            Ok(None) => {
+                self.say(package.warnings.drain(..));
+                Status::Incomplete
+            }
+            Err(reason) => {
+                self.text = reason;
+                Status::Failed
+            }
+        }
+    }
+
+    fn give(&mut self, frame: Frame, until: u32) -> Status {
         let point = frame.operating_point();
         let digest = frame.digest().unwrap_or_default();
         self.numbers.extend([
@@ -118,7 +158,7 @@ impl Session {
         self.numbers.extend([point.spatial, point.temporal, point.refinement].map(f64::from));
         self.numbers.push(f64::from(u8::from(frame.digest().is_some())));
         self.numbers.extend([(digest >> 32) as u32, digest as u32].map(f64::from));
-        self.numbers.push(frame.bytes() as f64);
+        self.numbers.extend([frame.bytes() as f64, f64::from(until)]);
         self.frame = Some(frame);
         Status::Done
     }
@@ -164,6 +204,11 @@ impl Session {
     /// Goes to a frame: the next one has this index, or a higher one where that is missing.
     pub fn seek(&mut self, index: u32) -> Status {
         self.clear();
+        #[cfg(feature = "packages")]
+        if let Some(package) = &mut self.package {
+            package.seek(index);
+            return Status::Done;
+        }
         match self.decoder.seek(Position::Frame(index)) {
             Ok(()) => Status::Done,
             Err(error) => self.fail(&error),
@@ -171,7 +216,12 @@ impl Session {
     }
 
     /// Changes the operating point: from the next GOP on, and where it is lower on some axis, from the next frame on.
+    /// A package has its own rule where all three are 255.
     pub fn set_point(&mut self, [spatial, temporal, refinement]: [u8; 3]) {
+        #[cfg(feature = "packages")]
+        if let Some(package) = &mut self.package {
+            return package.choose([spatial, temporal, refinement]);
+        }
         self.decoder.set_operating_point(OperatingPoint { spatial, temporal, refinement });
     }
 
@@ -181,13 +231,15 @@ impl Session {
     /// view in radians. Text: the title.
     pub fn describe(&mut self) -> Status {
         self.clear_report();
-        let Some(point) = self.decoder.highest_point() else { return Status::NeedBytes };
-        let duration = self.decoder.frame_duration().unwrap_or_default();
-        self.numbers.push(self.decoder.frame_count().unwrap_or_default().into());
+        let decoder = self.decoder();
+        let Some(point) = decoder.highest_point() else { return Status::NeedBytes };
+        let duration = decoder.frame_duration().unwrap_or_default();
+        let none = SceneDescription::default();
+        let scene = decoder.description().unwrap_or(&none).clone();
+        let frames = self.frame_count();
+        self.numbers.push(frames.into());
         self.numbers.push(duration.as_secs_f64());
         self.numbers.extend([point.spatial, point.temporal, point.refinement].map(f64::from));
-        let none = SceneDescription::default();
-        let scene = self.decoder.description().unwrap_or(&none);
         self.numbers.push(scene.up_axis.code().into());
         self.numbers.push(f64::from(u8::from(scene.background.is_some())));
         self.numbers.extend(scene.background.unwrap_or_default().map(f64::from));
@@ -196,8 +248,25 @@ impl Session {
             self.numbers.extend(camera.rotation.map(f64::from));
             self.numbers.push(camera.vertical_field_of_view.into());
         }
-        self.text = scene.title.clone().unwrap_or_default();
+        self.text = scene.title.unwrap_or_default();
         Status::Done
+    }
+
+    /// The decoder of what is shown.
+    fn decoder(&self) -> &Decoder {
+        #[cfg(feature = "packages")]
+        if let Some(package) = &self.package {
+            return package.decoder();
+        }
+        &self.decoder
+    }
+
+    fn frame_count(&self) -> u32 {
+        #[cfg(feature = "packages")]
+        if let Some(package) = &self.package {
+            return package.frame_count();
+        }
+        self.decoder.frame_count().unwrap_or_default()
     }
 
     fn clear(&mut self) {
@@ -205,7 +274,8 @@ impl Session {
         self.clear_report();
     }
 
-    fn clear_report(&mut self) {
+    /// Empties numbers and text for the next answer.
+    pub(crate) fn clear_report(&mut self) {
         self.numbers.clear();
         self.text.clear();
     }

@@ -23,12 +23,15 @@ pub(super) enum Kind {
     Level { subsegment: usize, level: u8 },
 }
 
-/// One request: parts that follow each other in a file.
+/// One request: bytes of a file, one or more.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Job {
-    pub(super) file: String,
-    pub(super) offset: u64,
-    pub(super) size: u64,
+pub struct ByteRequest {
+    /// Name of the file, beside the manifest.
+    pub file: String,
+    /// Of the first byte.
+    pub offset: u64,
+    /// How many.
+    pub size: u64,
 }
 
 /// The parts of a fetch in its order, each first one of a Representation after its initialisation segment if that is wanted.
@@ -69,18 +72,22 @@ fn of_piece(manifest: &Manifest, gop: usize, representation: usize, piece: u8) -
 }
 
 /// The requests for some parts: one for those that follow each other in a file.
-pub(super) fn jobs(manifest: &Manifest, parts: &[Part]) -> Vec<Job> {
-    let mut jobs: Vec<Job> = Vec::new();
+pub(super) fn requests(manifest: &Manifest, parts: &[Part]) -> Vec<ByteRequest> {
+    let mut requests: Vec<ByteRequest> = Vec::new();
     for part in parts.iter().filter(|part| part.range.size > 0) {
         let Some(info) = manifest.representations.get(part.representation) else { continue };
-        match jobs.last_mut() {
+        match requests.last_mut() {
             Some(last)
                 if last.file == info.file && last.offset.saturating_add(last.size) == part.range.offset =>
             {
                 last.size = last.size.saturating_add(part.range.size);
             }
-            _ => jobs.push(Job { file: info.file.clone(), offset: part.range.offset, size: part.range.size }),
+            _ => requests.push(ByteRequest {
+                file: info.file.clone(),
+                offset: part.range.offset,
+                size: part.range.size,
+            }),
         }
     }
-    jobs
+    requests
 }

@@ -2,6 +2,7 @@
 
 use super::parts::{Kind, Part};
 use crate::control::Levels;
+use crate::control::number::size;
 use crate::division::Place;
 use crate::manifest::Manifest;
 use crate::segments::Initialization;
@@ -38,6 +39,23 @@ impl Store {
             }
         }
         Ok(())
+    }
+
+    /// Bytes of all levels.
+    pub(super) fn bytes(&self) -> u64 {
+        self.levels.values().map(|bytes| size(bytes.len())).fold(0, u64::saturating_add)
+    }
+
+    /// The GOPs of which there is something, in order.
+    pub(super) fn gops(&self) -> Vec<usize> {
+        let mut gops: Vec<usize> = self.levels.keys().map(|key| key.0).collect();
+        gops.dedup();
+        gops
+    }
+
+    /// Removes a GOP.
+    pub(super) fn remove(&mut self, gop: usize) {
+        self.levels.retain(|key, _| key.0 != gop);
     }
 
     /// Removes all GOPs before one.
