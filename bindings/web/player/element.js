@@ -452,7 +452,8 @@ export class SplatPlayer extends HTMLElement {
       this.splitter.show(this.#tracks);
     }
     this.#find('compare').setAttribute('aria-pressed', String(!isOn));
-    if (!isOn && this.#openPanel === null) this.#showSide('quality');
+    // On a telephone the panel would hide what is compared.
+    if (!isOn && this.#openPanel === null && this.clientWidth > 620) this.#showSide('quality');
     else this.#fillSide();
     this.#playback.seek(this.#playback.index);
     this.#stage.invalidate();

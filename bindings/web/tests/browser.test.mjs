@@ -151,6 +151,34 @@ test('it plays, loops, and keys work', async () => {
   await page.finish();
 });
 
+test('on a telephone all keys are in the bar, and Tab visits them in the order in which they stand', async () => {
+  for (const [width, height] of [[390, 844], [360, 640]]) {
+    const page = await player({ size: { width, height }, scheme: 'light' });
+    await page.evaluate(() => player.press('quality'));
+    const inside = await page.evaluate(() => {
+      const box = (element) => element.getBoundingClientRect();
+      const bar = box(player.shadowRoot.getElementById('bar'));
+      const keys = [...player.shadowRoot.querySelectorAll('.keys > *')].map(box).filter((key) => key.width > 0);
+      return keys.every((key) => key.left >= bar.left && key.right <= bar.right) && bar.left >= 0 && bar.right <= innerWidth;
+    });
+    assert.ok(inside, `at ${width} pixels`);
+    const visited = [];
+    for (let count = 0; count < 11; count++) {
+      await page.keyboard.press('Tab');
+      visited.push(await page.evaluate(() => {
+        const element = player.shadowRoot.activeElement;
+        return element.id || element.getAttribute('aria-label');
+      }));
+    }
+    const axes = ['Detail layer', 'Frame rate', 'Refinement'];
+    const info = width > 380 ? ['info'] : [];
+    assert.deepEqual(visited, ['canvas', 'place', 'play', 'speed', 'quality', 'compare', ...info, 'home', 'full', ...axes].slice(0, 11));
+    await page.keyboard.press('Escape');
+    assert.deepEqual(await page.evaluate(() => [player.shadowRoot.getElementById('side').hidden, player.shadowRoot.activeElement.id]), [true, 'quality']);
+    await page.finish();
+  }
+});
+
 test('a page that the command has written plays from a file and asks nobody for anything', async () => {
   splatstream('view', streamPath, '-o', at('page.html'));
   const page = await browser.openPage('about:blank', { viewport: SIZE });
