@@ -3,10 +3,7 @@
 # Node and in Chromium, of which pictures stay in target/web. Says what it skips where a tool is not there.
 set -euo pipefail
 cd "$(dirname "$0")"
-mkdir -p "${CARGO_TARGET_DIR:=../../target}/tools"
-CARGO_TARGET_DIR=$(cd "$CARGO_TARGET_DIR" && pwd)
-export CARGO_TARGET_DIR SPLATSTREAM=$CARGO_TARGET_DIR/release/splatstream WEB_TESTS=$CARGO_TARGET_DIR/web
-tools=$CARGO_TARGET_DIR/tools/web
+. ./tools.sh
 rm -rf "$WEB_TESTS" && mkdir "$WEB_TESTS"
 
 # Bytes of a file, or of what is piped in, are at most so many.
@@ -41,31 +38,19 @@ sizes() {
     # A third more: reading manifests, boxes of files, and the control. Pages and streams do without it.
     at_most 'the module for packages' 1250000 decoder/splatstream-packages.wasm
     gzip -9c decoder/splatstream-packages.wasm | at_most 'the module for packages, compressed' 440000
-    cat player/*.js | at_most 'the player' 100000
+    find player -name '*.js' ! -name spark.js ! -name playcanvas.js -exec cat {} + | at_most 'the player' 100000
+    cat player/{playable,playcanvas,spark,texels}.js | at_most 'the adapters for engines' 24000
     "$SPLATSTREAM" demo --out "$WEB_TESTS/demo" >/dev/null
     at_most 'a page of the moving scene' 1000000 "$WEB_TESTS/demo/demo.html"
 }
 
-# npm packages of some names and versions, in $tools.
-packages() {
-    command -v npm >/dev/null && { [ -d "$tools/node_modules/playwright-core" ] ||
-        npm install --silent --no-audit --no-fund --prefix "$tools" playwright-core@1.65.1 typescript@5.9.3; }
-}
-
+# Programs that use the packages as npm installs them compile.
 types() {
-    "$tools/node_modules/.bin/tsc" --project tests
-}
-
-browser() {
-    local chromium=${CHROMIUM:-}
-    [ -n "$chromium" ] || chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
-    if [ -z "$chromium" ]; then
-        echo "skipped: Chromium is not there"
-        return
-    fi
-    export CHROMIUM=$chromium PLAYWRIGHT=$tools/node_modules/playwright-core
-    node --test tests/browser.test.mjs tests/packages.test.mjs
-    node tests/first.mjs "$WEB_TESTS/long/demo.gss" "$WEB_TESTS/package"
+    local installed=$tools/node_modules/@splatstream programs=$tools/programs
+    rm -rf "$installed" "$programs" && mkdir -p "$installed"
+    cp -r decoder player "$installed"
+    cp -r tests "$programs"
+    "$tools/node_modules/.bin/tsc" --project "$programs"
 }
 
 wasm
@@ -78,9 +63,12 @@ vectors
 node --test tests/node.test.mjs tests/package.test.mjs
 sizes
 node tests/speed.mjs "$WEB_TESTS/scene/demo.gss"
-if ! packages; then
-    echo "skipped: types and the browser, for which npm cannot install TypeScript and playwright-core"
+if ! packages typescript@5.9.3 three@0.187.0 @types/three@0.187.0 @sparkjsdev/spark@2.2.0 playcanvas@2.23.3; then
+    echo "skipped: types and the browser, for which npm cannot install TypeScript, Spark and PlayCanvas"
     exit
 fi
 types
-browser
+if browser; then
+    node --test --test-concurrency=1 tests/browser.test.mjs tests/packages.test.mjs tests/engines.test.mjs
+    node tests/first.mjs "$WEB_TESTS/long/demo.gss" "$WEB_TESTS/package"
+fi

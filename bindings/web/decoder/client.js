@@ -3,6 +3,13 @@
 /** Where the worker is, if nothing else is said: beside this file. */
 const workerBeside = () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
 
+/** A source whose address is not relative to the page, but whole: the worker is elsewhere. */
+function located(source) {
+  const whole = (address) => new URL(address, globalThis.document?.baseURI ?? location.href).href;
+  const addresses = Object.entries(source).filter(([name]) => name === 'url' || name === 'package');
+  return { ...source, ...Object.fromEntries(addresses.map(([name, address]) => [name, whole(address)])) };
+}
+
 /**
  * Decodes and sorts in a worker. Events, whose `detail` index.d.ts describes: `description`, `frame`, `order`, `received`,
  * `waiting` (for bytes), `end`, `error`; of packages also `package` and `better`.
@@ -21,7 +28,7 @@ export class DecoderWorker extends EventTarget {
     this.#worker = startWorker();
     this.#worker.addEventListener('message', ({ data }) => this.#take(data));
     this.#worker.addEventListener('error', (event) => this.#emit('error', { message: event.message ?? 'the worker cannot be started' }));
-    this.#worker.postMessage({ type: 'open', module, point, source });
+    this.#worker.postMessage({ type: 'open', module, point, source: located(source) });
   }
 
   /** The next bytes of a source that is pushed; `total` is the length of the stream, if that is known. */

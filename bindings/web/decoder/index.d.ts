@@ -130,7 +130,7 @@ export class Decoder {
 }
 
 /**
- * A stream: at an address, in memory, or pushed in pieces. Or a package for DASH: at the address of its `manifest.json`, of its
+ * A stream: at an address, which may be relative to the page, in memory, or pushed in pieces. Or a package for DASH: at the address of its `manifest.json`, of its
  * folder, or of its MPD. `url` takes both: a folder ends with a slash, an MPD with `.mpd`, and anything else is a package if it
  * is JSON. `package` needs no slash.
  */
@@ -210,8 +210,8 @@ export class DecoderWorker extends EventTarget {
   push(bytes: Uint8Array, total?: number | null): void;
   /** No more bytes will be pushed. */
   finish(): void;
-  /** Asks for a frame, sorted for a view: the answer is `frame` with this index or a higher one, or `end`. */
-  show(index: number, view: View): void;
+  /** Asks for a frame, sorted for a view, or with null not sorted: the answer is `frame` with this index or a higher one, or `end`. */
+  show(index: number, view: View | null): void;
   /** Sorts the frame that was given last for another view. */
   sort(view: View): void;
   /** Changes the operating point; frames that are asked for after this have it. `{}` leaves that of a package to the network. */

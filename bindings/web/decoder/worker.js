@@ -156,7 +156,7 @@ class Player {
     const decoded = performance.now();
     const update = this.#decoder.show();
     const packed = performance.now();
-    const order = this.#decoder.sort(this.#view.position, this.#view.ahead);
+    const order = this.#sorted();
     const sorted = performance.now();
     [this.#shown, this.#until] = [frame.index, frame.until];
     const times = { decode: decoded - start, pack: packed - decoded, sort: sorted - packed };
@@ -170,8 +170,14 @@ class Player {
 
   #order() {
     const start = performance.now();
-    const order = this.#decoder.sort(this.#view.position, this.#view.ahead);
+    const order = this.#sorted();
     post({ type: 'order', order, time: performance.now() - start }, [order.slots.buffer]);
+  }
+
+  /** The order for the view; an empty one for those who sort themselves, and give none. */
+  #sorted() {
+    if (this.#view === null) return { slots: new Uint32Array(0), near: 0 };
+    return this.#decoder.sort(this.#view.position, this.#view.ahead);
   }
 
   #takeWarnings() {

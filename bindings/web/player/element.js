@@ -7,6 +7,7 @@ import { listenToKeys } from './keys.js';
 import { Losses } from './losses.js';
 import { figures, pointPanel, pointText, trackFigures } from './panel.js';
 import { Playback } from './playback.js';
+import { Scene } from './renderer.js';
 import { Splitter } from './splitter.js';
 import { Stage } from './stage.js';
 import { TEMPLATE } from './template.js';
@@ -161,15 +162,7 @@ export class SplatPlayer extends HTMLElement {
   /** Goes to a frame; resolves with the frame that is shown then. */
   async seek(index) {
     this.#playback.seek(index);
-    const [track] = this.#tracks;
-    await new Promise((resolve) => {
-      const listen = () => {
-        if (!track.isSettled) return;
-        for (const name of ['shown', 'ended', 'failed']) track.removeEventListener(name, listen);
-        resolve();
-      };
-      for (const name of ['shown', 'ended', 'failed']) track.addEventListener(name, listen);
-    });
+    await this.#tracks[0].settled();
     return this.frame;
   }
 
@@ -236,7 +229,7 @@ export class SplatPlayer extends HTMLElement {
 
   #addTrack(point) {
     const options = { point, module: this.module, startWorker: this.startWorker };
-    const track = new Track(this.#source, options, this.#stage.renderer, this.#controls);
+    const track = new Track(this.#source, options, new Scene(this.#stage.renderer), this.#controls);
     this.#tracks.push(track);
     const on = (type, handler) => track.addEventListener(type, handler);
     on('shown', ({ detail }) => this.#shown(track, detail));
@@ -265,8 +258,7 @@ export class SplatPlayer extends HTMLElement {
     const title = this.#find('title');
     title.textContent = description.title;
     title.hidden = !description.title;
-    this.#playback.frames = description.frames;
-    this.#playback.frameSeconds = description.frameSeconds || 1 / 30;
+    this.#playback.describe(description);
     this.#retheme();
     const [track] = this.#tracks;
     track.point = { ...description.highest, ...(track.isAutomatic ? track.frame?.point : track.point) };
@@ -327,9 +319,7 @@ export class SplatPlayer extends HTMLElement {
   }
 
   #ended(track) {
-    // The stream did not say how many frames it has, or does not have as many.
-    const last = (track.frame?.index ?? -1) + 1;
-    if (this.#playback && last > 0 && this.#playback.frames === 0) this.#playback.frames = last;
+    this.#playback?.ended(track);
     if (!this.#isReady) this.#fail('There is no frame in it.');
   }
 
@@ -462,7 +452,8 @@ export class SplatPlayer extends HTMLElement {
       this.splitter.show(this.#tracks);
     }
     this.#find('compare').setAttribute('aria-pressed', String(!isOn));
-    if (!isOn && this.#openPanel === null) this.#showSide('quality');
+    // On a telephone the panel would hide what is compared.
+    if (!isOn && this.#openPanel === null && this.clientWidth > 620) this.#showSide('quality');
     else this.#fillSide();
     this.#playback.seek(this.#playback.index);
     this.#stage.invalidate();

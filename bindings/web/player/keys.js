@@ -18,7 +18,15 @@ const ACTIONS = {
   KeyI: (player) => player.press('info'),
   KeyF: (player) => player.press('fly'),
   KeyR: (player) => player.press('home'),
+  Escape: (_player, root) => closeSide(root),
 };
+
+/** Closes the panel at the side; the key that has opened it takes the focus. */
+function closeSide(root) {
+  const key = root.querySelector('[aria-expanded="true"]');
+  key?.focus();
+  key?.click();
+}
 
 /** Whether an element uses a key itself. */
 function isOwn(element, code) {
@@ -33,6 +41,6 @@ export function listenToKeys(player, root) {
     const action = ACTIONS[event.code];
     if (!action || event.ctrlKey || event.metaKey || event.altKey || isOwn(event.target, event.code)) return;
     event.preventDefault();
-    action(player);
+    action(player, root);
   });
 }

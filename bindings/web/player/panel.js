@@ -71,6 +71,8 @@ function axisSlider(axis, name, description, chosen, onchange) {
   const input = document.createElement('input');
   Object.assign(input, { type: 'range', min: 0, max: description.highest[axis], step: 1, value: chosen[axis] });
   input.dataset.axis = axis;
+  // The label is that of its first field, the output.
+  input.setAttribute('aria-label', name);
   const show = () => {
     const text = stepText(axis, Number(input.value), description);
     output.textContent = text;

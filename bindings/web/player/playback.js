@@ -61,6 +61,17 @@ export class Playback {
     for (const track of this.#tracks) track.run(this.isPlaying ? this.#speed : 0);
   }
 
+  /** Takes what the stream says of its length. */
+  describe({ frames, frameSeconds }) {
+    this.frames = frames;
+    this.frameSeconds = frameSeconds || 1 / 30;
+  }
+
+  /** Takes the end of a track: the length of a stream that did not say it. */
+  ended({ frame }) {
+    if (this.frames === 0 && frame) this.frames = frame.index + 1;
+  }
+
   play() {
     if (this.frames === 1) return;
     if (!this.isLooping && this.frames > 0 && this.index >= this.frames - 1) this.seek(0);

@@ -2,10 +2,8 @@
 
 import { ROW } from '@splatstream/decoder';
 import { FRAGMENT, VERTEX } from './shaders.js';
+import { BASE_TEXELS, SH_TEXELS } from './texels.js';
 
-/** Texels of a Gaussian in the base texture, and in that of the spherical harmonics by their degree. */
-const BASE_TEXELS = 2;
-const SH_TEXELS = [0, 2, 3, 6];
 /** Slots in a row of the texture of the order, and Gaussians of an instance: few vertices keep a GPU waiting. */
 const ORDER_ROW = 1024;
 const BATCH = 128;

@@ -5,7 +5,7 @@ export const STYLE = `
   color-scheme: light dark;
   --accent: light-dark(#2f5fd0, #8fb3ff);
   --surround: light-dark(#eceef2, #0d0f14);
-  --panel: light-dark(rgb(255 255 255 / 86%), rgb(24 27 35 / 80%));
+  --panel: light-dark(rgb(255 255 255 / 90%), rgb(24 27 35 / 88%));
   --line: light-dark(rgb(15 20 35 / 12%), rgb(255 255 255 / 12%));
   --text: light-dark(#171b26, #eef1f8);
   --faint: light-dark(#596072, #a3abbd);
@@ -47,7 +47,7 @@ button, select {
 }
 button { display: inline-grid; place-items: center; min-width: 36px; padding: 0 8px; cursor: pointer; }
 button:hover, select:hover { background: var(--hover); }
-button[aria-pressed="true"], button[aria-expanded="true"] { color: var(--accent); background: var(--hover); }
+button[aria-pressed="true"], button[aria-expanded="true"] { color: var(--accent); background: var(--hover); box-shadow: inset 0 -2px var(--accent); }
 select { padding: 0 4px; cursor: pointer; text-align: center; }
 select option { background: Canvas; color: CanvasText; }
 svg { width: 21px; height: 21px; display: block; }
@@ -95,12 +95,17 @@ dd { margin: 0; text-align: right; font-variant-numeric: tabular-nums; }
 @keyframes turn { to { rotate: 1turn; } }
 .drop { position: absolute; inset: 10px; border: 2px dashed var(--accent); border-radius: 14px; pointer-events: none; }
 @media (prefers-reduced-motion: reduce) { .ring { animation-duration: 4s; } }
+@media (forced-colors: active) { button[aria-pressed="true"], button[aria-expanded="true"] { outline: 2px solid Highlight; outline-offset: -2px; } }
 @container (max-width: 620px) {
-  .bar { padding: 6px 6px; }
+  .bar { padding: 6px; width: calc(100% - 16px); bottom: max(8px, env(safe-area-inset-bottom)); }
+  input[type="range"] { height: 30px; }
   .wide { display: none; }
-  button { min-width: 40px; min-height: 42px; padding: 0 4px; }
+  button { min-width: 38px; min-height: 44px; padding: 0 3px; }
+  select { width: 58px; padding: 0; min-height: 44px; }
   .time { padding: 0 4px; font-size: 13px; }
   .time span { display: none; }
   .side { left: 14px; right: 14px; width: auto; bottom: calc(max(14px, env(safe-area-inset-bottom)) + 104px); max-height: 52vh; }
+  .side:has(> :nth-child(2)) { grid-template-columns: 1fr 1fr; }
 }
+@container (max-width: 380px) { #info { display: none; } }
 `;

@@ -9,7 +9,7 @@ const toggle = (id, name, picture, isOn = false, more = '') => key(id, name, pic
 
 export const TEMPLATE = `
 <style>${STYLE}</style>
-<canvas id="canvas" tabindex="0" role="img" aria-label="Three-dimensional scene. Drag to look around, scroll to zoom; W A S D Q E move."></canvas>
+<canvas id="canvas" tabindex="0" role="application" aria-label="Three-dimensional scene. Arrow keys or drags look around, scrolling zooms; W A S D Q E move; space plays."></canvas>
 <button class="split" id="split" role="slider" aria-label="Where the pictures are divided" aria-valuemin="0" aria-valuemax="100" aria-valuenow="50" hidden></button>
 <div class="side-name panel" id="left-name" hidden></div>
 <div class="side-name panel" id="right-name" hidden></div>
@@ -26,7 +26,6 @@ export const TEMPLATE = `
     <ul id="lost-list"></ul>
   </details>
 </div>
-<div class="side" id="side"></div>
 <div class="bar panel" id="bar" role="group" aria-label="Playback" hidden>
   <div class="timeline" id="timeline"><input type="range" id="place" min="0" max="0" step="1" value="0" aria-label="Frame"></div>
   <div class="keys">
@@ -37,12 +36,13 @@ export const TEMPLATE = `
     </select>
     ${toggle('loop', 'Loop (L)', 'loop', true, 'class="wide"')}
     <div class="space"></div>
-    ${key('quality', 'Operating point (O)', 'layers', 'aria-expanded="false"')}
+    ${key('quality', 'Operating point (O)', 'layers', 'aria-expanded="false" aria-controls="side"')}
     ${toggle('compare', 'Compare two operating points (C)', 'compare')}
-    ${key('info', 'Figures (I)', 'info', 'aria-expanded="false"')}
+    ${key('info', 'Figures (I)', 'info', 'aria-expanded="false" aria-controls="side"')}
     ${toggle('fly', 'Fly instead of orbit (F)', 'fly', false, 'class="wide"')}
     ${key('home', 'Reset the view (R)', 'home')}
-    ${key('full', 'Full screen', 'full', 'class="wide"')}
+    ${key('full', 'Full screen', 'full', document.fullscreenEnabled ? '' : 'hidden')}
   </div>
 </div>
+<div class="side" id="side"></div>
 <div class="drop" id="drop" hidden></div>`;

@@ -1,17 +1,16 @@
 // One stream at one operating point: its worker, its Gaussians on the GPU, and the frames between them.
 
 import { DecoderWorker } from '@splatstream/decoder';
-import { Scene } from './renderer.js';
 
 /** Frames over which times and rates are averaged. */
 const AVERAGED = 12;
 
 /**
  * Asks for one frame at a time and shows it when it is due. Every answer of the worker is applied, in the order in which
- * they come: each holds what has changed since the one before.
+ * they come: each holds what has changed since the one before. `scene` takes what changes, and the orders to draw in;
+ * `controls` say from where it is seen, null where nobody needs an order.
  */
 export class Track extends EventTarget {
-  #renderer;
   #controls;
   #worker;
   /** The index that the worker has been asked for; the one to ask for after that, at once; a frame that is not due yet. */
@@ -20,11 +19,10 @@ export class Track extends EventTarget {
   #held = null;
   #history = [];
 
-  constructor(source, options, renderer, controls) {
+  constructor(source, options, scene, controls) {
     super();
-    this.#renderer = renderer;
     this.#controls = controls;
-    this.scene = new Scene(renderer);
+    this.scene = scene;
     this.frame = null;
     this.isEnded = false;
     this.error = null;
@@ -80,6 +78,19 @@ export class Track extends EventTarget {
     this.isEnded = false;
     if (this.#asked === null) this.#ask(index, true);
     else this.#next = index;
+  }
+
+  /** Resolves once the frame is there that was sought last, or cannot come. */
+  settled() {
+    const types = ['shown', 'ended', 'failed'];
+    return new Promise((resolve) => {
+      const listen = () => {
+        if (!this.isSettled) return;
+        for (const type of types) this.removeEventListener(type, listen);
+        resolve();
+      };
+      for (const type of types) this.addEventListener(type, listen);
+    });
   }
 
   /** Asks for a frame that is shown when it is released. */

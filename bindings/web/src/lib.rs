@@ -51,6 +51,7 @@ const MODULES: &[Module<'static>] = modules![
     "player/stage.js",
     "player/style.js",
     "player/template.js",
+    "player/texels.js",
     "player/track.js",
     "player/vectors.js",
 ];
