@@ -12,6 +12,7 @@ use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
 use splatstream_format::Limits;
 use splatstream_stream::Representation;
+use splatstream_stream::live::Settings;
 use splatstream_stream::manifest::{Manifest, RepresentationInfo};
 use splatstream_stream::package::{Layout, Options, Package};
 use std::path::{Path, PathBuf};
@@ -19,7 +20,8 @@ use std::slice;
 
 /// Write a stream as files for DASH: fragmented MP4, an MPD and a manifest. Nothing is decoded without --quality.
 #[derive(Args)]
-#[command(after_help = "Example:\n  splatstream package talk.gss -o talk/\n\n\
+#[command(after_help = "Examples:\n  splatstream package talk.gss -o talk/\n  \
+    splatstream encode frames/ -o - | splatstream package - -o talk/ --live\n\n\
     A file per spatial layer of the I frames and per temporal layer of the others, with a track per refinement.\n\
     What the files are is annex C of the specification; `splatstream unpackage` gives the stream back.")]
 pub(crate) struct PackageStream {
@@ -33,9 +35,17 @@ pub(crate) struct PackageStream {
     #[arg(long, value_enum, default_value_t = LayoutName::Gop)]
     layout: LayoutName,
     /// Package a stream that is still being written, GOP by GOP: files appear as they are complete, until the end unit
-    /// comes.
+    /// comes. Players follow the manifest, which is replaced with each GOP or, with --layout frame, with each frame.
     #[arg(long)]
     live: bool,
+    /// Seconds of the stream that the manifest lists while it grows, three GOPs at least; 60 or, with --layout frame, 6 by
+    /// default.
+    #[arg(long, value_name = "SECONDS", requires = "live", value_parser = seconds)]
+    window: Option<f64>,
+    /// Seconds from capture to display that players are told to aim at; two GOPs or, with --layout frame, two frames by
+    /// default.
+    #[arg(long, value_name = "SECONDS", requires = "live", value_parser = seconds)]
+    target_latency: Option<f64>,
     /// Measure what every operating point of every GOP looks like against everything, for players: PSNR and SSIM of
     /// pictures of its I frame and of a frame of each temporal layer go to the manifest.
     #[arg(long, conflicts_with = "live")]
@@ -93,7 +103,8 @@ impl PackageStream {
         let options = Options { layout, ..Options::default() };
         if self.live {
             self.clear(stale)?;
-            return live::run((&self.input, &self.out), &options, &self.limits.limits(), console);
+            let settings = self.live_settings(options);
+            return live::run((&self.input, &self.out), &settings, &self.limits.limits(), console);
         }
         let stream = StreamFile::read(&self.input)?;
         let package = package(&stream, &options, &self.limits.limits(), self.quality)?;
@@ -101,6 +112,13 @@ impl PackageStream {
         let sizes = write(&package, &self.out, slice::from_ref(&self.input))?;
         let report = Report::new(&self.out, &package.manifest, sizes);
         console.report(&report, || report.text())
+    }
+
+    fn live_settings(&self, package: Options) -> Settings {
+        let milliseconds = |seconds: f64| (seconds * 1e3) as u32;
+        let default = Settings::new(package);
+        let window_ms = self.window.map_or(default.window_ms, milliseconds);
+        Settings { window_ms, target_latency_ms: self.target_latency.map(milliseconds), ..default }
     }
 
     /// Makes the directory, without an earlier package.
@@ -162,6 +180,12 @@ pub(crate) fn write(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Re
     Ok(bytes)
 }
 
+/// From nothing to a day.
+fn seconds(text: &str) -> Result<f64, String> {
+    let found = text.parse().ok().filter(|seconds| (0.0..=86_400.0).contains(seconds));
+    found.ok_or_else(|| "a number of seconds from 0 to 86400 is expected".to_owned())
+}
+
 /// Whether a file has a name that packages have.
 fn is_of_package(path: &Path) -> bool {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
@@ -190,7 +214,7 @@ impl<'a> Report<'a> {
         Self {
             output,
             layout: &manifest.layout,
-            bytes_in: manifest.stream.bytes,
+            bytes_in: manifest.stream.bytes.unwrap_or(0),
             bytes,
             frames: Some(manifest.stream.frames),
             gops: manifest.gops.len(),

@@ -10,7 +10,7 @@ use crate::stream_file::LimitArgs;
 use clap::{Args, ValueEnum};
 use decoding::Decoding;
 use report::Report;
-use splatstream_stream::client::{Client, Options, PlayedGop};
+use splatstream_stream::client::{Client, Following, Options, PlayedGop};
 use splatstream_stream::control::{
     Bola, BufferRule, Layered, Limits, Rule, Settings, Single, ThroughputRule,
 };
@@ -21,7 +21,8 @@ use std::path::{Path, PathBuf};
 /// Play a package: fetch ranges as the network allows, decode, and report on every GOP.
 ///
 /// Every level is compared with its digest in the manifest, and every decoded frame with that in the stream. What cannot be
-/// had is named, and played without: refinements and layers, or the whole GOP if it is the base of one.
+/// had is named, and played without: refinements and layers, or the whole GOP if it is the base of one. A presentation that
+/// grows is followed until it has ended.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream play http://localhost:8080/talk/\n  \
     splatstream play talk/ --no-wait --json\n  \
@@ -49,7 +50,17 @@ pub(crate) struct Play {
     /// Seconds that are buffered at most.
     #[arg(long, value_name = "SECONDS", default_value_t = 25.0, value_parser = seconds)]
     buffer: f64,
-    /// Skip the time in which nothing is fetched: playback ends as soon as all is there.
+    /// Of a presentation that grows: start with the first GOP that is listed, not near the last one.
+    #[arg(long)]
+    from_start: bool,
+    /// Of a presentation that grows: seconds from capture to display to aim at, one and a half of the longest GOP at least;
+    /// by default what the manifest says.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    target_latency: Option<f64>,
+    /// Of a presentation that grows: end with an error if it has neither grown nor ended for so many seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
+    patience: f64,
+    /// Skip the time in which nothing is fetched: playback ends as soon as all is there. Not while the presentation grows.
     #[arg(long)]
     no_wait: bool,
     /// Fetch and check only.
@@ -147,6 +158,12 @@ impl Play {
             settings: self.settings(),
             layers: self.limit_layers.unwrap_or((u8::MAX, u8::MAX)),
             real_time: !self.no_wait,
+            following: Following {
+                from_start: self.from_start,
+                target_us: self.target_latency.map(|seconds| (seconds * 1e6) as u64),
+                patience_us: (self.patience * 1e6) as u64,
+                ..Following::default()
+            },
             ..Options::default()
         }
     }

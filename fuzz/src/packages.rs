@@ -2,9 +2,11 @@
 
 use crate::seal::sealed;
 use crate::{LIMITS, decode, streams};
-use splatstream_stream::live::Live;
+use splatstream_stream::control::Layered;
+use splatstream_stream::live::{Live, Settings};
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::{Layout, Options, Package};
+use splatstream_stream::playback::{Options as Playing, Player};
 use splatstream_stream::unpackage::unpackage;
 
 /// Names and bytes of files.
@@ -39,15 +41,40 @@ fn comes_back(stream: &[u8]) {
         presented(own.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())));
         let manifest = Manifest::parse(package.manifest.to_json().as_bytes());
         assert!(manifest.is_ok_and(|manifest| manifest.describes(stream)), "its manifest is refused");
-        let (mut live, mut changes) = (Live::new(&options, &LIMITS, ""), Vec::new());
-        for piece in stream.chunks(997) {
-            changes.extend(live.push(piece, "").expect("the whole stream was packaged"));
+        let settings = Settings { window_ms: 0, ..Settings::new(options) };
+        let (mut live, mut changes) = (Live::new(&settings, &LIMITS), Vec::new());
+        for (piece, now_ms) in stream.chunks(997).zip(0..) {
+            changes.extend(live.push(piece, now_ms).expect("the whole stream was packaged"));
         }
-        changes.extend(live.finish("").expect("the whole stream was packaged"));
+        changes.extend(live.finish(u64::MAX >> 11).expect("the whole stream was packaged"));
+        let manifests = changes.iter().filter(|change| change.name == Package::MANIFEST);
+        followed(stream, manifests.map(|change| change.bytes.as_slice()));
         presented(changes.iter().map(|change| (change.name.as_str(), change.bytes.as_slice())));
         let bytes: usize = changes.iter().map(|change| change.bytes.len()).sum();
         assert!(bytes >= stream.len(), "bytes are lost");
     }
+}
+
+/// Manifests of a stream that grows are read, each goes on from the one before, and the last one is of the stream.
+fn followed<'a>(stream: &[u8], manifests: impl Iterator<Item = &'a [u8]>) {
+    let mut player: Option<Player<Layered>> = None;
+    let mut last = None;
+    for text in manifests {
+        described(text);
+        let manifest =
+            Manifest::parse(text).unwrap_or_else(|error| panic!("its manifest is refused: {error}"));
+        match &mut player {
+            Some(player) => player.renew(0, manifest.clone()).expect("it is that of the same stream"),
+            None => {
+                player = Player::new(manifest.clone(), Playing::default(), Layered::default(), 0).ok();
+            }
+        }
+        last = Some(manifest);
+    }
+    assert!(
+        last.is_some_and(|manifest| manifest.describes(stream)),
+        "its last manifest is of another stream"
+    );
 }
 
 /// MPDs are XML, in which what refers to a Representation names one.

@@ -18,18 +18,19 @@
 mod clock;
 mod download;
 mod player;
+mod poll;
 mod report;
 mod source;
 
 use crate::control::Settings;
 use crate::manifest::{Manifest, ManifestError};
 use crate::package::Package;
-use crate::playback::PlaybackError;
+use crate::playback::{Fault, PlaybackError};
 use source::Source;
 use std::fmt;
 use std::time::Duration;
 
-pub use crate::playback::{GopLog, Loss, PlayedGop};
+pub use crate::playback::{Following, GopLog, Loss, PlayedGop};
 pub use report::{Outcome, Screen};
 
 /// How a client plays, and what it takes from a server.
@@ -39,7 +40,10 @@ pub struct Options {
     pub settings: Settings,
     /// The highest spatial and temporal layer that are fetched; higher numbers than there are fetch all.
     pub layers: (u8, u8),
-    /// Whether time passes as it does. Otherwise playback skips the time in which nothing is being fetched.
+    /// How a presentation that grows is followed.
+    pub following: Following,
+    /// Whether time passes as it does. Otherwise playback skips the time in which nothing is being fetched, unless the
+    /// presentation grows.
     pub real_time: bool,
     /// To establish a connection.
     pub connect_timeout: Duration,
@@ -64,6 +68,7 @@ impl Default for Options {
         Self {
             settings: Settings::default(),
             layers: (u8::MAX, u8::MAX),
+            following: Following::default(),
             real_time: true,
             connect_timeout: Duration::from_secs(10),
             read_timeout: Duration::from_secs(10),
@@ -88,6 +93,10 @@ pub enum ClientError {
     Changed(Option<usize>),
     /// Three GOPs have more bytes than [`Options::memory`]: bytes of the largest one.
     TooLarge(u64),
+    /// A manifest that was written later has fewer GOPs than one that was read before: how many there were, and are.
+    Backwards(usize, usize),
+    /// A presentation has neither grown nor ended for so many microseconds.
+    Stopped(u64),
 }
 
 impl fmt::Display for ClientError {
@@ -97,6 +106,10 @@ impl fmt::Display for ClientError {
             Self::Manifest(error) => write!(f, "the manifest is refused: {error}"),
             Self::Changed(gop) => PlaybackError::Changed(*gop).fmt(f),
             Self::TooLarge(bytes) => PlaybackError::TooLarge(*bytes).fmt(f),
+            Self::Backwards(known, listed) => {
+                PlaybackError::Backwards { known: *known, listed: *listed }.fmt(f)
+            }
+            Self::Stopped(us) => PlaybackError::Stopped(*us).fmt(f),
         }
     }
 }
@@ -108,6 +121,8 @@ impl From<PlaybackError> for ClientError {
         match error {
             PlaybackError::Changed(gop) => Self::Changed(gop),
             PlaybackError::TooLarge(bytes) => Self::TooLarge(bytes),
+            PlaybackError::Backwards { known, listed } => Self::Backwards(known, listed),
+            PlaybackError::Stopped(us) => Self::Stopped(us),
         }
     }
 }
@@ -123,6 +138,8 @@ impl From<ManifestError> for ClientError {
 pub struct Client {
     source: Source,
     manifest: Manifest,
+    /// The version of the manifest, if the server gives one.
+    tag: Option<String>,
     options: Options,
 }
 
@@ -134,8 +151,8 @@ impl Client {
     /// A manifest that cannot be had or is refused.
     pub fn open(location: &str, options: Options) -> Result<Self, ClientError> {
         let source = Source::new(location, &options);
-        let manifest = read_manifest(&source, &options)?;
-        Ok(Self { source, manifest, options })
+        let (manifest, tag) = read_manifest(&source, &options)?;
+        Ok(Self { source, manifest, tag, options })
     }
 
     /// The manifest, as it was read last, with the layers that are fetched.
@@ -144,13 +161,14 @@ impl Client {
     }
 }
 
-/// The manifest, after as many attempts as the base of a GOP gets.
-fn read_manifest(source: &Source, options: &Options) -> Result<Manifest, ClientError> {
+/// The manifest and its version, after as many attempts as the base of a GOP gets.
+fn read_manifest(source: &Source, options: &Options) -> Result<(Manifest, Option<String>), ClientError> {
     let mut wait = Duration::from_millis(100);
     let mut attempt = 1;
     loop {
-        match source.whole(Package::MANIFEST, Manifest::MAX_BYTES) {
-            Ok(bytes) => return Ok(Manifest::parse(&bytes)?.up_to(options.layers)),
+        match source.whole(Package::MANIFEST, Manifest::MAX_BYTES, None) {
+            Ok(Some((bytes, tag))) => return Ok((Manifest::parse(&bytes)?.up_to(options.layers), tag)),
+            Ok(None) => return Err(unasked(source)),
             Err(fault) if attempt >= options.base_attempts || fault.is_final() => {
                 return Err(ClientError::Unreachable(source.place(Package::MANIFEST), fault.to_string()));
             }
@@ -159,4 +177,9 @@ fn read_manifest(source: &Source, options: &Options) -> Result<Manifest, ClientE
         attempt = attempt.saturating_add(1);
         wait = wait.saturating_mul(2).min(Duration::from_millis(3200));
     }
+}
+
+/// A server says that a file has not changed, which nobody asked.
+fn unasked(source: &Source) -> ClientError {
+    ClientError::Unreachable(source.place(Package::MANIFEST), Fault::Status(304).to_string())
 }

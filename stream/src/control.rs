@@ -24,6 +24,7 @@ mod baselines;
 mod driven;
 pub(crate) mod ladder;
 mod layered;
+mod live;
 pub(crate) mod number;
 mod options;
 mod plan;

@@ -21,6 +21,9 @@ pub struct Manifest {
     pub stream: StreamInfo,
     /// What a subsegment is: `gop` or `frame`.
     pub layout: String,
+    /// C.9: of a live package.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub live: Option<LiveInfo>,
     /// In order of dependence.
     pub representations: Vec<RepresentationInfo>,
     /// In order.
@@ -39,10 +42,10 @@ pub struct StreamInfo {
     pub profile: u8,
     /// Annex A: 1 to 4.
     pub level: u8,
-    /// Bytes of the stream.
-    pub bytes: u64,
-    /// Of the stream.
-    pub digest: String,
+    /// Bytes of the stream; none while it grows.
+    pub bytes: Option<u64>,
+    /// Of the stream; none while it grows.
+    pub digest: Option<String>,
     /// Frames up to the end of the last GOP, up to 2^32.
     pub frames: u64,
     /// Degree of the spherical harmonics, 0 to 3.
@@ -61,12 +64,29 @@ pub struct StreamInfo {
     pub ticks_per_frame: u32,
 }
 
-/// A Representation: a file.
+/// A live package: of segment files, to which more come while it grows. Times are those of the packager's clock.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LiveInfo {
+    /// `growing` or `ended`.
+    pub state: String,
+    /// Number of the first GOP in [`Manifest::gops`], counted from 0.
+    pub first_gop: u64,
+    /// When the frame with display index 0 was made, milliseconds since 1970.
+    pub started_ms: u64,
+    /// When this manifest was written, milliseconds since 1970.
+    pub published_ms: u64,
+    /// Time from capture to display that players aim at, milliseconds.
+    pub target_latency_ms: u32,
+    /// Time from one manifest to the next while it grows, milliseconds, 1 or more.
+    pub update_ms: u32,
+}
+
+/// A Representation: a file, or files of which this is the first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RepresentationInfo {
     /// `s0` to `s3`, `t0` to `t3`.
     pub id: String,
-    /// The name of its file, beside the manifest.
+    /// The name of its file, beside the manifest; of a live package that of the initialisation segment.
     pub file: String,
     /// `I`, `P` or `B`.
     pub frame_type: String,
@@ -84,10 +104,13 @@ pub struct RepresentationInfo {
     pub bytes: u64,
     /// `ftyp` and `moov`.
     pub init: ByteRange,
-    /// `sidx` and `ssix`; none without GOPs.
+    /// `sidx` and `ssix`; none without GOPs, and in a live package.
     pub index: Option<ByteRange>,
     /// `gssT`, in the base alone.
     pub tail: Option<ByteRange>,
+    /// The file that the tail of a live package is in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tail_file: Option<String>,
 }
 
 /// Bytes of a file.
@@ -114,6 +137,9 @@ pub struct GopInfo {
     pub predicted: bool,
     /// `temporal_depth`, 0 to 3.
     pub temporal_depth: u8,
+    /// Whether frames of it may still come.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub growing: bool,
     /// By Representation, then in order.
     pub subsegments: Vec<SubsegmentInfo>,
 }
@@ -123,6 +149,9 @@ pub struct GopInfo {
 pub struct SubsegmentInfo {
     /// Of which Representation.
     pub representation: String,
+    /// The file of a live package that it is in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// Its frames, which are the samples of each track; none where the GOP has nothing for the Representation.
     pub frames: Vec<FrameInfo>,
     /// A range of bytes for each refinement, one after the other.
@@ -219,6 +248,12 @@ impl fmt::Display for ManifestError {
 
 impl std::error::Error for ManifestError {}
 
+/// Whether a key is left out.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands references")]
+const fn is_false(value: &bool) -> bool {
+    !*value
+}
+
 /// The clause that defines the manifest.
 pub(crate) const CLAUSE: &str = "C.8";
 
@@ -250,7 +285,18 @@ impl Manifest {
 
     /// Whether a stream is the one that was packaged.
     pub fn describes(&self, stream: &[u8]) -> bool {
-        u64::try_from(stream.len()) == Ok(self.stream.bytes) && digest_of(&[stream]) == self.stream.digest
+        let bytes = u64::try_from(stream.len()).ok();
+        bytes.is_some() && bytes == self.stream.bytes && Some(digest_of(&[stream])) == self.stream.digest
+    }
+
+    /// Whether GOPs, or frames of the last one, may still come.
+    pub fn is_growing(&self) -> bool {
+        self.live.as_ref().is_some_and(|live| live.state == LiveInfo::GROWING)
+    }
+
+    /// Number of the first GOP that is listed, counted from 0.
+    pub fn first_gop(&self) -> u64 {
+        self.live.as_ref().map_or(0, |live| live.first_gop)
     }
 
     /// The manifest as JSON, with a line feed at the end.
@@ -260,6 +306,22 @@ impl Manifest {
         text.push('\n');
         text
     }
+
+    /// The manifest as JSON with GOPs in JSON in place of its own, of which there are none.
+    pub(crate) fn to_json_with<'a>(&self, gops: impl Iterator<Item = &'a str>) -> String {
+        let text = self.to_json();
+        // Quotes within strings have a backslash before them, so no string has these characters.
+        let Some((before, after)) = text.split_once("\"gops\":[]") else { return text };
+        let gops: Vec<&str> = gops.collect();
+        [before, "\"gops\":[", &gops.join(","), "]", after].concat()
+    }
+}
+
+impl LiveInfo {
+    /// What `state` is while GOPs may come.
+    pub const GROWING: &'static str = "growing";
+    /// What `state` is from the end of the stream on.
+    pub const ENDED: &'static str = "ended";
 }
 
 impl ByteRange {
@@ -271,7 +333,33 @@ impl ByteRange {
 
 /// The digest of bytes that follow each other.
 pub(crate) fn digest_of(parts: &[&[u8]]) -> String {
-    let mut hash = Xxh64::new(0);
-    parts.iter().for_each(|part| hash.write(part));
-    format!("{:016x}", hash.finish())
+    let mut digest = Digest::default();
+    parts.iter().for_each(|part| digest.add(part));
+    digest.text()
+}
+
+/// The digest of bytes that come in pieces.
+pub(crate) struct Digest(Xxh64);
+
+impl Digest {
+    pub(crate) fn add(&mut self, bytes: &[u8]) {
+        self.0.write(bytes);
+    }
+
+    /// Of all bytes so far.
+    pub(crate) fn text(&self) -> String {
+        format!("{:016x}", self.0.finish())
+    }
+}
+
+impl Default for Digest {
+    fn default() -> Self {
+        Self(Xxh64::new(0))
+    }
+}
+
+impl fmt::Debug for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Digest").field(&self.text()).finish()
+    }
 }

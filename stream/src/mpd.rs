@@ -2,43 +2,27 @@
 
 mod live;
 
-use crate::manifest::{ByteRange, GopInfo, Manifest, RepresentationInfo};
+use crate::manifest::{ByteRange, Manifest, RepresentationInfo};
 use crate::package::Layout;
 use std::fmt::Write;
 
 /// What an ordinary DASH client does not know, so that it passes over the AdaptationSet.
 pub const SCHEME: &str = "urn:splatstream:dash:carriage:1";
 
-/// Where segments are.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Segments<'a> {
-    /// In a file of each Representation, which is complete.
-    Files,
-    /// In a file of each GOP. More may come unless `is_end`.
-    Numbered {
-        /// When the stream began, and what time it is.
-        started: &'a str,
-        now: &'a str,
-        is_end: bool,
-        /// The GOP in progress, if its files are there already.
-        growing: Option<&'a GopInfo>,
-    },
-}
-
-/// The MPD of a package.
-pub(crate) fn of(manifest: &Manifest, segments: Segments<'_>) -> String {
+/// The MPD of a package. That of a live one shall list all GOPs, of which nothing but their frames is needed.
+pub(crate) fn of(manifest: &Manifest) -> String {
     let mut xml = Xml::default();
     xml.out.push_str("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    let longest = duration(manifest, longest(manifest, segments).into());
+    let longest = duration(manifest, longest(manifest).into());
     let mut attributes = vec![
         ("xmlns", "urn:mpeg:dash:schema:mpd:2011".to_owned()),
         ("profiles", "urn:mpeg:dash:profile:full:2011".to_owned()),
     ];
-    match segments {
-        Segments::Numbered { started, now, is_end: false, .. } => attributes.extend([
+    match &manifest.live {
+        Some(live) if manifest.is_growing() => attributes.extend([
             ("type", "dynamic".to_owned()),
-            ("availabilityStartTime", started.to_owned()),
-            ("publishTime", now.to_owned()),
+            ("availabilityStartTime", live::date_time(live.started_ms)),
+            ("publishTime", live::date_time(live.published_ms)),
             ("minimumUpdatePeriod", longest.clone()),
         ]),
         _ => attributes.extend([
@@ -48,15 +32,15 @@ pub(crate) fn of(manifest: &Manifest, segments: Segments<'_>) -> String {
     }
     attributes.push(("minBufferTime", longest));
     xml.element("MPD", &attributes, |xml| {
-        live::service(xml, manifest, segments);
+        live::service(xml, manifest);
         xml.element("Period", &[("id", "0".to_owned()), ("start", "PT0S".to_owned())], |xml| {
-            adaptation_set(xml, manifest, segments);
+            adaptation_set(xml, manifest);
         });
     });
     xml.out
 }
 
-fn adaptation_set(xml: &mut Xml, manifest: &Manifest, segments: Segments<'_>) {
+fn adaptation_set(xml: &mut Xml, manifest: &Manifest) {
     let stream = &manifest.stream;
     let set = [
         ("id", "0".to_owned()),
@@ -68,25 +52,19 @@ fn adaptation_set(xml: &mut Xml, manifest: &Manifest, segments: Segments<'_>) {
     xml.element("AdaptationSet", &set, |xml| {
         let scheme = [("schemeIdUri", SCHEME.to_owned()), ("value", stream.specification.clone())];
         xml.empty("EssentialProperty", &scheme);
-        live::clock(xml, manifest, segments);
+        live::clock(xml, manifest);
         for level in 1..=stream.refinements.len() {
             let component = [("id", level.to_string()), ("contentType", "application".to_owned())];
             xml.empty("ContentComponent", &component);
         }
-        live::template(xml, manifest, segments);
+        live::template(xml, manifest);
         for (index, one) in manifest.representations.iter().enumerate() {
-            representation(xml, manifest, index, one, segments);
+            representation(xml, manifest, index, one);
         }
     });
 }
 
-fn representation(
-    xml: &mut Xml,
-    manifest: &Manifest,
-    index: usize,
-    one: &RepresentationInfo,
-    segments: Segments<'_>,
-) {
+fn representation(xml: &mut Xml, manifest: &Manifest, index: usize, one: &RepresentationInfo) {
     let mut attributes = vec![("id", one.id.clone()), ("bandwidth", one.bandwidth.to_string())];
     if !one.depends_on.is_empty() {
         attributes.push(("dependencyId", one.depends_on.join(" ")));
@@ -96,7 +74,7 @@ fn representation(
         attributes.push(("startWithSAP", "1".to_owned()));
     }
     xml.element("Representation", &attributes, |xml| {
-        let is_file = matches!(segments, Segments::Files);
+        let is_file = manifest.live.is_none();
         if is_file {
             xml.text("BaseURL", &one.file);
         }
@@ -145,7 +123,8 @@ fn frame_rate(manifest: &Manifest, index: usize) -> Option<String> {
     // Spatial layers show the same frames.
     let temporal = taken.filter(|one| one.id == "s0" || one.frame_type != "I");
     let shown: u64 = temporal.map(|one| u64::from(one.frames)).sum();
-    let all = manifest.gops.iter().map(|gop| u64::from(gop.frame_count)).fold(0, u64::saturating_add);
+    let complete = manifest.gops.iter().filter(|gop| !gop.growing);
+    let all = complete.map(|gop| u64::from(gop.frame_count)).fold(0, u64::saturating_add);
     let stream = &manifest.stream;
     let rate = u128::from(shown).checked_mul(stream.ticks_per_second.into())?;
     let over = u128::from(all).checked_mul(stream.ticks_per_frame.into())?;
@@ -165,18 +144,9 @@ fn common_divisor(mut a: u128, mut b: u128) -> u128 {
     a
 }
 
-/// The GOPs that there are files of.
-fn gops<'a>(manifest: &'a Manifest, segments: Segments<'a>) -> impl Iterator<Item = &'a GopInfo> {
-    let growing = match segments {
-        Segments::Numbered { growing, .. } => growing,
-        Segments::Files => None,
-    };
-    manifest.gops.iter().chain(growing)
-}
-
 /// Frames of the longest GOP.
-fn longest(manifest: &Manifest, segments: Segments<'_>) -> u32 {
-    gops(manifest, segments).map(|gop| gop.frame_count).max().unwrap_or(0)
+fn longest(manifest: &Manifest) -> u32 {
+    manifest.gops.iter().map(|gop| gop.frame_count).max().unwrap_or(0)
 }
 
 /// Frames as an `xs:duration`.

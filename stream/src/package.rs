@@ -154,7 +154,7 @@ impl<'a> Package<'a> {
             files.push(describer.file(file));
         }
         let manifest = describer.manifest();
-        let mpd = mpd::of(&manifest, mpd::Segments::Files);
+        let mpd = mpd::of(&manifest);
         Ok(Self { stream, files, manifest, mpd })
     }
 

@@ -5,7 +5,7 @@
 //! shown, with the operating point to decode them at. Equal events give equal answers on every machine.
 //!
 //! ```
-//! use splatstream_stream::control::{Layered, Playback};
+//! use splatstream_stream::control::Layered;
 //! use splatstream_stream::manifest::Manifest;
 //! use splatstream_stream::package::{Options as Packaging, Package};
 //! use splatstream_stream::playback::{Command, Options, Player};
@@ -19,7 +19,7 @@
 //! let manifest = Manifest::parse(package.manifest.to_json().as_bytes())?;
 //! let mut player = Player::new(manifest, Options::default(), Layered::default(), 0)?;
 //! let (mut now_us, mut shown) = (0, 0);
-//! while player.state().playback() != Playback::Ended {
+//! while !player.has_ended() {
 //!     match player.decide(now_us) {
 //!         Command::Fetch(requests) => {
 //!             for request in requests {
@@ -32,7 +32,7 @@
 //!             }
 //!         }
 //!         Command::Wait { until_us } => now_us = until_us,
-//!         Command::Abandon | Command::ReadManifest => unreachable!("this network is good"),
+//!         Command::Abandon | Command::ReadManifest | Command::PollManifest => unreachable!("this network is good"),
 //!     }
 //!     while let Some(gop) = player.show() {
 //!         assert!(gop.point.is_some() && !gop.units.is_empty());
@@ -44,7 +44,9 @@
 //! ```
 
 mod driven;
+mod error;
 mod fault;
+mod follow;
 mod parts;
 mod report;
 mod same;
@@ -54,12 +56,16 @@ use crate::control::number::size;
 use crate::control::{Decision, Fetch, Gop, Ladder, OperatingPoint, Rule, Session, Settings, State};
 use crate::manifest::{GopInfo, Manifest};
 use driven::Viewer;
+use follow::Follow;
 use parts::{Kind, Part, parts, requests};
+use same::check_same;
 use std::collections::{BTreeMap, BTreeSet};
-use std::{fmt, mem};
+use std::mem;
 use store::Store;
 
+pub use error::PlaybackError;
 pub use fault::Fault;
+pub use follow::Following;
 pub use parts::ByteRequest;
 pub use report::{GopLog, Loss, PlayedGop};
 
@@ -74,38 +80,22 @@ pub struct Options {
     pub base_attempts: u32,
     /// Bytes of the package that are held at the same time.
     pub memory: u64,
+    /// Of a presentation that grows.
+    pub following: Following,
 }
 
 impl Default for Options {
     /// 3 attempts and 8 for the base, 1 GiB.
     fn default() -> Self {
-        Self { settings: Settings::default(), attempts: 3, base_attempts: 8, memory: 1 << 30 }
-    }
-}
-
-/// Why nothing, or no more, can be played.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum PlaybackError {
-    /// The package has become another one: the first GOP that differs, or none if all do.
-    Changed(Option<usize>),
-    /// Three GOPs have more bytes than [`Options::memory`]: bytes of the largest one.
-    TooLarge(u64),
-}
-
-impl fmt::Display for PlaybackError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Changed(None) => write!(f, "the package was replaced by another one while it was played"),
-            Self::Changed(Some(gop)) => {
-                write!(f, "the package changed while it was played, from GOP {gop} on")
-            }
-            Self::TooLarge(bytes) => write!(f, "a GOP of {bytes} bytes is too large to be buffered"),
+        Self {
+            settings: Settings::default(),
+            attempts: 3,
+            base_attempts: 8,
+            memory: 1 << 30,
+            following: Following::default(),
         }
     }
 }
-
-impl std::error::Error for PlaybackError {}
 
 /// What the caller of a player does next.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -117,6 +107,9 @@ pub enum Command {
     Abandon,
     /// Read the manifest again, and give it to [`Player::renew`]. Nothing is fetched until then.
     ReadManifest,
+    /// Read the manifest of a presentation that grows, beside all else, if it is another one than before; say what came to
+    /// [`Player::renew`], [`Player::unchanged`] or [`Player::unreadable`].
+    PollManifest,
     /// Ask again at this time or after the next event, whatever comes first.
     Wait {
         /// Microseconds of the caller's clock.
@@ -155,6 +148,10 @@ pub struct Player<R> {
     running: Option<Running>,
     /// Whether the manifest has to be read again, and whether the caller does so.
     renewal: Renewal,
+    /// Set while the presentation grows.
+    follow: Option<Follow>,
+    /// Whether the caller is to give its requests up.
+    gives_up: bool,
     /// Per GOP, Representation and piece: requests that were of no use, and those among them that brought damaged bytes.
     faults: BTreeMap<(usize, usize, u8), (u32, u32)>,
     /// Representations whose files the server refuses, and how often in a row it did so.
@@ -190,17 +187,28 @@ impl<R: Rule> Player<R> {
     ///
     /// # Errors
     /// A package whose GOPs are too large.
-    pub fn new(manifest: Manifest, options: Options, rule: R, now_us: u64) -> Result<Self, PlaybackError> {
+    pub fn new(
+        mut manifest: Manifest,
+        options: Options,
+        rule: R,
+        now_us: u64,
+    ) -> Result<Self, PlaybackError> {
+        let follow = Follow::begin(&mut manifest, &options.following, now_us);
         let ladder = manifest.ladder().map_err(|_| PlaybackError::Changed(None))?;
         let settings = settings(&options, &ladder)?;
-        let logs = manifest.gops.iter().map(log).collect();
-        Ok(Self {
+        let live = settings.live;
+        let first = usize::try_from(manifest.first_gop()).unwrap_or(usize::MAX);
+        let numbered = manifest.gops.iter().zip(first..);
+        let logs = numbered.map(|(gop, number)| log(number, gop)).collect();
+        let mut player = Self {
             manifest,
             options,
             session: Session::new(ladder, settings, rule, now_us),
             store: Store::default(),
             running: None,
             renewal: Renewal::None,
+            follow,
+            gives_up: false,
             faults: BTreeMap::new(),
             refused: BTreeSet::new(),
             refusals: BTreeMap::new(),
@@ -212,7 +220,11 @@ impl<R: Rule> Player<R> {
             streak: 0,
             fetch: None,
             viewer: None,
-        })
+        };
+        player
+            .session
+            .set(now_us, Settings { live: player.live().or(live), ..player.state().settings().clone() });
+        Ok(player)
     }
 
     /// The manifest, as it was read last.
@@ -252,7 +264,8 @@ impl<R: Rule> Player<R> {
 
     /// What to do now.
     pub fn decide(&mut self, now_us: u64) -> Command {
-        if self.viewer.as_mut().is_some_and(|viewer| mem::take(&mut viewer.abandons)) {
+        let seeks = self.viewer.as_mut().is_some_and(|viewer| mem::take(&mut viewer.abandons));
+        if mem::take(&mut self.gives_up) || seeks {
             return Command::Abandon;
         }
         match self.renewal {
@@ -265,6 +278,9 @@ impl<R: Rule> Player<R> {
                 return self.wait(now_us, u64::MAX);
             }
             Renewal::None => {}
+        }
+        if self.reads(now_us) {
+            return Command::PollManifest;
         }
         while self.streak < DECISIONS {
             self.streak = self.streak.saturating_add(1);
@@ -288,12 +304,12 @@ impl<R: Rule> Player<R> {
         let end_us = self.session.state().gop_end_us().unwrap_or(u64::MAX);
         let is_busy = self.running.is_some() || self.renewal != Renewal::None;
         let tick_us = if is_busy { now_us.saturating_add(TICK_US) } else { u64::MAX };
-        Command::Wait { until_us: wake_us.min(end_us).min(tick_us) }
+        Command::Wait { until_us: wake_us.min(end_us).min(tick_us).min(self.next_reading_us()) }
     }
 
     fn send(&mut self, now_us: u64, fetch: Fetch) -> Command {
-        let parts = parts(&self.manifest, &fetch, |representation| !self.store.has_init(representation));
-        let requests = requests(&self.manifest, &parts);
+        let mut parts = parts(&self.manifest, &fetch, |representation| !self.store.has_init(representation));
+        let requests = requests(&mut parts);
         self.running = Some(Running { parts, next: 0, buffer: Vec::new(), before: 0 });
         self.fetch = Some(fetch);
         if requests.is_empty() {
@@ -307,6 +323,11 @@ impl<R: Rule> Player<R> {
         {
             self.count(gop, |log| log.abandoned = log.abandoned.saturating_add(1));
         }
+    }
+
+    /// The number of a GOP in the stream.
+    fn number_of(&self, gop: usize) -> usize {
+        self.logs.get(gop).map_or(gop, |log| log.number)
     }
 
     fn count(&mut self, gop: usize, add: impl FnOnce(&mut GopLog)) {
@@ -345,14 +366,17 @@ impl<R: Rule> Player<R> {
         let arrived = size(bytes.len());
         self.count(self.fetched_gop(), |log| log.bytes = log.bytes.saturating_add(arrived));
         while let Some(running) = &mut self.running {
-            let Some(part) = running.parts.get(running.next) else { break };
+            let Some(part) = running.parts.get_mut(running.next) else { break };
+            let between = size(bytes.len()).min(part.gap);
+            part.gap = part.gap.saturating_sub(between);
+            bytes = bytes.get(usize::try_from(between).unwrap_or(usize::MAX)..).unwrap_or_default();
             let missing = part.range.size.saturating_sub(size(running.buffer.len()));
             let (own, rest) = bytes
                 .split_at_checked(usize::try_from(missing).unwrap_or(usize::MAX))
                 .unwrap_or((bytes, &[]));
             running.buffer.extend_from_slice(own);
             bytes = rest;
-            if size(running.buffer.len()) < part.range.size {
+            if part.gap > 0 || size(running.buffer.len()) < part.range.size {
                 break;
             }
             let whole = mem::take(&mut running.buffer);
@@ -420,38 +444,20 @@ impl<R: Rule> Player<R> {
             Kind::Level { level, .. } => level,
         };
         self.losses.push(Loss {
-            gop: part.gop,
+            gop: self.number_of(part.gop),
+            count: 1,
             representation: representation.unwrap_or_default(),
             refinement,
             reason: fault.to_string(),
         });
     }
 
-    /// The manifest has been read again, with the layers that are fetched. Playback goes on if it is that of the same package,
-    /// to which GOPs may have been added.
-    ///
-    /// # Errors
-    /// A package that has become another one.
-    pub fn renew(&mut self, now_us: u64, manifest: Manifest) -> Result<(), PlaybackError> {
-        let known = self.manifest.gops.len();
-        same::check_same(&self.manifest, &manifest)?;
-        self.manifest = manifest;
-        self.renewal = Renewal::None;
-        for gop in known..self.manifest.gops.len() {
-            let Some((info, description)) = self.manifest.gops.get(gop).zip(self.manifest.description(gop))
-            else {
-                break;
-            };
-            self.logs.push(log(info));
-            let pushed = self.session.push(now_us, description);
-            pushed.map_err(|_| PlaybackError::Changed(Some(gop)))?;
-        }
-        Ok(())
-    }
-
     /// The next GOP that has begun and was not taken yet. To be asked until there is none.
     pub fn show(&mut self) -> Option<PlayedGop<'_>> {
         let number = if self.viewer.is_some() { self.driven_gop()? } else { self.next_gop()? };
+        if self.session.state().is_skipped(number) {
+            return self.show();
+        }
         let state = self.session.state();
         let shown = state.shown().iter().rev().find(|shown| shown.gop == number).copied();
         let shown = shown.filter(|_| !state.is_lost(number));
@@ -469,7 +475,7 @@ impl<R: Rule> Player<R> {
         let point = shown.map(|shown| decodable(&self.manifest, shown.point));
         self.count(number, |log| (log.shown, log.buffer_us) = (shown, buffer_us));
         let log = self.logs.get(number)?;
-        Some(PlayedGop { number, point, head: self.store.head(), units: &self.units, log })
+        Some(PlayedGop { number: log.number, point, head: self.store.head(), units: &self.units, log })
     }
 
     /// The next GOP that has begun by the clock. Those before it go away.
@@ -485,9 +491,11 @@ impl<R: Rule> Player<R> {
 
     /// Names Representations whose bytes are what was packaged, and malformed nevertheless.
     fn name_malformed(&mut self, gop: usize, malformed: Vec<usize>) {
+        let gop = self.number_of(gop);
         let infos = malformed.into_iter().filter_map(|index| self.manifest.representations.get(index));
         self.losses.extend(infos.map(|info| Loss {
             gop,
+            count: 1,
             representation: info.id.clone(),
             refinement: 0,
             reason: "the file was packaged wrongly".to_owned(),
@@ -495,8 +503,8 @@ impl<R: Rule> Player<R> {
     }
 }
 
-fn log(gop: &GopInfo) -> GopLog {
-    GopLog { first_frame: gop.first_frame, frame_count: gop.frame_count, ..GopLog::default() }
+fn log(number: usize, gop: &GopInfo) -> GopLog {
+    GopLog { number, first_frame: gop.first_frame, frame_count: gop.frame_count, ..GopLog::default() }
 }
 
 /// The settings with a buffer that fits into the memory.

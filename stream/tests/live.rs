@@ -8,30 +8,42 @@ use common::mpd::check;
 use common::{File, is_conforming, vectors, worked_example};
 use proptest::prelude::*;
 use roxmltree::Document;
+use serde_json::Value;
 use splatstream_format::Limits;
 use splatstream_format::arbitrary_stream::ArbitraryStream;
 use splatstream_stream::Representation;
-use splatstream_stream::live::{Change, Live};
-use splatstream_stream::package::{Layout, Options};
+use splatstream_stream::live::{Change, Live, Settings};
+use splatstream_stream::manifest::{ByteRange, LiveInfo, Manifest};
+use splatstream_stream::package::{Layout, Options, Package};
 use splatstream_stream::unpackage::unpackage;
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
-const START: &str = "2026-01-01T00:00:00Z";
+/// The time when the first bytes come.
+const START: u64 = 1_767_225_600_000;
+
+fn settings(layout: Layout) -> Settings {
+    Settings::new(Options { layout, ..Options::default() })
+}
 
 /// A directory to which changes are made.
 #[derive(Default)]
 struct Directory {
     files: BTreeMap<String, Vec<u8>>,
     mpds: Vec<String>,
+    manifests: Vec<Manifest>,
 }
 
 impl Directory {
     fn apply(&mut self, changes: Vec<Change>) {
         for Change { name, bytes, appends } in changes {
-            if name == "manifest.mpd" {
+            if name == Package::MPD {
                 let mpd = String::from_utf8(bytes).unwrap();
                 self.check(&mpd);
                 self.mpds.push(mpd);
+            } else if name == Package::MANIFEST {
+                assert!(!appends, "a manifest is replaced");
+                self.check_manifest(&bytes);
             } else if appends {
                 self.files.get_mut(&name).unwrap().extend(bytes);
             } else {
@@ -61,6 +73,34 @@ impl Directory {
         }
     }
 
+    /// A manifest obeys its schema, what it names is there, and it goes on from the one before.
+    fn check_manifest(&mut self, bytes: &[u8]) {
+        let manifest = Manifest::parse(bytes).unwrap();
+        let text: Value = serde_json::from_slice(bytes).unwrap();
+        let wrong: Vec<String> = schema().iter_errors(&text).map(|error| error.to_string()).collect();
+        assert_eq!(wrong, [""; 0]);
+        assert_eq!(manifest.to_json().as_bytes(), bytes, "what is put together is what is written");
+        for one in &manifest.representations {
+            self.holds(&one.file, &one.init);
+            one.tail.iter().zip(&one.tail_file).for_each(|(tail, file)| self.holds(file, tail));
+        }
+        let subsegments = manifest.gops.iter().flat_map(|gop| &gop.subsegments);
+        for (one, level) in subsegments.flat_map(|one| one.levels.iter().map(move |level| (one, level))) {
+            self.holds(one.file.as_ref().unwrap(), &level.bytes);
+        }
+        if let Some(before) = self.manifests.last() {
+            let end = |manifest: &Manifest| manifest.first_gop() as usize + manifest.gops.len();
+            assert!(end(&manifest) >= end(before) && before.is_growing());
+            assert!(manifest.first_gop() >= before.first_gop() || !manifest.is_growing());
+        }
+        self.manifests.push(manifest);
+    }
+
+    fn holds(&self, file: &str, range: &ByteRange) {
+        let bytes = &self.files[file][range.offset as usize..][..range.size as usize];
+        assert!(range.holds(bytes), "{file}: {range:?}");
+    }
+
     /// The files of Representations as C.9 puts them together.
     fn media(&self) -> Vec<(String, Vec<u8>)> {
         let inits = self.files.keys().filter_map(|name| name.strip_suffix("-init.mp4"));
@@ -79,14 +119,25 @@ impl Directory {
 
 /// Packages a stream that comes in pieces of a size.
 fn live(stream: &[u8], layout: Layout, size: usize) -> Directory {
-    let options = Options { layout, ..Options::default() };
-    let (mut live, mut directory) = (Live::new(&options, &Limits::default(), START), Directory::default());
-    for piece in stream.chunks(size) {
-        directory.apply(live.push(piece, START).unwrap());
+    live_as(&settings(layout), stream, size)
+}
+
+fn live_as(settings: &Settings, stream: &[u8], size: usize) -> Directory {
+    let (mut live, mut directory) = (Live::new(settings, &Limits::default()), Directory::default());
+    for (piece, now_ms) in stream.chunks(size).zip(START..) {
+        directory.apply(live.push(piece, now_ms).unwrap());
     }
     assert!(live.has_ended());
-    directory.apply(live.finish(START).unwrap());
+    directory.apply(live.finish(START + 1_000_000).unwrap());
     directory
+}
+
+fn schema() -> &'static jsonschema::Validator {
+    static SCHEMA: OnceLock<jsonschema::Validator> = OnceLock::new();
+    SCHEMA.get_or_init(|| {
+        let schema: Value = serde_json::from_str(include_str!("../manifest.schema.json")).unwrap();
+        jsonschema::validator_for(&schema).unwrap()
+    })
 }
 
 fn comes_back(stream: &[u8], layout: Layout, size: usize) -> Directory {
@@ -94,6 +145,9 @@ fn comes_back(stream: &[u8], layout: Layout, size: usize) -> Directory {
     let media = directory.media();
     let given: Vec<_> = media.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
     assert!(unpackage(&given, &Limits::default()).unwrap() == stream);
+    let (last, earlier) = directory.manifests.split_last().unwrap();
+    assert!(last.describes(stream) && !last.is_growing() && last.first_gop() == 0);
+    assert!(earlier.iter().all(|manifest| manifest.is_growing() && !manifest.describes(stream)));
     directory
 }
 
@@ -140,12 +194,119 @@ fn the_mpd_is_dynamic_until_the_stream_ends() {
     }
 }
 
+/// GOPs of a manifest without what is only true of live packages: what they are, not where. A frame that is written before
+/// the next one is known has another duration, so that digests differ.
+fn gops(manifest: &Manifest) -> Vec<String> {
+    let strip = |gop: &splatstream_stream::manifest::GopInfo| {
+        let mut gop = gop.clone();
+        // A live package has Representations without units too.
+        gop.subsegments.retain(|one| !one.frames.is_empty());
+        for one in &mut gop.subsegments {
+            one.file = None;
+            for level in &mut one.levels {
+                level.bytes.offset = 0;
+                level.bytes.digest.clear();
+            }
+        }
+        format!("{gop:?}")
+    };
+    manifest.gops.iter().map(strip).collect()
+}
+
+// covers: SS-CR-031, SS-CR-032
+#[test]
+fn the_last_manifest_says_of_gops_what_that_of_a_whole_package_says() {
+    for path in vectors().into_iter().filter(|path| is_conforming(path)).step_by(5) {
+        let stream = std::fs::read(&path).unwrap();
+        for layout in [Layout::Gop, Layout::Frame] {
+            let directory = live(&stream, layout, 777);
+            let last = directory.manifests.last().unwrap();
+            let whole = common::package(&stream, &settings(layout).package).manifest;
+            assert!(gops(last) == gops(&whole), "{}", path.display());
+            assert_eq!(last.stream, whole.stream);
+            let rates = |manifest: &Manifest| -> Vec<_> {
+                let all = manifest.representations.iter();
+                // A live package has Representations without units too.
+                all.filter(|one| one.frames > 0)
+                    .map(|one| (one.id.clone(), one.level_bandwidths.clone(), one.frames))
+                    .collect()
+            };
+            assert_eq!(rates(last), rates(&whole), "{}", path.display());
+        }
+    }
+}
+
+/// A stream of four GOPs.
+fn mixed() -> Vec<u8> {
+    let path = vectors().into_iter().find(|path| path.to_string_lossy().contains("temporal-gops-mixed"));
+    std::fs::read(path.unwrap()).unwrap()
+}
+
+// covers: SS-CR-031
+#[test]
+fn a_growing_manifest_lists_a_window_of_the_last_gops() {
+    let stream = mixed();
+    let all = common::package(&stream, &Options::default()).manifest;
+    assert!(all.gops.len() > 3, "the stream has {} GOPs", all.gops.len());
+    let narrow = Settings { window_ms: 0, ..settings(Layout::Gop) };
+    let directory = live_as(&narrow, &stream, 100);
+    let (last, growing) = directory.manifests.split_last().unwrap();
+    for (number, manifest) in growing.iter().enumerate() {
+        assert_eq!(manifest.gops.len(), 3.min(number + 1));
+        assert_eq!(manifest.first_gop() as usize, (number + 1).saturating_sub(3));
+        let of_all = &gops(&all)[manifest.first_gop() as usize..][..manifest.gops.len()];
+        assert_eq!(gops(manifest), of_all);
+    }
+    assert_eq!(last.gops.len(), all.gops.len());
+    // One that is held to a bound leaves out its first GOPs.
+    let small = Settings { manifest_bytes: 1, ..narrow };
+    let directory = live_as(&small, &stream, 100);
+    let last = directory.manifests.last().unwrap();
+    assert_eq!((last.gops.len(), last.first_gop() as usize), (3, all.gops.len() - 3));
+    assert!(last.describes(&stream));
+}
+
+// covers: SS-CR-031
+#[test]
+fn the_manifest_says_when_and_how_it_grows() {
+    let stream = worked_example();
+    for layout in [Layout::Gop, Layout::Frame] {
+        let directory = live(&stream, layout, 64);
+        let (last, growing) = directory.manifests.split_last().unwrap();
+        let (first, live) = (growing[0].live.clone().unwrap(), last.live.clone().unwrap());
+        assert_eq!((first.state.as_str(), live.state.as_str()), (LiveInfo::GROWING, LiveInfo::ENDED));
+        assert_eq!((first.started_ms, live.started_ms), (START, START));
+        assert_eq!(live.published_ms, START + 1_000_000);
+        assert!(
+            growing.windows(2).all(|pair| pair[0].live.as_ref().unwrap().published_ms
+                < pair[1].live.as_ref().unwrap().published_ms)
+        );
+        let info = &last.stream;
+        let ms = |frames: u32| (frames * info.ticks_per_frame * 1000).div_ceil(info.ticks_per_second);
+        let frames = if layout == Layout::Gop { last.gops[0].frame_count } else { 1 };
+        assert_eq!((live.update_ms, live.target_latency_ms), (ms(frames), ms(2 * frames)));
+        // Every frame is news where frames are subsegments.
+        let news = if layout == Layout::Gop { 1 } else { last.gops[0].subsegments.len() };
+        let frames = |manifest: &Manifest| -> usize {
+            manifest.gops.iter().flat_map(|gop| &gop.subsegments).filter(|one| !one.frames.is_empty()).count()
+        };
+        assert!(growing.len() <= news && !growing.is_empty());
+        assert!(
+            growing.windows(2).all(|pair| frames(&pair[0]) < frames(&pair[1]) || !pair[1].gops[0].growing)
+        );
+        assert_eq!(growing[0].gops[0].growing, layout == Layout::Frame);
+    }
+    let wanted = Settings { target_latency_ms: Some(1234), ..settings(Layout::Frame) };
+    let directory = live_as(&wanted, &stream, 64);
+    assert_eq!(directory.manifests[0].live.as_ref().unwrap().target_latency_ms, 1234);
+    assert!(directory.mpds[0].contains("<Latency target=\"1234\"/>"), "{}", directory.mpds[0]);
+}
+
 // covers: SS-CR-027
 #[test]
 fn a_frame_is_written_before_the_next_one_is_complete() {
     let stream = worked_example();
-    let options = Options { layout: Layout::Frame, ..Options::default() };
-    let mut live = Live::new(&options, &Limits::default(), START);
+    let mut live = Live::new(&settings(Layout::Frame), &Limits::default());
     let frames = splatstream_stream::division::Division::of(&stream, &Limits::default()).unwrap();
     let second = frames.gops[0].pieces.iter().find(|piece| piece.place.frame == 1).unwrap();
     // The header of the next frame ends a frame.
@@ -168,7 +329,7 @@ fn a_frame_is_written_before_the_next_one_is_complete() {
 #[test]
 fn a_stream_that_is_cut_is_an_error() {
     let stream = worked_example();
-    let mut live = Live::new(&Options::default(), &Limits::default(), START);
+    let mut live = Live::new(&settings(Layout::Gop), &Limits::default());
     live.push(&stream[..stream.len() - 36], START).unwrap();
     assert!(!live.has_ended());
     assert_eq!(live.finish(START).unwrap_err().kind.code(), "TRUNCATED");

@@ -54,7 +54,7 @@ impl Network {
             match self.player.decide(self.now_us) {
                 Command::Fetch(requests) => self.fetch(requests),
                 Command::Abandon => self.abandoned += 1,
-                Command::ReadManifest => panic!("nothing has changed"),
+                Command::ReadManifest | Command::PollManifest => panic!("nothing changes"),
                 Command::Wait { until_us } => self.now_us = until_us.min(self.now_us + 20_000),
             }
             self.show();

@@ -37,7 +37,7 @@ fn description() -> impl Strategy<Value = Description> {
 }
 
 fn settings() -> impl Strategy<Value = Settings> {
-    let live = prop::option::of((number(), number(), any::<u32>(), any::<u32>()));
+    let live = prop::option::of((any::<i64>(), number(), any::<u32>(), any::<u32>()));
     (number(), number(), number(), number(), live).prop_map(|(buffer_us, start_us, gaussians, rate, live)| {
         Settings {
             buffer_us,
@@ -85,6 +85,8 @@ enum Event {
     Unavailable(usize, usize, u8),
     Damaged(usize, usize, u8),
     Push(Description),
+    Set(Settings),
+    Skip(usize, usize),
 }
 
 fn event() -> impl Strategy<Value = Event> {
@@ -95,6 +97,8 @@ fn event() -> impl Strategy<Value = Event> {
         1 => (0_usize..12, 0_usize..6, any::<u8>()).prop_map(|(gop, index, from)| Event::Unavailable(gop, index, from)),
         1 => (0_usize..12, 0_usize..6, any::<u8>()).prop_map(|(gop, index, from)| Event::Damaged(gop, index, from)),
         1 => description().prop_map(Event::Push),
+        1 => settings().prop_map(Event::Set),
+        1 => (0_usize..12, 0_usize..12).prop_map(|(from, to)| Event::Skip(from, to)),
     ]
 }
 
@@ -128,6 +132,10 @@ proptest! {
                 Event::Failed => session.failed(now_us),
                 Event::Unavailable(gop, index, from) => session.unavailable(now_us, gop, index, from),
                 Event::Damaged(gop, index, from) => session.damaged(now_us, gop, index, from),
+                Event::Set(settings) => session.set(now_us, settings),
+                Event::Skip(from, to) => {
+                    let _ = session.skip(now_us, from..to);
+                }
                 Event::Push(description) => {
                     let _ = session.push(now_us, description);
                 }

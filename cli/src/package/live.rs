@@ -5,16 +5,15 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::output_file::{OutputFile, STANDARD};
 use crate::stream_file::{fault, open_pieces};
-use chrono::{SecondsFormat, Utc};
 use splatstream_format::Limits;
-use splatstream_stream::live::{Change, Live};
-use splatstream_stream::package::Options;
+use splatstream_stream::live::{Change, Live, Settings};
+use splatstream_stream::package::Package;
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Bytes that are read at once.
 const PIECE: usize = 1 << 16;
@@ -24,13 +23,13 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Packages a stream that is being made, until its end unit.
 pub(super) fn run(
     (input, out): (&Path, &Path),
-    options: &Options,
+    settings: &Settings,
     limits: &Limits,
     console: &Console,
 ) -> Result<(), Failure> {
     let mut reader = open_pieces(input)?;
-    let mut live = Live::new(options, limits, &now());
-    let mut files = Files { out, sizes: BTreeMap::new() };
+    let mut live = Live::new(settings, limits);
+    let mut files = Files { out, media: 0, texts: BTreeMap::new(), gops: 0 };
     let (mut piece, mut bytes_in) = (vec![0; PIECE], 0);
     while !live.has_ended() {
         let count = match reader.read(&mut piece) {
@@ -46,48 +45,55 @@ pub(super) fn run(
             continue;
         }
         bytes_in += count as u64;
-        let changes = live.push(&piece[..count], &now()).map_err(|error| fault(input, error))?;
+        let changes = live.push(&piece[..count], now_ms()).map_err(|error| fault(input, error))?;
         files.apply(changes, input)?;
     }
-    files.apply(live.finish(&now()).map_err(|error| fault(input, error))?, input)?;
-    let bytes = files.sizes.values().sum();
-    let report = Report::of_live(out, options.layout.name(), bytes_in, bytes, files.gops());
+    files.apply(live.finish(now_ms()).map_err(|error| fault(input, error))?, input)?;
+    let layout = settings.package.layout.name();
+    let report = Report::of_live(out, layout, bytes_in, files.bytes(), files.gops);
     console.report(&report, || report.text())
 }
 
-/// The time, as an `xs:dateTime`.
-fn now() -> String {
-    Utc::now().to_rfc3339_opts(SecondsFormat::Millis, true)
+/// Milliseconds since 1970.
+fn now_ms() -> u64 {
+    let passed = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    passed.as_millis() as u64
 }
 
 /// The files so far.
 struct Files<'a> {
     out: &'a Path,
-    /// Bytes by name.
-    sizes: BTreeMap<String, u64>,
+    /// Bytes of media.
+    media: u64,
+    /// Bytes of the files that are replaced, by name.
+    texts: BTreeMap<String, u64>,
+    /// Files of the base.
+    gops: usize,
 }
 
 impl Files<'_> {
     fn apply(&mut self, changes: Vec<Change>, input: &Path) -> Result<(), Failure> {
         for Change { name, bytes, appends } in changes {
             let path = self.out.join(&name);
-            let size = self.sizes.entry(name).or_default();
             if appends {
                 let file = OpenOptions::new().append(true).open(&path);
                 let written = file.and_then(|mut file| file.write_all(&bytes));
                 written.map_err(|error| Failure::file("write", &path, &error))?;
-                *size += bytes.len() as u64;
             } else {
                 OutputFile::write_apart(&path, &[input.to_path_buf()], &bytes)?;
-                *size = bytes.len() as u64;
+                let number = name.strip_prefix("s0-").and_then(|rest| rest.strip_suffix(".m4s"));
+                self.gops += usize::from(number.is_some_and(|number| number.parse::<u64>().is_ok()));
+            }
+            if [Package::MANIFEST, Package::MPD].contains(&name.as_str()) {
+                self.texts.insert(name, bytes.len() as u64);
+            } else {
+                self.media += bytes.len() as u64;
             }
         }
         Ok(())
     }
 
-    /// Segments of the base.
-    fn gops(&self) -> usize {
-        let numbers = self.sizes.keys().filter_map(|name| name.strip_prefix("s0-")?.strip_suffix(".m4s"));
-        numbers.filter(|number| number.parse::<u64>().is_ok()).count()
+    fn bytes(&self) -> u64 {
+        self.media + self.texts.values().sum::<u64>()
     }
 }

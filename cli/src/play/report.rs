@@ -35,6 +35,8 @@ struct GopReport {
     began_seconds: Option<f64>,
     waited_seconds: Option<f64>,
     buffer_seconds: Option<f64>,
+    /// From capture to display, of a presentation that grew.
+    latency_seconds: Option<f64>,
     switched: bool,
     /// Of the operating point, and all that arrived.
     bytes: u64,
@@ -48,6 +50,7 @@ struct GopReport {
 #[derive(Serialize)]
 struct LossReport {
     gop: usize,
+    count: usize,
     representation: String,
     refinement: u8,
     reason: String,
@@ -62,6 +65,8 @@ struct Totals {
     requests: u64,
     abandoned: u64,
     startup_seconds: f64,
+    /// Mean from capture to display, of a presentation that grew.
+    latency_seconds: Option<f64>,
     stalls: u64,
     stalled_seconds: f64,
     switches: u64,
@@ -82,8 +87,8 @@ impl Report {
         decoded: Option<BTreeMap<usize, Decoded>>,
     ) -> Self {
         let mut decoded = decoded.unwrap_or_default();
-        let rows = outcome.gops.iter().enumerate();
-        let gops = rows.map(|(gop, log)| GopReport::new(gop, log, decoded.remove(&gop))).collect();
+        let rows = outcome.gops.iter();
+        let gops = rows.map(|log| GopReport::new(log, decoded.remove(&log.number))).collect();
         let losses = outcome.losses.iter().map(LossReport::from).collect();
         Self { losses, ..Self::new(manifest, gops, &outcome.report, &outcome.score()) }
     }
@@ -94,6 +99,7 @@ impl Report {
             let shown = simulated.shown.iter().find(|shown| shown.gop == gop).copied();
             let requests = simulated.fetches.iter().filter(|(_, fetch)| fetch.gop() == gop).count();
             let log = GopLog {
+                number: gop,
                 first_frame: info.first_frame,
                 frame_count: info.frame_count,
                 shown,
@@ -101,7 +107,7 @@ impl Report {
                 bytes: shown.map_or(0, |shown| shown.fetched),
                 ..GopLog::default()
             };
-            GopReport { buffer_seconds: None, ..GopReport::new(gop, &log, None) }
+            GopReport { buffer_seconds: None, ..GopReport::new(&log, None) }
         };
         let gops = manifest.gops.iter().enumerate().map(row).collect();
         Self { simulated: true, ..Self::new(manifest, gops, simulated, &Score::of(ladder, simulated)) }
@@ -133,10 +139,13 @@ impl Report {
         let totals = &self.totals;
         let mut text = String::new();
         for loss in &self.losses {
-            let LossReport { gop, representation, refinement, reason } = loss;
-            text += &format!(
-                "GOP {gop}: {representation} is left out from refinement {refinement} on: {reason}\n"
-            );
+            let LossReport { gop, count, representation, refinement, reason } = loss;
+            text += &match count {
+                0 | 1 => format!(
+                    "GOP {gop}: {representation} is left out from refinement {refinement} on: {reason}\n"
+                ),
+                _ => format!("GOPs {gop} to {} are passed over: {reason}\n", gop + count - 1),
+            };
         }
         for gop in &self.gops {
             for error in gop.decoded.iter().flat_map(|decoded| &decoded.errors) {
@@ -168,10 +177,10 @@ impl Report {
 }
 
 impl GopReport {
-    fn new(gop: usize, log: &GopLog, decoded: Option<Decoded>) -> Self {
+    fn new(log: &GopLog, decoded: Option<Decoded>) -> Self {
         let of = |value: fn(&Shown) -> f64| log.shown.as_ref().map(value);
         Self {
-            gop,
+            gop: log.number,
             first_frame: log.first_frame,
             frames: log.frame_count,
             op: log.shown.map(|shown| shown.point.to_string()),
@@ -179,6 +188,7 @@ impl GopReport {
             began_seconds: of(|shown| seconds(shown.began_us)),
             waited_seconds: of(|shown| seconds(shown.waited_us)),
             buffer_seconds: Some(seconds(log.buffer_us)),
+            latency_seconds: log.shown.and_then(|shown| shown.latency_us).map(seconds),
             switched: false,
             bytes: log.shown.map_or(0, |shown| shown.bytes),
             fetched_bytes: log.bytes,
@@ -192,13 +202,14 @@ impl GopReport {
 
 impl From<&Loss> for LossReport {
     fn from(loss: &Loss) -> Self {
-        let Loss { gop, representation, refinement, reason } = loss.clone();
-        Self { gop, representation, refinement, reason }
+        let Loss { gop, count, representation, refinement, reason } = loss.clone();
+        Self { gop, count, representation, refinement, reason }
     }
 }
 
 impl Totals {
     fn new(report: &Simulated, score: &Score) -> Self {
+        let is_live = report.shown.iter().any(|shown| shown.latency_us.is_some());
         Self {
             complete: report.complete,
             seconds: seconds(report.ended_us),
@@ -207,6 +218,7 @@ impl Totals {
             requests: report.requests,
             abandoned: report.abandoned,
             startup_seconds: score.startup_seconds,
+            latency_seconds: is_live.then_some(score.latency_seconds),
             stalls: score.stalls,
             stalled_seconds: score.stalled_seconds,
             switches: score.switches,
@@ -227,13 +239,14 @@ pub(super) fn line(gop: &PlayedGop<'_>) -> String {
     let Some(shown) = log.shown else {
         return format!("GOP {number}: nothing of it could be had, {} requests failed", log.failures);
     };
+    let behind = shown.latency_us.map_or(String::new(), |us| format!(", {:.3} s behind", seconds(us)));
     let waited = match shown.waited_us {
         0 => String::new(),
-        us if number == 0 => format!(", after {:.3} s", seconds(us)),
+        us if shown.gop == 0 => format!(", after {:.3} s", seconds(us)),
         us => format!(", stalled for {:.3} s", seconds(us)),
     };
     format!(
-        "GOP {number}: {}, {} bytes in {} requests, {:.1} s buffered{waited}",
+        "GOP {number}: {}, {} bytes in {} requests, {:.1} s buffered{behind}{waited}",
         shown.point,
         grouped(shown.bytes),
         log.requests,

@@ -72,7 +72,7 @@ pub fn run(
 ) -> Result<Vec<PackageResult>> {
     let decoder = Decoder::Once(template);
     let mut session = Session::new(&decoder, limits, cancel)?;
-    each(folder, &["invalid", "valid"], cancel, |path, record| {
+    each(folder, &["growing", "invalid", "valid"], cancel, |path, record| {
         let (answer, out) = session.ask_file(path, "out.gss")?;
         Ok(judge(&record.expect, &answer, &out))
     })

@@ -108,7 +108,7 @@ fn main() -> Result<()> {
 
 fn play(presentation: &Ladder, rule: Box<dyn Rule>, trace: &Trace, arguments: &Arguments) -> Report {
     let link = Link { limit_us: 4_000_000_000, latency_us: arguments.latency_us, ..Link::new(trace.clone()) };
-    let available_us = presentation.gops().first().map_or(0, Gop::duration_us);
+    let available_us = presentation.gops().first().map_or(0, Gop::duration_us) as i64;
     let live = |target_us| Live { available_us, target_us, slowest_milli: 950, fastest_milli: 1050 };
     let live = arguments.live_us.map(live);
     let settings = Settings { buffer_us: arguments.buffer_us, live, ..Settings::default() };

@@ -20,10 +20,10 @@ impl Clock {
         passed.saturating_add(self.skipped_us)
     }
 
-    /// Waits until a time, or skips the time until then.
-    pub(super) fn wait_until(&mut self, until_us: u64) {
+    /// Waits until a time, or skips the time until then if nobody else's time passes meanwhile.
+    pub(super) fn wait_until(&mut self, until_us: u64, is_shared: bool) {
         let left_us = until_us.saturating_sub(self.now_us());
-        if self.real_time {
+        if self.real_time || is_shared {
             std::thread::sleep(Duration::from_micros(left_us));
         } else {
             self.skipped_us = self.skipped_us.saturating_add(left_us);

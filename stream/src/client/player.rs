@@ -2,35 +2,43 @@
 
 use super::clock::Clock;
 use super::download::{Download, Event};
+use super::poll::Poll;
 use super::report::{Outcome, Screen};
 use super::{Client, ClientError, Options, read_manifest};
-use crate::control::{Fetch, Playback, Rule};
-use crate::playback::{Command, GopLog, Options as Playing, Player};
+use crate::control::{Fetch, Rule};
+use crate::package::Package;
+use crate::playback::{Command, GopLog, Options as Playing, PlaybackError, Player};
 use crate::simulation::Report;
 use std::time::Duration;
 
 impl Client {
-    /// Plays all of the presentation under a rule.
+    /// Plays all of the presentation under a rule, and what comes meanwhile of one that grows, until that has ended.
     ///
     /// # Errors
-    /// A package that becomes another one, and one whose GOPs are too large.
+    /// A package that becomes another one, and one whose GOPs are too large; a presentation that grows no more and has not
+    /// ended.
     pub fn play<R: Rule>(&mut self, rule: R, screen: &mut dyn Screen) -> Result<Outcome, ClientError> {
         let clock = Clock::new(self.options.real_time);
         let player = Player::new(self.manifest.clone(), playing(&self.options), rule, clock.now_us())?;
-        let mut run = Run { client: self, player, clock, download: None, fetches: Vec::new() };
-        while run.player.state().playback() != Playback::Ended {
+        let mut run = Run { client: self, player, clock, download: None, poll: None, fetches: Vec::new() };
+        while !run.player.has_ended() {
             let wake_us = run.decide()?;
             run.present(screen);
             run.step(wake_us);
+            run.hear()?;
         }
         run.present(screen);
+        run.client.manifest.clone_from(run.player.manifest());
         Ok(run.outcome())
     }
 }
 
+/// How often it is looked whether the manifest has come.
+const LOOK_US: u64 = 5000;
+
 fn playing(options: &Options) -> Playing {
-    let Options { attempts, base_attempts, memory, .. } = *options;
-    Playing { settings: options.settings.clone(), attempts, base_attempts, memory }
+    let Options { attempts, base_attempts, memory, following, .. } = *options;
+    Playing { settings: options.settings.clone(), attempts, base_attempts, memory, following }
 }
 
 struct Run<'a, R> {
@@ -38,6 +46,7 @@ struct Run<'a, R> {
     player: Player<R>,
     clock: Clock,
     download: Option<Download>,
+    poll: Option<Poll>,
     fetches: Vec<(u64, Fetch)>,
 }
 
@@ -53,6 +62,10 @@ impl<R: Rule> Run<'_, R> {
                 }
                 Command::Abandon => self.download = None,
                 Command::ReadManifest => self.read_again()?,
+                Command::PollManifest => {
+                    let Client { source, tag, options, .. } = &*self.client;
+                    self.poll = Some(Poll::start(source.clone(), options.layers, tag.clone()));
+                }
                 Command::Wait { until_us } => return Ok(until_us),
             }
         }
@@ -60,16 +73,43 @@ impl<R: Rule> Run<'_, R> {
 
     /// Reads the manifest again.
     fn read_again(&mut self) -> Result<(), ClientError> {
-        let manifest = read_manifest(&self.client.source, &self.client.options)?;
+        let (manifest, tag) = read_manifest(&self.client.source, &self.client.options)?;
         self.client.source.forget();
+        self.client.tag = tag;
         self.player.renew(self.clock.now_us(), manifest)?;
-        self.client.manifest.clone_from(self.player.manifest());
+        Ok(())
+    }
+
+    /// Takes the manifest that was being read, if that has come.
+    fn hear(&mut self) -> Result<(), ClientError> {
+        let Some(polled) = self.poll.as_ref().and_then(Poll::take) else { return Ok(()) };
+        self.poll = None;
+        let now_us = self.clock.now_us();
+        match polled {
+            Ok(Some((manifest, tag))) => {
+                self.client.tag = tag;
+                self.player.renew(now_us, manifest)?;
+            }
+            Ok(None) => self.player.unchanged(now_us)?,
+            Err(fault) => self.player.unreadable(now_us).map_err(|error| match error {
+                PlaybackError::Stopped(_) => {
+                    ClientError::Unreachable(self.client.source.place(Package::MANIFEST), fault.to_string())
+                }
+                error => error.into(),
+            })?,
+        }
         Ok(())
     }
 
     /// Waits for the next event, and takes it.
     fn step(&mut self, until_us: u64) {
-        let Some(download) = &self.download else { return self.clock.wait_until(until_us) };
+        let until_us = match self.poll {
+            Some(_) => until_us.min(self.clock.now_us().saturating_add(LOOK_US)),
+            None => until_us,
+        };
+        let Some(download) = &self.download else {
+            return self.clock.wait_until(until_us, self.player.is_following());
+        };
         let left_us = until_us.saturating_sub(self.clock.now_us()).max(1);
         let Some(event) = download.next(Duration::from_micros(left_us)) else { return };
         let now_us = self.clock.now_us();
@@ -95,9 +135,13 @@ impl<R: Rule> Run<'_, R> {
         let logs = self.player.logs();
         let sum = |of: fn(&GopLog) -> u64| logs.iter().map(of).fold(0, u64::saturating_add);
         let state = self.player.state();
+        // Those that were passed over are between.
+        let spanned = logs.first().zip(logs.last());
+        let spanned =
+            spanned.map_or(0, |(first, last)| last.number.saturating_sub(first.number).saturating_add(1));
         let report = Report {
             shown: state.shown().to_vec(),
-            complete: state.shown().len() == state.ladder().gops().len(),
+            complete: state.shown().len() == spanned,
             waiting_us: state.waiting_us(),
             ended_us: state.now_us(),
             bytes: sum(|log| log.bytes),

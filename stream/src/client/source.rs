@@ -1,6 +1,7 @@
 //! Where a package is: ranges of bytes of its files, from an HTTP server or a directory.
 
 use super::Options;
+use crate::manifest::digest_of;
 use crate::package::Package;
 use crate::playback::Fault;
 use std::collections::HashMap;
@@ -22,6 +23,9 @@ impl From<ureq::Error> for Fault {
         Self::Failed(error.to_string())
     }
 }
+
+/// Bytes of a file and its version, or nothing.
+pub(super) type Whole = Option<(Vec<u8>, Option<String>)>;
 
 /// A package. Clones share connections and what is known of files.
 #[derive(Debug, Clone)]
@@ -50,16 +54,27 @@ impl Source {
         }
     }
 
-    /// All bytes of a file that has at most so many.
-    pub(super) fn whole(&self, file: &str, most: usize) -> Result<Vec<u8>, Fault> {
-        let reader: Box<dyn Read> = match self {
-            Self::Server(server) => Box::new(server.whole(file)?),
-            Self::Directory(path) => Box::new(File::open(path.join(file))?),
+    /// All bytes of a file that has at most so many, and its version; nothing if that is the one that is known.
+    pub(super) fn whole(&self, file: &str, most: usize, known: Option<&str>) -> Result<Whole, Fault> {
+        let (reader, tag): (Box<dyn Read>, _) = match self {
+            Self::Server(server) => match server.whole(file, known)? {
+                Some((reader, tag)) => (Box::new(reader), tag),
+                None => return Ok(None),
+            },
+            Self::Directory(path) => (Box::new(File::open(path.join(file))?), None),
         };
         let mut bytes = Vec::new();
         let limit = u64::try_from(most).unwrap_or(u64::MAX);
         reader.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
-        if bytes.len() > most { Err(Fault::Wrong("the file is too large")) } else { Ok(bytes) }
+        if bytes.len() > most {
+            return Err(Fault::Wrong("the file is too large"));
+        }
+        let tag = match self {
+            Self::Server(_) => tag,
+            Self::Directory(_) => Some(digest_of(&[&bytes])),
+        };
+        let is_known = tag.is_some() && tag.as_deref() == known;
+        Ok((!is_known).then_some((bytes, tag)))
     }
 
     /// A range of a file, which has one byte or more. The reader may have fewer bytes, and more.
@@ -122,10 +137,22 @@ impl Server {
         [&self.base, file, &self.query].concat()
     }
 
-    fn whole(&self, file: &str) -> Result<impl Read + use<>, Fault> {
-        let response = self.agent.get(self.url(file)).header(header::CACHE_CONTROL, "no-cache").call()?;
+    fn whole(
+        &self,
+        file: &str,
+        known: Option<&str>,
+    ) -> Result<Option<(impl Read + use<>, Option<String>)>, Fault> {
+        let mut request = self.agent.get(self.url(file)).header(header::CACHE_CONTROL, "no-cache");
+        if let Some(tag) = known {
+            request = request.header(header::IF_NONE_MATCH, tag);
+        }
+        let response = request.call()?;
         match response.status() {
-            StatusCode::OK => Ok(response.into_body().into_reader()),
+            StatusCode::OK => {
+                let tag = text(response.headers(), header::ETAG.as_str()).map(str::to_owned);
+                Ok(Some((response.into_body().into_reader(), tag)))
+            }
+            StatusCode::NOT_MODIFIED if known.is_some() => Ok(None),
             status => Err(Fault::Status(status.as_u16())),
         }
     }

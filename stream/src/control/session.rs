@@ -36,9 +36,9 @@ impl<R: Rule> Session<R> {
         self.advance(now_us);
         self.state.ladder.push(gop)?;
         self.state.grow();
+        // It stands still since then.
         if self.state.playback == Playback::Ended {
             self.state.playback = Playback::Stalled;
-            self.state.waiting_since_us = self.state.now_us;
         }
         Ok(())
     }
@@ -167,6 +167,7 @@ impl<R: Rule> Session<R> {
     /// Begins the current GOP right after the one before, or stalls.
     pub(super) fn begin(&mut self) {
         let state = &mut self.state;
+        state.pass_skipped();
         state.waiting_since_us = state.now_us;
         if state.current >= state.ladder.gops().len() {
             state.playback = Playback::Ended;
@@ -179,6 +180,7 @@ impl<R: Rule> Session<R> {
 
     /// Begins the current GOP after a start-up or a stall, as soon as enough is buffered.
     pub(super) fn resume(&mut self) {
+        self.state.pass_skipped();
         let state = &self.state;
         let still = matches!(state.playback, Playback::Starting | Playback::Stalled);
         let missing = state.first_missing();

@@ -27,8 +27,9 @@ impl Default for Settings {
 /// How a live presentation is played.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Live {
-    /// When GOP 0 can be requested, on the caller's clock; each further one can be after its own duration.
-    pub available_us: u64,
+    /// When GOP 0 can be requested, on the caller's clock, which may be before that begins; each further one can be after
+    /// its own duration.
+    pub available_us: i64,
     /// Time from capture to display that is aimed at; not less than a GOP.
     pub target_us: u64,
     /// Least rate of playback, in thousandths.
@@ -105,6 +106,8 @@ pub struct State {
     pub(super) fetched: Vec<u64>,
     /// GOPs for which a request has ended as the rule wanted.
     pub(super) settled: Vec<bool>,
+    /// GOPs that playback passes over.
+    pub(super) skipped: Vec<bool>,
     pub(super) only_whole: bool,
     pub(super) request: Option<Request>,
     /// Requests that failed since the last one that did not.
@@ -144,6 +147,7 @@ impl State {
             available: Vec::new(),
             fetched: Vec::new(),
             settled: Vec::new(),
+            skipped: Vec::new(),
             only_whole,
             request: None,
             failures: 0,
@@ -163,6 +167,7 @@ impl State {
         self.available.resize(gops, Levels::all(self.ladder.representations().len()));
         self.fetched.resize(gops, 0);
         self.settled.resize(gops, false);
+        self.skipped.resize(gops, false);
     }
 
     /// The presentation.
@@ -264,7 +269,7 @@ impl State {
                 None => available_choices(known, arrived, available, &self.settings.limits),
             })
         };
-        self.ladder.gops().get(gop).and_then(of).unwrap_or_default()
+        self.ladder.gops().get(gop).filter(|_| !self.is_skipped(gop)).and_then(of).unwrap_or_default()
     }
 
     /// Whether what is shown is shown again as soon as more of it has arrived: where a viewer has the playhead, as long as that
@@ -304,9 +309,9 @@ impl State {
         f64::from(self.viewer.speed_milli) / 1000.0
     }
 
-    /// Whether a GOP can be played.
+    /// Whether a GOP can be played, or is passed over.
     pub fn is_ready(&self, gop: usize) -> bool {
-        if self.is_lost(gop) {
+        if self.is_lost(gop) || self.is_skipped(gop) {
             return true;
         }
         let running = self.request.as_ref().is_some_and(|request| request.fetch.gop() == gop);
@@ -335,32 +340,31 @@ impl State {
 
     /// Media time from the playhead to the start of a GOP, in microseconds; 0 if it has begun.
     pub fn media_until(&self, gop: usize) -> u64 {
-        let until = self
-            .ladder
-            .gops()
-            .iter()
-            .take(gop)
-            .skip(self.current)
-            .map(Gop::duration_us)
-            .fold(0, u64::saturating_add);
+        let gops = self.ladder.gops().iter().zip(&self.skipped).take(gop).skip(self.current);
+        let played = gops.filter(|(_, skipped)| !**skipped).map(|(gop, _)| gop.duration_us());
+        let until = played.fold(0, u64::saturating_add);
         until.saturating_sub(self.offset_ns / 1000)
     }
 
     /// When a GOP can be requested; 0 unless the presentation is live.
     pub fn available_us(&self, gop: usize) -> u64 {
-        let Some(live) = self.settings.live else { return 0 };
+        let available = self.settings.live.map(|live| self.captured_us(live, gop));
+        available.and_then(|us| u64::try_from(us).ok()).unwrap_or(0)
+    }
+
+    /// When a GOP was captured to its end, on the caller's clock.
+    fn captured_us(&self, live: Live, gop: usize) -> i64 {
         let before = self.ladder.gops().iter().take(gop.saturating_add(1)).skip(1).map(Gop::duration_us);
-        before.fold(live.available_us, u64::saturating_add)
+        live.available_us.saturating_add(signed(before.fold(0, u64::saturating_add)))
     }
 
     /// Time from capture to display of what is playing, in a live presentation.
     pub fn latency_us(&self) -> Option<u64> {
-        self.settings.live?;
+        let live = self.settings.live?;
         let duration_us = self.ladder.gops().get(self.current).or(self.ladder.gops().last())?.duration_us();
-        // A GOP can be requested when it has been captured to its end.
-        let began_us = self.available_us(self.current).saturating_sub(duration_us);
-        let captured = began_us.saturating_add(self.offset_ns / 1000);
-        Some(self.now_us.saturating_sub(captured))
+        let began_us = self.captured_us(live, self.current).saturating_sub(signed(duration_us));
+        let captured_us = began_us.saturating_add(signed(self.offset_ns / 1000));
+        Some(u64::try_from(signed(self.now_us).saturating_sub(captured_us)).unwrap_or(0))
     }
 
     /// When the GOP that is playing ends; none while playback stands still.
@@ -373,4 +377,8 @@ impl State {
         let rate = u64::from(self.rate_milli).max(1);
         Some(self.now_us.saturating_add(left_ns.div_ceil(rate)))
     }
+}
+
+fn signed(us: u64) -> i64 {
+    i64::try_from(us).unwrap_or(i64::MAX)
 }

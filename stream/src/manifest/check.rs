@@ -1,13 +1,16 @@
 //! What must hold of a manifest, so that a reader can act on it.
 
 use super::{
-    ByteRange, CLAUSE, FrameInfo, GopInfo, LevelInfo, Manifest, ManifestError, RepresentationInfo,
+    ByteRange, CLAUSE, FrameInfo, GopInfo, LevelInfo, LiveInfo, Manifest, ManifestError, RepresentationInfo,
     SubsegmentInfo,
 };
 use crate::package::Layout;
 use crate::representation::Representation;
 use splatstream_format::syntax::{GopHeader, MAX_LAYERS, MAX_REFINEMENTS};
 use std::collections::HashMap;
+
+/// The largest time in milliseconds: numbers of JSON are exact up to it everywhere.
+const MAX_TIME: u64 = 1 << 53;
 
 type Result = core::result::Result<(), ManifestError>;
 
@@ -28,10 +31,24 @@ impl Manifest {
         demand(self.version == Self::VERSION, at("version"), version)?;
         let layouts = [Layout::Gop, Layout::Frame].map(Layout::name);
         demand(layouts.contains(&self.layout.as_str()), at("layout"), "neither gop nor frame")?;
+        self.check_live()?;
         self.check_stream()?;
         self.check_representations()?;
         self.check_gops()?;
         self.check_quality()
+    }
+
+    fn check_live(&self) -> Result {
+        let Some(live) = &self.live else { return Ok(()) };
+        let at = |name: &'static str| move || format!("live.{name}");
+        let states = [LiveInfo::GROWING, LiveInfo::ENDED];
+        demand(states.contains(&live.state.as_str()), at("state"), "neither growing nor ended")?;
+        let count = u64::try_from(self.gops.len()).unwrap_or(u64::MAX);
+        let end = live.first_gop.checked_add(count);
+        demand(end.is_some_and(|end| end <= 1 << 32), at("first_gop"), "more than 2^32 GOPs")?;
+        demand(live.started_ms <= MAX_TIME, at("started_ms"), "beyond 2^53")?;
+        demand(live.published_ms <= MAX_TIME, at("published_ms"), "beyond 2^53")?;
+        demand(live.update_ms > 0, at("update_ms"), "not 1 or more")
     }
 
     fn check_stream(&self) -> Result {
@@ -44,7 +61,19 @@ impl Manifest {
         demand((1..=MAX_LAYERS).contains(&stream.temporal_layers), at("temporal_layers"), "not 1 to 4")?;
         demand(stream.ticks_per_second > 0, at("ticks_per_second"), "not 1 or more")?;
         demand(stream.ticks_per_frame > 0, at("ticks_per_frame"), "not 1 or more")?;
-        demand(is_digest(&stream.digest), at("digest"), "not 16 hexadecimal digits")?;
+        let known = !self.is_growing();
+        demand(
+            stream.bytes.is_some() == known,
+            at("bytes"),
+            "not null while the stream grows, a number otherwise",
+        )?;
+        demand(
+            stream.digest.is_some() == known,
+            at("digest"),
+            "not null while the stream grows, text otherwise",
+        )?;
+        let digest = stream.digest.as_deref().is_none_or(is_digest);
+        demand(digest, at("digest"), "not 16 hexadecimal digits")?;
         demand(stream.frames <= 1 << 32, at("frames"), "more than 2^32")?;
         let percents = &stream.refinements;
         let rises = percents.iter().zip(percents.iter().skip(1)).all(|(one, next)| one < next);
@@ -102,20 +131,38 @@ impl Manifest {
             in_file(range, one.bytes, at("index"))?;
             demand(range.offset == one.init.size, at("index"), "not after the initialisation segment")?;
         }
-        one.tail.as_ref().map_or(Ok(()), |range| in_file(range, one.bytes, at("tail")))
+        let Some(live) = &self.live else {
+            demand(one.tail_file.is_none(), at("tail_file"), "the package is not live")?;
+            return one.tail.as_ref().map_or(Ok(()), |range| in_file(range, one.bytes, at("tail")));
+        };
+        demand(one.bytes == one.init.size, at("bytes"), "more than the initialisation segment")?;
+        demand(one.index.is_none(), at("index"), "not null in a live package")?;
+        let can_be = one.tail.is_none() || live.state == LiveInfo::ENDED;
+        demand(can_be, at("tail"), "not null while the stream grows")?;
+        demand(one.tail_file.is_some() == one.tail.is_some(), at("tail_file"), "not that of a tail")?;
+        demand(one.tail_file.as_deref().is_none_or(is_plain), at("tail_file"), "not a plain file name")?;
+        one.tail.as_ref().map_or(Ok(()), |range| in_file(range, u64::MAX, at("tail")))
     }
 
     fn check_gops(&self) -> Result {
         let mut ends: HashMap<&str, u64> = HashMap::new();
-        for one in &self.representations {
+        for one in self.representations.iter().filter(|_| self.live.is_none()) {
             let index = one.index.as_ref().map_or(0, |range| range.size);
-            ends.insert(&one.id, one.init.size.saturating_add(index));
+            ends.insert(&one.file, one.init.size.saturating_add(index));
         }
+        let last = self.gops.len().saturating_sub(1);
+        let can_grow = self.is_growing() && self.layout == Layout::Frame.name();
         let mut next = 0;
         for (index, gop) in self.gops.iter().enumerate() {
             let at = |name: &'static str| move || format!("gops[{index}].{name}");
             demand(u64::from(gop.first_frame) >= next, at("first_frame"), "within the GOP before it")?;
             demand(gop.frame_count > 0, at("frame_count"), "not 1 or more")?;
+            let growing = !gop.growing || (can_grow && index == last);
+            demand(
+                growing,
+                at("growing"),
+                "only the last GOP grows, frame by frame, until the stream has ended",
+            )?;
             demand(
                 gop.temporal_depth < self.stream.temporal_layers,
                 at("temporal_depth"),
@@ -140,29 +187,27 @@ impl Manifest {
         at: impl Fn() -> String,
     ) -> Result {
         let of_it = self.representations.iter().find(|one| one.id == subsegment.representation);
-        let (Some(file), Some(end)) = (of_it, ends.get_mut(subsegment.representation.as_str())) else {
+        let Some(of_it) = of_it else {
             return demand(false, || format!("{}.representation", at()), "unknown");
         };
-        let last = u64::from(gop.first_frame).saturating_add(gop.frame_count.into());
-        let header = match gop.predicted {
-            true => GopHeader::predicted(gop.index, gop.frame_count, gop.temporal_depth),
-            false => GopHeader::intra(gop.index, gop.frame_count),
-        };
-        let mut next = gop.first_frame.into();
-        for frame in &subsegment.frames {
-            let within = (next..last).contains(&u64::from(frame.frame));
-            let holds = within && *frame == FrameInfo::of(&header, gop.first_frame, frame.frame);
-            demand(holds, || format!("{}.frames", at()), format!("frame {} cannot be here", frame.frame))?;
-            next = u64::from(frame.frame).saturating_add(1);
-        }
+        let file = subsegment.file.as_deref();
+        let is_live = self.live.is_some();
+        demand(file.is_some() == is_live, || format!("{}.file", at()), "not the file of a live package")?;
+        demand(file.is_none_or(is_plain), || format!("{}.file", at()), "not a plain file name")?;
+        // Indices may stand before a subsegment of a live package, whose files have no known length.
+        let bytes = if is_live { u64::MAX } else { of_it.bytes };
+        let end = ends.entry(file.unwrap_or(&of_it.file)).or_default();
+        check_frames(gop, subsegment, &at)?;
         let count = subsegment.levels.len() == self.stream.refinements.len();
         demand(count, || format!("{}.levels", at()), "not one for each refinement")?;
         let percents = (0_u8..).zip(&self.stream.refinements);
         for (level, (refinement, percent)) in subsegment.levels.iter().zip(percents) {
             let at = || format!("{}.levels[{refinement}]", at());
             demand((level.refinement, level.percent) == (refinement, *percent), at, "not that refinement")?;
-            demand(level.bytes.offset == *end, at, "the range does not start where the one before it ends")?;
-            in_file(&level.bytes, file.bytes, at)?;
+            let offset = level.bytes.offset;
+            let follows = offset == *end || (is_live && refinement == 0 && offset > *end);
+            demand(follows, at, "the range does not start where the one before it ends")?;
+            in_file(&level.bytes, bytes, at)?;
             check_level(level, at)?;
             *end = level.bytes.offset.saturating_add(level.bytes.size);
         }
@@ -193,6 +238,23 @@ impl Manifest {
         });
         all && parts.next().is_none()
     }
+}
+
+/// The frames of a subsegment are some of its GOP, in order.
+fn check_frames(gop: &GopInfo, subsegment: &SubsegmentInfo, at: impl Fn() -> String) -> Result {
+    let last = u64::from(gop.first_frame).saturating_add(gop.frame_count.into());
+    let header = match gop.predicted {
+        true => GopHeader::predicted(gop.index, gop.frame_count, gop.temporal_depth),
+        false => GopHeader::intra(gop.index, gop.frame_count),
+    };
+    let mut next = gop.first_frame.into();
+    for frame in &subsegment.frames {
+        let within = (next..last).contains(&u64::from(frame.frame));
+        let holds = within && *frame == FrameInfo::of(&header, gop.first_frame, frame.frame);
+        demand(holds, || format!("{}.frames", at()), format!("frame {} cannot be here", frame.frame))?;
+        next = u64::from(frame.frame).saturating_add(1);
+    }
+    Ok(())
 }
 
 fn check_level(level: &LevelInfo, at: impl Fn() -> String) -> Result {

@@ -29,7 +29,7 @@ impl Manifest {
         self
     }
 
-    /// The presentation as a controller plans it. Of Representations of predicted frames it is taken that they need all
+    /// The presentation as a controller plans it, without a GOP to which frames still come. Of Representations of predicted frames it is taken that they need all
     /// refinements of all spatial layers where `whole_anchor` says so, and the base and the temporal layers below otherwise.
     ///
     /// # Errors
@@ -48,7 +48,7 @@ impl Manifest {
                 .collect(),
         };
         let mut ladder = Ladder::new(layers.iter().enumerate().map(needs).collect())?;
-        for gop in 0..self.gops.len() {
+        for gop in 0..self.complete_gops() {
             ladder.push(self.description(gop).ok_or(LadderError::Pieces)?)?;
         }
         Ok(ladder)
@@ -59,9 +59,14 @@ impl Manifest {
         Requests::Apart { inits: self.representations.iter().map(|one| one.init.size).collect() }
     }
 
+    /// GOPs to which no frames come any more: those of [`Manifest::ladder`].
+    pub fn complete_gops(&self) -> usize {
+        self.gops.iter().take_while(|gop| !gop.growing).count()
+    }
+
     /// A GOP of [`Manifest::ladder`]; none if there are not so many.
     pub fn description(&self, gop: usize) -> Option<Description> {
-        let info = self.gops.get(gop)?;
+        let info = self.gops.get(gop).filter(|gop| !gop.growing)?;
         let mut description = Description {
             duration_us: self.duration_us(gop),
             frames: Vec::new(),

@@ -74,6 +74,7 @@ impl<'a> Describer<'a> {
             init,
             index,
             tail,
+            tail_file: None,
         });
         File { name, chunks: file.chunks }
     }
@@ -93,7 +94,8 @@ impl<'a> Describer<'a> {
             let mut bytes = vec![0_u64; rates.len()];
             for subsegment in segments {
                 let percents = &sequence.refinement_percent;
-                let described = describe(subsegment, representation, gop, percents, file, self.stream);
+                let ranges = subsegment.levels.iter().map(|level| file.add(chunks(level), self.stream));
+                let described = describe(subsegment, representation, gop, percents, ranges);
                 for (sum, level) in bytes.iter_mut().zip(&described.levels) {
                     *sum = sum.saturating_add(level.bytes.size);
                 }
@@ -119,11 +121,12 @@ impl<'a> Describer<'a> {
             format: Manifest::FORMAT.to_owned(),
             version: Manifest::VERSION,
             stream: StreamInfo {
-                bytes: size(self.stream.len()),
-                digest: digest_of(&[self.stream]),
+                bytes: Some(size(self.stream.len())),
+                digest: Some(digest_of(&[self.stream])),
                 ..stream
             },
             layout: self.options.layout.name().to_owned(),
+            live: None,
             representations: self.representations,
             gops: self.gops,
             quality: None,
@@ -140,12 +143,13 @@ impl GopInfo {
             frame_count: gop.header.gop_frame_count,
             predicted: gop.header.is_predicted(),
             temporal_depth: gop.header.temporal_depth,
+            growing: false,
             subsegments: Vec::new(),
         }
     }
 
     /// Display index after its last frame.
-    fn end(&self) -> u64 {
+    pub(crate) fn end(&self) -> u64 {
         u64::from(self.first_frame).saturating_add(self.frame_count.into())
     }
 }
@@ -159,8 +163,8 @@ impl StreamInfo {
             specification: SPECIFICATION.to_owned(),
             profile: header.profile,
             level: header.level,
-            bytes: 0,
-            digest: String::new(),
+            bytes: None,
+            digest: None,
             frames: last.map_or(0, GopInfo::end),
             sh_degree: sequence.sh_degree,
             spatial_layers: sequence.spatial_layer_count,
@@ -173,22 +177,25 @@ impl StreamInfo {
     }
 }
 
-fn describe(
+/// A subsegment whose levels are these ranges of its file.
+pub(crate) fn describe(
     subsegment: &Subsegment,
     representation: Representation,
     gop: &Gop,
     percents: &[u8],
-    file: &mut Growing,
-    stream: &[u8],
+    ranges: impl Iterator<Item = ByteRange>,
 ) -> SubsegmentInfo {
     let frames =
         subsegment.frames.iter().map(|&frame| FrameInfo::of(&gop.header, gop.first_frame, frame)).collect();
-    let levels =
-        (0_u8..).zip(subsegment.levels.iter().zip(percents)).map(|(refinement, (level, &percent))| {
-            let bytes = file.add(chunks(level), stream);
-            level_info(refinement, percent, bytes, &level.tools)
-        });
-    SubsegmentInfo { representation: representation.to_string(), frames, levels: levels.collect() }
+    let levels = subsegment.levels.iter().zip(percents).zip(ranges).zip(0_u8..);
+    let levels = levels
+        .map(|(((level, &percent), bytes), refinement)| level_info(refinement, percent, bytes, &level.tools));
+    SubsegmentInfo {
+        representation: representation.to_string(),
+        file: None,
+        frames,
+        levels: levels.collect(),
+    }
 }
 
 fn chunks(level: &Level) -> Vec<Chunk> {

@@ -11,7 +11,10 @@ pub(super) struct Part {
     /// The piece that it belongs to in the ladder.
     pub(super) piece: u8,
     pub(super) kind: Kind,
+    pub(super) file: String,
     pub(super) range: ByteRange,
+    /// Bytes of a request between the part before it and this one, which nobody wants.
+    pub(super) gap: u64,
 }
 
 /// What a part is.
@@ -43,7 +46,8 @@ pub(super) fn parts(manifest: &Manifest, fetch: &Fetch, needs_init: impl Fn(usiz
         let is_first = parts.iter().all(|part| part.representation != representation);
         if is_first && needs_init(representation) {
             let (kind, range) = (Kind::Init, info.init.clone());
-            parts.push(Part { gop, representation, piece: 0, kind, range });
+            let file = info.file.clone();
+            parts.push(Part { gop, representation, piece: 0, kind, file, range, gap: 0 });
         }
         for piece in range.from..range.to {
             parts.extend(of_piece(manifest, gop, representation, piece));
@@ -55,35 +59,41 @@ pub(super) fn parts(manifest: &Manifest, fetch: &Fetch, needs_init: impl Fn(usiz
 /// The parts of a piece of the ladder, as they are in the file.
 fn of_piece(manifest: &Manifest, gop: usize, representation: usize, piece: u8) -> Vec<Part> {
     let levels = manifest.levels_of_piece(representation, piece).unwrap_or(0..0);
-    let id = manifest.representations.get(representation).map(|info| &info.id);
+    let Some(of_it) = manifest.representations.get(representation) else { return Vec::new() };
     let all = manifest.gops.get(gop).map_or(&[][..], |gop| &gop.subsegments);
     let mut parts = Vec::new();
-    for (subsegment, info) in all.iter().filter(|one| Some(&one.representation) == id).enumerate() {
+    for (subsegment, info) in all.iter().filter(|one| one.representation == of_it.id).enumerate() {
         let own = info.levels.iter().filter(|level| levels.contains(&level.refinement));
         parts.extend(own.map(|level| Part {
             gop,
             representation,
             piece,
             kind: Kind::Level { subsegment, level: level.refinement },
+            file: info.file.as_ref().unwrap_or(&of_it.file).clone(),
             range: level.bytes.clone(),
+            gap: 0,
         }));
     }
     parts
 }
 
-/// The requests for some parts: one for those that follow each other in a file.
-pub(super) fn requests(manifest: &Manifest, parts: &[Part]) -> Vec<ByteRequest> {
+/// Bytes that are fetched in vain for one request less: indices between the frames of a live package.
+const GAP: u64 = 1024;
+
+/// The requests for some parts: one for those that follow each other in a file, or nearly so.
+pub(super) fn requests(parts: &mut [Part]) -> Vec<ByteRequest> {
     let mut requests: Vec<ByteRequest> = Vec::new();
-    for part in parts.iter().filter(|part| part.range.size > 0) {
-        let Some(info) = manifest.representations.get(part.representation) else { continue };
-        match requests.last_mut() {
-            Some(last)
-                if last.file == info.file && last.offset.saturating_add(last.size) == part.range.offset =>
-            {
-                last.size = last.size.saturating_add(part.range.size);
+    for part in parts.iter_mut().filter(|part| part.range.size > 0) {
+        let last = requests.last_mut().filter(|last| last.file == part.file);
+        let gap =
+            last.as_ref().and_then(|last| part.range.offset.checked_sub(last.offset.checked_add(last.size)?));
+        match last.zip(gap.filter(|gap| *gap <= GAP)) {
+            Some((last, gap)) => {
+                part.gap = gap;
+                last.size = last.size.saturating_add(gap).saturating_add(part.range.size);
             }
-            _ => requests.push(ByteRequest {
-                file: info.file.clone(),
+            None => requests.push(ByteRequest {
+                file: part.file.clone(),
                 offset: part.range.offset,
                 size: part.range.size,
             }),

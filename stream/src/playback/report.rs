@@ -5,7 +5,7 @@ use crate::control::{OperatingPoint, Shown};
 /// A GOP that is to be shown now.
 #[derive(Debug, Clone, Copy)]
 pub struct PlayedGop<'a> {
-    /// Its number in the manifest.
+    /// Its number in the stream, from 0.
     pub number: usize,
     /// What to decode it at: without a temporal layer, only the first frame, for which alone units are there. None if nothing of it could be
     /// had: what was shown before stands still.
@@ -22,6 +22,8 @@ pub struct PlayedGop<'a> {
 /// A GOP of a playback. Of requests it counts those up to when it began, and those after that for what came too late.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct GopLog {
+    /// Its number in the stream, from 0.
+    pub number: usize,
     /// Display index of its first frame.
     pub first_frame: u32,
     /// Its frames.
@@ -40,11 +42,13 @@ pub struct GopLog {
     pub bytes: u64,
 }
 
-/// Something that was left out of a GOP.
+/// Something that was left out of a GOP, or of several that were passed over.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Loss {
-    /// The GOP, by its number in the manifest.
+    /// The GOP, by its number in the stream.
     pub gop: usize,
+    /// How many GOPs from it on.
+    pub count: usize,
     /// The identifier of the Representation.
     pub representation: String,
     /// The first refinement that is left out, with all above it.

@@ -48,7 +48,7 @@ impl Folder {
             return Ok(None);
         }
         match File::open(&path) {
-            Ok(file) => Found::new(file, &path).map(Some),
+            Ok(file) => Found::new(file, &path, may_grow(&path)).map(Some),
             Err(error) if is_absence(&error) => Ok(None),
             Err(error) => Err(error),
         }
@@ -78,12 +78,23 @@ fn is_hidden(path: &Path) -> bool {
     path.iter().any(|part| part.as_encoded_bytes().starts_with(b"."))
 }
 
+/// Whether a file of a GOP of a live package may still get frames: there is none of the next GOP, nor of the end.
+fn may_grow(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let parts = name.strip_suffix(".m4s").and_then(|stem| stem.rsplit_once('-'));
+    let Some((id, number)) = parts.and_then(|(id, number)| Some((id, number.parse::<u64>().ok()?))) else {
+        return false;
+    };
+    let next = format!("{id}-{}.m4s", number.saturating_add(1));
+    !path.with_file_name(next).exists() && !path.with_file_name("s0-end.m4s").exists()
+}
+
 fn is_absence(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied)
 }
 
 impl Found {
-    fn new(file: File, path: &Path) -> io::Result<Self> {
+    fn new(file: File, path: &Path, may_grow: bool) -> io::Result<Self> {
         let metadata = file.metadata()?;
         let modified = metadata.modified()?;
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
@@ -92,7 +103,7 @@ impl Found {
             length: metadata.len(),
             modified,
             content_type: content_type(extension),
-            cache_control: cache_control(extension, age),
+            cache_control: cache_control(extension, age, may_grow),
             file,
         })
     }
@@ -116,12 +127,14 @@ fn content_type(extension: &str) -> &'static str {
     }
 }
 
-/// How long caches may keep a file. Media of a package never change under their names, MPDs and manifests of live packages
-/// do with every GOP; of anything else a cache asks each time, and it keeps nothing that is still being written.
-fn cache_control(extension: &str, age: Duration) -> &'static str {
+/// How long caches may keep a file. Media of a package never change under their names, but for the last GOP of a live one,
+/// which may grow. MPDs and manifests of live packages change with every GOP or frame: a cache asks each time whether they
+/// have, or once a second where they rest. Of anything else it asks each time, and keeps nothing that is still being written.
+fn cache_control(extension: &str, age: Duration, may_grow: bool) -> &'static str {
     match extension {
-        "mp4" | "m4s" => "public, max-age=31536000, immutable",
-        "mpd" | "json" => "public, max-age=1",
+        "mp4" | "m4s" if !may_grow => "public, max-age=31536000, immutable",
+        "mpd" | "json" if age >= GROWING => "public, max-age=1",
+        "mp4" | "m4s" | "mpd" | "json" => "no-cache",
         _ if age < GROWING => "no-store",
         _ => "no-cache",
     }
@@ -148,8 +161,21 @@ mod tests {
     #[test]
     fn caches_keep_what_does_not_change() {
         let (new, old) = (Duration::ZERO, Duration::from_secs(3600));
-        assert_eq!(cache_control("m4s", new), cache_control("mp4", old));
-        assert_eq!(cache_control("mpd", old), "public, max-age=1");
-        assert_eq!((cache_control("gss", new), cache_control("gss", old)), ("no-store", "no-cache"));
+        let control = |extension, age| cache_control(extension, age, false);
+        assert_eq!(control("m4s", new), control("mp4", old));
+        assert_eq!((control("mpd", old), control("json", new)), ("public, max-age=1", "no-cache"));
+        assert_eq!((control("gss", new), control("gss", old)), ("no-store", "no-cache"));
+        assert_eq!(cache_control("m4s", old, true), "no-cache");
+    }
+
+    #[test]
+    fn the_last_gop_may_grow() {
+        let folder = tempfile::tempdir().expect("there is room");
+        let grows = |name: &str| may_grow(&folder.path().join(name));
+        let write = |name: &str| std::fs::write(folder.path().join(name), "").expect("there is room");
+        ["s0-init.mp4", "s0-1.m4s", "s0-2.m4s", "t0-2.m4s"].into_iter().for_each(write);
+        assert!(!grows("s0-init.mp4") && !grows("s0-1.m4s") && grows("s0-2.m4s") && grows("t0-2.m4s"));
+        write("s0-end.m4s");
+        assert!(!grows("s0-2.m4s") && !grows("s0-end.m4s"));
     }
 }

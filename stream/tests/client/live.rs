@@ -72,7 +72,8 @@ fn play_live(late: Duration, slower_percent: u64) -> Outcome {
     };
     let server = Server::start(files, not_yet);
     let first_us = ladder.gops()[0].duration_us();
-    let live = Live { available_us: first_us, target_us: first_us, slowest_milli: 950, fastest_milli: 1050 };
+    let live =
+        Live { available_us: first_us as i64, target_us: first_us, slowest_milli: 950, fastest_milli: 1050 };
     let mut options = Options { real_time: true, ..options() };
     options.settings.live = Some(live);
     let mut client = Client::open(&server.url, options).unwrap();

@@ -3,21 +3,19 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod follow;
 mod live;
 mod network;
 mod server;
 
+use common::played::check;
 use common::{files, is_conforming, package, vectors};
 use server::{Answer, Request, Server};
-use splatstream_decoder::operating_point::OperatingPoint;
-use splatstream_decoder::process::{DecodedFrame, Options as Decoding};
-use splatstream_decoder::stream::{decode_stream, decode_stream_inside};
 use splatstream_stream::client::{Client, ClientError, Options, Outcome, PlayedGop};
 use splatstream_stream::control::{BufferRule, Layered, Rule, Single, ThroughputRule};
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::{Layout, Options as Packaging, Package};
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -48,53 +46,6 @@ fn frame_lasts(manifest: &mut Manifest, milliseconds: u32) {
 
 fn options() -> Options {
     Options { real_time: false, read_timeout: Duration::from_millis(400), ..Options::default() }
-}
-
-/// The frames of a stream at a point.
-fn frames(
-    decode: impl FnOnce(&Decoding, &mut Vec<DecodedFrame>),
-    point: OperatingPoint,
-) -> Vec<DecodedFrame> {
-    let mut frames = Vec::new();
-    decode(&Decoding { operating_point: point, ..Decoding::default() }, &mut frames);
-    frames
-}
-
-/// Every frame of a GOP is that of the same stream at the same point, and none is missing.
-fn check(stream: &[u8], gop: &PlayedGop<'_>) {
-    let Some(point) = gop.point else { return };
-    let temporal = point.temporal.unwrap_or(0);
-    let named = OperatingPoint { spatial: point.spatial, temporal, refinement: point.refinement };
-    let played = [gop.head, gop.units].concat();
-    let inside = gop.head.len() as u64;
-    let ours = frames(
-        |options, frames| {
-            let _summary = decode_stream_inside(&played, inside, options, |_, frame| {
-                frames.push(frame);
-                ControlFlow::Continue(())
-            });
-        },
-        named,
-    );
-    let native = frames(
-        |options, frames| {
-            let _summary = decode_stream(stream, options, |_, frame| {
-                frames.push(frame);
-                ControlFlow::Continue(())
-            });
-        },
-        named,
-    );
-    let own = gop.log.first_frame..gop.log.first_frame + gop.log.frame_count;
-    let count = if point.temporal.is_none() { 1 } else { usize::MAX };
-    let expected: Vec<_> =
-        native.iter().filter(|frame| own.contains(&frame.index) && !frame.is_lost).take(count).collect();
-    let shown: Vec<_> = ours.iter().filter(|frame| !frame.is_lost).take(count).collect();
-    assert_eq!(shown.len(), expected.len(), "GOP {} at {point}", gop.number);
-    for (ours, native) in shown.iter().zip(expected) {
-        assert_eq!((ours.index, ours.level), (native.index, native.level));
-        assert!(ours.planes == native.planes, "frame {} at {point}", ours.index);
-    }
 }
 
 /// Plays a package, whose frames are all checked.

@@ -1,5 +1,6 @@
 //! A small HTTP server that misbehaves where it is told to.
 
+use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -15,6 +16,7 @@ pub(crate) struct Request {
     /// First and last byte; none for the whole file.
     pub(crate) range: Option<(usize, usize)>,
     pub(crate) if_range: Option<String>,
+    pub(crate) if_none_match: Option<String>,
     /// Number of the connection.
     pub(crate) connection: usize,
 }
@@ -104,7 +106,8 @@ fn read(reader: &mut impl BufRead) -> Option<Request> {
     reader.read_line(&mut line).ok()?;
     let path = line.split(' ').nth(1)?;
     let file = path.rsplit('/').next()?.to_owned();
-    let mut request = Request { number: 0, file, range: None, if_range: None, connection: 0 };
+    let mut request =
+        Request { number: 0, file, range: None, if_range: None, if_none_match: None, connection: 0 };
     loop {
         let mut line = String::new();
         reader.read_line(&mut line).ok()?;
@@ -115,6 +118,7 @@ fn read(reader: &mut impl BufRead) -> Option<Request> {
                 request.range = Some((first.parse().ok()?, last.parse().ok()?));
             }
             "if-range" => request.if_range = Some(value.to_owned()),
+            "if-none-match" => request.if_none_match = Some(value.to_owned()),
             _ => {}
         }
     }
@@ -123,7 +127,15 @@ fn read(reader: &mut impl BufRead) -> Option<Request> {
 fn answer(mut stream: &TcpStream, request: &Request, answer: Answer, content: &Mutex<Content>) -> Option<()> {
     let (file, tag) = {
         let content = content.lock().unwrap();
-        (content.files.get(&request.file).cloned(), content.tag.clone())
+        let file = content.files.get(&request.file).cloned();
+        // A manifest changes by itself.
+        let tag = match &file {
+            Some(bytes) if request.file == "manifest.json" => {
+                format!("\"{:x?}\"", &Sha256::digest(bytes)[..8])
+            }
+            _ => content.tag.clone(),
+        };
+        (file, tag)
     };
     let status = match (&answer, &file) {
         (Answer::Status(status), _) => Some(*status),
@@ -132,6 +144,9 @@ fn answer(mut stream: &TcpStream, request: &Request, answer: Answer, content: &M
     };
     if let Some(status) = status {
         return write!(stream, "HTTP/1.1 {status} No\r\nContent-Length: 2\r\n\r\nno").ok();
+    }
+    if request.if_none_match.as_ref() == Some(&tag) && matches!(answer, Answer::Well) {
+        return write!(stream, "HTTP/1.1 304 Not Modified\r\nETag: {tag}\r\n\r\n").ok();
     }
     let file = file?;
     let is_same = request.if_range.as_ref().is_none_or(|known| *known == tag);

@@ -2,9 +2,12 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "every test takes what it needs; a panic is a failed test")]
 
 pub(crate) mod mpd;
+pub(crate) mod played;
 
 use mp4_atom::{Any, Decode, Moof, Moov, Sidx};
 use splatstream_format::Limits;
+use splatstream_format::syntax::UnitType;
+use splatstream_format::unit::{Stream, Unit, write_unit};
 use splatstream_stream::package::{Options, Package};
 use std::path::{Path, PathBuf};
 
@@ -117,4 +120,45 @@ fn walk(directory: &Path, found: &mut Vec<PathBuf>) {
 pub(crate) fn worked_example() -> Vec<u8> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/data/worked-temporal-example.gss");
     std::fs::read(path).unwrap()
+}
+
+/// A stream whose GOPs come several times, with frames of some milliseconds, and without an index.
+pub(crate) fn repeated(stream: &[u8], times: u32, frame_ms: u32) -> Vec<u8> {
+    let parsed = Stream::open(stream, &Limits::default()).unwrap();
+    let units: Vec<_> = parsed.units().map(Result::unwrap).collect();
+    let is = |kind: UnitType| move |unit: &&Unit<'_>| unit.header.unit_type() == kind;
+    let is_tail =
+        |unit: &Unit<'_>| ["operating_points", "index", "end"].contains(&unit.header.unit_type().name());
+    let first = units.iter().position(|unit| is(UnitType::GopHeader)(&unit)).unwrap();
+    let (head, rest) = units.split_at(first);
+    let gops: Vec<&Unit<'_>> = rest.iter().take_while(|unit| !is_tail(unit)).collect();
+    let number =
+        |unit: &Unit<'_>, at: usize| u32::from_le_bytes(unit.payload[at..at + 4].try_into().unwrap());
+    let headers: Vec<_> = gops.iter().copied().filter(is(UnitType::GopHeader)).collect();
+    let length: u32 = headers.iter().map(|unit| number(unit, 4)).sum();
+    let mut out = stream[..units[0].at as usize].to_vec();
+    for unit in head {
+        let mut payload = unit.payload.to_vec();
+        if unit.header.unit_type() == UnitType::SequenceParameters {
+            // frame_count, ticks_per_second, ticks_per_frame.
+            payload[50..62].copy_from_slice(&[0_u32, 1000, frame_ms].map(u32::to_le_bytes).concat());
+        }
+        write_unit(&mut out, unit.header.id(), &payload).unwrap();
+    }
+    for time in 0..times {
+        for unit in &gops {
+            let (mut id, mut payload) = (unit.header.id(), unit.payload.to_vec());
+            if id.unit_type == UnitType::GopHeader {
+                let index = number(unit, 0) + time * headers.len() as u32;
+                payload[..4].copy_from_slice(&index.to_le_bytes());
+            }
+            id.frame += time * length;
+            write_unit(&mut out, id, &payload).unwrap();
+        }
+    }
+    let frames = times * gops.iter().copied().filter(is(UnitType::FrameHeader)).count() as u32;
+    let count = head.len() as u32 + times * gops.len() as u32;
+    let payload = [frames, count, 0, 0].map(u32::to_le_bytes).concat();
+    write_unit(&mut out, units.last().unwrap().header.id(), &payload).unwrap();
+    out
 }

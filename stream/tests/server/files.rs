@@ -104,14 +104,19 @@ fn head_says_what_get_would() {
 fn types_and_times_in_caches_are_right() {
     let folder = folder();
     let old = SystemTime::now() - Duration::from_secs(1000);
-    File::options().write(true).open(folder.path().join("player.js")).unwrap().set_modified(old).unwrap();
+    fs::write(folder.path().join("old.json"), "{}").unwrap();
+    for file in ["player.js", "old.json"] {
+        File::options().write(true).open(folder.path().join(file)).unwrap().set_modified(old).unwrap();
+    }
     let server = Running::start(folder.path(), |_| ());
     let immutable = "public, max-age=31536000, immutable";
     let expected = [
         ("/talk/s0.mp4", "application/mp4", immutable),
         ("/talk/s0-1.m4s", "application/mp4", immutable),
-        ("/talk/manifest.mpd", "application/dash+xml", "public, max-age=1"),
-        ("/talk/manifest.json", "application/json", "public, max-age=1"),
+        ("/talk/s0-2.m4s", "application/mp4", "no-cache"),
+        ("/talk/manifest.mpd", "application/dash+xml", "no-cache"),
+        ("/talk/manifest.json", "application/json", "no-cache"),
+        ("/old.json", "application/json", "public, max-age=1"),
         ("/talk.gss", "application/octet-stream", "no-store"),
         ("/player.js", "text/javascript; charset=utf-8", "no-cache"),
         ("/player.wasm", "application/wasm", "no-store"),

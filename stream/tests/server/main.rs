@@ -35,6 +35,7 @@ fn folder() -> TempDir {
     fs::create_dir(path.join("talk")).unwrap();
     fs::write(path.join("talk/s0.mp4"), bytes(1_000_000)).unwrap();
     fs::write(path.join("talk/s0-1.m4s"), bytes(1_000)).unwrap();
+    fs::write(path.join("talk/s0-2.m4s"), bytes(1_000)).unwrap();
     fs::write(path.join("talk/manifest.mpd"), "<MPD/>").unwrap();
     fs::write(path.join("talk/manifest.json"), "{}").unwrap();
     fs::write(path.join("talk.gss"), bytes(5_000)).unwrap();

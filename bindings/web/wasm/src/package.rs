@@ -10,6 +10,9 @@ use splatstream_stream::playback::{Command, Fault, GopLog, Loss, Options, Player
 /// Bytes of a package that a tab of a browser holds at the same time.
 const MEMORY: u64 = 256 << 20;
 
+/// What is said of a presentation that still grows.
+const GROWING: &str = "the presentation is still being made: this player opens it when it has ended, and `splatstream play` follows it";
+
 /// Plays one package. The clock of the page is told before anything that takes time.
 pub struct Package {
     player: Player<Layered>,
@@ -51,10 +54,13 @@ impl Package {
     /// A package with a manifest, whose base is requested at once.
     ///
     /// # Errors
-    /// Why the manifest is refused.
+    /// Why the manifest is refused; a presentation that still grows.
     pub fn open(manifest: &[u8], now_us: u64) -> Result<Self, String> {
         let manifest =
             Manifest::parse(manifest).map_err(|error| format!("the manifest is refused: {error}"))?;
+        if manifest.is_growing() {
+            return Err(GROWING.to_owned());
+        }
         let options = Options { memory: MEMORY, ..Options::default() };
         let is_still = manifest.stream.frames <= 1;
         let player = Player::new(manifest, options, Layered::default(), now_us);
@@ -377,6 +383,6 @@ impl Package {
 
 /// A loss in words.
 fn line(loss: &Loss) -> String {
-    let Loss { gop, representation, refinement, reason } = loss;
+    let Loss { gop, representation, refinement, reason, .. } = loss;
     format!("GOP {gop}: {representation} from refinement {refinement} on cannot be had: {reason}")
 }

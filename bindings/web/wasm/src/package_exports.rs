@@ -95,7 +95,7 @@ pub extern "C" fn gss_package_decide() -> u32 {
                 1
             }
             Command::Abandon => 2,
-            Command::ReadManifest => 3,
+            Command::ReadManifest | Command::PollManifest => 3,
         }
     })
 }
