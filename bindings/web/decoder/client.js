@@ -5,7 +5,7 @@ const workerBeside = () => new Worker(new URL('./worker.js', import.meta.url), {
 
 /** A source whose address is not relative to the page, but whole: the worker is elsewhere. */
 function located(source) {
-  const whole = (address) => new URL(address, globalThis.document?.baseURI ?? location.href).href;
+  const whole = (address) => new URL(address, globalThis.document?.baseURI ?? globalThis.location?.href).href;
   const addresses = Object.entries(source).filter(([name]) => name === 'url' || name === 'package');
   return { ...source, ...Object.fromEntries(addresses.map(([name, address]) => [name, whole(address)])) };
 }

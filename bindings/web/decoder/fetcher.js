@@ -2,6 +2,8 @@
 
 /** Milliseconds without an answer, or without more of it, after which a request has failed. */
 const SILENCE = 10_000;
+/** Requests that were of no use and are remembered. */
+const DOUBTS = 64;
 /** Attempts to read the manifest, and milliseconds before the second one; each further one waits twice as long, up to the last. */
 const ATTEMPTS = 8;
 const FIRST_WAIT = 100, LAST_WAIT = 3200;
@@ -64,9 +66,9 @@ export class Fetcher {
   #running = null;
   #timer = null;
   #isClosed = false;
-  /** `ETag` of each file, and ranges that were of no use once: they are not taken from a cache again. */
+  /** `ETag` of each file, and requests that were of no use: what they asked for is not taken from a cache again. */
   #tags = new Map();
-  #doubtful = new Set();
+  #doubtful = [];
 
   /**
    * `onchange` is called when something has come or failed, `ontick` when all was done that is to be done for now, `onfail`
@@ -137,7 +139,7 @@ export class Fetcher {
       const fault = await this.#request(request, control, isWanted).catch((error) => error);
       if (!isWanted()) return;
       if (fault) {
-        this.#doubtful.add(`${request.file} ${request.offset}`);
+        this.#doubt(request);
         this.#decoder.clock(performance.now());
         this.#decoder.failed(fault instanceof Fault ? fault : Fault.failed(fault.message));
         this.#running = null;
@@ -168,7 +170,8 @@ export class Fetcher {
   /** The response, if it is the range asked for, or the whole file. */
   async #answer({ file, offset, size }, signal) {
     const last = offset + size - 1;
-    const cache = this.#doubtful.has(`${file} ${offset}`) ? 'reload' : 'default';
+    const isDoubtful = this.#doubtful.some((other) => other.file === file && other.offset <= last && offset < other.offset + other.size);
+    const cache = isDoubtful ? 'reload' : 'default';
     const url = new URL(file, this.#address);
     url.search = new URL(this.#address).search;
     const response = await fetch(url, { headers: { range: `bytes=${offset}-${last}` }, signal, cache });
@@ -184,8 +187,8 @@ export class Fetcher {
   }
 
   /** Hands on the bytes of a response. A server that ignores ranges sends those before and after too. */
-  async #read({ file, offset, size }, response, watch, isWanted) {
-    const key = `${file} ${offset}`;
+  async #read(request, response, watch, isWanted) {
+    const { offset, size } = request;
     let skip = response.status === 200 ? offset : 0;
     let got = 0;
     const reader = response.body.getReader();
@@ -199,18 +202,23 @@ export class Fetcher {
       skip -= value.length - bytes.length;
       const own = bytes.subarray(0, size - got);
       got += own.length;
-      if (own.length > 0) this.#take(own, key);
+      if (own.length > 0) this.#take(own, request);
       if (got === size && response.status === 200) return void reader.cancel().catch(() => {});
       if (own.length < bytes.length) return Fault.wrong();
     }
   }
 
-  #take(bytes, key) {
+  #take(bytes, request) {
     this.#decoder.clock(performance.now());
-    if (!this.#decoder.received(bytes)) this.#doubtful.add(key);
+    if (!this.#decoder.received(bytes)) this.#doubt(request);
     // All has come, or something of it is not what was packaged.
     if (!this.#decoder.isFetching) this.#running = null;
     this.#changed();
+  }
+
+  #doubt(request) {
+    this.#doubtful.push(request);
+    if (this.#doubtful.length > DOUBTS) this.#doubtful.shift();
   }
 }
 

@@ -93,7 +93,9 @@ test('bytes that arrive damaged once are fetched again, past caches, and never s
   assert.deepEqual(player.warnings, []);
   assert.equal(player.states.at(-1).failures, 1);
   const [first] = requests.filter(isMedia);
-  assert.ok(requests.some(({ file, range, cache }) => file === first.file && range?.[0] === first.range[0] && cache === 'reload'));
+  // What arrived before the damage stays.
+  const isAgain = ({ file, range }) => file === first.file && first.range[0] <= range[0] && range[0] <= first.range[1];
+  assert.ok(requests.slice(1).some((request) => request.cache === 'reload' && isAgain(request)));
 });
 
 test('bytes that are always damaged are left out', async () => {
@@ -143,7 +145,9 @@ test('seeks are exact to the frame at a chosen point, and fetch what they need',
     assert.deepEqual([frame.index, frame.point], [index, best]);
     await check([frame]);
   }
-  const asked = requests.filter(isMedia).map(({ file, range }) => `${file} ${range}`);
+  // A seek gives up what runs, and what has just been sent.
+  const whole = requests.filter((request) => isMedia(request) && !request.isAborted && request.got > 0);
+  const asked = whole.map(({ file, range }) => `${file} ${range}`);
   assert.equal(new Set(asked).size, asked.length, 'something was fetched twice');
 });
 
