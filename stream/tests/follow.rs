@@ -5,20 +5,17 @@
 mod common;
 
 use common::played::check;
-use common::{repeated, vectors};
+use common::{Files, apply, repeated, vectors};
 use splatstream_format::Limits;
 use splatstream_stream::control::Layered;
 use splatstream_stream::division::Division;
-use splatstream_stream::live::{Change, Live, Settings};
+use splatstream_stream::live::{Live, Settings};
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::{Layout, Options as Packaging, Package};
 use splatstream_stream::playback::{
     ByteRequest, Command, Fault, Following, GopLog, Loss, Options, PlaybackError, Player,
 };
 use std::cell::Cell;
-use std::collections::BTreeMap;
-
-type Files = BTreeMap<String, Vec<u8>>;
 
 /// When the first bytes come, by the clock of the packager.
 const START_MS: u64 = 1_767_225_600_000;
@@ -69,16 +66,6 @@ impl Broadcast {
 
     fn manifest(&self, now_us: u64) -> Option<Manifest> {
         self.files(now_us).get(Package::MANIFEST).map(|bytes| Manifest::parse(bytes).unwrap())
-    }
-}
-
-fn apply(files: &mut Files, changes: Vec<Change>) {
-    for Change { name, bytes, appends } in changes {
-        let file = files.entry(name).or_default();
-        if !appends {
-            file.clear();
-        }
-        file.extend(bytes);
     }
 }
 

@@ -4,19 +4,17 @@
 
 mod common;
 
+use common::{Files, apply};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use splatstream_format::Limits;
 use splatstream_stream::control::Layered;
-use splatstream_stream::live::{Change, Live, Settings};
+use splatstream_stream::live::{Live, Settings};
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::{Layout, Options, Package};
 use splatstream_stream::playback::{Options as Playing, PlaybackError, Player};
 use splatstream_stream::unpackage::unpackage;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-type Files = BTreeMap<String, Vec<u8>>;
 
 /// The time when the first bytes come.
 const START: u64 = 1_767_225_600_000;
@@ -29,16 +27,6 @@ fn packages() -> PathBuf {
 fn mixed() -> Vec<u8> {
     let path = packages().join("../vectors/valid/temporal/temporal-gops-mixed/in.gss");
     std::fs::read(path).unwrap()
-}
-
-fn apply(files: &mut Files, changes: Vec<Change>) {
-    for Change { name, bytes, appends } in changes {
-        let file = files.entry(name).or_default();
-        if !appends {
-            file.clear();
-        }
-        file.extend(bytes);
-    }
 }
 
 /// A live package after each piece of a stream, and when it has ended. Bytes come at 1,000 a second.
@@ -413,7 +401,7 @@ fn later_manifests_of_something_else_are_refused_as_recorded() {
             other => panic!("{name}: {other}"),
         };
         assert_eq!(at, *gop, "{name}: {error}");
-        // An older copy of it is passed over.
+        // An older copy of it is discarded.
         let mut older = changed.clone();
         change(&mut older, "/live/published_ms", "1767225600000");
         assert_eq!(begin().renew(0, Manifest::parse(&with_line(&older)).unwrap()), Ok(()), "{name}");

@@ -8,8 +8,24 @@ use mp4_atom::{Any, Decode, Moof, Moov, Sidx};
 use splatstream_format::Limits;
 use splatstream_format::syntax::UnitType;
 use splatstream_format::unit::{Stream, Unit, write_unit};
+use splatstream_stream::live::Change;
 use splatstream_stream::package::{Options, Package};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// Files by their names.
+pub(crate) type Files = BTreeMap<String, Vec<u8>>;
+
+/// Writes what a live package changes.
+pub(crate) fn apply(files: &mut Files, changes: Vec<Change>) {
+    for Change { name, bytes, appends } in changes {
+        let file = files.entry(name).or_default();
+        if !appends {
+            file.clear();
+        }
+        file.extend(bytes);
+    }
+}
 
 /// A package of a stream that can be packaged.
 pub(crate) fn package<'a>(stream: &'a [u8], options: &Options) -> Package<'a> {
