@@ -62,9 +62,14 @@ impl OutputFile {
 
     /// Writes a whole file, not in the place of `inputs`.
     pub(crate) fn write_apart(path: &Path, inputs: &[PathBuf], bytes: &[u8]) -> Result<(), Failure> {
-        let mut file = Self::create(path, inputs)?;
-        file.writer.write_all(bytes).map_err(|error| Failure::file("write", path, &error))?;
-        file.finish()
+        Self::create(path, inputs)?.finish_with(bytes)
+    }
+
+    /// Writes the last bytes, and gives the file its name.
+    pub(crate) fn finish_with(mut self, bytes: &[u8]) -> Result<(), Failure> {
+        let written = self.writer.write_all(bytes);
+        written.map_err(|error| Failure::file("write", &self.path, &error))?;
+        self.finish()
     }
 }
 

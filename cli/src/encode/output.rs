@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 pub(super) struct Output {
     file: OutputFile,
     page: Option<Page>,
-    path: PathBuf,
 }
 
 /// The page that the stream goes into, once it is whole.
@@ -27,17 +26,13 @@ impl Output {
         let file = OutputFile::create(path, inputs)?;
         let title = title.map_or_else(|| name_of(path), str::to_owned);
         let page = is_page(path).then(|| Page { title, stream: Vec::new() });
-        Ok(Self { file, page, path: path.to_path_buf() })
+        Ok(Self { file, page })
     }
 
     /// Gives the file its name; the bytes of the page, if it is one.
-    pub(super) fn finish(mut self) -> Result<Option<u64>, Failure> {
+    pub(super) fn finish(self) -> Result<Option<u64>, Failure> {
         let page = self.page.map(|page| page_with(&page.title, &page.stream));
-        if let Some(page) = &page {
-            let written = self.file.write_all(page.as_bytes());
-            written.map_err(|error| Failure::file("write", &self.path, &error))?;
-        }
-        self.file.finish()?;
+        self.file.finish_with(page.as_deref().unwrap_or_default().as_bytes())?;
         Ok(page.map(|page| page.len() as u64))
     }
 }
