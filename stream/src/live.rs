@@ -142,8 +142,7 @@ impl Live {
         self.bytes = self.bytes.saturating_add(size(bytes.len()));
         let mut changes = self.read(false, now_ms)?;
         if std::mem::take(&mut self.is_news) {
-            let manifest = self.timeline.manifest(self.times(now_ms), None);
-            changes.extend(manifest.map(|text| Change::whole(Package::MANIFEST.to_owned(), text.into())));
+            changes.extend(self.manifest(now_ms, None));
         }
         Ok(changes)
     }
@@ -169,8 +168,7 @@ impl Live {
         let digest = self.digest.text();
         let known = End { bytes: self.bytes, digest, file: end.name.clone(), tail };
         changes.push(end);
-        let manifest = self.timeline.manifest(self.times(now_ms), Some(&known));
-        changes.extend(manifest.map(|text| Change::whole(Package::MANIFEST.to_owned(), text.into())));
+        changes.extend(self.manifest(now_ms, Some(&known)));
         changes.extend(self.mpd(now_ms, Some(&known)));
         Ok(changes)
     }
@@ -315,6 +313,12 @@ impl Live {
             changes.push(Change { name, bytes, appends });
         }
         Ok(())
+    }
+
+    /// The manifest as it is now.
+    fn manifest(&self, now_ms: u64, end: Option<&End>) -> Option<Change> {
+        let manifest = self.timeline.manifest(self.times(now_ms), end)?;
+        Some(Change::whole(Package::MANIFEST.to_owned(), manifest.into_bytes()))
     }
 
     /// The MPD as it is now.
