@@ -197,8 +197,7 @@ impl<R: Rule> Player<R> {
         let ladder = manifest.ladder().map_err(|_| PlaybackError::Changed(None))?;
         let settings = settings(&options, &ladder)?;
         let live = settings.live;
-        let first = usize::try_from(manifest.first_gop()).unwrap_or(usize::MAX);
-        let numbered = manifest.gops.iter().zip(first..);
+        let numbered = manifest.gops.iter().zip(first_gop(&manifest)..);
         let logs = numbered.map(|(gop, number)| log(number, gop)).collect();
         let mut player = Self {
             manifest,
@@ -264,8 +263,7 @@ impl<R: Rule> Player<R> {
 
     /// What to do now.
     pub fn decide(&mut self, now_us: u64) -> Command {
-        let seeks = self.viewer.as_mut().is_some_and(|viewer| mem::take(&mut viewer.abandons));
-        if mem::take(&mut self.gives_up) || seeks {
+        if mem::take(&mut self.gives_up) {
             return Command::Abandon;
         }
         match self.renewal {
@@ -455,9 +453,6 @@ impl<R: Rule> Player<R> {
     /// The next GOP that has begun and was not taken yet. To be asked until there is none.
     pub fn show(&mut self) -> Option<PlayedGop<'_>> {
         let number = if self.viewer.is_some() { self.driven_gop()? } else { self.next_gop()? };
-        if self.session.state().is_skipped(number) {
-            return self.show();
-        }
         let state = self.session.state();
         let shown = state.shown().iter().rev().find(|shown| shown.gop == number).copied();
         let shown = shown.filter(|_| !state.is_lost(number));
@@ -478,15 +473,13 @@ impl<R: Rule> Player<R> {
         Some(PlayedGop { number: log.number, point, head: self.store.head(), units: &self.units, log })
     }
 
-    /// The next GOP that has begun by the clock. Those before it go away.
+    /// The next GOP that has begun by the clock and is not skipped. Those before it go away.
     fn next_gop(&mut self) -> Option<usize> {
-        let number = self.presented;
-        self.store.drop_before(number);
-        if number >= self.session.state().first_open() {
-            return None;
-        }
-        self.presented = number.saturating_add(1);
-        Some(number)
+        let state = self.session.state();
+        let number = (self.presented..state.first_open()).find(|&gop| !state.is_skipped(gop));
+        self.presented = number.map_or(state.first_open().max(self.presented), |gop| gop.saturating_add(1));
+        self.store.drop_before(number.unwrap_or(self.presented));
+        number
     }
 
     /// Names Representations whose bytes are what was packaged, and malformed nevertheless.
@@ -501,6 +494,11 @@ impl<R: Rule> Player<R> {
             reason: "the file was packaged wrongly".to_owned(),
         }));
     }
+}
+
+/// The number of the first GOP that a manifest lists, which is below 2^32.
+fn first_gop(manifest: &Manifest) -> usize {
+    usize::try_from(manifest.first_gop()).unwrap_or(usize::MAX)
 }
 
 fn log(number: usize, gop: &GopInfo) -> GopLog {

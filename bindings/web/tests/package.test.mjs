@@ -221,7 +221,7 @@ test('a package that becomes another one is refused in words', async () => {
   }, /the package changed while it was played, from GOP 2 on/);
 });
 
-test('files that are tagged anew are followed', async () => {
+test('files that are tagged again are followed', async () => {
   const { player } = await viewer(({ file, number }) => ({ tag: isMedia({ file }) ? `"${number > 4}"` : undefined }));
   await check(await player.play(FRAME));
   assert.deepEqual(player.warnings, []);

@@ -135,7 +135,7 @@ impl<R: Rule> Run<'_, R> {
         let logs = self.player.logs();
         let sum = |of: fn(&GopLog) -> u64| logs.iter().map(of).fold(0, u64::saturating_add);
         let state = self.player.state();
-        // Those that were passed over are between.
+        // Those that were skipped are between.
         let spanned = logs.first().zip(logs.last());
         let spanned =
             spanned.map_or(0, |(first, last)| last.number.saturating_sub(first.number).saturating_add(1));

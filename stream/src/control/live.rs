@@ -1,4 +1,4 @@
-//! What playback of a live presentation does besides: other settings while it plays, and GOPs that are passed over.
+//! What playback of a live presentation does besides: other settings while it plays, and GOPs that are skipped.
 
 use super::rule::Rule;
 use super::session::Session;
@@ -12,7 +12,7 @@ impl<R: Rule> Session<R> {
         self.state.settings = settings;
     }
 
-    /// Passes over GOPs that have not begun: playback goes on with the one after them, as if they were not there. A request
+    /// Skips GOPs that have not begun: playback goes on with the one after them, as if they were not there. A request
     /// for one of them ends; gives whether there was one.
     pub fn skip(&mut self, now_us: u64, gops: Range<usize>) -> bool {
         self.advance(now_us);
@@ -31,12 +31,12 @@ impl<R: Rule> Session<R> {
 }
 
 impl State {
-    /// Whether playback passes over a GOP.
+    /// Whether playback skips a GOP.
     pub fn is_skipped(&self, gop: usize) -> bool {
         self.skipped.get(gop) == Some(&true)
     }
 
-    /// Moves the playhead, which stands at the start of a GOP, behind GOPs that are passed over.
+    /// Moves the playhead, which stands at the start of a GOP, after GOPs that are skipped.
     pub(super) fn pass_skipped(&mut self) {
         if self.playback == Playback::Playing && self.offset_ns > 0 {
             return;

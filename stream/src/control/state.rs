@@ -106,7 +106,7 @@ pub struct State {
     pub(super) fetched: Vec<u64>,
     /// GOPs for which a request has ended as the rule wanted.
     pub(super) settled: Vec<bool>,
-    /// GOPs that playback passes over.
+    /// GOPs that playback skips.
     pub(super) skipped: Vec<bool>,
     pub(super) only_whole: bool,
     pub(super) request: Option<Request>,
@@ -309,7 +309,7 @@ impl State {
         f64::from(self.viewer.speed_milli) / 1000.0
     }
 
-    /// Whether a GOP can be played, or is passed over.
+    /// Whether a GOP can be played, or is skipped.
     pub fn is_ready(&self, gop: usize) -> bool {
         if self.is_lost(gop) || self.is_skipped(gop) {
             return true;

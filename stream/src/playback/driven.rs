@@ -11,8 +11,6 @@ pub(super) struct Viewer {
     enters: bool,
     /// What was taken last.
     taken: Option<Shown>,
-    /// The running requests have to be given up.
-    pub(super) abandons: bool,
 }
 
 /// Players whose caller has the playhead, after [`Player::driven`].
@@ -37,7 +35,7 @@ impl<R: Rule> Player<R> {
             if running.is_some_and(|running| running < gop || (running > gop && !is_ready)) {
                 self.abandon();
                 self.session.give_up(now_us);
-                self.viewer.iter_mut().for_each(|viewer| viewer.abandons = true);
+                self.gives_up = true;
             }
         }
         self.session.go_to(now_us, gop);
@@ -60,7 +58,7 @@ impl<R: Rule> Player<R> {
         self.session.choose(now_us, point);
     }
 
-    /// Whether the GOP that the playhead is in is to be shown anew: it has begun, or has become better.
+    /// Whether the GOP that the playhead is in is to be shown again: it has begun, or has become better.
     pub fn is_due(&self) -> bool {
         self.due().is_some()
     }
@@ -75,12 +73,12 @@ impl<R: Rule> Player<R> {
         (viewer.enters || viewer.taken != shown).then_some((gop, shown))
     }
 
-    /// Takes the GOP that is due.
+    /// Takes the GOP that is due, unless it is skipped.
     pub(super) fn driven_gop(&mut self) -> Option<usize> {
         let (gop, shown) = self.due()?;
         let viewer = self.viewer.as_mut()?;
         (viewer.enters, viewer.taken) = (false, shown);
-        Some(gop)
+        Some(gop).filter(|&gop| !self.session.state().is_skipped(gop))
     }
 
     /// Lets go of GOPs that do not fit into the memory: those before the playhead first, then those that are furthest ahead of

@@ -1,6 +1,6 @@
-//! C.9.3: a presentation that grows is followed: when the manifest is read again, what is appended, and what is passed over.
+//! C.9.3: a presentation that grows is followed: when the manifest is read again, what is appended, and what is skipped.
 
-use super::{PlaybackError, Player, Renewal, check_same, log, settings};
+use super::{PlaybackError, Player, Renewal, check_same, first_gop, log, settings};
 use crate::control::{Live, Rule, Settings};
 use crate::manifest::{GopInfo, Manifest};
 use crate::playback::Loss;
@@ -193,7 +193,7 @@ impl<R: Rule> Player<R> {
     }
 
     /// The manifest has been read again, with the layers that are fetched. Playback goes on if it is that of the same package,
-    /// to which GOPs may have been added. A copy that is not newer than the one before is passed over.
+    /// to which GOPs may have been added. A copy that is not newer than the one before is discarded.
     ///
     /// # Errors
     /// A package that has become another one, or whose GOPs are too large.
@@ -212,7 +212,7 @@ impl<R: Rule> Player<R> {
         }
         self.forget_shown();
         self.place_again(&manifest);
-        let first = self.pass_over(now_us, &manifest);
+        let first = self.skip_ahead(now_us, &manifest);
         self.append(now_us, manifest, first)?;
         self.set(now_us)
     }
@@ -227,7 +227,7 @@ impl<R: Rule> Player<R> {
 
     /// Takes where the bytes of GOPs are now.
     fn place_again(&mut self, manifest: &Manifest) {
-        let first = number(manifest.first_gop());
+        let first = first_gop(manifest);
         let listed = manifest.gops.get(..manifest.complete_gops()).unwrap_or_default();
         let known = self.manifest.gops.iter_mut().zip(&self.logs).skip(self.presented);
         for (gop, log) in known {
@@ -237,15 +237,14 @@ impl<R: Rule> Player<R> {
         }
     }
 
-    /// Where what is to be fetched next is not listed any more, or playback is far behind: passes over GOPs. Gives the number
+    /// Where what is to be fetched next is not listed any more, or playback is far behind: skips GOPs. Gives the number
     /// of the first GOP that is to be appended.
-    fn pass_over(&mut self, now_us: u64, manifest: &Manifest) -> usize {
-        let known =
-            self.logs.last().map_or(number(self.manifest.first_gop()), |log| log.number.saturating_add(1));
+    fn skip_ahead(&mut self, now_us: u64, manifest: &Manifest) -> usize {
+        let known = self.logs.last().map_or(first_gop(&self.manifest), |log| log.number.saturating_add(1));
         let state = self.session.state();
         let missing = state.first_missing();
         let next = self.logs.get(missing).map_or(known, |log| log.number);
-        let first = number(manifest.first_gop());
+        let first = first_gop(manifest);
         let Some(follow) = &self.follow else { return known.max(first) };
         let most_us = follow.target_us.saturating_add(self.options.following.drift_us);
         let is_late = !state.shown().is_empty() && state.latency_us().is_some_and(|us| us > most_us);
@@ -273,7 +272,7 @@ impl<R: Rule> Player<R> {
 
     /// Appends the GOPs of a manifest from a number on, and takes all else that it says.
     fn append(&mut self, now_us: u64, manifest: Manifest, from: usize) -> Result<(), PlaybackError> {
-        let first = number(manifest.first_gop());
+        let first = first_gop(&manifest);
         let mut gops = std::mem::take(&mut self.manifest.gops);
         for index in from.saturating_sub(first)..manifest.complete_gops() {
             let number = first.saturating_add(index);
@@ -334,9 +333,4 @@ fn target_us(manifest: &Manifest) -> u64 {
 
 fn signed(us: u64) -> i64 {
     i64::try_from(us).unwrap_or(i64::MAX)
-}
-
-/// The number of a GOP, which is below 2^32.
-fn number(gop: u64) -> usize {
-    usize::try_from(gop).unwrap_or(usize::MAX)
 }

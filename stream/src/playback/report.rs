@@ -42,7 +42,7 @@ pub struct GopLog {
     pub bytes: u64,
 }
 
-/// Something that was left out of a GOP, or of several that were passed over.
+/// Something that was left out of a GOP, or of several that were skipped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Loss {
     /// The GOP, by its number in the stream.

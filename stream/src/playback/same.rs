@@ -1,6 +1,6 @@
 //! Whether a manifest that was read again is that of the same package.
 
-use super::{GopLog, PlaybackError};
+use super::{GopLog, PlaybackError, first_gop};
 use crate::manifest::{GopInfo, Manifest};
 
 /// A package shall be the one it was, but for GOPs that were added and for where ranges are. `logs` has the numbers of the
@@ -20,7 +20,7 @@ pub(super) fn check_same(old: &Manifest, logs: &[GopLog], new: &Manifest) -> Res
     if ids(old) != ids(new) || stream(old) != stream(new) || began_again {
         return Err(PlaybackError::Changed(None));
     }
-    let first = usize::try_from(new.first_gop()).unwrap_or(usize::MAX);
+    let first = first_gop(new);
     let listed = first.saturating_add(new.complete_gops());
     let known = logs.last().map_or(0, |log| log.number.saturating_add(1));
     if listed < known && new.live.is_some() {
