@@ -144,7 +144,7 @@ impl Report {
                 0 | 1 => format!(
                     "GOP {gop}: {representation} is left out from refinement {refinement} on: {reason}\n"
                 ),
-                _ => format!("GOPs {gop} to {} are passed over: {reason}\n", gop + count - 1),
+                _ => format!("GOPs {gop} to {} are skipped: {reason}\n", gop + count - 1),
             };
         }
         for gop in &self.gops {
