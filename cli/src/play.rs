@@ -14,7 +14,7 @@ use splatstream_stream::client::{Client, Following, Options, PlayedGop};
 use splatstream_stream::control::{
     Bola, BufferRule, Layered, Limits, Rule, Settings, Single, ThroughputRule,
 };
-use splatstream_stream::simulation::{Link, Trace, simulate};
+use splatstream_stream::simulation::{Link, Requests, Trace, simulate};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -118,7 +118,7 @@ impl Play {
                 let ladder = client.manifest().ladder().map_err(|error| Failure::other(error.to_string()))?;
                 let link = Link {
                     latency_us: u64::from(self.latency) * 1000,
-                    requests: client.manifest().requests(),
+                    requests: Requests::OfClient(Box::new(client.manifest().clone())),
                     ..Link::new(trace)
                 };
                 let outcome = simulate(&ladder, &self.settings(), self.rule.rule(), &link);

@@ -13,7 +13,7 @@ use splatstream_stream::control::{Layered, Settings};
 use splatstream_stream::package::Package;
 use splatstream_stream::qoe::Score;
 use splatstream_stream::server::{self, Bucket, Network, Server, Stopper};
-use splatstream_stream::simulation::{Link, Report, Trace, simulate};
+use splatstream_stream::simulation::{Link, Report, Requests, Trace, simulate};
 use std::env;
 use std::error::Error;
 use std::fs;
@@ -135,7 +135,7 @@ fn virtually(package: &Path, trace: &Trace, latency: Duration) -> Result<Figures
     let begun_us = trace.time_of(u128::from(bytes) * 8_000_000).ok_or("the trace carries nothing")?;
     let link = Link {
         latency_us: u64::try_from(latency.as_micros())?,
-        requests: manifest.requests(),
+        requests: Requests::OfClient(Box::new(manifest.clone())),
         credit_us: Bucket::DEPTH_US,
         ..Link::new(trace.since(begun_us))
     };

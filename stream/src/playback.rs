@@ -47,7 +47,7 @@ mod driven;
 mod error;
 mod fault;
 mod follow;
-mod parts;
+pub(crate) mod parts;
 mod report;
 mod same;
 mod store;

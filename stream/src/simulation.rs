@@ -11,8 +11,10 @@
 //! ```
 
 pub mod ladders;
+mod request;
 mod run;
 mod trace;
 
-pub use run::{Link, Report, Requests, simulate};
+pub use request::Requests;
+pub use run::{Link, Report, simulate};
 pub use trace::{Trace, TraceError};

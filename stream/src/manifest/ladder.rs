@@ -4,7 +4,6 @@ use super::{GopInfo, Manifest, SubsegmentInfo};
 use crate::control::number::{real, size};
 use crate::control::{Description, Ladder, LadderError, Layer, OperatingPoint, Piece, Representation};
 use crate::representation::Representation as Kind;
-use crate::simulation::Requests;
 use core::ops::Range;
 
 /// What a frame that stands still costs in dB, where no picture of it was measured.
@@ -52,11 +51,6 @@ impl Manifest {
             ladder.push(self.description(gop).ok_or(LadderError::Pieces)?)?;
         }
         Ok(ladder)
-    }
-
-    /// How the client of this crate sends fetches, for a simulation.
-    pub fn requests(&self) -> Requests {
-        Requests::Apart { inits: self.representations.iter().map(|one| one.init.size).collect() }
     }
 
     /// GOPs to which no frames come any more: those of [`Manifest::ladder`].

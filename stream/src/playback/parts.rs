@@ -5,21 +5,21 @@ use crate::manifest::{ByteRange, Manifest};
 
 /// Bytes with a digest of their own.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Part {
-    pub(super) gop: usize,
-    pub(super) representation: usize,
+pub(crate) struct Part {
+    pub(crate) gop: usize,
+    pub(crate) representation: usize,
     /// The piece that it belongs to in the ladder.
-    pub(super) piece: u8,
-    pub(super) kind: Kind,
-    pub(super) file: String,
-    pub(super) range: ByteRange,
+    pub(crate) piece: u8,
+    pub(crate) kind: Kind,
+    pub(crate) file: String,
+    pub(crate) range: ByteRange,
     /// Bytes of a request between the part before it and this one, which nobody wants.
-    pub(super) gap: u64,
+    pub(crate) gap: u64,
 }
 
 /// What a part is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// The initialisation segment of the Representation.
     Init,
     /// A level of a subsegment, which is counted within its GOP and Representation.
@@ -38,7 +38,7 @@ pub struct ByteRequest {
 }
 
 /// The parts of a fetch in its order, each first one of a Representation after its initialisation segment if that is wanted.
-pub(super) fn parts(manifest: &Manifest, fetch: &Fetch, needs_init: impl Fn(usize) -> bool) -> Vec<Part> {
+pub(crate) fn parts(manifest: &Manifest, fetch: &Fetch, needs_init: impl Fn(usize) -> bool) -> Vec<Part> {
     let mut parts: Vec<Part> = Vec::new();
     for range in fetch.ranges() {
         let (gop, representation) = (fetch.gop(), range.representation);
@@ -81,7 +81,7 @@ fn of_piece(manifest: &Manifest, gop: usize, representation: usize, piece: u8) -
 const GAP: u64 = 1024;
 
 /// The requests for some parts: one for those that follow each other in a file, or nearly so.
-pub(super) fn requests(parts: &mut [Part]) -> Vec<ByteRequest> {
+pub(crate) fn requests(parts: &mut [Part]) -> Vec<ByteRequest> {
     let mut requests: Vec<ByteRequest> = Vec::new();
     for part in parts.iter_mut().filter(|part| part.range.size > 0) {
         let last = requests.last_mut().filter(|last| last.file == part.file);

@@ -1,11 +1,12 @@
 //! The loop of events.
 
+use super::request::{Request, Requests};
 use super::trace::Trace;
 use crate::control::{Decision, Fetch, Ladder, Playback, Rule, Session, Settings, Shown};
 use std::collections::BTreeSet;
 
 /// A network between a server and a player.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// Its bandwidth.
     pub trace: Trace,
@@ -19,19 +20,6 @@ pub struct Link {
     pub requests: Requests,
     /// A link that was idle for longer carries at once what it would have carried in so many microseconds.
     pub credit_us: u64,
-}
-
-/// How a player sends fetches.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Requests {
-    /// As one request, whatever ranges they have.
-    #[default]
-    Together,
-    /// A request for each range, after the one before has ended, as the client of this crate does.
-    Apart {
-        /// Bytes of the initialisation segment of each Representation, which is requested before its first range.
-        inits: Vec<u64>,
-    },
 }
 
 impl Link {
@@ -133,21 +121,6 @@ struct Flow {
     done: u64,
 }
 
-/// A request of a fetch.
-#[derive(Clone, Default)]
-struct Request {
-    /// The Representation whose initialisation segment it is for, of which the session does not know.
-    init: Option<usize>,
-    /// Lengths of its pieces added up: where something new has arrived.
-    marks: Vec<u64>,
-}
-
-impl Request {
-    fn bytes(&self) -> u64 {
-        self.marks.last().copied().unwrap_or(0)
-    }
-}
-
 struct Run<'a, R> {
     session: Session<R>,
     link: &'a Link,
@@ -187,7 +160,7 @@ impl<R: Rule> Run<'_, R> {
     }
 
     fn send(&mut self, fetch: Fetch) {
-        let requests = self.requests(&fetch);
+        let requests = self.link.requests.of(&fetch, self.session.state().ladder(), &self.inits);
         self.begin(requests, 0);
         self.report.fetches.push((self.now_us, fetch));
     }
@@ -200,29 +173,6 @@ impl<R: Rule> Run<'_, R> {
         self.report.requests = self.report.requests.saturating_add(1);
     }
 
-    /// What is requested for a fetch; nothing if it has no bytes.
-    fn requests(&self, fetch: &Fetch) -> Vec<Request> {
-        let gop = self.session.state().ladder().gops().get(fetch.gop());
-        let (mut requests, mut request, mut seen) = (Vec::new(), Request::default(), self.inits.clone());
-        for range in fetch.ranges() {
-            if let Requests::Apart { inits } = &self.link.requests {
-                let init = inits.get(range.representation).filter(|_| seen.insert(range.representation));
-                let init =
-                    init.map(|&bytes| Request { init: Some(range.representation), marks: vec![bytes] });
-                requests.extend([Some(request), init].into_iter().flatten());
-                request = Request::default();
-            }
-            let pieces = gop.map_or(&[][..], |gop| gop.pieces(range.representation));
-            let own = pieces.get(usize::from(range.from)..usize::from(range.to)).unwrap_or_default();
-            for piece in own {
-                request.marks.push(request.bytes().saturating_add(piece.bytes));
-            }
-        }
-        requests.push(request);
-        requests.retain(|request| request.bytes() > 0);
-        requests
-    }
-
     /// Goes on to the next event.
     fn step(&mut self) {
         let mut next = self.wake_us.min(self.link.limit_us);
@@ -231,8 +181,8 @@ impl<R: Rule> Run<'_, R> {
         }
         let loss = self.link.losses_us.iter().copied().find(|&loss| loss > self.now_us);
         if let Some(flow) = &self.flow {
-            let marks = flow.requests.first().map_or(&[][..], |request| &request.marks);
-            let mark = marks.iter().find(|&&mark| mark > flow.bytes).copied().unwrap_or(0);
+            let mut ends = flow.requests.iter().take(1).flat_map(Request::ends);
+            let mark = ends.find(|&end| end > flow.bytes).unwrap_or(0);
             let carried = flow.before.saturating_add(u128::from(mark).saturating_mul(BYTE));
             let mark_us = self.link.trace.time_of(carried).unwrap_or(u64::MAX).max(flow.first_us);
             let event_us = if self.now_us < flow.first_us { flow.first_us } else { mark_us };
@@ -247,16 +197,17 @@ impl<R: Rule> Run<'_, R> {
         let Some(flow) = &mut self.flow else { return };
         if self.now_us >= flow.first_us {
             let carried = self.link.trace.carried(self.now_us).saturating_sub(flow.before);
-            let (init, all) =
-                flow.requests.first().map_or((None, 0), |request| (request.init, request.bytes()));
+            let nothing = Request::default();
+            let request = flow.requests.first().unwrap_or(&nothing);
+            let all = request.bytes();
             let bytes = u64::try_from(carried / BYTE).unwrap_or(u64::MAX).min(all);
             self.report.bytes = self.report.bytes.saturating_add(bytes.saturating_sub(flow.bytes));
             flow.bytes = bytes;
             self.used = flow.before.saturating_add(u128::from(bytes).saturating_mul(BYTE));
-            let arrived = flow.done.saturating_add(if init.is_some() { 0 } else { bytes });
+            let arrived = flow.done.saturating_add(request.counted(bytes));
+            self.inits.extend(request.inits(bytes));
             self.session.received(self.now_us, arrived);
             if bytes == all {
-                self.inits.extend(init);
                 let rest = flow.requests.get(1..).unwrap_or_default().to_vec();
                 self.flow = None;
                 if !rest.is_empty() {
