@@ -168,16 +168,11 @@ pub(crate) fn compare_frames(
     choice: Match,
     sums: &mut ErrorSums,
 ) -> Matching {
-    let (a, b) = (canonical(a), canonical(b));
+    let [a, b] = [a, b].map(|frame| canonicalise(frame.clone(), true));
     let (small, large) = if b.len() <= a.len() { (&b, &a) } else { (&a, &b) };
     let (matching, partners) = matching::partners(small, large, choice);
     sums.add(small, large, &partners);
     matching
-}
-
-fn canonical(frame: &GaussianFrame) -> GaussianFrame {
-    let all: Vec<u32> = (0..frame.len() as u32).collect();
-    canonicalise(frame, &all, true)
 }
 
 /// Which of two frames comes first in display order; none if there is no frame.

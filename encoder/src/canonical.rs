@@ -79,27 +79,24 @@ pub fn canonical(log_scale: [f32; 3], rotation: [f32; 4], sort: bool) -> ([f32; 
     (sorted, smallest_turn(product(unit, permutation(order))))
 }
 
-/// The Gaussians `indices` of a frame in canonical form.
-#[expect(
-    clippy::indexing_slicing,
-    reason = "axes and parts are constants or a permutation of them; rows are those of the planes"
-)]
-pub fn canonicalise(frame: &GaussianFrame, indices: &[u32], sort: bool) -> GaussianFrame {
-    let mut selected = frame.select(indices);
-    let PlanesMut { mut log_scale, mut rotation, .. } = selected.planes_mut();
-    let forms: Vec<([f32; 3], [f32; 4])> = (0..indices.len())
-        .into_par_iter()
-        .map(|row| {
-            let scales = [0, 1, 2].map(|axis: usize| log_scale[axis][row]);
-            let turn = [0, 1, 2, 3].map(|part: usize| rotation[part][row]);
-            canonical(scales, turn, sort)
-        })
-        .collect();
-    for (row, (scales, turn)) in forms.into_iter().enumerate() {
-        log_scale.iter_mut().zip(scales).for_each(|(plane, scale)| plane[row] = scale);
-        rotation.iter_mut().zip(turn).for_each(|(plane, part)| plane[row] = part);
-    }
-    selected
+/// Gaussians that are put into canonical form at a time.
+const PART: usize = 1 << 12;
+
+/// The Gaussians of a frame in canonical form.
+#[must_use]
+pub fn canonicalise(mut frame: GaussianFrame, sort: bool) -> GaussianFrame {
+    let PlanesMut { log_scale, rotation, .. } = frame.planes_mut();
+    let [a, b, c] = log_scale.map(|plane| plane.par_chunks_mut(PART));
+    let [w, x, y, z] = rotation.map(|plane| plane.par_chunks_mut(PART));
+    let parts = (a, b, c, w, x, y, z).into_par_iter();
+    parts.for_each(|(a, b, c, w, x, y, z)| {
+        let scales = a.iter_mut().zip(b).zip(c);
+        let turns = w.iter_mut().zip(x).zip(y).zip(z);
+        for (((a, b), c), (((w, x), y), z)) in scales.zip(turns) {
+            ([*a, *b, *c], [*w, *x, *y, *z]) = canonical([*a, *b, *c], [*w, *x, *y, *z], sort);
+        }
+    });
+    frame
 }
 
 #[cfg(test)]

@@ -45,6 +45,8 @@ pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32)
 
 /// Gaussians projected at a time: their planes stay in the second-level cache.
 const TILE: usize = 1 << 12;
+/// Tiles that are there at the same time.
+const TILES: usize = 64;
 
 /// Components in units of the step; one plane per component.
 #[expect(clippy::indexing_slicing, reason = "tiles and rows lie within the planes that they are cut from")]
@@ -53,7 +55,6 @@ pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) ->
         transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
     let scale = 1.0 / (step * UNIT as f32);
     let count = planes.first().map_or(0, |plane| plane.len());
-    let starts: Vec<usize> = (0..count).step_by(TILE).collect();
     let tile = |&start: &usize| -> Vec<Vec<f32>> {
         let end = count.min(start + TILE);
         let row = |weights: &[i16]| {
@@ -68,9 +69,14 @@ pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) ->
         };
         transform.rows().map(row).collect()
     };
-    let tiles: Vec<Vec<Vec<f32>>> = starts.par_iter().map(tile).collect();
-    let component = |index: usize| tiles.iter().flat_map(|tile| tile[index].iter().copied()).collect();
-    (0..transform.rows().len()).into_par_iter().map(component).collect()
+    let mut components: Vec<Vec<f32>> = transform.rows().map(|_| Vec::with_capacity(count)).collect();
+    let starts: Vec<usize> = (0..count).step_by(TILE).collect();
+    for some in starts.chunks(TILES) {
+        let tiles: Vec<Vec<Vec<f32>>> = some.par_iter().map(tile).collect();
+        let each = components.par_iter_mut().enumerate();
+        each.for_each(|(index, plane)| tiles.iter().for_each(|tile| plane.extend_from_slice(&tile[index])));
+    }
+    components
 }
 
 /// Drops the last components that round to 0 for every Gaussian, with these steps; at least one stays.

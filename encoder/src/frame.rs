@@ -46,6 +46,12 @@ pub(crate) struct Target {
 }
 
 impl Target {
+    /// Lets the values go, and keeps which Gaussians they were of.
+    pub(crate) fn forget(&mut self) {
+        self.frame = GaussianFrame::default();
+        self.position = Default::default();
+    }
+
     pub(crate) fn cloud(&self) -> Cloud<'_> {
         Cloud {
             position: self.position.each_ref().map(Vec::as_slice),

@@ -299,7 +299,7 @@ impl SequenceCoder<'_, '_> {
         let row_count = frame.len() as u32;
         // Where frames are predicted axes are named as in the reference, and what a frame starts with is sorted.
         let sorts = self.sequence.canonical_axes() || self.settings.profile() == Profile::Dynamic;
-        let frame = canonicalise(&frame, &rows, sorts);
+        let frame = canonicalise(frame.into_selected(&rows), sorts);
         let (frame, found) = isolated::colours(frame, &rows, number);
         let grid = PositionGrid::of(&self.sequence);
         // A frame is looked at again where it is tried in one way and coded in another.
@@ -321,31 +321,34 @@ impl SequenceCoder<'_, '_> {
 
     /// Codes an I frame.
     fn intra(&mut self, gop: &mut Gop, number: u32, intra: Intra) -> Result<(), Error> {
-        let Intra { target, order } = &intra;
+        let Intra { mut target, order } = intra;
         let known = gop.tools.take_components();
         let coder = self.coder(gop, None);
         let wanted = Wanted::new(&target.frame, known, &coder);
-        let compensator = self.compensator(target);
+        let compensator = self.compensator(&target);
         let is_predicted = gop.header.is_predicted();
+        if !is_predicted {
+            target.forget();
+        }
         let coded = code_intra(
             &coder,
-            &IntraTarget {
+            IntraTarget {
                 chooser: self.chooser(),
                 compensator: compensator.as_ref(),
                 shows_top_prefixes: !(is_predicted && self.sequence.whole_anchor()),
-                wanted: &wanted,
-                order,
+                wanted,
+                order: &order,
                 rows: &target.rows,
                 row_count: target.row_count,
                 in_one_layer: gop.in_one_layer,
             },
         )?;
         let role = FrameRole { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
-        self.add(gop, number, &role, target, &coded)?;
+        self.add(gop, number, &role, &target, &coded)?;
         gop.intra_bytes = coded.bytes() / f64::from(coded.gaussians().max(1));
         if is_predicted && self.recorder.is_none() && !target.frame.is_empty() {
             let cameras = self.ranking.cameras(&target.frame);
-            gop.steadiness = Some(Steadiness::new(cameras, target, &coded, &self.sequence)?);
+            gop.steadiness = Some(Steadiness::new(cameras, &target, &coded, &self.sequence)?);
         }
         if is_predicted {
             gop.start_with(number, coded, self.sequence.whole_anchor());
@@ -455,7 +458,7 @@ impl SequenceCoder<'_, '_> {
         }
         let bytes = |(_, payload): &(UnitId, Vec<u8>)| (UnitHeader::SIZE + payload.len()) as u64;
         frame.bytes = gop.units[start..].iter().map(bytes).sum();
-        self.report.invisible += u64::from(target.row_count) - target.frame.len() as u64;
+        self.report.invisible += u64::from(target.row_count) - target.rows.len() as u64;
         self.report.gaussians += u64::from(gaussians);
         self.report.coded.push(frame);
         self.report.digests.push(coded.units.last().map_or(0, |unit| unit.header.refinement_digest));

@@ -5,6 +5,7 @@
     reason = "contexts, tables and tokens are numbers below the lengths that the model was made with"
 )]
 
+use crate::blocks::Blocks;
 use crate::clusters::{Clustering, cluster};
 use crate::entropy_cost::Histogram;
 use crate::parametric_fit::fitted;
@@ -22,6 +23,8 @@ use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 /// Gaussians that are looked at for the choice of a model, nearly: whole blocks.
 const SAMPLE: usize = 1 << 15;
 const SAMPLE_FAST: usize = 1 << 14;
+/// Gaussians whose tokens are counted at once.
+const COUNTED: usize = 1 << 16;
 /// Thresholds of the first and of the second axis.
 const FIRST_THRESHOLDS: usize = 15;
 const SECOND_THRESHOLDS: usize = 3;
@@ -109,8 +112,7 @@ fn quantile_thresholds(values: &[i32], parts: usize) -> Vec<i32> {
 struct PlaneView<'a> {
     info: PlaneInfo,
     plane: usize,
-    blocks: Vec<&'a CodedBlock>,
-    direct_log2: u8,
+    blocks: &'a [CodedBlock],
     tokens: Vec<u8>,
 }
 
@@ -195,39 +197,33 @@ fn direct_log2(info: PlaneInfo, values: &[u64]) -> u8 {
     (3..=7).find(|&log2| 1 << log2 > most).unwrap_or(7)
 }
 
-/// The model of one plane of a unit. `bias` has been taken off the coded values already.
-pub(crate) fn choose(
+/// The model of one plane of a unit without its tables, chosen for some of the unit's values. `bias` has been taken off the
+/// coded values already.
+fn choose(
     info: PlaneInfo,
     plane: usize,
     blocks: &[CodedBlock],
     bias: i32,
-    preset: Preset,
-    tools: Tools,
+    two_axes: bool,
+    (preset, tools): (Preset, Tools),
 ) -> PlaneModel {
-    let total: usize = blocks.iter().map(CodedBlock::len).sum();
-    let most = match preset {
-        Preset::Fast => SAMPLE_FAST,
-        Preset::Balanced => SAMPLE,
-        Preset::Small => usize::MAX,
-    };
-    let stride = total.div_ceil(most).max(1);
-    let sample: Vec<&CodedBlock> = blocks.iter().step_by(stride).collect();
-    let values: Vec<u64> = sample.iter().flat_map(|block| unsigned_values(info, plane, block)).collect();
+    let values: Vec<u64> = blocks.iter().flat_map(|block| unsigned_values(info, plane, block)).collect();
     let direct_log2 = direct_log2(info, &values);
     let tokens = values.iter().map(|&value| split(value, direct_log2).token).collect();
-    let view = PlaneView { info, plane, blocks: sample, direct_log2, tokens };
-    let best = view.best(&candidates(info, preset, tools), preset != Preset::Fast && total >= 1024);
+    let view = PlaneView { info, plane, blocks, tokens };
+    let best = view.best(&candidates(info, preset, tools), two_axes);
     let (axes, table_of_context) = best.clustering.simplified(best.axes);
-    let mut model =
-        PlaneModel { bias, direct_log2: view.direct_log2, axes, tables: Vec::new(), table_of_context };
-    model.tables = tables(&model, info, plane, blocks);
-    model
+    PlaneModel { bias, direct_log2, axes, tables: Vec::new(), table_of_context }
 }
 
-/// The tables that fit all of the unit's tokens, given the rest of the model.
-fn tables(model: &PlaneModel, info: PlaneInfo, plane: usize, blocks: &[CodedBlock]) -> Vec<Frequencies> {
-    let count = model.table_of_context.iter().max().map_or(0, |&last| usize::from(last) + 1);
-    let mut histograms = vec![Histogram::default(); count];
+/// Counts the tokens of some blocks, each for the table of its context.
+fn count(
+    histograms: &mut [Histogram],
+    model: &PlaneModel,
+    info: PlaneInfo,
+    plane: usize,
+    blocks: &[CodedBlock],
+) {
     for block in blocks {
         let contexts = contexts(model, info, plane, block);
         for (index, value) in unsigned_values(info, plane, block).enumerate() {
@@ -236,7 +232,6 @@ fn tables(model: &PlaneModel, info: PlaneInfo, plane: usize, blocks: &[CodedBloc
             histograms[table].add(split(value, model.direct_log2).token);
         }
     }
-    histograms.iter().map(|histogram| table(&histogram.counts(), info.alphabet, model.direct_log2)).collect()
 }
 
 /// The explicit table of the counts, or a parametric one if that saves bits.
@@ -257,35 +252,55 @@ fn table(counts: &[u64], alphabet: Alphabet, direct_log2: u8) -> Frequencies {
     if bits(&parametric) < bits(&explicit) { parametric } else { explicit }
 }
 
-/// Models for all planes of a unit.
-pub(crate) fn choose_all(
-    planes: &[PlaneInfo],
-    blocks: &[CodedBlock],
-    biases: &[i32],
-    preset: Preset,
-    tools: Tools,
-) -> Vec<PlaneModel> {
-    planes
-        .par_iter()
-        .enumerate()
-        .map(|(plane, &info)| choose(info, plane, blocks, biases[plane], preset, tools))
-        .collect()
+/// Models for all planes of a section: contexts that suit a part of its blocks, tables that fit all of its tokens.
+pub(crate) fn choose_all(blocks: &Blocks<'_>, preset: Preset, tools: Tools) -> Vec<PlaneModel> {
+    if blocks.len() == 0 {
+        return Vec::new();
+    }
+    let most = match preset {
+        Preset::Fast => SAMPLE_FAST,
+        Preset::Balanced => SAMPLE,
+        Preset::Small => usize::MAX,
+    };
+    let stride = blocks.values().div_ceil(most).max(1);
+    let two_axes = preset != Preset::Fast && blocks.values() >= 1024;
+    let sample = blocks.cut((0..blocks.len()).step_by(stride));
+    let planes = blocks.planes().par_iter().zip(blocks.biases()).enumerate();
+    let mut counted: Vec<(PlaneModel, Vec<Histogram>)> = planes
+        .map(|(plane, (&info, &bias))| {
+            let model = choose(info, plane, &sample, bias, two_axes, (preset, tools));
+            let tables = model.table_of_context.iter().max().map_or(0, |&last| usize::from(last) + 1);
+            (model, vec![Histogram::default(); tables])
+        })
+        .collect();
+    let mut add = |some: &[CodedBlock]| {
+        let each = counted.par_iter_mut().zip(blocks.planes()).enumerate();
+        each.for_each(|(plane, ((model, histograms), &info))| count(histograms, model, info, plane, some));
+    };
+    if stride == 1 {
+        add(&sample);
+    } else {
+        drop(sample);
+        let all: Vec<usize> = (0..blocks.len()).collect();
+        let at_once = (COUNTED * blocks.len()).div_ceil(blocks.values());
+        all.chunks(at_once).for_each(|some| add(&blocks.cut(some.iter().copied())));
+    }
+    let with_tables = counted.into_par_iter().zip(blocks.planes()).map(|((model, histograms), info)| {
+        let table = |histogram: &Histogram| table(&histogram.counts(), info.alphabet, model.direct_log2);
+        PlaneModel { tables: histograms.iter().map(table).collect(), ..model }
+    });
+    with_tables.collect()
 }
 
 /// For each plane its own model, or the one before if that has the same bias and saves its tables.
-pub(crate) fn cheapest(
-    own: &[PlaneModel],
-    before: Option<&[PlaneModel]>,
-    planes: &[PlaneInfo],
-    blocks: &[CodedBlock],
-) -> Vec<PlaneModel> {
-    let Some(before) = before else { return own.to_vec() };
+pub(crate) fn cheapest(own: &[PlaneModel], before: &[PlaneModel], blocks: &Blocks<'_>) -> Vec<PlaneModel> {
+    let (planes, cut) = (blocks.planes(), blocks.cut(0..blocks.len()));
     let choose = |(plane, own): (usize, &PlaneModel)| {
         let Some(before) = before.get(plane).filter(|before| before.bias == own.bias) else {
             return own.clone();
         };
         let bits = |model: &PlaneModel| -> Option<f64> {
-            blocks.iter().map(|block| symbol_bits(model, planes[plane], plane, block)).sum()
+            cut.iter().map(|block| symbol_bits(model, planes[plane], plane, block)).sum()
         };
         let own_bits = bits(own).map(|bits| bits + model_bits(own, planes[plane].alphabet));
         match (bits(before), own_bits) {

@@ -193,7 +193,7 @@ fn needed_degree(frame: &GaussianFrame, step: f32) -> u8 {
 fn try_axes(frame: &GaussianFrame, shown: &[u32], settings: &Settings) -> [f64; 2] {
     let sample: Vec<u32> = shown.iter().step_by(shown.len().div_ceil(TRIAL).max(1)).copied().collect();
     [true, false].map(|sort| {
-        let canonical = canonicalise(frame, &sample, sort);
+        let canonical = canonicalise(frame.select(&sample), sort);
         let round = |plane: &Vec<f32>, step: f32| -> Vec<i32> {
             plane.iter().map(|&value| nearest_integer(value / step)).collect()
         };

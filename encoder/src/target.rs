@@ -101,7 +101,7 @@ impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
         let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
         let shown = visible(&first, settings.keep_invisible);
-        let frame = canonicalise(&first, &shown, true);
+        let frame = canonicalise(first.into_selected(&shown), true);
         let (frame, _) = isolated::colours(frame, &shown, 0);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);

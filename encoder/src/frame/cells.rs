@@ -156,7 +156,7 @@ pub(crate) fn code_cells(
     let field = field(&values, motion.cell_log2, sequence, 0)?;
     let coder = &from.coder;
     let drafted = coder.section_draft(Section::Cells, &values, coder.steps([0; 5]), models);
-    let section = drafted.code(Section::Cells, &coder.plan, models)?;
+    let section = drafted.code(Section::Cells, &values, &coder.plan, models)?;
     let (cell_count, cell_log2) = (motion.cells.len() as u32, motion.cell_log2);
     Ok((field, Some(CellsBytes { cell_count, cell_log2, section })))
 }

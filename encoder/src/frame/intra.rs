@@ -31,7 +31,8 @@ pub(crate) struct IntraTarget<'a> {
     pub(crate) compensator: Option<&'a Compensator>,
     /// Whether prefixes of the highest layer are shown too.
     pub(crate) shows_top_prefixes: bool,
-    pub(crate) wanted: &'a Wanted,
+    /// Goes when it is not needed any more.
+    pub(crate) wanted: Wanted,
     /// Most important first.
     pub(crate) order: &'a [u32],
     /// Row of each Gaussian in its file, and rows of the file.
@@ -45,7 +46,7 @@ pub(crate) struct IntraTarget<'a> {
 struct Intra<'a> {
     coder: &'a UnitCoder<'a>,
     ladder: Ladder,
-    target: &'a IntraTarget<'a>,
+    target: IntraTarget<'a>,
     lists: Vec<GaussianList>,
     /// Gaussians of each list, by index in the target.
     members: Vec<Vec<u32>>,
@@ -57,7 +58,7 @@ struct Intra<'a> {
 ///
 /// # Errors
 /// What the decoder's own checks refuse.
-pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> Result<CodedFrame, Error> {
+pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: IntraTarget<'_>) -> Result<CodedFrame, Error> {
     let sequence = coder.sequence;
     let refinements = usize::from(sequence.refinement_count);
     let sh_planes = usize::from(sequence.sh_dimension());
@@ -74,7 +75,7 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> Res
     for layer in 0..sequence.spatial_layer_count {
         intra.layer(layer)?;
     }
-    let Intra { lists, members, models, units, .. } = intra;
+    let Intra { target, lists, members, models, units, .. } = intra;
     let rows = members.iter().map(|list| list.iter().map(|&index| target.rows[index as usize]).collect());
     let reference = Reference {
         rows: rows.collect(),
@@ -102,7 +103,10 @@ impl Intra<'_> {
             added.push((rows.to_vec(), self.grain(layer, refinement)));
             before = after;
         }
-        let new = NewList::all(self.coder, self.target.wanted, added, self.models.before(0));
+        let new = NewList::all(self.coder, &self.target.wanted, added, self.models.before(0));
+        if !self.target.chooser.predicts() && !self.ladder.refines_from(layer) {
+            self.target.wanted = self.target.wanted.select(&[]);
+        }
         let mut digests = Vec::new();
         for (refinement, new) in (0..).zip(new) {
             self.unit(layer, refinement, new, &mut digests)?;
@@ -129,7 +133,7 @@ impl Intra<'_> {
         let situation = Situation { around: [&lower, &[]], temporal: None };
         let mut models = self.models.before(refinement).clone();
         let chooser = self.target.chooser;
-        chooser.choose(self.coder, &mut draft, &parents, &situation, (self.target.wanted, &new), &models)?;
+        chooser.choose(self.coder, &mut draft, &parents, &situation, (&self.target.wanted, &new), &models)?;
         let applied = self.coder.apply(&draft, parents, &situation)?;
         digests.push(applied.list.digest());
         draft.header.refinement_digest = lists_digest(digests);

@@ -57,6 +57,11 @@ impl Ladder {
         layer > 0 && self.refined_at.get(list) == Some(&layer)
     }
 
+    /// Whether a layer or one above it brings a list to its final steps.
+    pub(crate) fn refines_from(&self, layer: u8) -> bool {
+        self.refined_at.iter().any(|&refined| refined >= layer.max(1))
+    }
+
     /// How finely a layer codes a list whose final steps are `last`. Entries of codebooks keep their step: no layer
     /// refines them.
     #[expect(clippy::indexing_slicing, reason = "lists are below the number of shares; stages are constants")]

@@ -16,7 +16,7 @@ pub(crate) struct NewList {
     pub(crate) added: Vec<u32>,
     /// Their positions and residuals, until a draft takes them.
     pub(crate) values: SectionValues,
-    /// The section with models of its own.
+    /// Models of its own.
     pub(crate) coded: SectionDraft,
 }
 
@@ -41,7 +41,7 @@ impl NewList {
             let alike: Vec<&SectionValues> = alike.map(|(_, values, _)| values).collect();
             let biases = biases(Section::New, &layout, &alike, models, &coder.plan);
             let steps = coder.steps(grain.attribute_step);
-            SectionDraft::new(layout.clone(), values, &biases, steps, &coder.plan)
+            SectionDraft::new(layout.clone(), values, biases, steps, &coder.plan)
         };
         let drafts: Vec<SectionDraft> = placed.par_iter().map(draft).collect();
         let lists = placed.into_iter().zip(drafts);
@@ -66,9 +66,11 @@ pub(crate) fn unpredicted(
     let mut codes: Vec<(u64, u32)> = added.par_iter().map(|&index| (all.code(index, shift), index)).collect();
     codes.par_sort_unstable();
     let (codes, added): (Vec<u64>, Vec<u32>) = codes.into_iter().unzip();
-    let planes = all.direct(&added, &coder.steps(grain.attribute_step), coder);
     let block = coder.block();
-    (added, SectionValues { deltas: deltas(&codes, block), planes, block })
+    let deltas = deltas(&codes, block);
+    drop(codes);
+    let planes = all.direct(&added, &coder.steps(grain.attribute_step), coder);
+    (added, SectionValues { deltas, planes, block })
 }
 
 /// Differences of rising codes; they start again in each block.

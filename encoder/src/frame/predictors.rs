@@ -66,6 +66,11 @@ type Choice = (u8, Vec<usize>);
 type Residuals = Vec<Vec<i32>>;
 
 impl Chooser<'_> {
+    /// Whether a Gaussian may be predicted.
+    pub(crate) fn predicts(self) -> bool {
+        self.predictors != Predictors::NONE
+    }
+
     /// Gives each new Gaussian of a draft, which has them without prediction, the predictor that suits it. `all`: what
     /// the Gaussians of the frame shall become, of which the draft adds those of `new`.
     ///
@@ -112,7 +117,7 @@ impl Chooser<'_> {
     ) -> Result<Option<QuantizedFrame>, Error> {
         // A codebook is made for whole values, not for residuals.
         let codebook = matches!(coder.colour.mode, ShCoding::VectorQuantised { .. });
-        if self.predictors == Predictors::NONE || count < FEW || codebook {
+        if !self.predicts() || count < FEW || codebook {
             return Ok(None);
         }
         let set = match situation.temporal {

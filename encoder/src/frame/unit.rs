@@ -173,21 +173,22 @@ impl UnitCoder<'_> {
     ) -> Result<Vec<u8>, Error> {
         let header = trimmed(draft.header);
         let mut sections = self.sections(draft, models)?;
+        let values = draft.values.section(Section::New);
         let new = match (draft.is_predicted(), header.new_count) {
             (_, 0) => return Ok(write_increment(&header, self.sequence, &sections)?),
             (false, _) => &new.coded,
             (true, _) => {
                 let steps = self.steps(header.attribute_step);
-                &self.section_draft(Section::New, draft.values.section(Section::New), steps, models)
+                &self.section_draft(Section::New, values, steps, models)
             }
         };
         let before = models.clone();
-        sections.push(new.code(Section::New, &self.plan, models)?);
+        sections.push(new.code(Section::New, values, &self.plan, models)?);
         // Gaussians that are all alike take nearly nothing, which A.2 does not allow.
         if u64::from(header.new_count) > Limits::NEW_PER_BYTE * length(&sections) as u64 {
             *models = before;
             sections.pop();
-            sections.push(new.code_at_length(Section::New, models)?);
+            sections.push(new.code_at_length(Section::New, values, &self.plan, models)?);
         }
         Ok(write_increment(&header, self.sequence, &sections)?)
     }
@@ -208,7 +209,8 @@ impl UnitCoder<'_> {
             sections.push(self.own_section(Section::Predictors, draft, &mut models)?);
             sections.push(self.own_section(Section::New, draft, &mut models)?);
         } else {
-            sections.push(new.coded.code(Section::New, &self.plan, &mut models)?);
+            let values = draft.values.section(Section::New);
+            sections.push(new.coded.code(Section::New, values, &self.plan, &mut models)?);
         }
         Ok(length(&sections))
     }
@@ -227,12 +229,12 @@ impl UnitCoder<'_> {
         draft: &Draft,
         models: &mut ModelsInForce,
     ) -> Result<SectionBytes, Error> {
-        let steps = self.steps(draft.header.attribute_step);
-        let coded = self.section_draft(section, draft.values.section(section), steps, models);
-        coded.code(section, &self.plan, models)
+        let (steps, values) = (self.steps(draft.header.attribute_step), draft.values.section(section));
+        let coded = self.section_draft(section, values, steps, models);
+        coded.code(section, values, &self.plan, models)
     }
 
-    /// Values divided into blocks, with models of their own; `steps` are those of the unit.
+    /// Models for values of their own; `steps` are those of the unit.
     pub(crate) fn section_draft(
         &self,
         section: Section,
@@ -242,7 +244,7 @@ impl UnitCoder<'_> {
     ) -> SectionDraft {
         let layout = self.layout(section);
         let biases = biases(section, &layout, &[values], models, &self.plan);
-        SectionDraft::new(layout, values, &biases, steps, &self.plan)
+        SectionDraft::new(layout, values, biases, steps, &self.plan)
     }
 }
 

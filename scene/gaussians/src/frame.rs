@@ -146,12 +146,8 @@ impl Planes {
             .chain(self.rotation.iter().enumerate().map(numbered("rot_")))
     }
 
-    #[expect(
-        clippy::indexing_slicing,
-        reason = "a row that is not there is a fault of the caller, as `select` says"
-    )]
     fn gather(&self, indices: &[u32]) -> Self {
-        let pick = |plane: &Vec<f32>| indices.iter().map(|&row| plane[row as usize]).collect();
+        let pick = |plane: &Vec<f32>| picked(plane, indices);
         Self {
             position: self.position.each_ref().map(pick),
             log_scale: self.log_scale.each_ref().map(pick),
@@ -161,6 +157,15 @@ impl Planes {
             sh: self.sh.iter().map(pick).collect(),
         }
     }
+}
+
+/// Some values of a plane.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "a row that is not there is a fault of the caller, as `select` says"
+)]
+fn picked(plane: &[f32], rows: &[u32]) -> Vec<f32> {
+    rows.iter().map(|&row| plane[row as usize]).collect()
 }
 
 impl GaussianFrame {
@@ -280,6 +285,21 @@ impl GaussianFrame {
             antialiased: self.antialiased,
             planes: Arc::new(self.planes.gather(indices)),
         }
+    }
+
+    /// The same in the frame's own memory, one plane after the other, if nobody else has the frame.
+    ///
+    /// # Panics
+    /// If an index is not below [`GaussianFrame::len`].
+    #[must_use]
+    pub fn into_selected(self, indices: &[u32]) -> Self {
+        if indices.iter().copied().eq(0..self.len() as u32) {
+            return self;
+        }
+        let Self { sh_degree, antialiased, planes } = self;
+        let mut planes = Arc::unwrap_or_clone(planes);
+        planes.iter_mut().for_each(|plane| *plane = picked(plane, indices));
+        Self { sh_degree, antialiased, planes: Arc::new(planes) }
     }
 }
 
