@@ -69,19 +69,33 @@ pub(crate) fn mean(decibels: impl Iterator<Item = Result<Option<f64>, Error>>) -
     Ok((!decibels.is_empty()).then(|| decibels.iter().sum::<f64>() / decibels.len() as f64))
 }
 
-/// The mean PSNR of a frame in one strip in `every` of each view, dB; none if nothing can be seen in any.
-pub(crate) fn mean_psnr(
-    original: &GaussianFrame,
-    decoded: &GaussianFrame,
-    cameras: &[Camera],
+/// Strips of views in which frames are compared that are not in memory at the same time.
+pub(crate) struct StripViews {
+    cameras: Vec<Camera>,
     every: u32,
-) -> Result<Option<f64>, Error> {
-    let every = strip_of(every, original.len());
-    let (original, decoded) = (PreparedFrame::new(original), PreparedFrame::new(decoded));
-    mean(cameras.iter().zip(0..).map(|(camera, number)| {
-        let drawn = |frame: &PreparedFrame<'_>| frame.strips(camera, BACKGROUND, strips(number, every));
-        Ok(compared(&drawn(&original), &drawn(&decoded)))
-    }))
+}
+
+impl StripViews {
+    /// One strip in `every` of each view, for frames of so many Gaussians.
+    pub(crate) fn new(cameras: Vec<Camera>, every: u32, gaussians: usize) -> Self {
+        Self { cameras, every: strip_of(every, gaussians) }
+    }
+
+    /// The strips of a frame, view by view.
+    pub(crate) fn draw(&self, frame: &GaussianFrame) -> impl Iterator<Item = Rendering> {
+        let prepared = PreparedFrame::new(frame);
+        let views = self.cameras.iter().zip(0..);
+        views.map(move |(camera, number)| prepared.strips(camera, BACKGROUND, strips(number, self.every)))
+    }
+
+    /// Their mean PSNR where those of another frame have been drawn, dB; none if nothing can be seen in any.
+    pub(crate) fn mean_psnr(
+        &self,
+        original: &GaussianFrame,
+        decoded: &[Rendering],
+    ) -> Result<Option<f64>, Error> {
+        mean(self.draw(original).zip(decoded).map(|(original, decoded)| Ok(compared(&original, decoded))))
+    }
 }
 
 fn compared(one: &Rendering, other: &Rendering) -> Option<f64> {

@@ -8,14 +8,14 @@ use crate::error::Error;
 use crate::report::{PictureReport, VerifiedFrame};
 use crate::settings::{Preset, Settings};
 use crate::source::FrameSource;
-use crate::strips::mean_psnr;
+use crate::strips::StripViews;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
 use splatstream_format::Limits;
 use splatstream_format::syntax::{FrameType, GopHeader, UnitHeader};
 use splatstream_format::unit::Stream;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::Camera;
+use splatstream_render::Rendering;
 use splatstream_render::camera::{Up, held_out};
 
 /// Views of each frame, and their height: with other heights PSNR is another number.
@@ -146,20 +146,22 @@ impl Verifier {
         let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
         self.frames.sort_by_key(|decoded| decoded.number);
         let mut frames = Vec::new();
-        for Decoded { number, frame_type, frame } in &self.frames {
-            let original =
-                source.frame(*number).map_err(|source| Error::Source { frame: *number, source })?;
-            frames.push(VerifiedFrame {
-                number: *number,
-                frame_type: *frame_type,
-                psnr: mean_psnr(&original, frame, &cameras(&original, settings), every)?,
-            });
+        for Decoded { number, frame_type, frame } in self.frames {
+            // The source is read again rather than kept beside what was decoded: a frame may fill the memory.
+            let mut original =
+                || source.frame(number).map_err(|source| Error::Source { frame: number, source });
+            let views = views(&original()?, settings, every);
+            let decoded: Vec<Rendering> = views.draw(&frame).collect();
+            drop(frame);
+            let psnr = views.mean_psnr(&original()?, &decoded)?;
+            frames.push(VerifiedFrame { number, frame_type, psnr });
         }
         Ok(PictureReport { frames, views: VIEWS, height: HEIGHT })
     }
 }
 
 /// Views of a frame that nothing was chosen by.
-fn cameras(frame: &GaussianFrame, settings: &Settings) -> Vec<Camera> {
-    held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT)
+fn views(frame: &GaussianFrame, settings: &Settings, every: u32) -> StripViews {
+    let cameras = held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
+    StripViews::new(cameras, every, frame.len())
 }

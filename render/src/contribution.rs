@@ -1,7 +1,7 @@
 //! How much each Gaussian matters to a set of views.
 
 use crate::camera::Camera;
-use crate::rasterise::{Blend, Ink, Lanes, Shapes, Sight, Splat, TILE, Tile, View, blend_tile};
+use crate::rasterise::{Blend, Ink, Lanes, Light, Shapes, Sight, Splat, TILE, Tile, View, blend_tile};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
@@ -136,12 +136,22 @@ impl WithSimd for RowShares<'_> {
                 continue;
             }
             trace.clear();
-            blend_tile(splats, places, &mut Tile::new(self.row, column, rows.size()), &mut trace);
-            trace.shares(splats, places, &mut shares);
+            let tile = || Tile::new(self.row, column, rows.size());
+            blend_tile(splats, places, &mut tile(), &mut trace);
+            if trace.is_whole() {
+                trace.shares(splats, places, &mut shares);
+                continue;
+            }
+            let (light, lines) = (trace.ink.light, Vec::new());
+            let mut again = Again { splats, places, light, lines, shares: &mut shares };
+            blend_tile(splats, places, &mut tile(), &mut again);
         }
         shares
     }
 }
+
+/// Lines of a tile that are kept at most. A tile that has more, for it can have millions of Gaussians, is blended twice.
+const LINES: usize = 1 << 14;
 
 /// What a tile was blended from, to be gone through again when all of its light is known.
 #[derive(Default)]
@@ -163,12 +173,16 @@ impl Blend for Trace {
     #[inline(always)]
     fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes) {
         self.ink.line(colour, line, visible, passing);
-        self.lines.push(Line { line: line as u32, visible: *visible, passing: *passing });
+        if self.lines.len() < LINES {
+            self.lines.push(Line { line: line as u32, visible: *visible, passing: *passing });
+        }
     }
 
     #[inline(always)]
     fn done(&mut self, entry: usize) {
-        self.entries.push((entry as u32, self.lines.len()));
+        if self.is_whole() {
+            self.entries.push((entry as u32, self.lines.len()));
+        }
     }
 }
 
@@ -178,6 +192,11 @@ impl Trace {
         self.ink = Ink::default();
         self.lines.clear();
         self.entries.clear();
+    }
+
+    /// Whether all lines are kept.
+    fn is_whole(&self) -> bool {
+        self.lines.len() < LINES
     }
 
     /// Sums what each Gaussian is to the tile: the light behind it is what is left of all of it.
@@ -190,33 +209,67 @@ impl Trace {
         let mut start = 0;
         for &(entry, end) in &self.entries {
             let place = places[entry as usize];
-            let colour = splats[place as usize].colour;
-            let [mut given, mut lost, mut squared] = [[0.0; TILE]; 3];
-            for Line { line, visible, passing } in &self.lines[start..end] {
-                for lane in 0..TILE {
-                    given[lane] += visible[lane];
-                    squared[lane] += visible[lane] * visible[lane];
-                }
-                let mut ratio = [0.0; TILE];
-                for lane in 0..TILE {
-                    // What passes is T (1 - a): a pixel that is done has a negative sign there, and nothing visible.
-                    ratio[lane] = visible[lane] / passing[lane].abs().max(f32::MIN_POSITIVE);
-                }
-                for (behind, colour) in self.ink.light[*line as usize].iter_mut().zip(colour) {
-                    for lane in 0..TILE {
-                        let own = visible[lane] * colour;
-                        behind[lane] -= own;
-                        let change = own - behind[lane] * ratio[lane];
-                        lost[lane] += change * change;
-                    }
-                }
-            }
+            shares.extend(share(splats, place, &self.lines[start..end], &mut self.ink.light));
             start = end;
-            let contribution: f32 = given.iter().sum();
-            if contribution > 0.0 {
-                let (loss, energy) = (lost.iter().sum(), squared.iter().sum());
-                shares.push(Share { place, contribution, loss, energy });
+        }
+    }
+}
+
+/// A tile that is blended again, when all of its light is known.
+struct Again<'a> {
+    splats: &'a [Splat],
+    places: &'a [u32],
+    /// What is left of the light.
+    light: Light,
+    /// Lines of the Gaussian that is blended.
+    lines: Vec<Line>,
+    shares: &'a mut Vec<Share>,
+}
+
+impl Blend for Again<'_> {
+    #[inline(always)]
+    fn line(&mut self, _: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes) {
+        self.lines.push(Line { line: line as u32, visible: *visible, passing: *passing });
+    }
+
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "entries are those of the tile")]
+    fn done(&mut self, entry: usize) {
+        self.shares.extend(share(self.splats, self.places[entry], &self.lines, &mut self.light));
+        self.lines.clear();
+    }
+}
+
+/// What a Gaussian is to a tile, if that shows it: from its lines, and from the light of it and of what lies behind it, which
+/// it is taken from.
+#[inline(always)]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "lines and lanes are those of a tile; places are those of splats"
+)]
+fn share(splats: &[Splat], place: u32, lines: &[Line], light: &mut Light) -> Option<Share> {
+    let colour = splats[place as usize].colour;
+    let [mut given, mut lost, mut squared] = [[0.0; TILE]; 3];
+    for Line { line, visible, passing } in lines {
+        for lane in 0..TILE {
+            given[lane] += visible[lane];
+            squared[lane] += visible[lane] * visible[lane];
+        }
+        let mut ratio = [0.0; TILE];
+        for lane in 0..TILE {
+            // What passes is T (1 - a): a pixel that is done has a negative sign there, and nothing visible.
+            ratio[lane] = visible[lane] / passing[lane].abs().max(f32::MIN_POSITIVE);
+        }
+        for (behind, colour) in light[*line as usize].iter_mut().zip(colour) {
+            for lane in 0..TILE {
+                let own = visible[lane] * colour;
+                behind[lane] -= own;
+                let change = own - behind[lane] * ratio[lane];
+                lost[lane] += change * change;
             }
         }
     }
+    let contribution: f32 = given.iter().sum();
+    let (loss, energy) = (lost.iter().sum(), squared.iter().sum());
+    (contribution > 0.0).then_some(Share { place, contribution, loss, energy })
 }

@@ -188,11 +188,13 @@ impl WithSimd for DrawRow<'_> {
     }
 }
 
+/// Red, green and blue of each line of a tile.
+pub(crate) type Light = [[Lanes; 3]; TILE];
+
 /// Collects the colour of a tile: at first it has no light.
 #[derive(Default)]
 pub(crate) struct Ink {
-    /// Red, green and blue of each line.
-    pub(crate) light: [[Lanes; 3]; TILE],
+    pub(crate) light: Light,
 }
 
 impl Blend for Ink {

@@ -112,12 +112,13 @@ impl WithSimd for ProjectChunk<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let row = |place: usize| self.rows.map_or(place, |rows| rows[place] as usize);
-        let mut splats = Vec::new();
+        let mut splats = Vec::with_capacity(self.places.len());
         for place in self.places {
             if let Some((offset, depth, splat)) = self.view.ellipse(row(place)) {
                 splats.push((depth, Splat { colour: self.view.colour(row(place), offset), ..splat }));
             }
         }
+        splats.shrink_to_fit();
         splats
     }
 }

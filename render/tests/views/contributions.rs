@@ -59,6 +59,28 @@ proptest! {
 }
 
 #[test]
+fn many_gaussians_on_one_tile_are_measured_as_few_are() {
+    // Faint, so that no pixel ends, and each on all lines of the only tile, so that these are more than are kept.
+    let faint = |number: u32| {
+        let position = [0.0, 0.0, 2.0 + number as f32 / 1000.0];
+        Gaussian { position, log_scale: [1.0; 3], opacity_logit: -5.3, ..BALL }
+    };
+    let gaussians: Vec<Gaussian> = (0..1500).map(faint).collect();
+    let (frame, camera) = (frame(&gaussians), camera(16, 16, 40.0));
+    let picture = render(&frame, &camera, BLACK);
+    let sum: f64 = contribution(&frame, std::slice::from_ref(&camera)).iter().sum();
+    let alpha: f64 = picture.alpha.iter().copied().map(f64::from).sum();
+    assert!((sum - alpha).abs() <= 1e-5 * alpha, "{sum} {alpha}");
+    let losses = removal(&frame, std::slice::from_ref(&camera));
+    for row in [0, 700, 1499] {
+        let without = render(&all_but(&frame, row), &camera, BLACK).colour;
+        let expected = squared_difference(&picture.colour, &without);
+        let lost = losses[row as usize];
+        assert!((lost - expected).abs() <= 0.05 * expected + 1e-6, "{row}: {lost} {expected}");
+    }
+}
+
+#[test]
 fn what_no_view_sees_gives_nothing_and_is_not_missed() {
     let behind = Gaussian { position: [0.0, 0.0, -3.0], ..BALL };
     let (frame, cameras) = (frame(&[BALL, behind]), [camera(33, 17, 40.0)]);
