@@ -108,4 +108,9 @@ dd { margin: 0; text-align: right; font-variant-numeric: tabular-nums; }
   .side:has(> :nth-child(2)) { grid-template-columns: 1fr 1fr; }
 }
 @container (max-width: 380px) { #info { display: none; } }
+@container (max-width: 340px) {
+  .keys { gap: 0; }
+  button { min-width: 34px; }
+  select { width: 52px; }
+}
 `;

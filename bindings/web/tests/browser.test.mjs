@@ -152,7 +152,7 @@ test('it plays, loops, and keys work', async () => {
 });
 
 test('on a telephone all keys are in the bar, and Tab visits them in the order in which they stand', async () => {
-  for (const [width, height] of [[390, 844], [360, 640]]) {
+  for (const [width, height] of [[390, 844], [360, 640], [320, 568]]) {
     const page = await player({ size: { width, height }, scheme: 'light' });
     await page.evaluate(() => player.press('quality'));
     const inside = await page.evaluate(() => {
