@@ -13,7 +13,7 @@ if ! command -v python3 >/dev/null; then
 fi
 rm -rf "$site"
 mkdir -p "$site/scenes"
-cargo build --quiet --release -p splatstream-cli
+command_line
 
 # A built-in scene of so many frames as a page that plays it, and a picture of it.
 scene() {

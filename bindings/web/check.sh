@@ -54,7 +54,7 @@ types() {
 }
 
 wasm
-cargo build --quiet --release -p splatstream-cli
+command_line
 if ! command -v node >/dev/null; then
     echo "skipped: the packages, for which Node is not there"
     exit

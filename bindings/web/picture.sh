@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 . ./tools.sh
 browser || exit 3
-cargo build --quiet --release -p splatstream-cli
+command_line
 scene=$(mktemp -d)
 trap 'rm -rf "$scene"' EXIT
 "$SPLATSTREAM" demo --out "$scene/demo" --frames 72 >/dev/null

@@ -2,8 +2,15 @@
 web=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 mkdir -p "${CARGO_TARGET_DIR:=$web/../../target}/tools"
 CARGO_TARGET_DIR=$(cd "$CARGO_TARGET_DIR" && pwd)
-export CARGO_TARGET_DIR SPLATSTREAM=$CARGO_TARGET_DIR/release/splatstream WEB_TESTS=$CARGO_TARGET_DIR/web
+export CARGO_TARGET_DIR WEB_TESTS=$CARGO_TARGET_DIR/web
 tools=$CARGO_TARGET_DIR/tools/web
+
+# The command that SPLATSTREAM names, or a release build.
+command_line() {
+    [ -z "${SPLATSTREAM:-}" ] || return 0
+    cargo build --quiet --release -p splatstream-cli
+    export SPLATSTREAM=$CARGO_TARGET_DIR/release/splatstream
+}
 
 # npm packages of some names and versions, in $tools; fails where npm cannot install them.
 packages() {
