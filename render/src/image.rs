@@ -48,6 +48,35 @@ impl Image {
         &self.pixels
     }
 
+    /// The picture in `width` by `height` pixels, each the mean of the area that it covers: what a camera of fewer pixels
+    /// sees. Weights of pixels that are covered in part are exact, sums run in 64 bits.
+    ///
+    /// # Panics
+    /// If a side is 0.
+    #[must_use]
+    #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
+    #[expect(clippy::indexing_slicing, reason = "shares are of pixels of the picture")]
+    pub fn averaged(&self, width: usize, height: usize) -> Self {
+        assert!(width > 0 && height > 0, "a picture without pixels");
+        let columns: Vec<Vec<(usize, f64)>> = (0..width).map(|x| shares(x, width, self.width)).collect();
+        let mut pixels = Vec::with_capacity(width * height);
+        let mut means = vec![[0.0; 3]; self.width];
+        for y in 0..height {
+            means.fill([0.0; 3]);
+            for (line, share) in shares(y, height, self.height()) {
+                let line = &self.pixels[line * self.width..][..self.width];
+                for (mean, pixel) in means.iter_mut().zip(line) {
+                    *mean = [0, 1, 2].map(|c| mean[c] + share * f64::from(pixel[c]));
+                }
+            }
+            let pixel = |shares: &Vec<(usize, f64)>| {
+                [0, 1, 2].map(|c| shares.iter().map(|&(x, share)| share * means[x][c]).sum::<f64>() as f32)
+            };
+            pixels.extend(columns.iter().map(pixel));
+        }
+        Self { width, pixels }
+    }
+
     /// The picture as a PNG file of 8 bits a channel: clamped to 0..1, rounded half up.
     ///
     /// # Errors
@@ -72,9 +101,29 @@ impl Image {
     }
 }
 
+/// The pixels that one of `to` pixels on an axis covers of `from`, and their shares in its mean.
+#[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
+fn shares(at: usize, to: usize, from: usize) -> Vec<(usize, f64)> {
+    // In units of a pixel divided by `to`, so that everything is whole: pixel `p` reaches from p·to to (p + 1)·to.
+    let (start, end) = (at * from, (at + 1) * from);
+    let covered = |pixel: usize| end.min((pixel + 1) * to) - start.max(pixel * to);
+    (start / to..end.div_ceil(to)).map(|pixel| (pixel, covered(pixel) as f64 / from as f64)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn means_of_areas_count_pixels_by_what_is_covered_of_them() {
+        let line = Image::new(3, vec![[0.0; 3], [0.6; 3], [1.2; 3]]);
+        let two = line.averaged(2, 1);
+        for (pixel, expected) in two.pixels().iter().zip([0.2, 1.0]) {
+            assert!((pixel[0] - expected).abs() < 1e-6, "{pixel:?}");
+        }
+        assert_eq!(line.averaged(3, 1), line);
+        assert_eq!(line.averaged(1, 4).pixels(), [[0.6; 3]; 4]);
+    }
 
     #[test]
     fn a_picture_comes_back_from_png_to_the_nearest_step() {

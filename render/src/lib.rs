@@ -5,6 +5,7 @@
 //! * [`ReferencePictures`]: a frame as cameras see it, to compare other frames with;
 //! * [`PreparedFrame::strips`]: strips of a picture, which show nearly the errors of all of it;
 //! * [`contribution`]: how much each Gaussian shows in a set of views;
+//! * [`gradient`]: how a loss on pictures changes with every value of a frame;
 //! * [`metrics`]: PSNR, SSIM, a learned metric, and the mean difference of two rate-distortion curves.
 //!
 //! Pictures are equal for any number of threads and on every machine: single IEEE operations in a stated
@@ -18,6 +19,7 @@
 
 pub mod camera;
 pub mod contribution;
+pub mod gradient;
 pub mod image;
 pub mod metrics;
 pub mod rasterise;

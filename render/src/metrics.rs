@@ -13,6 +13,7 @@ mod temporal;
 pub use bjontegaard::{RatePoint, bd_psnr, bd_rate, quality_at_rate, rate_at_quality};
 pub use comparison::{Comparison, compare};
 pub use psnr::{LOSSLESS_DB, Mask, YuvPsnr, psnr, psnr_masked, yuv_psnr};
+pub(crate) use ssim::{RADIUS, TAPS, window};
 pub use ssim::{SsimMap, ssim};
 pub use st_lpips::{Features, StLpips, WeightsError};
 pub use temporal::still;

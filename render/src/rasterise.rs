@@ -13,12 +13,13 @@ use crate::camera::Camera;
 use crate::image::Image;
 pub(crate) use project::Shapes;
 pub(crate) use project::Splat;
+pub(crate) use project::{LOW_PASS, seen_slopes};
 use project::{project, touching};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::TileRows;
 use splatstream_gaussians::GaussianFrame;
-pub(crate) use tile::{Blend, Lanes, Tile, blend_tile};
+pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, Lanes, Tile, blend_tile};
 
 /// Pixels on a side of a tile.
 pub(crate) const TILE: usize = 16;
@@ -44,8 +45,8 @@ pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> R
 
 /// A frame, and what is the same of it in all views, worked out once.
 pub struct PreparedFrame<'a> {
-    frame: &'a GaussianFrame,
-    shapes: Shapes,
+    pub(crate) frame: &'a GaussianFrame,
+    pub(crate) shapes: Shapes,
 }
 
 impl<'a> PreparedFrame<'a> {
@@ -70,23 +71,28 @@ impl<'a> PreparedFrame<'a> {
 }
 
 /// Draws with the instructions of `arch`, which change nothing but the time.
-#[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
 fn draw(
     prepared: &PreparedFrame<'_>,
     camera: &Camera,
     background: [f32; 3],
     (strips, arch): (Strips, pulp::Arch),
 ) -> Rendering {
-    let (width, height) = (camera.width as usize, camera.height as usize);
-    let strips = strips.within(height.div_ceil(TILE));
-    let view = View::new(prepared.frame, &prepared.shapes, &Sight { strips, ..Sight::of(camera) });
-    let rows: Vec<usize> = strips.rows(height.div_ceil(TILE)).collect();
+    let strips = strips.within((camera.height as usize).div_ceil(TILE));
+    let sight = Sight { strips, ..Sight::of(camera) };
+    paint(&View::new(prepared.frame, &prepared.shapes, &sight), &sight, background, arch)
+}
+
+/// Draws what a camera sees.
+#[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
+pub(crate) fn paint(view: &View, sight: &Sight<'_>, background: [f32; 3], arch: pulp::Arch) -> Rendering {
+    let (width, height) = (sight.camera.width as usize, sight.camera.height as usize);
+    let rows: Vec<usize> = sight.strips.rows(height.div_ceil(TILE)).collect();
     let lines: usize = rows.iter().map(|row| TILE.min(height - row * TILE)).sum();
     let mut pixels = vec![[0.0; 3]; width * lines];
     let mut alpha = vec![0.0; width * lines];
     let bands = pixels.par_chunks_mut(width * TILE).zip(alpha.par_chunks_mut(width * TILE));
     bands.zip(rows).with_max_len(1).for_each(|((pixels, alpha), row)| {
-        arch.dispatch(DrawRow { view: &view, row, pixels, alpha, background });
+        arch.dispatch(DrawRow { view, row, pixels, alpha, background });
     });
     Rendering { colour: Image::new(width, pixels), alpha }
 }

@@ -16,9 +16,9 @@ use crate::image::Image;
 use rayon::prelude::*;
 
 /// Pixels from the middle of the window to its edge.
-const RADIUS: usize = 5;
+pub(crate) const RADIUS: usize = 5;
 /// Pixels across the window.
-const TAPS: usize = 2 * RADIUS + 1;
+pub(crate) const TAPS: usize = 2 * RADIUS + 1;
 /// Standard deviation of the window's weights, pixels.
 const SIGMA: f64 = 1.5;
 /// (K1 L)² and (K2 L)², for a range L of 1.
@@ -65,7 +65,7 @@ impl SsimMap {
         }
         let inner = width - 2 * RADIUS;
         let mut values = vec![0.0; inner * (height - 2 * RADIUS)];
-        let weights = weights();
+        let weights = window();
         values.par_chunks_mut(inner * BAND).enumerate().for_each(|(band, values)| {
             let first = width * BAND * band;
             let last = first + width * (values.len() / inner + 2 * RADIUS);
@@ -103,7 +103,7 @@ impl SsimMap {
 }
 
 /// The window along one axis; the whole is the product of two.
-fn weights() -> [f64; TAPS] {
+pub(crate) fn window() -> [f64; TAPS] {
     let bell = std::array::from_fn(|tap| {
         let distance = tap as f64 - RADIUS as f64;
         libm::exp(-0.5 * (distance / SIGMA) * (distance / SIGMA))

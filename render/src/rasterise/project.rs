@@ -15,7 +15,7 @@ use std::ops::Range;
 const NEAR: f32 = 1.0 / 256.0;
 
 /// Variance that the low-pass filter adds on each axis, square pixels.
-const LOW_PASS: f32 = 0.3;
+pub(crate) const LOW_PASS: f32 = 0.3;
 
 /// -log2 of the least alpha drawn, 1/255.
 pub(crate) const LOG2_255: f32 = 7.994_353_4;
@@ -67,6 +67,11 @@ impl Shapes {
         let longest = axes.par_iter().with_min_len(CHUNK).map(|axes| squared(axes).sqrt()).collect();
         let logits = frame.opacity_logit().par_iter().with_min_len(CHUNK);
         Self { axes, longest, opacity: logits.map(|logit| 1.0 / (1.0 + libm::expf(-logit))).collect() }
+    }
+
+    /// The semi-axes of a Gaussian.
+    pub(crate) fn axes(&self, row: usize) -> [Vec3; 3] {
+        self.axes[row]
     }
 }
 
@@ -138,7 +143,6 @@ struct View<'a> {
     strips: Strips,
     /// Variance of the low-pass filter in the picture that this one stands for, square pixels of this one.
     fine_pass: f32,
-    /// Slopes beyond which the Jacobian is not followed: the picture and 15 % on either side.
     slopes: [(f32, f32); 2],
 }
 
@@ -147,11 +151,6 @@ impl<'a> View<'a> {
         let camera = sight.camera;
         let to_camera = Mat3::from_cols_array_2d(&camera.rotation).transpose();
         let size = [camera.width as f32, camera.height as f32];
-        let slopes = [0, 1].map(|axis| {
-            let (focal, principal) = (camera.focal[axis], camera.principal[axis]);
-            let margin = 0.15 * size[axis] / focal;
-            (-(principal / focal + margin), (size[axis] - principal) / focal + margin)
-        });
         Self {
             frame,
             shapes,
@@ -164,7 +163,7 @@ impl<'a> View<'a> {
             size,
             strips: sight.strips,
             fine_pass: LOW_PASS * sight.fine * sight.fine,
-            slopes,
+            slopes: seen_slopes(camera),
         }
     }
 
@@ -280,6 +279,16 @@ impl<'a> View<'a> {
         }
         colour.map(|channel| channel.max(0.0))
     }
+}
+
+/// Slopes beyond which the Jacobian is not followed: the picture and 15 % on either side.
+pub(crate) fn seen_slopes(camera: &Camera) -> [(f32, f32); 2] {
+    let size = [camera.width as f32, camera.height as f32];
+    [0, 1].map(|axis| {
+        let (focal, principal) = (camera.focal[axis], camera.principal[axis]);
+        let margin = 0.15 * size[axis] / focal;
+        (-(principal / focal + margin), (size[axis] - principal) / focal + margin)
+    })
 }
 
 /// The near plane of a view, scene units: a share of the geometric mean of the depths in front of the camera, so that

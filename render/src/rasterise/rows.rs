@@ -56,6 +56,12 @@ impl TileRows {
         self.size
     }
 
+    /// The ellipses of a row, nearest first.
+    #[expect(clippy::indexing_slicing, reason = "a row of the picture")]
+    pub(crate) fn of_row(&self, row: usize) -> &[u32] {
+        &self.rows[row]
+    }
+
     /// Rows of tiles.
     pub(crate) fn len(&self) -> usize {
         self.rows.len()

@@ -7,6 +7,9 @@ use std::f32::consts::LN_2;
 /// The most that one Gaussian may cover.
 const MAX_ALPHA: f32 = 0.99;
 
+/// log2 of that.
+pub(crate) const LOG2_MAX_ALPHA: f32 = -0.014_499_556;
+
 /// A pixel is done where less of the light would pass than this.
 const MIN_TRANSMITTANCE: f32 = 1e-4;
 
@@ -15,6 +18,9 @@ pub(crate) type Lanes = [f32; TILE];
 
 /// Receives what a Gaussian adds to the picture.
 pub(crate) trait Blend {
+    /// The lines that follow are of this Gaussian.
+    fn begin(&mut self, _splat: &Splat) {}
+
     /// `visible` is transmittance times alpha of each pixel of a line of the tile.
     fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes);
 
@@ -78,6 +84,7 @@ pub(crate) fn blend_tile(splats: &[Splat], entries: &[u32], tile: &mut Tile, ble
         if last < 0.0 {
             continue;
         }
+        blend.begin(splat);
         for line in first..=last as usize {
             if tile.alive[line] {
                 let visible = blend_line(splat, tile.origin, line, &mut tile.passing[line]);
@@ -138,6 +145,11 @@ fn exp2(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_exponent_of_the_most_alpha_is_its_logarithm() {
+        assert!((LOG2_MAX_ALPHA - libm::log2f(MAX_ALPHA)).abs() < 1e-8);
+    }
 
     #[test]
     fn exp2_is_right_to_the_last_two_bits_where_alpha_lies() {
