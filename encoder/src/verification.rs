@@ -1,4 +1,5 @@
-//! The finished stream, decoded and looked at: what its pictures are worth, in views that nothing was chosen by.
+//! The finished stream, decoded and looked at: what its pictures are worth, in views that nothing else was chosen by
+//! than how fine all steps together are.
 //!
 //! While a stream is written the units of up to three of its GOPs are kept: those of the first, the middle and the last
 //! frame. Each is decoded when it is complete, as any receiver would who starts there, and a few of its frames are
