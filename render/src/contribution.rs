@@ -66,9 +66,9 @@ struct SmallView {
     ellipses: Option<Vec<Splat>>,
 }
 
-/// Bytes of ellipses that are kept from one look to the next, at most: they take half the time, but ten views of a large
-/// scene would take more than the scene.
-const KEPT: usize = 1 << 26;
+/// Bytes of ellipses that are kept from one look to the next, at most, where all Gaussians are left: they take half the
+/// time, but ten views of a large scene would take more than the scene.
+const KEPT: usize = 1 << 24;
 
 impl<'a> SmallViews<'a> {
     /// Pictures of at most so many lines.
@@ -105,6 +105,9 @@ impl<'a> SmallViews<'a> {
         let mut sums = vec![Worth::default(); self.frame.len()];
         let bytes = |view: &SmallView| view.ellipses.as_deref().map_or(0, size_of_val);
         let mut kept: usize = self.views.iter().map(bytes).sum();
+        // Of each Gaussian that is gone there would be another ellipse while those of a view are sorted.
+        let gone = self.left.as_ref().map_or(0, |left| self.frame.len().saturating_sub(left.len()));
+        let room = KEPT.max(gone.saturating_mul(size_of::<Splat>()));
         for view in &mut self.views {
             let SmallView { camera, fine, ellipses } = view;
             let sight = Sight { rows: self.left.as_deref(), fine: *fine, ..Sight::of(camera) };
@@ -117,7 +120,7 @@ impl<'a> SmallViews<'a> {
             };
             add(&view, &mut sums);
             kept = kept.saturating_add(size_of_val(view.splats.as_slice()));
-            match kept <= KEPT {
+            match kept <= room {
                 true => *ellipses = Some(view.splats),
                 false => kept = kept.saturating_sub(size_of_val(view.splats.as_slice())),
             }
