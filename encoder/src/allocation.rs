@@ -16,11 +16,12 @@ use crate::laws::Laws;
 use crate::pca::Components;
 use crate::quantised::Trial;
 use crate::refinements::parts;
+use crate::secant::Secant;
 use crate::sensitivity::Sensitivity;
 use crate::sequence::Scene;
 use crate::settings::{Preset, Settings};
 use crate::steps::Steps;
-use crate::strips::{StripView, mean};
+use crate::strips::{StripView, StripViews, mean};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
@@ -30,7 +31,6 @@ const VIEWS: u32 = 4;
 const HEIGHT: u32 = 540;
 /// Of so many strips of a view one is drawn.
 const EVERY: u32 = 8;
-const EVERY_FAST: u32 = 16;
 /// Views in which attributes are measured alone: shares need not be exact.
 const ALONE: usize = 2;
 /// Frames of fewer Gaussians are measured so for the fast preset too.
@@ -39,11 +39,12 @@ const FEW: usize = 1 << 12;
 const SAMPLE: usize = 1 << 14;
 /// How often shares are estimated: the first steps are those of an average scene.
 const ROUNDS: usize = 2;
-/// How often pictures are measured, at most, and how near is near enough, dB.
-const CORRECTIONS: usize = 3;
-const NEAR: f64 = 0.1;
-/// By halving all steps pictures gain so much, dB, as long as nothing better is known.
-const OCTAVE: f64 = 5.8;
+/// How often pictures are measured, at most, and how near is near enough, dB: a stream that misses more costs another
+/// encoding.
+const CORRECTIONS: usize = 6;
+const NEAR: f64 = 0.2;
+/// What halving all steps brings.
+const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// Steps change by no more than this factor at once: the model is local.
 const LARGEST_CHANGE: f64 = 8.0;
 
@@ -87,6 +88,13 @@ impl Attribute {
     }
 }
 
+/// All steps finer by one factor: as if pictures gained so many decibels.
+pub(crate) fn finer(mut steps: Steps, decibels: f64) -> Steps {
+    let factor = libm::exp2(-decibels / DECIBELS_AN_OCTAVE);
+    ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, factor));
+    steps
+}
+
 /// What is measured of a frame to fit steps to a quality.
 pub(crate) struct Fit {
     pub(crate) scene: Scene,
@@ -95,30 +103,29 @@ pub(crate) struct Fit {
     pub(crate) refinement: Vec<u8>,
     /// Principal components of dc and of sh.
     pub(crate) bases: [Components; 2],
-    /// The source as some views show it, and by which of them attributes are measured alone.
+    /// The source as the views show it that quality is measured in.
     views: Vec<StripView>,
-    alone: Vec<usize>,
+    /// The source as those views show it in which attributes are measured alone.
+    alone: Vec<StripView>,
     /// Some of the Gaussians, and which these are.
     sample: (GaussianFrame, Vec<u32>),
     sensitivity: Sensitivity,
 }
 
 impl Fit {
-    /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it.
-    pub(crate) fn new(frame: &GaussianFrame, ranked: &Ranked, settings: &Settings) -> Self {
+    /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it; `views` are those that
+    /// it is measured in.
+    pub(crate) fn new(
+        frame: &GaussianFrame,
+        ranked: &Ranked,
+        views: &StripViews,
+        settings: &Settings,
+    ) -> Self {
         let laws = match settings.tools.adaptive_steps {
             true => Laws::of(frame, &ranked.order, &ranked.shown, &settings.refinements),
             false => Laws::default(),
         };
-        let is_fast = settings.preset == Preset::Fast;
         let cameras = cameras(frame, settings);
-        // Of few Gaussians the estimates are poor, and pictures cost little.
-        let alone = if is_fast && frame.len() >= FEW { 0 } else { ALONE };
-        // Views made for a scene rise from below to above: not the first of them.
-        let apart = cameras.len().div_ceil(ALONE).max(1);
-        let alone =
-            (0..cameras.len()).skip(usize::from(cameras.len() > 1)).step_by(apart).take(alone).collect();
-        let every = if is_fast { EVERY_FAST } else { EVERY };
         let mut scene = Scene::new();
         scene.add(frame, &(0..frame.len() as u32).collect::<Vec<u32>>());
         let mut refinement = vec![0; frame.len()];
@@ -137,8 +144,8 @@ impl Fit {
             settings: Settings { laws, ..settings.clone() },
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),
-            views: StripView::all(frame, &cameras, every),
-            alone,
+            views: views.of(frame, 0..views.len()),
+            alone: alone(frame, cameras, settings),
             sample: (sample, rows),
         }
     }
@@ -160,34 +167,30 @@ impl Fit {
         }
         if !self.alone.is_empty() {
             // Shares are those of steps near the ones that are looked for.
-            steps = self.levelled(steps, decibels, 1)?;
+            let now = self.psnr(&steps)?.unwrap_or(decibels.into());
+            steps = finer(steps, f64::from(decibels) - now);
             let errors = self.measured(&steps)?;
             steps = self.allocated(&steps, errors);
         }
-        self.levelled(steps, decibels, CORRECTIONS)
+        self.levelled(steps, decibels.into())
     }
 
     /// All steps finer or coarser by one factor, so that renderings have a PSNR of about `decibels`.
-    fn levelled(&self, mut steps: Steps, decibels: f32, corrections: usize) -> Result<Steps, Error> {
-        // log2 of the last factor of all steps, and the PSNR before it.
-        let mut before: Option<(f64, f64)> = None;
-        for _ in 0..corrections {
+    ///
+    /// Values that lie on a grid already leap where steps pass its own: what is found is looked at before it is taken.
+    fn levelled(&self, steps: Steps, decibels: f64) -> Result<Steps, Error> {
+        let mut secant = Secant::new(decibels, NEAR, 1.0, CORRECTIONS);
+        let mut best = steps;
+        let mut next = Some(decibels);
+        while let Some(at) = next {
+            let scaled = finer(steps, at - decibels);
             // Where nothing can be seen nothing is too bad.
-            let now = self.psnr(&steps)?.unwrap_or(decibels.into());
-            let missing = f64::from(decibels) - now;
-            if missing.abs() < NEAR {
-                break;
+            if secant.take(at, self.psnr(&scaled)?.unwrap_or(decibels)) {
+                best = scaled;
             }
-            // An octave is 6 dB where quantisers are fine, and less where they are coarse.
-            let slope = match before {
-                Some((log, was)) if log != 0.0 => ((was - now) / log).clamp(4.0, 7.0),
-                _ => OCTAVE,
-            };
-            let log = -missing / slope;
-            before = Some((log, now));
-            ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, libm::exp2(log)));
+            next = secant.next();
         }
-        Ok(steps)
+        Ok(best)
     }
 
     /// PSNR of pictures with all attributes on their grids, dB.
@@ -207,9 +210,9 @@ impl Fit {
 
     /// The same as strips of a few views show it.
     fn measured(&self, steps: &Steps) -> Result<[f64; 6], Error> {
-        let views = || self.alone.iter().map(|&view| &self.views[view]);
+        let views = self.alone.iter();
         let trials: Vec<Trial<'_>> =
-            views().map(|view| Trial::new(self, &view.frame, Some(&view.rows), steps)).collect();
+            views.map(|view| Trial::new(self, &view.frame, Some(&view.rows), steps)).collect();
         let mut errors = [0.0; 6];
         for (error, attribute) in errors.iter_mut().zip(ATTRIBUTES) {
             if attribute == Attribute::Sh && self.sample.0.sh_degree() == 0 {
@@ -217,7 +220,7 @@ impl Fit {
             }
             let of_view =
                 |(view, trial): (&StripView, &Trial<'_>)| Ok(view.psnr(&trial.decoded(&[attribute])?));
-            let decibels = mean(views().zip(&trials).map(of_view))?;
+            let decibels = mean(self.alone.iter().zip(&trials).map(of_view))?;
             *error = decibels.map_or(0.0, |decibels| libm::pow(10.0, -0.1 * decibels));
         }
         Ok(errors)
@@ -253,7 +256,20 @@ impl Fit {
     }
 }
 
-/// The views that a fit goes by.
+/// What attributes are measured alone in: nothing for the fast preset, unless there are so few Gaussians that estimates are
+/// poor and pictures cost little.
+fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Vec<StripView> {
+    if settings.preset == Preset::Fast && frame.len() >= FEW {
+        return Vec::new();
+    }
+    // Views made for a scene rise from below to above: not the first of them.
+    let first = usize::from(cameras.len() > 1);
+    let apart = cameras.len().div_ceil(ALONE).max(1);
+    let places = (first..cameras.len()).step_by(apart).take(ALONE);
+    StripViews::new(cameras, EVERY, frame.len()).of(frame, places)
+}
+
+/// The views that shares are fitted in.
 fn cameras(frame: &GaussianFrame, settings: &Settings) -> Vec<Camera> {
     match settings.cameras.as_slice() {
         [] => spiral(frame, Up::default(), VIEWS, HEIGHT),

@@ -8,6 +8,7 @@ use crate::refinements::parts;
 use crate::report::Report;
 use crate::settings::Settings;
 use crate::shape::Shape;
+use rayon::prelude::*;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::stage::Stage;
 use splatstream_decoder::steps::StepRule;
@@ -134,18 +135,19 @@ fn sh_exponents(
     settings: &Settings,
 ) -> Vec<u8> {
     let Geometry { log_scale, opacity, .. } = geometry(frame, sequence);
-    let mut exponents = vec![0; frame.len()];
+    let mut refinements = vec![0; frame.len()];
+    let mut rules = Vec::new();
     for (refinement, part) in (0..).zip(parts(&settings.refinements, order.len())) {
         let announced = settings.laws.attribute_step(&settings.steps, sequence, refinement);
-        let rule = StepRule::new(sequence, announced);
-        for &row in &order[part] {
-            let row = row as usize;
-            let wanted = log_scale.each_ref().map(|plane| plane[row]);
-            let shape = Shape::new(wanted, opacity[row], &rule, sequence.canonical_axes());
-            exponents[row] = shape.exponent(Stage::Sh, &rule);
-        }
+        rules.push(StepRule::new(sequence, announced));
+        order[part].iter().for_each(|&row| refinements[row as usize] = refinement);
     }
-    exponents
+    let exponent = |(row, &refinement): (usize, &u8)| {
+        let rule = &rules[usize::from(refinement)];
+        let wanted = log_scale.each_ref().map(|plane| plane[row]);
+        Shape::new(wanted, opacity[row], rule, sequence.canonical_axes()).exponent(Stage::Sh, rule)
+    };
+    refinements.par_iter().enumerate().map(exponent).collect()
 }
 
 /// Makes entry 0 of every codebook zero, so that it can stand for "as before".

@@ -93,10 +93,10 @@ impl Ranking {
             let shown = unhidden(frame, &self.cameras);
             return Ranked { order: by(&shown, |worth| worth.energy), shown };
         }
-        let views = self.views(frame);
+        let mut views = self.views(frame);
         let shown = views.worth();
         let order = match self.importance {
-            Importance::Removal => self.eliminate(&views, &volume, &shown),
+            Importance::Removal => self.eliminate(views, &volume, &shown),
             _ => by(&shown, |worth| worth.contribution),
         };
         Ranked { order, shown }
@@ -140,7 +140,7 @@ impl Ranking {
     /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
     /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what
     /// goes at the same time, the contribution alone none of how alike things look.
-    fn eliminate(&self, views: &SmallViews<'_>, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
+    fn eliminate(&self, mut views: SmallViews<'_>, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
         let count = volume.len();
         let mut kept = all(count);
         let mut gone: Vec<u32> = Vec::new();
@@ -148,7 +148,10 @@ impl Ranking {
             kept.sort_unstable();
             let of_kept = match kept.len() == count {
                 true => whole.to_vec(),
-                false => views.worth_of(&kept),
+                false => {
+                    views.leave(&kept);
+                    views.worth()
+                }
             };
             let scores: Vec<f64> = of_kept.iter().map(|w| (w.contribution * w.loss).sqrt()).collect();
             kept = ranked(&scores, volume, &kept);

@@ -22,6 +22,9 @@ use splatstream_decoder::steps::{StepRule, step};
 use splatstream_format::syntax::{SequenceParameters, TransformKind};
 use splatstream_gaussians::{GaussianFrame, Planes};
 
+/// Gaussians whose colours are made together.
+const NEAR: usize = 1 << 11;
+
 /// A frame with some steps.
 pub(crate) struct Trial<'a> {
     frame: &'a GaussianFrame,
@@ -158,13 +161,20 @@ impl<'a> Trial<'a> {
     #[expect(clippy::arithmetic_side_effects, reason = "values on a grid times its steps, both clamped")]
     fn colours(&self, which: usize) -> Vec<Vec<f32>> {
         let (basis, finest) = (&self.bases[which], self.colour_step(which));
-        let components = self.components(which);
+        let real = |component: &Vec<i32>| -> Vec<f32> {
+            let value = |(value, coded): (&i32, &Coded)| (value * step(coded.exponents[1 + which])) as f32;
+            component.iter().zip(&self.coded).map(value).collect()
+        };
+        let components: Vec<Vec<f32>> = self.components(which).par_iter().map(real).collect();
         let plane = |index: usize| {
             let mut plane = vec![basis.mean[index] as f32; self.coded.len()];
-            for (row, component) in basis.rows.iter().zip(&components) {
-                let weight = row[index] as f32 * finest;
-                for ((value, &component), coded) in plane.iter_mut().zip(component).zip(&self.coded) {
-                    *value += weight * (component * step(coded.exponents[1 + which])) as f32;
+            // Some Gaussians after the others, so that their values are near for all components.
+            for (part, values) in plane.chunks_mut(NEAR).enumerate() {
+                for (row, component) in basis.rows.iter().zip(&components) {
+                    let weight = row[index] as f32 * finest;
+                    for (value, component) in values.iter_mut().zip(&component[part * NEAR..]) {
+                        *value += weight * component;
+                    }
                 }
             }
             plane

@@ -85,11 +85,14 @@ impl Core {
         if rows.is_empty() {
             rows = all().collect();
         }
-        let axes = frame.position().each_ref().map(|plane| {
+        let of_axis = |plane: &Vec<f32>| {
             let mut values: Vec<f32> = rows.iter().map(|&row| plane[row]).collect();
             let last = values.len().saturating_sub(1);
             [3, 20, 80, 97].map(|percent: usize| selected(&mut values, last * percent / 100))
-        });
+        };
+        let [x, y, z] = frame.position();
+        let (x, (y, z)) = rayon::join(|| of_axis(x), || rayon::join(|| of_axis(y), || of_axis(z)));
+        let axes = [x, y, z];
         let halves = |low: usize, high: usize| {
             axes.iter().map(|axis| 0.5 * axis[high] - 0.5 * axis[low]).fold(0.0, f32::max)
         };

@@ -8,6 +8,7 @@ use crate::laws::{FEATURE_SHIFT, finest};
 use crate::reach::{Core, Extent, Reach};
 use crate::settings::{Settings, Size, Structure};
 use crate::source::FrameSource;
+use rayon::prelude::*;
 use splatstream_decoder::attribute::ROTATION_RANGE;
 use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_format::Limits;
@@ -16,6 +17,8 @@ use splatstream_gaussians::{GaussianFrame, sh_coefficients};
 
 /// Gaussians on which sorted and unsorted axes are compared.
 const TRIAL: usize = 1 << 14;
+/// Gaussians that a thread looks at at once, at least.
+const AT_ONCE: usize = 1 << 14;
 
 /// What the first pass found out.
 pub(crate) struct Analysis {
@@ -239,17 +242,21 @@ impl Scene {
         }
         self.extent = self.extent.with(frame, shown);
         self.cores.push(Core::of(frame, shown));
+        let rows = || shown.par_iter().with_min_len(AT_ONCE);
         let farthest = |planes: &[&[f32]], from: f32| {
-            let values = planes.iter().flat_map(|plane| shown.iter().map(|&row| plane[row as usize]));
-            values.map(|value| (value - from).abs()).fold(0.0, f32::max)
+            let of_row = |&row: &u32| {
+                let values = planes.iter().map(|plane| plane[row as usize]);
+                values.map(|value| (value - from).abs()).fold(0.0, f32::max)
+            };
+            rows().map(of_row).reduce(|| 0.0, f32::max)
         };
         let norm = |planes: &[&[f32]]| {
             let square = |plane: &&[f32], row: u32| {
                 let value = plane[row as usize].clamp(-MAX_COLOUR, MAX_COLOUR);
                 value * value
             };
-            let norms = shown.iter().map(|&row| planes.iter().map(|plane| square(plane, row)).sum::<f32>());
-            norms.fold(0.0, f32::max).sqrt()
+            let of_row = |&row: &u32| planes.iter().map(|plane| square(plane, row)).sum::<f32>();
+            rows().map(of_row).reduce(|| 0.0, f32::max).sqrt()
         };
         let [scale, opacity] = self.means;
         let reach = [

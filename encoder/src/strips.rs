@@ -42,18 +42,12 @@ pub(crate) struct StripView {
 }
 
 impl StripView {
-    /// One strip in `every` of each view.
-    pub(crate) fn all(frame: &GaussianFrame, cameras: &[Camera], every: u32) -> Vec<Self> {
-        let every = strip_of(every, frame.len());
-        let whole = PreparedFrame::new(frame);
-        let view = |(camera, number): (&Camera, u32)| {
-            let strips = strips(number, every);
-            let rows = whole.touching(camera, strips);
-            let frame = frame.select(&rows);
-            let picture = PreparedFrame::new(&frame).strips(camera, BACKGROUND, strips);
-            Self { camera: camera.clone(), strips, picture, frame, rows }
-        };
-        cameras.iter().zip(0..).map(view).collect()
+    /// Of a frame that is prepared.
+    fn new(frame: &GaussianFrame, prepared: &PreparedFrame<'_>, camera: &Camera, strips: Strips) -> Self {
+        let rows = prepared.touching(camera, strips);
+        let frame = frame.select(&rows);
+        let picture = PreparedFrame::new(&frame).strips(camera, BACKGROUND, strips);
+        Self { camera: camera.clone(), strips, picture, frame, rows }
     }
 
     /// PSNR of another version of the same Gaussians, dB; none if nothing can be seen.
@@ -79,6 +73,21 @@ impl StripViews {
     /// One strip in `every` of each view, for frames of so many Gaussians.
     pub(crate) fn new(cameras: Vec<Camera>, every: u32, gaussians: usize) -> Self {
         Self { cameras, every: strip_of(every, gaussians) }
+    }
+
+    /// The strips of a frame, to compare others of the same Gaussians with: of the views at some places.
+    pub(crate) fn of(&self, frame: &GaussianFrame, places: impl Iterator<Item = usize>) -> Vec<StripView> {
+        let prepared = PreparedFrame::new(frame);
+        let view = |place: usize| {
+            let strips = strips(place as u32, self.every);
+            Some(StripView::new(frame, &prepared, self.cameras.get(place)?, strips))
+        };
+        places.filter_map(view).collect()
+    }
+
+    /// How many views there are.
+    pub(crate) fn len(&self) -> usize {
+        self.cameras.len()
     }
 
     /// The strips of a frame, view by view.

@@ -5,7 +5,7 @@
 //! or less, by the [secant](crate::secant) through what is known.
 #![expect(clippy::arithmetic_side_effects, reason = "counts of encodings and frames; layers are at most 4")]
 
-use crate::allocation::Fit;
+use crate::allocation::{Fit, finer};
 use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
 use crate::importance::Ranking;
@@ -18,6 +18,7 @@ use crate::sequence;
 use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
 use crate::steps::Steps;
+use crate::verification;
 use splatstream_format::syntax::FrameType;
 use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
@@ -37,11 +38,8 @@ const GROWTH: f64 = 0.036;
 /// Steps are shared differently among attributes where the PSNR is another by more than this, decibels.
 const ALIKE: f64 = 4.0;
 
-/// What halving all steps brings.
-const DECIBELS_AN_OCTAVE: f64 = 6.02;
-
 /// Finer steps are given up where pictures gain less than this share of what they should.
-const LEAST_GAIN: f64 = 0.25;
+const LEAST_GAIN: f64 = 0.05;
 
 /// Encodings for a PSNR and for a size, at most.
 const MOST_FOR_PSNR: usize = 4;
@@ -100,12 +98,13 @@ struct Fitting<'a> {
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
         let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
+        let views = verification::views(&first, settings);
         let shown = visible(&first, settings.keep_invisible);
         let frame = canonicalise(first.into_selected(&shown), true);
         let (frame, _) = isolated::colours(frame, &shown, 0);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
-        Ok(Self { settings, fit: Fit::new(&frame, &ranked, settings), ranking, known: Vec::new() })
+        Ok(Self { settings, fit: Fit::new(&frame, &ranked, &views, settings), ranking, known: Vec::new() })
     }
 
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
@@ -114,7 +113,7 @@ impl<'a> Fitting<'a> {
         let apart = |known: &&(f64, Steps)| (known.0 - decibels).abs();
         let nearest = self.known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
-            Some((from, steps)) => finer(*steps, ((decibels - from) / DECIBELS_AN_OCTAVE) as f32),
+            Some((from, steps)) => finer(*steps, decibels - from),
             None => {
                 let steps = self.fit.at(decibels as f32)?;
                 self.known.push((decibels, steps));
@@ -122,19 +121,6 @@ impl<'a> Fitting<'a> {
             }
         };
         Ok(Settings { steps, laws: self.fit.laws(), ..self.settings.clone() })
-    }
-}
-
-/// All steps, halved so many times.
-fn finer(steps: Steps, octaves: f32) -> Steps {
-    let scale = libm::exp2f(-octaves);
-    Steps {
-        position_bits: (steps.position_bits + octaves).clamp(1.0, 20.0),
-        log_scale: steps.log_scale * scale,
-        rotation: steps.rotation * scale,
-        opacity: steps.opacity * scale,
-        dc: steps.dc * scale,
-        sh: steps.sh * scale,
     }
 }
 

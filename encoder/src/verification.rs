@@ -1,4 +1,5 @@
-//! The finished stream, decoded and looked at: what its pictures are worth, in views that nothing was chosen by.
+//! The finished stream, decoded and looked at: what its pictures are worth, in views that nothing else was chosen by
+//! than how fine all steps together are.
 //!
 //! While a stream is written the units of up to three of its GOPs are kept: those of the first, the middle and the last
 //! frame. Each is decoded when it is complete, as any receiver would who starts there, and a few of its frames are
@@ -143,14 +144,13 @@ impl Verifier {
         source: &mut dyn FrameSource,
         settings: &Settings,
     ) -> Result<PictureReport, Error> {
-        let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
         self.frames.sort_by_key(|decoded| decoded.number);
         let mut frames = Vec::new();
         for Decoded { number, frame_type, frame } in self.frames {
             // The source is read again rather than kept beside what was decoded: a frame may fill the memory.
             let mut original =
                 || source.frame(number).map_err(|source| Error::Source { frame: number, source });
-            let views = views(&original()?, settings, every);
+            let views = views(&original()?, settings);
             let decoded: Vec<Rendering> = views.draw(&frame).collect();
             drop(frame);
             let psnr = views.mean_psnr(&original()?, &decoded)?;
@@ -160,8 +160,9 @@ impl Verifier {
     }
 }
 
-/// Views of a frame that nothing was chosen by.
-fn views(frame: &GaussianFrame, settings: &Settings, every: u32) -> StripViews {
+/// Views of a frame that nothing is chosen by but how fine all steps together are.
+pub(crate) fn views(frame: &GaussianFrame, settings: &Settings) -> StripViews {
+    let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
     let cameras = held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
     StripViews::new(cameras, every, frame.len())
 }

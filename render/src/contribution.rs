@@ -52,64 +52,110 @@ pub fn worth(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
 pub struct SmallViews<'a> {
     frame: &'a GaussianFrame,
     shapes: Shapes,
-    /// Cameras of the small pictures, and the side of a pixel of the large ones in pixels of the small ones.
-    cameras: Vec<(Camera, f32)>,
+    views: Vec<SmallView>,
+    /// The Gaussians that are left, by rising row; none if all are.
+    left: Option<Vec<u32>>,
 }
+
+/// One of the small pictures.
+struct SmallView {
+    camera: Camera,
+    /// The side of a pixel of the large picture in pixels of this one.
+    fine: f32,
+    /// The ellipses of the Gaussians that were left when it was looked at last, nearest first, if they are kept.
+    ellipses: Option<Vec<Splat>>,
+}
+
+/// Bytes of ellipses that are kept from one look to the next, at most, where all Gaussians are left: they take half the
+/// time, but ten views of a large scene would take more than the scene.
+const KEPT: usize = 1 << 24;
 
 impl<'a> SmallViews<'a> {
     /// Pictures of at most so many lines.
     #[must_use]
     pub fn new(frame: &'a GaussianFrame, cameras: &[Camera], lines: u32) -> Self {
-        let small = |camera: &Camera| match camera.height > lines {
-            true => (camera.scaled_to_height(lines), lines as f32 / camera.height as f32),
-            false => (camera.clone(), 1.0),
+        let small = |camera: &Camera| {
+            let (camera, fine) = match camera.height > lines {
+                true => (camera.scaled_to_height(lines), lines as f32 / camera.height as f32),
+                false => (camera.clone(), 1.0),
+            };
+            SmallView { camera, fine, ellipses: None }
         };
-        Self { frame, shapes: Shapes::of(frame), cameras: cameras.iter().map(small).collect() }
+        let views = cameras.iter().map(small).collect();
+        Self { frame, shapes: Shapes::of(frame), views, left: None }
     }
 
-    /// What each Gaussian is to them.
-    #[must_use]
-    pub fn worth(&self) -> Vec<Worth> {
-        self.measure(None)
+    /// Takes all Gaussians away but those of some rows, which rise and were left so far.
+    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
+    pub fn leave(&mut self, rows: &[u32]) {
+        let mut is_left = vec![false; self.frame.len()];
+        rows.iter().for_each(|&row| is_left[row as usize] = true);
+        let kept = self.views.par_iter_mut().filter_map(|view| view.ellipses.as_mut());
+        kept.for_each(|ellipses| {
+            ellipses.retain(|ellipse| is_left[ellipse.gaussian as usize]);
+            ellipses.shrink_to_fit();
+        });
+        self.left = Some(rows.to_vec());
     }
 
-    /// What each of some Gaussians is to them if there were no others. `rows` rise; so does what is returned.
+    /// What each of the Gaussians that are left is to the pictures if there are no others, by rising row.
     #[must_use]
     #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
-    pub fn worth_of(&self, rows: &[u32]) -> Vec<Worth> {
-        let all = self.measure(Some(rows));
-        rows.iter().map(|&row| all[row as usize]).collect()
-    }
-
-    fn measure(&self, rows: Option<&[u32]>) -> Vec<Worth> {
+    pub fn worth(&mut self) -> Vec<Worth> {
         let mut sums = vec![Worth::default(); self.frame.len()];
-        for (camera, fine) in &self.cameras {
-            let sight = Sight { rows, fine: *fine, ..Sight::of(camera) };
-            add(&View::new(self.frame, &self.shapes, &sight), &mut sums);
+        let bytes = |view: &SmallView| view.ellipses.as_deref().map_or(0, size_of_val);
+        let mut kept: usize = self.views.iter().map(bytes).sum();
+        // Of each Gaussian that is gone there would be another ellipse while those of a view are sorted.
+        let gone = self.left.as_ref().map_or(0, |left| self.frame.len().saturating_sub(left.len()));
+        let room = KEPT.max(gone.saturating_mul(size_of::<Splat>()));
+        for view in &mut self.views {
+            let SmallView { camera, fine, ellipses } = view;
+            let sight = Sight { rows: self.left.as_deref(), fine: *fine, ..Sight::of(camera) };
+            let view = match ellipses.take() {
+                Some(splats) => {
+                    kept = kept.saturating_sub(size_of_val(splats.as_slice()));
+                    View::of(splats, &sight)
+                }
+                None => View::new(self.frame, &self.shapes, &sight),
+            };
+            add(&view, &mut sums);
+            kept = kept.saturating_add(size_of_val(view.splats.as_slice()));
+            match kept <= room {
+                true => *ellipses = Some(view.splats),
+                false => kept = kept.saturating_sub(size_of_val(view.splats.as_slice())),
+            }
         }
-        sums
+        match &self.left {
+            Some(rows) => rows.iter().map(|&row| sums[row as usize]).collect(),
+            None => sums,
+        }
     }
 }
 
 /// Adds what each Gaussian is to a view.
-#[expect(clippy::indexing_slicing, reason = "places and Gaussians are those that the view was made from")]
+#[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians in memory")]
 fn add(view: &View, sums: &mut [Worth]) {
     let rows = (0..view.rows.len()).into_par_iter().with_max_len(1);
     let shares: Vec<Vec<Share>> =
         rows.map(|row| pulp::Arch::new().dispatch(RowShares { view, row })).collect();
-    // In the order of the rows, whoever computed them.
-    for share in shares.iter().flatten() {
-        let sum = &mut sums[view.splats[share.place as usize].gaussian as usize];
-        sum.contribution += f64::from(share.contribution);
-        sum.loss += f64::from(share.loss);
-        sum.energy += f64::from(share.energy);
-    }
+    // Each thread adds what belongs to its part of the Gaussians, in the order of the rows.
+    let part = sums.len().div_ceil(rayon::current_num_threads()).max(1);
+    sums.par_chunks_mut(part).enumerate().for_each(|(number, sums)| {
+        let first = (number * part) as u32;
+        for share in shares.iter().flatten() {
+            if let Some(sum) = sums.get_mut(share.gaussian.wrapping_sub(first) as usize) {
+                sum.contribution += f64::from(share.contribution);
+                sum.loss += f64::from(share.loss);
+                sum.energy += f64::from(share.energy);
+            }
+        }
+    });
 }
 
 /// What an ellipse is to a tile: sums over its pixels.
 struct Share {
-    /// Which ellipse of the view.
-    place: u32,
+    /// Which Gaussian of the frame.
+    gaussian: u32,
     contribution: f32,
     loss: f32,
     energy: f32,
@@ -139,11 +185,11 @@ impl WithSimd for RowShares<'_> {
             let tile = || Tile::new(self.row, column, rows.size());
             blend_tile(splats, places, &mut tile(), &mut trace);
             if trace.is_whole() {
-                trace.shares(splats, places, &mut shares);
+                trace.shares(&mut shares);
                 continue;
             }
             let (light, lines) = (trace.ink.light, Vec::new());
-            let mut again = Again { splats, places, light, lines, shares: &mut shares };
+            let mut again = Again { light, lines, shares: &mut shares };
             blend_tile(splats, places, &mut tile(), &mut again);
         }
         shares
@@ -158,8 +204,8 @@ const LINES: usize = 1 << 14;
 struct Trace {
     ink: Ink,
     lines: Vec<Line>,
-    /// Entries of the tile that have lines, and where their lines end.
-    entries: Vec<(u32, usize)>,
+    /// Gaussians that have lines: which they are, their colours, and where their lines end.
+    ellipses: Vec<(u32, [f32; 3], usize)>,
 }
 
 /// What a Gaussian adds to a line.
@@ -179,9 +225,10 @@ impl Blend for Trace {
     }
 
     #[inline(always)]
-    fn done(&mut self, entry: usize) {
-        if self.is_whole() {
-            self.entries.push((entry as u32, self.lines.len()));
+    fn done(&mut self, splat: &Splat, _entry: usize) {
+        let before = self.ellipses.last().map_or(0, |&(_, _, end)| end);
+        if self.lines.len() > before {
+            self.ellipses.push((splat.gaussian, splat.colour, self.lines.len()));
         }
     }
 }
@@ -191,7 +238,7 @@ impl Trace {
     fn clear(&mut self) {
         self.ink = Ink::default();
         self.lines.clear();
-        self.entries.clear();
+        self.ellipses.clear();
     }
 
     /// Whether all lines are kept.
@@ -201,15 +248,11 @@ impl Trace {
 
     /// Sums what each Gaussian is to the tile: the light behind it is what is left of all of it.
     #[inline(always)]
-    #[expect(
-        clippy::indexing_slicing,
-        reason = "entries are those of the tile, and lines are counted by them"
-    )]
-    fn shares(&mut self, splats: &[Splat], places: &[u32], shares: &mut Vec<Share>) {
+    #[expect(clippy::indexing_slicing, reason = "lines are counted by the ellipses that have them")]
+    fn shares(&mut self, shares: &mut Vec<Share>) {
         let mut start = 0;
-        for &(entry, end) in &self.entries {
-            let place = places[entry as usize];
-            shares.extend(share(splats, place, &self.lines[start..end], &mut self.ink.light));
+        for &(gaussian, colour, end) in &self.ellipses {
+            shares.extend(share(gaussian, colour, &self.lines[start..end], &mut self.ink.light));
             start = end;
         }
     }
@@ -217,8 +260,6 @@ impl Trace {
 
 /// A tile that is blended again, when all of its light is known.
 struct Again<'a> {
-    splats: &'a [Splat],
-    places: &'a [u32],
     /// What is left of the light.
     light: Light,
     /// Lines of the Gaussian that is blended.
@@ -233,9 +274,8 @@ impl Blend for Again<'_> {
     }
 
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "entries are those of the tile")]
-    fn done(&mut self, entry: usize) {
-        self.shares.extend(share(self.splats, self.places[entry], &self.lines, &mut self.light));
+    fn done(&mut self, splat: &Splat, _entry: usize) {
+        self.shares.extend(share(splat.gaussian, splat.colour, &self.lines, &mut self.light));
         self.lines.clear();
     }
 }
@@ -243,12 +283,8 @@ impl Blend for Again<'_> {
 /// What a Gaussian is to a tile, if that shows it: from its lines, and from the light of it and of what lies behind it, which
 /// it is taken from.
 #[inline(always)]
-#[expect(
-    clippy::indexing_slicing,
-    reason = "lines and lanes are those of a tile; places are those of splats"
-)]
-fn share(splats: &[Splat], place: u32, lines: &[Line], light: &mut Light) -> Option<Share> {
-    let colour = splats[place as usize].colour;
+#[expect(clippy::indexing_slicing, reason = "lines and lanes are those of a tile")]
+fn share(gaussian: u32, colour: [f32; 3], lines: &[Line], light: &mut Light) -> Option<Share> {
     let [mut given, mut lost, mut squared] = [[0.0; TILE]; 3];
     for Line { line, visible, passing } in lines {
         for lane in 0..TILE {
@@ -271,5 +307,5 @@ fn share(splats: &[Splat], place: u32, lines: &[Line], light: &mut Light) -> Opt
     }
     let contribution: f32 = given.iter().sum();
     let (loss, energy) = (lost.iter().sum(), squared.iter().sum());
-    (contribution > 0.0).then_some(Share { place, contribution, loss, energy })
+    (contribution > 0.0).then_some(Share { gaussian, contribution, loss, energy })
 }

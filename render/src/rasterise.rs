@@ -5,6 +5,7 @@
 //! Where the programs in use differ: a Gaussian reaches as far as its alpha is 1/255 or more (no cut at 3
 //! sigma), alpha is at most 0.99, and a pixel is done when less than 1/10,000 of the light would pass.
 
+mod block;
 mod project;
 mod rows;
 mod tile;
@@ -152,7 +153,11 @@ pub(crate) struct View {
 impl View {
     /// Projects and sorts.
     pub(crate) fn new(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Self {
-        let splats = project(frame, shapes, sight);
+        Self::of(project(frame, shapes, sight), sight)
+    }
+
+    /// Sorts ellipses that are projected already, nearest first.
+    pub(crate) fn of(splats: Vec<Splat>, sight: &Sight<'_>) -> Self {
         let rows = TileRows::new(&splats, sight);
         Self { splats, rows }
     }

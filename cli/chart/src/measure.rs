@@ -122,8 +122,8 @@ fn run(
     let what = format!("{}: {}, {}", scene.name, variant.name, quality.name().to_owned());
     progress.step(format!("{what}: encoding and decoding"));
     let settings = variant.at(quality);
-    let (stream, gaussians, encode) = encoded(scene, &settings, sweep.repeat)?;
-    let decode = decoded(&stream, sweep.repeat)?;
+    let (stream, gaussians, encode) = encoded(scene, &settings, sweep.repeats(quality))?;
+    let decode = decoded(&stream, sweep.repeats(quality))?;
     progress.advance();
     let limits = Limits::default();
     let infos = operating_points(&stream, &limits)?;

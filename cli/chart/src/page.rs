@@ -141,7 +141,7 @@ impl Page<'_> {
                     dt { "Program" } dd { "splatstream " (env!("CARGO_PKG_VERSION")) (build) }
                     dt { "Machine" } dd { (cores) " processors (" (system) ", " (processor) "), " (threads) " threads used" }
                     dt { "Timing" } dd {
-                        "wall time, median of " (self.sweep.repeat) ". Encoding is from Gaussians in memory to bytes in \
+                        "wall time, median of " (self.sweep.repeat) " at quality " (self.sweep.quality().name()) ", once at others. Encoding is from Gaussians in memory to bytes in \
                          memory; decoding is back again, every digest verified. Neither reads or writes a file."
                     }
                     dt { "Pictures" } dd {

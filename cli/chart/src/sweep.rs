@@ -56,7 +56,7 @@ pub struct Sweep {
     pub qualities: Vec<Quality>,
     /// Shares up to each refinement, percent.
     pub refinements: Vec<u8>,
-    /// Times that each run is timed.
+    /// Times that runs at the [quality of comparison](Self::quality) are timed; others are timed once.
     pub repeat: u32,
 }
 
@@ -65,6 +65,11 @@ impl Sweep {
     pub fn quality(&self) -> Quality {
         let high = self.qualities.iter().copied().find(|&quality| quality == Quality::High);
         high.or(self.qualities.last().copied()).unwrap_or(Quality::High)
+    }
+
+    /// Times that a run at a quality is timed: only where variants are compared do speeds stand side by side.
+    pub fn repeats(&self, quality: Quality) -> u32 {
+        if quality == self.quality() { self.repeat } else { 1 }
     }
 
     /// The baseline at the quality of comparison.

@@ -20,7 +20,7 @@ pub(super) struct SweepArgs {
     /// Tools of the encoder that are left out one at a time; default is each.
     #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
     without: Vec<ToolName>,
-    /// Times that encoding and decoding are timed; the median counts.
+    /// Times that encoding and decoding are timed at the quality of comparison; the median counts.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     repeat: Option<u32>,
     /// One preset, few points, small pictures, one timing: a look at the page, no measurement.

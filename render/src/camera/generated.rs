@@ -6,6 +6,7 @@
 
 use super::Camera;
 use glam::{Quat, Vec3};
+use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
 use std::f32::consts::{PI, TAU};
 
@@ -127,7 +128,7 @@ impl Subject {
     /// The box of what is visible, less 3 % at either end of each axis: stray Gaussians do not push the cameras
     /// away. Where that box is more than four times as large as that of the inner 60 %, the scene has
     /// surroundings, and the inner box is the subject; and so on to the inner 30 %.
-    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
+    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame; boxes are constants")]
     fn of(frame: &GaussianFrame, up: Up) -> Self {
         let shown = |row: &usize| frame.opacity_logit()[*row] > VISIBLE_LOGIT;
         let mut rows: Vec<usize> = (0..frame.len()).filter(shown).collect();
@@ -136,13 +137,19 @@ impl Subject {
         }
         let mut axes =
             frame.position().each_ref().map(|plane| rows.iter().map(|&row| plane[row]).collect::<Vec<f32>>());
-        let mut at = |percent: usize| {
-            Vec3::from(axes.each_mut().map(|values| {
+        let of_axis = |values: &mut Vec<f32>| {
+            let mut at = |percent: usize| {
                 let place = values.len() * percent / 100;
                 if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(place, f32::total_cmp).1 }
-            }))
+            };
+            BOXES.map(|percents| percents.map(&mut at))
         };
-        let boxes = BOXES.map(|percents| percents.map(&mut at));
+        let mut of_axes = [[[0.0; 2]; BOXES.len()]; 3];
+        of_axes.par_iter_mut().zip(&mut axes).for_each(|(boxes, values)| *boxes = of_axis(values));
+        let corner =
+            |number: usize, end: usize| Vec3::from(of_axes.each_ref().map(|boxes| boxes[number][end]));
+        let boxes: [[Vec3; 2]; BOXES.len()] =
+            std::array::from_fn(|number| [0, 1].map(|end| corner(number, end)));
         let side = |[low, high]: [Vec3; 2]| (high - low).length();
         let mut subject = boxes[0];
         for inner in &boxes[1..] {

@@ -190,7 +190,7 @@ impl Blend for Replay<'_> {
     }
 
     #[inline(always)]
-    fn done(&mut self, entry: usize) {
+    fn done(&mut self, _splat: &Splat, entry: usize) {
         let slot = self.slots[self.places[entry] as usize];
         let sums = &mut self.sums[slot as usize];
         for (number, (sum, lanes)) in sums.iter_mut().zip(&self.lanes).enumerate() {

@@ -2,12 +2,13 @@
 #![expect(clippy::arithmetic_side_effects, reason = "vectors of floats; counts of Gaussians in memory")]
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
 
+use super::block::Block;
 use super::{Sight, Strips, TILE};
 use crate::camera::Camera;
 use glam::{Mat3, Vec3};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
-use splatstream_gaussians::{GaussianFrame, sh_basis, sh_coefficients};
+use splatstream_gaussians::GaussianFrame;
 use std::f32::consts::LOG2_E;
 use std::ops::Range;
 
@@ -20,9 +21,6 @@ pub(crate) const LOW_PASS: f32 = 0.3;
 /// -log2 of the least alpha drawn, 1/255.
 pub(crate) const LOG2_255: f32 = 7.994_353_4;
 
-/// The constant SH basis function, 1 / (2 √π).
-const SH_C0: f32 = 0.282_094_8;
-
 /// Gaussians that a thread projects at once.
 const CHUNK: usize = 4096;
 
@@ -31,7 +29,7 @@ const CHUNK: usize = 4096;
 ///
 /// No term is above 0, so that rounding never makes alpha larger than the opacity, and long thin ellipses keep
 /// their shape far from their centre: `xx·dx² + xy·dx·dy + yy·dy²` would be a small difference of large terms.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Splat {
     /// Centre, pixels.
     pub(crate) centre: [f32; 2],
@@ -116,11 +114,23 @@ impl WithSimd for ProjectChunk<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let row = |place: usize| self.rows.map_or(place, |rows| rows[place] as usize);
-        let mut splats = Vec::with_capacity(self.places.len());
-        for place in self.places {
-            if let Some((offset, depth, splat)) = self.view.ellipse(row(place)) {
-                splats.push((depth, Splat { colour: self.view.colour(row(place), offset), ..splat }));
+        let Self { view, rows, places } = self;
+        let mut splats = Vec::with_capacity(places.len());
+        for start in places.clone().step_by(TILE) {
+            let block = Block::new(rows, start..places.end.min(start + TILE));
+            let first = splats.len();
+            for (lane, row) in block.rows() {
+                if let Some((depth, splat)) = view.ellipse(row) {
+                    // Until the colours of the block are there, the lane that it is at.
+                    splats.push((depth, Splat { colour: [lane as f32; 3], ..splat }));
+                }
+            }
+            if splats.len() > first {
+                let colours = block.colours(view.frame, view.position.to_array());
+                for (_, splat) in &mut splats[first..] {
+                    let lane = splat.colour[0] as usize;
+                    splat.colour = colours.each_ref().map(|channel| channel[lane]);
+                }
             }
         }
         splats.shrink_to_fit();
@@ -167,9 +177,9 @@ impl<'a> View<'a> {
         }
     }
 
-    /// A Gaussian from the camera, its depth, and its ellipse without colour; none if it cannot be seen.
+    /// The depth of a Gaussian, and its ellipse without colour; none if it cannot be seen.
     #[inline(always)]
-    fn ellipse(&self, row: usize) -> Option<(Vec3, f32, Splat)> {
+    fn ellipse(&self, row: usize) -> Option<(f32, Splat)> {
         let offset = Vec3::from(self.frame.position().each_ref().map(|plane| plane[row])) - self.position;
         let at = self.to_camera * offset;
         if at.z.is_nan() || at.z < self.near || self.is_outside(at, self.shapes.longest[row]) {
@@ -212,7 +222,7 @@ impl<'a> View<'a> {
             colour: [0.0; 3],
             gaussian: row as u32,
         };
-        Some((offset, at.z, splat))
+        Some((at.z, splat))
     }
 
     /// Whether a Gaussian surely touches nothing that is drawn: by a circle around it in which it is, with room for
@@ -262,22 +272,6 @@ impl<'a> View<'a> {
         // Lagrange's identity: never negative, where |u|²·|v|² - (u·v)² may lose every digit.
         let determinant = u.cross(v).length_squared();
         Covariance { xx: u.length_squared(), xy: u.dot(v), yy: v.length_squared(), determinant }
-    }
-
-    /// Colour of a Gaussian that lies at `offset` from the camera.
-    fn colour(&self, row: usize, offset: Vec3) -> [f32; 3] {
-        let mut colour = self.frame.dc().each_ref().map(|plane| 0.5 + SH_C0 * plane[row]);
-        let coefficients = sh_coefficients(self.frame.sh_degree());
-        if coefficients > 0 {
-            let basis = sh_basis(offset.normalize_or_zero().as_dvec3().to_array());
-            let planes = self.frame.sh().chunks_exact(3);
-            for (planes, basis) in planes.zip(basis.iter().take(coefficients)) {
-                for (colour, plane) in colour.iter_mut().zip(planes) {
-                    *colour += *basis as f32 * plane[row];
-                }
-            }
-        }
-        colour.map(|channel| channel.max(0.0))
     }
 }
 

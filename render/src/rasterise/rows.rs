@@ -34,16 +34,17 @@ impl TileRows {
         let mut rows = vec![Vec::new(); count];
         let mut is_drawn = vec![false; count];
         sight.strips.rows(count).for_each(|row| is_drawn[row] = true);
+        let of_splat = |splat: &Splat| tiles_across(splat.centre[1], splat.extent[1], count);
+        let across: Vec<(u32, u32)> = splats.par_iter().with_min_len(4096).map(of_splat).collect();
         // Bands of rows, so that threads share no row.
         let band = count.div_ceil(2 * rayon::current_num_threads()).max(1);
         rows.par_chunks_mut(band).enumerate().for_each(|(number, rows)| {
             let first = number * band;
-            for (place, splat) in (0..).zip(splats) {
-                let (top, bottom) = tiles_across(splat.centre[1], splat.extent[1]);
-                let top = top.max(first as i32);
-                for row in top..=bottom.min((first + rows.len()) as i32 - 1) {
-                    if is_drawn[row as usize] {
-                        rows[row as usize - first].push(place);
+            for (place, &(top, bottom)) in (0..).zip(&across) {
+                let top = (top as usize).max(first);
+                for row in top..(bottom as usize + 1).min(first + rows.len()) {
+                    if is_drawn[row] {
+                        rows[row - first].push(place);
                     }
                 }
             }
@@ -76,16 +77,15 @@ impl TileRows {
     pub(crate) fn entries(&self, row: usize, splats: &[Splat]) -> RowEntries {
         let tiles = self.size[0].div_ceil(TILE);
         let top = (row * TILE) as f32 + 0.5;
-        let spans: Vec<(i32, i32)> = self.rows[row]
-            .iter()
-            .map(|&place| {
-                let (left, right) = span(&splats[place as usize], top, top + (TILE - 1) as f32);
-                (left.max(0), right.min(tiles as i32 - 1))
-            })
-            .collect();
         let mut starts = vec![0; tiles + 1];
-        for tile in spans.iter().flat_map(|&(left, right)| left..=right) {
-            starts[tile as usize + 1] += 1;
+        let mut spans = Vec::with_capacity(self.rows[row].len());
+        for &place in &self.rows[row] {
+            let (left, right) = span(&splats[place as usize], top, top + (TILE - 1) as f32);
+            let (left, right) = (left.max(0), right.min(tiles as i32 - 1));
+            for tile in left..=right {
+                starts[tile as usize + 1] += 1;
+            }
+            spans.push((left, right));
         }
         for tile in 0..tiles {
             starts[tile + 1] += starts[tile];
@@ -103,10 +103,10 @@ impl TileRows {
     }
 }
 
-/// First and last tile that a centre and its reach touch on one axis.
-fn tiles_across(centre: f32, extent: f32) -> (i32, i32) {
+/// First and last of so many rows of tiles that a centre and its reach touch.
+fn tiles_across(centre: f32, extent: f32, count: usize) -> (u32, u32) {
     // What is projected ends at 0 or above, so that truncation is the floor.
-    let tile = |at: f32| (at.max(0.0) / TILE as f32) as i32;
+    let tile = |at: f32| ((at.max(0.0) / TILE as f32) as usize).min(count) as u32;
     (tile(centre - extent), tile(centre + extent))
 }
 

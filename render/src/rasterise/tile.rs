@@ -13,6 +13,9 @@ pub(crate) const LOG2_MAX_ALPHA: f32 = -0.014_499_556;
 /// A pixel is done where less of the light would pass than this.
 const MIN_TRANSMITTANCE: f32 = 1e-4;
 
+/// Ellipses of a tile that are brought together at once; as many as a cache holds beside the tile.
+const AHEAD: usize = 4 * TILE;
+
 /// One value for each pixel of a line of a tile.
 pub(crate) type Lanes = [f32; TILE];
 
@@ -21,11 +24,12 @@ pub(crate) trait Blend {
     /// The lines that follow are of this Gaussian.
     fn begin(&mut self, _splat: &Splat) {}
 
-    /// `visible` is transmittance times alpha of each pixel of a line of the tile.
+    /// `visible` is transmittance times alpha of each pixel of a line of the tile, of which one at least is not 0; `passing` the
+    /// transmittance behind it, negative where the pixel is done.
     fn line(&mut self, colour: [f32; 3], line: usize, visible: &Lanes, passing: &Lanes);
 
-    /// The Gaussian at this place of the tile's entries has added all its lines.
-    fn done(&mut self, _entry: usize) {}
+    /// A Gaussian, at this place of the tile's entries, has added all its lines.
+    fn done(&mut self, _splat: &Splat, _entry: usize) {}
 }
 
 /// The light that still passes each pixel of a tile.
@@ -66,33 +70,48 @@ impl Tile {
 }
 
 /// Blends the ellipses at `entries`, nearest first, until no light passes.
+///
+/// They are brought together some at a time: they lie far apart in memory, and waiting for one hides no other wait.
 #[inline(always)]
-#[expect(
-    clippy::indexing_slicing,
-    reason = "lines and lanes are those of a tile; places are those of the splats"
-)]
+#[expect(clippy::indexing_slicing, reason = "places are those of the splats")]
+#[expect(clippy::arithmetic_side_effects, reason = "places of entries in memory")]
 pub(crate) fn blend_tile(splats: &[Splat], entries: &[u32], tile: &mut Tile, blend: &mut impl Blend) {
-    for (entry, &place) in entries.iter().enumerate() {
-        if entry % TILE == TILE - 1 && tile.finished() {
-            break;
+    let mut near = [Splat::default(); AHEAD];
+    for (chunk, places) in entries.chunks(AHEAD).enumerate() {
+        for (splat, &place) in near.iter_mut().zip(places) {
+            *splat = splats[place as usize];
         }
-        let splat = &splats[place as usize];
-        let middle = splat.centre[1] - tile.origin[1];
-        let first = (middle - splat.extent[1]).ceil().max(0.0) as usize;
-        let last = (middle + splat.extent[1]).floor().min((TILE - 1) as f32);
-        // A float below 0 would become line 0.
-        if last < 0.0 {
-            continue;
+        for (entry, splat) in (chunk * AHEAD..).zip(near.iter().take(places.len())) {
+            if entry % TILE == TILE - 1 && tile.finished() {
+                return;
+            }
+            blend_splat((splat, entry), tile, blend);
         }
-        blend.begin(splat);
-        for line in first..=last as usize {
-            if tile.alive[line] {
-                let visible = blend_line(splat, tile.origin, line, &mut tile.passing[line]);
+    }
+}
+
+/// Blends one ellipse, which is at a place of the tile's entries.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "lines are those of a tile")]
+fn blend_splat((splat, entry): (&Splat, usize), tile: &mut Tile, blend: &mut impl Blend) {
+    let middle = splat.centre[1] - tile.origin[1];
+    let first = (middle - splat.extent[1]).ceil().max(0.0) as usize;
+    let last = (middle + splat.extent[1]).floor().min((TILE - 1) as f32);
+    // A float below 0 would become line 0.
+    if last < 0.0 {
+        return;
+    }
+    blend.begin(splat);
+    for line in first..=last as usize {
+        if tile.alive[line] {
+            let visible = blend_line(splat, tile.origin, line, &mut tile.passing[line]);
+            // Nothing visible is below 0, so that bits say what values do.
+            if visible.iter().fold(0, |bits, visible| bits | visible.to_bits()) != 0 {
                 blend.line(splat.colour, line, &visible, &tile.passing[line]);
             }
         }
-        blend.done(entry);
     }
+    blend.done(splat, entry);
 }
 
 /// Takes the light that a Gaussian stops on one line; returns transmittance times alpha.

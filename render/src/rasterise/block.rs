@@ -1,0 +1,108 @@
+//! Colours of sixteen Gaussians at a time.
+#![expect(clippy::arithmetic_side_effects, reason = "floats; counts of Gaussians in memory")]
+#![expect(clippy::indexing_slicing, reason = "rows are those of the frame; lanes and axes are constants")]
+
+use super::TILE;
+use super::tile::Lanes;
+use splatstream_gaussians::{GaussianFrame, sh_basis, sh_coefficients};
+use std::ops::Range;
+
+/// The constant SH basis function, 1 / (2 √π).
+const SH_C0: f32 = 0.282_094_8;
+
+/// Some Gaussians of a frame, side by side.
+pub(super) struct Block {
+    rows: [u32; TILE],
+    /// How many there are: further lanes repeat the last.
+    count: usize,
+    /// Whether they are neighbours in the frame.
+    is_run: bool,
+}
+
+impl Block {
+    /// Those at at most sixteen places of `rows`, or of the frame where there are none.
+    #[inline(always)]
+    pub(super) fn new(rows: Option<&[u32]>, places: Range<usize>) -> Self {
+        let of_lane = |lane: usize| {
+            let place = (places.start + lane).min(places.end - 1);
+            rows.map_or(place as u32, |rows| rows[place])
+        };
+        let (rows, count): ([u32; TILE], _) = (std::array::from_fn(of_lane), places.len());
+        let is_run = count == TILE && (rows[TILE - 1] - rows[0]) as usize == TILE - 1;
+        Self { rows, count, is_run }
+    }
+
+    /// Each with its lane.
+    #[inline(always)]
+    pub(super) fn rows(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.rows[..self.count].iter().map(|&row| row as usize).enumerate()
+    }
+
+    /// Red, green and blue of each, as they are seen from a position.
+    #[inline(always)]
+    pub(super) fn colours(&self, frame: &GaussianFrame, position: [f32; 3]) -> [Lanes; 3] {
+        let dc = frame.dc().each_ref().map(|plane| self.of(plane));
+        let mut colours = dc.map(|lanes| lanes.map(|dc| 0.5 + SH_C0 * dc));
+        let coefficients = sh_coefficients(frame.sh_degree());
+        if coefficients > 0 {
+            let bases = bases(self.directions(frame, position));
+            let planes = frame.sh().chunks_exact(3);
+            for (planes, basis) in planes.zip(bases.iter().take(coefficients)) {
+                for (colour, plane) in colours.iter_mut().zip(planes) {
+                    let plane = self.of(plane);
+                    for lane in 0..TILE {
+                        colour[lane] += basis[lane] * plane[lane];
+                    }
+                }
+            }
+        }
+        colours.map(|channel| channel.map(|value| value.max(0.0)))
+    }
+
+    /// Where they lie, of length 1; 0 for one that is at the position itself.
+    #[inline(always)]
+    fn directions(&self, frame: &GaussianFrame, position: [f32; 3]) -> [Lanes; 3] {
+        let mut offsets = frame.position().each_ref().map(|plane| self.of(plane));
+        for (offset, position) in offsets.iter_mut().zip(position) {
+            offset.iter_mut().for_each(|offset| *offset -= position);
+        }
+        let mut inverse = [0.0; TILE];
+        for lane in 0..TILE {
+            let [x, y, z] = offsets.each_ref().map(|offset| offset[lane]);
+            let of_length = 1.0 / (x * x + y * y + z * z).sqrt();
+            inverse[lane] = of_length;
+        }
+        for offset in &mut offsets {
+            for lane in 0..TILE {
+                let is_apart = inverse[lane] > 0.0 && inverse[lane] < f32::INFINITY;
+                offset[lane] = if is_apart { offset[lane] * inverse[lane] } else { 0.0 };
+            }
+        }
+        offsets
+    }
+
+    /// Their values in a plane of the frame.
+    #[inline(always)]
+    fn of(&self, plane: &[f32]) -> Lanes {
+        let first = self.rows[0] as usize;
+        let mut lanes = [0.0; TILE];
+        match self.is_run {
+            true => lanes.copy_from_slice(&plane[first..first + TILE]),
+            false => lanes.iter_mut().zip(self.rows).for_each(|(lane, row)| *lane = plane[row as usize]),
+        }
+        lanes
+    }
+}
+
+/// The SH basis in sixteen directions.
+#[inline(always)]
+fn bases([x, y, z]: [Lanes; 3]) -> [Lanes; 15] {
+    let mut bases = [[0.0; TILE]; 15];
+    for lane in 0..TILE {
+        let of_lane = sh_basis([x[lane], y[lane], z[lane]].map(f64::from));
+        for (basis, value) in bases.iter_mut().zip(of_lane) {
+            basis[lane] = value as f32;
+        }
+    }
+    bases
+}
