@@ -2,9 +2,9 @@
 
 use super::{Machine, WIDE};
 use core::arch::wasm32::{
-    i32x4_abs, i32x4_add, i32x4_bitmask, i32x4_dot_i16x8, i32x4_eq, i32x4_gt, i32x4_mul, i32x4_shuffle,
-    i32x4_sub, i64x2_shuffle, u8x16_add_sat, u8x16_splat, u8x16_swizzle, u32x4_shl, u32x4_shr, u32x4_splat,
-    v128, v128_and, v128_any_true, v128_bitselect, v128_or, v128_xor,
+    i16x8_eq, i32x4_abs, i32x4_add, i32x4_bitmask, i32x4_dot_i16x8, i32x4_gt, i32x4_mul, i32x4_shr,
+    i32x4_shuffle, i32x4_sub, i64x2_shuffle, u8x16_add_sat, u8x16_splat, u8x16_swizzle, u32x4_shl, u32x4_shr,
+    u32x4_splat, v128, v128_and, v128_any_true, v128_bitselect, v128_or, v128_xor,
 };
 use pulp::cast;
 
@@ -58,7 +58,8 @@ fn transpose_four([a, b, c, d]: [v128; 4]) -> [v128; 4] {
 /// Gives four lanes with a mask their next state, with words after the first `skipped`; also how many were taken.
 #[inline(always)]
 fn advance_four(state: v128, next: v128, mask: v128, words: v128, skipped: u8) -> (v128, u8) {
-    let low = i32x4_eq(u32x4_shr(next, 16), u32x4_splat(0));
+    // Halves that are 0, of which the high one counts: engines have no comparison of unsigned values in one instruction.
+    let low = i32x4_shr(i16x8_eq(next, u32x4_splat(0)), 16);
     let takes = v128_and(low, mask);
     let set = i32x4_bitmask(takes);
     let own = OWN_WORD.get(usize::from(set & 15)).copied().unwrap_or_default();
