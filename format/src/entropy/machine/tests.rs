@@ -45,6 +45,20 @@ proptest! {
     }
 
     #[test]
+    fn vectors_count_the_thresholds_that_values_reach(
+        values in proptest::array::uniform4(proptest::array::uniform8(prop_oneof![-40_i32..40, -70_000..70_000, any::<i32>()])),
+        thresholds in proptest::collection::vec(prop_oneof![-40_i16..40, -32_767..=i16::MAX, Just(i16::MAX), Just(-32_767)], 0..64),
+    ) {
+        let values = values.map(|values| values.map(i32::cast_unsigned));
+        let count = |value: u32| thresholds.iter().filter(|&&one| i32::from(one) <= value.cast_signed()).count() as u32;
+        let expected = values.map(|values| values.map(count));
+        prop_assert_eq!(Portable.reached(values, &thresholds), expected);
+        let Some(wide) = wide() else { return Ok(()) };
+        let counts = wide.reached(values.map(|values| wide.load(values)), &thresholds);
+        prop_assert_eq!(counts.map(|counts| wide.store(counts)), expected);
+    }
+
+    #[test]
     fn vectors_take_the_words_that_lanes_take(
         states in vector(), next in vector(), lanes in 0_u32..256, words in any::<[u16; WIDE]>(),
     ) {
