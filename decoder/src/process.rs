@@ -60,8 +60,9 @@ pub struct Options {
     pub identities: bool,
     /// What decoding may take.
     pub budget: Budget,
-    /// Decode a frame that no other one refers to beside the frame after it, if that comes before
-    /// [`Decoder::stop_waiting`] is called. This takes the memory of one frame more. Not if decoding stops at the first error.
+    /// Decode a frame that no other one refers to beside the frame after it, if there is more than one thread and that frame
+    /// comes before [`Decoder::stop_waiting`] is called. This takes the memory of one frame more. Not where decoding stops at
+    /// the first error.
     pub ahead: bool,
 }
 
@@ -407,25 +408,6 @@ impl Decoder {
         self.counted.frame_headers = self.counted.frame_headers.saturating_add(is_frame.into());
     }
 
-    /// Decodes the pending units of the frame in progress, and of the one that waits, which ends; reports their errors.
-    fn settle(&mut self) {
-        if self.waiting.is_some() {
-            return self.settle_both();
-        }
-        let Some(mut frame) = self.frame.take() else { return };
-        let errors = self.decoded(&mut frame);
-        self.frame = Some(frame);
-        errors.into_iter().for_each(|error| self.add(error));
-    }
-
-    /// Decodes the pending units of a frame; gives their errors.
-    fn decoded(&self, frame: &mut FrameInProgress) -> Vec<Error> {
-        match self.context(frame.reference) {
-            Some(context) if !frame.pending.is_empty() => frame.decode(&context),
-            _ => Vec::new(),
-        }
-    }
-
     /// Reports an error, after those of the units before it.
     fn report(&mut self, error: Error) {
         self.settle();
@@ -493,7 +475,7 @@ impl Decoder {
             gop,
             reference: None,
         };
-        let is_kept = is_kept(gop, layer);
+        let is_kept = ahead::is_kept(gop, layer);
         let reference = reference.and_then(|layer| self.references.get_mut(layer));
         let closed = frame.close(&context, reference, end != FrameEnd::Cut);
         self.next_identity = closed.next_identity;
@@ -543,9 +525,4 @@ impl Decoder {
         let gop_index = unit.payload.first_chunk().copied().map_or(0, u32::from_le_bytes);
         u64::from(gop_index) >= self.next_gop && u64::from(unit.header.frame) >= self.next_frame
     }
-}
-
-/// Whether later frames of a GOP may refer to those of a temporal layer.
-fn is_kept(gop: &Gop, layer: u8) -> bool {
-    gop.header.is_predicted() && (layer == 0 || layer < gop.header.temporal_depth)
 }

@@ -1,13 +1,15 @@
 //! Two frames side by side.
 //!
 //! A frame that no other one refers to may wait, once it has all its units, until the frame after it has them too: neither
-//! needs the other, so that each core decodes one of them. Whatever else happens ends the wait first. Frames and errors come
-//! in the order of the stream, as if nothing had waited.
+//! needs the other, so that each core decodes one of them. On one core nothing waits. Whatever else happens ends the wait
+//! first. Frames and errors come in the order of the stream, as if nothing had waited.
 
 use super::frame::FrameInProgress;
 use super::report::Found;
-use super::{DecodedFrame, Decoder, FrameEnd, is_kept};
+use super::{DecodedFrame, Decoder, FrameEnd};
+use crate::gop::Gop;
 use crate::operating_point::OperatingPoint;
+use splatstream_format::Error;
 
 /// A frame that has ended and is to be handed out.
 pub(super) struct Ready {
@@ -24,7 +26,8 @@ impl Decoder {
         let (Some(frame), Some(gop)) = (&self.frame, &self.gop) else { return false };
         let is_free = gop.header.is_predicted() && !is_kept(gop, frame.role.temporal_layer);
         let is_wanted = self.options.ahead && !self.options.stop_at_first_error && self.frames_left > 0;
-        is_wanted && is_free && self.waiting.is_none() && frame.error.is_none()
+        let is_worth_it = rayon::current_num_threads() > 1;
+        is_wanted && is_worth_it && is_free && self.waiting.is_none() && frame.error.is_none()
     }
 
     /// The frame in progress waits. The identities of its new Gaussians are set apart.
@@ -40,9 +43,28 @@ impl Decoder {
         self.waiting.is_some() && self.frame.is_none()
     }
 
+    /// Decodes the pending units of the frame in progress, and of the one that waits, which ends; reports their errors.
+    pub(super) fn settle(&mut self) {
+        if self.waiting.is_some() {
+            return self.settle_both();
+        }
+        let Some(mut frame) = self.frame.take() else { return };
+        let errors = self.decoded(&mut frame);
+        self.frame = Some(frame);
+        errors.into_iter().for_each(|error| self.add(error));
+    }
+
+    /// Decodes the pending units of a frame; gives their errors.
+    fn decoded(&self, frame: &mut FrameInProgress) -> Vec<Error> {
+        match self.context(frame.reference) {
+            Some(context) if !frame.pending.is_empty() => frame.decode(&context),
+            _ => Vec::new(),
+        }
+    }
+
     /// Decodes the pending units of the frame that waits, and of the frame in progress if there is one, beside each other.
     /// The former ends.
-    pub(super) fn settle_both(&mut self) {
+    fn settle_both(&mut self) {
         let (mut waiting, mut next) = (self.waiting.take(), self.frame.take());
         let decoded = |frame: &mut Option<FrameInProgress>| {
             frame.as_mut().map(|frame| self.decoded(frame)).unwrap_or_default()
@@ -84,4 +106,9 @@ impl Decoder {
         self.ready.extend(done.map(|frame| Ready { frame, point: self.frame_point, found: None }));
         self.next_ready()
     }
+}
+
+/// Whether later frames of a GOP may refer to those of a temporal layer.
+pub(super) fn is_kept(gop: &Gop, layer: u8) -> bool {
+    gop.header.is_predicted() && (layer == 0 || layer < gop.header.temporal_depth)
 }

@@ -47,14 +47,15 @@ struct Table {
 
 impl Table {
     #[inline(always)]
-    fn token(&self, slot: u32) -> u8 {
+    fn token(&self, slot: u32) -> u32 {
         let slot = usize::try_from(slot & 0xFFF).unwrap_or(0);
-        self.token_of_slot.get(slot).copied().unwrap_or(0)
+        self.token_of_slot.get(slot).copied().unwrap_or(0).into()
     }
 
     #[inline(always)]
-    fn entry(&self, token: u8) -> u32 {
-        self.entry_of_token.get(usize::from(token)).copied().unwrap_or(0)
+    fn entry(&self, token: u32) -> u32 {
+        let token = usize::try_from(token & 0xFF).unwrap_or(0);
+        self.entry_of_token.get(token).copied().unwrap_or(0)
     }
 
     fn new(of_token: &[u16]) -> Self {
@@ -483,10 +484,10 @@ impl<M> Plane<'_, M> {
         let tables = contexts.map(table);
         let mut entries = slots;
         for (slot, table) in entries.iter_mut().zip(tables) {
-            *slot = table.token(*slot).into();
+            *slot = table.token(*slot);
         }
         for (entry, table) in entries.iter_mut().zip(tables) {
-            *entry = table.entry(*entry as u8);
+            *entry = table.entry(*entry);
         }
         entries
     }
