@@ -11,6 +11,9 @@ use crate::gop::Gop;
 use crate::operating_point::OperatingPoint;
 use splatstream_format::Error;
 
+/// Modules for web pages have one thread, and no code for more.
+const HAS_THREADS: bool = cfg!(not(target_family = "wasm"));
+
 /// A frame that has ended and is to be handed out.
 pub(super) struct Ready {
     frame: DecodedFrame,
@@ -26,7 +29,7 @@ impl Decoder {
         let (Some(frame), Some(gop)) = (&self.frame, &self.gop) else { return false };
         let is_free = gop.header.is_predicted() && !is_kept(gop, frame.role.temporal_layer);
         let is_wanted = self.options.ahead && !self.options.stop_at_first_error && self.frames_left > 0;
-        let is_worth_it = rayon::current_num_threads() > 1;
+        let is_worth_it = HAS_THREADS && rayon::current_num_threads() > 1;
         is_wanted && is_worth_it && is_free && self.waiting.is_none() && frame.error.is_none()
     }
 
@@ -45,7 +48,7 @@ impl Decoder {
 
     /// Decodes the pending units of the frame in progress, and of the one that waits, which ends; reports their errors.
     pub(super) fn settle(&mut self) {
-        if self.waiting.is_some() {
+        if HAS_THREADS && self.waiting.is_some() {
             return self.settle_both();
         }
         let Some(mut frame) = self.frame.take() else { return };

@@ -153,8 +153,8 @@ impl AxisLookup {
         values: &[M::V; COUNT],
         contexts: &mut [M::V; COUNT],
     ) {
+        let factor = machine.splat(self.factor.into());
         if let (Some(thresholds), (fours, [])) = (&self.narrow, values.as_chunks::<4>()) {
-            let factor = machine.splat(self.factor.into());
             for (values, contexts) in fours.iter().zip(contexts.as_chunks_mut::<4>().0) {
                 for (context, count) in contexts.iter_mut().zip(machine.reached(*values, thresholds)) {
                     *context = machine.add(*context, machine.mul(count, factor));
@@ -162,33 +162,11 @@ impl AxisLookup {
             }
             return;
         }
-        let (pairs, last) = values.as_chunks::<2>();
-        let (of_pairs, of_last) = contexts.as_chunks_mut::<2>();
-        for (values, contexts) in pairs.iter().zip(of_pairs) {
-            self.add_some(machine, values, contexts);
-        }
-        for (value, context) in last.iter().zip(of_last) {
-            self.add_some(machine, core::array::from_ref(value), core::array::from_mut(context));
-        }
-    }
-
-    /// [`AxisLookup::add`] of so many vectors that all of it is in registers.
-    #[inline(always)]
-    fn add_some<M: Machine, const COUNT: usize>(
-        &self,
-        machine: M,
-        values: &[M::V; COUNT],
-        contexts: &mut [M::V; COUNT],
-    ) {
-        let mut counts = [machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0)); COUNT];
-        for &threshold in &self.thresholds {
-            let threshold = machine.splat(threshold.cast_unsigned());
-            for (count, &value) in counts.iter_mut().zip(values) {
-                *count = machine.add(*count, machine.greater(threshold, value));
+        for (context, &value) in contexts.iter_mut().zip(values) {
+            let mut count = machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0));
+            for &threshold in &self.thresholds {
+                count = machine.add(count, machine.greater(machine.splat(threshold.cast_unsigned()), value));
             }
-        }
-        let factor = machine.splat(self.factor.into());
-        for (context, count) in contexts.iter_mut().zip(counts) {
             *context = machine.add(*context, machine.mul(count, factor));
         }
     }
