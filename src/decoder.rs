@@ -34,6 +34,8 @@ pub struct Decoder {
     limits: Limits,
     point: OperatingPoint,
     cancel: Cancel,
+    /// Whether two frames are decoded at a time.
+    is_ahead: bool,
     /// Frames before this one are decoded and not given out.
     from: u32,
     warnings: Vec<Warning>,
@@ -90,9 +92,9 @@ impl Decoder {
 
     fn of(source: Source) -> Self {
         let (limits, point, cancel) = (Limits::default(), OperatingPoint::ALL, Cancel::default());
-        let stream = stream(&limits, point, &cancel);
+        let stream = stream(&limits, point, &cancel, false);
         let (warnings, state) = (Vec::new(), State::Decoding);
-        Self { source, stream, limits, point, cancel, from: 0, warnings, state }
+        Self { source, stream, limits, point, cancel, is_ahead: false, from: 0, warnings, state }
     }
 
     /// The same with other limits. To be called before anything has been decoded.
@@ -107,7 +109,7 @@ impl Decoder {
     /// ```
     #[must_use]
     pub fn with_limits(mut self, limits: Limits) -> Self {
-        self.stream = stream(&limits, self.point, &self.cancel);
+        self.stream = stream(&limits, self.point, &self.cancel, self.is_ahead);
         self.limits = limits;
         self
     }
@@ -126,7 +128,29 @@ impl Decoder {
     #[must_use]
     pub fn with_operating_point(mut self, point: OperatingPoint) -> Self {
         self.point = point;
-        self.stream = stream(&self.limits, point, &self.cancel);
+        self.stream = stream(&self.limits, point, &self.cancel, self.is_ahead);
+        self
+    }
+
+    /// The same, but where the bytes of two frames are there of which neither needs the other, both are decoded at a time:
+    /// more frames a second on more than one core. The first of them comes later for it, a lower operating point may hold one
+    /// frame later, and decoding takes the memory of one frame more. To be called before anything has been decoded.
+    ///
+    /// ```
+    /// # let stream = include_bytes!("../examples/talk.gss").to_vec();
+    /// # let bytes: std::sync::Arc<[u8]> = stream.into();
+    /// use splatstream::Decoder;
+    ///
+    /// let [one, two] = [Decoder::from_bytes(bytes.clone()), Decoder::from_bytes(bytes).ahead()];
+    /// for (one, two) in one.zip(two) {
+    ///     assert_eq!(one?.digest(), two?.digest());
+    /// }
+    /// # Ok::<(), splatstream::Error>(())
+    /// ```
+    #[must_use]
+    pub fn ahead(mut self) -> Self {
+        self.is_ahead = true;
+        self.stream = stream(&self.limits, self.point, &self.cancel, true);
         self
     }
 
@@ -138,7 +162,8 @@ impl Decoder {
         self
     }
 
-    /// Changes the operating point: from the next GOP on, and where it is lower on some axis, from the next frame on.
+    /// Changes the operating point: from the next GOP on, and where it is lower on some axis, from the next frame on that has
+    /// not been decoded yet, which may be one of them [`ahead`](Decoder::ahead).
     pub fn set_operating_point(&mut self, point: OperatingPoint) {
         self.point = point;
         self.stream.set_operating_point(point);
@@ -208,8 +233,7 @@ impl Decoder {
             }
             match step.map_err(Error::Stream)? {
                 Step::Frame(frame) => {
-                    self.collect()?;
-                    if let Some(frame) = self.frame(*frame)? {
+                    if let Some(frame) = self.told(*frame)? {
                         return Ok(Some(frame));
                     }
                 }
@@ -221,7 +245,10 @@ impl Decoder {
                 Step::NeedMoreData(more) => {
                     // Shared bytes are all there: the decoder has gone to another place.
                     if !self.source.is_shared() && !self.source.fill(more)? {
-                        return Ok(None);
+                        let Some(waited) = self.stream.stop_waiting() else { return Ok(None) };
+                        if let Some(frame) = self.told(waited)? {
+                            return Ok(Some(frame));
+                        }
                     }
                 }
                 Step::End => {
@@ -230,6 +257,15 @@ impl Decoder {
                 }
             }
         }
+    }
+
+    /// A frame as it is given out, with what was found wrong up to it.
+    ///
+    /// # Errors
+    /// As [`Self::collect`] and [`Self::frame`].
+    fn told(&mut self, decoded: DecodedFrame) -> Result<Option<Frame>> {
+        self.collect()?;
+        self.frame(decoded)
     }
 
     fn has_failed(&self) -> bool {
@@ -309,7 +345,7 @@ impl Decoder {
         self.state = State::Decoding;
         match gop_of(&mut self.source, frame, &self.limits.of_format()) {
             Some(gop) => self.stream.go_to(gop.offset),
-            None => self.stream = stream(&self.limits, self.point, &self.cancel),
+            None => self.stream = stream(&self.limits, self.point, &self.cancel, self.is_ahead),
         }
         Ok(())
     }
@@ -363,12 +399,13 @@ impl Iterator for Decoder {
 }
 
 /// A decoder of a stream from its start.
-fn stream(limits: &Limits, point: OperatingPoint, cancel: &Cancel) -> StreamDecoder {
+fn stream(limits: &Limits, point: OperatingPoint, cancel: &Cancel, ahead: bool) -> StreamDecoder {
     let mut stream = StreamDecoder::new(&Options {
         limits: limits.of_format(),
         operating_point: point,
         identities: true,
         budget: limits.budget(),
+        ahead,
         ..Options::default()
     });
     stream.set_interrupt(cancel.clone());

@@ -63,18 +63,21 @@ const PROBED: u64 = 16 << 20;
 pub(crate) struct Shape {
     planes: u64,
     layers: u64,
-    /// Frames that are held besides the one in progress.
+    /// Frames that are held besides those in progress.
     kept: u64,
+    /// Frames that are in progress at the same time.
+    at_once: u64,
     is_predicted: bool,
 }
 
 impl Shape {
-    pub(crate) fn new(sequence: &SequenceParameters, gop: &GopHeader) -> Self {
+    pub(crate) fn new(sequence: &SequenceParameters, gop: &GopHeader, ahead: bool) -> Self {
         let is_predicted = gop.is_predicted();
         let anchor = u64::from(sequence.whole_anchor());
         let kept = if is_predicted { u64::from(gop.temporal_depth).max(1).saturating_add(anchor) } else { 0 };
         let planes = PLANES.saturating_add(sequence.sh_dimension().into());
-        Self { planes, layers: sequence.spatial_layer_count.into(), kept, is_predicted }
+        let at_once = if ahead && is_predicted { 2 } else { 1 };
+        Self { planes, layers: sequence.spatial_layer_count.into(), kept, at_once, is_predicted }
     }
 
     /// Bytes that decoding a frame takes at most, where the largest frame of its GOP has so many Gaussians.
@@ -83,12 +86,13 @@ impl Shape {
         let of_list = of_planes.saturating_add(FRACTIONS);
         let of_values = self.planes.saturating_add(UNIT_PLANES).saturating_mul(VALUE);
         let output = of_planes.saturating_add(VALUE);
-        let shown = if self.is_predicted { 2 } else { 1 };
+        let shown = if self.is_predicted { self.at_once.saturating_add(1) } else { 1 };
         let held = match (self.is_predicted, self.layers) {
             (true, _) => {
-                let frames = self.kept.saturating_add(1).saturating_mul(of_list.saturating_add(CARRIED));
+                let frames = self.kept.saturating_add(self.at_once);
                 let reference_set = of_planes.saturating_mul(3);
-                frames.saturating_add(of_values).saturating_add(reference_set)
+                let in_progress = of_values.saturating_add(reference_set).saturating_mul(self.at_once);
+                frames.saturating_mul(of_list.saturating_add(CARRIED)).saturating_add(in_progress)
             }
             // Blocks go straight into planes.
             (false, 1) => 0,
@@ -169,7 +173,7 @@ fn probe(bytes: u64, at: u64) -> Result<()> {
 mod tests {
     use super::*;
 
-    const STATIC: Shape = Shape { planes: 58, layers: 1, kept: 0, is_predicted: false };
+    const STATIC: Shape = Shape { planes: 58, layers: 1, kept: 0, at_once: 1, is_predicted: false };
 
     #[test]
     fn memory_is_refused_before_it_is_taken() {

@@ -3,7 +3,7 @@
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
 use rayon::prelude::*;
-use xxhash_rust::xxh64::{Xxh64, xxh64};
+use xxhash_rust::xxh64::xxh64;
 
 /// The XXH64 digests of the canonical planes of one list, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,23 +42,70 @@ enum Plane<'a> {
 impl Plane<'_> {
     fn digest(&self, seed: u64) -> u64 {
         match self {
-            Self::Unsigned(values) => digest_words(values, seed, |&value| value.to_le_bytes()),
-            Self::Signed(values) => digest_words(values, seed, |&value| value.to_le_bytes()),
+            Self::Unsigned(values) => digest_words(values, seed, |value| value),
+            Self::Signed(values) => digest_words(values, seed, i32::cast_unsigned),
         }
     }
 }
 
-/// Hashes words as little-endian bytes, a buffer at a time: the same on any machine.
-fn digest_words<T>(values: &[T], seed: u64, bytes_of: impl Fn(&T) -> [u8; 4]) -> u64 {
-    let mut hasher = Xxh64::new(seed);
-    let mut buffer = [0_u8; 4096];
-    for chunk in values.chunks(1024) {
-        for (bytes, value) in buffer.chunks_exact_mut(4).zip(chunk) {
-            bytes.copy_from_slice(&bytes_of(value));
-        }
-        hasher.update(buffer.get(..chunk.len().wrapping_mul(4)).unwrap_or_default());
+const PRIMES: [u64; 5] = [
+    0x9E37_79B1_85EB_CA87,
+    0xC2B2_AE3D_27D4_EB4F,
+    0x1656_67B1_9E37_79F9,
+    0x85EB_CA77_C2B2_AE63,
+    0x27D4_EB2F_1656_67C5,
+];
+
+/// XXH64 of words as little-endian bytes, the same on any machine. The words are hashed where they are: a function of bytes
+/// would need them copied first.
+fn digest_words<T: Copy>(values: &[T], seed: u64, word: impl Fn(T) -> u32 + Copy) -> u64 {
+    let [first, second, _, _, fifth] = PRIMES;
+    let pair = |low: T, high: T| u64::from(word(low)) | u64::from(word(high)).wrapping_shl(32);
+    let (stripes, rest) = values.as_chunks::<8>();
+    let mut sums = [seed.wrapping_add(first).wrapping_add(second), seed.wrapping_add(second), seed];
+    let mut last = seed.wrapping_sub(first);
+    for &[a, b, c, d, e, f, g, h] in stripes {
+        let [x, y, z] = sums;
+        sums = [round(x, pair(a, b)), round(y, pair(c, d)), round(z, pair(e, f))];
+        last = round(last, pair(g, h));
     }
-    hasher.digest()
+    let mut hash = seed.wrapping_add(fifth);
+    if !stripes.is_empty() {
+        let [x, y, z] = sums;
+        hash = x.rotate_left(1).wrapping_add(y.rotate_left(7));
+        hash = hash.wrapping_add(z.rotate_left(12)).wrapping_add(last.rotate_left(18));
+        hash = [x, y, z, last].into_iter().fold(hash, merged);
+    }
+    hash = hash.wrapping_add((values.len() as u64).wrapping_mul(4));
+    finished(hash, rest, word, pair)
+}
+
+/// The words after the last whole stripe, fewer than 8, and the end of the hash.
+fn finished<T: Copy>(mut hash: u64, rest: &[T], word: impl Fn(T) -> u32, pair: impl Fn(T, T) -> u64) -> u64 {
+    let [first, second, third, fourth, _] = PRIMES;
+    let (pairs, single) = rest.as_chunks::<2>();
+    for &[low, high] in pairs {
+        hash ^= round(0, pair(low, high));
+        hash = hash.rotate_left(27).wrapping_mul(first).wrapping_add(fourth);
+    }
+    for &value in single {
+        hash ^= u64::from(word(value)).wrapping_mul(first);
+        hash = hash.rotate_left(23).wrapping_mul(second).wrapping_add(third);
+    }
+    hash = (hash ^ hash >> 33).wrapping_mul(second);
+    hash = (hash ^ hash >> 29).wrapping_mul(third);
+    hash ^ hash >> 32
+}
+
+#[inline(always)]
+fn round(sum: u64, lane: u64) -> u64 {
+    let [first, second, ..] = PRIMES;
+    sum.wrapping_add(lane.wrapping_mul(second)).rotate_left(31).wrapping_mul(first)
+}
+
+fn merged(hash: u64, sum: u64) -> u64 {
+    let [first, _, _, fourth, _] = PRIMES;
+    (hash ^ round(0, sum)).wrapping_mul(first).wrapping_add(fourth)
 }
 
 /// The digest of several lists, one after the other.
@@ -103,8 +150,10 @@ mod tests {
 
     #[test]
     fn a_plane_is_hashed_as_one_run_of_little_endian_words() {
-        let values: Vec<i32> = (-1500..1500).collect();
-        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        assert_eq!(Plane::Signed(&values).digest(9), xxh64(&bytes, 9));
+        let values: Vec<i32> = (-1500..1500).map(|value: i32| value.wrapping_mul(0x0123_4567)).collect();
+        for (count, seed) in (0..70).chain([2999, 3000]).zip([0, 9, u64::MAX].into_iter().cycle()) {
+            let bytes: Vec<u8> = values[..count].iter().flat_map(|value| value.to_le_bytes()).collect();
+            assert_eq!(Plane::Signed(&values[..count]).digest(seed), xxh64(&bytes, seed), "{count}");
+        }
     }
 }

@@ -190,8 +190,9 @@ fn real_part(fine: [i32; 3], one: i32) -> i32 {
     let [x, y, z] = fine.map(f64::from);
     let one = f64::from(one);
     let square = one * one - (x * x + y * y + z * z);
-    // At most 2^21, not negative.
-    square.max(0.0).sqrt() as i32
+    // A choice: WebAssembly has the greater of two by a call. The root is at most 2^21, not negative.
+    let square = if square > 0.0 { square } else { 0.0 };
+    square.sqrt() as i32
 }
 
 /// A fine rotation in its range.

@@ -68,8 +68,9 @@ fn affine(plane: Vec<i32>, offset: Option<f32>, step: f32) -> Vec<f32> {
 /// w is what makes the quaternion a unit, 0 if x, y, z are already longer than one.
 fn unit_w(x: &[f32], y: &[f32], z: &[f32]) -> Vec<f32> {
     let of = |((&x, &y), &z): ((&f32, &f32), &f32)| {
-        let squares = x * x + y * y + z * z;
-        (1.0 - squares).max(0.0).sqrt()
+        // A choice: WebAssembly has the greater of two by a call.
+        let rest = 1.0 - (x * x + y * y + z * z);
+        if rest > 0.0 { rest.sqrt() } else { 0.0 }
     };
     x.iter().zip(y).zip(z).map(of).collect()
 }

@@ -10,6 +10,7 @@ use crate::buffers::BufferPool;
 use crate::gop::Gop;
 use crate::interrupt::Interrupt;
 use crate::operating_point::{OperatingPoint, Tally};
+use ahead::Ready;
 use core::ops::RangeInclusive;
 use frame::{Context, FrameInProgress, Refused};
 use phase::{Phase, ends_frame, ends_gop, is_layered, unexpected};
@@ -21,8 +22,10 @@ use splatstream_format::syntax::{
     ErrorScope, FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
 };
 use splatstream_format::unit::{Landmark, Unit};
-use splatstream_format::{Error, ErrorKind, Limits, Result};
+use splatstream_format::{Class, Error, ErrorKind, Limits, Result};
+use std::collections::VecDeque;
 
+mod ahead;
 mod applying;
 mod closing;
 mod control;
@@ -57,6 +60,10 @@ pub struct Options {
     pub identities: bool,
     /// What decoding may take.
     pub budget: Budget,
+    /// Decode a frame that no other one refers to beside the frame after it, if there is more than one thread and that frame
+    /// comes before [`Decoder::stop_waiting`] is called. This takes the memory of one frame more. Not where decoding stops at
+    /// the first error.
+    pub ahead: bool,
 }
 
 impl Default for Options {
@@ -70,6 +77,7 @@ impl Default for Options {
             entropy: false,
             identities: false,
             budget: Budget::UNLIMITED,
+            ahead: false,
         }
     }
 }
@@ -118,8 +126,13 @@ pub struct Decoder {
     sequence: Option<(SequenceParameters, Vec<u8>)>,
     gop: Option<Gop>,
     frame: Option<FrameInProgress>,
+    /// A frame that has all its units and waits to be decoded beside the one after it.
+    waiting: Option<FrameInProgress>,
+    /// Frames that have ended and are to be handed out.
+    ready: VecDeque<Ready>,
     references: References,
-    spares: Spares,
+    /// Of the frames that have ended, one for each that is decoded at a time.
+    spares: Vec<Spares>,
     /// The least `gop_index` of the next GOP.
     next_gop: u64,
     /// The least display index of the next frame.
@@ -161,8 +174,10 @@ impl Decoder {
             sequence: None,
             gop: None,
             frame: None,
+            waiting: None,
+            ready: VecDeque::new(),
             references: References::default(),
-            spares: Spares::default(),
+            spares: Vec::new(),
             next_gop: 0,
             next_frame: 0,
             frames_left: 0,
@@ -222,8 +237,13 @@ impl Decoder {
         if self.sequence.is_none() { Landmark::SequenceParameters } else { Landmark::GopHeader }
     }
 
-    /// Takes the next unit; gives the frame that it ends or completes, if it does.
+    /// Takes the next unit; gives the frame that it ends or completes, if it does. More may be [ready](Self::next_ready) then.
     pub fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
+        let done = self.taken(unit);
+        self.in_order(done)
+    }
+
+    fn taken(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
         self.counted.units = self.counted.units.saturating_add(1);
         if self.has_stopped() || self.phase == Phase::Lost && !self.wants(unit) {
             return None;
@@ -245,19 +265,21 @@ impl Decoder {
 
     /// Takes the error of bytes in which no unit could be delimited; gives the frame that this ends, if it does.
     pub fn unreadable(&mut self, error: Error) -> Option<DecodedFrame> {
-        match self.phase {
+        let done = match self.phase {
             Phase::Lost => None,
             Phase::Ended => {
                 self.report(error);
                 None
             }
             _ => self.fail(error, ErrorScope::Gop),
-        }
+        };
+        self.in_order(done)
     }
 
     /// Ends the frame in progress: no more units will come.
     pub fn finish(&mut self) -> Option<DecodedFrame> {
-        self.close_frame(FrameEnd::Cut)
+        let done = self.close_frame(FrameEnd::Cut);
+        self.in_order(done)
     }
 
     /// A unit that is no increment: the frame that it ends, and whether it took effect.
@@ -279,7 +301,11 @@ impl Decoder {
         if is_surplus || !self.phase.allows(unit_type) {
             return (None, Err(unexpected(unit)));
         }
-        let done = if ends_frame(unit_type) { self.close_frame(FrameEnd::Unit(unit.at)) } else { None };
+        let goes_beside = unit_type == UnitType::FrameHeader && self.is_waiting();
+        let done = match ends_frame(unit_type) && !goes_beside {
+            true => self.close_frame(FrameEnd::Unit(unit.at)),
+            false => None,
+        };
         if ends_gop(unit_type) {
             self.close_gop(unit.at);
         }
@@ -326,6 +352,10 @@ impl Decoder {
         if self.phase.is_in_gop() && !self.belongs(&unit.header) {
             self.discard(UnitType::Increment);
             return;
+        }
+        if self.is_waiting() {
+            // The unit is of no frame, or one too many.
+            self.settle();
         }
         if self.phase != Phase::Frame {
             self.report(unexpected(unit));
@@ -378,17 +408,6 @@ impl Decoder {
         self.counted.frame_headers = self.counted.frame_headers.saturating_add(is_frame.into());
     }
 
-    /// Decodes the pending units of the frame in progress, and reports their errors.
-    fn settle(&mut self) {
-        let Some(mut frame) = self.frame.take() else { return };
-        let errors = match self.context(frame.reference) {
-            Some(context) if !frame.pending.is_empty() => frame.decode(&context),
-            _ => Vec::new(),
-        };
-        self.frame = Some(frame);
-        errors.into_iter().for_each(|error| self.add(error));
-    }
-
     /// Reports an error, after those of the units before it.
     fn report(&mut self, error: Error) {
         self.settle();
@@ -404,7 +423,8 @@ impl Decoder {
             frame.error.get_or_insert(error);
         }
         self.report.errors.push(error);
-        self.has_stopped = self.options.stop_at_first_error || self.is_exhausted;
+        let is_limit = error.class() == Class::OverLimit;
+        self.has_stopped = self.options.stop_at_first_error || self.is_exhausted && is_limit;
     }
 
     /// Ends the frame in progress if it has all units that belong to the operating point, so that it need not wait for
@@ -417,12 +437,21 @@ impl Decoder {
                 .is_ok_and(|header| self.belongs(&header))
         };
         let is_complete = frame.is_complete(sequence, takes);
+        if is_complete && self.may_wait() {
+            self.wait();
+            return None;
+        }
         is_complete.then(|| self.close_frame(FrameEnd::Complete)).flatten()
     }
 
     /// Ends the frame in progress. One that is complete stays: it tells why it takes no further increment.
     fn close_frame(&mut self, end: FrameEnd) -> Option<DecodedFrame> {
         self.settle();
+        self.close(end)
+    }
+
+    /// Ends the frame in progress, whose units have been decoded.
+    fn close(&mut self, end: FrameEnd) -> Option<DecodedFrame> {
         let mut frame = self.frame.take().filter(|frame| !frame.has_ended)?;
         if self.interrupt.is_requested() {
             self.has_stopped = true;
@@ -446,16 +475,17 @@ impl Decoder {
             gop,
             reference: None,
         };
-        let is_kept = gop.header.is_predicted() && (layer == 0 || layer < gop.header.temporal_depth);
+        let is_kept = ahead::is_kept(gop, layer);
         let reference = reference.and_then(|layer| self.references.get_mut(layer));
         let closed = frame.close(&context, reference, end != FrameEnd::Cut);
         self.next_identity = closed.next_identity;
-        self.spares = closed.spares;
         self.has_stopped |= self.interrupt.is_requested();
+        let mut spares = closed.spares;
         match is_kept {
-            true => self.references.store(layer, closed.state, |state| self.spares.take(state.into_lists())),
-            false => self.spares.take(closed.state.into_lists()),
+            true => self.references.store(layer, closed.state, |state| spares.take(state.into_lists())),
+            false => spares.take(closed.state.into_lists()),
         }
+        self.spares.push(spares);
         closed.fault.into_iter().for_each(|error| self.add(error));
         if end == FrameEnd::Complete {
             self.frame = Some(frame);

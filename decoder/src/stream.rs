@@ -109,6 +109,9 @@ impl StreamDecoder {
     /// [`StreamDecoder::summary`].
     pub fn next_step(&mut self, bytes: &[u8], is_end: bool) -> Result<Step> {
         let start = self.position();
+        if let Some(frame) = self.decoder.as_mut().and_then(Decoder::next_ready) {
+            return Ok(self.frame(frame));
+        }
         loop {
             let used = self.position().checked_sub(start).and_then(|used| usize::try_from(used).ok());
             let rest = match used.map(|used| bytes.get(used..)) {
@@ -119,9 +122,10 @@ impl StreamDecoder {
                 _ => return Ok(Step::NeedMoreData(1)),
             };
             match self.step(rest, is_end)? {
-                Some(Step::Frame(frame)) => {
-                    self.frames = self.frames.saturating_add(1);
-                    return Ok(Step::Frame(frame));
+                // A stream may end without a unit that ends its last frame.
+                Some(Step::End) => {
+                    let waited = self.stop_waiting();
+                    return Ok(waited.map_or(Step::End, |frame| Step::Frame(Box::new(frame))));
                 }
                 Some(step) => return Ok(step),
                 None => {}
@@ -159,7 +163,20 @@ impl StreamDecoder {
             }
             Ok(_) => return Ok(Some(Step::End)),
         };
-        Ok(frame.map(|frame| Step::Frame(Box::new(frame))))
+        Ok(frame.map(|frame| self.frame(frame)))
+    }
+
+    fn frame(&mut self, frame: DecodedFrame) -> Step {
+        self.frames = self.frames.saturating_add(1);
+        Step::Frame(Box::new(frame))
+    }
+
+    /// Where [`Options::ahead`] is set: ends the wait for another frame, whose bytes may not come soon, and gives the frame
+    /// that has waited. There is none if nothing has waited.
+    pub fn stop_waiting(&mut self) -> Option<DecodedFrame> {
+        let waited = self.decoder.as_mut().and_then(Decoder::stop_waiting);
+        self.frames = self.frames.saturating_add(waited.is_some().into());
+        waited
     }
 
     fn start(&mut self, file: &FileHeader) {
@@ -172,7 +189,7 @@ impl StreamDecoder {
     }
 
     /// Takes the units of another operating point from the next GOP on. Where it is lower on some axis, it holds there from
-    /// the next frame on.
+    /// the next frame on that has not been decoded yet: one may be, if frames are decoded [ahead](Options::ahead).
     pub fn set_operating_point(&mut self, point: OperatingPoint) {
         self.options.operating_point = point;
         self.decoder.iter_mut().for_each(|decoder| decoder.set_operating_point(point));
@@ -234,13 +251,13 @@ pub struct Frames<'a> {
 }
 
 impl<'a> Frames<'a> {
-    /// The frames of the stream that `bytes` is.
+    /// The frames of the stream that `bytes` is. As all of it is there, frames are decoded [ahead](Options::ahead).
     ///
     /// # Errors
     /// What clause 6.2 says of the file header; nothing can be decoded then.
     pub fn open(bytes: &'a [u8], options: &Options) -> Result<Self> {
         FileHeader::parse(bytes)?;
-        Ok(Self { bytes, decoder: StreamDecoder::new(options) })
+        Ok(Self { bytes, decoder: StreamDecoder::new(&Options { ahead: true, ..*options }) })
     }
 
     /// The frames from the GOP on whose header stands at the absolute offset `gop`, see [`StreamDecoder::inside`].
@@ -250,7 +267,8 @@ impl<'a> Frames<'a> {
     pub fn open_inside(bytes: &'a [u8], gop: u64, options: &Options) -> Result<Self> {
         FileHeader::parse(bytes)?;
         let gop = gop.min(u64::try_from(bytes.len()).unwrap_or(u64::MAX));
-        Ok(Self { bytes, decoder: StreamDecoder::inside(gop, options) })
+        let options = Options { ahead: true, ..*options };
+        Ok(Self { bytes, decoder: StreamDecoder::inside(gop, &options) })
     }
 
     /// The next frame; none after the last.

@@ -27,6 +27,7 @@ pub const PLAIN: Options = Options {
     entropy: false,
     identities: false,
     budget: Budget::UNLIMITED,
+    ahead: false,
 };
 /// The first error ends decoding.
 pub const STRICT: Options = Options { stop_at_first_error: true, ..PLAIN };

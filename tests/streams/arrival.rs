@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Everything that a decoder says.
 #[derive(Debug, PartialEq)]
-struct Said {
+pub(super) struct Said {
     frames: Vec<(u32, splatstream::Integers, Vec<u32>, Vec<String>)>,
     end: Option<String>,
 }
@@ -24,7 +24,7 @@ impl Said {
         self.frames.push((frame.index(), frame.into_integers(), identities, warnings));
     }
 
-    fn of(decoder: Decoder) -> Self {
+    pub(super) fn of(decoder: Decoder) -> Self {
         let mut said = Self { frames: Vec::new(), end: None };
         for frame in decoder.with_limits(Limits::UNLIMITED) {
             match frame {
@@ -37,8 +37,13 @@ impl Said {
 
     /// The same of bytes that come in chunks, whose sizes repeat.
     fn of_chunks(bytes: &[u8], sizes: &[usize]) -> Self {
+        Self::of_pushed(Decoder::new(), bytes, sizes)
+    }
+
+    /// What a decoder says that chunks are pushed to.
+    pub(super) fn of_pushed(decoder: Decoder, bytes: &[u8], sizes: &[usize]) -> Self {
         let mut said = Self { frames: Vec::new(), end: None };
-        let mut decoder = Decoder::new().with_limits(Limits::UNLIMITED);
+        let mut decoder = decoder.with_limits(Limits::UNLIMITED);
         let mut rest = bytes;
         for &size in sizes.iter().cycle() {
             let (chunk, after) = rest.split_at(size.clamp(1, rest.len().max(1)).min(rest.len()));

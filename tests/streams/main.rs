@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+mod ahead;
 mod arrival;
 mod bounds;
 mod operating_points;

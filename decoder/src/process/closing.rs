@@ -81,7 +81,7 @@ impl FrameInProgress {
         if context.options.identities {
             decoded.identities = self.lists.shown_identities(decoded.planes.len());
         }
-        let next_identity = self.lists.next_identity;
+        let next_identity = self.next_identity();
         let Lists { lists, digests, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
         (state.lists, state.models, state.digests) = (lists, models.first, digests);
         spares.end_frame(displaced);
@@ -131,7 +131,7 @@ impl FrameInProgress {
         decoded.is_lost = level == 0 && decoded.carried_lists == 0;
         let refinements = context.sequence.refinement_count;
         decoded.compensation = self.lists.compensation(&decoded, refinements, state.carried_shift);
-        let next_identity = self.lists.next_identity;
+        let next_identity = self.next_identity();
         let Lists { lists, digests, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
         (state.lists, state.models, state.digests) = (lists, models.first, digests);
         spares.end_frame(displaced);

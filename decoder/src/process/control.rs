@@ -29,7 +29,7 @@ impl Decoder {
     }
 
     /// Takes the units of another operating point from the next GOP on. Where it is lower on some axis, it holds there from
-    /// the next frame on.
+    /// the next frame on that has not been decoded yet: one may be, if frames are decoded [ahead](super::Options::ahead).
     pub fn set_operating_point(&mut self, point: OperatingPoint) {
         self.wanted_point = point;
     }
@@ -73,6 +73,6 @@ impl Decoder {
     /// What the budget needs to know of the GOP in progress.
     fn shape(&self) -> Option<Shape> {
         let ((sequence, _), gop) = (self.sequence.as_ref()?, self.gop.as_ref()?);
-        Some(Shape::new(sequence, &gop.header))
+        Some(Shape::new(sequence, &gop.header, self.options.ahead))
     }
 }

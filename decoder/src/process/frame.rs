@@ -73,6 +73,8 @@ pub(super) struct FrameInProgress {
     pub(super) entropy: Vec<UnitEntropy>,
     /// The first error of the frame.
     pub(super) error: Option<Error>,
+    /// The identity of its first new Gaussian, and how many of these the units that were accepted announce.
+    pub(super) identities: (u32, u32),
     /// Whether it has ended, and its content has been taken.
     pub(super) has_ended: bool,
 }
@@ -262,8 +264,16 @@ impl FrameInProgress {
     pub(super) fn push(&mut self, unit: &DividedUnit<'_>, payload: &[u8]) {
         let &DividedUnit { spatial_layer, refinement, payload_at, bytes, .. } = unit;
         self.expected.take(spatial_layer, refinement, unit.increment.header.list_size());
+        self.identities.1 = self.identities.1.wrapping_add(unit.increment.header.new_count);
         let payload = payload.to_vec();
         self.pending.push(PendingUnit { spatial_layer, refinement, payload, payload_at, bytes });
+    }
+
+    /// The identity of the first new Gaussian of the frame after this one. It does not depend on what this one makes of its
+    /// units.
+    pub(super) const fn next_identity(&self) -> u32 {
+        let (first, announced) = self.identities;
+        first.wrapping_add(announced)
     }
 
     /// Takes note of an error; units of refinements from `limit` on are discarded.

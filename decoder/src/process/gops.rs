@@ -118,7 +118,7 @@ impl Decoder {
             FramePayload::parse(unit.payload, at, sequence, &self.options.limits)?;
         header.validate_role(at, &role)?;
         let of_count = element_at(&FrameHeader::TABLE, at, "gaussian_count");
-        let shape = Shape::new(sequence, &gop.header);
+        let shape = Shape::new(sequence, &gop.header, self.options.ahead);
         let spent = self.spent.frame(header.gaussian_count, &shape, &self.options.budget, of_count);
         self.is_exhausted = spent.is_err();
         spent?;
@@ -146,10 +146,11 @@ impl Decoder {
             pending: Vec::new(),
             expected: Progress::new(limit),
             decoded: Progress::new(limit),
-            lists: Lists::new(moved.models, self.next_identity, core::mem::take(&mut self.spares)),
+            lists: Lists::new(moved.models, self.next_identity, self.spares.pop().unwrap_or_default()),
             bytes: unit_bytes(unit),
             entropy: moved.entropy.into_iter().collect(),
             error: absent,
+            identities: (self.next_identity, 0),
             has_ended: false,
         });
         absent.into_iter().for_each(|error| self.report(error));

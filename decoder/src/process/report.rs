@@ -11,6 +11,15 @@ pub(super) struct Report {
     pub(super) lost: Vec<RangeInclusive<u32>>,
     /// Whether there have been errors that are no longer here.
     pub(super) had_errors: bool,
+    /// How much of it is told next.
+    told: Option<Found>,
+}
+
+/// How much had been found at some time: errors and ranges of lost frames.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Found {
+    errors: usize,
+    lost: usize,
 }
 
 impl Report {
@@ -19,10 +28,22 @@ impl Report {
         self.errors.is_empty() && !self.had_errors
     }
 
+    /// How much there is.
+    pub(super) fn found(&self) -> Found {
+        Found { errors: self.errors.len(), lost: self.lost.len() }
+    }
+
+    /// The next call of [`Report::take`] gives only what had been found at some time; of `None`, everything.
+    pub(super) fn tell(&mut self, found: Option<Found>) {
+        self.told = found;
+    }
+
     /// Takes what has been found since the last call.
     pub(super) fn take(&mut self) -> (Vec<Error>, Vec<RangeInclusive<u32>>) {
         self.had_errors |= !self.errors.is_empty();
-        (core::mem::take(&mut self.errors), core::mem::take(&mut self.lost))
+        let Found { errors, lost } = self.told.take().unwrap_or_else(|| self.found());
+        let (errors, lost) = (errors.min(self.errors.len()), lost.min(self.lost.len()));
+        (self.errors.drain(..errors).collect(), self.lost.drain(..lost).collect())
     }
 
     /// The frames with display indices from `first` up to, but without, `end` will not be output.

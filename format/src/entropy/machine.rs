@@ -39,6 +39,8 @@ pub trait Machine: Copy {
     fn greater(self, a: Self::V, b: Self::V) -> Self::V;
     /// The magnitudes of signed values.
     fn magnitude(self, a: Self::V) -> Self::V;
+    /// For each signed value, how many of some thresholds above -32768, of which there are fewer than 2^15, it reaches.
+    fn reached(self, values: [Self::V; 4], thresholds: &[i16]) -> [Self::V; 4];
     /// Whether any bit is set.
     fn any(self, a: Self::V) -> bool;
     /// Row i of the result has value i of every row.
@@ -132,6 +134,19 @@ impl Machine for Portable {
     #[inline(always)]
     fn magnitude(self, a: Self::V) -> Self::V {
         a.map(|value| value.cast_signed().unsigned_abs())
+    }
+
+    #[inline(always)]
+    fn reached(self, values: [Self::V; 4], thresholds: &[i16]) -> [Self::V; 4] {
+        let mut counts = [[0; WIDE]; 4];
+        for (counts, values) in counts.iter_mut().zip(values) {
+            for &threshold in thresholds {
+                *counts = each(*counts, values, |count, value| {
+                    count.wrapping_add(u32::from(i32::from(threshold) <= value.cast_signed()))
+                });
+            }
+        }
+        counts
     }
 
     #[inline(always)]

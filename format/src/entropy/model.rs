@@ -123,13 +123,17 @@ impl ContextAxis {
 #[derive(Debug, Clone)]
 pub struct AxisLookup {
     thresholds: Vec<i32>,
+    /// The same in 16 bits, if they fit: machines compare twice as many of these at a time.
+    narrow: Option<Vec<i16>>,
     factor: u8,
 }
 
 impl AxisLookup {
     /// The contexts of an axis, times a factor. A plane has at most 64 contexts, so that no product is above 255.
     pub fn new(axis: &ContextAxis, factor: u8) -> Self {
-        Self { thresholds: axis.thresholds.clone(), factor }
+        let narrow = |&threshold: &i32| i16::try_from(threshold).ok().filter(|&narrow| narrow > i16::MIN);
+        let narrow = axis.thresholds.iter().map(narrow).collect();
+        Self { thresholds: axis.thresholds.clone(), narrow, factor }
     }
 
     /// [`ContextAxis::context`] of the axis, times the factor.
@@ -149,33 +153,20 @@ impl AxisLookup {
         values: &[M::V; COUNT],
         contexts: &mut [M::V; COUNT],
     ) {
-        let (pairs, last) = values.as_chunks::<2>();
-        let (of_pairs, of_last) = contexts.as_chunks_mut::<2>();
-        for (values, contexts) in pairs.iter().zip(of_pairs) {
-            self.add_some(machine, values, contexts);
-        }
-        for (value, context) in last.iter().zip(of_last) {
-            self.add_some(machine, core::array::from_ref(value), core::array::from_mut(context));
-        }
-    }
-
-    /// [`AxisLookup::add`] of so many vectors that all of it is in registers.
-    #[inline(always)]
-    fn add_some<M: Machine, const COUNT: usize>(
-        &self,
-        machine: M,
-        values: &[M::V; COUNT],
-        contexts: &mut [M::V; COUNT],
-    ) {
-        let mut counts = [machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0)); COUNT];
-        for &threshold in &self.thresholds {
-            let threshold = machine.splat(threshold.cast_unsigned());
-            for (count, &value) in counts.iter_mut().zip(values) {
-                *count = machine.add(*count, machine.greater(threshold, value));
-            }
-        }
         let factor = machine.splat(self.factor.into());
-        for (context, count) in contexts.iter_mut().zip(counts) {
+        if let (Some(thresholds), (fours, [])) = (&self.narrow, values.as_chunks::<4>()) {
+            for (values, contexts) in fours.iter().zip(contexts.as_chunks_mut::<4>().0) {
+                for (context, count) in contexts.iter_mut().zip(machine.reached(*values, thresholds)) {
+                    *context = machine.add(*context, machine.mul(count, factor));
+                }
+            }
+            return;
+        }
+        for (context, &value) in contexts.iter_mut().zip(values) {
+            let mut count = machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0));
+            for &threshold in &self.thresholds {
+                count = machine.add(count, machine.greater(machine.splat(threshold.cast_unsigned()), value));
+            }
             *context = machine.add(*context, machine.mul(count, factor));
         }
     }

@@ -40,8 +40,9 @@ pub struct PlaneDecoder {
 #[derive(Debug, Clone)]
 struct Table {
     token_of_slot: [u8; SLOTS],
-    /// Frequency in the high half, first slot in the low half.
-    interval_of_token: [u32; TOKENS],
+    /// Of each token that occurs, itself in the high 8 bits, its frequency less 1 in the next 12, and its first slot in the
+    /// low 12.
+    entry_of_token: [u32; TOKENS],
 }
 
 impl Table {
@@ -52,20 +53,19 @@ impl Table {
     }
 
     #[inline(always)]
-    fn interval(&self, token: u32) -> u32 {
+    fn entry(&self, token: u32) -> u32 {
         let token = usize::try_from(token & 0xFF).unwrap_or(0);
-        self.interval_of_token.get(token).copied().unwrap_or(0)
+        self.entry_of_token.get(token).copied().unwrap_or(0)
     }
 
     fn new(of_token: &[u16]) -> Self {
-        let mut table = Self { token_of_slot: [0; SLOTS], interval_of_token: [0; TOKENS] };
+        let mut table = Self { token_of_slot: [0; SLOTS], entry_of_token: [0; TOKENS] };
         let mut slots = table.token_of_slot.iter_mut();
         let mut first = 0_u32;
-        for ((token, interval), &frequency) in
-            (0..=u8::MAX).zip(table.interval_of_token.iter_mut()).zip(of_token)
-        {
+        for ((token, entry), &frequency) in (0..=u8::MAX).zip(table.entry_of_token.iter_mut()).zip(of_token) {
             slots.by_ref().take(frequency.into()).for_each(|slot| *slot = token);
-            *interval = u32::from(frequency).wrapping_shl(16) | first;
+            let length = u32::from(frequency.saturating_sub(1));
+            *entry = u32::from(token).wrapping_shl(24) | length.wrapping_shl(12) | first & 0xFFF;
             first = first.wrapping_add(frequency.into());
         }
         table
@@ -193,14 +193,16 @@ impl Symbol for Signed {
 
     #[inline(always)]
     fn transpose<M: Machine>(machine: M, rows: [[i32; WIDE]; WIDE]) -> [[i32; WIDE]; WIDE] {
-        let (mut vectors, mut columns) = ([machine.splat(0); WIDE], rows);
-        for (slot, row) in vectors.iter_mut().zip(&rows) {
-            *slot = vector(machine, row);
-        }
-        for (slot, column) in columns.iter_mut().zip(machine.transpose(vectors)) {
-            *slot = signed(machine, column);
-        }
-        columns
+        // One by one: arrays that are filled in a loop would be emptied first.
+        let [a, b, c, d, e, f, g, h] = &rows;
+        let upper = [vector(machine, a), vector(machine, b), vector(machine, c), vector(machine, d)];
+        let lower = [vector(machine, e), vector(machine, f), vector(machine, g), vector(machine, h)];
+        let ([a, b, c, d], [e, f, g, h]) = (upper, lower);
+        let [a, b, c, d, e, f, g, h] = machine.transpose([a, b, c, d, e, f, g, h]);
+        let upper = [signed(machine, a), signed(machine, b), signed(machine, c), signed(machine, d)];
+        let lower = [signed(machine, e), signed(machine, f), signed(machine, g), signed(machine, h)];
+        let ([a, b, c, d], [e, f, g, h]) = (upper, lower);
+        [a, b, c, d, e, f, g, h]
     }
 }
 
@@ -275,22 +277,24 @@ struct Words<'a> {
     next: usize,
 }
 
+/// Words that a step may look at: one for each lane, and those that a vector looks at and does not take.
+type Ahead = [[u8; 2]; MAX_LANES + WIDE];
+
 impl Words<'_> {
-    /// The next words, as many as lanes of a vector may take.
+    /// The next words, where they are, or in `copy` if there are fewer.
     #[inline(always)]
-    fn ahead(&self) -> [u16; WIDE] {
+    fn ahead<'w>(&'w self, copy: &'w mut Ahead) -> &'w Ahead {
         let rest = self.words.get(self.next..).unwrap_or_default();
-        match rest.first_chunk::<WIDE>() {
-            Some(words) => words.map(u16::from_le_bytes),
-            None => Self::last(rest),
+        match rest.first_chunk() {
+            Some(words) => words,
+            None => Self::last(rest, copy),
         }
     }
 
     #[cold]
-    fn last(rest: &[[u8; 2]]) -> [u16; WIDE] {
-        let mut words = [0; WIDE];
-        words.iter_mut().zip(rest).for_each(|(word, bytes)| *word = u16::from_le_bytes(*bytes));
-        words
+    fn last<'w>(rest: &[[u8; 2]], copy: &'w mut Ahead) -> &'w Ahead {
+        copy.iter_mut().zip(rest).for_each(|(slot, word)| *slot = *word);
+        copy
     }
 
     fn are_spent(&self) -> bool {
@@ -410,27 +414,32 @@ impl<'a> BlockReader<'a> {
         let active_lanes = machine.splat(u32::try_from(active).unwrap_or(0));
         let mut is_split = machine.splat(0);
         let last_direct = machine.splat(plane.decoder.direct.wrapping_sub(1));
+        let mut copy = [[0; 2]; MAX_LANES + WIDE];
+        let words = self.words.ahead(&mut copy);
+        let mut taken = 0_usize;
         let parts = symbols.iter_mut().zip(&mut values).zip(&mut self.states).zip(contexts);
         for (((symbols, values), states), contexts) in parts {
             let state = machine.load(*states);
             let slots = machine.and(state, machine.splat(0xFFF));
-            let (tokens, intervals) = plane.find(machine.store(slots), machine.store(contexts));
-            *symbols = tokens;
-            let interval = machine.load(intervals);
-            let first = machine.and(interval, machine.splat(0xFFFF));
+            let entries = machine.load(plane.find(machine.store(slots), machine.store(contexts)));
+            let first = machine.and(entries, machine.splat(0xFFF));
             let rest = machine.sub(slots, first);
-            let product = machine
-                .mul(machine.shr::<16>(interval), machine.shr::<{ FREQUENCY_BITS.cast_signed() }>(state));
+            let quotient = machine.shr::<{ FREQUENCY_BITS.cast_signed() }>(state);
+            let length = machine.and(machine.shr::<12>(entries), machine.splat(0xFFF));
+            let product = machine.add(machine.mul(length, quotient), quotient);
             let mask = machine.greater(active_lanes, lane_of_group);
-            let (next, taken) = machine.advance(state, machine.add(product, rest), mask, &self.words.ahead());
+            let (next, more) =
+                machine.advance(state, machine.add(product, rest), mask, &window(words, taken));
             *states = machine.store(next);
-            self.words.next = self.words.next.wrapping_add(taken);
-            let tokens = machine.load(tokens);
+            taken = taken.wrapping_add(more);
+            let tokens = machine.shr::<24>(entries);
+            *symbols = machine.store(tokens);
             let split = machine.greater(tokens, last_direct);
             is_split = machine.or(is_split, machine.and(split, mask));
             lane_of_group = machine.add(lane_of_group, machine.splat(8));
             *values = S::of_tokens(machine, tokens);
         }
+        self.words.next = self.words.next.wrapping_add(taken);
         if machine.any(is_split) {
             let split = values.as_flattened_mut().iter_mut().zip(symbols.as_flattened()).take(active);
             for (value, &token) in split.filter(|&(_, &token)| token >= plane.decoder.direct) {
@@ -464,25 +473,31 @@ struct Plane<'d, M> {
 }
 
 impl<M> Plane<'_, M> {
-    /// The tokens of slots, and their intervals. Every index here is below the length of its array: nothing is checked.
+    /// The entries of the tokens of slots. Every index here is below the length of its array: nothing is checked.
     #[inline(always)]
-    fn find(&self, slots: [u32; WIDE], contexts: [u32; WIDE]) -> ([u32; WIDE], [u32; WIDE]) {
-        const NONE: &Table = &Table { token_of_slot: [0; SLOTS], interval_of_token: [0; TOKENS] };
+    fn find(&self, slots: [u32; WIDE], contexts: [u32; WIDE]) -> [u32; WIDE] {
+        const NONE: &Table = &Table { token_of_slot: [0; SLOTS], entry_of_token: [0; TOKENS] };
         let table = |context: u32| -> &Table {
             let context = usize::try_from(context & 63).unwrap_or(0);
             self.tables.get(context).copied().unwrap_or(NONE)
         };
         let tables = contexts.map(table);
-        let mut tokens = slots;
-        for (token, table) in tokens.iter_mut().zip(tables) {
-            *token = table.token(*token);
+        let mut entries = slots;
+        for (slot, table) in entries.iter_mut().zip(tables) {
+            *slot = table.token(*slot);
         }
-        let mut intervals = tokens;
-        for (interval, table) in intervals.iter_mut().zip(tables) {
-            *interval = table.interval(*interval);
+        for (entry, table) in entries.iter_mut().zip(tables) {
+            *entry = table.entry(*entry);
         }
-        (tokens, intervals)
+        entries
     }
+}
+
+/// The words after those that vectors before have taken, which are fewer than [`MAX_LANES`]: so nothing is checked.
+#[inline(always)]
+fn window(words: &Ahead, taken: usize) -> [u16; WIDE] {
+    let rest = words.get(taken & (MAX_LANES - 1)..).unwrap_or_default();
+    rest.first_chunk::<WIDE>().map_or([0; WIDE], |words| words.map(u16::from_le_bytes))
 }
 
 /// The low 32 bits.

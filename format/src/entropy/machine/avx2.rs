@@ -108,6 +108,27 @@ impl Machine for Avx2 {
     }
 
     #[inline(always)]
+    fn reached(self, [a, b, c, d]: [__m256i; 4], thresholds: &[i16]) -> [__m256i; 4] {
+        let (avx, avx2) = (self.0.avx, self.0.avx2);
+        // Values that 16 bits do not hold become the nearest that they hold: the comparison comes to the same.
+        let (low, high) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
+        let all = avx._mm256_set1_epi16(i16::try_from(thresholds.len()).unwrap_or(0));
+        let (mut of_low, mut of_high) = (all, all);
+        for &threshold in thresholds {
+            let threshold = avx._mm256_set1_epi16(threshold);
+            of_low = avx2._mm256_add_epi16(of_low, avx2._mm256_cmpgt_epi16(threshold, low));
+            of_high = avx2._mm256_add_epi16(of_high, avx2._mm256_cmpgt_epi16(threshold, high));
+        }
+        let zero = avx._mm256_setzero_si256();
+        [
+            avx2._mm256_unpacklo_epi16(of_low, zero),
+            avx2._mm256_unpackhi_epi16(of_low, zero),
+            avx2._mm256_unpacklo_epi16(of_high, zero),
+            avx2._mm256_unpackhi_epi16(of_high, zero),
+        ]
+    }
+
+    #[inline(always)]
     fn any(self, a: __m256i) -> bool {
         self.0.avx._mm256_testz_si256(a, a) == 0
     }

@@ -2,9 +2,10 @@
 
 use super::{Machine, WIDE};
 use core::arch::wasm32::{
-    i32x4_abs, i32x4_add, i32x4_bitmask, i32x4_dot_i16x8, i32x4_eq, i32x4_gt, i32x4_mul, i32x4_shuffle,
-    i32x4_sub, i64x2_shuffle, u8x16_add_sat, u8x16_splat, u8x16_swizzle, u32x4_shl, u32x4_shr, u32x4_splat,
-    v128, v128_and, v128_any_true, v128_bitselect, v128_or, v128_xor,
+    i16x8_add, i16x8_eq, i16x8_gt, i16x8_narrow_i32x4, i16x8_splat, i32x4_abs, i32x4_add, i32x4_bitmask,
+    i32x4_dot_i16x8, i32x4_gt, i32x4_mul, i32x4_shr, i32x4_shuffle, i32x4_sub, i64x2_shuffle, u8x16_add_sat,
+    u8x16_splat, u8x16_swizzle, u32x4_extend_high_u16x8, u32x4_extend_low_u16x8, u32x4_shl, u32x4_shr,
+    u32x4_splat, v128, v128_and, v128_any_true, v128_bitselect, v128_or, v128_xor,
 };
 use pulp::cast;
 
@@ -58,7 +59,8 @@ fn transpose_four([a, b, c, d]: [v128; 4]) -> [v128; 4] {
 /// Gives four lanes with a mask their next state, with words after the first `skipped`; also how many were taken.
 #[inline(always)]
 fn advance_four(state: v128, next: v128, mask: v128, words: v128, skipped: u8) -> (v128, u8) {
-    let low = i32x4_eq(u32x4_shr(next, 16), u32x4_splat(0));
+    // Halves that are 0, of which the high one counts: engines have no comparison of unsigned values in one instruction.
+    let low = i32x4_shr(i16x8_eq(next, u32x4_splat(0)), 16);
     let takes = v128_and(low, mask);
     let set = i32x4_bitmask(takes);
     let own = OWN_WORD.get(usize::from(set & 15)).copied().unwrap_or_default();
@@ -135,6 +137,24 @@ impl Machine for Simd128 {
     #[inline(always)]
     fn magnitude(self, a: [v128; 2]) -> [v128; 2] {
         a.map(|half| i32x4_abs(half))
+    }
+
+    #[inline(always)]
+    fn reached(self, values: [[v128; 2]; 4], thresholds: &[i16]) -> [[v128; 2]; 4] {
+        // Values that 16 bits do not hold become the nearest that they hold: the comparison comes to the same.
+        let [[a, b], [c, d], [e, f], [g, h]] = values;
+        let [a, b] = [i16x8_narrow_i32x4(a, b), i16x8_narrow_i32x4(c, d)];
+        let [c, d] = [i16x8_narrow_i32x4(e, f), i16x8_narrow_i32x4(g, h)];
+        let all = i16x8_splat(i16::try_from(thresholds.len()).unwrap_or(0));
+        let (mut of_a, mut of_b, mut of_c, mut of_d) = (all, all, all, all);
+        for &threshold in thresholds {
+            let threshold = i16x8_splat(threshold);
+            of_a = i16x8_add(of_a, i16x8_gt(threshold, a));
+            of_b = i16x8_add(of_b, i16x8_gt(threshold, b));
+            of_c = i16x8_add(of_c, i16x8_gt(threshold, c));
+            of_d = i16x8_add(of_d, i16x8_gt(threshold, d));
+        }
+        [of_a, of_b, of_c, of_d].map(|of| [u32x4_extend_low_u16x8(of), u32x4_extend_high_u16x8(of)])
     }
 
     #[inline(always)]

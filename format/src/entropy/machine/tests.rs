@@ -26,6 +26,12 @@ fn vector() -> impl Strategy<Value = [u32; WIDE]> {
     proptest::array::uniform8(prop_oneof![0..STATE_LOW, any::<u32>(), Just(1 << 31)])
 }
 
+/// Values near 0, near the ends of 16 bits, and any.
+fn signed() -> impl Strategy<Value = [u32; WIDE]> {
+    let value = prop_oneof![-40_i32..40, -32_780..-32_750, 32_750..32_780, any::<i32>()];
+    proptest::array::uniform8(value.prop_map(i32::cast_unsigned))
+}
+
 proptest! {
     #[test]
     fn vectors_calculate_as_the_text_says(a in vector(), b in vector()) {
@@ -42,6 +48,20 @@ proptest! {
         prop_assert_eq!(wide.store(wide.greater(x, y)), plain.greater(a, b));
         prop_assert_eq!(wide.store(wide.magnitude(x)), plain.magnitude(a));
         prop_assert_eq!(wide.any(x), plain.any(a));
+    }
+
+    #[test]
+    fn vectors_count_the_thresholds_that_values_reach(
+        values in proptest::array::uniform4(signed()),
+        thresholds in proptest::collection::vec(prop_oneof![-40_i16..40, -32_767..=i16::MAX, Just(-32_767)], 0..64),
+    ) {
+        let is_reached = |value: u32, threshold: i16| u32::from(i32::from(threshold) <= value.cast_signed());
+        let count = |value: u32| thresholds.iter().map(|&threshold| is_reached(value, threshold)).sum();
+        let expected = values.map(|values| values.map(count));
+        prop_assert_eq!(Portable.reached(values, &thresholds), expected);
+        let Some(wide) = wide() else { return Ok(()) };
+        let counts = wide.reached(values.map(|values| wide.load(values)), &thresholds);
+        prop_assert_eq!(counts.map(|counts| wide.store(counts)), expected);
     }
 
     #[test]
