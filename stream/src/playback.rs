@@ -56,7 +56,7 @@ use crate::control::number::size;
 use crate::control::{Decision, Fetch, Gop, Ladder, OperatingPoint, Rule, Session, Settings, State};
 use crate::manifest::{GopInfo, Manifest};
 use driven::Viewer;
-use follow::Follow;
+use follow::{Follow, leave_out_before};
 use parts::{Kind, Part, parts, requests};
 use same::check_same;
 use std::collections::{BTreeMap, BTreeSet};
@@ -193,7 +193,23 @@ impl<R: Rule> Player<R> {
         rule: R,
         now_us: u64,
     ) -> Result<Self, PlaybackError> {
-        let follow = Follow::begin(&mut manifest, &options.following, now_us);
+        let follow = Follow::begin(&manifest, &options.following, now_us);
+        if let Some(follow) = follow.as_ref().filter(|_| !options.following.from_start) {
+            let first = follow.join(&manifest);
+            leave_out_before(&mut manifest, first);
+        }
+        Self::of(manifest, options, rule, follow, now_us)
+    }
+
+    /// A playback of the complete GOPs of a manifest.
+    fn of(
+        mut manifest: Manifest,
+        options: Options,
+        rule: R,
+        follow: Option<Follow>,
+        now_us: u64,
+    ) -> Result<Self, PlaybackError> {
+        manifest.gops.truncate(manifest.complete_gops());
         let ladder = manifest.ladder().map_err(|_| PlaybackError::Changed(None))?;
         let settings = settings(&options, &ladder)?;
         let live = settings.live;

@@ -43,7 +43,7 @@ impl Network {
     }
 
     fn of((files, manifest): (BTreeMap<String, Vec<u8>>, Manifest), byte_us: u64, options: Options) -> Self {
-        let player = Player::new(manifest, options, Layered::default(), 0).unwrap().driven(0);
+        let player = Player::driven(manifest, options, Layered::default(), 0).unwrap();
         Self { files, player, now_us: 0, byte_us, requests: Vec::new(), abandoned: 0, shown: Vec::new() }
     }
 

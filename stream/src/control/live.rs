@@ -28,6 +28,17 @@ impl<R: Rule> Session<R> {
         self.resume();
         ends
     }
+
+    /// Whether a viewer can go back to a GOP before the playhead; what had arrived of one that is not kept is forgotten.
+    pub fn keep(&mut self, now_us: u64, gop: usize, is_kept: bool) {
+        self.advance(now_us);
+        for skipped in self.state.skipped.iter_mut().skip(gop).take(1) {
+            *skipped = !is_kept;
+        }
+        if !is_kept {
+            self.forget(gop);
+        }
+    }
 }
 
 impl State {

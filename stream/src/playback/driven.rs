@@ -1,8 +1,12 @@
 //! Playback that somebody looks at: the caller has the playhead, and GOPs are kept for when it comes back.
 
-use super::Player;
+use super::follow::Follow;
+use super::{Options, PlaybackError, Player, first_gop};
 use crate::control::{OperatingPoint, Playback, Rule, Shown};
 use crate::manifest::Manifest;
+
+/// Playback that a pause or a seek has brought farther than this behind the target stays behind a presentation that grows.
+const BEHIND_US: u64 = 2_000_000;
 
 /// What a player knows of a viewer.
 #[derive(Debug, Default)]
@@ -11,17 +15,47 @@ pub(super) struct Viewer {
     enters: bool,
     /// What was taken last.
     taken: Option<Shown>,
+    /// Whether the viewer has gone back in a presentation that grows, or paused it: playback does not hurry then.
+    is_behind: bool,
 }
 
 /// Players whose caller has the playhead, after [`Player::driven`].
 impl<R: Rule> Player<R> {
-    /// The same, whose caller says which GOP is shown, from the first one on.
-    #[must_use]
-    pub fn driven(mut self, now_us: u64) -> Self {
-        self.session = self.session.driven();
-        self.viewer = Some(Viewer { enters: true, ..Viewer::default() });
-        self.session.go_to(now_us, 0);
-        self
+    /// A playback whose caller says which GOP is shown. It starts with the first one or, where the presentation grows, near the
+    /// last one, and those before it can be gone back to.
+    ///
+    /// # Errors
+    /// As [`Player::new`].
+    pub fn driven(manifest: Manifest, options: Options, rule: R, now_us: u64) -> Result<Self, PlaybackError> {
+        let follow = Follow::begin(&manifest, &options.following, now_us);
+        let mut player = Self::of(manifest, options, rule, follow, now_us)?;
+        player.session = player.session.driven();
+        player.viewer = Some(Viewer { enters: true, ..Viewer::default() });
+        let first = if player.options.following.from_start { 0 } else { player.edge().unwrap_or(0) };
+        player.session.go_to(now_us, first);
+        Ok(player)
+    }
+
+    /// The GOP that is as far from the end of a presentation that grows as is aimed at; none if it does not grow.
+    pub fn edge(&self) -> Option<usize> {
+        self.follow.as_ref().map(|follow| follow.join(&self.manifest))
+    }
+
+    /// Whether the playhead stays behind a presentation that grows: the viewer has sought a GOP more than two seconds before
+    /// [`Player::edge`], or has paused for longer than that. Otherwise playback keeps to the latency that is aimed at.
+    pub fn is_behind(&self) -> bool {
+        self.viewer.as_ref().is_some_and(|viewer| viewer.is_behind)
+    }
+
+    /// Media time that passes in a second, in thousandths, so that playback keeps to the latency that is aimed at.
+    pub fn pace_milli(&self) -> u32 {
+        if self.follow.is_none() || self.is_behind() { 1000 } else { self.state().rate_milli() }
+    }
+
+    /// The first GOP that can be gone back to.
+    pub fn first_kept(&self) -> usize {
+        let gops = self.manifest.gops.len();
+        (0..gops).find(|&gop| !self.state().is_skipped(gop)).unwrap_or(gops)
     }
 
     /// The playhead goes to a GOP, which is [shown](Player::show) as soon as it can be. A GOP that does not follow the one
@@ -39,7 +73,11 @@ impl<R: Rule> Player<R> {
             }
         }
         self.session.go_to(now_us, gop);
-        self.viewer.iter_mut().for_each(|viewer| viewer.enters = true);
+        let to_edge_us = self.edge().map_or(0, |edge| self.session.state().media_until(edge));
+        if let Some(viewer) = &mut self.viewer {
+            viewer.enters = true;
+            viewer.is_behind = if is_sought { to_edge_us > BEHIND_US } else { viewer.is_behind };
+        }
     }
 
     /// The playhead is so far into the GOP that is shown.
@@ -50,6 +88,14 @@ impl<R: Rule> Player<R> {
     /// The playhead stands still at speed 0, in which time what is shown becomes better, or moves at a speed in thousandths.
     pub fn run(&mut self, now_us: u64, speed_milli: u32) {
         self.session.run(now_us, speed_milli);
+        let state = self.session.state();
+        let near_us =
+            self.follow.as_ref().map_or(u64::MAX, |follow| follow.target_us.saturating_add(BEHIND_US));
+        let is_late = state.latency_us().is_some_and(|us| us > near_us);
+        let is_paused = speed_milli == 0 && state.playback() == Playback::Playing;
+        if let Some(viewer) = &mut self.viewer {
+            viewer.is_behind = is_paused || (viewer.is_behind && is_late);
+        }
     }
 
     /// GOPs are shown at an operating point, as far as they have it; none leaves it to the rule. It holds from the next GOP
@@ -99,6 +145,30 @@ impl<R: Rule> Player<R> {
             }
             self.store.remove(gop);
             self.session.forget(gop);
+        }
+    }
+}
+
+/// Where a viewer can go back to.
+impl<R: Rule> Player<R> {
+    /// Lets go of GOPs before the playhead that a manifest lists no more, and takes back those that it lists again, as that of
+    /// a presentation that has ended does.
+    pub(super) fn forget_unlisted(&mut self, now_us: u64, manifest: &Manifest) {
+        if self.viewer.is_none() {
+            return;
+        }
+        let first = first_gop(manifest);
+        let current = self.session.state().current();
+        for (gop, log) in self.logs.iter().enumerate().take(current) {
+            let is_listed = log.number >= first;
+            if is_listed == self.session.state().is_skipped(gop) {
+                self.session.keep(now_us, gop, is_listed);
+            }
+            if !is_listed {
+                self.store.remove(gop);
+                let known = self.manifest.gops.iter_mut().skip(gop).take(1);
+                known.for_each(|info| info.subsegments = Vec::new());
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ use super::{PlaybackError, Player, Renewal, check_same, first_gop, log, settings
 use crate::control::{Live, Rule, Settings};
 use crate::manifest::{GopInfo, Manifest};
 use crate::playback::Loss;
+use core::ops::Range;
 
 /// How a presentation that grows is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +30,7 @@ impl Default for Following {
 /// What is known of a presentation while it grows. Times are those of the player.
 #[derive(Debug)]
 pub(super) struct Follow {
-    target_us: u64,
+    pub(super) target_us: u64,
     /// Whether the latency is to stay what it was at the start.
     stays: bool,
     /// When frame 0 was captured, as far as that is known: a GOP that was listed had been captured, so it is never later.
@@ -54,9 +55,8 @@ const LEAST_US: u64 = 20_000;
 const LATER_US: u64 = 10_000;
 
 impl Follow {
-    /// Begins to follow a presentation, if it grows; leaves the GOPs in the manifest that are to be played.
-    pub(super) fn begin(manifest: &mut Manifest, options: &Following, now_us: u64) -> Option<Self> {
-        let complete = manifest.complete_gops();
+    /// Begins to follow a presentation, if it grows.
+    pub(super) fn begin(manifest: &Manifest, options: &Following, now_us: u64) -> Option<Self> {
         let mut follow = manifest.is_growing().then_some(Self {
             target_us: 0,
             stays: false,
@@ -72,7 +72,6 @@ impl Follow {
         follow.hear(now_us, manifest);
         let wanted_us = options.target_us.unwrap_or_else(|| target_us(manifest));
         follow.target_us = wanted_us.max(longest_us(manifest).saturating_mul(3).div_ceil(2));
-        let first = if options.from_start { 0 } else { follow.join(manifest) };
         if options.from_start {
             // What is played from the start is not hurried.
             let started_us = manifest.gops.first().map_or(0, |gop| start_us(manifest, gop));
@@ -80,11 +79,6 @@ impl Follow {
                 signed(now_us).saturating_sub(follow.captured_us.saturating_add(signed(started_us)));
             follow.target_us = follow.target_us.max(u64::try_from(latency_us).unwrap_or(0));
             follow.stays = true;
-        }
-        manifest.gops.truncate(complete);
-        manifest.gops.drain(..first.min(complete));
-        if let Some(live) = &mut manifest.live {
-            live.first_gop = live.first_gop.saturating_add(u64::try_from(first).unwrap_or(0));
         }
         Some(follow)
     }
@@ -131,7 +125,7 @@ impl Follow {
     }
 
     /// The complete GOP in which what was captured the target ago begins; the first one if none is that old.
-    fn join(&self, manifest: &Manifest) -> usize {
+    pub(super) fn join(&self, manifest: &Manifest) -> usize {
         let complete = manifest.gops.iter().take(manifest.complete_gops());
         let end_us = complete.clone().next_back().map_or(0, |gop| end_us(manifest, gop));
         let is_old = |gop: &&GopInfo| start_us(manifest, gop).saturating_add(self.target_us) <= end_us;
@@ -142,6 +136,15 @@ impl Follow {
     fn live(&self, end_us: u64, later_us: u64) -> Live {
         let available_us = self.captured_us.saturating_add(signed(end_us)).saturating_sub(signed(later_us));
         Live { available_us, target_us: self.target_us, slowest_milli: 950, fastest_milli: 1050 }
+    }
+}
+
+/// Leaves the first complete GOPs out of a manifest.
+pub(super) fn leave_out_before(manifest: &mut Manifest, first: usize) {
+    let first = first.min(manifest.complete_gops());
+    manifest.gops.drain(..first);
+    if let Some(live) = &mut manifest.live {
+        live.first_gop = live.first_gop.saturating_add(u64::try_from(first).unwrap_or(0));
     }
 }
 
@@ -212,6 +215,7 @@ impl<R: Rule> Player<R> {
         }
         self.forget_shown();
         self.place_again(&manifest);
+        self.forget_unlisted(now_us, &manifest);
         let first = self.skip_ahead(now_us, &manifest);
         self.append(now_us, manifest, first)?;
         self.set(now_us)
@@ -247,7 +251,9 @@ impl<R: Rule> Player<R> {
         let first = first_gop(manifest);
         let Some(follow) = &self.follow else { return known.max(first) };
         let most_us = follow.target_us.saturating_add(self.options.following.drift_us);
-        let is_late = !state.shown().is_empty() && state.latency_us().is_some_and(|us| us > most_us);
+        let is_late = !self.is_behind()
+            && !state.shown().is_empty()
+            && state.latency_us().is_some_and(|us| us > most_us);
         let to = first.saturating_add(follow.join(manifest));
         if to <= next || !(first > next || is_late) {
             return known.max(first);
@@ -259,15 +265,28 @@ impl<R: Rule> Player<R> {
             self.running = None;
             self.gives_up = true;
         }
+        self.name_skipped(next..to, why);
+        known.max(to)
+    }
+
+    /// Names GOPs that are skipped, together with those before them if these were skipped for the same reason.
+    fn name_skipped(&mut self, numbers: Range<usize>, why: &str) {
+        let count = numbers.len();
+        let before = self.losses.last_mut();
+        if let Some(loss) =
+            before.filter(|loss| loss.reason == why && loss.gop.saturating_add(loss.count) == numbers.start)
+        {
+            loss.count = loss.count.saturating_add(count);
+            return;
+        }
         let representation = self.manifest.representations.first().map(|info| info.id.clone());
         self.losses.push(Loss {
-            gop: next,
-            count: to.saturating_sub(next),
+            gop: numbers.start,
+            count,
             representation: representation.unwrap_or_default(),
             refinement: 0,
             reason: why.to_owned(),
         });
-        known.max(to)
     }
 
     /// Appends the GOPs of a manifest from a number on, and takes all else that it says.

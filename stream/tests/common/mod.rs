@@ -1,6 +1,7 @@
 //! What several tests do with packages.
 #![allow(dead_code, clippy::unwrap_used, reason = "every test takes what it needs; a panic is a failed test")]
 
+pub(crate) mod broadcast;
 pub(crate) mod mpd;
 pub(crate) mod played;
 
