@@ -69,11 +69,11 @@ export class Decoder {
     if (status === NEED_BYTES) return null;
     if (status === END || status === INCOMPLETE) return { isEnd: true, warnings };
     if (status !== DONE) throw new Error(this.#text());
-    const [index, time, gaussians, carried, refinements, isKeyframe, spatial, temporal, refinement, hasDigest, high, low, bytes, until] =
+    const [index, time, gaussians, carried, refinements, isKeyframe, spatial, temporal, refinement, hasDigest, high, low, bytes, until, isJump] =
       this.#numbers();
     const digest = hasDigest ? hex(high) + hex(low) : null;
     const point = { spatial, temporal, refinement };
-    return { isEnd: false, index, time, gaussians, carried, refinements, isKeyframe: isKeyframe === 1, point, digest, bytes, until, warnings };
+    return { isEnd: false, index, time, gaussians, carried, refinements, isKeyframe: isKeyframe === 1, point, digest, bytes, until, isJump: isJump === 1, warnings };
   }
 
   /** Puts the frame that was decoded last into the textures: see Update in index.d.ts. */
@@ -144,14 +144,26 @@ export class Decoder {
     this.#check(this.#exports.gss_package_renew());
   }
 
+  /** Takes the manifest of a presentation that grows, read beside playback; throws if nothing more can be played. */
+  polledPackage(manifest) {
+    this.#write(manifest);
+    this.#check(this.#exports.gss_package_polled(1));
+  }
+
+  /** The manifest of a presentation that grows could not be read; throws if nothing more can be played. */
+  unreadablePackage(message) {
+    this.#write(new TextEncoder().encode(message));
+    this.#check(this.#exports.gss_package_polled(0));
+  }
+
   /** Says what time it is, in milliseconds. */
   clock(now) {
     this.#exports.gss_package_clock(1000 * now);
   }
 
-  /** What to do now: wait, fetch, abandon, or read the manifest again. */
+  /** What to do now: wait, fetch, abandon, read the manifest again, or do that beside all else. */
   decide() {
-    const type = ['wait', 'fetch', 'abandon', 'manifest'][this.#exports.gss_package_decide()];
+    const type = ['wait', 'fetch', 'abandon', 'manifest', 'poll'][this.#exports.gss_package_decide()];
     const numbers = this.#numbers();
     if (type === 'wait') return { type, until: numbers[0] / 1000 };
     const names = this.#text().split('\n').filter(Boolean);
@@ -199,10 +211,11 @@ export class Decoder {
   packageState() {
     this.#exports.gss_package_report();
     const [isWaiting, gop, buffer, throughput, latency, stalls, stalled, bytes, requests, failures, abandoned, ...rest] = this.#numbers();
-    const [spatial, temporal, refinement, quality, rate, buffered] = rest;
+    const [spatial, temporal, refinement, quality, rate, buffered, isLive, first, frames, edge, isBehind, delay, pace] = rest;
     const point = spatial < 0 ? null : { spatial, temporal: temporal < 0 ? null : temporal, refinement };
     const counts = { stalls, stalled, bytes, requests, failures, abandoned };
-    return { isWaiting: isWaiting === 1, gop, buffer, buffered, throughput, latency, point, quality, rate, ...counts };
+    const live = { isLive: isLive === 1, first, frames, edge, isBehind: isBehind === 1, delay: delay < 0 ? null : delay, pace };
+    return { isWaiting: isWaiting === 1, gop, buffer, buffered, throughput, latency, point, quality, rate, ...counts, ...live };
   }
 
   /** Hands bytes to the next call. */

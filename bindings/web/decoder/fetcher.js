@@ -35,8 +35,9 @@ export function manifestAddress(address) {
   return url.href;
 }
 
-/** All bytes of a response. */
-async function whole(response) {
+/** All bytes of a manifest, which is asked for once. */
+async function readOnce(address) {
+  const response = await fetch(address, { cache: 'no-cache', signal: AbortSignal.timeout(SILENCE) });
   if (!response.ok) throw Fault.status(response.status);
   const bytes = new Uint8Array(await response.arrayBuffer());
   if (bytes.length > LARGEST_MANIFEST) throw new Error('the manifest is too large');
@@ -47,7 +48,7 @@ async function whole(response) {
 export async function readManifest(address) {
   for (let attempt = 1, wait = FIRST_WAIT; ; attempt++, wait = Math.min(2 * wait, LAST_WAIT)) {
     try {
-      return await whole(await fetch(address, { cache: 'no-cache' }));
+      return await readOnce(address);
     } catch (error) {
       if (attempt >= ATTEMPTS || FINAL.includes(error.value)) throw new Error(`${address}: ${error.message}`);
       await pause(wait);
@@ -92,6 +93,7 @@ export class Fetcher {
         return;
       }
       if (type === 'manifest') this.#renew();
+      else if (type === 'poll') this.#poll();
       else this.#stop();
       if (type === 'fetch') this.#fetch(requests);
     }
@@ -112,14 +114,34 @@ export class Fetcher {
   async #renew() {
     try {
       const manifest = await readManifest(this.#address);
-      this.#tags.clear();
-      this.#decoder.clock(performance.now());
-      this.#decoder.renewPackage(manifest);
-      this.#changed();
+      this.#take((decoder) => decoder.renewPackage(manifest));
     } catch (error) {
-      this.close();
-      this.#onfail(error.message);
+      this.#fail(error);
     }
+  }
+
+  /** Reads the manifest of a presentation that grows. The decoder says when to do it again, whatever comes of it. */
+  async #poll() {
+    const read = await readOnce(this.#address).catch((error) => error);
+    try {
+      this.#take((decoder) => (read instanceof Error ? decoder.unreadablePackage(read.message) : decoder.polledPackage(read)));
+    } catch (error) {
+      this.#fail(error);
+    }
+  }
+
+  /** Lets the decoder take a manifest. Files may be others than before, and new ones are not to pile up. */
+  #take(renew) {
+    if (this.#isClosed) return;
+    this.#tags.clear();
+    this.#decoder.clock(performance.now());
+    renew(this.#decoder);
+    this.#changed();
+  }
+
+  #fail({ message }) {
+    this.close();
+    this.#onfail(message);
   }
 
   #changed() {
@@ -202,13 +224,13 @@ export class Fetcher {
       skip -= value.length - bytes.length;
       const own = bytes.subarray(0, size - got);
       got += own.length;
-      if (own.length > 0) this.#take(own, request);
+      if (own.length > 0) this.#receive(own, request);
       if (got === size && response.status === 200) return void reader.cancel().catch(() => {});
       if (own.length < bytes.length) return Fault.wrong();
     }
   }
 
-  #take(bytes, request) {
+  #receive(bytes, request) {
     this.#decoder.clock(performance.now());
     if (!this.#decoder.received(bytes)) this.#doubt(request);
     // All has come, or something of it is not what was packaged.

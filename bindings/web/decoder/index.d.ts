@@ -27,6 +27,8 @@ export interface Frame {
   bytes: number;
   /** The frame stands until the one with this index: `index + 1`, of packages that of the next frame at the operating point. */
   until: number;
+  /** Of packages: the clock goes on from this frame, since it is the first one, or GOPs before it were skipped. */
+  isJump: boolean;
   /** What was lost since the frame before, in English. */
   warnings: string[];
 }
@@ -162,6 +164,20 @@ export interface PackageState {
   failures: number;
   /** Fetches that were given up for others. */
   abandoned: number;
+  /** Whether the presentation still grows. The next four are display indices, and change then. */
+  isLive: boolean;
+  /** The first frame that can be shown. */
+  first: number;
+  /** The frame after the last one that is there. */
+  frames: number;
+  /** Where playback near the end starts: who seeks this or a later frame follows the presentation. */
+  edge: number;
+  /** Whether playback stays behind, after a seek to an earlier frame or a pause; otherwise it keeps to the latency that is aimed at. */
+  isBehind: boolean;
+  /** Seconds from capture to display; null where nothing grows. */
+  delay: number | null;
+  /** Rate of playback that keeps to the latency that is aimed at: 1, or a little less or more. */
+  pace: number;
 }
 
 /** From where a scene is seen; `ahead` is a unit vector. */

@@ -11,6 +11,7 @@ import { Scene } from './renderer.js';
 import { Splitter } from './splitter.js';
 import { Stage } from './stage.js';
 import { TEMPLATE } from './template.js';
+import { Timeline } from './timeline.js';
 import { Track } from './track.js';
 
 /** Radians that an arrow key turns by. */
@@ -19,8 +20,6 @@ const STEP = 0.07;
 const FIGURES = 250;
 const SPEEDS = [0.25, 0.5, 1, 2];
 const LOWEST = { spatial: 0, temporal: 0, refinement: 0 };
-
-const clock = (seconds) => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, '0')}`;
 
 /** What a text such as s0,t1,r2 names. */
 function pointOf(text) {
@@ -42,6 +41,7 @@ export class SplatPlayer extends HTMLElement {
   #framing = null;
   #received = { bytes: 0, total: null };
   #losses = null;
+  #timeline = null;
   #interval = null;
   #openPanel = null;
   #figuresAt = 0;
@@ -49,13 +49,29 @@ export class SplatPlayer extends HTMLElement {
   #drawn = null;
   #background = null;
   #pointShown = null;
+  /** Whether a presentation was followed when the page was hidden. */
+  #isAway = false;
 
   constructor() {
     super();
     this.attachShadow({ mode: 'open' }).innerHTML = TEMPLATE;
   }
 
+  /** A page that nobody sees does not follow a presentation that grows; it goes on where that is when it is seen again. */
+  #onvisibility = () => {
+    const { isLive, isPlaying } = this.#playback ?? {};
+    if (!isLive) return;
+    if (document.hidden && isPlaying) {
+      this.#isAway = !this.#tracks[0].package.isBehind;
+      this.pause();
+    } else if (!document.hidden && this.#isAway) {
+      this.#isAway = false;
+      this.goLive();
+    }
+  };
+
   connectedCallback() {
+    document.addEventListener('visibilitychange', this.#onvisibility);
     if (!this.#stage && !this.#setUp()) return;
     const source = this.getAttribute('src');
     if (source) this.open({ url: new URL(source, document.baseURI).href });
@@ -63,6 +79,7 @@ export class SplatPlayer extends HTMLElement {
   }
 
   disconnectedCallback() {
+    document.removeEventListener('visibilitychange', this.#onvisibility);
     this.#close();
   }
 
@@ -166,6 +183,13 @@ export class SplatPlayer extends HTMLElement {
     return this.frame;
   }
 
+  /** Goes to where a presentation that grows is followed, and plays. */
+  goLive() {
+    if (!this.#playback?.isLive) return;
+    this.#playback.goLive();
+    this.play();
+  }
+
   /** Pauses and goes some frames on or back. */
   step(frames) {
     this.pause();
@@ -209,6 +233,7 @@ export class SplatPlayer extends HTMLElement {
     this.#stage.ontick = (now) => this.#tick(now);
     this.#stage.ondraw = (interval) => this.#drewPicture(interval);
     this.#controls.onchange = () => this.#moved();
+    this.#timeline = new Timeline(this.shadowRoot);
     this.#losses = new Losses(this.#find('lost'), this.#find('lost-count'), this.#find('lost-list'));
     this.splitter = new Splitter(this.shadowRoot, this.#stage);
     canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
@@ -289,9 +314,9 @@ export class SplatPlayer extends HTMLElement {
   #begin() {
     this.#isReady = true;
     this.#say('');
-    const isMoving = this.#playback.frames !== 1;
+    const { isMoving } = this.#playback;
     this.#find('bar').hidden = this.getAttribute('controls') === 'none';
-    for (const id of ['timeline', 'play', 'time', 'speed', 'loop']) this.#find(id).hidden = !isMoving;
+    this.#timeline.prepare(this.#playback);
     const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
     if (isMoving && !calm && this.getAttribute('autoplay') !== 'no') this.play();
     else this.#playback.pace();
@@ -301,16 +326,15 @@ export class SplatPlayer extends HTMLElement {
 
   #receive({ bytes, total }) {
     this.#received = { bytes, total };
-    const share = total ? bytes / total : 0;
-    this.#find('place').style.setProperty('--there', `${100 * share}%`);
+    this.#timeline.fill(total ? bytes / total : 0);
   }
 
   /** What a package reports: how far it is buffered, whether it waits, and the operating point. */
   #showPackage(track, state) {
     if (track !== this.#tracks[0]) return;
     this.#received = { bytes: state.bytes, total: null };
-    const { frames } = this.#playback;
-    if (frames > 0) this.#find('place').style.setProperty('--there', `${(100 * state.buffered) / frames}%`);
+    this.#timeline.follow(state, this.#playback);
+    if (state.isLive) this.#showPlace();
     if (this.#isReady) this.#say('', state.isWaiting);
     const point = state.point && pointText(state.point);
     if (this.#openPanel === 'quality' && track.isAutomatic && point !== this.#pointShown) this.#fillSide();
@@ -389,16 +413,7 @@ export class SplatPlayer extends HTMLElement {
   }
 
   #showPlace() {
-    const { frames, frameSeconds, duration, time } = this.#playback;
-    const place = this.#find('place');
-    const index = this.isPlaying ? Math.round(time / frameSeconds) : (this.frame?.index ?? 0);
-    const shown = frames > 0 ? Math.min(index, frames - 1) : index;
-    place.max = Math.max(1, frames - 1);
-    if (!place.matches(':active')) place.value = shown;
-    place.style.setProperty('--done', `${(100 * place.value) / place.max}%`);
-    const text = `${clock(shown * frameSeconds)} <span>/ ${clock(duration)}</span>`;
-    if (this.#find('time').innerHTML !== text) this.#find('time').innerHTML = text;
-    place.setAttribute('aria-valuetext', `frame ${shown} of ${frames}`);
+    this.#timeline.show(this.#playback, this.frame);
   }
 
   #showSide(name) {
@@ -465,6 +480,7 @@ export class SplatPlayer extends HTMLElement {
     on('play', 'click', () => this.togglePlay());
     on('place', 'input', ({ target }) => this.#playback.seek(Number(target.value)));
     on('speed', 'change', ({ target }) => (this.#playback.speed = Number(target.value)));
+    on('live', 'click', () => this.goLive());
     on('loop', 'click', ({ currentTarget }) => (this.#playback.isLooping = flip(currentTarget)));
     on('fly', 'click', ({ currentTarget }) => (this.#controls.mode = flip(currentTarget) ? 'fly' : 'orbit'));
     on('compare', 'click', () => this.#compare());

@@ -60,12 +60,14 @@ export class SplatPlayer extends HTMLElement {
   togglePlay(): void;
   /** Goes to a frame; resolves with the frame that is shown then. */
   seek(index: number): Promise<Frame | null>;
+  /** Goes to where a presentation that grows is followed, and plays. */
+  goLive(): void;
   /** Pauses and goes some frames on or back. */
   step(frames: number): void;
   /** Turns by steps to the right and upwards. */
   look(right: number, up: number): void;
   changeSpeed(by: 1 | -1): void;
-  /** Presses a key of the bar: play, loop, quality, compare, info, fly, home, full. */
+  /** Presses a key of the bar: play, live, loop, quality, compare, info, fly, home, full. */
   press(id: string): void;
   /** Draws at once and gives the pixels as a PNG. */
   snapshot(): Promise<Blob | null>;

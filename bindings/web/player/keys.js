@@ -10,6 +10,7 @@ const ACTIONS = {
   ArrowUp: (player) => player.look(0, 1),
   ArrowDown: (player) => player.look(0, -1),
   Home: (player) => player.seek(0),
+  End: (player) => player.goLive(),
   BracketLeft: (player) => player.changeSpeed(-1),
   BracketRight: (player) => player.changeSpeed(1),
   KeyL: (player) => player.press('loop'),
@@ -31,7 +32,7 @@ function closeSide(root) {
 /** Whether an element uses a key itself. */
 function isOwn(element, code) {
   if (element instanceof HTMLSelectElement) return true;
-  if (element instanceof HTMLInputElement || element.getAttribute?.('role') === 'slider') return code.startsWith('Arrow') || code === 'Home';
+  if (element instanceof HTMLInputElement || element.getAttribute?.('role') === 'slider') return code.startsWith('Arrow') || code === 'Home' || code === 'End';
   return (element instanceof HTMLButtonElement || element.localName === 'summary') && code === 'Space';
 }
 

@@ -15,6 +15,12 @@ export class Playback {
   /** Seconds of a frame, and frames in the stream; 0 as long as that is not known. */
   frameSeconds = 1 / 30;
   frames = 0;
+  /** The first frame that can be shown. While a presentation grows this one and the number of frames change. */
+  first = 0;
+  isLive = false;
+  /** What is known of a package; null of a stream. */
+  #package = null;
+  #hasPlayed = false;
   #tracks;
   #speed = 1;
   /** Where the clock stands, and when it was looked at last, milliseconds. */
@@ -26,20 +32,43 @@ export class Playback {
   constructor(tracks) {
     this.#tracks = tracks;
     this.#rewind();
+    const [leader] = tracks;
+    leader.addEventListener('jumped', ({ detail }) => this.#jump(detail));
+    leader.addEventListener('package', ({ detail }) => this.#follow(detail));
+  }
+
+  /** The clock goes on from a frame. */
+  #jump({ time }) {
+    this.#time = time;
+    this.#rewind();
+  }
+
+  /** Takes how far a presentation has grown. */
+  #follow(state) {
+    this.#package = state;
+    if (state.isLive || this.isLive) [this.first, this.frames] = [state.first, state.frames];
+    this.isLive = state.isLive;
+  }
+
+  /** Whether there is more than one frame, or may be. */
+  get isMoving() {
+    return this.isLive || this.frames !== 1;
   }
 
   #rewind() {
     for (const track of this.#tracks) this.#places.set(track, { round: 0, shownAt: this.#time });
   }
 
-  /** Seconds of the whole stream; 0 as long as that is not known. */
+  /** Seconds of all that can be shown; 0 as long as that is not known. */
   get duration() {
-    return this.frames * this.frameSeconds;
+    return (this.frames - this.first) * this.frameSeconds;
   }
 
   /** Where the clock stands in the stream, seconds. */
   get time() {
-    return this.duration > 0 ? this.#time % this.duration : this.#time;
+    if (this.isLive || this.duration <= 0) return this.#time;
+    const start = this.first * this.frameSeconds;
+    return start + (Math.max(0, this.#time - start) % this.duration);
   }
 
   /** The frame that is due. */
@@ -63,7 +92,7 @@ export class Playback {
 
   /** Takes what the stream says of its length. */
   describe({ frames, frameSeconds }) {
-    this.frames = frames;
+    if (!this.isLive) this.frames = frames;
     this.frameSeconds = frameSeconds || 1 / 30;
   }
 
@@ -73,8 +102,11 @@ export class Playback {
   }
 
   play() {
-    if (this.frames === 1) return;
-    if (!this.isLooping && this.frames > 0 && this.index >= this.frames - 1) this.seek(0);
+    if (!this.isMoving) return;
+    if (!this.isLive && !this.isLooping && this.frames > 0 && this.index >= this.frames - 1) this.seek(this.first);
+    // Who starts later than the page has loaded wants to see what is being made.
+    if (!this.#hasPlayed && this.#package?.isBehind) this.goLive();
+    this.#hasPlayed = true;
     this.isPlaying = true;
     this.#last = null;
     this.pace();
@@ -85,6 +117,11 @@ export class Playback {
     this.pace();
   }
 
+  /** Goes to where a presentation that grows is followed. */
+  goLive() {
+    if (this.isLive) this.seek(this.#package.edge);
+  }
+
   /** A frame that stands still can be had better: shows the one that is due. */
   improve(track) {
     if (track.frame && !track.isBusy) track.seek(this.index);
@@ -93,7 +130,7 @@ export class Playback {
   /** Goes to a frame, which is shown as soon as it is there. */
   seek(index) {
     const last = this.frames > 0 ? this.frames - 1 : index;
-    const frame = Math.max(0, Math.min(index, last));
+    const frame = Math.max(this.first, Math.min(index, last));
     this.#time = frame * this.frameSeconds;
     this.#rewind();
     for (const track of this.#tracks) track.seek(frame);
@@ -105,7 +142,7 @@ export class Playback {
     this.#last = now;
     if (!this.isPlaying) return;
     if (this.#tracks.some((track) => track.frame === null)) return;
-    this.#time += passed * this.#speed;
+    this.#time += passed * this.#speed * (this.#package?.pace ?? 1);
     for (const track of this.#tracks) this.#serve(track);
     if (this.#tracks.every((track) => track.isEnded && track.heldTime === null)) this.#finish();
   }
@@ -129,7 +166,7 @@ export class Playback {
     } else if (this.isLooping && this.duration > 0 && !track.error) {
       place.round += 1;
       track.isEnded = false;
-      track.prefetch(0);
+      track.prefetch(this.first);
     }
   }
 
@@ -141,6 +178,6 @@ export class Playback {
   #finish() {
     if (this.isLooping) return;
     this.pause();
-    this.#time = Math.max(0, this.duration - this.frameSeconds);
+    this.#time = Math.max(this.first, this.frames - 1) * this.frameSeconds;
   }
 }

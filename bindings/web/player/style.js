@@ -12,6 +12,7 @@ export const STYLE = `
   --there-line: light-dark(rgb(15 20 35 / 30%), rgb(255 255 255 / 34%));
   --hover: light-dark(rgb(15 20 35 / 8%), rgb(255 255 255 / 11%));
   --alarm: light-dark(#9a4a00, #ffb86b);
+  --alive: light-dark(#c01f35, #ff6b7d);
   display: block;
   position: relative;
   overflow: hidden;
@@ -56,6 +57,9 @@ svg { width: 21px; height: 21px; display: block; }
 .keys { display: flex; align-items: center; gap: 2px; }
 .time { padding: 0 8px; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .time span { color: var(--faint); }
+.live { grid-auto-flow: column; gap: 6px; font-weight: 600; color: var(--faint); }
+.live::before { content: ""; width: 8px; height: 8px; border-radius: 50%; background: currentColor; }
+button.live[aria-pressed="true"] { color: var(--alive); background: none; box-shadow: none; }
 .space { flex: 1; }
 .timeline { position: relative; padding: 2px 8px 4px; }
 

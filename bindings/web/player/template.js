@@ -31,6 +31,7 @@ export const TEMPLATE = `
   <div class="keys">
     ${key('play', 'Play (space)', 'play')}
     <div class="time" id="time"></div>
+    <button class="live" id="live" title="Go to what is being made now (End)" hidden>Live</button>
     <select id="speed" aria-label="Speed" title="Speed">
       ${[0.25, 0.5, 1, 2].map((speed) => `<option value="${speed}" ${speed === 1 ? 'selected' : ''}>${speed}×</option>`).join('')}
     </select>

@@ -147,6 +147,7 @@ export class Track extends EventTarget {
     const isUrgent = this.#asked?.isUrgent || this.#next !== null || answer.wanted !== this.#asked?.index;
     if (answer.wanted === this.#asked?.index) this.#asked = null;
     this.#emit('warnings', { warnings: answer.frame.warnings, index: answer.frame.index });
+    if (answer.frame.isJump) this.#emit('jumped', answer.frame);
     if (isUrgent) this.#show(answer, true);
     else this.#held = answer;
     this.#askNext();

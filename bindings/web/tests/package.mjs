@@ -1,6 +1,7 @@
 // A package of the scene of the tests, a network that is made up, and a worker in this thread.
+import { spawn } from 'node:child_process';
 import { setMaxListeners } from 'node:events';
-import { existsSync, readFileSync, readdirSync } from 'node:fs';
+import { existsSync, readFileSync, readdirSync, rmSync } from 'node:fs';
 import { Decoder, DecoderWorker } from '../decoder/index.js';
 import { at, nativeDigests, pointOf, splatstream } from './setting.mjs';
 
@@ -11,7 +12,6 @@ const path = at('long', 'demo.gss');
 if (!existsSync(path)) splatstream('demo', '--out', at('long'), '--gaussians', '1500', '--frames', String(FRAMES));
 const folder = at('package');
 if (!existsSync(folder)) splatstream('package', path, '-o', folder, '--quality');
-const stream = readFileSync(path);
 
 /** The files of the package by their names. */
 export const files = new Map(readdirSync(folder).map((name) => [name, readFileSync(`${folder}/${name}`)]));
@@ -24,26 +24,60 @@ export function manifestAt(milliseconds) {
   return manifest;
 }
 
+let started = 0;
 const known = new Map();
 
-/** Digests of a point by display index: those of the native decoder. */
-export async function digestsAt({ spatial, temporal, refinement }) {
+/** Digests of a point by display index: those of the native decoder, of the scene or of another stream. */
+export async function digestsAt({ spatial, temporal, refinement }, of = path) {
   const name = `s${spatial},t${temporal},r${refinement}`;
-  if (!known.has(name)) {
+  const key = `${of} ${name}`;
+  if (!known.has(key)) {
     const decoder = await Decoder.load();
     decoder.setPoint(pointOf(name));
-    decoder.push(stream);
+    decoder.push(readFileSync(of));
     decoder.end();
     const indices = [];
     for (let frame = decoder.next(); !frame.isEnd; frame = decoder.next()) indices.push(frame.index);
-    const native = nativeDigests(name, path);
+    const native = nativeDigests(name, of);
     if (native.length !== indices.length) throw new Error(`${name}: ${native.length} frames, not ${indices.length}`);
-    known.set(name, new Map(indices.map((index, place) => [index, native[place]])));
+    known.set(key, new Map(indices.map((index, place) => [index, native[place]])));
   }
-  return known.get(name);
+  return known.get(key);
 }
 
 const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
+
+/** Milliseconds of a frame of a broadcast, which has all frames of the scene. */
+export const FRAME_TIME = 1000 / 12;
+export const broadcastPath = at('broadcast.gss');
+if (!existsSync(broadcastPath)) {
+  splatstream('encode', at('long', 'source'), '-o', broadcastPath, '--fps', '12', '--gop', '8', '--preset', 'fast', '--layers', '540,1080', '--refinements', '10,30,100');
+}
+
+/**
+ * A live package whose bytes come in the time of the stream, with so many seconds in its manifest. Gives its folder, its files by their names as they are at that time, and what ends it.
+ */
+export function broadcast(window) {
+  const out = at(`live-${started++}`);
+  rmSync(out, { recursive: true, force: true });
+  const options = ['package', '-', '-o', out, '--live', '--window', String(window), '--target-latency', '0.6'];
+  const packager = spawn(process.env.SPLATSTREAM, options, { stdio: ['pipe', 'ignore', 'inherit'] });
+  const [begun, stream] = [performance.now(), readFileSync(broadcastPath)];
+  let sent = 0;
+  const timer = setInterval(() => {
+    const due = Math.min(1, (performance.now() - begun) / (FRAMES * FRAME_TIME));
+    packager.stdin.write(stream.subarray(sent, (sent = Math.floor(due * stream.length))));
+    if (due < 1) return;
+    clearInterval(timer);
+    packager.stdin.end();
+  }, 10);
+  const close = () => {
+    clearInterval(timer);
+    packager.kill();
+  };
+  const get = (name) => (existsSync(`${out}/${name}`) ? readFileSync(`${out}/${name}`) : undefined);
+  return { folder: out, files: { get }, close };
+}
 
 /**
  * A network in place of `fetch`: `behaviour` says of each request what becomes of it, as { status, bytes, delay, rate (bytes a
@@ -96,8 +130,6 @@ function bodyOf(bytes, rate, request, signal) {
     },
   }, { highWaterMark: 0 });
 }
-
-let started = 0;
 
 /** A worker in this thread: the module `worker.js` with a scope of its own. Its timers end with it. */
 export async function startWorker() {
@@ -190,7 +222,7 @@ export class Viewer {
       const now = performance.now();
       seen.push({ ...frame, at: now });
       due = seen.length === 1 ? now : Math.max(due, now - 250);
-      due += (frame.until - index) * frameMilliseconds;
+      due += (frame.until - Math.max(index, frame.index)) * frameMilliseconds;
       index = frame.until;
       await pause(Math.max(0, due - performance.now() - frameMilliseconds));
     }

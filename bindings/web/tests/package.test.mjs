@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import test, { afterEach } from 'node:test';
 import { GOP, pointOf } from './setting.mjs';
-import { FRAMES, Viewer, digestsAt, files, manifestAt, network } from './package.mjs';
+import { FRAMES, FRAME_TIME, Viewer, broadcast, broadcastPath, digestsAt, files, manifestAt, network } from './package.mjs';
 
 const ADDRESS = 'http://127.0.0.1/talk/manifest.json';
 /** Milliseconds of a frame in most tests: a GOP lasts 0.2 s. */
@@ -24,10 +24,10 @@ async function viewer(behaviour, { content = served(), source = { package: ADDRE
 }
 
 /** Every frame is that of the native decoder at the point that it was decoded at. */
-async function check(frames) {
+async function check(frames, path) {
   assert.ok(frames.length > 0);
   for (const { index, point, digest } of frames) {
-    assert.equal(digest, (await digestsAt(point)).get(index), `frame ${index} at ${JSON.stringify(point)}`);
+    assert.equal(digest, (await digestsAt(point, path)).get(index), `frame ${index} at ${JSON.stringify(point)}`);
   }
 }
 
@@ -233,4 +233,65 @@ test('manifests that are none, or are not there, are refused with a reason', asy
   await assert.rejects(player.see(0), /the manifest is refused: version: version 9/);
   const { player: gone } = await viewer(() => ({ status: 404 }));
   await assert.rejects(gone.see(0), /404/);
+});
+
+const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
+
+/** A viewer of a broadcast that has gone on for a while. */
+async function liveViewer(window, behaviour) {
+  const live = broadcast(window);
+  open.push(live.close);
+  await pause(4500);
+  return viewer(behaviour, { content: live.files });
+}
+
+test('a presentation that grows is followed near its end, to its last frame', async () => {
+  const { player } = await liveViewer(60);
+  const frames = await player.play(FRAME_TIME);
+  await check(frames, broadcastPath);
+  const [first] = frames;
+  assert.ok(first.isJump && first.index > 0, JSON.stringify(first));
+  for (const [place, { until, isJump }] of frames.entries()) {
+    assert.equal(until, frames[place + 1]?.index ?? FRAMES);
+    assert.ok(place === 0 || !isJump);
+  }
+  assert.deepEqual(player.warnings, []);
+  const live = player.states.filter(({ isLive }) => isLive);
+  assert.ok(live.length > 3 && live.every(({ isBehind, frames: end, edge }) => !isBehind && edge < end));
+  assert.ok(live.at(-1).delay < 2, `${live.at(-1).delay} s`);
+  const last = player.states.at(-1);
+  assert.deepEqual([last.isLive, last.first, last.frames, last.delay], [false, 0, FRAMES, null]);
+});
+
+test('a viewer of a presentation that grows goes back, and returns to what is being made', async () => {
+  const { player } = await liveViewer(60);
+  player.worker.setPoint(best);
+  const first = await player.see(0);
+  const past = [await player.see(3), await player.see(4)];
+  assert.deepEqual(past.map(({ index }) => index), [3, 4]);
+  assert.ok(first.index > 24 && past.every(({ isJump }) => !isJump));
+  await pause(300);
+  await check([...past, await player.see(5)], broadcastPath);
+  const { isBehind, edge, delay } = player.states.at(-1);
+  assert.ok(isBehind && edge > 24 && delay > 3, JSON.stringify({ isBehind, edge, delay }));
+  const now = await player.see(edge);
+  assert.equal(now.index, edge);
+  await check([now, ...(await player.play(FRAME_TIME, now.until))], broadcastPath);
+  assert.ok(!player.states.at(-1).isBehind);
+  assert.deepEqual(player.warnings, []);
+});
+
+test('a manifest that cannot be read for a while does not stop a presentation that grows', async () => {
+  let [refused, since] = [0, null];
+  const behaviour = ({ file, number }) => {
+    if (file !== 'manifest.json' || number === 0) return {};
+    since ??= performance.now();
+    return performance.now() - since < 700 ? (refused++ % 2 ? { status: 503 } : { fails: true }) : {};
+  };
+  const { player } = await liveViewer(60, behaviour);
+  const frames = await player.play(FRAME_TIME);
+  await check(frames, broadcastPath);
+  assert.equal(frames.at(-1).until, FRAMES);
+  assert.ok(refused > 1);
+  assert.deepEqual(player.warnings, []);
 });

@@ -6,7 +6,7 @@ import { cpSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import test, { after, afterEach, before } from 'node:test';
 import { pathToFileURL } from 'node:url';
-import { FRAMES, digestsAt, files, manifestAt, packageFolder } from './package.mjs';
+import { FRAMES, broadcast, broadcastPath, digestsAt, files, manifestAt, packageFolder } from './package.mjs';
 import { serve } from './server.mjs';
 import { at } from './setting.mjs';
 
@@ -70,9 +70,9 @@ async function player(src, attributes = {}) {
 }
 
 /** Every frame is that of the native decoder at its point. */
-async function check(frames) {
+async function check(frames, path) {
   assert.ok(frames.length > 0);
-  for (const { index, point, digest } of frames) assert.equal(digest, (await digestsAt(point)).get(index), `frame ${index}`);
+  for (const { index, point, digest } of frames) assert.equal(digest, (await digestsAt(point, path)).get(index), `frame ${index}`);
 }
 
 const state = (page) => page.evaluate(() => player.statistics.package);
@@ -159,4 +159,31 @@ test('the page of serve --player plays the package of its folder', async () => {
   assert.ok(await page.evaluate(() => document.querySelector('splat-player').statistics.package.requests > 0));
   await page.close();
   assert.deepEqual(said.filter((line) => !line.includes('favicon')), []);
+});
+
+test('a presentation that grows is followed, gone back in and returned to, and is a recording when it has ended', async () => {
+  const live = broadcast(60);
+  const server = spawn(process.env.SPLATSTREAM, ['serve', live.folder, '--port', '0'], { stdio: ['ignore', 'ignore', 'pipe'] });
+  servers.push(server, { kill: live.close });
+  const line = await new Promise((resolve) => server.stderr.once('data', (data) => resolve(String(data))));
+  await new Promise((resolve) => setTimeout(resolve, 4500));
+  const page = await player(/http:\S+/.exec(line)[0]);
+  const key = page.locator('#live');
+  const isLit = (wanted) => page.waitForFunction((is) => player.shadowRoot.getElementById('live').getAttribute('aria-pressed') === is, String(wanted));
+  await isLit(true);
+  const [first] = await page.evaluate(() => frames_);
+  assert.ok(first.index > 0);
+  await page.screenshot({ path: at('live.png'), timeout: 120_000 });
+  await page.evaluate(() => void player.seek(0));
+  await isLit(false);
+  await key.click();
+  await isLit(true);
+  // Speed and rounds are for what has been recorded.
+  assert.ok(await page.locator('#speed').isHidden());
+  await key.waitFor({ state: 'hidden', timeout: 60_000 });
+  assert.ok(await page.locator('#speed').isVisible());
+  await page.waitForFunction((last) => player.frame.index >= last - 8, FRAMES, { timeout: 60_000 });
+  await page.waitForFunction((last) => player.frame.index < last - 8 && player.isPlaying, FRAMES, { timeout: 60_000 });
+  assert.deepEqual(await page.evaluate(() => player.losses), []);
+  await check(await page.finish(), broadcastPath);
 });

@@ -10,9 +10,6 @@ use splatstream_stream::playback::{Command, Fault, GopLog, Loss, Options, Player
 /// Bytes of a package that a tab of a browser holds at the same time.
 const MEMORY: u64 = 256 << 20;
 
-/// What is said of a presentation that still grows.
-const GROWING: &str = "the presentation is still being made: this player opens it when it has ended, and `splatstream play` follows it";
-
 /// Plays one package. The clock of the page is told before anything that takes time.
 pub struct Package {
     player: Player<Layered>,
@@ -21,6 +18,9 @@ pub struct Package {
     gop: OpenGop,
     /// Whether the last GOP has been decoded to its end.
     is_ended: bool,
+    /// Whether the clock goes on from the frame that comes next, and whether it does so from the one that was given last.
+    jumps: bool,
+    is_jump: bool,
     /// Thousandths; 0 while the page stands still.
     speed_milli: u32,
     /// Losses that were told.
@@ -54,22 +54,14 @@ impl Package {
     /// A package with a manifest, whose base is requested at once.
     ///
     /// # Errors
-    /// Why the manifest is refused; a presentation that still grows.
+    /// Why the manifest is refused.
     pub fn open(manifest: &[u8], now_us: u64) -> Result<Self, String> {
-        let manifest =
-            Manifest::parse(manifest).map_err(|error| format!("the manifest is refused: {error}"))?;
-        if manifest.is_growing() {
-            return Err(GROWING.to_owned());
-        }
         let options = Options { memory: MEMORY, ..Options::default() };
-        let is_still = manifest.stream.frames <= 1;
-        let player = Player::new(manifest, options, Layered::default(), now_us);
-        let mut player = player.map_err(|error| error.to_string())?.driven(now_us);
-        let speed_milli = if is_still { 0 } else { 1000 };
-        player.run(now_us, speed_milli);
+        let player = Player::driven(parse(manifest)?, options, Layered::default(), now_us);
+        let player = player.map_err(|error| error.to_string())?;
         let gop = OpenGop {
             decoder: Decoder::new(),
-            number: 0,
+            number: player.state().current(),
             is_open: false,
             is_still: false,
             is_done: false,
@@ -78,16 +70,29 @@ impl Package {
             since_us: now_us,
             follows: false,
         };
-        Ok(Self {
+        let mut package = Self {
             player,
             now_us,
             gop,
             is_ended: false,
-            speed_milli,
+            jumps: true,
+            is_jump: false,
+            speed_milli: 0,
             told: 0,
             warnings: Vec::new(),
             stalls: (0, 0),
-        })
+        };
+        if package.is_moving() {
+            package.run(1000);
+        } else {
+            package.player.run(now_us, 0);
+        }
+        Ok(package)
+    }
+
+    /// Whether there are several frames, or may be.
+    fn is_moving(&self) -> bool {
+        self.player.is_following() || self.player.manifest().stream.frames > 1
     }
 
     /// The manifest has been read again.
@@ -95,9 +100,27 @@ impl Package {
     /// # Errors
     /// A manifest that is refused, or one of another package.
     pub fn renew(&mut self, manifest: &[u8]) -> Result<(), String> {
-        let manifest =
-            Manifest::parse(manifest).map_err(|error| format!("the manifest is refused: {error}"))?;
-        self.player.renew(self.now_us, manifest).map_err(|error| error.to_string())
+        self.player.renew(self.now_us, parse(manifest)?).map_err(|error| error.to_string())
+    }
+
+    /// The manifest of a presentation that grows has been read beside playback.
+    ///
+    /// # Errors
+    /// That of another package; a presentation that has neither grown nor ended for a minute. A manifest that is refused may be
+    /// whole the next time.
+    pub fn polled(&mut self, manifest: &[u8]) -> Result<(), String> {
+        match parse(manifest) {
+            Ok(manifest) => self.player.renew(self.now_us, manifest).map_err(|error| error.to_string()),
+            Err(reason) => self.unreadable(&reason),
+        }
+    }
+
+    /// The manifest of a presentation that grows could not be read, for a reason.
+    ///
+    /// # Errors
+    /// As [`Package::polled`].
+    pub fn unreadable(&mut self, reason: &str) -> Result<(), String> {
+        self.player.unreadable(self.now_us).map_err(|error| format!("{error}: {reason}"))
     }
 
     /// What time it is; it never goes back.
@@ -157,7 +180,7 @@ impl Package {
 
     /// Plays at a speed in thousandths, or stands still at 0.
     pub fn run(&mut self, speed_milli: u32) {
-        if self.player.manifest().stream.frames <= 1 {
+        if !self.is_moving() {
             return;
         }
         self.speed_milli = speed_milli;
@@ -177,9 +200,17 @@ impl Package {
         self.player.choose(self.now_us, (!is_automatic).then_some(point));
     }
 
-    /// Frames of the package.
+    /// Frames of the package; 0 while it grows.
     pub fn frame_count(&self) -> u32 {
+        if self.player.is_following() {
+            return 0;
+        }
         u32::try_from(self.player.manifest().stream.frames).unwrap_or(u32::MAX)
+    }
+
+    /// Whether the clock goes on from the frame that was given last: it is the first one, or GOPs before it were skipped.
+    pub fn is_jump(&self) -> bool {
+        self.is_jump
     }
 
     /// The decoder of the GOP that is shown.
@@ -200,6 +231,7 @@ impl Package {
         loop {
             self.open_gop();
             if !self.gop.is_open {
+                self.is_ended |= self.is_over();
                 return Ok(None);
             }
             if self.gop.is_done {
@@ -236,8 +268,14 @@ impl Package {
         (index.saturating_add(1)..end).find(is_next).unwrap_or(end)
     }
 
+    /// Whether the playhead waits for a GOP that will not come: the presentation has ended.
+    fn is_over(&self) -> bool {
+        !self.player.is_following() && self.gop.number >= self.player.manifest().gops.len()
+    }
+
     fn give(&mut self, frame: Frame) -> (Frame, u32) {
         self.warn(frame.warnings());
+        self.is_jump = core::mem::take(&mut self.jumps);
         let first = self.first_frame(self.gop.number);
         let duration = self.gop.decoder.frame_duration().unwrap_or_default();
         let passed = duration.saturating_mul(frame.index().saturating_sub(first));
@@ -254,11 +292,14 @@ impl Package {
 
     /// The first frame of a GOP; the number of frames after the last one.
     fn first_frame(&self, gop: usize) -> u32 {
-        self.player.manifest().gops.get(gop).map_or_else(|| self.frame_count(), |gop| gop.first_frame)
+        let gops = &self.player.manifest().gops;
+        let end = || gops.last().map_or(0, |last| last.first_frame.saturating_add(last.frame_count));
+        gops.get(gop).map_or_else(end, |gop| gop.first_frame)
     }
 
     /// Opens the GOP that is due.
     fn open_gop(&mut self) {
+        let mut current = self.player.state().current();
         while let Some(gop) = self.player.show() {
             let is_lost = gop.point.is_none();
             if let Some(point) = gop.point {
@@ -278,18 +319,28 @@ impl Package {
                 self.stalls.1 = self.stalls.1.saturating_add(waited_us);
             }
             self.gop.follows = false;
+            self.skip_to(current);
             self.tell_losses();
             if is_lost && !self.next_gop() {
                 return;
             }
+            current = self.player.state().current();
         }
         self.tell_losses();
     }
 
-    /// Goes on with the GOP after the one that is open; whether there is one.
+    /// The playhead is in a GOP: where it is another one than that it went to, those between were skipped.
+    fn skip_to(&mut self, gop: usize) {
+        if gop != self.gop.number {
+            (self.gop.number, self.gop.from) = (gop, self.first_frame(gop));
+            self.jumps = true;
+        }
+    }
+
+    /// Goes on with the GOP after the one that is open; whether there is one, or will be.
     fn next_gop(&mut self) -> bool {
         let next = self.gop.number.saturating_add(1);
-        let is_there = next < self.player.manifest().gops.len();
+        let is_there = next < self.player.manifest().gops.len() || self.player.is_following();
         if is_there {
             self.enter(next, self.first_frame(next), false);
         } else {
@@ -306,6 +357,7 @@ impl Package {
         self.gop.since_us = self.now_us;
         (self.gop.is_open, self.gop.is_still, self.gop.is_done) = (false, false, false);
         self.gop.follows = !is_sought;
+        self.jumps &= !is_sought;
     }
 
     /// Remembers warnings. A GOP of a package ends where its last unit does, which is no damage, nor are frames that the
@@ -336,7 +388,10 @@ impl Package {
     /// What is known of playback, in numbers: 1 while it waits, the GOP, seconds that are buffered, bits a second that the
     /// network carries (0 if that is not known) and its latency in seconds, stalls, seconds of these, seconds until the first
     /// picture; bytes, requests, failures and abandoned fetches; of the GOP that is shown its operating point (spatial,
-    /// temporal or -1, refinement), its quality in dB and its bits a second; the frame up to which it is buffered.
+    /// temporal or -1, refinement), its quality in dB and its bits a second; the frame up to which it is buffered; 1 while it
+    /// grows, the first frame that can be shown, the one after the last, the one that playback near the end starts with, 1 if
+    /// playback stays behind, how long ago in seconds what is shown was captured (-1 if it does not grow), and the pace of
+    /// playback.
     pub fn report(&self, numbers: &mut Vec<f64>) {
         let state = self.player.state();
         let seconds = |us: u64| us as f64 / 1e6;
@@ -359,6 +414,19 @@ impl Package {
         ]);
         self.report_shown(state, numbers);
         numbers.push(self.first_frame(state.first_missing()).into());
+        self.report_growth(numbers);
+    }
+
+    fn report_growth(&self, numbers: &mut Vec<f64>) {
+        let player = &self.player;
+        let end = self.first_frame(usize::MAX);
+        let edge = player.edge().map_or(end, |gop| self.first_frame(gop));
+        let latency_us = player.state().latency_us().filter(|_| player.is_following());
+        numbers.push(f64::from(u8::from(player.is_following())));
+        numbers.extend([self.first_frame(player.first_kept()), end, edge].map(f64::from));
+        numbers.push(f64::from(u8::from(player.is_behind())));
+        numbers.push(latency_us.map_or(-1.0, |us| us as f64 / 1e6));
+        numbers.push(f64::from(player.pace_milli()) / 1000.0);
     }
 
     fn report_shown(&self, state: &State, numbers: &mut Vec<f64>) {
@@ -381,8 +449,18 @@ impl Package {
     }
 }
 
+fn parse(manifest: &[u8]) -> Result<Manifest, String> {
+    Manifest::parse(manifest).map_err(|error| format!("the manifest is refused: {error}"))
+}
+
 /// A loss in words.
 fn line(loss: &Loss) -> String {
-    let Loss { gop, representation, refinement, reason, .. } = loss;
-    format!("GOP {gop}: {representation} from refinement {refinement} on cannot be had: {reason}")
+    let Loss { gop, count, representation, refinement, reason } = loss;
+    let last = gop.saturating_add(*count).saturating_sub(1);
+    match count {
+        0 | 1 => {
+            format!("GOP {gop}: {representation} from refinement {refinement} on cannot be had: {reason}")
+        }
+        _ => format!("GOPs {gop} to {last} are skipped: {reason}"),
+    }
 }

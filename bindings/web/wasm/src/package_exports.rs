@@ -69,14 +69,28 @@ pub extern "C" fn gss_package_renew() -> u32 {
     })
 }
 
+/// [`Package::polled`] with the manifest that has been written, or [`Package::unreadable`] with why it could not be read;
+/// [`Status`], with the reason as text.
+#[unsafe(no_mangle)]
+pub extern "C" fn gss_package_polled(is_read: u32) -> u32 {
+    with(|session| {
+        let Some(package) = &mut session.package else { return Status::NeedBytes as u32 };
+        let result = ROOM.with_borrow(|bytes| match is_read {
+            0 => package.unreadable(&String::from_utf8_lossy(bytes)),
+            _ => package.polled(bytes),
+        });
+        say(session, result)
+    })
+}
+
 /// [`Package::clock`].
 #[unsafe(no_mangle)]
 pub extern "C" fn gss_package_clock(now: f64) {
     package(|package| package.clock(microseconds(now)));
 }
 
-/// What to do: 0 wait until the time in the numbers, 1 request, 2 give requests up, 3 read the manifest again. Of requests the
-/// numbers are offsets and lengths, and the text the names of files, line by line.
+/// What to do: 0 wait until the time in the numbers, 1 request, 2 give requests up, 3 read the manifest again, 4 read it beside all
+/// else. Of requests the numbers are offsets and lengths, and the text the names of files, line by line.
 #[unsafe(no_mangle)]
 pub extern "C" fn gss_package_decide() -> u32 {
     with(|session| {
@@ -95,7 +109,8 @@ pub extern "C" fn gss_package_decide() -> u32 {
                 1
             }
             Command::Abandon => 2,
-            Command::ReadManifest | Command::PollManifest => 3,
+            Command::ReadManifest => 3,
+            Command::PollManifest => 4,
         }
     })
 }

@@ -99,7 +99,8 @@ impl Session {
     /// Decodes the next frame. Numbers: index, seconds from the start, Gaussians, how many of these are carried over from
     /// an earlier frame in place of missing refinements, refinements shown, whether it is a keyframe, the operating point
     /// (spatial, temporal, refinement), whether it has a digest, its high and its low half, bytes of its units, the index
-    /// up to which it stands, which is its own and 1 where frames that follow are decoded.
+    /// up to which it stands, which is its own and 1 where frames that follow are decoded, whether the clock of playback goes on
+    /// from it.
     pub fn decode(&mut self) -> Status {
         self.clear();
         #[cfg(feature = "packages")]
@@ -120,7 +121,7 @@ impl Session {
         };
         self.say(frame.warnings().iter());
         let until = frame.index().saturating_add(1);
-        self.give(frame, until)
+        self.give(frame, until, false)
     }
 
     /// The next frame of a package.
@@ -129,7 +130,7 @@ impl Session {
         match package.next_frame() {
             Ok(Some((frame, until))) => {
                 self.say(package.warnings.drain(..));
-                self.give(frame, until)
+                self.give(frame, until, package.is_jump())
             }
             Ok(None) if !package.is_ended() => Status::NeedBytes,
             Ok(None) if package.warnings.is_empty() => Status::End,
@@ -144,7 +145,7 @@ impl Session {
         }
     }
 
-    fn give(&mut self, frame: Frame, until: u32) -> Status {
+    fn give(&mut self, frame: Frame, until: u32, is_jump: bool) -> Status {
         let point = frame.operating_point();
         let digest = frame.digest().unwrap_or_default();
         self.numbers.extend([
@@ -158,7 +159,7 @@ impl Session {
         self.numbers.extend([point.spatial, point.temporal, point.refinement].map(f64::from));
         self.numbers.push(f64::from(u8::from(frame.digest().is_some())));
         self.numbers.extend([(digest >> 32) as u32, digest as u32].map(f64::from));
-        self.numbers.extend([frame.bytes() as f64, f64::from(until)]);
+        self.numbers.extend([frame.bytes() as f64, f64::from(until), f64::from(u8::from(is_jump))]);
         self.frame = Some(frame);
         Status::Done
     }

@@ -8,7 +8,6 @@ use splatstream_stream::package::{Options, Package as Packaged};
 use splatstream_stream::playback::{Command, Fault};
 use splatstream_wasm::package::Package;
 use splatstream_wasm::session::{Session, Status};
-use std::fs;
 
 const STREAM: &[u8] = include_bytes!("../../../../examples/talk.gss");
 
@@ -123,13 +122,4 @@ fn what_cannot_be_had_is_said() {
 fn manifests_that_are_none_are_refused_with_a_reason() {
     let refused = Package::open(b"{}", 0).err().unwrap();
     assert!(refused.contains("the manifest is refused"), "{refused}");
-}
-
-#[test]
-fn a_presentation_that_grows_is_refused_in_words() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../conformance/packages");
-    let open = |name: &str| Package::open(&fs::read(format!("{folder}/{name}/manifest.json")).unwrap(), 0);
-    assert!(open("growing/live-gop").is_err_and(|why| why.contains("still being made")));
-    // When it has ended, its segments are files like others.
-    assert!(open("valid/live-gop").is_ok());
 }
