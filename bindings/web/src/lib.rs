@@ -52,6 +52,7 @@ const MODULES: &[Module<'static>] = modules![
     "player/style.js",
     "player/template.js",
     "player/texels.js",
+    "player/timeline.js",
     "player/track.js",
     "player/vectors.js",
 ];
