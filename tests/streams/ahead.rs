@@ -1,6 +1,6 @@
 //! Two frames that are decoded at a time are those that come one after the other, with any number of threads.
 
-use super::arrival::Said;
+use super::arrival::{Said, damaged_talk};
 use super::vectors;
 use proptest::prelude::*;
 use splatstream::{Cancel, Decoder, Error, OperatingPoint};
@@ -39,19 +39,9 @@ proptest! {
 
     #[test]
     fn damage_is_told_with_the_same_frames(
-        damage in prop::collection::vec((any::<prop::sample::Index>(), 1_u8..), 0..4),
+        bytes in damaged_talk(),
         chunk in 1_usize..9000,
-        cut in any::<prop::sample::Index>(),
-        is_cut in any::<bool>(),
     ) {
-        let mut bytes = vectors::talk().to_vec();
-        for (at, change) in damage {
-            let at = at.index(bytes.len());
-            bytes[at] ^= change;
-        }
-        if is_cut {
-            bytes.truncate(cut.index(bytes.len()));
-        }
         let bytes: Arc<[u8]> = bytes.into();
         let expected = Said::of(Decoder::from_bytes(bytes.clone()));
         for said in ahead(&bytes, 2, chunk) {
