@@ -3,6 +3,7 @@
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use xxhash_rust::xxh64::xxh64;
 
 /// The XXH64 digests of the canonical planes of one list, in order.
@@ -42,70 +43,19 @@ enum Plane<'a> {
 impl Plane<'_> {
     fn digest(&self, seed: u64) -> u64 {
         match self {
-            Self::Unsigned(values) => digest_words(values, seed, |value| value),
-            Self::Signed(values) => digest_words(values, seed, i32::cast_unsigned),
+            Self::Unsigned(values) => digest_words(values, seed),
+            Self::Signed(values) => digest_words(bytemuck::cast_slice(values), seed),
         }
     }
 }
 
-const PRIMES: [u64; 5] = [
-    0x9E37_79B1_85EB_CA87,
-    0xC2B2_AE3D_27D4_EB4F,
-    0x1656_67B1_9E37_79F9,
-    0x85EB_CA77_C2B2_AE63,
-    0x27D4_EB2F_1656_67C5,
-];
-
-/// XXH64 of words as little-endian bytes, the same on any machine. The words are hashed where they are: a function of bytes
-/// would need them copied first.
-fn digest_words<T: Copy>(values: &[T], seed: u64, word: impl Fn(T) -> u32 + Copy) -> u64 {
-    let [first, second, _, _, fifth] = PRIMES;
-    let pair = |low: T, high: T| u64::from(word(low)) | u64::from(word(high)).wrapping_shl(32);
-    let (stripes, rest) = values.as_chunks::<8>();
-    let mut sums = [seed.wrapping_add(first).wrapping_add(second), seed.wrapping_add(second), seed];
-    let mut last = seed.wrapping_sub(first);
-    for &[a, b, c, d, e, f, g, h] in stripes {
-        let [x, y, z] = sums;
-        sums = [round(x, pair(a, b)), round(y, pair(c, d)), round(z, pair(e, f))];
-        last = round(last, pair(g, h));
-    }
-    let mut hash = seed.wrapping_add(fifth);
-    if !stripes.is_empty() {
-        let [x, y, z] = sums;
-        hash = x.rotate_left(1).wrapping_add(y.rotate_left(7));
-        hash = hash.wrapping_add(z.rotate_left(12)).wrapping_add(last.rotate_left(18));
-        hash = [x, y, z, last].into_iter().fold(hash, merged);
-    }
-    hash = hash.wrapping_add((values.len() as u64).wrapping_mul(4));
-    finished(hash, rest, word, pair)
-}
-
-/// The words after the last whole stripe, fewer than 8, and the end of the hash.
-fn finished<T: Copy>(mut hash: u64, rest: &[T], word: impl Fn(T) -> u32, pair: impl Fn(T, T) -> u64) -> u64 {
-    let [first, second, third, fourth, _] = PRIMES;
-    let (pairs, single) = rest.as_chunks::<2>();
-    for &[low, high] in pairs {
-        hash ^= round(0, pair(low, high));
-        hash = hash.rotate_left(27).wrapping_mul(first).wrapping_add(fourth);
-    }
-    for &value in single {
-        hash ^= u64::from(word(value)).wrapping_mul(first);
-        hash = hash.rotate_left(23).wrapping_mul(second).wrapping_add(third);
-    }
-    hash = (hash ^ hash >> 33).wrapping_mul(second);
-    hash = (hash ^ hash >> 29).wrapping_mul(third);
-    hash ^ hash >> 32
-}
-
-#[inline(always)]
-fn round(sum: u64, lane: u64) -> u64 {
-    let [first, second, ..] = PRIMES;
-    sum.wrapping_add(lane.wrapping_mul(second)).rotate_left(31).wrapping_mul(first)
-}
-
-fn merged(hash: u64, sum: u64) -> u64 {
-    let [first, _, _, fourth, _] = PRIMES;
-    (hash ^ round(0, sum)).wrapping_mul(first).wrapping_add(fourth)
+/// XXH64 of words as little-endian bytes, the same on any machine. Where words are so in memory they are hashed where they are.
+fn digest_words(values: &[u32], seed: u64) -> u64 {
+    let little = match cfg!(target_endian = "little") {
+        true => Cow::Borrowed(values),
+        false => Cow::Owned(values.iter().map(|value| value.to_le()).collect()),
+    };
+    xxh64(bytemuck::cast_slice(&little), seed)
 }
 
 /// The digest of several lists, one after the other.
