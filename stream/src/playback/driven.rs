@@ -159,15 +159,15 @@ impl<R: Rule> Player<R> {
         }
         let first = first_gop(manifest);
         let current = self.session.state().current();
-        for (gop, log) in self.logs.iter().enumerate().take(current) {
+        let known = self.manifest.gops.iter_mut().zip(&self.logs);
+        for (gop, (info, log)) in known.enumerate().take(current) {
             let is_listed = log.number >= first;
             if is_listed == self.session.state().is_skipped(gop) {
                 self.session.keep(now_us, gop, is_listed);
             }
-            if !is_listed {
+            if !is_listed && !info.subsegments.is_empty() {
                 self.store.remove(gop);
-                let known = self.manifest.gops.iter_mut().skip(gop).take(1);
-                known.for_each(|info| info.subsegments = Vec::new());
+                info.subsegments = Vec::new();
             }
         }
     }
