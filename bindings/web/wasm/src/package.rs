@@ -82,11 +82,8 @@ impl Package {
             warnings: Vec::new(),
             stalls: (0, 0),
         };
-        if package.is_moving() {
-            package.run(1000);
-        } else {
-            package.player.run(now_us, 0);
-        }
+        package.speed_milli = if package.is_moving() { 1000 } else { 0 };
+        package.player.run(now_us, package.speed_milli);
         Ok(package)
     }
 
@@ -100,7 +97,11 @@ impl Package {
     /// # Errors
     /// A manifest that is refused, or one of another package.
     pub fn renew(&mut self, manifest: &[u8]) -> Result<(), String> {
-        self.player.renew(self.now_us, parse(manifest)?).map_err(|error| error.to_string())
+        self.take(parse(manifest)?)
+    }
+
+    fn take(&mut self, manifest: Manifest) -> Result<(), String> {
+        self.player.renew(self.now_us, manifest).map_err(|error| error.to_string())
     }
 
     /// The manifest of a presentation that grows has been read beside playback.
@@ -110,7 +111,7 @@ impl Package {
     /// whole the next time.
     pub fn polled(&mut self, manifest: &[u8]) -> Result<(), String> {
         match parse(manifest) {
-            Ok(manifest) => self.player.renew(self.now_us, manifest).map_err(|error| error.to_string()),
+            Ok(manifest) => self.take(manifest),
             Err(reason) => self.unreadable(&reason),
         }
     }
