@@ -3,9 +3,6 @@
 use glam::DVec3;
 use splatstream_gaussians::{GaussianFrame, sh_basis, sh_coefficients};
 
-/// The constant SH basis function, 1 / (2 √π).
-pub(super) const SH_C0: f64 = 0.282_094_791_773_878_14;
-
 /// Adds slopes by the coefficients of bands 1 and up, whose planes are those of the frame and whose row here is `row` of
 /// `planes` and `gaussian` of the frame; returns the slope by the Gaussian's centre, which lies at `offset` from the camera.
 #[expect(clippy::arithmetic_side_effects, reason = "vectors of floats")]

@@ -6,12 +6,12 @@
 )]
 
 use super::blend::Sums;
-use super::harmonics::{self, SH_C0};
+use super::harmonics;
 use crate::camera::Camera;
 use crate::rasterise::{LOW_PASS, PreparedFrame, Splat, seen_slopes};
 use glam::DVec3;
 use rayon::prelude::*;
-use splatstream_gaussians::{GaussianFrame, Planes, PlanesMut};
+use splatstream_gaussians::{GaussianFrame, Planes, PlanesMut, SH_C0};
 use std::f64::consts::LOG2_E;
 
 /// Gaussians that a thread goes back through at once.

@@ -4,11 +4,8 @@
 
 use super::TILE;
 use super::tile::Lanes;
-use splatstream_gaussians::{GaussianFrame, sh_basis, sh_coefficients};
+use splatstream_gaussians::{GaussianFrame, SH_C0, sh_basis, sh_coefficients};
 use std::ops::Range;
-
-/// The constant SH basis function, 1 / (2 √π).
-const SH_C0: f32 = 0.282_094_8;
 
 /// Some Gaussians of a frame, side by side.
 pub(super) struct Block {
@@ -42,7 +39,8 @@ impl Block {
     #[inline(always)]
     pub(super) fn colours(&self, frame: &GaussianFrame, position: [f32; 3]) -> [Lanes; 3] {
         let dc = frame.dc().each_ref().map(|plane| self.of(plane));
-        let mut colours = dc.map(|lanes| lanes.map(|dc| 0.5 + SH_C0 * dc));
+        let constant = SH_C0 as f32;
+        let mut colours = dc.map(|lanes| lanes.map(|dc| 0.5 + constant * dc));
         let coefficients = sh_coefficients(frame.sh_degree());
         if coefficients > 0 {
             let bases = bases(self.directions(frame, position));

@@ -2,8 +2,7 @@
 //!
 //! `f64` and `libm` throughout, so that the same values give the same frame on every machine.
 
-/// The constant SH basis function, 1 / (2 √π).
-const SH_C0: f64 = 0.282_094_791_773_878_14;
+use crate::sh::SH_C0;
 
 /// Opacity, 0 to 1, of a logit.
 pub fn sigmoid(logit: f64) -> f64 {

@@ -27,4 +27,4 @@ mod sh;
 
 pub use defect::{Defect, DefectKind, Defects};
 pub use frame::{FrameError, GaussianFrame, Planes, PlanesMut};
-pub use sh::{MAX_SH_DEGREE, rest_index, sh_basis, sh_coefficients, sh_planes};
+pub use sh::{MAX_SH_DEGREE, SH_C0, rest_index, sh_basis, sh_coefficients, sh_planes};

@@ -3,6 +3,9 @@
 /// The largest SH degree that a frame can carry.
 pub const MAX_SH_DEGREE: u8 = 3;
 
+/// The constant basis function, 1 / (2 √π), whose coefficient is DC.
+pub const SH_C0: f64 = 0.282_094_791_773_878_14;
+
 /// Coefficients per colour channel without DC: 0, 3, 8, 15 for degrees 0 to 3; `(degree + 1)² − 1`.
 #[expect(
     clippy::arithmetic_side_effects,
