@@ -1,27 +1,18 @@
 #!/usr/bin/env python3
 """Checks splatstream_render::gradient against PyTorch's gradients of gsplat's projection and blending in 64 bits."""
 
-import argparse
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import gsplat as pictures
-from gsplat import LOW_PASS, MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, ROOT, VARIANTS, np, torch
+from gsplat import BUILTIN, LOW_PASS, MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, ROOT, VARIANTS, np, torch
 
-SCENES = [Path("builtin"), ROOT / "../shared/data/static/kacy9k.ply"]
+SCENES = [BUILTIN, ROOT / "../shared/data/static/kacy9k.ply"]
 # Of the norm of an attribute's gradients. What is decided by rounding (alpha at 1/255, a pixel that is done) is decided
 # otherwise here for some pixels.
 MOST_ERROR = 1e-3
 # First and last plane.
 ATTRIBUTES = {"position": (0, 3), "log-scale": (3, 6), "rotation": (6, 10), "opacity": (10, 11), "dc": (11, 14), "sh": (14, None)}
-
-
-def write_views(scene, count, height, folder):
-    command = ["cargo", "run", "-q", "--release", "-p", "splatstream-render", "--example", "gradients", "--"]
-    name = scene if str(scene) == "builtin" else scene.resolve()
-    subprocess.check_call([*command, str(name), str(count), str(height), folder], cwd=ROOT)
 
 
 def planes_of(folder, name, count):
@@ -107,23 +98,10 @@ def check(gsplat, folder, name):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenes", nargs="*", type=Path, default=SCENES, help="files, or builtin; else that and ../shared/data")
-    parser.add_argument("--views", type=int, default=2, help="cameras on a ring")
-    parser.add_argument("--height", type=int, default=270, help="rows of a view")
-    parser.add_argument("--wheel", type=Path, help=f"gsplat {pictures.VERSION}, if it was downloaded already")
-    options = parser.parse_args()
+    options = pictures.arguments(__doc__, SCENES, views=2, height=270).parse_args()
     gsplat = pictures.gsplat_module(options.wheel)
     print(f"{'scene':16} {'view':>4} {'kernel':12} {'attribute':10} {'norm':>10} {'error':>10}")
-    good = True
-    for path in options.scenes:
-        if str(path) != "builtin" and not path.exists():
-            print(f"{path.name:16} skipped: not there")
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            write_views(path, options.views, options.height, folder)
-            good &= check(gsplat, folder, path.name)
-    return 0 if good else 1
+    return pictures.check_scenes(options, "gradients", lambda folder, path: check(gsplat, folder, path.name))
 
 
 if __name__ == "__main__":

@@ -46,8 +46,8 @@ def gsplat_module(wheel):
     return module
 
 
-def write_views(scene, count, height, folder):
-    command = ["cargo", "run", "-q", "--release", "-p", "splatstream-render", "--example", "views", "--"]
+def write_views(example, scene, count, height, folder):
+    command = ["cargo", "run", "-q", "--release", "-p", "splatstream-render", "--example", example, "--"]
     name = scene if scene == BUILTIN else scene.resolve()
     subprocess.check_call([*command, str(name), str(count), str(height), folder], cwd=ROOT)
 
@@ -177,26 +177,41 @@ def check(gsplat, scene, name, pixels_per_view):
     return good
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenes", nargs="*", type=Path, default=SCENES, help="files, or builtin; else that and ../shared/data")
-    parser.add_argument("--views", type=int, default=3, help="cameras on a ring")
-    parser.add_argument("--height", type=int, default=540, help="rows of a view")
-    parser.add_argument("--pixels", type=int, default=4000, help="chosen at random in each view; 0 for all")
+def arguments(about, scenes, views, height):
+    """What both checks are asked for, with their defaults."""
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("scenes", nargs="*", type=Path, default=scenes, help="files, or builtin; else that and ../shared/data")
+    parser.add_argument("--views", type=int, default=views, help="cameras on a ring")
+    parser.add_argument("--height", type=int, default=height, help="rows of a view")
     parser.add_argument("--wheel", type=Path, help=f"gsplat {VERSION}, if it was downloaded already")
-    options = parser.parse_args()
-    gsplat = gsplat_module(options.wheel)
-    print(f"{'scene':24} {'variant':12} {'pixels':>8} {'PSNR dB':>9} {'colour':>9} {'alpha':>9}")
+    return parser
+
+
+def check_scenes(options, example, check_files):
+    """Lets an example write each scene; 0 if a function of the folder and of the scene finds all near enough."""
     good = True
     for path in options.scenes:
         if path != BUILTIN and not path.exists():
             print(f"{path.name:24} skipped: not there")
             continue
         with tempfile.TemporaryDirectory() as folder:
-            write_views(path, options.views, options.height, folder)
-            name = "/".join(path.parts[-2:]).removeprefix("static/")
-            good &= check(gsplat, Scene(folder), name, options.pixels)
+            write_views(example, path, options.views, options.height, folder)
+            good &= check_files(folder, path)
     return 0 if good else 1
+
+
+def main():
+    parser = arguments(__doc__, SCENES, views=3, height=540)
+    parser.add_argument("--pixels", type=int, default=4000, help="chosen at random in each view; 0 for all")
+    options = parser.parse_args()
+    gsplat = gsplat_module(options.wheel)
+    print(f"{'scene':24} {'variant':12} {'pixels':>8} {'PSNR dB':>9} {'colour':>9} {'alpha':>9}")
+
+    def check_files(folder, path):
+        name = "/".join(path.parts[-2:]).removeprefix("static/")
+        return check(gsplat, Scene(folder), name, options.pixels)
+
+    return check_scenes(options, "views", check_files)
 
 
 if __name__ == "__main__":

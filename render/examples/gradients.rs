@@ -10,46 +10,28 @@
 //! blue of each pixel of view N: noise, and 0 outside of a few hundred pixels. `gradients-N-classic.f32` and
 //! `gradients-N-antialiased.f32` hold planes as `scene.f32` does. Values are `f32`, lowest byte first.
 
-use serde_json::{Value, json};
-use splatstream_files::builtin::BuiltinScene;
-use splatstream_files::{ReadLimits, read_scene};
+mod files;
+
+use files::Files;
 use splatstream_gaussians::random::SplitMix64;
-use splatstream_render::camera::{Up, ring};
 use splatstream_render::gradient::Gradients;
 use splatstream_render::{Camera, Image, PreparedFrame};
 use std::error::Error;
-use std::path::Path;
 
 /// Pixels of a view that have slopes.
 const PIXELS: usize = 400;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [scene, count, height, folder] = arguments.as_slice() else {
-        return Err("which views? See the head of the example's source".into());
-    };
-    let folder = Path::new(folder);
-    let frame = match scene.as_str() {
-        "builtin" => BuiltinScene { gaussians: 3_000, ..BuiltinScene::default() }.frame(0),
-        file => read_scene(Path::new(file), &ReadLimits::default())?,
-    };
-    let cameras = ring(&frame, Up::default(), count.parse()?, height.parse()?);
-    let description = json!({
-        "gaussians": frame.len(),
-        "sh_degree": frame.sh_degree(),
-        "views": cameras.iter().map(describe).collect::<Vec<Value>>(),
-    });
-    std::fs::write(folder.join("views.json"), description.to_string())?;
-    std::fs::write(folder.join("scene.f32"), bytes(frame.planes().iter().flatten()))?;
-    for (number, camera) in cameras.iter().enumerate() {
+    let files = Files::write(3_000)?;
+    for (number, camera) in files.cameras.iter().enumerate() {
         let slopes = slopes(number as u64, camera);
-        std::fs::write(folder.join(format!("slopes-{number}.f32")), bytes(slopes.pixels().iter().flatten()))?;
+        files.add(&format!("slopes-{number}.f32"), slopes.pixels().iter().flatten())?;
         for (variant, antialiased) in [("classic", false), ("antialiased", true)] {
-            let frame = frame.clone().with_antialiased(antialiased);
+            let frame = files.frame.clone().with_antialiased(antialiased);
             let mut gradients = Gradients::zero(&frame);
             PreparedFrame::new(&frame).draw(camera, [0.0; 3]).backward(&slopes, &mut gradients)?;
             let name = format!("gradients-{number}-{variant}.f32");
-            std::fs::write(folder.join(name), bytes(gradients.planes().iter().flatten()))?;
+            files.add(&name, gradients.planes().iter().flatten())?;
         }
     }
     Ok(())
@@ -65,18 +47,4 @@ fn slopes(seed: u64, camera: &Camera) -> Image {
         pixels[y * width + x] = [(); 3].map(|()| random.signed());
     }
     Image::new(width, pixels)
-}
-
-fn describe(camera: &Camera) -> Value {
-    json!({
-        "size": [camera.width, camera.height],
-        "focal": camera.focal,
-        "principal": camera.principal,
-        "rotation": camera.rotation,
-        "position": camera.position,
-    })
-}
-
-fn bytes<'a>(values: impl Iterator<Item = &'a f32>) -> Vec<u8> {
-    values.flat_map(|value| value.to_le_bytes()).collect()
 }
