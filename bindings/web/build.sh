@@ -2,7 +2,7 @@
 # Compiles the decoder for web pages: decoder/splatstream.wasm and, with the client for packages, splatstream-packages.wasm. Both
 # have instructions of 128 bits and are kept in the repository, so that the commands `view` and `serve` need no target but their
 # own; those with -plain, for engines without them, are made when the npm package is. The same sources and compiler give the same
-# bytes on any machine: `build.sh --check` compares.
+# bytes on any machine: `build.sh --check` compares. `build.sh --plain` makes only those with -plain.
 set -euo pipefail
 cd "$(dirname "$0")"
 target=wasm32-unknown-unknown
@@ -49,7 +49,7 @@ if [ "${1:-}" = --check ]; then
 fi
 for features in '' packages; do
     module=decoder/splatstream${features:+-$features}
-    compile "$module.wasm" "$features" -Ctarget-feature=+simd128
+    [ "${1:-}" = --plain ] || compile "$module.wasm" "$features" -Ctarget-feature=+simd128
     compile "$module-plain.wasm" "$features"
 done
-rustc --version >"$compiler"
+[ "${1:-}" = --plain ] || rustc --version >"$compiler"
