@@ -6,6 +6,11 @@ use splatstream::Planes;
 const KEY_BITS: u32 = 22;
 /// Bits that are sorted by at a time.
 const DIGIT: u32 = 11;
+const DIGIT_MASK: u32 = (1 << DIGIT) - 1;
+/// The key of a slot that is not drawn: it is sorted behind all others.
+const ABSENT: u32 = (1 << KEY_BITS) - 1;
+/// Bits that are left for a slot beside a digit.
+const SLOT_BITS: u32 = 32 - DIGIT;
 /// What is nearer than this share of the mean depth is not drawn.
 const NEAR: f32 = 1.0 / 256.0;
 
@@ -17,79 +22,82 @@ pub struct Order {
     /// Depth from which Gaussians are drawn: 1/256 of the geometric mean of those in front of the camera, as the renderer
     /// of this repository has it.
     pub near: f32,
+    /// By slot; a small one is far.
     keys: Vec<u32>,
-    other: Vec<(u32, u32)>,
+    other: Vec<u32>,
 }
+
+/// How many keys have each digit.
+type Counts = [u32; 1 << DIGIT];
 
 impl Order {
     /// Sorts by the depth along `ahead`, a unit vector, from `position`.
+    ///
+    /// By the low digit first. Between both passes a slot and its high digit share a word, where slots are few enough.
     pub fn sort(&mut self, planes: &Planes, position: [f32; 3], ahead: [f32; 3]) {
-        self.find(planes, position, ahead);
-        let mask = (1 << DIGIT) - 1;
-        let low = starts(self.keys.iter().map(|key| key & mask));
-        let high = starts(self.keys.iter().map(|key| key >> DIGIT));
-        self.other.clear();
-        self.other.resize(self.keys.len(), (0, 0));
-        scatter(self.keys.iter().copied().zip(self.slots.iter().copied()), low, &mut self.other, |entry| {
-            (entry.0 & mask, entry)
-        });
-        scatter(self.other.iter().copied(), high, &mut self.slots, |(key, slot)| (key >> DIGIT, slot));
+        let visible = self.find(planes, position, ahead);
+        let Self { slots, keys, other, .. } = self;
+        let (low, high) = counted(keys);
+        other.resize(keys.len(), 0);
+        slots.resize(keys.len(), 0);
+        if keys.len() <= 1 << SLOT_BITS {
+            let both = (0..).zip(keys.iter()).map(|(slot, key)| (key & DIGIT_MASK, key >> DIGIT << SLOT_BITS | slot));
+            scatter(both, low, other);
+            scatter(other.iter().map(|both| (both >> SLOT_BITS, both & ((1 << SLOT_BITS) - 1))), high, slots);
+        } else {
+            scatter((0..).zip(keys.iter()).map(|(slot, key)| (key & DIGIT_MASK, slot)), low, other);
+            let digit = |&slot: &u32| keys.get(slot as usize).map_or(0, |key| key >> DIGIT);
+            scatter(other.iter().map(|slot| (digit(slot), *slot)), high, slots);
+        }
+        slots.truncate(visible);
     }
 
-    /// Finds the slots in front of the camera, and their keys: a small one is far.
-    fn find(&mut self, planes: &Planes, position: [f32; 3], ahead: [f32; 3]) {
+    /// Finds the keys, and how many Gaussians are in front of the camera.
+    fn find(&mut self, planes: &Planes, position: [f32; 3], ahead: [f32; 3]) -> usize {
         let [x, y, z] = &planes.position;
         let offset: f32 = position.iter().zip(ahead).map(|(position, ahead)| position * ahead).sum();
-        self.slots.clear();
         self.keys.clear();
-        let mut sum = 0_u64;
+        let (mut sum, mut visible) = (0_u64, 0_u32);
         let places = x.iter().zip(y).zip(z).zip(&planes.opacity_logit);
-        for (slot, (((x, y), z), logit)) in (0..).zip(places) {
+        self.keys.extend(places.map(|(((x, y), z), logit)| {
             let depth = x * ahead[0] + y * ahead[1] + z * ahead[2] - offset;
-            if depth > 0.0 && depth.is_finite() && *logit > f32::NEG_INFINITY {
-                sum = sum.saturating_add(depth.to_bits().into());
-                self.slots.push(slot);
-                // Bits of positive floats order as their values.
-                self.keys.push((u32::MAX >> 1 ^ depth.to_bits()) >> (31 - KEY_BITS));
-            }
-        }
+            let is_visible = depth > 0.0 && depth < f32::INFINITY && *logit > f32::NEG_INFINITY;
+            // Bits of positive floats order as their values.
+            let bits = depth.to_bits() & u32::MAX >> 1;
+            sum += u64::from(if is_visible { bits } else { 0 });
+            visible += u32::from(is_visible);
+            if is_visible { ((bits ^ u32::MAX >> 1) >> (31 - KEY_BITS)).min(ABSENT - 1) } else { ABSENT }
+        }));
         // The mean of the bits is close to the logarithm of the geometric mean.
-        let mean = sum.checked_div(self.slots.len() as u64).unwrap_or_default();
+        let mean = sum.checked_div(visible.into()).unwrap_or_default();
         self.near = (NEAR * f32::from_bits(mean as u32)).max(f32::MIN_POSITIVE);
+        visible as usize
     }
 }
 
-/// Where the entries of each digit start.
-fn starts(digits: impl Iterator<Item = u32>) -> Vec<u32> {
-    let mut counts = vec![0_u32; 1 << DIGIT];
-    for digit in digits {
-        if let Some(count) = counts.get_mut(digit as usize) {
-            *count += 1;
-        }
+/// How many keys have each low and each high digit.
+fn counted(keys: &[u32]) -> (Counts, Counts) {
+    let (mut low, mut high) = ([0; 1 << DIGIT], [0; 1 << DIGIT]);
+    for key in keys {
+        // Masks show that a digit is in range.
+        low[(key & DIGIT_MASK) as usize] += 1;
+        high[(key >> DIGIT & DIGIT_MASK) as usize] += 1;
     }
+    (low, high)
+}
+
+/// Puts entries where their digits go: those with smaller ones first, and equals in their order.
+fn scatter(entries: impl Iterator<Item = (u32, u32)>, mut counts: Counts, to: &mut [u32]) {
     let mut start = 0;
     for count in &mut counts {
-        let here = *count;
-        *count = start;
-        start += here;
+        start += core::mem::replace(count, start);
     }
-    counts
-}
-
-/// Puts entries where their digits go.
-fn scatter<T: Copy, U>(
-    entries: impl Iterator<Item = T>,
-    mut starts: Vec<u32>,
-    to: &mut [U],
-    part: impl Fn(T) -> (u32, U),
-) {
-    for entry in entries {
-        let (digit, value) = part(entry);
-        let Some(start) = starts.get_mut(digit as usize) else { continue };
-        if let Some(place) = to.get_mut(*start as usize) {
-            *place = value;
+    for (digit, value) in entries {
+        let place = &mut counts[(digit & DIGIT_MASK) as usize];
+        if let Some(entry) = to.get_mut(*place as usize) {
+            *entry = value;
         }
-        *start += 1;
+        *place += 1;
     }
 }
 
@@ -109,16 +117,23 @@ mod tests {
         assert!(order.near > 0.0 && order.near < 1.0);
     }
 
-    #[test]
-    fn many_depths_are_in_order() {
-        let depths: Vec<f32> =
-            (0..10_000_u32).map(|number| (number.wrapping_mul(2_654_435_761) % 9973) as f32).collect();
+    /// Order of so many depths, seen from a place that all are in front of.
+    fn sorted(count: u32) -> Vec<f32> {
+        let depths: Vec<f32> = (0..count).map(|number| (number.wrapping_mul(2_654_435_761) % 9973) as f32).collect();
         let mut planes = Planes { opacity_logit: vec![0.0; depths.len()], ..Planes::default() };
         planes.position = [depths.clone(), vec![0.0; depths.len()], vec![0.0; depths.len()]];
         let mut order = Order::default();
         order.sort(&planes, [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
-        assert_eq!(order.slots.len(), depths.len());
-        let sorted: Vec<f32> = order.slots.iter().map(|&slot| depths[slot as usize] + 1.0).collect();
-        assert!(sorted.windows(2).all(|pair| pair[0] * 1.0002 >= pair[1]));
+        let mut slots = order.slots.clone();
+        slots.sort_unstable();
+        assert!(slots.into_iter().eq(0..count), "every slot is there once");
+        order.slots.iter().map(|&slot| depths[slot as usize] + 1.0).collect()
+    }
+
+    #[test]
+    fn many_depths_are_in_order() {
+        for count in [1, 10_000, (1 << SLOT_BITS) + 1] {
+            assert!(sorted(count).windows(2).all(|pair| pair[0] * 1.0002 >= pair[1]));
+        }
     }
 }
