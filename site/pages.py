@@ -7,7 +7,7 @@ import re
 import sys
 
 HERE = pathlib.Path(__file__).parent
-MATRIX = HERE.parent / "conformance/coverage/matrix.md"
+MATRIX = HERE.parent / "conformance/results/matrix.md"
 REPOSITORY = "https://github.com/splatstream/splatstream"
 
 

@@ -7,6 +7,7 @@ mod common;
 use common::{Vectors, WRITE, results, settings};
 use serde_json::{Value, json};
 use splatstream_conformance::feature::{self, FEATURES, Feature};
+use splatstream_conformance::matrix;
 use splatstream_conformance::reference;
 use splatstream_conformance::report::Report;
 use splatstream_conformance::result::Outcome;
@@ -98,4 +99,37 @@ fn every_vector_of_the_repository_is_valid() {
             .collect();
         assert_eq!(problems, Vec::<String>::new(), "{}", path.display());
     }
+}
+
+/// The results that others and we have submitted, in the order of their names.
+fn submitted() -> Vec<Value> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../results");
+    let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
+    paths.sort();
+    paths.iter().map(|path| serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()).collect()
+}
+
+#[test]
+fn submitted_results_are_of_whole_runs_on_whole_suites() {
+    for result in submitted() {
+        assert_eq!(problems("report", &result), Vec::<String>::new());
+        let report: Report = serde_json::from_value(result).unwrap();
+        let (name, suite) = (&report.decoder.name, &report.suite);
+        assert!(suite.changed.is_none() && report.interrupted.is_none(), "{name}");
+        assert!(report.settings.selection.is_everything(), "{name}");
+    }
+}
+
+#[test]
+fn the_page_of_results_is_made_from_them() {
+    let reports: Vec<Report> =
+        submitted().into_iter().map(|result| serde_json::from_value(result).unwrap()).collect();
+    assert!(reports.len() >= 2, "the reference and the independent decoder are there");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../results/matrix.md");
+    assert_eq!(
+        std::fs::read_to_string(page).unwrap(),
+        matrix::page(&reports),
+        ".ci/reports matrix writes it"
+    );
 }

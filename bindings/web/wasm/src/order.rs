@@ -41,7 +41,9 @@ impl Order {
         other.resize(keys.len(), 0);
         slots.resize(keys.len(), 0);
         if keys.len() <= 1 << SLOT_BITS {
-            let both = (0..).zip(keys.iter()).map(|(slot, key)| (key & DIGIT_MASK, key >> DIGIT << SLOT_BITS | slot));
+            let both = (0..)
+                .zip(keys.iter())
+                .map(|(slot, key)| (key & DIGIT_MASK, key >> DIGIT << SLOT_BITS | slot));
             scatter(both, low, other);
             scatter(other.iter().map(|both| (both >> SLOT_BITS, both & ((1 << SLOT_BITS) - 1))), high, slots);
         } else {
@@ -119,7 +121,8 @@ mod tests {
 
     /// Order of so many depths, seen from a place that all are in front of.
     fn sorted(count: u32) -> Vec<f32> {
-        let depths: Vec<f32> = (0..count).map(|number| (number.wrapping_mul(2_654_435_761) % 9973) as f32).collect();
+        let depths: Vec<f32> =
+            (0..count).map(|number| (number.wrapping_mul(2_654_435_761) % 9973) as f32).collect();
         let mut planes = Planes { opacity_logit: vec![0.0; depths.len()], ..Planes::default() };
         planes.position = [depths.clone(), vec![0.0; depths.len()], vec![0.0; depths.len()]];
         let mut order = Order::default();
