@@ -12,9 +12,12 @@
 //! | `shN` labels | 2 | low and high byte of a row of the palette |
 //! | `shN` centroids | 3 | the palette: 64 entries a row, 3, 8 or 15 pixels each; by codebook or range |
 
+mod codebook;
 mod image;
 mod meta;
+mod palette;
 mod planes;
+mod write;
 
 use std::io::Cursor;
 use std::path::Path;
@@ -26,6 +29,8 @@ use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
 use crate::sequence::read_member;
 use splatstream_gaussians::GaussianFrame;
+
+pub use write::write_zip;
 
 /// The name of the file that describes the others.
 pub(crate) const META: &str = "meta.json";
