@@ -11,7 +11,7 @@ use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
 use crate::scene::Scene;
-use crate::sequence::{Sequence, SequenceOptions, SPLAT4D, SPLATV};
+use crate::sequence::{SPLAT4D, SPLATV, Sequence, SequenceOptions};
 use crate::{compressed_ply, gltf, ksplat, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
@@ -131,9 +131,10 @@ pub(crate) fn read_whole(
         SceneFormat::Sog => sog::read_zip_as_is(bytes, budget),
         SceneFormat::Gltf => gltf::read_as_is(bytes, directory, budget),
         SceneFormat::Ksplat => ksplat::read_as_is(bytes, budget),
-        SceneFormat::Splatv | SceneFormat::Splat4d | SceneFormat::Archive => {
-            Err(SceneError::unsupported("a sequence inside of an archive", "unpack the archive, and give the sequence"))
-        }
+        SceneFormat::Splatv | SceneFormat::Splat4d | SceneFormat::Archive => Err(SceneError::unsupported(
+            "a sequence inside of an archive",
+            "unpack the archive, and give the sequence",
+        )),
     }
 }
 
@@ -160,7 +161,8 @@ fn format_of(head: &[u8], path: &Path, whole: impl Read + Seek) -> Result<SceneF
         return Ok(if is_tar(&start) { SceneFormat::Archive } else { SceneFormat::Spz });
     }
     if is_zip(head) {
-        let has_meta = ZipArchive::new(whole).is_ok_and(|archive| archive.index_for_name(sog::META).is_some());
+        let has_meta =
+            ZipArchive::new(whole).is_ok_and(|archive| archive.index_for_name(sog::META).is_some());
         let is_sog = has_meta || has_extension("sog");
         return Ok(if is_sog { SceneFormat::Sog } else { SceneFormat::Archive });
     }
@@ -179,7 +181,10 @@ fn format_of(head: &[u8], path: &Path, whole: impl Read + Seek) -> Result<SceneF
     if head.starts_with(&SPLATV) && !has_extension("splat") {
         return Ok(SceneFormat::Splatv);
     }
-    match [("splat", SceneFormat::Splat), ("ksplat", SceneFormat::Ksplat)].iter().find(|(name, _)| has_extension(name)) {
+    match [("splat", SceneFormat::Splat), ("ksplat", SceneFormat::Ksplat)]
+        .iter()
+        .find(|(name, _)| has_extension(name))
+    {
         Some(&(_, format)) => Ok(format),
         None => Err(SceneError::unsupported("the content is of no known scene format", GIVE)),
     }

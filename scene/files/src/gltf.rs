@@ -18,9 +18,12 @@ mod accessor;
 mod buffers;
 mod container;
 mod document;
+#[expect(clippy::arithmetic_side_effects, reason = "vectors and matrices of floats, which do not overflow")]
 mod placement;
 mod primitive;
+#[expect(clippy::arithmetic_side_effects, reason = "floats, and degrees from 1 to 3")]
 mod spin;
+#[expect(clippy::arithmetic_side_effects, reason = "vectors and matrices of floats, which do not overflow")]
 mod tree;
 mod write;
 
@@ -64,7 +67,10 @@ pub(crate) fn read_as_is(
         Some(directory) if is_inside(name) => read_file(&directory.join(name), budget),
         Some(_) => {
             let what = format!("the file names a buffer \"{name}\", which is not beside it");
-            Err(SceneError::unsupported(what, "put the buffers into the folder of the file, or export a .glb"))
+            Err(SceneError::unsupported(
+                what,
+                "put the buffers into the folder of the file, or export a .glb",
+            ))
         }
         None => {
             let what = format!("the file has a buffer outside of it, \"{name}\"");

@@ -17,9 +17,9 @@ use crate::scene::Scene;
 use splatstream_gaussians::GaussianFrame;
 
 pub(crate) use archive::read_member;
+pub use names::natural_order;
 pub(crate) use splats4d::MAGIC as SPLAT4D;
 pub(crate) use splatv::MAGIC as SPLATV;
-pub use names::natural_order;
 
 /// How the frames of a sequence are chosen, where the file leaves that open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,9 +106,14 @@ impl Sequence {
         let mut budget = Budget::new(limits);
         let frames: Result<Box<dyn Frames>, SceneError> = match format {
             SceneFormat::Archive => archive::open(source, &mut budget),
-            SceneFormat::Splatv => splatv::Splatv::open(source, options.samples, &mut budget).map(|it| Box::new(it) as _),
+            SceneFormat::Splatv => {
+                splatv::Splatv::open(source, options.samples, &mut budget).map(|it| Box::new(it) as _)
+            }
             SceneFormat::Splat4d => splats4d::Splat4d::open(source, &mut budget).map(|it| Box::new(it) as _),
-            _ => Err(SceneError::unsupported("the file holds one scene", "read it as a scene, not as a sequence")),
+            _ => Err(SceneError::unsupported(
+                "the file holds one scene",
+                "read it as a scene, not as a sequence",
+            )),
         };
         let frames = frames.map_err(|error| error.in_file(path))?;
         Ok(Self { path: path.to_path_buf(), limits: *limits, frames })
@@ -146,7 +151,8 @@ impl Sequence {
                 Err(SceneError::inconsistent(what, "count frames from 0"))
             }
         };
-        let path = self.frames.member(frame).map_or_else(|| self.path.clone(), |member| self.path.join(member));
+        let path =
+            self.frames.member(frame).map_or_else(|| self.path.clone(), |member| self.path.join(member));
         let frame = read.map_err(|error| error.in_file(&path))?;
         Ok(Scene { frame, notes: budget.into_notes() })
     }

@@ -55,7 +55,11 @@ fn header(frame: &GaussianFrame) -> String {
     let properties = |kind: &'static str, names: &[&str]| -> String {
         names.iter().map(|name| format!("property {kind} {name}\n")).collect()
     };
-    text.push_str(&format!("element chunk {}\n{}", frame.len().div_ceil(CHUNK), properties("float", &RANGES)));
+    text.push_str(&format!(
+        "element chunk {}\n{}",
+        frame.len().div_ceil(CHUNK),
+        properties("float", &RANGES)
+    ));
     text.push_str(&format!("element vertex {}\n{}", frame.len(), properties("uint", &WORDS)));
     if !frame.sh().is_empty() {
         text.push_str(&format!("element sh {}\n", frame.len()));
@@ -94,7 +98,8 @@ struct Chunk {
 impl Chunk {
     fn of(frame: &GaussianFrame, rows: &[u32]) -> Self {
         let range = |plane: &Vec<f32>, value: &dyn Fn(f32) -> f32| {
-            let values = || rows.iter().filter_map(|&row| plane.get(row as usize)).map(|&stored| value(stored));
+            let values =
+                || rows.iter().filter_map(|&row| plane.get(row as usize)).map(|&stored| value(stored));
             [values().fold(f32::INFINITY, f32::min), values().fold(f32::NEG_INFINITY, f32::max)]
         };
         let plain = |planes: &[Vec<f32>; 3]| planes.each_ref().map(|plane| range(plane, &|value| value));
@@ -107,7 +112,8 @@ impl Chunk {
 
     /// In the order of the properties: of each attribute the least values, then the greatest.
     fn ranges(&self) -> Vec<f32> {
-        let ends = |ranges: &[Range; 3]| [ranges.map(|[least, _]| least), ranges.map(|[_, most]| most)].concat();
+        let ends =
+            |ranges: &[Range; 3]| [ranges.map(|[least, _]| least), ranges.map(|[_, most]| most)].concat();
         [&self.position, &self.log_scale, &self.colour].into_iter().flat_map(ends).collect()
     }
 
@@ -116,9 +122,9 @@ impl Chunk {
         let rotation = row_of(frame.rotation(), row);
         // Validated: no quaternion is zero.
         let (largest, smallest) = to_smallest_three(normalised(rotation).unwrap_or([1.0, 0.0, 0.0, 0.0]));
-        let rotation = smallest.iter().fold(largest as u32, |word, part| {
-            word << 10 | ((part / SQRT_2 + 0.5) * 1023.0).round() as u32
-        });
+        let rotation = smallest
+            .iter()
+            .fold(largest as u32, |word, part| word << 10 | ((part / SQRT_2 + 0.5) * 1023.0).round() as u32);
         let colour = row_of(frame.dc(), row).map(|dc| colour_of_dc(dc) as f32);
         let [red, green, blue] = fractions(colour, &self.colour).map(|part| to_byte(part * 255.0));
         let opacity = frame.opacity_logit().get(row).map_or(0, |&logit| byte_of_logit(logit));

@@ -102,7 +102,8 @@ impl<'a, const N: usize> Values<'a, N> {
         if stride < size {
             return Err(wrong(format!("has a value of {size} bytes every {stride} bytes")));
         }
-        let needed = accessor.count.saturating_sub(1).saturating_mul(stride as u64).saturating_add(size as u64);
+        let needed =
+            accessor.count.saturating_sub(1).saturating_mul(stride as u64).saturating_add(size as u64);
         let offset = usize::try_from(accessor.byte_offset).unwrap_or(usize::MAX);
         let bytes = bytes.get(offset..).unwrap_or_default();
         if accessor.count > 0 && needed > bytes.len() as u64 {

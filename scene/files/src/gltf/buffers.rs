@@ -57,7 +57,9 @@ impl<'a> Buffers<'a> {
         let bytes = range.and_then(view_of).ok_or_else(|| {
             let (from, length, buffer) = (view.byte_offset, view.byte_length, view.buffer);
             let size = bytes.len();
-            broken(format!("buffer view {index} has {length} bytes from {from} of buffer {buffer}, which has {size}"))
+            broken(format!(
+                "buffer view {index} has {length} bytes from {from} of buffer {buffer}, which has {size}"
+            ))
         })?;
         Ok((bytes, view))
     }

@@ -30,7 +30,8 @@ impl Placement {
             return None;
         }
         let axes = DMat3::from_cols(axes.x_axis / scale.x, axes.y_axis / scale.y, axes.z_axis / scale.z);
-        let cosines = [axes.x_axis.dot(axes.y_axis), axes.y_axis.dot(axes.z_axis), axes.z_axis.dot(axes.x_axis)];
+        let cosines =
+            [axes.x_axis.dot(axes.y_axis), axes.y_axis.dot(axes.z_axis), axes.z_axis.dot(axes.x_axis)];
         if axes.determinant() <= 0.0 || cosines.iter().any(|cosine| !(cosine.abs() <= RIGHT_ANGLE)) {
             return None;
         }
@@ -94,7 +95,9 @@ fn shaped((rotation, log_scale): (DQuat, [f32; 3]), placement: &Placement) -> (D
         return (rotation, log_scale);
     }
     let scale = DVec3::from(log_scale.map(|log| libm::exp(log.into())));
-    let shape = DMat3::from_diagonal(placement.scale) * DMat3::from_quat(rotation / length) * DMat3::from_diagonal(scale);
+    let shape = DMat3::from_diagonal(placement.scale)
+        * DMat3::from_quat(rotation / length)
+        * DMat3::from_diagonal(scale);
     let (axes, squares) = principal_axes(shape * shape.transpose());
     let logs = squares.to_array().map(|square| (0.5 * libm::log(square.max(f64::MIN_POSITIVE))) as f32);
     (placement.rotation * DQuat::from_mat3(&axes), logs)
@@ -152,7 +155,8 @@ mod tests {
     #[test]
     fn a_transform_in_gltf_is_that_of_the_flipped_frame() {
         let turn = DQuat::from_xyzw(0.3, -0.1, 0.7, 0.6).normalize();
-        let matrix = DMat4::from_scale_rotation_translation(DVec3::splat(2.0), turn, DVec3::new(1.0, 2.0, 3.0));
+        let matrix =
+            DMat4::from_scale_rotation_translation(DVec3::splat(2.0), turn, DVec3::new(1.0, 2.0, 3.0));
         let planes = Planes {
             position: [vec![0.5], vec![-1.5], vec![4.0]],
             rotation: [vec![1.0], vec![0.0], vec![0.0], vec![0.0]],

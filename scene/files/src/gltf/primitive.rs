@@ -5,12 +5,12 @@ use super::accessor::Values;
 use super::buffers::Buffers;
 use super::document::{Compressed, Document, Primitive, broken};
 use super::tree::Part;
+use crate::axes::Flip;
 use crate::byte_values::{log_scale_of, logit_within};
 use crate::error::SceneError;
 use crate::limits::Budget;
 use crate::note::Note;
 use crate::reading::frame_of;
-use crate::axes::Flip;
 use crate::spz;
 use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, sh_coefficients};
 
@@ -77,9 +77,10 @@ fn check(part: &Part<'_>, budget: &mut Budget) -> Result<(), SceneError> {
 /// Where a primitive is compressed.
 fn compressed(primitive: &Primitive) -> Option<Compressed> {
     let extensions = &primitive.extensions;
-    let inside = extensions.gaussians.iter().find_map(|gaussians| {
-        SPZ.iter().find_map(|&name| gaussians.extensions.get(name))
-    });
+    let inside = extensions
+        .gaussians
+        .iter()
+        .find_map(|gaussians| SPZ.iter().find_map(|&name| gaussians.extensions.get(name)));
     inside.copied().or(extensions.spz_draft)
 }
 
@@ -92,7 +93,8 @@ pub(super) const REQUIRED: [&str; 5] = ["POSITION", ROTATION, SCALE, OPACITY, DC
 /// The attributes of the coefficients of some degrees, in the order of a frame.
 pub(super) fn sh_names(sh_degree: u8) -> impl Iterator<Item = String> {
     (1..=sh_degree).flat_map(|degree| {
-        (0..=u16::from(degree).saturating_mul(2)).map(move |at| format!("{EXTENSION}:SH_DEGREE_{degree}_COEF_{at}"))
+        (0..=u16::from(degree).saturating_mul(2))
+            .map(move |at| format!("{EXTENSION}:SH_DEGREE_{degree}_COEF_{at}"))
     })
 }
 
@@ -169,13 +171,16 @@ fn sh_degree(part: &Part<'_>, budget: &mut Budget) -> Result<u8, SceneError> {
     let mut degree = 0_u8;
     for next in 1..=MAX_SH_DEGREE {
         let first = sh_coefficients(next.saturating_sub(1));
-        let missing: Vec<String> = sh_names(next).skip(first).filter(|name| !found.contains_key(name)).collect();
+        let missing: Vec<String> =
+            sh_names(next).skip(first).filter(|name| !found.contains_key(name)).collect();
         let is_whole = missing.is_empty();
         let is_there = missing.len() < sh_coefficients(next).saturating_sub(first);
         if is_there && !(is_whole && degree.checked_add(1) == Some(next)) {
             let what = match missing.first() {
                 Some(name) => format!("{} lacks {name}", name_of_degree(part, next)),
-                None => format!("{} comes without degree {}", name_of_degree(part, next), next.saturating_sub(1)),
+                None => {
+                    format!("{} comes without degree {}", name_of_degree(part, next), next.saturating_sub(1))
+                }
             };
             return Err(broken(what));
         }

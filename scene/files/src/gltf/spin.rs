@@ -93,7 +93,8 @@ mod tests {
     fn a_turned_function_has_the_values_of_where_it_came_from() {
         let rotation = DQuat::from_xyzw(0.4, -0.3, 0.2, 0.7).normalize();
         let old: Vec<f64> = (0..15).map(|at| f64::from(at * 7 % 11) / 10.0 - 0.4).collect();
-        let mut planes: Vec<Vec<f32>> = old.iter().flat_map(|&value| [value as f32; 3].map(|value| vec![value])).collect();
+        let mut planes: Vec<Vec<f32>> =
+            old.iter().flat_map(|&value| [value as f32; 3].map(|value| vec![value])).collect();
         Spin::of(rotation).turn(planes.iter_mut().map(Vec::as_mut_slice).collect());
         for channel in 0..3 {
             let new: Vec<f64> = planes.iter().skip(channel).step_by(3).map(|plane| plane[0].into()).collect();

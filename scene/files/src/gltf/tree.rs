@@ -1,9 +1,9 @@
 //! The nodes of a scene: which primitives of Gaussians it shows, and where.
 
 use super::document::{Document, Node, Primitive, broken};
+use super::note_others;
 use super::placement::Placement;
 use super::primitive::is_gaussians;
-use super::note_others;
 use crate::error::SceneError;
 use crate::limits::Budget;
 use glam::{DMat4, DQuat, DVec3};
@@ -20,15 +20,20 @@ pub(super) struct Part<'a> {
 }
 
 /// The primitives of Gaussians of the scene, in the order of its nodes: a node, then its children.
-pub(super) fn gaussians<'a>(document: &'a Document, budget: &mut Budget) -> Result<Vec<Part<'a>>, SceneError> {
+pub(super) fn gaussians<'a>(
+    document: &'a Document,
+    budget: &mut Budget,
+) -> Result<Vec<Part<'a>>, SceneError> {
     let mut parts = Vec::new();
     let (mut others, mut is_seen) = (0_u64, budget.room(document.nodes.len() as u64, WHAT)?);
     is_seen.resize(document.nodes.len(), false);
     // The last is the next.
-    let mut waiting: Vec<(u32, DMat4)> = roots(document)?.into_iter().rev().map(|node| (node, DMat4::IDENTITY)).collect();
+    let mut waiting: Vec<(u32, DMat4)> =
+        roots(document)?.into_iter().rev().map(|node| (node, DMat4::IDENTITY)).collect();
     budget.take((waiting.len() as u64).saturating_mul(size_of::<(u32, DMat4)>() as u64), WHAT)?;
     while let Some((index, parent)) = waiting.pop() {
-        let node = document.nodes.get(index as usize).ok_or_else(|| broken(format!("there is no node {index}")))?;
+        let node =
+            document.nodes.get(index as usize).ok_or_else(|| broken(format!("there is no node {index}")))?;
         if is_seen.get_mut(index as usize).is_none_or(|seen| std::mem::replace(seen, true)) {
             return Err(broken(format!("node {index} comes twice: nodes must be a tree")));
         }
@@ -95,7 +100,9 @@ fn own_matrix(node: &Node) -> DMat4 {
     if let Some(matrix) = &node.matrix {
         return DMat4::from_cols_array(matrix);
     }
-    let vector = |values: &Option<Box<[f64; 3]>>, usual| values.as_deref().map_or(usual, |&values| DVec3::from(values));
+    let vector = |values: &Option<Box<[f64; 3]>>, usual| {
+        values.as_deref().map_or(usual, |&values| DVec3::from(values))
+    };
     let rotation = node.rotation.as_deref().map_or(DQuat::IDENTITY, |&parts| DQuat::from_array(parts));
     let (scale, translation) = (vector(&node.scale, DVec3::ONE), vector(&node.translation, DVec3::ZERO));
     // A rotation without direction gives numbers that are none, which placing refuses.

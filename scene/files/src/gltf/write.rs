@@ -1,9 +1,9 @@
 //! Writing `.glb`.
 
+use super::EXTENSION;
 use super::accessor::{FLOAT, UNSIGNED_BYTE};
 use super::container::{BINARY, JSON, MAGIC, VERSION};
 use super::primitive::{REQUIRED, sh_names};
-use super::EXTENSION;
 use crate::axes::Flip;
 use crate::byte_values::{byte_of_logit, is_beyond_scales, scale_of_log, to_byte};
 use crate::clamped::Clamped;
@@ -112,7 +112,8 @@ impl Parts {
     fn add_colours(&mut self, frame: &GaussianFrame) {
         let linear = |dc: f32| {
             let colour = colour_of_dc(dc).clamp(0.0, 1.0);
-            let linear = if colour <= 0.04045 { colour / 12.92 } else { libm::pow((colour + 0.055) / 1.055, 2.4) };
+            let linear =
+                if colour <= 0.04045 { colour / 12.92 } else { libm::pow((colour + 0.055) / 1.055, 2.4) };
             to_byte(linear * 255.0)
         };
         let colours = frame.opacity_logit().iter().enumerate().flat_map(|(row, &logit)| {

@@ -30,7 +30,11 @@ impl Level {
             0 => Ok(Self::Floats),
             1 => Ok(Self::Halves),
             2 => Ok(Self::HalvesAndBytes),
-            _ => Err(SceneError::malformed(20, format!("compression level {level}, 0 to 2 are known"), NOT_KSPLAT)),
+            _ => Err(SceneError::malformed(
+                20,
+                format!("compression level {level}, 0 to 2 are known"),
+                NOT_KSPLAT,
+            )),
         }
     }
 
@@ -113,7 +117,8 @@ impl<'a> Section<'a> {
         let range = if range == 0 { 32767.0 } else { range as f32 };
         let lengths = body.take_rows(partial.into(), 4, "the lengths of buckets")?;
         let centres = body.take_rows(buckets.into(), centre_stride.into(), "the centres of buckets")?;
-        let data = body.take_rows(capacity.into(), stride(level, sh_degree) as u64, "the Gaussians of a section")?;
+        let data =
+            body.take_rows(capacity.into(), stride(level, sh_degree) as u64, "the Gaussians of a section")?;
         Ok(Self {
             at,
             count: count.into(),
@@ -137,7 +142,10 @@ impl<'a> Section<'a> {
     /// The Gaussians.
     pub(super) fn rows(&self) -> impl Iterator<Item = Row<'a>> {
         let (level, count) = (self.level, usize::try_from(self.count).unwrap_or(usize::MAX));
-        self.data.chunks_exact(stride(level, self.sh_degree)).take(count).map(move |bytes| Row { level, bytes })
+        self.data
+            .chunks_exact(stride(level, self.sh_degree))
+            .take(count)
+            .map(move |bytes| Row { level, bytes })
     }
 
     /// The centre of the bucket of one Gaussian after another; no centre ends them, where there are too few.
@@ -151,9 +159,7 @@ impl<'a> Section<'a> {
             centre.iter_mut().zip(parts).for_each(|(to, from)| *to = from);
             centre
         });
-        let in_buckets = lengths
-            .zip(centres)
-            .flat_map(|(length, centre)| (0..length).map(move |_| centre));
+        let in_buckets = lengths.zip(centres).flat_map(|(length, centre)| (0..length).map(move |_| centre));
         let has_none = self.level == Level::Floats;
         let none = (0..if has_none { self.count } else { 0 }).map(|_| [0.0; 3]);
         in_buckets.take(if has_none { 0 } else { usize::MAX }).chain(none)

@@ -44,7 +44,9 @@ pub(super) fn open(mut source: Box<dyn Source>, budget: &mut Budget) -> Result<B
 }
 
 /// The names that are frames, in their order, each with its place in the archive. All must be of one format.
-fn frames<'a>(names: impl Iterator<Item = (usize, Cow<'a, str>)>) -> Result<Vec<(usize, String)>, SceneError> {
+fn frames<'a>(
+    names: impl Iterator<Item = (usize, Cow<'a, str>)>,
+) -> Result<Vec<(usize, String)>, SceneError> {
     let mut frames = Vec::new();
     let mut kinds = BTreeSet::new();
     for (place, name) in names {
@@ -57,7 +59,10 @@ fn frames<'a>(names: impl Iterator<Item = (usize, Cow<'a, str>)>) -> Result<Vec<
     match kinds.as_slice() {
         [] => {
             let what = "the archive holds no frames";
-            Err(SceneError::inconsistent(what, "pack .ply, .compressed.ply, .spz, .sog, .splat, .ksplat or .glb files"))
+            Err(SceneError::inconsistent(
+                what,
+                "pack .ply, .compressed.ply, .spz, .sog, .splat, .ksplat or .glb files",
+            ))
         }
         [_] => {
             frames.sort_by(|(_, a), (_, b)| natural_order(a, b));
@@ -76,12 +81,16 @@ fn kind(name: &str) -> Option<&'static str> {
     let is_hidden = path.file_name()?.to_str()?.starts_with('.') || name.starts_with("__MACOSX/");
     let extension = path.extension()?.to_str()?;
     // The buffers of a .gltf would be other members.
-    let known = EXTENSIONS.into_iter().find(|known| extension.eq_ignore_ascii_case(known) && *known != "gltf");
+    let known =
+        EXTENSIONS.into_iter().find(|known| extension.eq_ignore_ascii_case(known) && *known != "gltf");
     known.filter(|_| !is_hidden && !name.ends_with('/'))
 }
 
 /// The bytes of a member of a ZIP archive, as many as it says.
-pub(crate) fn read_member<R: Read>(mut member: ZipFile<'_, R>, budget: &mut Budget) -> Result<Vec<u8>, SceneError> {
+pub(crate) fn read_member<R: Read>(
+    mut member: ZipFile<'_, R>,
+    budget: &mut Budget,
+) -> Result<Vec<u8>, SceneError> {
     let refuse = |what: String| SceneError::inconsistent(what, DAMAGED);
     let name = member.name().map_or_else(|_| MEMBER.to_owned(), |name| name.escape_default().to_string());
     let size = member.size();
@@ -173,7 +182,8 @@ fn unpacked(mut source: Box<dyn Source>) -> Result<Box<dyn Source>, SceneError> 
     let most = packed.saturating_mul(MOST_RATIO).max(1 << 20);
     let mut file = tempfile::tempfile()?;
     let mut content = MultiGzDecoder::new(io::BufReader::new(source)).take(most.saturating_add(1));
-    let refuse = |error: io::Error| SceneError::inconsistent(format!("cannot unpack the archive: {error}"), DAMAGED);
+    let refuse =
+        |error: io::Error| SceneError::inconsistent(format!("cannot unpack the archive: {error}"), DAMAGED);
     let length = io::copy(&mut content, &mut file).map_err(refuse)?;
     if length > most {
         let what = format!("the archive becomes more than {MOST_RATIO} times as long as it is");

@@ -76,12 +76,18 @@ impl Splat4d {
     /// How many Gaussians have values of their own in each frame.
     fn changing(&self, attribute: usize) -> usize {
         let mask = self.still.masks.get(attribute);
-        let still = mask.map_or(0, |mask| (0..self.header.gaussians).filter(|&row| is_set(mask, row)).count());
+        let still =
+            mask.map_or(0, |mask| (0..self.header.gaussians).filter(|&row| is_set(mask, row)).count());
         self.header.gaussians.saturating_sub(still)
     }
 
     /// The group of a frame, read if another one is open.
-    fn open_group(&mut self, index: usize, group: &Group, budget: &mut Budget) -> Result<OpenGroup, SceneError> {
+    fn open_group(
+        &mut self,
+        index: usize,
+        group: &Group,
+        budget: &mut Budget,
+    ) -> Result<OpenGroup, SceneError> {
         if let Some(open) = self.group.take_if(|open| open.index == index) {
             budget.take(open.used, "a group of frames")?;
             return Ok(open);
@@ -180,7 +186,8 @@ impl Frames for Splat4d {
     fn read(&mut self, frame: u32, budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
         budget.take(self.used, "what does not change")?;
         let found = self.header.group_of(frame as usize).map(|(index, group)| (index, group.clone()));
-        let (index, group) = found.ok_or_else(|| SceneError::inconsistent("a frame in no group", NOT_SPLAT4D))?;
+        let (index, group) =
+            found.ok_or_else(|| SceneError::inconsistent("a frame in no group", NOT_SPLAT4D))?;
         let mut open = self.open_group(index, &group, budget)?;
         open.go_to((frame as usize).saturating_sub(group.first));
         let planes = self.planes(&open, budget);
@@ -190,7 +197,11 @@ impl Frames for Splat4d {
 }
 
 impl Splat4d {
-    fn planes(&self, open: &OpenGroup, budget: &mut Budget) -> Result<splatstream_gaussians::Planes, SceneError> {
+    fn planes(
+        &self,
+        open: &OpenGroup,
+        budget: &mut Budget,
+    ) -> Result<splatstream_gaussians::Planes, SceneError> {
         let mut planes = budget.planes(0, self.header.gaussians as u64)?;
         let (still, steps) = (&self.still, &self.header.steps);
         // The next values of each attribute, of those Gaussians that change.
@@ -207,7 +218,8 @@ impl Splat4d {
             }
             values
         };
-        let of = |values: &[i32], at: usize, step: f64| f64::from(values.get(at).copied().unwrap_or(0)) * step;
+        let of =
+            |values: &[i32], at: usize, step: f64| f64::from(values.get(at).copied().unwrap_or(0)) * step;
         for row in 0..self.header.gaussians {
             let at_rest = |at| of(&still.position, at, steps.base_position);
             let position = value_of(POSITION, row, &at_rest, steps.position);

@@ -78,12 +78,13 @@ impl Splatv {
         let json = cursor.u32("the header")?;
         let json = cursor.take(json.into(), "the list of chunks")?;
         budget.take((json.len() as u64).saturating_mul(PARSED), "the list of chunks")?;
-        let chunks: Vec<Chunk> =
-            serde_json::from_slice(json).map_err(|error| SceneError::malformed(8, error.to_string(), NOT_SPLATV))?;
+        let chunks: Vec<Chunk> = serde_json::from_slice(json)
+            .map_err(|error| SceneError::malformed(8, error.to_string(), NOT_SPLATV))?;
         if !chunks.iter().any(|chunk| chunk.kind == "splat") {
             return Err(SceneError::malformed(8, "no chunk is of the type splat", NOT_SPLATV));
         }
-        let (mut records, mut unusable) = (budget.room(cursor.remaining().len() as u64, "the Gaussians")?, 0_u64);
+        let (mut records, mut unusable) =
+            (budget.room(cursor.remaining().len() as u64, "the Gaussians")?, 0_u64);
         for chunk in chunks {
             // The texture that a chunk is meant for is larger than the chunk.
             let size = chunk.size.min(cursor.remaining().len() as u64);
@@ -91,7 +92,9 @@ impl Splatv {
             for record in part.as_chunks::<RECORD>().0.iter().filter(|_| chunk.kind == "splat") {
                 match Record(record).is_usable() {
                     true => records.extend_from_slice(record),
-                    false => unusable = unusable.saturating_add(u64::from(record.iter().any(|&byte| byte != 0))),
+                    false => {
+                        unusable = unusable.saturating_add(u64::from(record.iter().any(|&byte| byte != 0)))
+                    }
                 }
             }
         }
@@ -145,7 +148,10 @@ impl Record<'_> {
         let centre = (0..3_usize).map(|axis| self.float(axis));
         let mut all = centre.chain(of(12, 7)).chain(of(32, 9)).chain(of(52, 6));
         let [.., opacity] = self.colour();
-        all.all(f64::is_finite) && opacity > 0 && of(20, 3).all(|scale| scale > 0.0) && of(12, 4).any(|part| part != 0.0)
+        all.all(f64::is_finite)
+            && opacity > 0
+            && of(20, 3).all(|scale| scale > 0.0)
+            && of(12, 4).any(|part| part != 0.0)
     }
 
     /// A coordinate of the centre, so long after the time of the Gaussian.

@@ -32,8 +32,15 @@ pub(super) fn members(source: impl Read + Seek, budget: &mut Budget) -> Result<V
             EntryType::Regular | EntryType::Continuous => {
                 let name = given.take().unwrap_or_else(|| entry.path_bytes().into_owned());
                 let name = String::from_utf8_lossy(&name).trim_end_matches('\0').to_owned();
-                budget.take((name.len() as u64).saturating_add(size_of::<Member>() as u64).saturating_mul(2), "names")?;
-                members.push(Member { name, at: entry.raw_file_position(), size: entry.header().size().map_err(refuse)? });
+                budget.take(
+                    (name.len() as u64).saturating_add(size_of::<Member>() as u64).saturating_mul(2),
+                    "names",
+                )?;
+                members.push(Member {
+                    name,
+                    at: entry.raw_file_position(),
+                    size: entry.header().size().map_err(refuse)?,
+                });
             }
             EntryType::XGlobalHeader => {}
             _ => given = None,

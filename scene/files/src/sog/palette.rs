@@ -88,9 +88,13 @@ impl Part {
             }
         }
         let means: Vec<f64> = sums.iter().map(|sum| sum / count).collect();
-        let spreads: Vec<f64> =
-            squares.iter().zip(&means).map(|(square, mean)| (square - mean * mean * count).max(0.0)).collect();
-        let axis = (0..rows.width).max_by(|&a, &b| spread(&spreads, a).total_cmp(&spread(&spreads, b)).then(b.cmp(&a)));
+        let spreads: Vec<f64> = squares
+            .iter()
+            .zip(&means)
+            .map(|(square, mean)| (square - mean * mean * count).max(0.0))
+            .collect();
+        let axis = (0..rows.width)
+            .max_by(|&a, &b| spread(&spreads, a).total_cmp(&spread(&spreads, b)).then(b.cmp(&a)));
         let axis = axis.unwrap_or(0);
         let middle = spread(&means, axis);
         let entry = means.into_iter().map(|mean| mean as f32).collect();
@@ -117,12 +121,15 @@ struct Tree {
 impl Tree {
     fn of(rows: &Rows, most: usize) -> Self {
         let (first, entry) = Part::of(rows, (0..rows.len() as u32).collect(), 0);
-        let mut tree = Self { nodes: vec![Node::Entry(0)], entries: Rows { values: entry, width: rows.width } };
+        let mut tree =
+            Self { nodes: vec![Node::Entry(0)], entries: Rows { values: entry, width: rows.width } };
         let mut parts = BinaryHeap::from([first]);
         while tree.entries.len() < most
             && let Some(part) = parts.pop()
         {
-            let is_below = |&&row: &&u32| rows.get(row).get(part.axis).is_some_and(|&value| f64::from(value) < part.middle);
+            let is_below = |&&row: &&u32| {
+                rows.get(row).get(part.axis).is_some_and(|&value| f64::from(value) < part.middle)
+            };
             let (below, above): (Vec<u32>, Vec<u32>) = part.rows.iter().partition(is_below);
             // Rows that are alike are not divided, nor are those that differ by less than rounding.
             if below.is_empty() || above.is_empty() {
@@ -141,7 +148,12 @@ impl Tree {
             _ => 0,
         };
         let new = self.entries.len() as u32;
-        let node = Node::Division { axis: part.axis, middle: part.middle, below: first, above: first.saturating_add(1) };
+        let node = Node::Division {
+            axis: part.axis,
+            middle: part.middle,
+            below: first,
+            above: first.saturating_add(1),
+        };
         self.nodes.get_mut(part.node).into_iter().for_each(|place| *place = node);
         self.nodes.extend([Node::Entry(old), Node::Entry(new)]);
         let (below, entry) = Part::of(rows, below, first);
@@ -180,7 +192,8 @@ impl Tree {
                 at = near;
             }
             if let Some(&Node::Entry(entry)) = self.nodes.get(at) {
-                let apart: f32 = row.iter().zip(self.entries.get(entry)).map(|(a, b)| (a - b) * (a - b)).sum();
+                let apart: f32 =
+                    row.iter().zip(self.entries.get(entry)).map(|(a, b)| (a - b) * (a - b)).sum();
                 if apart < best.0 || (apart == best.0 && entry < best.1) {
                     best = (apart, entry);
                 }
@@ -272,8 +285,12 @@ mod tests {
     fn the_entry_of_a_row_is_mostly_the_nearest() {
         let rows = random_rows(2000, 9);
         let (entries, labels) = palette(&rows, 128);
-        let apart = |row: u32, entry: u32| -> f32 { rows.get(row).iter().zip(entries.get(entry)).map(|(a, b)| (a - b).powi(2)).sum() };
-        let nearest = (0..).zip(&labels).filter(|&(row, &label)| (0..128).all(|other| apart(row, other) >= apart(row, label)));
+        let apart = |row: u32, entry: u32| -> f32 {
+            rows.get(row).iter().zip(entries.get(entry)).map(|(a, b)| (a - b).powi(2)).sum()
+        };
+        let nearest = (0..)
+            .zip(&labels)
+            .filter(|&(row, &label)| (0..128).all(|other| apart(row, other) >= apart(row, label)));
         assert!(nearest.count() > 1800);
     }
 }

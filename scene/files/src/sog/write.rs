@@ -42,16 +42,22 @@ pub fn write_zip(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
     let means = means(frame, &order, &mut files)?;
     files.add("quats.webp", order.iter().map(|&row| rotation(frame, row as usize)))?;
     let scales = codebook(frame.log_scale().concat());
-    files.add("scales.webp", order.iter().map(|&row| {
-        let [x, y, z] = row_of(frame.log_scale(), row as usize).map(|log| nearest(&scales, log));
-        [x, y, z, 255]
-    }))?;
+    files.add(
+        "scales.webp",
+        order.iter().map(|&row| {
+            let [x, y, z] = row_of(frame.log_scale(), row as usize).map(|log| nearest(&scales, log));
+            [x, y, z, 255]
+        }),
+    )?;
     let colours = codebook(frame.dc().concat());
-    files.add("sh0.webp", order.iter().map(|&row| {
-        let [red, green, blue] = row_of(frame.dc(), row as usize).map(|dc| nearest(&colours, dc));
-        let opacity = frame.opacity_logit().get(row as usize).map_or(0, |&logit| byte_of_logit(logit));
-        [red, green, blue, opacity]
-    }))?;
+    files.add(
+        "sh0.webp",
+        order.iter().map(|&row| {
+            let [red, green, blue] = row_of(frame.dc(), row as usize).map(|dc| nearest(&colours, dc));
+            let opacity = frame.opacity_logit().get(row as usize).map_or(0, |&logit| byte_of_logit(logit));
+            [red, green, blue, opacity]
+        }),
+    )?;
     let mut meta = json!({
         "version": 2,
         "asset": { "generator": concat!("SplatStream ", env!("CARGO_PKG_VERSION")) },
@@ -78,7 +84,8 @@ impl Files {
     /// A nearly square image of a pixel for each Gaussian, sides multiples of four.
     fn for_frame(frame: &GaussianFrame) -> Result<Self, SceneError> {
         let count = frame.len();
-        let width = count.isqrt().saturating_add(usize::from(count.isqrt().saturating_mul(count.isqrt()) < count));
+        let width =
+            count.isqrt().saturating_add(usize::from(count.isqrt().saturating_mul(count.isqrt()) < count));
         let width = width.next_multiple_of(4);
         let height = count.div_ceil(width.max(1)).next_multiple_of(4);
         if count == 0 || width.max(height) > MOST_PIXELS {
@@ -144,14 +151,20 @@ fn means(frame: &GaussianFrame, order: &[u32], files: &mut Files) -> Result<Valu
         }
         codes.map(u16::to_le_bytes)
     };
-    files.add("means_l.webp", order.iter().map(|&row| {
-        let [[x, _], [y, _], [z, _]] = code(row);
-        [x, y, z, 255]
-    }))?;
-    files.add("means_u.webp", order.iter().map(|&row| {
-        let [[_, x], [_, y], [_, z]] = code(row);
-        [x, y, z, 255]
-    }))?;
+    files.add(
+        "means_l.webp",
+        order.iter().map(|&row| {
+            let [[x, _], [y, _], [z, _]] = code(row);
+            [x, y, z, 255]
+        }),
+    )?;
+    files.add(
+        "means_u.webp",
+        order.iter().map(|&row| {
+            let [[_, x], [_, y], [_, z]] = code(row);
+            [x, y, z, 255]
+        }),
+    )?;
     Ok(json!({ "mins": mins, "maxs": maxs, "files": ["means_l.webp", "means_u.webp"] }))
 }
 
@@ -169,7 +182,8 @@ fn harmonics(frame: &GaussianFrame, order: &[u32], files: &mut Files) -> Result<
     if frame.sh().is_empty() {
         return Ok(None);
     }
-    let values = (0..frame.len()).flat_map(|row| frame.sh().iter().filter_map(move |plane| plane.get(row).copied()));
+    let values =
+        (0..frame.len()).flat_map(|row| frame.sh().iter().filter_map(move |plane| plane.get(row).copied()));
     let rows = Rows { values: values.collect(), width: frame.sh().len() };
     let (entries, labels) = palette(&rows, entries_for(frame.len()));
     drop(rows);
@@ -181,10 +195,13 @@ fn harmonics(frame: &GaussianFrame, order: &[u32], files: &mut Files) -> Result<
     let count = entries.len();
     let width = sh_coefficients(frame.sh_degree()).saturating_mul(ENTRIES_A_ROW);
     files.add_of_size("shN_centroids.webp", pixels, width, count.div_ceil(ENTRIES_A_ROW))?;
-    files.add("shN_labels.webp", order.iter().map(|&row| {
-        let [low, high, ..] = labels.get(row as usize).copied().unwrap_or(0).to_le_bytes();
-        [low, high, 0, 255]
-    }))?;
+    files.add(
+        "shN_labels.webp",
+        order.iter().map(|&row| {
+            let [low, high, ..] = labels.get(row as usize).copied().unwrap_or(0).to_le_bytes();
+            [low, high, 0, 255]
+        }),
+    )?;
     Ok(Some(json!({
         "count": count, "bands": frame.sh_degree(), "codebook": codes,
         "files": ["shN_centroids.webp", "shN_labels.webp"],

@@ -81,7 +81,9 @@ impl Header {
         let size = source.seek(SeekFrom::End(0))?;
         source.rewind()?;
         let mut head = [0; 12];
-        source.read_exact(&mut head).map_err(|_| SceneError::truncated(0, "the header", 12, size as usize))?;
+        source
+            .read_exact(&mut head)
+            .map_err(|_| SceneError::truncated(0, "the header", 12, size as usize))?;
         let [[a, b, c, d], [version, _, _, _], length] = *head.as_chunks().0 else {
             return Err(SceneError::malformed(0, "no header", NOT_SPLAT4D));
         };
@@ -89,7 +91,10 @@ impl Header {
             return Err(SceneError::malformed(0, "the magic number is another", NOT_SPLAT4D));
         }
         if version != 1 {
-            return Err(SceneError::unsupported(format!(".splat4d of version {version}"), "version 1 is known"));
+            return Err(SceneError::unsupported(
+                format!(".splat4d of version {version}"),
+                "version 1 is known",
+            ));
         }
         let length = u64::from(u32::from_le_bytes(length));
         let there = size.saturating_sub(12);
@@ -112,9 +117,15 @@ impl Header {
     }
 
     fn check(&self, size: u64) -> Result<(), SceneError> {
-        let lies_inside = |offset: u64, length: u64| offset.checked_add(length).is_some_and(|end| end <= size);
+        let lies_inside =
+            |offset: u64, length: u64| offset.checked_add(length).is_some_and(|end| end <= size);
         if !lies_inside(self.still.offset, self.still.length) {
-            return Err(SceneError::truncated(self.still.offset as usize, "the static section", self.still.length, 0));
+            return Err(SceneError::truncated(
+                self.still.offset as usize,
+                "the static section",
+                self.still.length,
+                0,
+            ));
         }
         let mut next = 0_usize;
         for (index, group) in self.groups.iter().enumerate() {
@@ -122,7 +133,12 @@ impl Header {
                 return Err(broken(format!("group {index} has frames {} to {}", group.first, group.last)));
             }
             if !lies_inside(group.offset, group.length) {
-                return Err(SceneError::truncated(group.offset as usize, "a group of frames", group.length, 0));
+                return Err(SceneError::truncated(
+                    group.offset as usize,
+                    "a group of frames",
+                    group.length,
+                    0,
+                ));
             }
             next = group.last.saturating_add(1);
         }

@@ -23,7 +23,9 @@ impl Stream {
     /// An integer, which is there.
     pub(super) fn get(&self, at: usize) -> u32 {
         let planes = self.bytes.chunks_exact(self.count.max(1)).enumerate();
-        planes.fold(0, |sum, (plane, bytes)| sum | u32::from(bytes.get(at).copied().unwrap_or(0)) << (8 * plane))
+        planes.fold(0, |sum, (plane, bytes)| {
+            sum | u32::from(bytes.get(at).copied().unwrap_or(0)) << (8 * plane)
+        })
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
@@ -63,7 +65,12 @@ impl<'a> Cursor<'a> {
     }
 
     /// A stream of so many integers, after its head.
-    pub(super) fn stream(&mut self, count: usize, what: &'static str, budget: &mut Budget) -> Result<Stream, SceneError> {
+    pub(super) fn stream(
+        &mut self,
+        count: usize,
+        what: &'static str,
+        budget: &mut Budget,
+    ) -> Result<Stream, SceneError> {
         let head = self.head(what)?;
         self.content(head, count, what, budget)
     }
@@ -143,12 +150,15 @@ impl Chunk {
             *slot = Some(cursor.content(head, count.saturating_mul(frames), WHAT, budget)?);
         }
         let whole = |streams: [Option<Stream>; 5], frames: usize| {
-            let is_whole = streams.iter().zip(counts).all(|(stream, &count)| {
-                stream.is_some() || count == 0 || frames == 0
-            });
+            let is_whole = streams
+                .iter()
+                .zip(counts)
+                .all(|(stream, &count)| stream.is_some() || count == 0 || frames == 0);
             match is_whole {
                 true => Ok(streams.map(Option::unwrap_or_default)),
-                false => Err(SceneError::malformed(group.offset as usize, "a group lacks streams", NOT_SPLAT4D)),
+                false => {
+                    Err(SceneError::malformed(group.offset as usize, "a group lacks streams", NOT_SPLAT4D))
+                }
             }
         };
         Ok(Self { keys: whole(keys, 1)?, deltas: whole(deltas, group.frames().saturating_sub(1))? })
