@@ -14,7 +14,9 @@ impl ReadNotes {
     pub(crate) fn add(&mut self, frame: u32, notes: Vec<Note>) {
         for note in notes {
             match self.0.iter_mut().find(|(known, _)| known.code() == note.code()) {
-                Some((_, frames)) => drop(frames.insert(frame)),
+                Some((_, frames)) => {
+                    frames.insert(frame);
+                }
                 None => self.0.push((note, BTreeSet::from([frame]))),
             }
         }
