@@ -32,7 +32,7 @@ impl Placement {
         let axes = DMat3::from_cols(axes.x_axis / scale.x, axes.y_axis / scale.y, axes.z_axis / scale.z);
         let cosines =
             [axes.x_axis.dot(axes.y_axis), axes.y_axis.dot(axes.z_axis), axes.z_axis.dot(axes.x_axis)];
-        if axes.determinant() <= 0.0 || cosines.iter().any(|cosine| !(cosine.abs() <= RIGHT_ANGLE)) {
+        if axes.determinant() <= 0.0 || !cosines.iter().all(|cosine| cosine.abs() <= RIGHT_ANGLE) {
             return None;
         }
         // Half a turn about z on both sides: what it does to a vector it does to the axis of a rotation.
@@ -91,7 +91,7 @@ fn shaped((rotation, log_scale): (DQuat, [f32; 3]), placement: &Placement) -> (D
     }
     // The ellipsoid is stretched along axes that are not its own: its new axes are those of its covariance.
     let length = rotation.length();
-    if !(length > 0.0) || !length.is_finite() {
+    if length <= 0.0 || !length.is_finite() {
         return (rotation, log_scale);
     }
     let scale = DVec3::from(log_scale.map(|log| libm::exp(log.into())));

@@ -255,7 +255,9 @@ mod tests {
 
     fn random_rows(count: usize, width: usize) -> Rows {
         let mut random = SplitMix64::new(7);
-        let values = (0..count * width).map(|_| (random.bits() >> 40) as f32 / (1 << 24) as f32).collect();
+        let values = (0..count.saturating_mul(width))
+            .map(|_| (random.bits() >> 40) as f32 / (1 << 24) as f32)
+            .collect();
         Rows { values, width }
     }
 

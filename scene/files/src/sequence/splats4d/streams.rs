@@ -22,10 +22,12 @@ impl Stream {
 
     /// An integer, which is there.
     pub(super) fn get(&self, at: usize) -> u32 {
-        let planes = self.bytes.chunks_exact(self.count.max(1)).enumerate();
-        planes.fold(0, |sum, (plane, bytes)| {
-            sum | u32::from(bytes.get(at).copied().unwrap_or(0)) << (8 * plane)
-        })
+        let mut word = [0; 4];
+        let planes = self.bytes.chunks_exact(self.count.max(1));
+        for (byte, plane) in word.iter_mut().zip(planes) {
+            *byte = plane.get(at).copied().unwrap_or(0);
+        }
+        u32::from_le_bytes(word)
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
@@ -40,7 +42,7 @@ impl Stream {
 
 /// The integer of a symbol, which has the sign in its lowest bit.
 pub(super) fn unzigzag(symbol: u32) -> i32 {
-    (symbol >> 1).cast_signed() ^ -((symbol & 1).cast_signed())
+    (symbol >> 1).cast_signed() ^ (symbol & 1).cast_signed().wrapping_neg()
 }
 
 /// What is next in a section, and where the section is in the file.
