@@ -63,7 +63,9 @@ seek() {
     if [ "$target" = scene ]; then
         # Of this reader only: its target shares its time among all of them.
         mkdir "$folder/seeds"
-        cp seeds/scene/*"${fault%%-[gz]*}"* "$folder/seeds"
+        for seed in seeds/scene/{,packed-}"${fault%%-[gz]*}"{,-*}.bin; do
+            if [ -e "$seed" ]; then cp "$seed" "$folder/seeds"; fi
+        done
         starts=(-dict=dictionaries/scene.dict "$folder/seeds")
     fi
     # The limit is of time on the clock: more than enough where other work takes most of the processor.

@@ -116,6 +116,8 @@ impl Compare {
         report.pictures = pictures.errors();
         (report.errors_a, report.errors_b) = (frames_a.faults(), frames_b.faults());
         report.pictures.warning().into_iter().for_each(|warning| console.complain(&warning));
+        let notes = frames_a.warnings().into_iter().chain(frames_b.warnings());
+        notes.for_each(|warning| console.complain(&warning.text()));
         console.report(&report, || report.text())?;
         frames_a.verdict().and_then(|()| frames_b.verdict())
     }

@@ -40,7 +40,8 @@ pub(crate) struct Decode {
     /// The stream; - is standard input.
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
-    /// A directory for frame_0000.ply and so on, or a .ply, .spz or .splat file for one frame; - is standard output.
+    /// A directory for frame_0000.ply and so on, or a .ply, .spz, .splat, .glb, .sog or .compressed.ply file for one
+    /// frame; - is standard output.
     #[arg(short, long = "out", value_name = "DIR_OR_FILE", required_unless_present = "dry_run")]
     out: Option<PathBuf>,
     /// The operating point: highest spatial layer, temporal layer and refinement; default is everything.

@@ -38,17 +38,20 @@ use warnings::{Warning, unlike_frames, warnings};
 
 /// Encode frames of Gaussians to a stream.
 ///
-/// Frames are .ply, .compressed.ply, .spz, .sog or .splat files, or SOG directories (those with a meta.json).
-/// They are taken in the natural order of their names: frame_9 before frame_10. The finished stream is decoded, and
+/// Frames are .ply, .compressed.ply, .spz, .sog, .splat, .ksplat, .glb or .gltf files, or SOG directories (those with a
+/// meta.json). One .zip, .tar or .tar.gz of such files is a sequence, and so is one .splatv or .splat4d.
+/// Frames are taken in the natural order of their names: frame_9 before frame_10. The finished stream is decoded, and
 /// pictures of a few frames are compared with those of the source; a quality or a size that was missed is a warning.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream encode frames/ -o talk.gss --fps 30\n  \
     splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small\n  \
     splatstream encode garden.ply -o garden.gss --target-mb 8\n  \
+    splatstream encode frames.zip -o talk.gss\n  \
+    splatstream encode kitchen.splatv -o kitchen.gss --samples 100\n  \
     splatstream encode frames/ -o talk.html\n  \
     splatstream encode garden.ply plant.spz talk/ --each -o streams/")]
 pub(crate) struct Encode {
-    /// Files, or one directory of frames; - is one .ply, .spz or .sog file on standard input.
+    /// Files, or one directory of frames, or one file of many; - is one file on standard input, but no .splat or .ksplat.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// The stream to write; - is standard output. A name that ends in .html is a web page that plays it, with the stream
@@ -299,6 +302,7 @@ impl Encode {
         if inputs.len() > 1 {
             encoded.warnings.extend(unlike_frames(source.counts()));
         }
+        encoded.warnings.extend(source.warnings());
         encoded.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         Ok(encoded)
     }

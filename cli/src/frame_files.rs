@@ -1,27 +1,29 @@
 //! Frames in files: which files, in which order, each read when it is needed.
 
+use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::input_args::{InputArgs, with_advice};
 use crate::output_file::STANDARD;
+use crate::read_notes::ReadNotes;
 use crate::stream_file::is_stream;
 use crate::unfinished::Unfinished;
 use splatstream_encoder::FrameSource;
-use splatstream_files::{read_scene, read_scene_as_is};
+use splatstream_files::{
+    EXTENSIONS, Scene, SceneError, SceneFormat, Sequence, detect, natural_order, read_scene_as_is,
+};
 use splatstream_gaussians::GaussianFrame;
-use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Extensions of the scene formats.
-const EXTENSIONS: [&str; 4] = ["ply", "spz", "sog", "splat"];
-
 /// The file that makes a directory a SOG scene.
 const SOG_META: &str = "meta.json";
 
-/// A frame a file, in natural order of their names.
+/// Frames in natural order of their names: a frame a file, or all in one file.
 pub(crate) struct FrameFiles {
     paths: Vec<PathBuf>,
+    /// The one file, if it holds many frames.
+    sequence: Option<Sequence>,
     reading: InputArgs,
     /// The frame read last: of a single frame, the encoder's second pass needs no second reading.
     last: Option<(u32, GaussianFrame)>,
@@ -31,13 +33,15 @@ pub(crate) struct FrameFiles {
     spooled: Option<Unfinished>,
     /// The fewest and the most Gaussians of the frames read so far.
     counts: Option<(usize, usize)>,
+    /// What readers have noted.
+    notes: ReadNotes,
 }
 
 /// What standard input is called in messages.
 const STANDARD_INPUT: &str = "standard input";
 
 impl FrameFiles {
-    /// The frames that the arguments of a command name: files, or one directory of frames.
+    /// The frames that the arguments of a command name: files, or one directory of frames, or one file of many.
     pub(crate) fn find(inputs: &[PathBuf], reading: InputArgs) -> Result<Self, Failure> {
         let mut spooled = None;
         let mut paths = match inputs {
@@ -53,11 +57,25 @@ impl FrameFiles {
             [directory] if directory.is_dir() && !is_sog(directory) => frames_in(directory)?,
             files => {
                 files.iter().try_for_each(|path| check_file(path))?;
+                if let (2.., Some(path)) = (files.len(), files.iter().find(|path| is_sequence(path))) {
+                    let path = path.display();
+                    return Err(Failure::Usage(format!(
+                        "{path}: holds many frames; give it by itself, or use --each"
+                    )));
+                }
                 files.to_vec()
             }
         };
         paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-        Ok(Self { paths, reading, last: None, as_is: false, spooled, counts: None })
+        let sequence = match paths.as_slice() {
+            [only] if is_sequence(only) => {
+                let opened = Sequence::open(only, &reading.limits(only), &reading.sequence());
+                Some(opened.map_err(|error| Failure::other(named(&error, only, spooled.as_ref())))?)
+            }
+            _ => None,
+        };
+        let notes = ReadNotes::default();
+        Ok(Self { paths, sequence, reading, last: None, as_is: false, spooled, counts: None, notes })
     }
 
     /// Values are not checked.
@@ -75,8 +93,16 @@ impl FrameFiles {
         self.counts.unwrap_or_default()
     }
 
+    /// What readers have changed on the way, in the frames that were read.
+    pub(crate) fn warnings(&self) -> Vec<Warning> {
+        self.notes.warnings(&|frame| self.name(frame))
+    }
+
     /// What a frame is called in messages.
     pub(crate) fn name(&self, frame: u32) -> String {
+        if let Some(sequence) = self.sequence.as_ref().filter(|_| self.spooled.is_none()) {
+            return sequence.name(frame);
+        }
         match self.paths.get(frame as usize) {
             Some(_) if self.spooled.is_some() => STANDARD_INPUT.to_owned(),
             Some(path) => path.display().to_string(),
@@ -104,7 +130,7 @@ fn is_encoded(name: &str) -> Failure {
 
 impl FrameSource for FrameFiles {
     fn len(&self) -> u32 {
-        self.paths.len() as u32
+        self.sequence.as_ref().map_or(self.paths.len() as u32, Sequence::len)
     }
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
@@ -113,13 +139,11 @@ impl FrameSource for FrameFiles {
         {
             return Ok(frame.clone());
         }
-        let path = self.paths.get(number as usize).ok_or_else(|| format!("there is no frame {number}"))?;
-        let read = if self.as_is { read_scene_as_is } else { read_scene };
-        let name = |error: splatstream_files::SceneError| match self.spooled {
-            Some(_) => with_advice(&error).replace(&*path.to_string_lossy(), STANDARD_INPUT),
-            None => with_advice(&error),
-        };
-        let frame = read(path, &self.reading.limits(path)).map_err(name)?;
+        let Scene { frame, notes } = self.read(number)?;
+        if !self.as_is {
+            frame.validate().map_err(|defect| format!("{}: {defect}", self.name(number)))?;
+        }
+        self.notes.add(number, notes);
         let (fewest, most) = self.counts.unwrap_or((frame.len(), frame.len()));
         self.counts = Some((fewest.min(frame.len()), most.max(frame.len())));
         self.last = Some((number, frame.clone()));
@@ -127,7 +151,33 @@ impl FrameSource for FrameFiles {
     }
 }
 
-/// A file or a SOG directory: one frame.
+impl FrameFiles {
+    /// Reads a frame as it is.
+    fn read(&mut self, number: u32) -> Result<Scene, String> {
+        let place = if self.sequence.is_some() { 0 } else { number as usize };
+        let path = self.paths.get(place).ok_or_else(|| format!("there is no frame {number}"))?;
+        let read = match &mut self.sequence {
+            Some(sequence) => sequence.frame(number),
+            None => read_scene_as_is(path, &self.reading.limits(path)),
+        };
+        read.map_err(|error| named(&error, path, self.spooled.as_ref()))
+    }
+}
+
+/// An error of reading, with advice; what came by standard input is called that.
+fn named(error: &SceneError, path: &Path, spooled: Option<&Unfinished>) -> String {
+    match spooled {
+        Some(_) => with_advice(error).replace(&*path.to_string_lossy(), STANDARD_INPUT),
+        None => with_advice(error),
+    }
+}
+
+/// Whether a file holds many frames.
+fn is_sequence(path: &Path) -> bool {
+    detect(path).is_ok_and(SceneFormat::is_sequence)
+}
+
+/// A file or a SOG directory: one frame, or a file of many if it is the only one.
 fn check_file(path: &Path) -> Result<(), Failure> {
     if path.is_dir() && !is_sog(path) {
         let path = path.display();
@@ -158,7 +208,7 @@ fn frames_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     let folder = directory.display();
     match kinds.len() {
         0 => Err(Failure::other(format!(
-            "{folder}: no frames here\n  give a directory with .ply, .compressed.ply, .spz, .sog or .splat files"
+            "{folder}: no frames here\n  give a directory with .ply, .compressed.ply, .spz, .sog, .splat, .ksplat or .glb files"
         ))),
         1 => Ok(paths),
         _ => {
@@ -183,57 +233,4 @@ fn kind_of(path: &Path) -> Option<&'static str> {
 
 fn is_sog(path: &Path) -> bool {
     path.join(SOG_META).is_file()
-}
-
-/// Orders names as people count: frame_9 before frame_10.
-fn natural_order(a: &str, b: &str) -> Ordering {
-    let (mut left, mut right) = (a, b);
-    loop {
-        let (text_a, number_a, rest_a) = split_number(left);
-        let (text_b, number_b, rest_b) = split_number(right);
-        let order = text_a
-            .cmp(text_b)
-            .then_with(|| number_a.len().cmp(&number_b.len()))
-            .then_with(|| number_a.cmp(number_b));
-        if order != Ordering::Equal {
-            return order;
-        }
-        if rest_a.is_empty() || rest_b.is_empty() {
-            // Names that differ only in leading zeros still have one order.
-            return rest_a.len().cmp(&rest_b.len()).then_with(|| a.cmp(b));
-        }
-        (left, right) = (rest_a, rest_b);
-    }
-}
-
-/// A name up to its first number, that number without leading zeros, and the rest.
-fn split_number(name: &str) -> (&str, &str, &str) {
-    let start = name.find(|c: char| c.is_ascii_digit()).unwrap_or(name.len());
-    let (text, rest) = name.split_at(start);
-    let end = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
-    let (number, rest) = rest.split_at(end);
-    (text, number.trim_start_matches('0'), rest)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_come_in_the_order_that_people_count_in() {
-        let mut names = ["f10.ply", "f9.ply", "f010.ply", "f1b2.ply", "f1b10.ply", "a.ply"];
-        names.sort_by(|a, b| natural_order(a, b));
-        assert_eq!(names, ["a.ply", "f1b2.ply", "f1b10.ply", "f9.ply", "f010.ply", "f10.ply"]);
-    }
-
-    #[test]
-    fn the_order_of_names_is_total() {
-        let names = ["", "1", "01", "1a", "a1", "a", "a1b", "a01b", "a2"];
-        for a in names {
-            for b in names {
-                assert_eq!(natural_order(a, b), natural_order(b, a).reverse(), "{a} {b}");
-                assert_eq!(natural_order(a, b) == Ordering::Equal, a == b, "{a} {b}");
-            }
-        }
-    }
 }

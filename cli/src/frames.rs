@@ -1,5 +1,6 @@
 //! The frames of a stream, a scene file or a directory, one after the other.
 
+use crate::encode::warnings::Warning;
 use crate::failure::{Failure, StreamFault};
 use crate::frame_files::FrameFiles;
 use crate::input_args::InputArgs;
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Opened {
     /// The bytes of a stream.
     Stream(StreamFile),
-    /// A scene file or a directory of frames, and how it is read.
+    /// A scene file, a file of many frames or a directory of frames, and how it is read.
     Scene(PathBuf, InputArgs),
 }
 
@@ -106,6 +107,14 @@ impl Frames<'_> {
                 *next += 1;
                 Ok(Some((*next - 1, frame)))
             }
+        }
+    }
+
+    /// What readers of files have changed on the way, as far as frames have been read.
+    pub(crate) fn warnings(&self) -> Vec<Warning> {
+        match self {
+            Self::Stream(_) => Vec::new(),
+            Self::Files { files, .. } => files.warnings(),
         }
     }
 

@@ -1,7 +1,7 @@
-//! How much memory a scene file may ask for.
+//! How scene files are read: how much memory they may ask for, and which frames are taken of continuous time.
 
 use clap::Args;
-use splatstream_files::{ReadLimits, SceneError, SceneErrorKind};
+use splatstream_files::{ReadLimits, SceneError, SceneErrorKind, SequenceOptions};
 use std::path::Path;
 
 /// Memory that a scene may take for each byte of its file, whatever the default: packed scenes of any format take less.
@@ -13,9 +13,17 @@ pub(crate) struct InputArgs {
     /// Most memory that reading one scene may take, as in 512M or 4G [default: 1G, or 32 times the file if that is more].
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     max_input_memory: Option<u64>,
+    /// Frames to take of a scene in continuous time, .splatv: so many, evenly over its length [default: 50].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    samples: Option<u32>,
 }
 
 impl InputArgs {
+    /// How the frames of a file of many are chosen.
+    pub(crate) fn sequence(&self) -> SequenceOptions {
+        SequenceOptions { samples: self.samples.unwrap_or(SequenceOptions::default().samples) }
+    }
+
     /// The limits for the scene at a path.
     pub(crate) fn limits(&self, path: &Path) -> ReadLimits {
         let of_file = || size_of(path).saturating_mul(PER_BYTE).max(ReadLimits::default().max_memory);

@@ -23,6 +23,7 @@ mod output_file;
 mod package;
 mod play;
 mod progress;
+mod read_notes;
 mod render;
 mod seek;
 mod serve;

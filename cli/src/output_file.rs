@@ -116,7 +116,7 @@ pub(crate) fn check_stream_name(path: &Path) -> Result<(), Failure> {
     }
     Err(Failure::Usage(format!(
         "{}: the output is a stream; give it a name that ends in .gss; \
-         `splatstream decode` writes .ply, .spz and .splat",
+         `splatstream decode` writes .ply, .spz, .splat, .glb, .sog and .compressed.ply",
         path.display()
     )))
 }

@@ -130,6 +130,7 @@ impl Render {
         drawn.expected = expected;
         drawn.seconds = drawn.pictures.iter().map(|picture| picture.seconds).sum();
         drawn.errors = frames.faults();
+        frames.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         console.report(&drawn, || drawn.text())?;
         frames.verdict()
     }

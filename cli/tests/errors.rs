@@ -21,6 +21,16 @@ fn changed(change: impl FnOnce(&mut splatstream_gaussians::Planes)) -> Vec<u8> {
     ply::write(&GaussianFrame::from_planes(0, planes).unwrap())
 }
 
+/// An archive of files.
+fn zip_of(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, content) in files {
+        archive.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        std::io::Write::write_all(&mut archive, content).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
+}
+
 /// The files that the cases name.
 fn write_files(directory: &Path) {
     let write = |name: &str, bytes: &[u8]| fs::write(directory.join(name), bytes).unwrap();
@@ -42,6 +52,15 @@ fn write_files(directory: &Path) {
     write("far.ply", &changed(|planes| (planes.position[0][3], planes.position[0][9]) = (1e15, -1e16)));
     write("text.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nend_header\n");
     write("short.splat", &[0; 33]);
+    write("frames.zip", &zip_of(&[("a.ply", b"ply\nx".as_slice()), ("b.ply", b"")]));
+    write("mixed.zip", &zip_of(&[("a.ply", b"".as_slice()), ("b.spz", b"")]));
+    write("cut.glb", b"glTF\x02\0\0\0\xff\0\0\0");
+    write(
+        "meshes.gltf",
+        br#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{}}]}]}"#,
+    );
+    write("old.ksplat", &[0; 8192]);
+    write("cut.splat4d", b"SP4D\x01\0\0\0\x09\0\0\0{");
     write("notes.txt", b"no scene");
     write("cameras.json", b"[{]");
     let frame = BuiltinScene { gaussians: 100, ..BuiltinScene::default() }.frame(0);
@@ -70,6 +89,13 @@ const CASES: &[&str] = &[
     "encode text.ply -o out.gss",
     "encode short.splat -o out.gss",
     "encode cut.spz -o out.gss",
+    "encode frames.zip -o out.gss",
+    "encode frames.zip good.ply -o out.gss",
+    "encode mixed.zip -o out.gss",
+    "encode cut.glb -o out.gss",
+    "encode meshes.gltf -o out.gss",
+    "encode old.ksplat -o out.gss",
+    "encode cut.splat4d -o out.gss",
     "encode mixed -o out.gss",
     "encode none -o out.gss",
     "encode good.ply none -o out.gss",
@@ -96,9 +122,9 @@ const CASES: &[&str] = &[
     "encode good.ply -o taken.gss",
     "encode good.ply -o no-such/out.gss",
     "extract good.gss --op s0,t0,r0 -o good.gss",
-    "decode good.gss -o out.glb",
+    "decode good.gss -o out.gltf",
+    "decode good.gss -o out.ksplat",
     "decode good.gss -o out.sog",
-    "decode good.gss -o out.compressed.ply",
     "decode good.gss -o out.png",
     "decode good.gss -o out.ply",
     "decode good.gss -o stale",

@@ -74,7 +74,7 @@ fn outputs_are_refused_in_words() {
     let decode = |out: &Path| fail(2, &["decode", text(&stream), "-o", text(out)]);
     succeed(&["decode", text(&stream), "-o", text(&at("out"))]);
     let said = [
-        decode(&at("o.glb")),
+        decode(&at("o.gltf")),
         decode(&at("o.compressed.ply")),
         decode(&at("o.ply")),
         decode(&at("out")),

@@ -81,9 +81,9 @@ fn names_say_what_is_written() {
     let (directory, still, stream) = files();
     let before = names(directory.path());
     let at = |name: &str| directory.path().join(name);
-    for name in ["o.glb", "o.sog", "o.compressed.ply", "o.png"] {
+    for name in ["o.gltf", "o.ksplat", "o.splatv", "o.png"] {
         let said = fail(2, &["decode", text(&stream), "-o", text(&at(name)), "--frames", "0..1"]);
-        assert!(said.contains(".ply, .spz or .splat") && said.contains("directory in /"), "{said}");
+        assert!(said.contains(".glb, .sog or .compressed.ply") && said.contains("directory in /"), "{said}");
     }
     for name in ["x.spz", "x.ply"] {
         let said = fail(2, &["encode", text(&still), "-o", text(&at(name))]);

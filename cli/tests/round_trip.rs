@@ -136,7 +136,7 @@ fn a_span_of_frames_is_what_is_written() {
 fn one_frame_can_go_to_a_file_of_any_format() {
     let directory = directory();
     let stream = write_stream(directory.path());
-    for name in ["one.ply", "one.spz", "one.splat"] {
+    for name in ["one.ply", "one.spz", "one.splat", "one.glb", "one.sog", "one.compressed.ply"] {
         let file = directory.path().join(name);
         succeed(&["decode", text(&stream), "-o", text(&file), "--frames", "0..1"]);
         let compared = json(&["compare", text(&file), text(&stream)]);

@@ -11,7 +11,7 @@ TRANSFORM = Package("npm", "@playcanvas/splat-transform", "3.7.0")
 def to_gaussians(path, tools):
     """Reads any format that splat-transform reads."""
     out = tools.scratch("transform.ply")
-    _convert(tools, [{"in": os.path.abspath(path), "out": out}], "ply", {}, decode=False)
+    convert(tools, [{"in": os.path.abspath(path), "out": out}], "ply", {}, decode=False)
     return ply.read(out)
 
 
@@ -25,7 +25,7 @@ def code(suffix, options, scene, decoded, tools):
     """Codes the reference to the format of `suffix` and back."""
     frames = [{"in": path, "out": out} for path, out in zip(map(os.path.abspath, scene.paths),
                                                             map(os.path.abspath, decoded))]
-    done = _convert(tools, frames, suffix, options, decode=True)
+    done = convert(tools, frames, suffix, options, decode=True)
     gaussians = 0
     for path in decoded:
         frame = ply.read(path)
@@ -35,7 +35,7 @@ def code(suffix, options, scene, decoded, tools):
     return Coded(done["bytes"], gaussians, done["encode_s"], done["decode_s"], "in-process", call)
 
 
-def _convert(tools, frames, suffix, options, decode):
+def convert(tools, frames, suffix, options, decode):
     job = {"module": tools.entry(TRANSFORM), "frames": frames, "suffix": suffix, "options": options,
            "decode": decode, "repeat": tools.repeat if decode else 1}
     return tools.node("transform.mjs", job)

@@ -1,14 +1,22 @@
-//! The readers of scene files: on any bytes, and on files that are packed from what an input says, so that what lies
+//! The readers of scene files and of files of many frames: on any bytes, and on files that are packed from what an input says, so that what lies
 //! behind compression and checksums is read.
 
 use crate::measured::{Allowance, within};
-use splatstream_files::{ReadLimits, SceneError, compressed_ply, ply, sog, splat, spz};
+use splatstream_files::{
+    ReadLimits, SceneError, SceneFormat, Sequence, SequenceOptions, compressed_ply, gltf, ksplat, ply, sog,
+    splat, spz,
+};
 use splatstream_gaussians::GaussianFrame;
 use std::borrow::Cow;
+use std::io::Cursor;
+use std::path::Path;
 use std::time::Duration;
 
 mod bytes;
+pub mod gltf_file;
+pub mod ksplat_file;
 pub mod ply_file;
+pub mod sequence_file;
 pub mod sog_archive;
 pub mod spz_file;
 mod webp;
@@ -34,7 +42,7 @@ pub struct Form {
 }
 
 /// The first byte of the input chooses one, and limits.
-pub const FORMS: [Form; 10] = [
+pub const FORMS: [Form; 20] = [
     Form { name: "ply", read: ply::read, pack: None },
     Form { name: "spz", read: spz::read, pack: None },
     Form { name: "splat", read: splat::read, pack: None },
@@ -45,7 +53,51 @@ pub const FORMS: [Form; 10] = [
     Form { name: "packed-sog", read: sog::read_zip, pack: Some(sog_archive::pack) },
     Form { name: "packed-ply", read: ply::read, pack: Some(ply_file::pack) },
     Form { name: "packed-compressed-ply", read: compressed_ply::read, pack: Some(ply_file::pack) },
+    Form { name: "gltf", read: gltf::read, pack: None },
+    Form { name: "packed-gltf", read: gltf::read, pack: Some(gltf_file::pack) },
+    Form { name: "ksplat", read: ksplat::read, pack: None },
+    Form { name: "packed-ksplat", read: ksplat::read, pack: Some(ksplat_file::pack) },
+    Form { name: "splatv", read: splatv, pack: None },
+    Form { name: "packed-splatv", read: splatv, pack: Some(sequence_file::splatv) },
+    Form { name: "splat4d", read: splat4d, pack: None },
+    Form { name: "packed-splat4d", read: splat4d, pack: Some(sequence_file::splat4d) },
+    Form { name: "archive", read: archive, pack: None },
+    Form { name: "packed-tar", read: archive, pack: Some(sequence_file::tar) },
 ];
+
+fn splatv(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    some_frames(bytes, SceneFormat::Splatv, limits)
+}
+
+fn splat4d(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    some_frames(bytes, SceneFormat::Splat4d, limits)
+}
+
+fn archive(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    some_frames(bytes, SceneFormat::Archive, limits)
+}
+
+/// The last frame of a sequence, after the first and the one before the last: forwards and backwards.
+fn some_frames(bytes: &[u8], format: SceneFormat, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+    let options = SequenceOptions { samples: 3 };
+    let mut sequence =
+        Sequence::of(Cursor::new(bytes.to_vec()), format, Path::new("input"), limits, &options)?;
+    let last = sequence.len().saturating_sub(1);
+    let mut read = |number| {
+        let frame = sequence.frame(number)?.frame;
+        frame.validate()?;
+        Ok(frame)
+    };
+    let whole = read(last);
+    // A damaged frame does not change what others are.
+    let _ = (read(0), read(last.saturating_sub(1)));
+    let again = read(last);
+    assert!(
+        whole.is_ok() == again.is_ok() && (whole.is_err() || whole.as_ref().ok() == again.as_ref().ok()),
+        "{format:?}"
+    );
+    again
+}
 
 impl Form {
     /// The file that an input stands for, without its first byte.
@@ -99,6 +151,18 @@ fn reads_again(frame: &GaussianFrame) {
     if let Ok(written) = splat::write(frame) {
         let back = splat::read(&written, &limits).expect("a .splat file of our own reads");
         assert_eq!(back.len(), frame.len());
+    }
+    if let Ok(written) = gltf::write(frame) {
+        let back = gltf::read(&written, &limits).expect("a .glb file of our own reads");
+        assert_eq!((back.len(), back.sh_degree()), (frame.len(), frame.sh_degree()));
+    }
+    if let Ok(written) = compressed_ply::write(frame) {
+        let back = compressed_ply::read(&written, &limits).expect("a compressed PLY of our own reads");
+        assert_eq!((back.len(), back.sh_degree()), (frame.len(), frame.sh_degree()));
+    }
+    if let Ok(written) = sog::write_zip(frame) {
+        let back = sog::read_zip(&written, &limits).expect("a SOG archive of our own reads");
+        assert_eq!((back.len(), back.sh_degree()), (frame.len(), frame.sh_degree()));
     }
     if let Ok(written) = spz::write(frame) {
         let back = spz::read(&written, &limits).expect("an SPZ file of our own reads");

@@ -4,7 +4,7 @@ use super::target::Format;
 use crate::encode::warnings::Warning;
 use splatstream_chart::numbers::grouped;
 use splatstream_files::spz::WriteOptions;
-use splatstream_files::{Clamped, splat, spz};
+use splatstream_files::{Clamped, compressed_ply, gltf, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
 /// What was lost in the files written so far.
@@ -20,7 +20,10 @@ impl Losses {
     /// Takes note of a frame that was written.
     pub(super) fn add(&mut self, number: u32, frame: &GaussianFrame, format: Format) {
         let found = match format {
-            Format::Ply => return,
+            // SOG chooses its ranges by the frame.
+            Format::Ply | Format::Sog => return,
+            Format::Glb => gltf::clamped(frame),
+            Format::CompressedPly => compressed_ply::clamped(frame),
             Format::Spz => spz::clamped(frame, &WriteOptions::default()),
             Format::Splat => {
                 self.sh_degree = self.sh_degree.max(frame.sh_degree());
@@ -51,7 +54,7 @@ impl Losses {
         let dropped = (degree > 0).then(|| {
             let message = format!(
                 ".{name} has no spherical harmonics: those of the stream, degree {degree}, were left out; \
-                 --format ply and spz keep them"
+                 --format ply, glb, sog and spz keep them"
             );
             Warning::new("sh-dropped", message)
         });

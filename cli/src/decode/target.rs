@@ -7,7 +7,7 @@ use crate::output_file::{
     OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_inputs, refuse_terminal,
 };
 use clap::ValueEnum;
-use splatstream_files::{SceneError, ply, splat, spz};
+use splatstream_files::{SceneError, compressed_ply, gltf, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -21,6 +21,12 @@ pub(crate) enum Format {
     Spz,
     /// 32 bytes per Gaussian: no spherical harmonics.
     Splat,
+    /// glTF 2.0 with KHR_gaussian_splatting: keeps everything, as floats.
+    Glb,
+    /// SOG version 2: images that GPUs take as they are; Gaussians come in another order.
+    Sog,
+    /// PLY of packed vertices: quantises; Gaussians come in another order.
+    CompressedPly,
 }
 
 /// Where frames go.
@@ -118,16 +124,15 @@ fn is_directory(path: &Path) -> Result<bool, Failure> {
     if path.is_dir() || ends_with_separator(path) {
         return Ok(true);
     }
-    let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let is_device = path.metadata().is_ok_and(|found| !found.is_file());
-    if is_device || Format::of_name(path).is_some() && !name.ends_with(".compressed.ply") {
+    if is_device || Format::of_name(path).is_some() {
         return Ok(false);
     }
     if path.extension().is_some() || path.exists() {
         let path = path.display();
         return Err(Failure::Usage(format!(
-            "{path}: decode cannot write this format; end the name of a file in .ply, .spz or .splat, \
-             and that of a directory in /; {STANDARD} is standard output"
+            "{path}: decode cannot write this format; end the name of a file in .ply, .spz, .splat, .glb, .sog or \
+             .compressed.ply, and that of a directory in /; {STANDARD} is standard output"
         )));
     }
     Ok(true)
@@ -152,25 +157,33 @@ fn stale(wanted: &Wanted<'_>) -> Result<Vec<PathBuf>, Failure> {
 
 /// Whether a file has a name that frames are given.
 fn is_frame(path: &Path) -> bool {
-    let number = path.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("frame_"));
-    Format::of_name(path).is_some()
+    let format = Format::of_name(path);
+    let number = path.file_name().and_then(|name| {
+        let rest = name.to_str()?.strip_prefix("frame_")?;
+        rest.get(..rest.len().checked_sub(format?.extension().len() + 1)?)
+    });
+    format.is_some()
         && number.is_some_and(|number| number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 impl Format {
-    /// The format that a file's extension names.
+    /// The format that the end of a file's name stands for.
     fn of_name(path: &Path) -> Option<Self> {
-        let extension = path.extension()?.to_str()?;
-        [Self::Ply, Self::Spz, Self::Splat]
-            .into_iter()
-            .find(|format| extension.eq_ignore_ascii_case(format.extension()))
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        // Compressed PLY before PLY.
+        let known = [Self::CompressedPly, Self::Ply, Self::Spz, Self::Splat, Self::Glb, Self::Sog];
+        known.into_iter().find(|format| name.ends_with(&format!(".{}", format.extension())))
     }
 
+    /// The end of a file's name.
     pub(super) fn extension(self) -> &'static str {
         match self {
             Self::Ply => "ply",
             Self::Spz => "spz",
             Self::Splat => "splat",
+            Self::Glb => "glb",
+            Self::Sog => "sog",
+            Self::CompressedPly => "compressed.ply",
         }
     }
 
@@ -179,6 +192,9 @@ impl Format {
             Self::Ply => Ok(ply::write(frame)),
             Self::Spz => spz::write(frame),
             Self::Splat => splat::write(frame),
+            Self::Glb => gltf::write(frame),
+            Self::Sog => sog::write_zip(frame),
+            Self::CompressedPly => compressed_ply::write(frame),
         }
     }
 }

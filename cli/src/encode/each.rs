@@ -75,5 +75,6 @@ fn stem(input: &Path) -> String {
     }
     let stem = Path::new(&name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let stem = stem.unwrap_or_default();
-    stem.strip_suffix(".compressed").unwrap_or(&stem).to_owned()
+    let stem = [".compressed", ".tar"].iter().find_map(|suffix| stem.strip_suffix(suffix)).unwrap_or(&stem);
+    stem.to_owned()
 }

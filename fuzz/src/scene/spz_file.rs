@@ -106,7 +106,7 @@ fn stored(content: &[u8], out: &mut Vec<u8>) {
 }
 
 /// A frame of Zstandard of blocks that are stored, or of which each repeats its first byte.
-fn zstd_frame(content: &[u8], window: u8, is_repeated: bool) -> Vec<u8> {
+pub(super) fn zstd_frame(content: &[u8], window: u8, is_repeated: bool) -> Vec<u8> {
     // No checksum, no dictionary, no content size: a window descriptor.
     let mut out = vec![0x28, 0xb5, 0x2f, 0xfd, 0, window];
     let mut blocks = content.chunks(1 << 17).peekable();

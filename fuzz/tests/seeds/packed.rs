@@ -1,4 +1,4 @@
-//! What the packed forms of scene files are made of: see `scene::spz_file` and `scene::sog_archive`.
+//! What the packed forms of scene files are made of: see `scene::spz_file` and its neighbours.
 
 /// Gaussians of a seed, and pixels of an image of them.
 const ROWS: u8 = 4;
@@ -75,3 +75,51 @@ pub(crate) const RANGES: &str = r#"{"means":{"shape":[4,3],"mins":[-1,-1,-1],"ma
 "scales":{"mins":-8,"maxs":-1,"files":["s.webp"]},"quats":{"files":["q.webp"]},
 "sh0":{"mins":[-1,-1,-1,-4],"maxs":[1,1,1,4],"files":["c.webp"]},
 "shN":{"mins":-1,"maxs":1,"files":["labels.webp","centroids.webp"]}}"#;
+
+/// A glTF of degree 1, in a GLB or as text, with transforms or not; nothing is wrong.
+pub(crate) fn gltf(flags: u8) -> Vec<u8> {
+    let values = (0..16).flat_map(|value| (value as f32 / 16.0 + 0.1).to_le_bytes());
+    // As text the document has no buffer, and is read where it has no Gaussians either.
+    let (count, text) = if flags & 1 == 0 { (ROWS, "") } else { (0, TEXT) };
+    let head = [flags, count, 0, 1, 255, 0, 0, 0, 0, text.len() as u8, (text.len() >> 8) as u8];
+    head.into_iter().chain(text.bytes()).chain(values).collect()
+}
+
+/// One Gaussian, in a buffer inside of the text.
+const TEXT: &str = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,
+"KHR_gaussian_splatting:ROTATION":1,"KHR_gaussian_splatting:SCALE":0,"KHR_gaussian_splatting:OPACITY":2,
+"KHR_gaussian_splatting:SH_DEGREE_0_COEF_0":0},"extensions":{"KHR_gaussian_splatting":{}}}]}],"accessors":[
+{"bufferView":0,"componentType":5126,"count":1,"type":"VEC3"},{"bufferView":0,"componentType":5126,"count":1,"type":"VEC4"},
+{"bufferView":0,"componentType":5121,"normalized":true,"count":1,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteLength":16}],
+"buffers":[{"byteLength":16,"uri":"data:;base64,AAAAPwAAAD8AAAA/AAAAPw=="}]}"#;
+
+/// A GLB whose primitive is an SPZ file.
+pub(crate) fn gltf_of_spz(file: &[u8]) -> Vec<u8> {
+    let spz = 4;
+    [&[spz, ROWS, 0, 1, 255, 0, 0, 0, 0, 0, 0][..], file].concat()
+}
+
+/// Two sections of degrees 1 and 2, the first with a bucket that is not full.
+pub(crate) fn ksplat(level: u8) -> Vec<u8> {
+    let sections = [[5, 0, 1, 2, 1, 0], [4, 0, 0, 2, 2, 0]];
+    [&[FITS, 1, level, 2, 0, 0, 0, 0], sections.as_flattened(), &[0x3c; 16]].concat()
+}
+
+/// Two records of 64 bytes.
+pub(crate) fn splatv() -> Vec<u8> {
+    let record: Vec<u8> = (0..64_u8).map(|at| if at % 2 == 0 { at } else { 0x38 }).collect();
+    [&128_u64.to_le_bytes()[..], &record, &record].concat()
+}
+
+/// Four Gaussians in five frames of groups of two; positions and opacities change.
+pub(crate) fn splat4d() -> Vec<u8> {
+    [&[ROWS, 0, 5, 1, 255, 0, 0, 0, 0], &[1, 0, 0, 1, 0][..], &[3, 4, 5, 6, 7, 8, 9]].concat()
+}
+
+/// Two frames, what a folder is, and a long name.
+pub(crate) fn tar() -> Vec<u8> {
+    let frame = |name: u8| [&[0, name, 0, 32, 0][..], &[0x3c; 32]].concat();
+    let folder = [4, 4, 0, 0, 0];
+    let name = [&[1, 4, 0, 14, 0][..], b"frame_20.splat"].concat();
+    [&[5][..], &frame(2), &folder, &frame(1), &name, &frame(0)].concat()
+}

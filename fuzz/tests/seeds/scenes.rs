@@ -7,7 +7,8 @@ use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 use splatstream_files::builtin::BuiltinScene;
-use splatstream_files::{ply, splat, spz};
+use splatstream_files::{gltf, ply, splat, spz};
+use splatstream_fuzz::scene;
 use splatstream_gaussians::GaussianFrame;
 use std::io::{Cursor, Read, Write};
 use zip::write::SimpleFileOptions;
@@ -41,6 +42,21 @@ pub(crate) fn all() -> Vec<(String, Vec<u8>)> {
         ("packed-ply", 8, packed::ply(0)),
         ("packed-ply-of-text", 8, packed::ply(1)),
         ("packed-compressed-ply", 9, packed::compressed_ply()),
+        ("gltf", 10, gltf::write(&frame).unwrap()),
+        ("packed-gltf", 11, packed::gltf(2)),
+        ("packed-gltf-of-text", 11, packed::gltf(1)),
+        ("packed-gltf-spz", 11, packed::gltf_of_spz(&spz::write(&frame).unwrap())),
+        ("ksplat", 12, scene::ksplat_file::pack(&packed::ksplat(1))),
+        ("packed-ksplat-level-0", 13, packed::ksplat(0)),
+        ("packed-ksplat-level-1", 13, packed::ksplat(1)),
+        ("packed-ksplat-level-2", 13, packed::ksplat(2)),
+        ("splatv", 14, scene::sequence_file::splatv(&packed::splatv())),
+        ("packed-splatv", 15, packed::splatv()),
+        ("splat4d", 16, scene::sequence_file::splat4d(&packed::splat4d())),
+        ("packed-splat4d", 17, packed::splat4d()),
+        ("archive-zip", 18, zip(&[("a_2.splat", &splat::write(&frame).unwrap()), ("a_10.splat", &[1; 32])])),
+        ("archive-tgz", 18, gzip(&scene::sequence_file::tar(&packed::tar()))),
+        ("packed-tar", 19, packed::tar()),
     ];
     files.into_iter().map(|(name, choice, file)| (name.to_owned(), [vec![choice], file].concat())).collect()
 }
@@ -115,6 +131,16 @@ fn new_spz(frame: &GaussianFrame) -> Vec<u8> {
     out
 }
 
+/// An archive of files.
+fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, content) in files {
+        archive.start_file(*name, SimpleFileOptions::default()).unwrap();
+        archive.write_all(content).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
+}
+
 fn gzip(content: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), flate2::Compression::fast());
     encoder.write_all(content).unwrap();
@@ -159,12 +185,8 @@ fn sog(meta: &str) -> Vec<u8> {
         // Three pixels to an entry of degree 1, 64 entries in a row.
         ("centroids.webp", webp(64 * 3, 1, |pixel, _| pixel as u8)),
     ];
-    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, content) in files {
-        archive.start_file(name, SimpleFileOptions::default()).unwrap();
-        archive.write_all(&content).unwrap();
-    }
-    archive.finish().unwrap().into_inner()
+    let files: Vec<(&str, &[u8])> = files.iter().map(|(name, content)| (*name, content.as_slice())).collect();
+    zip(&files)
 }
 
 fn webp(width: u32, height: u32, value: impl Fn(u32, u32) -> u8) -> Vec<u8> {

@@ -8,16 +8,20 @@
 //!
 //! Optional element `sh`: `f_rest_*` as bytes, a channel after another, over −4 to 4.
 
+mod write;
+
 use std::f64::consts::SQRT_2;
 
 use crate::byte_values::logit_of_byte;
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
-use crate::ply::{Body, Element, Header, degree_of_rest, parse_header, planes_of_rest, require, rest_names};
+use crate::ply::{Body, Element, Header, Rest, parse_header, planes_of_rest, require};
 use crate::reading::{checked, frame_of};
 use crate::smallest_three::from_smallest_three;
 use splatstream_gaussians::activation::dc_of_colour;
 use splatstream_gaussians::{GaussianFrame, Planes};
+
+pub use write::{clamped, write};
 
 /// Gaussians that share a row of the element `chunk`.
 const CHUNK: usize = 256;
@@ -58,7 +62,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
 /// As [`read`], with values as they are: none is checked.
 pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
     let header = parse_header(bytes, budget)?;
-    let layout = Layout::of(&header)?;
+    let layout = Layout::of(&header, budget)?;
     let (mut ranges, mut rest) = (Vec::new(), Vec::new());
     let mut words: [Vec<u32>; 4] = Default::default();
     let mut body = Body::new(bytes, &header);
@@ -88,7 +92,7 @@ struct Layout {
 
 impl Layout {
     /// Checks that a header has what it needs, and enough chunks for its vertices.
-    fn of(header: &Header) -> Result<Self, SceneError> {
+    fn of(header: &Header, budget: &mut Budget) -> Result<Self, SceneError> {
         let (vertex, chunk) = (wanted(header, "vertex")?, wanted(header, "chunk")?);
         require(vertex, &owned(&WORDS))?;
         let coloured = chunk.has("min_r");
@@ -101,10 +105,10 @@ impl Layout {
         let Some(sh) = header.element("sh") else {
             return Ok(Self { ranges, rest: Vec::new(), sh_degree: 0 });
         };
-        let sh_degree = degree_of_rest(sh)?;
-        let rest: Vec<_> = rest_names(sh_degree).collect();
-        require(sh, &rest)?;
-        Ok(Self { ranges, rest, sh_degree })
+        let rest = Rest::of(sh, budget)?;
+        let names: Vec<_> = rest.names().collect();
+        require(sh, &names)?;
+        Ok(Self { ranges, rest: names, sh_degree: rest.sh_degree })
     }
 }
 

@@ -1,20 +1,36 @@
 //! Which format a file is in, and reading it without being told.
 
 use std::fs::{self, File};
-use std::io::Read;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
-use crate::error::{SceneError, SceneErrorKind};
+use flate2::read::GzDecoder;
+use zip::ZipArchive;
+
+use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
-use crate::{compressed_ply, ply, sog, splat, spz};
+use crate::scene::Scene;
+use crate::sequence::{SPLAT4D, SPLATV, Sequence, SequenceOptions};
+use crate::{compressed_ply, gltf, ksplat, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
 /// A PLY header must fit in this many bytes for [`detect`] to tell packed vertices from plain ones.
 const HEAD: u64 = 64 << 10;
 
+/// Where a tar archive has its name, and that.
+const TAR: (usize, &[u8]) = (257, b"ustar");
+
+/// Extensions of files that hold one scene each.
+pub const EXTENSIONS: [&str; 7] = ["ply", "spz", "sog", "splat", "ksplat", "glb", "gltf"];
+
+/// What to give where a file is of no known format.
+const GIVE: &str = "give a .ply, .compressed.ply, .spz, .sog, .splat, .ksplat, .glb or .gltf file, a SOG directory, or a \
+                    sequence: .splatv, .splat4d, .zip, .tar or .tar.gz";
+
 /// The formats that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SceneFormat {
     /// Standard Gaussian splatting PLY: [`ply`].
     Ply,
@@ -26,10 +42,20 @@ pub enum SceneFormat {
     Spz,
     /// A directory or a ZIP archive of images: [`sog`].
     Sog,
+    /// `.glb` and `.gltf` with Gaussians: [`gltf`].
+    Gltf,
+    /// Sections of Gaussians at three levels of compression: [`ksplat`].
+    Ksplat,
+    /// Gaussians in continuous time: a [`Sequence`].
+    Splatv,
+    /// Frames of one count: a [`Sequence`].
+    Splat4d,
+    /// A ZIP or tar archive of scene files: a [`Sequence`].
+    Archive,
 }
 
 /// The format of the file or directory at `path`: its content decides, and its extension only where content
-/// cannot (`.splat`).
+/// cannot (`.splat`, `.ksplat`).
 ///
 /// # Errors
 /// A path that cannot be read, or content of no known format.
@@ -37,43 +63,79 @@ pub fn detect(path: &Path) -> Result<SceneFormat, SceneError> {
     if sog_directory(path).is_some() {
         return Ok(SceneFormat::Sog);
     }
-    let mut head = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(HEAD).read_to_end(&mut head))
-        .map_err(|error| SceneError::from(error).in_file(path))?;
-    format_of(&head, path).map_err(|error| error.in_file(path))
+    let find = || {
+        let mut file = File::open(path)?;
+        let mut head = Vec::new();
+        file.by_ref().take(HEAD).read_to_end(&mut head)?;
+        format_of(&head, path, file)
+    };
+    find().map_err(|error| error.in_file(path))
 }
 
-/// Reads the scene at `path`: a file of any supported format, a SOG directory, or the `meta.json` in one.
+/// Reads the scene at `path`: a file of any supported format, a SOG directory, or the `meta.json` in one. Of a sequence of
+/// one frame it reads that.
 ///
 /// # Errors
-/// Those of [`detect`] and of the format's reader, with the path.
+/// Those of [`detect`] and of the format's reader, with the path; a sequence of several frames.
 pub fn read_scene(path: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    checked(read_scene_as_is(path, limits)?).map_err(|error| error.in_file(path))
+    checked(read_scene_as_is(path, limits)?.frame).map_err(|error| error.in_file(path))
 }
 
-/// As [`read_scene`], but with all values as they are, even those that no frame may hold: see
+/// As [`read_scene`], with what the reader has noted, and with all values as they are, even those that no frame may hold: see
 /// [`GaussianFrame::defects`].
 ///
 /// # Errors
 /// As [`read_scene`], without those of values.
-pub fn read_scene_as_is(path: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
+pub fn read_scene_as_is(path: &Path, limits: &ReadLimits) -> Result<Scene, SceneError> {
     let mut budget = Budget::new(limits);
     if let Some(directory) = sog_directory(path) {
-        return sog::read_dir_as_is(&directory, &mut budget);
+        let frame = sog::read_dir_as_is(&directory, &mut budget)?;
+        return Ok(Scene { frame, notes: budget.into_notes() });
+    }
+    if detect(path)?.is_sequence() {
+        return only_frame(path, limits);
     }
     let mut read = || {
-        let budget = &mut budget;
-        let bytes = read_file(path, budget)?;
-        match format_of(&bytes, path)? {
-            SceneFormat::Ply => ply::read_as_is(&bytes, budget),
-            SceneFormat::CompressedPly => compressed_ply::read_as_is(&bytes, budget),
-            SceneFormat::Splat => splat::read_as_is(&bytes, budget),
-            SceneFormat::Spz => spz::read_as_is(&bytes, budget),
-            SceneFormat::Sog => sog::read_zip_as_is(&bytes, budget),
-        }
+        let bytes = read_file(path, &mut budget)?;
+        read_whole(&bytes, path, path.parent(), &mut budget)
     };
-    read().map_err(|error| error.in_file(path))
+    let frame = read().map_err(|error| error.in_file(path))?;
+    Ok(Scene { frame, notes: budget.into_notes() })
+}
+
+/// The frame of a sequence that has one.
+fn only_frame(path: &Path, limits: &ReadLimits) -> Result<Scene, SceneError> {
+    let mut sequence = Sequence::open(path, limits, &SequenceOptions::default())?;
+    match sequence.len() {
+        1 => sequence.frame(0),
+        frames => {
+            let what = format!("the file holds {frames} frames");
+            Err(SceneError::unsupported(what, "read it as a sequence").in_file(path))
+        }
+    }
+}
+
+/// Reads a scene that is in memory, of any format but sequences; values are not checked. Its name decides where content
+/// cannot, and files that it refers to are those of the directory.
+pub(crate) fn read_whole(
+    bytes: &[u8],
+    name: &Path,
+    directory: Option<&Path>,
+    budget: &mut Budget,
+) -> Result<GaussianFrame, SceneError> {
+    match format_of(bytes, name, std::io::Cursor::new(bytes))? {
+        SceneFormat::Ply => ply::read_as_is(bytes, budget),
+        SceneFormat::CompressedPly => compressed_ply::read_as_is(bytes, budget),
+        SceneFormat::Splat => splat::read_as_is(bytes, budget),
+        SceneFormat::Spz => spz::read_as_is(bytes, budget),
+        SceneFormat::Sog => sog::read_zip_as_is(bytes, budget),
+        SceneFormat::Gltf => gltf::read_as_is(bytes, directory, budget),
+        SceneFormat::Ksplat => ksplat::read_as_is(bytes, budget),
+        SceneFormat::Splatv | SceneFormat::Splat4d | SceneFormat::Archive => Err(SceneError::unsupported(
+            "a sequence inside of an archive",
+            "unpack the archive, and give the sequence",
+        )),
+    }
 }
 
 /// The directory of a SOG scene: `path` itself, or that of a `meta.json`.
@@ -84,24 +146,61 @@ fn sog_directory(path: &Path) -> Option<PathBuf> {
     fs::metadata(path).is_ok_and(|found| found.is_dir()).then(|| path.to_path_buf())
 }
 
-fn format_of(bytes: &[u8], path: &Path) -> Result<SceneFormat, SceneError> {
-    if ply::is_ply(bytes) {
-        let header = ply::parse_header(bytes, &mut Budget::new(&ReadLimits::default()))?;
+/// The format of a file, by how it begins and by its name; `whole` is the file, which is listed if it is an archive.
+fn format_of(head: &[u8], path: &Path, whole: impl Read + Seek) -> Result<SceneFormat, SceneError> {
+    let has_extension = |known: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(known));
+    if ply::is_ply(head) {
+        let header = ply::parse_header(head, &mut Budget::new(&ReadLimits::default()))?;
         let packed = header.element("vertex").is_some_and(ply::is_packed);
         return Ok(if packed { SceneFormat::CompressedPly } else { SceneFormat::Ply });
     }
-    if spz::is_spz(bytes) {
+    if is_gzip(head) {
+        let mut start = Vec::new();
+        // What is damaged is said when it is read.
+        let _ = GzDecoder::new(head).take(512).read_to_end(&mut start);
+        return Ok(if is_tar(&start) { SceneFormat::Archive } else { SceneFormat::Spz });
+    }
+    if is_zip(head) {
+        let has_meta =
+            ZipArchive::new(whole).is_ok_and(|archive| archive.index_for_name(sog::META).is_some());
+        let is_sog = has_meta || has_extension("sog");
+        return Ok(if is_sog { SceneFormat::Sog } else { SceneFormat::Archive });
+    }
+    if is_tar(head) {
+        return Ok(SceneFormat::Archive);
+    }
+    if spz::is_spz(head) {
         return Ok(SceneFormat::Spz);
     }
-    if sog::is_zip(bytes) {
-        return Ok(SceneFormat::Sog);
+    if gltf::is_glb(head) || has_extension("gltf") && gltf::is_json(head) {
+        return Ok(SceneFormat::Gltf);
     }
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splat")) {
-        return Ok(SceneFormat::Splat);
+    if head.starts_with(&SPLAT4D) {
+        return Ok(SceneFormat::Splat4d);
     }
-    Err(SceneErrorKind::Unsupported {
-        what: "the content is of no known scene format".to_owned(),
-        advice: "give a .ply, .compressed.ply, .spz, .sog or .splat file, or a SOG directory",
+    if head.starts_with(&SPLATV) && !has_extension("splat") {
+        return Ok(SceneFormat::Splatv);
     }
-    .into())
+    match [("splat", SceneFormat::Splat), ("ksplat", SceneFormat::Ksplat)]
+        .iter()
+        .find(|(name, _)| has_extension(name))
+    {
+        Some(&(_, format)) => Ok(format),
+        None => Err(SceneError::unsupported("the content is of no known scene format", GIVE)),
+    }
+}
+
+/// Whether `bytes` begin as a ZIP archive does.
+pub(crate) fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
+}
+
+/// Whether `bytes` begin as gzip does.
+pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x1f, 0x8b])
+}
+
+fn is_tar(bytes: &[u8]) -> bool {
+    let (at, name) = TAR;
+    bytes.get(at..).is_some_and(|rest| rest.starts_with(name))
 }

@@ -1,8 +1,9 @@
 //! Files of 3D Gaussians in and out, and scenes made from a seed.
 //!
-//! * [`read_scene`] reads any supported file or directory; [`ply`], [`compressed_ply`], [`splat`], [`spz`]
-//!   and [`sog`] read one format each, and the first, third and fourth write; [`Clamped`] is what the last two
-//!   cannot keep.
+//! * [`read_scene`] reads any supported file or directory; [`ply`], [`compressed_ply`], [`splat`], [`spz`], [`sog`],
+//!   [`gltf`] and [`ksplat`] read one format each, and all but the last write; [`Clamped`] is what a format cannot keep of a
+//!   frame, [`Note`] what a frame cannot hold of a file.
+//! * [`Sequence`] reads files of many frames, one at a time: archives, `.splatv` and `.splat4d`.
 //! * [`builtin`] makes scenes from a seed, so that everything can be tried and tested without any input file.
 //!
 //! All of them give and take [`splatstream_gaussians::GaussianFrame`], whose axes are PLY's: x right, y down,
@@ -27,22 +28,33 @@
 )]
 pub mod builtin;
 pub mod compressed_ply;
+pub mod gltf;
+pub mod ksplat;
 pub mod ply;
 pub mod sog;
 pub mod splat;
 pub mod spz;
 
+mod axes;
 mod byte_values;
 mod clamped;
 mod cursor;
 mod decompress;
 mod error;
 mod format;
+mod half;
 mod limits;
+mod morton;
+mod note;
 mod reading;
+mod scene;
+mod sequence;
 mod smallest_three;
 
 pub use clamped::Clamped;
 pub use error::{SceneError, SceneErrorKind};
-pub use format::{SceneFormat, detect, read_scene, read_scene_as_is};
+pub use format::{EXTENSIONS, SceneFormat, detect, read_scene, read_scene_as_is};
 pub use limits::ReadLimits;
+pub use note::Note;
+pub use scene::Scene;
+pub use sequence::{Sequence, SequenceOptions, natural_order};

@@ -3,6 +3,7 @@
 use std::collections::TryReserveError;
 
 use crate::error::{SceneError, SceneErrorKind};
+use crate::note::Note;
 use splatstream_gaussians::{Planes, sh_planes};
 
 /// The bound on the memory of one read.
@@ -24,16 +25,29 @@ impl Default for ReadLimits {
     }
 }
 
-/// What is left of the memory of one read.
+/// What is left of the memory of one read, and what the read has noted so far.
 #[derive(Debug)]
 pub(crate) struct Budget {
     allowed: u64,
     used: u64,
+    notes: Vec<Note>,
 }
 
 impl Budget {
     pub(crate) fn new(limits: &ReadLimits) -> Self {
-        Self { allowed: limits.max_memory, used: 0 }
+        Self { allowed: limits.max_memory, used: 0, notes: Vec::new() }
+    }
+
+    /// Takes note of something that the frame will not show. Equal notes count once.
+    pub(crate) fn note(&mut self, note: Note) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// What was noted.
+    pub(crate) fn into_notes(self) -> Vec<Note> {
+        self.notes
     }
 
     /// Bytes that are left.

@@ -1,7 +1,8 @@
 //! Standard 3D Gaussian splatting PLY, as the original training code writes it.
 //!
 //! Read: ascii and both byte orders, any scalar type, any property order; other properties and elements are
-//! passed over. `f_rest_*` holds one channel after another and may have 0, 9, 24 or 45 properties.
+//! passed over. `f_rest_*` holds one channel after another and may have 0, 9, 24, 45 or 72 properties, those of degree 4, which
+//! is reduced to 3. Without `scale_2`, Gaussians are flat (2DGS): they get a third semi-axis of 1e-6.
 //! Written: binary little endian `f32` in the original order, normals zero.
 
 mod header;
@@ -12,8 +13,9 @@ pub(crate) use table::Body;
 
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
+use crate::note::{MOST_SH_DEGREE, Note};
 use crate::reading::{checked, frame_of};
-use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, rest_index, sh_planes};
+use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, rest_index, sh_coefficients, sh_planes};
 
 /// Reads a PLY file. Rotations come out at unit length.
 ///
@@ -34,20 +36,42 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
         let what = "this is a compressed PLY: its vertices are packed_position and so on";
         return Err(SceneError::unsupported(what, "read it as compressed PLY"));
     }
-    let sh_degree = degree_of_rest(vertex)?;
-    let names = names(sh_degree);
+    let rest = Rest::of(vertex, budget)?;
+    let names = names(&rest, !is_flat(vertex));
     require(vertex, &names)?;
     let mut body = Body::new(bytes, &header);
     for element in header.elements.iter().take_while(|element| element.name != "vertex") {
         body.skip(element)?;
     }
     let columns = body.columns(vertex, &names, budget)?;
-    frame_of(sh_degree, planes_of_columns(sh_degree, columns))
+    let mut planes = planes_of_columns(rest.sh_degree, is_flat(vertex), columns);
+    if is_flat(vertex) {
+        thicken(&mut planes, budget)?;
+    }
+    frame_of(rest.sh_degree, planes)
+}
+
+/// Natural log of the semi-axis that flat Gaussians get, 1e-6: thinner than a pixel in any view of a scene, and finite.
+const FLAT_LOG_SCALE: f32 = -13.815_511;
+
+/// Whether Gaussians have two semi-axes: all properties but the third scale.
+fn is_flat(vertex: &Element) -> bool {
+    vertex.has("scale_0") && vertex.has("scale_1") && !vertex.has("scale_2")
+}
+
+/// Gives flat Gaussians their third semi-axis.
+fn thicken(planes: &mut Planes, budget: &mut Budget) -> Result<(), SceneError> {
+    let count = planes.opacity_logit.len();
+    let [.., third] = &mut planes.log_scale;
+    *third = budget.room(count as u64, "the third semi-axis")?;
+    third.resize(count, FLAT_LOG_SCALE);
+    budget.note(Note::Flat { log_scale: FLAT_LOG_SCALE });
+    Ok(())
 }
 
 /// Writes a frame: every value exactly, whatever it is.
 pub fn write(frame: &GaussianFrame) -> Vec<u8> {
-    let mut names = names(frame.sh_degree());
+    let mut names = names(&Rest::all_of(frame.sh_degree()), true);
     names.splice(3..3, ["nx", "ny", "nz"].map(str::to_owned));
     let mut text = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", frame.len());
     for name in &names {
@@ -81,25 +105,47 @@ pub(crate) fn require(element: &Element, names: &[String]) -> Result<(), SceneEr
     Err(SceneError::inconsistent(what, "export it as a Gaussian splatting PLY with all its properties"))
 }
 
-/// The SH degree that an element's number of `f_rest_*` properties stands for.
-pub(crate) fn degree_of_rest(element: &Element) -> Result<u8, SceneError> {
-    let is_rest =
-        |name: &str| name.strip_prefix("f_rest_").is_some_and(|digits| digits.parse::<u32>().is_ok());
-    let found = element.properties.iter().filter(|property| is_rest(&property.name)).count();
-    degree_of_values(found).ok_or_else(|| {
-        let what = format!("element {} has {found} f_rest properties", element.name);
-        SceneError::inconsistent(what, "SH degrees 0 to 3 have 0, 9, 24 or 45; export it with one of these")
-    })
+/// The `f_rest_*` properties of an element: what it stores, and what a frame takes of it.
+pub(crate) struct Rest {
+    /// Of the file.
+    stored_degree: u8,
+    /// Of the frame, 3 at most.
+    pub(crate) sh_degree: u8,
 }
 
-/// The degree whose three channels have `values` coefficients in all: 0, 9, 24, 45; none otherwise.
+impl Rest {
+    /// Finds the degree that an element's number of `f_rest_*` properties stands for; one that is too high is noted.
+    pub(crate) fn of(element: &Element, budget: &mut Budget) -> Result<Self, SceneError> {
+        let is_rest =
+            |name: &str| name.strip_prefix("f_rest_").is_some_and(|digits| digits.parse::<u32>().is_ok());
+        let found = element.properties.iter().filter(|property| is_rest(&property.name)).count();
+        let stored_degree = degree_of_values(found).ok_or_else(|| {
+            let what = format!("element {} has {found} f_rest properties", element.name);
+            let advice = "SH degrees 0 to 4 have 0, 9, 24, 45 or 72; export it with one of these";
+            SceneError::inconsistent(what, advice)
+        })?;
+        if stored_degree > MAX_SH_DEGREE {
+            budget.note(Note::ShDegree { found: stored_degree });
+        }
+        Ok(Self { stored_degree, sh_degree: stored_degree.min(MAX_SH_DEGREE) })
+    }
+
+    /// All of a degree, 3 at most.
+    fn all_of(sh_degree: u8) -> Self {
+        Self { stored_degree: sh_degree, sh_degree }
+    }
+
+    /// The names that a frame takes: one channel after another, of each the coefficients of the frame's degree.
+    pub(crate) fn names(&self) -> impl Iterator<Item = String> {
+        let (kept, stored) = (sh_coefficients(self.sh_degree), sh_coefficients(self.stored_degree));
+        let first = (0..3_usize).map(move |channel| channel.saturating_mul(stored));
+        first.flat_map(move |first| (first..first.saturating_add(kept)).map(|at| format!("f_rest_{at}")))
+    }
+}
+
+/// The degree whose three channels have `values` coefficients in all: 0, 9, 24, 45, 72; none otherwise.
 fn degree_of_values(values: usize) -> Option<u8> {
-    (0..=MAX_SH_DEGREE).find(|&degree| sh_planes(degree) == values)
-}
-
-/// `f_rest_0` and on, as many as the degree has.
-pub(crate) fn rest_names(sh_degree: u8) -> impl Iterator<Item = String> {
-    (0..sh_planes(sh_degree)).map(|at| format!("f_rest_{at}"))
+    (0..=MOST_SH_DEGREE).find(|&degree| sh_planes(degree) == values)
 }
 
 /// SH planes, coefficient by coefficient, of `f_rest_*` columns, channel by channel.
@@ -109,21 +155,21 @@ pub(crate) fn planes_of_rest<T: Default>(sh_degree: u8, mut rest: Vec<T>) -> Vec
     planes.map(&mut take).collect()
 }
 
-/// The properties that make a Gaussian, in the order of the original code, without normals.
-fn names(sh_degree: u8) -> Vec<String> {
+/// The properties that make a Gaussian, in the order of the original code, without normals; flat ones have two scales.
+fn names(rest: &Rest, is_solid: bool) -> Vec<String> {
     let numbered = |prefix: &'static str, count: usize| (0..count).map(move |at| format!("{prefix}_{at}"));
     let position = ["x", "y", "z"].into_iter().map(str::to_owned);
     position
         .chain(numbered("f_dc", 3))
-        .chain(rest_names(sh_degree))
+        .chain(rest.names())
         .chain(std::iter::once("opacity".to_owned()))
-        .chain(numbered("scale", 3))
+        .chain(numbered("scale", if is_solid { 3 } else { 2 }))
         .chain(numbered("rot", 4))
         .collect()
 }
 
 /// Planes of columns in the order of [`names`].
-fn planes_of_columns(sh_degree: u8, columns: Vec<Vec<f32>>) -> Planes {
+fn planes_of_columns(sh_degree: u8, is_flat: bool, columns: Vec<Vec<f32>>) -> Planes {
     let mut columns = columns.into_iter();
     // There are as many columns as names, so none of these defaults is ever used.
     let mut next = || columns.next().unwrap_or_default();
@@ -131,7 +177,7 @@ fn planes_of_columns(sh_degree: u8, columns: Vec<Vec<f32>>) -> Planes {
     let dc = std::array::from_fn(|_| next());
     let rest = (0..sh_planes(sh_degree)).map(|_| next()).collect();
     let opacity_logit = next();
-    let log_scale = std::array::from_fn(|_| next());
+    let log_scale = std::array::from_fn(|axis| if is_flat && axis == 2 { Vec::new() } else { next() });
     let rotation = std::array::from_fn(|_| next());
     Planes { position, log_scale, rotation, opacity_logit, dc, sh: planes_of_rest(sh_degree, rest) }
 }
@@ -161,6 +207,7 @@ mod tests {
 
     #[test]
     fn the_degree_follows_from_the_number_of_values() {
-        assert_eq!([0, 9, 24, 45, 12].map(degree_of_values), [Some(0), Some(1), Some(2), Some(3), None]);
+        let degrees = [Some(0), Some(1), Some(2), Some(3), Some(4), None];
+        assert_eq!([0, 9, 24, 45, 72, 12].map(degree_of_values), degrees);
     }
 }

@@ -12,11 +12,14 @@
 //! | `shN` labels | 2 | low and high byte of a row of the palette |
 //! | `shN` centroids | 3 | the palette: 64 entries a row, 3, 8 or 15 pixels each; by codebook or range |
 
+mod codebook;
 mod image;
 mod meta;
+mod palette;
 mod planes;
+mod write;
 
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::path::Path;
 
 use zip::ZipArchive;
@@ -24,7 +27,10 @@ use zip::ZipArchive;
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
+use crate::sequence::read_member;
 use splatstream_gaussians::GaussianFrame;
+
+pub use write::write_zip;
 
 /// The name of the file that describes the others.
 pub(crate) const META: &str = "meta.json";
@@ -66,21 +72,8 @@ pub(crate) fn read_zip_as_is(bytes: &[u8], budget: &mut Budget) -> Result<Gaussi
     let mut archive =
         ZipArchive::new(Cursor::new(bytes)).map_err(|error| refuse(format!("cannot list it: {error}")))?;
     let fetch = |name: &str, budget: &mut Budget| {
-        let mut member = archive.by_name(name).map_err(|error| refuse(format!("{name}: {error}")))?;
-        let size = member.size();
-        let mut content = budget.room(size, "a member of the archive")?;
-        let read = (&mut member).take(size).read_to_end(&mut content);
-        // The checksum is compared when the member ends.
-        let over = read.and_then(|_| member.read(&mut [0]));
-        if over.map_err(|error| refuse(format!("{name}: {error}")))? > 0 || (content.len() as u64) < size {
-            return Err(refuse(format!("{name} is not as long as the archive says, {size} bytes")));
-        }
-        Ok(content)
+        let member = archive.by_name(name).map_err(|error| refuse(format!("{name}: {error}")))?;
+        read_member(member, budget)
     };
     planes::read(fetch, budget)
-}
-
-/// Whether `bytes` begin as a ZIP archive does.
-pub(crate) fn is_zip(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"PK\x03\x04")
 }

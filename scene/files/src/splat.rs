@@ -7,7 +7,9 @@
 //! | 24–27 | red, green, blue, opacity; 0 to 255 |
 //! | 28–31 | rotation w, x, y, z; (byte − 128) / 128 |
 
-use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
+use crate::byte_values::{
+    byte_of_logit, is_beyond_scales, log_scale_of, logit_of_byte, scale_of_log, to_byte,
+};
 use crate::clamped::{Clamped, is_no_byte};
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
@@ -18,9 +20,6 @@ use splatstream_gaussians::{GaussianFrame, Planes};
 
 /// Bytes of one Gaussian.
 pub const RECORD: usize = 32;
-
-/// The smallest semi-axis told from zero: smaller ones, zero among them, have no finite log.
-const SMALLEST_SCALE: f32 = 1e-10;
 
 /// Reads `.splat` records. Opacity 0 and 255 become finite logits, half a step inside.
 ///
@@ -56,10 +55,7 @@ fn push(planes: &mut Planes, record: &[u8; RECORD]) {
         plane.push(f32::from_le_bytes(bytes));
     }
     for (plane, &bytes) in planes.log_scale.iter_mut().zip(scales) {
-        let scale = f32::from_le_bytes(bytes);
-        // Not `max`, which would hide a NaN.
-        let scale = if scale < SMALLEST_SCALE { SMALLEST_SCALE } else { scale };
-        plane.push(libm::log(f64::from(scale)) as f32);
+        plane.push(log_scale_of(f32::from_le_bytes(bytes)));
     }
     let &[[red, green, blue, opacity], rotation] = rest else { return };
     for (plane, byte) in planes.dc.iter_mut().zip([red, green, blue]) {
@@ -87,9 +83,7 @@ pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
             out.extend_from_slice(&value.to_le_bytes());
         }
         for log in row_of(frame.log_scale(), row) {
-            // `as` gives infinity beyond the largest float: the largest is nearer.
-            let scale = (libm::exp(f64::from(log)) as f32).min(f32::MAX);
-            out.extend_from_slice(&scale.to_le_bytes());
+            out.extend_from_slice(&scale_of_log(log).to_le_bytes());
         }
         out.extend(row_of(frame.dc(), row).map(|dc| to_byte(byte_scale(dc))));
         out.push(byte_of_logit(opacity));
@@ -105,8 +99,7 @@ pub fn write(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
 /// property that has some.
 pub fn clamped(frame: &GaussianFrame) -> Vec<Clamped> {
     let dc = Clamped::of("dc", frame.dc(), |_, dc| is_no_byte(byte_scale(dc)));
-    let largest = libm::log(f64::from(f32::MAX));
-    let scale = Clamped::of("log_scale", frame.log_scale(), |_, log| f64::from(log) > largest);
+    let scale = Clamped::of("log_scale", frame.log_scale(), |_, log| is_beyond_scales(log));
     dc.into_iter().chain(scale).collect()
 }
 

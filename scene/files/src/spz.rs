@@ -17,7 +17,6 @@
 //! down, z forward. Reading and writing convert.
 
 mod attributes;
-mod axes;
 mod container;
 
 use crate::clamped::Clamped;
@@ -45,10 +44,11 @@ impl Default for WriteOptions {
     }
 }
 
-/// Reads an SPZ file of any version. Opacity 0 and 255 become finite logits, half a step inside.
+/// Reads an SPZ file of any version. Opacity 0 and 255 become finite logits, half a step inside. Spherical harmonics of
+/// degree 4 are reduced to degree 3.
 ///
 /// # Errors
-/// Bytes that are no SPZ or end early, SH degree 4, axes that are more than flipped, more than `limits`
+/// Bytes that are no SPZ or end early, axes that are more than flipped, more than `limits`
 /// allow, or a value that no frame may hold.
 pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
     checked(read_as_is(bytes, &mut Budget::new(limits))?)

@@ -13,9 +13,9 @@ use crate::smallest_three::from_smallest_three;
 use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, Planes, sh_coefficients};
 
 /// Palette entries in a row of the centroid image.
-const ENTRIES_A_ROW: usize = 64;
+pub(super) const ENTRIES_A_ROW: usize = 64;
 /// Alpha of a rotation whose largest component is the first.
-const FIRST_LARGEST: u8 = 252;
+pub(super) const FIRST_LARGEST: u8 = 252;
 
 const EXPORT: &str = "export the scene again";
 

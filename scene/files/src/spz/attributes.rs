@@ -3,15 +3,16 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use super::WriteOptions;
-use super::axes::Flip;
 use super::container::{Shape, Streams};
+use crate::axes::Flip;
 use crate::byte_values::{byte_of_logit, logit_of_byte, to_byte};
 use crate::clamped::{Clamped, is_no_byte};
 use crate::error::SceneError;
+use crate::half::float_of_half;
 use crate::reading::row_of;
 use crate::smallest_three::{from_smallest_three, to_smallest_three};
 use splatstream_gaussians::rotation::normalised;
-use splatstream_gaussians::{GaussianFrame, Planes};
+use splatstream_gaussians::{GaussianFrame, Planes, sh_planes};
 
 /// How much of a DC coefficient makes one of colour: less than the basis function, to leave room outside 0–1.
 const COLOUR_SCALE: f64 = 0.15;
@@ -34,12 +35,13 @@ pub(crate) fn unpack(shape: &Shape, streams: &Streams, mut planes: Planes) -> Pl
     }
     unpack_rotations(shape, rotations, &mut planes);
     let signs = shape.flip.sh();
-    let count = planes.sh.len();
+    // A file of degree 4 has more coefficients than the planes take: those of band 4 come last.
+    let stride = sh_planes(shape.stored_degree).max(1);
     // Three channels have the sign of their coefficient.
     for ((at, plane), sign) in
         planes.sh.iter_mut().enumerate().zip(signs.into_iter().flat_map(|sign| [sign; 3]))
     {
-        let bytes = sh.iter().skip(at).step_by(count);
+        let bytes = sh.iter().skip(at).step_by(stride);
         plane.extend(bytes.map(|&byte| sign * (f32::from(byte) - 128.0) / 128.0));
     }
     planes
@@ -89,20 +91,6 @@ fn unpack_rotations(shape: &Shape, bytes: &[u8], planes: &mut Planes) {
     }
 }
 
-/// A 16-bit float, exactly. Version 1 has no others, and `f16` is not stable.
-fn float_of_half(half: u16) -> f32 {
-    let sign = if half >> 15 == 1 { -1.0 } else { 1.0 };
-    let (exponent, fraction) = (half >> 10 & 0x1f, f32::from(half & 0x3ff));
-    // Powers of two built from their bits are exact.
-    let power = |exponent: u32| f32::from_bits(exponent << 23);
-    sign * match exponent {
-        0 => fraction * power(127 - 24),
-        31 if fraction == 0.0 => f32::INFINITY,
-        31 => f32::NAN,
-        _ => (1024.0 + fraction) * power(127 - 25 + u32::from(exponent)),
-    }
-}
-
 /// The streams of version 3.
 pub(crate) fn pack(frame: &GaussianFrame, options: &WriteOptions) -> Result<(Shape, Streams), SceneError> {
     check_sh_bits(options)?;
@@ -111,6 +99,7 @@ pub(crate) fn pack(frame: &GaussianFrame, options: &WriteOptions) -> Result<(Sha
         version: 3,
         gaussians: frame.len(),
         sh_degree: frame.sh_degree(),
+        stored_degree: frame.sh_degree(),
         fractional_bits,
         antialiased: frame.antialiased(),
         flip: Flip::default(),
@@ -241,24 +230,4 @@ fn sh_steps(value: f32, bits: u8) -> (f64, f64) {
 /// Bits of the coefficients in a plane.
 fn sh_bits(plane: usize, options: &WriteOptions) -> u8 {
     if plane < 9 { options.sh1_bits } else { options.sh_rest_bits }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn halves_are_exact() {
-        let pairs = [
-            (0x3c00, 1.0),
-            (0xc000, -2.0),
-            (0x0001, 5.960_464_5e-8),
-            (0x7bff, 65504.0),
-            (0x0400, 6.103_515_6e-5),
-        ];
-        for (half, float) in pairs {
-            assert_eq!(float_of_half(half), float, "{half:#06x}");
-        }
-        assert!(float_of_half(0x7c00).is_infinite() && float_of_half(0x7e00).is_nan());
-    }
 }

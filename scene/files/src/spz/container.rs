@@ -6,11 +6,12 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
-use super::axes::Flip;
+use crate::axes::Flip;
 use crate::cursor::Cursor;
 use crate::decompress;
 use crate::error::SceneError;
 use crate::limits::{Budget, bytes_of_planes};
+use crate::note::{MOST_SH_DEGREE, Note};
 use splatstream_gaussians::{MAX_SH_DEGREE, Planes, sh_planes};
 
 /// "NGSP" as the first four bytes.
@@ -58,7 +59,10 @@ impl StreamHeader {
 pub(crate) struct Shape {
     pub(crate) version: u32,
     pub(crate) gaussians: usize,
+    /// Of the planes, 3 at most.
     pub(crate) sh_degree: u8,
+    /// Of the file, whose coefficients of degree 4 are passed over.
+    pub(crate) stored_degree: u8,
     pub(crate) fractional_bits: u8,
     pub(crate) antialiased: bool,
     pub(crate) flip: Flip,
@@ -74,7 +78,7 @@ impl Shape {
     pub(crate) fn strides(&self) -> [usize; 6] {
         let position = if self.version == 1 { 6 } else { 9 };
         let rotation = if self.version < 3 { 3 } else { 4 };
-        [position, 1, 3, 3, rotation, sh_planes(self.sh_degree)]
+        [position, 1, 3, 3, rotation, sh_planes(self.stored_degree)]
     }
 
     /// Checks a header: nothing in it is used before.
@@ -82,9 +86,9 @@ impl Shape {
         if header.magic != MAGIC {
             return Err(SceneError::malformed(0, format!("magic is {:#010x}", header.magic), NOT_SPZ));
         }
-        if header.sh_degree > MAX_SH_DEGREE {
+        if header.sh_degree > MOST_SH_DEGREE {
             let what = format!("SPZ with SH degree {}", header.sh_degree);
-            return Err(SceneError::unsupported(what, "convert it to degree 3 or less"));
+            return Err(SceneError::unsupported(what, "convert it to degree 4 or less"));
         }
         if header.fractional_bits > 31 {
             let what = format!("fractional_bits is {}, at most 31 make sense", header.fractional_bits);
@@ -93,7 +97,8 @@ impl Shape {
         let shape = Self {
             version: header.version,
             gaussians: header.gaussians as usize,
-            sh_degree: header.sh_degree,
+            sh_degree: header.sh_degree.min(MAX_SH_DEGREE),
+            stored_degree: header.sh_degree,
             fractional_bits: header.fractional_bits,
             antialiased: header.flags & ANTIALIASED != 0,
             flip: Flip::default(),
@@ -107,6 +112,9 @@ impl Shape {
         let planes = bytes_of_planes(self.sh_degree, self.gaussians as u64);
         budget.take(streams.saturating_add(planes), "all its Gaussians")?;
         budget.give_back(planes);
+        if self.stored_degree > self.sh_degree {
+            budget.note(Note::ShDegree { found: self.stored_degree });
+        }
         budget.planes(self.sh_degree, self.gaussians as u64)
     }
 
@@ -232,7 +240,7 @@ pub(crate) fn write(shape: &Shape, streams: &Streams) -> Result<Vec<u8>, SceneEr
         magic: MAGIC,
         version: shape.version,
         gaussians,
-        sh_degree: shape.sh_degree,
+        sh_degree: shape.stored_degree,
         fractional_bits: shape.fractional_bits,
         flags: if shape.antialiased { ANTIALIASED } else { 0 },
         reserved: 0,

@@ -1,14 +1,15 @@
 //! Whatever the bytes are, a reader answers; it does not panic.
 
 use proptest::prelude::*;
-use splatstream_files::{SceneError, compressed_ply, ply, sog, splat, spz};
+use splatstream_files::{SceneError, compressed_ply, gltf, ksplat, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
 use super::samples::{LIMITS, small_files};
 
 type Reader = fn(&[u8], &splatstream_files::ReadLimits) -> Result<GaussianFrame, SceneError>;
 
-const READERS: [Reader; 5] = [ply::read, compressed_ply::read, splat::read, spz::read, sog::read_zip];
+const READERS: [Reader; 7] =
+    [ply::read, compressed_ply::read, splat::read, spz::read, sog::read_zip, gltf::read, ksplat::read];
 
 /// Every reader on `bytes`; what they say does not matter here.
 fn read_all(bytes: &[u8]) {
@@ -20,11 +21,13 @@ fn read_all(bytes: &[u8]) {
 }
 
 fn reader_of(name: &str) -> Reader {
-    match name {
-        "a.ply" => ply::read,
-        "a.compressed.ply" => compressed_ply::read,
-        "a.splat" => splat::read,
-        "a.sog" => sog::read_zip,
+    match name.split_once('.') {
+        Some((_, "ply")) => ply::read,
+        Some((_, "compressed.ply")) => compressed_ply::read,
+        Some((_, "splat")) => splat::read,
+        Some((_, "sog")) => sog::read_zip,
+        Some((_, "glb" | "gltf")) => gltf::read,
+        Some((_, "ksplat")) => ksplat::read,
         _ => spz::read,
     }
 }
@@ -70,7 +73,7 @@ proptest! {
 
     #[test]
     fn any_bytes_after_a_true_start_do_no_harm(
-        which in 0..6_usize,
+        which in 0..13_usize,
         kept in 0.0..1.0_f64,
         tail in prop::collection::vec(any::<u8>(), 0..400),
     ) {
@@ -82,7 +85,7 @@ proptest! {
 
     #[test]
     fn several_changed_bytes_do_no_harm(
-        which in 0..6_usize,
+        which in 0..13_usize,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
     ) {
         let (_, mut bytes) = small_files().swap_remove(which);

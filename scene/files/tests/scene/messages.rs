@@ -99,13 +99,17 @@ fn content_decides_the_format_and_errors_carry_the_path() {
     let directory = tempfile::tempdir().unwrap();
     for (name, bytes) in small_files() {
         // A wrong extension does not matter where the content says enough.
-        let path = directory.path().join(if name == "a.splat" { name } else { "scene.bin" });
+        let (_, suffix) = name.split_once('.').unwrap();
+        let needs_name = matches!(suffix, "splat" | "ksplat" | "gltf");
+        let path = directory.path().join(if needs_name { name } else { "scene.bin" });
         fs::write(&path, &bytes).unwrap();
-        let expected = match name {
-            "a.ply" => SceneFormat::Ply,
-            "a.compressed.ply" => SceneFormat::CompressedPly,
-            "a.splat" => SceneFormat::Splat,
-            "a.sog" => SceneFormat::Sog,
+        let expected = match suffix {
+            "ply" => SceneFormat::Ply,
+            "compressed.ply" => SceneFormat::CompressedPly,
+            "splat" => SceneFormat::Splat,
+            "sog" => SceneFormat::Sog,
+            "glb" | "gltf" => SceneFormat::Gltf,
+            "ksplat" => SceneFormat::Ksplat,
             _ => SceneFormat::Spz,
         };
         assert_eq!(detect(&path).unwrap(), expected, "{name}");

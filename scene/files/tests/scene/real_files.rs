@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use splatstream_files::{ReadLimits, read_scene};
+use splatstream_files::{Note, ReadLimits, Sequence, SequenceOptions, read_scene};
 use splatstream_gaussians::{GaussianFrame, importance};
 
 /// The data directory, which lies beside the repository, or nothing and a line that says so.
@@ -58,5 +58,25 @@ fn dynamic_scenes_have_their_counts() {
     }
     for frame in 1..=50 {
         assert_eq!(read(&data.join(format!("dynamic/monkey/monkey_{frame:04}.sog"))).len(), 31_658);
+    }
+}
+
+#[test]
+fn scenes_in_continuous_time_have_their_counts() {
+    let Some(data) = data() else { return };
+    for (name, usable, unusable) in [("kitchen", 61_245, 1197), ("clip", 40_935, 20_902)] {
+        let path = data.join(format!("dynamic/{name}/{name}.splatv"));
+        let options = SequenceOptions { samples: 50 };
+        let mut sequence = Sequence::open(&path, &ReadLimits::default(), &options).unwrap();
+        assert_eq!(sequence.len(), 50);
+        let mut alive = Vec::new();
+        for number in [0, 25, 49] {
+            let scene = sequence.frame(number).unwrap();
+            assert_eq!(scene.frame.validate(), Ok(()));
+            assert_eq!((scene.frame.len(), scene.notes), (usable, vec![Note::Unusable { count: unusable }]));
+            // Opacities of less than 1/255 are not seen.
+            alive.push(scene.frame.opacity_logit().iter().filter(|&&logit| logit >= -5.537).count());
+        }
+        assert!(alive.iter().all(|&count| count > usable * 8 / 10 && count < usable), "{name}: {alive:?}");
     }
 }

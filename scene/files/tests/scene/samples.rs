@@ -6,14 +6,14 @@ use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use proptest::collection::vec;
 use proptest::prelude::*;
-use splatstream_files::{ReadLimits, ply, splat, spz};
+use splatstream_files::{ReadLimits, compressed_ply, gltf, ply, sog, splat, spz};
 use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
 
 /// Small, so that a test of broken files cannot take all memory.
 pub(crate) const LIMITS: ReadLimits = ReadLimits { max_memory: 1 << 22 };
 
 /// The values of one Gaussian: position, log scale, rotation, opacity logit, DC, SH.
-type Row = ([f32; 3], [f32; 3], [f32; 4], f32, [f32; 3], Vec<f32>);
+pub(crate) type Row = ([f32; 3], [f32; 3], [f32; 4], f32, [f32; 3], Vec<f32>);
 
 /// Frames of up to 12 Gaussians and any SH degree, with values as scenes have them. No rotation is zero.
 pub(crate) fn frames() -> impl Strategy<Value = GaussianFrame> {
@@ -30,7 +30,7 @@ pub(crate) fn frames() -> impl Strategy<Value = GaussianFrame> {
     (0..=3_u8, vec(row, 0..12)).prop_map(|(degree, rows)| frame_of(degree, &rows))
 }
 
-fn frame_of(degree: u8, rows: &[Row]) -> GaussianFrame {
+pub(crate) fn frame_of(degree: u8, rows: &[Row]) -> GaussianFrame {
     let planes = Planes {
         position: [0, 1, 2].map(|at| rows.iter().map(|row| row.0[at]).collect()),
         log_scale: [0, 1, 2].map(|at| rows.iter().map(|row| row.1[at]).collect()),
@@ -63,10 +63,17 @@ pub(crate) fn small_files() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("a.ply", ply::write(&frame)),
         ("a.compressed.ply", compressed_ply()),
+        ("b.compressed.ply", compressed_ply::write(&frame).unwrap()),
         ("a.splat", splat::write(&frame).unwrap()),
         ("a.spz", spz::write(&frame).unwrap()),
         ("four.spz", super::spz_versions::version_4(&frame)),
         ("a.sog", sog()),
+        ("b.sog", sog::write_zip(&frame).unwrap()),
+        ("a.glb", gltf::write(&frame).unwrap()),
+        ("a.gltf", super::gltf_files::with_data_uri(&frame)),
+        ("a.ksplat", super::ksplat_files::ksplat(&frame, 0, 2)),
+        ("b.ksplat", super::ksplat_files::ksplat(&frame, 1, 2)),
+        ("c.ksplat", super::ksplat_files::ksplat(&frame, 2, 2)),
     ]
 }
 

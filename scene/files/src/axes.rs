@@ -1,4 +1,4 @@
-//! The directions of SPZ's axes, and what changes sign when they flip.
+//! The directions of a format's axes, and what changes sign when they flip.
 
 use crate::error::SceneError;
 
@@ -10,6 +10,8 @@ pub(crate) struct Flip([f32; 3]);
 const RIGHT_DOWN_FORWARD: u32 = 6;
 /// Right, up, back: SPZ's own axes.
 const RIGHT_UP_BACK: u32 = 4;
+/// Left, up, forward: the axes of glTF.
+const LEFT_UP_FORWARD: u32 = 7;
 
 impl Default for Flip {
     fn default() -> Self {
@@ -32,6 +34,11 @@ impl Flip {
                 "convert the file to right-up-back axes",
             )),
         }
+    }
+
+    /// The flip between glTF's axes and those of frames, either way: half a turn about z.
+    pub(crate) fn of_gltf() -> Self {
+        Self::between(LEFT_UP_FORWARD)
     }
 
     fn between(system: u32) -> Self {
@@ -73,6 +80,12 @@ mod tests {
                 assert!((there - here * f64::from(sign)).abs() < 1e-12, "system {system}");
             }
         }
+    }
+
+    #[test]
+    fn gltf_axes_flip_x_and_y() {
+        assert_eq!(Flip::of_gltf().position(), [-1.0, -1.0, 1.0]);
+        assert_eq!(Flip::of_gltf().rotation(), [-1.0, -1.0, 1.0]);
     }
 
     #[test]

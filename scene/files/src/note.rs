@@ -1,0 +1,81 @@
+//! What a reader changed on the way into a frame, where a user should know of it.
+
+use std::fmt;
+
+/// The highest SH degree that any format has; frames hold up to degree 3.
+pub(crate) const MOST_SH_DEGREE: u8 = 4;
+
+/// Something that a file has and a frame cannot hold, or that a file lacks and a frame needs. The frame is good, and not all
+/// that the file is.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Note {
+    /// Spherical harmonics were cut to degree 3.
+    ShDegree {
+        /// The degree of the file, 4.
+        found: u8,
+    },
+    /// The Gaussians of the file are flat (2DGS): they have two semi-axes, and were given a third.
+    Flat {
+        /// Natural log of the third semi-axis, the same for all.
+        log_scale: f32,
+    },
+    /// Meshes and points that are no Gaussians were left out.
+    OtherPrimitives {
+        /// How many primitives.
+        count: u64,
+    },
+    /// Gaussians that nothing can show were left out: values that are not finite, no opacity, no size or no rotation.
+    Unusable {
+        /// How many.
+        count: u64,
+    },
+    /// Colours are in linear light, and were taken as they are.
+    LinearColours,
+}
+
+impl Note {
+    /// A word for programs, which does not change: `sh-reduced`, `flat`, `other-primitives`, `unusable`, `linear-colours`.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::ShDegree { .. } => "sh-reduced",
+            Self::Flat { .. } => "flat",
+            Self::OtherPrimitives { .. } => "other-primitives",
+            Self::Unusable { .. } => "unusable",
+            Self::LinearColours => "linear-colours",
+        }
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let number = |count: u64, one: &str, more: &str| match count {
+            1 => format!("1 {one} was"),
+            _ => format!("{count} {more} were"),
+        };
+        match self {
+            Self::ShDegree { found } => write!(
+                f,
+                "spherical harmonics of degree {found} were reduced to degree 3; the coefficients of higher degrees were \
+                 left out"
+            ),
+            Self::Flat { log_scale } => write!(
+                f,
+                "Gaussians have two semi-axes (2DGS); each was given a third of {:.0e}, and is drawn as a thin ellipsoid",
+                libm::exp(f64::from(*log_scale))
+            ),
+            Self::OtherPrimitives { count } => {
+                write!(f, "{} left out: only Gaussians are read", number(*count, "mesh primitive", "mesh primitives"))
+            }
+            Self::Unusable { count } => write!(
+                f,
+                "{} left out: their values are not finite, or they have no opacity, size or rotation",
+                number(*count, "Gaussian", "Gaussians")
+            ),
+            Self::LinearColours => f.write_str(
+                "colours are in linear light (lin_rec709_display) and were kept as they are; they look too dark where \
+                 they are shown as sRGB",
+            ),
+        }
+    }
+}
