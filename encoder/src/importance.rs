@@ -102,15 +102,15 @@ impl Ranking {
         Ranked { order, shown }
     }
 
-    /// A GOP begins: after a cut there is something else to see, from elsewhere. Views for which an order is known already
-    /// stay.
+    /// A GOP begins, which has views of its own: there may be something else to see, from elsewhere. Views for which an
+    /// order is known already stay.
     pub(crate) fn start_gop(&mut self) {
         if !self.are_given && self.known_order.is_none() {
             self.cameras.clear();
         }
     }
 
-    /// The cameras in use: those of the settings, or made for the first frame of a GOP that they are asked for.
+    /// The cameras in use: those of the settings, or made for the first frame of the GOP.
     pub(crate) fn cameras(&mut self, frame: &GaussianFrame) -> &[Camera] {
         if self.cameras.is_empty() {
             let (count, height) = match self.preset {
