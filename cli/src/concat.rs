@@ -71,7 +71,8 @@ impl Concat {
         }
         drop(progress);
         let mut file = OutputFile::create(&self.out, &self.inputs)?;
-        let mut open = |part: usize| File::open(&self.inputs[part]).map(|file| Box::new(file) as Box<dyn Read>);
+        let mut open =
+            |part: usize| File::open(&self.inputs[part]).map(|file| Box::new(file) as Box<dyn Read>);
         let joined = concat(&parts, &mut open, &mut file, &limits).map_err(|error| self.failure(error))?;
         file.finish()?;
         let mut report = Report {
@@ -125,7 +126,9 @@ impl Concat {
                 frames.start,
                 frames.end - 1
             )),
-            ConcatError::Write(splatstream_encoder::Error::Output(cause)) => Failure::file("write", &self.out, &cause),
+            ConcatError::Write(splatstream_encoder::Error::Output(cause)) => {
+                Failure::file("write", &self.out, &cause)
+            }
             error => Failure::other(error.to_string()),
         }
     }
@@ -157,7 +160,8 @@ impl Report {
         );
         for Part { file, bytes, first_frame, frames, .. } in &self.parts {
             let last = (first_frame + frames).saturating_sub(1);
-            text += &format!("  {}: frames {first_frame}..={last}, {} bytes\n", file.display(), grouped(*bytes));
+            text +=
+                &format!("  {}: frames {first_frame}..={last}, {} bytes\n", file.display(), grouped(*bytes));
         }
         text
     }

@@ -304,7 +304,8 @@ impl Encode {
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
         let shard = self.shards.open(&mut source, &settings)?;
-        let progress = Progress::frames("encoding", shard.as_ref().map_or(source.len(), |shard| shard.frames));
+        let progress =
+            Progress::frames("encoding", shard.as_ref().map_or(source.len(), |shard| shard.frames));
         let mut at = |done, _| progress.at(done);
         let report = match &shard {
             None => encode(&mut source, &settings, &mut file, &mut at),
@@ -459,9 +460,7 @@ fn failed(source: &FrameFiles, out: &Path, error: &splatstream_encoder::Error) -
         )),
         Error::TooManyGaussians { frame, .. }
         | Error::TooManyPerSecond { frame, .. }
-        | Error::OtherFrame { frame, .. } => {
-            Failure::other(format!("{}: {error}", source.name(*frame)))
-        }
+        | Error::OtherFrame { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
         Error::Output(cause) => Failure::file("write", out, cause),
         Error::Setting { .. } => Failure::Usage(error.to_string()),
         _ => Failure::other(error.to_string()),

@@ -122,14 +122,12 @@ fn name_of(matches: &ArgMatches) -> String {
 }
 
 /// Runs `work` with so many threads, or one per processor.
-fn in_threads(
-    threads: Option<u16>,
-    work: impl FnOnce() -> Result<(), Failure>,
-) -> Result<(), Failure> {
+fn in_threads(threads: Option<u16>, work: impl FnOnce() -> Result<(), Failure>) -> Result<(), Failure> {
     // 0 is one per processor. The thread that is here is none of them: it may wait for work without keeping any from it.
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0).into());
     builder.build_global().map_err(|error| {
-        let threads = threads.map_or_else(|| "a thread per processor".to_owned(), |count| format!("{count} threads"));
+        let threads =
+            threads.map_or_else(|| "a thread per processor".to_owned(), |count| format!("{count} threads"));
         Failure::other(format!("cannot start {threads}: {error}\n  give fewer with --threads"))
     })?;
     work()

@@ -25,7 +25,8 @@ fn write_frames(directory: &Path, count: u32) -> PathBuf {
 
 /// Encodes shard `number` with more arguments; gives its file.
 fn shard(directory: &Path, number: &str, more: &[&str]) -> PathBuf {
-    let (frames, out) = (directory.join("frames"), directory.join(format!("{}.gss", number.replace('/', "of"))));
+    let (frames, out) =
+        (directory.join("frames"), directory.join(format!("{}.gss", number.replace('/', "of"))));
     let how = ["encode", text(&frames), "--shard", number, "-o", text(&out)];
     let report = json(&[&how[..], &OPTIONS, more].concat());
     assert_eq!(report["shard"]["number"].as_u64(), number[..1].parse().ok());
@@ -40,7 +41,8 @@ fn shards_of_several_machines_give_the_bytes_of_a_single_run() {
     let [whole, plan, joined] = ["whole.gss", "plan.json", "joined.gss"].map(|name| directory.join(name));
     let report = json(&[&["encode", text(&frames), "-o", text(&whole)][..], &OPTIONS].concat());
     assert!(report["shard"].is_null());
-    let planned = json(&[&["encode", text(&frames), "--write-plan", "-o", text(&plan)][..], &OPTIONS].concat());
+    let planned =
+        json(&[&["encode", text(&frames), "--write-plan", "-o", text(&plan)][..], &OPTIONS].concat());
     assert_eq!((planned["frames"].as_u64(), planned["most_shards"].as_u64()), (Some(7), Some(4)));
     let with_plan = ["--plan", text(&plan)];
     // One of them finds the plan again, another has another number of threads.
@@ -52,12 +54,22 @@ fn shards_of_several_machines_give_the_bytes_of_a_single_run() {
     let inputs = shards.each_ref().map(|path| text(path));
     let report = json(&[&["concat"], &inputs[..], &["-o", text(&joined)]].concat());
     assert!(std::fs::read(&joined).expect("a stream") == std::fs::read(&whole).expect("a stream"));
-    let firsts: Vec<u64> = report["parts"].as_array().expect("parts").iter().filter_map(|part| part["first_frame"].as_u64()).collect();
-    assert_eq!((firsts, report["frames"].as_u64(), report["gops"].as_u64()), (vec![0, 2, 4], Some(7), Some(4)));
+    let firsts: Vec<u64> = report["parts"]
+        .as_array()
+        .expect("parts")
+        .iter()
+        .filter_map(|part| part["first_frame"].as_u64())
+        .collect();
+    assert_eq!(
+        (firsts, report["frames"].as_u64(), report["gops"].as_u64()),
+        (vec![0, 2, 4], Some(7), Some(4))
+    );
     assert_eq!(report["parts"][0]["file"].as_str(), Some(inputs[1]));
     // A shard alone is a stream.
     succeed(&["validate", inputs[0]]);
-    assert!(succeed(&["concat", inputs[0], inputs[1], inputs[2], "-o", text(&joined)]).contains("of 3 shards"));
+    assert!(
+        succeed(&["concat", inputs[0], inputs[1], inputs[2], "-o", text(&joined)]).contains("of 3 shards")
+    );
 }
 
 #[test]
@@ -72,7 +84,10 @@ fn what_does_not_belong_together_is_refused_by_name() {
     let said = fail(1, &["concat", a, c, "-o", out]);
     assert!(said.contains("frames 2..=3 of 6 are in none of the shards"), "{said}");
     let said = fail(1, &["concat", a, b, b, c, "-o", out]);
-    assert!(said.contains("2of3.gss: holds frames 2..=3, which ") && said.contains("every shard once"), "{said}");
+    assert!(
+        said.contains("2of3.gss: holds frames 2..=3, which ") && said.contains("every shard once"),
+        "{said}"
+    );
     let more = ["--tolerance", "0.4", "--shard", "3/3"];
     succeed(&[&["encode", text(&frames), "-o", text(&other)][..], &OPTIONS, &more].concat());
     let said = fail(1, &["concat", a, b, text(&other), "-o", out]);

@@ -155,7 +155,9 @@ pub fn concat<'a>(
     for &part in &order {
         let in_part = |error: PartError| ConcatError::Part { part, error };
         let mut stream = open(part).map_err(|error| in_part(error.into()))?;
-        let copied = walk(&mut *stream, limits, &mut |header, unit| copy(&mut writer, (header.profile(), unit), start));
+        let copied = walk(&mut *stream, limits, &mut |header, unit| {
+            copy(&mut writer, (header.profile(), unit), start)
+        });
         let copied = copied.map_err(|error: CopyError| error.of_part(part))?;
         let known = parts.get(part);
         if known.map(|part| part.bytes) != Some(copied.1) {
@@ -195,7 +197,11 @@ impl From<StreamError> for CopyError {
 }
 
 /// Writes a unit of a part whose frame 0 is frame `start` of the stream. What describes a whole stream is written anew.
-fn copy(writer: &mut UnitWriter<'_>, (profile, unit): (Profile, &Unit<'_>), start: u32) -> Result<(), CopyError> {
+fn copy(
+    writer: &mut UnitWriter<'_>,
+    (profile, unit): (Profile, &Unit<'_>),
+    start: u32,
+) -> Result<(), CopyError> {
     let id = unit.header.id();
     let id = UnitId { frame: id.frame.saturating_add(start), ..id };
     let written = match id.unit_type {

@@ -92,7 +92,9 @@ pub enum Error {
         announced: String,
     },
     /// There are not so many GOPs.
-    #[error("{count} shards are asked for, and the sequence has {most} GOPs; give at most {most} shards, or shorter GOPs")]
+    #[error(
+        "{count} shards are asked for, and the sequence has {most} GOPs; give at most {most} shards, or shorter GOPs"
+    )]
     Shards {
         /// The number of shards.
         count: u32,
@@ -100,7 +102,9 @@ pub enum Error {
         most: u32,
     },
     /// The sequence has not the frames that it was planned with.
-    #[error("the sequence has {found} frames, and had {planned} when it was planned; give the same frames, or plan again")]
+    #[error(
+        "the sequence has {found} frames, and had {planned} when it was planned; give the same frames, or plan again"
+    )]
     OtherFrames {
         /// Frames there are.
         found: u32,
@@ -120,7 +124,9 @@ pub enum Error {
         planned: u32,
     },
     /// A setting is not the one that was planned with.
-    #[error("{name} is {found}, and was {planned} when the sequence was planned; give every shard the settings of the plan")]
+    #[error(
+        "{name} is {found}, and was {planned} when the sequence was planned; give every shard the settings of the plan"
+    )]
     OtherSetting {
         /// The setting.
         name: &'static str,

@@ -116,7 +116,16 @@ impl<'a> SpanCoder<'a> {
         sink: &'a mut dyn GopSink,
         progress: &'a mut dyn FnMut(u32),
     ) -> Self {
-        Self { source, common, ranking, sink, report: Report::default(), recorder: None, looked_at: 0, progress }
+        Self {
+            source,
+            common,
+            ranking,
+            sink,
+            report: Report::default(),
+            recorder: None,
+            looked_at: 0,
+            progress,
+        }
     }
 
     /// Codes all frames, and reports what was coded.
@@ -245,7 +254,8 @@ impl<'a> SpanCoder<'a> {
 
     /// Whether a frame shares too little with the one before it to be predicted from it.
     fn is_unlike(&self, before: &Target, after: &Target) -> bool {
-        let matching = follow(&before.cloud(), &after.cloud(), &self.measure(), self.common.sequence.position_bits);
+        let matching =
+            follow(&before.cloud(), &after.cloud(), &self.measure(), self.common.sequence.position_bits);
         shares_little(&matching) && !(self.by_pictures() && shares_much(&matching))
     }
 
@@ -302,7 +312,8 @@ impl<'a> SpanCoder<'a> {
         let rows = visible(&frame, self.common.settings.keep_invisible);
         let row_count = frame.len() as u32;
         // Where frames are predicted axes are named as in the reference, and what a frame starts with is sorted.
-        let sorts = self.common.sequence.canonical_axes() || self.common.settings.profile() == Profile::Dynamic;
+        let sorts =
+            self.common.sequence.canonical_axes() || self.common.settings.profile() == Profile::Dynamic;
         let frame = canonicalise(frame.into_selected(&rows), sorts);
         let (frame, found) = isolated::colours(frame, &rows, number);
         let grid = PositionGrid::of(&self.common.sequence);
@@ -430,7 +441,8 @@ impl<'a> SpanCoder<'a> {
     /// Prefixes of I frames are compensated where time is no matter: not in streams of one frame, or of frames that
     /// each stand for themselves, which are encoded quickly.
     fn compensator(&self, target: &Target) -> Option<Compensator> {
-        let takes_time = self.common.settings.preset != Preset::Fast && self.common.settings.profile() == Profile::Dynamic;
+        let takes_time =
+            self.common.settings.preset != Preset::Fast && self.common.settings.profile() == Profile::Dynamic;
         let has_prefixes = self.common.sequence.refinement_count > 1 && !target.frame.is_empty();
         (takes_time && has_prefixes).then(|| Compensator::new(&target.frame))
     }
@@ -448,7 +460,8 @@ impl<'a> SpanCoder<'a> {
         let gaussians = coded.gaussians();
         let sh = gop.tools.sh.as_ref().map(|_| 0);
         let header = FrameHeader::new(role.frame_type, 0, sh, gaussians);
-        let payload = write_frame(&header, coded.carried_digest, coded.cells.as_ref(), &self.common.sequence)?;
+        let payload =
+            write_frame(&header, coded.carried_digest, coded.cells.as_ref(), &self.common.sequence)?;
         let cells = coded.cells.as_ref().map_or(0, |cells| cells.cell_count);
         let mut frame = FrameReport::new(role.frame_type, gaussians, cells);
         let start = gop.units.len();

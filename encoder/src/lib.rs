@@ -69,8 +69,8 @@ pub use error::Error;
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;
-pub use progress::Progress;
 pub use plan::{Plan, PlanRecord, PlannedSteps, PlannedTarget, Single, plan};
+pub use progress::Progress;
 pub use push::Encoder;
 pub use report::{Dropped, FrameReport, GopReport, PictureReport, Report, TargetReport, VerifiedFrame};
 pub use settings::{

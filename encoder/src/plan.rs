@@ -122,7 +122,11 @@ impl Plan {
     pub fn frames_of_shard(&self, (number, count): (u32, u32)) -> Result<Range<u32>, Error> {
         let (spans, frames) = (self.shards(), self.analysis.parameters.frame_count);
         if !(1..=count).contains(&number) {
-            return Err(Error::Setting { name: "shard", value: format!("{number}/{count}"), allowed: "1/N to N/N" });
+            return Err(Error::Setting {
+                name: "shard",
+                value: format!("{number}/{count}"),
+                allowed: "1/N to N/N",
+            });
         }
         if count > spans {
             return Err(Error::Shards { count, most: spans });
@@ -154,7 +158,8 @@ impl Plan {
         if source.len() != sequence_frames {
             return Err(Error::OtherFrames { found: source.len(), planned: sequence_frames });
         }
-        let mut source = CheckedSource::new(source, self.settings.drop_invalid).expecting(&self.analysis.counts);
+        let mut source =
+            CheckedSource::new(source, self.settings.drop_invalid).expecting(&self.analysis.counts);
         let encoded = self.encode(&mut source, (frames, Some(shard)), sink, progress, None);
         let mut report = encoded.map_err(named)?.unwrap_or_default();
         (report.target, report.stands_alone) = (self.target, self.stands_alone);
@@ -184,7 +189,8 @@ impl Plan {
         let spans = self.spans(frames);
         let at_once = at_once(settings, &self.analysis, &spans);
         let description = self.analysis.description(settings);
-        let head = Head { level: self.analysis.level, description: Some(&description), shard: shard.as_ref() };
+        let head =
+            Head { level: self.analysis.level, description: Some(&description), shard: shard.as_ref() };
         let mut coding = Coding {
             source,
             common: self.common(),

@@ -106,6 +106,10 @@ impl<W: Write> Encoder<W> {
     /// # Errors
     /// As [`Encoder::push`]; no frame at all.
     pub fn finish(mut self) -> Result<Report, Error> {
+        let is_one_gop = self.window.len() <= self.gop_length();
+        if self.stream.is_none() && !is_one_gop {
+            self.code()?;
+        }
         if self.stream.is_none() {
             let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut |_, _| ())?;
             self.sink.flush()?;
@@ -124,13 +128,24 @@ impl<W: Write> Encoder<W> {
         self.stream.as_ref().map_or_else(|| self.settings.gop_length(), |stream| stream.settings.gop_length())
     }
 
+    /// Begins the stream with what its first GOP and one frame more announce; later frames that are there already are held
+    /// to it.
+    fn start(&mut self) -> Result<(), Error> {
+        let frames = self.gop_length().saturating_add(1);
+        let mut first = FirstFrames { source: &mut self.window, frames };
+        let mut source = CheckedSource::new(&mut first, self.settings.drop_invalid);
+        let mut stream = Stream::start(&mut source, &self.settings, &mut self.sink).map_err(named)?;
+        for (number, frame) in (0..).zip(&mut self.window.frames).skip(frames as usize) {
+            *frame = stream.hold(core::mem::take(frame), number)?;
+        }
+        self.stream = Some(stream);
+        Ok(())
+    }
+
     /// Codes the GOPs of which all frames are there.
     fn code(&mut self) -> Result<(), Error> {
         if self.stream.is_none() {
-            let frames = self.gop_length().saturating_add(1);
-            let mut first = FirstFrames { source: &mut self.window, frames };
-            let mut source = CheckedSource::new(&mut first, self.settings.drop_invalid);
-            self.stream = Some(Stream::start(&mut source, &self.settings, &mut self.sink).map_err(named)?);
+            self.start()?;
         }
         let there = self.window.len();
         let gops = there.checked_div(self.gop_length()).unwrap_or(0);

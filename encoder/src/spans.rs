@@ -67,7 +67,9 @@ impl Spans {
         let of = |frame: u32| frame.checked_div(self.length).unwrap_or(0);
         match self.frames.is_empty() {
             true => 0,
-            false => of(self.frames.end.saturating_sub(1)).saturating_sub(of(self.frames.start)).saturating_add(1),
+            false => {
+                of(self.frames.end.saturating_sub(1)).saturating_sub(of(self.frames.start)).saturating_add(1)
+            }
         }
     }
 }
@@ -92,7 +94,8 @@ pub(crate) fn at_once(settings: &Settings, analysis: &Analysis, spans: &Spans) -
     let gaussians = analysis.largest as u64;
     let planes = u64::from(analysis.parameters.sh_dimension()).saturating_add(14);
     let frames = u64::from(spans.length.min(spans.frames.end.saturating_sub(spans.frames.start)));
-    let of_span = gaussians.saturating_mul(frames.saturating_mul(planes).saturating_mul(4).saturating_add(BESIDE_FRAMES));
+    let of_span = gaussians
+        .saturating_mul(frames.saturating_mul(planes).saturating_mul(4).saturating_add(BESIDE_FRAMES));
     let fitting = settings.gop_memory.checked_div(of_span).unwrap_or(u64::MAX);
     let fitting = usize::try_from(fitting).unwrap_or(usize::MAX).max(1);
     fitting.min(rayon::current_num_threads()).min(spans.left() as usize)
@@ -168,7 +171,8 @@ impl Coding<'_, '_> {
                 }
                 let Some(job) = jobs.pop_front() else { return Ok(true) };
                 let done = job.span.first.saturating_sub(start);
-                let (coded, report) = job.finish(&mut |frames| (self.progress)(done.saturating_add(frames)))?;
+                let (coded, report) =
+                    job.finish(&mut |frames| (self.progress)(done.saturating_add(frames)))?;
                 if let Some(judge) = judge.take()
                     && !judge(self.source, &coded, &report)?
                 {

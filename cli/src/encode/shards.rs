@@ -83,7 +83,11 @@ impl ShardArgs {
     }
 
     /// The frames that are encoded and where they are in the sequence; none where all of it is.
-    pub(super) fn open(&self, source: &mut FrameFiles, settings: &Settings) -> Result<Option<Shard>, Failure> {
+    pub(super) fn open(
+        &self,
+        source: &mut FrameFiles,
+        settings: &Settings,
+    ) -> Result<Option<Shard>, Failure> {
         let Some(number) = self.shard else { return Ok(None) };
         let plan = match &self.plan {
             Some(path) => read(path, settings)?,
@@ -128,7 +132,9 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
     let is_json = out.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("json"));
     if !is_json {
         let out = out.display();
-        return Err(Failure::Usage(format!("{out}: --write-plan writes JSON; give a name that ends in .json")));
+        return Err(Failure::Usage(format!(
+            "{out}: --write-plan writes JSON; give a name that ends in .json"
+        )));
     }
     let mut source = FrameFiles::find(&command.inputs, command.reading)?.unchecked();
     let read = command.read_files(&source);
@@ -138,7 +144,8 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
     let plan = plan(&mut source, &settings).map_err(|error| failed(&source, out, &error))?;
     let (most_shards, frames) = (plan.shards(), source.len());
     let plan = plan.record().map_err(|error| failed(&source, out, &error))?;
-    let (digest, gaussians) = (format!("{:016x}", plan.digest()), plan.gaussians.iter().map(|&n| u64::from(n)).sum());
+    let (digest, gaussians) =
+        (format!("{:016x}", plan.digest()), plan.gaussians.iter().map(|&n| u64::from(n)).sum());
     let plan = PlanFile { format: FORMAT.to_owned(), frames, most_shards, plan };
     let text = serde_json::to_string_pretty(&plan).map_err(|error| Failure::other(error.to_string()))?;
     file.finish_with(format!("{text}\n").as_bytes())?;
@@ -160,7 +167,9 @@ fn read(path: &Path, settings: &Settings) -> Result<Plan, Failure> {
     let text = std::fs::read_to_string(path).map_err(|error| Failure::file("read", path, &error))?;
     let name = path.display();
     let none = |why: String| {
-        Failure::other(format!("{name}: is no plan: {why}\n  make one: `splatstream encode ... --write-plan -o PLAN.json`"))
+        Failure::other(format!(
+            "{name}: is no plan: {why}\n  make one: `splatstream encode ... --write-plan -o PLAN.json`"
+        ))
     };
     let file: PlanFile = serde_json::from_str(&text).map_err(|error| none(error.to_string()))?;
     if file.format != FORMAT {
@@ -180,5 +189,6 @@ fn parse_shard(text: &str) -> Result<(u32, u32), String> {
         let (number, count) = (number.parse().ok()?, count.parse().ok()?);
         (1..=count).contains(&number).then_some((number, count))
     };
-    parse().ok_or_else(|| format!("'{text}' is not a shard; write 1/8 for the first of eight, 8/8 for the last"))
+    parse()
+        .ok_or_else(|| format!("'{text}' is not a shard; write 1/8 for the first of eight, 8/8 for the last"))
 }

@@ -20,7 +20,10 @@ pub(super) fn check_all(parts: &[StreamPart], limits: &Limits) -> Result<Vec<usi
         same(first, (part, other))?;
     }
     let total = |count: fn(&StreamPart) -> u32| parts.iter().map(|part| u64::from(count(part))).sum::<u64>();
-    let most = [("frames", total(|part| part.frames), u32::MAX), ("units", total(|part| part.units), limits.max_units)];
+    let most = [
+        ("frames", total(|part| part.frames), u32::MAX),
+        ("units", total(|part| part.units), limits.max_units),
+    ];
     for (what, count, max) in most {
         if count > u64::from(max) {
             return Err(ConcatError::TooLong { what, count, max: max.into() });
@@ -41,7 +44,10 @@ fn of_shards(parts: &[StreamPart]) -> Result<Vec<usize>, ConcatError> {
                 return Err(ConcatError::NoShard { part: shard, other: part });
             }
         }
-        let plans = shards.first().zip(shards.last()).map(|(a, b)| (a.plan, a.sequence_frames) == (b.plan, b.sequence_frames));
+        let plans = shards
+            .first()
+            .zip(shards.last())
+            .map(|(a, b)| (a.plan, a.sequence_frames) == (b.plan, b.sequence_frames));
         if plans == Some(false) {
             return Err(ConcatError::OtherPlan { part, other: 0 });
         }

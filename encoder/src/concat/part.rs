@@ -2,9 +2,7 @@
 
 use crate::shard::Shard;
 use splatstream_format::payload::SceneDescription;
-use splatstream_format::syntax::{
-    EndOfStream, FileHeader, GopHeader, Profile, SequenceParameters, UnitType,
-};
+use splatstream_format::syntax::{EndOfStream, FileHeader, GopHeader, Profile, SequenceParameters, UnitType};
 use splatstream_format::unit::Unit;
 use splatstream_format::unit_reader::{Event, UnitReader};
 use splatstream_format::{Error, ErrorKind, Limits};

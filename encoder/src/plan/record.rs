@@ -212,9 +212,12 @@ fn named(settings: &Settings) -> BTreeMap<String, String> {
 
 /// Everything that the bytes of a stream follow from, beside its frames.
 fn described(settings: &Settings) -> Vec<(&'static str, String)> {
-    let Settings { preset, steps, laws, psnr, size, verify, drop_invalid, gop, structure, anchor, .. } = settings;
-    let Settings { spatial_layers, predictors, predictor_choice, neighbours, network, refinements, .. } = settings;
-    let Settings { sh_degree, sh, keep_invisible, importance, cameras, fidelity, tolerance, tools, .. } = settings;
+    let Settings { preset, steps, laws, psnr, size, verify, drop_invalid, gop, structure, anchor, .. } =
+        settings;
+    let Settings { spatial_layers, predictors, predictor_choice, neighbours, network, refinements, .. } =
+        settings;
+    let Settings { sh_degree, sh, keep_invisible, importance, cameras, fidelity, tolerance, tools, .. } =
+        settings;
     // How much is coded at once changes nothing.
     let Settings { block_log2, ticks, description, gop_memory: _, .. } = settings;
     let network = match network {
