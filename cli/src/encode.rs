@@ -2,6 +2,7 @@
 
 mod choices;
 mod each;
+mod failed;
 mod output;
 mod pictures;
 mod shards;
@@ -21,6 +22,7 @@ use crate::setting_names::{
 use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
+use failed::failed;
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
@@ -30,7 +32,7 @@ use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
 };
 use splatstream_format::payload::{Network, SceneDescription};
-use splatstream_gaussians::{Defect, GaussianFrame};
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -430,40 +432,6 @@ impl Encode {
             title: self.title.clone(),
             ..SceneDescription::default()
         }
-    }
-}
-
-/// The encoder counts frames; a user has files.
-fn failed(source: &FrameFiles, out: &Path, error: &splatstream_encoder::Error) -> Failure {
-    use splatstream_encoder::Error;
-    match error {
-        // Errors of reading name the file.
-        Error::Source { source, .. } => Failure::other(source.to_string()),
-        Error::Invalid { frame, count, first } => {
-            let Defect { row, property, value, kind } = first;
-            let path = source.name(*frame);
-            let more = match count - 1 {
-                0 => String::new(),
-                more => {
-                    format!(", and {} more Gaussians of this frame have such values", grouped(more as u64))
-                }
-            };
-            Failure::other(format!(
-                "{path}: frame {frame}, Gaussian {row}: {property} is {value}: {kind}{more}\n  \
-                 repair the file, or leave such Gaussians out with --drop-invalid"
-            ))
-        }
-        Error::OutOfGrid { frame, farthest_row, .. } => Failure::other(format!(
-            "{}: {error}\n  repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from \
-             all others can put the rest out of reach",
-            source.name(*frame)
-        )),
-        Error::TooManyGaussians { frame, .. }
-        | Error::TooManyPerSecond { frame, .. }
-        | Error::OtherFrame { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
-        Error::Output(cause) => Failure::file("write", out, cause),
-        Error::Setting { .. } => Failure::Usage(error.to_string()),
-        _ => Failure::other(error.to_string()),
     }
 }
 

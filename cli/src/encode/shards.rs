@@ -1,6 +1,7 @@
 //! Sequences that outgrow one machine: `encode --write-plan` and `encode --shard`.
 
-use super::{Encode, failed};
+use super::Encode;
+use super::failed::failed;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
