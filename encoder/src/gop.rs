@@ -143,9 +143,10 @@ impl<'a> SpanCoder<'a> {
     /// Codes a GOP of the frames from `first` to the end of the span at most, and gives the frame after it: it ends where
     /// a frame shares little with the one it would refer to.
     fn gop(&mut self, first: u32, span: Span) -> Result<u32, Error> {
-        self.ranking.start_gop();
         let (before, last) = ((self.report.clone(), self.looked_at), span.end);
-        let intra = self.intra_target(first)?;
+        let target = self.target(first)?;
+        self.ranking.start_gop(&target.frame);
+        let intra = Intra { order: self.ranking.order(&target.frame), target };
         let mut gop = self.start(first, last - first, &intra)?;
         self.intra(&mut gop, first, intra)?;
         let (end, verdict) = self.others(&mut gop, span)?;

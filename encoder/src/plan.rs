@@ -98,6 +98,7 @@ impl Plan {
         ranking: Ranking,
     ) -> Result<Self, Error> {
         let analysis = analyse(source, &settings)?;
+        let ranking = target::looking(source, ranking, &settings)?;
         let network = learning::network(source, &settings, &analysis)?;
         let (asked, ranking) = (asked.clone(), Some(ranking));
         Ok(Self { asked, settings, analysis, network, ranking, target: None, stands_alone: false })
@@ -105,7 +106,7 @@ impl Plan {
 
     /// The same with frames that each stand for themselves, in one layer.
     pub(crate) fn alone(&self, source: &mut dyn FrameSource) -> Result<Self, Error> {
-        let (settings, ranking) = (self.settings.clone().alone(), self.first_ranking(source)?);
+        let (settings, ranking) = (self.settings.clone().alone(), self.ranking(source, true)?);
         let plan = Self::new(source, &self.asked, settings, ranking)?;
         Ok(Self { target: self.target, stands_alone: true, ..plan })
     }
@@ -180,7 +181,7 @@ impl Plan {
         let settings = &self.settings;
         let frame_count = frames.end.saturating_sub(frames.start);
         let sequence = SequenceParameters { frame_count, ..self.analysis.parameters };
-        let ranking = if frames.start == 0 { self.first_ranking(source)? } else { Ranking::new(settings) };
+        let ranking = self.ranking(source, frames.start == 0)?;
         let mut report = Report::new(&self.analysis, settings, ranking.importance());
         let mut record = Record::new(settings.profile(), &sequence, frames.start);
         let is_verified = settings.verify || settings.has_target();
@@ -211,17 +212,18 @@ impl Plan {
     /// Codes a span to memory.
     pub(crate) fn code(&self, source: &mut dyn FrameSource, span: Span) -> Result<(Coded, Report), Error> {
         let mut coded = Coded::default();
-        let (ranking, mut progress) = (self.first_ranking(source)?, |_| ());
+        let (ranking, mut progress) = (self.ranking(source, true)?, |_| ());
         let report = SpanCoder::new(source, self.common(), ranking, &mut coded, &mut progress).code(span)?;
         Ok((coded, report))
     }
 
-    /// The ranking that the first frame is coded with.
-    fn first_ranking(&self, source: &mut dyn FrameSource) -> Result<Ranking, Error> {
+    /// The ranking that the first GOP is coded with, or those after it.
+    fn ranking(&self, source: &mut dyn FrameSource, is_first: bool) -> Result<Ranking, Error> {
         match &self.ranking {
-            Some(ranking) => Ok(ranking.clone()),
-            None if self.asked.has_target() => target::first_ranking(source, &self.asked),
-            None => Ok(Ranking::new(&self.settings)),
+            Some(ranking) if is_first => Ok(ranking.clone()),
+            Some(ranking) => Ok(ranking.for_later()),
+            None if is_first && self.asked.has_target() => target::first_ranking(source, &self.asked),
+            None => target::looking(source, Ranking::new(&self.settings), &self.settings),
         }
     }
 

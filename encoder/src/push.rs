@@ -61,8 +61,8 @@ struct Stream {
     settings: Settings,
     analysis: Analysis,
     announced: Announced,
-    /// Of the first GOP, until that is coded.
-    ranking: Option<Ranking>,
+    /// Of the first GOP.
+    ranking: Ranking,
     network: Option<Network>,
     record: Record,
     report: Report,
@@ -179,8 +179,9 @@ impl Stream {
         let description = analysis.description(&settings);
         let head = Head { level: analysis.level, description: Some(&description), shard: None };
         UnitWriter::new(sink, &mut record).start(&head)?;
+        let ranking = target::looking(source, ranking, &settings)?;
         let network = learning::network(source, &settings, &analysis)?;
-        Ok(Self { analysis, announced, settings, ranking: Some(ranking), network, record, report })
+        Ok(Self { analysis, announced, settings, ranking, network, record, report })
     }
 
     /// A frame within what was announced.
@@ -198,7 +199,8 @@ impl Stream {
         sink: &mut dyn Write,
     ) -> Result<(), Error> {
         let settings = &self.settings;
-        let ranking = self.ranking.take().unwrap_or_else(|| Ranking::new(settings));
+        let ranking =
+            if self.record.gops.is_empty() { self.ranking.clone() } else { self.ranking.for_later() };
         let spans = Spans::new(frames, settings.gop_length());
         let at_once = at_once(settings, &self.analysis, &spans);
         let common = Common {

@@ -140,7 +140,7 @@ impl Coding<'_, '_> {
     fn one_by_one(&mut self, spans: Spans, ranking: Ranking) -> Result<bool, Error> {
         self.begin()?;
         let start = spans.frames.start;
-        let mut rankings = rankings(ranking, self.common.settings);
+        let mut rankings = rankings(ranking);
         for span in spans {
             let done = span.first.saturating_sub(start);
             let progress = &mut |frames: u32| (self.progress)(done.saturating_add(frames));
@@ -159,7 +159,7 @@ impl Coding<'_, '_> {
         mut judge: Option<Judge<'_>>,
     ) -> Result<bool, Error> {
         let start = spans.frames.start;
-        let mut rankings = rankings(ranking, self.common.settings);
+        let mut rankings = rankings(ranking);
         let common = self.common;
         rayon::in_place_scope(|scope| {
             let mut jobs = VecDeque::new();
@@ -192,8 +192,8 @@ impl Coding<'_, '_> {
 }
 
 /// The ranking of each span: the first may know an order.
-fn rankings(first: Ranking, settings: &Settings) -> impl FnMut() -> Ranking {
-    let later = Ranking::new(settings);
+fn rankings(first: Ranking) -> impl FnMut() -> Ranking {
+    let later = first.for_later();
     let mut first = Some(first);
     move || first.take().unwrap_or_else(|| later.clone())
 }

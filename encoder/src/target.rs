@@ -101,6 +101,21 @@ pub(crate) fn first_ranking(source: &mut dyn FrameSource, settings: &Settings) -
     Ok(ranking)
 }
 
+/// The ranking with the views of the sequence, if they are to be made.
+///
+/// # Errors
+/// A frame that cannot be read.
+pub(crate) fn looking(
+    source: &mut dyn FrameSource,
+    mut ranking: Ranking,
+    settings: &Settings,
+) -> Result<Ranking, Error> {
+    if ranking.is_blind() {
+        ranking.look_at(&first_frame(source, settings)?.1);
+    }
+    Ok(ranking)
+}
+
 /// The first frame as it is read, and as it is coded.
 fn first_frame(
     source: &mut dyn FrameSource,

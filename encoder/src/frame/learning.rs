@@ -8,6 +8,7 @@ use crate::sequence::{Analysis, analyse};
 use crate::settings::{NetworkSource, Preset, Settings};
 use crate::source::FrameSource;
 use crate::spans::{Common, Spans};
+use crate::target::looking;
 use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, TrainingReport, train};
 use crate::writer::Coded;
 use core::ops::ControlFlow;
@@ -81,9 +82,10 @@ fn recorded(
     let network = zero(architecture)?;
     let (sequence, network, limits) = (*sequence, Some(&network), Limits::default());
     let common = Common { settings, sequence, limits, network };
+    let ranking = looking(source, Ranking::new(settings), settings)?;
     for span in Spans::new(0..source.len(), settings.gop_length()) {
-        let (mut coded, ranking, mut progress) = (Coded::default(), Ranking::new(settings), |_| ());
-        let coder = SpanCoder::new(source, common, ranking, &mut coded, &mut progress);
+        let (mut coded, mut progress) = (Coded::default(), |_| ());
+        let coder = SpanCoder::new(source, common, ranking.clone(), &mut coded, &mut progress);
         SpanCoder { recorder: Some(&recorder), ..coder }.code(span)?;
     }
     Ok(recorder.into_samples())
