@@ -2,15 +2,17 @@
 
 mod choices;
 mod each;
+mod failed;
 mod output;
 mod pictures;
+mod shards;
 pub(crate) mod warnings;
 
 use crate::cameras::{BackgroundArg, CameraArgs, Views, to_stream};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
-use crate::input_args::InputArgs;
+use crate::input_args::{InputArgs, parse_size};
 use crate::numbers::{hex_digest, parse_frame_rate};
 use crate::output_file::refuse_inputs;
 use crate::progress::Progress;
@@ -20,15 +22,17 @@ use crate::setting_names::{
 use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
+use failed::failed;
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
+use shards::{ShardArgs, ShardReport};
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{
     FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
 };
 use splatstream_format::payload::{Network, SceneDescription};
-use splatstream_gaussians::{Defect, GaussianFrame};
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -49,7 +53,9 @@ use warnings::{Warning, unlike_frames, warnings};
     splatstream encode frames.zip -o talk.gss\n  \
     splatstream encode kitchen.splatv -o kitchen.gss --samples 100\n  \
     splatstream encode frames/ -o talk.html\n  \
-    splatstream encode garden.ply plant.spz talk/ --each -o streams/")]
+    splatstream encode garden.ply plant.spz talk/ --each -o streams/\n  \
+    splatstream encode frames/ --write-plan -o plan.json\n  \
+    splatstream encode frames/ --plan plan.json --shard 2/8 -o shard-2.gss")]
 pub(crate) struct Encode {
     /// Files, or one directory of frames, or one file of many; - is one file on standard input, but no .splat or .ksplat.
     #[arg(required = true, value_name = "INPUT")]
@@ -135,6 +141,12 @@ pub(crate) struct Encode {
     /// around. The first 64 cameras of a file go into the stream, for viewers to start from.
     #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
     cameras: Option<Views>,
+    #[command(flatten)]
+    shards: ShardArgs,
+    /// Memory that GOPs which are coded at the same time may take together, as in 512M or 4G; with little, fewer are, and
+    /// the stream is the same.
+    #[arg(long, value_name = "SIZE", value_parser = parse_size, default_value = "2G")]
+    gop_memory: u64,
     #[command(flatten)]
     reading: InputArgs,
     #[command(flatten)]
@@ -255,6 +267,8 @@ struct Encoded {
     bytes: u64,
     /// Of the page that holds it; none if a stream was written.
     page_bytes: Option<u64>,
+    /// What it is a part of; none if it is a whole sequence.
+    shard: Option<ShardReport>,
     frames: u32,
     gaussians: u64,
     bpg: f64,
@@ -275,6 +289,9 @@ impl Encode {
         if self.each {
             return each::run(self, console);
         }
+        if self.shards.writes_plan() {
+            return shards::write_plan(self, console);
+        }
         console.claim(Some(&self.out))?;
         refuse_inputs(&self.out, &self.inputs)?;
         check_name(&self.out)?;
@@ -291,12 +308,21 @@ impl Encode {
         let (settings, guess) = self.settings(&mut source)?;
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
-        let progress = Progress::frames("encoding", source.len());
-        let report = encode(&mut source, &settings, &mut file, &mut |done, _| progress.at(done))
-            .map_err(|error| failed(&source, out, &error))?;
+        let shard = self.shards.open(&mut source, &settings)?;
+        let progress =
+            Progress::frames("encoding", shard.as_ref().map_or(source.len(), |shard| shard.frames));
+        let mut at = |done, _| progress.at(done);
+        let report = match &shard {
+            None => encode(&mut source, &settings, &mut file, &mut at),
+            Some(shard) => shard.encode(&mut source, &mut file, &mut at),
+        };
+        let report = report.map_err(|error| failed(&source, out, &error))?;
         drop(progress);
         let page_bytes = file.finish()?;
+        // The size that was asked for is that of the whole stream.
+        let settings = if shard.is_some() { Settings { size: None, ..settings } } else { settings };
         let mut encoded = Encoded::new(out, &report, &settings, &source, start.elapsed().as_secs_f64());
+        encoded.shard = shard.map(|shard| shard.report);
         encoded.page_bytes = page_bytes;
         encoded.chosen.extend(guess.map(choices::up));
         if inputs.len() > 1 {
@@ -317,7 +343,7 @@ impl Encode {
             Some(NetworkName::File(path)) => Some(path),
             _ => None,
         };
-        source.paths().iter().chain(cameras).chain(network).cloned().collect()
+        source.paths().iter().chain(cameras).chain(network).chain(self.shards.plan_file()).cloned().collect()
     }
 
     /// Spatial layers.
@@ -377,6 +403,7 @@ impl Encode {
             verify: true,
             drop_invalid: self.drop_invalid,
             gop: self.gop,
+            gop_memory: self.gop_memory,
             refinements: self.refinements.clone(),
             sh_degree: self.sh_degree,
             sh: self.sh.into(),
@@ -412,46 +439,13 @@ impl Encode {
     }
 }
 
-/// The encoder counts frames; a user has files.
-fn failed(source: &FrameFiles, out: &Path, error: &splatstream_encoder::Error) -> Failure {
-    use splatstream_encoder::Error;
-    match error {
-        // Errors of reading name the file.
-        Error::Source { source, .. } => Failure::other(source.to_string()),
-        Error::Invalid { frame, count, first } => {
-            let Defect { row, property, value, kind } = first;
-            let path = source.name(*frame);
-            let more = match count - 1 {
-                0 => String::new(),
-                more => {
-                    format!(", and {} more Gaussians of this frame have such values", grouped(more as u64))
-                }
-            };
-            Failure::other(format!(
-                "{path}: frame {frame}, Gaussian {row}: {property} is {value}: {kind}{more}\n  \
-                 repair the file, or leave such Gaussians out with --drop-invalid"
-            ))
-        }
-        Error::OutOfGrid { frame, farthest_row, .. } => Failure::other(format!(
-            "{}: {error}\n  repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from \
-             all others can put the rest out of reach",
-            source.name(*frame)
-        )),
-        Error::TooManyGaussians { frame, .. } | Error::TooManyPerSecond { frame, .. } => {
-            Failure::other(format!("{}: {error}", source.name(*frame)))
-        }
-        Error::Output(cause) => Failure::file("write", out, cause),
-        Error::Setting { .. } => Failure::Usage(error.to_string()),
-        _ => Failure::other(error.to_string()),
-    }
-}
-
 impl Encoded {
     fn new(out: &Path, report: &Report, settings: &Settings, source: &FrameFiles, seconds: f64) -> Self {
         Self {
             output: out.to_path_buf(),
             bytes: report.bytes,
             page_bytes: None,
+            shard: None,
             frames: report.frames,
             gaussians: report.gaussians,
             bpg: bits_per_gaussian(report.bytes, report.gaussians),
@@ -469,8 +463,9 @@ impl Encoded {
         let chosen: String = self.chosen.iter().map(Choice::text).collect();
         let page =
             self.page_bytes.map(|bytes| format!(", in a page of {}", grouped(bytes))).unwrap_or_default();
+        let shard = self.shard.as_ref().map(ShardReport::text).unwrap_or_default();
         format!(
-            "{}\n  frames             {}\n  Gaussians          {}\n  bytes              {}{page}\n  \
+            "{}\n{shard}  frames             {}\n  Gaussians          {}\n  bytes              {}{page}\n  \
              bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}chosen\n{chosen}",
             self.output.display(),
             grouped(self.frames.into()),

@@ -52,7 +52,7 @@ fn size_of(path: &Path) -> u64 {
 }
 
 /// Bytes, with K, M or G for 2 to the 10, 20 or 30 of them.
-fn parse_size(text: &str) -> Result<u64, String> {
+pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
     let wrong = || format!("'{text}' is not a size; write 512M, 4G or a number of bytes");
     let digits = text.trim_end_matches(|last: char| last.is_ascii_alphabetic());
     let shift = match text[digits.len()..].to_ascii_uppercase().as_str() {

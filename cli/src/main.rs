@@ -6,6 +6,7 @@ mod cameras;
 mod chart;
 mod compare;
 mod completions;
+mod concat;
 mod conformance;
 mod console;
 mod decode;
@@ -74,6 +75,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Validate(validate::Validate),
     Extract(extract::Extract),
+    Concat(concat::Concat),
     Compare(compare::Compare),
     Render(render::Render),
     Chart(chart::Chart),
@@ -121,25 +123,15 @@ fn name_of(matches: &ArgMatches) -> String {
 }
 
 /// Runs `work` with so many threads, or one per processor.
-fn in_threads(
-    threads: Option<u16>,
-    work: impl FnOnce() -> Result<(), Failure> + Send,
-) -> Result<(), Failure> {
-    let builder = rayon::ThreadPoolBuilder::new();
-    let Some(threads) = threads else {
-        // Later it would be a panic.
-        builder.build_global().map_err(|error| {
-            Failure::other(format!(
-                "cannot start a thread per processor: {error}\n  give fewer with --threads"
-            ))
-        })?;
-        return work();
-    };
-    let pool = builder.num_threads(threads.into()).build();
-    pool.map_err(|error| {
-        Failure::other(format!("cannot start {threads} threads: {error}\n  give fewer with --threads"))
-    })?
-    .install(work)
+fn in_threads(threads: Option<u16>, work: impl FnOnce() -> Result<(), Failure>) -> Result<(), Failure> {
+    // 0 is one per processor. The thread that is here is none of them: it may wait for work without keeping any from it.
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0).into());
+    builder.build_global().map_err(|error| {
+        let threads =
+            threads.map_or_else(|| "a thread per processor".to_owned(), |count| format!("{count} threads"));
+        Failure::other(format!("cannot start {threads}: {error}\n  give fewer with --threads"))
+    })?;
+    work()
 }
 
 impl Command {
@@ -151,6 +143,7 @@ impl Command {
             Self::Inspect(command) => command.run(console),
             Self::Validate(command) => command.run(console),
             Self::Extract(command) => command.run(console),
+            Self::Concat(command) => command.run(console),
             Self::Compare(command) => command.run(console),
             Self::Render(command) => command.run(console),
             Self::Chart(command) => command.run(console),

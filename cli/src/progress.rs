@@ -27,6 +27,11 @@ impl Progress {
         Self::new(frames, template).named(verb)
     }
 
+    /// A bar for `files` files.
+    pub(crate) fn files(verb: &'static str, files: u32) -> Self {
+        Self::new(files, "{msg} {wide_bar} {pos}/{len} files, {eta} left").named(verb)
+    }
+
     /// A bar for `cases` cases of a conformance suite; where standard error is no terminal, a line now and then.
     pub(crate) fn cases(cases: u32) -> Self {
         let mut progress = Self::new(cases, "testing {wide_bar} {pos}/{len} cases, {eta} left");

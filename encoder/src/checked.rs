@@ -12,6 +12,16 @@ pub(crate) struct CheckedSource<'a> {
     drop_invalid: bool,
     /// By frame.
     dropped: BTreeMap<u32, Defects>,
+    /// Gaussians that each frame shall have; empty where that is not known.
+    expected: &'a [u32],
+}
+
+/// A frame that has not the Gaussians that it should have.
+#[derive(Debug, thiserror::Error)]
+#[error("it has {found} Gaussians, and should have {planned}")]
+struct Unplanned {
+    found: u32,
+    planned: u32,
 }
 
 /// A frame with values that no frame may hold.
@@ -21,7 +31,12 @@ struct Invalid(Defects);
 
 impl<'a> CheckedSource<'a> {
     pub(crate) fn new(source: &'a mut dyn FrameSource, drop_invalid: bool) -> Self {
-        Self { source, drop_invalid, dropped: BTreeMap::new() }
+        Self { source, drop_invalid, dropped: BTreeMap::new(), expected: &[] }
+    }
+
+    /// Refuses frames that have other numbers of Gaussians.
+    pub(crate) fn expecting(self, counts: &'a [u32]) -> Self {
+        Self { expected: counts, ..self }
     }
 
     /// What was left out of each frame that was read.
@@ -43,6 +58,12 @@ impl FrameSource for CheckedSource<'_> {
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
         let frame = self.source.frame(number)?;
+        let found = u32::try_from(frame.len()).unwrap_or(u32::MAX);
+        if let Some(&planned) = self.expected.get(number as usize)
+            && found != planned
+        {
+            return Err(Box::new(Unplanned { found, planned }));
+        }
         let Some(defects) = frame.defects() else { return Ok(frame) };
         if !self.drop_invalid {
             return Err(Box::new(Invalid(defects)));
@@ -61,7 +82,10 @@ pub(crate) fn named(error: Error) -> Error {
                 let Defects { rows, first, .. } = invalid.0;
                 Error::Invalid { frame, count: rows.len(), first }
             }
-            Err(source) => Error::Source { frame, source },
+            Err(source) => match source.downcast::<Unplanned>() {
+                Ok(other) => Error::OtherFrame { frame, found: other.found, planned: other.planned },
+                Err(source) => Error::Source { frame, source },
+            },
         },
         other => other,
     }

@@ -91,6 +91,53 @@ pub enum Error {
         /// What was announced.
         announced: String,
     },
+    /// There are not so many GOPs.
+    #[error(
+        "{count} shards are asked for, and the sequence has {most} GOPs; give at most {most} shards, or shorter GOPs"
+    )]
+    Shards {
+        /// The number of shards.
+        count: u32,
+        /// The number of GOPs.
+        most: u32,
+    },
+    /// The sequence has not the frames that it was planned with.
+    #[error(
+        "the sequence has {found} frames, and had {planned} when it was planned; give the same frames, or plan again"
+    )]
+    OtherFrames {
+        /// Frames there are.
+        found: u32,
+        /// Frames there were.
+        planned: u32,
+    },
+    /// A frame is not the one that was planned with.
+    #[error(
+        "frame {frame} has {found} Gaussians, and had {planned} when the sequence was planned; give the same frames, or plan again"
+    )]
+    OtherFrame {
+        /// The frame.
+        frame: u32,
+        /// Its Gaussians.
+        found: u32,
+        /// Those it had.
+        planned: u32,
+    },
+    /// A setting is not the one that was planned with.
+    #[error(
+        "{name} is {found}, and was {planned} when the sequence was planned; give every shard the settings of the plan"
+    )]
+    OtherSetting {
+        /// The setting.
+        name: &'static str,
+        /// What it is.
+        found: String,
+        /// What it was.
+        planned: String,
+    },
+    /// A record is not one of a plan.
+    #[error("the plan is damaged: {0}; make it again")]
+    Plan(&'static str),
     /// A frame could not be read.
     #[error("frame {frame}: {source}")]
     Source {

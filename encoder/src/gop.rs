@@ -22,16 +22,15 @@ use crate::importance::Ranking;
 use crate::isolated::{self, Isolated};
 use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
-use crate::progress::Progress;
 use crate::report::{FrameReport, Report};
-use crate::settings::{Preset, Settings};
+use crate::settings::Preset;
 use crate::source::FrameSource;
-use crate::writer::UnitWriter;
+use crate::spans::{Common, Span};
+use crate::writer::GopSink;
 use splatstream_decoder::list::GaussianList;
-use splatstream_format::Limits;
-use splatstream_format::payload::{Network, write_frame};
+use splatstream_format::payload::write_frame;
 use splatstream_format::syntax::{
-    FrameHeader, FrameRole, FrameType, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
+    FrameHeader, FrameRole, FrameType, GopHeader, Profile, UnitHeader, UnitId, UnitType,
 };
 
 /// A predicted frame that takes more than this part of what an I frame would is not worth it: it is no easier to decode,
@@ -41,22 +40,25 @@ const DEAR: f64 = 0.97;
 /// A GOP whose predicted frames take more than this part, on average, is tried as I frames too.
 const DOUBTFUL: f64 = 0.5;
 
-/// Codes the frames of a sequence one after the other.
-pub(crate) struct SequenceCoder<'a, 'w> {
+/// A GOP gets its number where it is written: how many come before it is not known before.
+const UNNUMBERED: u32 = 0;
+
+/// Codes the frames of a span, one after the other.
+pub(crate) struct SpanCoder<'a> {
     pub(crate) source: &'a mut dyn FrameSource,
-    pub(crate) settings: &'a Settings,
-    pub(crate) sequence: SequenceParameters,
-    pub(crate) ranking: &'a mut Ranking,
-    pub(crate) writer: &'a mut UnitWriter<'w>,
-    pub(crate) report: &'a mut Report,
-    /// The network that the GOPs may use.
-    pub(crate) network: Option<Network>,
-    /// Those of the level of the stream.
-    pub(crate) limits: Limits,
+    /// What it has in common with all other spans.
+    pub(crate) common: Common<'a>,
+    pub(crate) ranking: Ranking,
+    /// Where coded GOPs go.
+    pub(crate) sink: &'a mut dyn GopSink,
+    /// What was coded of the span.
+    pub(crate) report: Report,
     /// What a network is trained with, while that is being collected.
     pub(crate) recorder: Option<&'a Recorder>,
-    /// Frames from the first on that have been looked at.
+    /// Frames before this one have been looked at.
     pub(crate) looked_at: u32,
+    /// Is told how many frames of the span are done.
+    pub(crate) progress: &'a mut dyn FnMut(u32),
 }
 
 /// An I frame to be coded.
@@ -105,46 +107,66 @@ struct Gop {
     in_one_layer: bool,
 }
 
-impl SequenceCoder<'_, '_> {
-    /// Codes all frames.
-    ///
-    /// # Errors
-    /// As [`encode`](crate::encode).
-    pub(crate) fn run(mut self, progress: Progress<'_>) -> Result<(), Error> {
-        let length = self.settings.gop_length();
-        let frames = self.source.len();
-        let mut first = 0;
-        while first < frames && !self.recorder.is_some_and(Recorder::is_full) {
-            first = self.gop(first, frames.min(first.saturating_add(length)), progress)?;
+impl<'a> SpanCoder<'a> {
+    /// Of a span that nothing has been coded of.
+    pub(crate) fn new(
+        source: &'a mut dyn FrameSource,
+        common: Common<'a>,
+        ranking: Ranking,
+        sink: &'a mut dyn GopSink,
+        progress: &'a mut dyn FnMut(u32),
+    ) -> Self {
+        Self {
+            source,
+            common,
+            ranking,
+            sink,
+            report: Report::default(),
+            recorder: None,
+            looked_at: 0,
+            progress,
         }
-        Ok(())
     }
 
-    /// Codes a GOP of the frames from `first` up to `last` at most, and gives the frame after it: it ends where a
-    /// frame shares little with the one it would refer to.
-    pub(crate) fn gop(&mut self, first: u32, last: u32, progress: Progress<'_>) -> Result<u32, Error> {
-        let before = (self.report.clone(), self.looked_at);
-        let intra = self.intra_target(first)?;
+    /// Codes all frames, and reports what was coded.
+    ///
+    /// # Errors
+    /// As [`encode`](fn@crate::encode).
+    pub(crate) fn code(mut self, span: Span) -> Result<Report, Error> {
+        let mut first = span.first;
+        while first < span.end && !self.recorder.is_some_and(Recorder::is_full) {
+            first = self.gop(first, span)?;
+        }
+        Ok(self.report)
+    }
+
+    /// Codes a GOP of the frames from `first` to the end of the span at most, and gives the frame after it: it ends where
+    /// a frame shares little with the one it would refer to.
+    fn gop(&mut self, first: u32, span: Span) -> Result<u32, Error> {
+        let (before, last) = ((self.report.clone(), self.looked_at), span.end);
+        let target = self.target(first)?;
+        self.ranking.start_gop(&target.frame);
+        let intra = Intra { order: self.ranking.order(&target.frame), target };
         let mut gop = self.start(first, last - first, &intra)?;
         self.intra(&mut gop, first, intra)?;
-        let (end, verdict) = self.others(&mut gop, (first + 1, last), progress)?;
+        let (end, verdict) = self.others(&mut gop, span)?;
         gop.header = self.header(end - first);
-        if end == first + 1 && (verdict != Verdict::Predicted || self.is_rest(first)) {
-            (*self.report, self.looked_at) = before;
-            return self.intra_run((first, last), verdict, progress);
+        if end == first + 1 && (verdict != Verdict::Predicted || self.is_rest(first, last)) {
+            (self.report, self.looked_at) = before;
+            return self.intra_run(first, span, verdict);
         }
         if self.is_doubtful(&before.0, &gop) {
             let after = (self.report.clone(), self.looked_at);
-            (*self.report, self.looked_at) = before;
+            (self.report, self.looked_at) = before;
             let mut alone = self.alone(first, last)?;
             for number in first + 1..end {
                 let intra = self.intra_target(number)?;
                 self.intra(&mut alone, number, intra)?;
             }
-            alone.header = GopHeader::intra(self.writer.gops(), end - first);
+            alone.header = GopHeader::intra(UNNUMBERED, end - first);
             match alone.bytes() < gop.bytes() {
                 true => gop = alone,
-                false => (*self.report, self.looked_at) = after,
+                false => (self.report, self.looked_at) = after,
             }
         }
         self.write(&mut gop)?;
@@ -152,14 +174,10 @@ impl SequenceCoder<'_, '_> {
     }
 
     /// Codes the frames of a GOP after its first, as far as they can be predicted, and gives the frame after them.
-    fn others(
-        &mut self,
-        gop: &mut Gop,
-        (second, last): (u32, u32),
-        progress: Progress<'_>,
-    ) -> Result<(u32, Verdict), Error> {
-        progress(second, self.source.len());
-        for number in second..last {
+    fn others(&mut self, gop: &mut Gop, span: Span) -> Result<(u32, Verdict), Error> {
+        let second = gop.first + 1;
+        (self.progress)(second - span.first);
+        for number in second..span.end {
             let role = gop.header.role(number - gop.first);
             match role.reference {
                 None => {
@@ -174,15 +192,16 @@ impl SequenceCoder<'_, '_> {
                     }
                 }
             }
-            progress(number + 1, self.source.len());
+            (self.progress)(number + 1 - span.first);
         }
-        Ok((last, Verdict::Predicted))
+        Ok((span.end, Verdict::Predicted))
     }
 
-    /// Whether a frame is what is left of a sequence that may predict frames.
-    fn is_rest(&self, first: u32) -> bool {
-        let may_predict = self.settings.temporal_layers() > 0 && self.settings.gop > 1;
-        may_predict && first > 0 && first + 1 == self.source.len()
+    /// Whether a frame is what is left of a span, or of a sequence, that may predict frames.
+    fn is_rest(&self, first: u32, last: u32) -> bool {
+        let settings = self.common.settings;
+        let may_predict = settings.temporal_layers() > 0 && settings.gop > 1;
+        may_predict && first > 0 && first + 1 == last
     }
 
     /// Whether the frames of a GOP might take fewer bits if each stood for itself. `before`: what was written before it.
@@ -191,16 +210,15 @@ impl SequenceCoder<'_, '_> {
         let predicted = frames.filter(|frame| frame.frame_type != FrameType::Intra);
         let (bytes, gaussians) =
             predicted.fold((0, 0), |sum, frame| (sum.0 + frame.bytes, sum.1 + u64::from(frame.gaussians)));
-        let is_trained_with = self.recorder.is_some() || !self.settings.tools.survivors;
+        let is_trained_with = self.recorder.is_some() || !self.common.settings.tools.survivors;
         !is_trained_with && bytes as f64 > DOUBTFUL * gop.intra_bytes * gaussians as f64
     }
 
     /// A GOP of I frames in one layer: its first frame.
     fn alone(&mut self, first: u32, last: u32) -> Result<Gop, Error> {
-        self.ranking.start_gop();
         let intra = self.intra_target(first)?;
         let mut gop = self.start(first, last - first, &intra)?;
-        gop.header = GopHeader::intra(self.writer.gops(), last - first);
+        gop.header = GopHeader::intra(UNNUMBERED, last - first);
         gop.in_one_layer = true;
         self.intra(&mut gop, first, intra)?;
         Ok(gop)
@@ -210,12 +228,8 @@ impl SequenceCoder<'_, '_> {
     ///
     /// Frames that share little are I frames until two share much again, which begins a GOP; those of which the
     /// differences are dear are I frames as far as the GOP goes.
-    fn intra_run(
-        &mut self,
-        (first, last): (u32, u32),
-        verdict: Verdict,
-        progress: Progress<'_>,
-    ) -> Result<u32, Error> {
+    fn intra_run(&mut self, first: u32, span: Span, verdict: Verdict) -> Result<u32, Error> {
+        let last = span.end;
         let mut gop = self.alone(first, last)?;
         let mut end = first + 1;
         let mut next = (verdict == Verdict::Unlike).then(|| self.target(end)).transpose()?;
@@ -232,32 +246,34 @@ impl SequenceCoder<'_, '_> {
             let intra = self.intra_target(end)?;
             self.intra(&mut gop, end, intra)?;
             end += 1;
-            progress(end, self.source.len());
+            (self.progress)(end - span.first);
         }
-        gop.header = GopHeader::intra(self.writer.gops(), end - first);
+        gop.header = GopHeader::intra(UNNUMBERED, end - first);
         self.write(&mut gop)?;
         Ok(end)
     }
 
     /// Whether a frame shares too little with the one before it to be predicted from it.
     fn is_unlike(&self, before: &Target, after: &Target) -> bool {
-        let matching = follow(&before.cloud(), &after.cloud(), &self.measure(), self.sequence.position_bits);
+        let matching =
+            follow(&before.cloud(), &after.cloud(), &self.measure(), self.common.sequence.position_bits);
         shares_little(&matching) && !(self.by_pictures() && shares_much(&matching))
     }
 
     /// A GOP of at most so many frames that starts with an I frame.
     fn start(&mut self, first: u32, frames: u32, intra: &Intra) -> Result<Gop, Error> {
         let frame = &intra.target.frame;
-        let tools = GopTools::new(frame, &intra.order, &self.sequence, self.settings, frames);
-        if first == 0 {
-            tools.report(self.report);
+        let (sequence, settings) = (&self.common.sequence, self.common.settings);
+        let tools = GopTools::new(frame, &intra.order, sequence, settings, frames);
+        if self.report.coded.is_empty() {
+            tools.report(&mut self.report);
         }
         Ok(Gop {
             first,
             header: self.header(frames),
-            units: tools.units(&self.sequence, first)?,
+            units: tools.units(sequence, first)?,
             tools,
-            references: (0..self.settings.temporal_layers()).map(|_| None).collect(),
+            references: (0..settings.temporal_layers()).map(|_| None).collect(),
             anchor: Vec::new(),
             compensation: Vec::new(),
             price_level: 0,
@@ -271,37 +287,37 @@ impl SequenceCoder<'_, '_> {
 
     /// The header of a GOP of some frames.
     fn header(&self, frames: u32) -> GopHeader {
-        let gop_index = self.writer.gops();
-        match self.settings.temporal_layers() {
-            0 => GopHeader::intra(gop_index, frames),
-            layers => GopHeader::predicted(gop_index, frames, layers - 1),
+        match self.common.settings.temporal_layers() {
+            0 => GopHeader::intra(UNNUMBERED, frames),
+            layers => GopHeader::predicted(UNNUMBERED, frames, layers - 1),
         }
     }
 
     /// Writes what has been coded of a GOP. Its header and the network it needs are known then.
     fn write(&mut self, gop: &mut Gop) -> Result<(), Error> {
         if !gop.is_open {
-            self.writer.gop(&gop.header, gop.first)?;
-            if let Some(network) = self.network.as_ref().filter(|_| gop.has_learned) {
+            self.sink.gop(&gop.header, gop.first)?;
+            if let Some(network) = self.common.network.filter(|_| gop.has_learned) {
                 let id = UnitId::of_frame(UnitType::Weights, gop.first);
-                self.writer.unit(id, &weights(network)?.to_bytes()?)?;
+                self.sink.unit(id, weights(network)?.to_bytes()?)?;
             }
             gop.is_open = true;
         }
-        gop.units.drain(..).try_for_each(|(id, payload)| self.writer.unit(id, &payload))
+        gop.units.drain(..).try_for_each(|(id, payload)| self.sink.unit(id, payload))
     }
 
     /// A frame in canonical form.
     #[expect(clippy::indexing_slicing, reason = "units are counted by what they index, axes are constants")]
     fn target(&mut self, number: u32) -> Result<Target, Error> {
         let frame = self.source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
-        let rows = visible(&frame, self.settings.keep_invisible);
+        let rows = visible(&frame, self.common.settings.keep_invisible);
         let row_count = frame.len() as u32;
         // Where frames are predicted axes are named as in the reference, and what a frame starts with is sorted.
-        let sorts = self.sequence.canonical_axes() || self.settings.profile() == Profile::Dynamic;
+        let sorts =
+            self.common.sequence.canonical_axes() || self.common.settings.profile() == Profile::Dynamic;
         let frame = canonicalise(frame.into_selected(&rows), sorts);
         let (frame, found) = isolated::colours(frame, &rows, number);
-        let grid = PositionGrid::of(&self.sequence);
+        let grid = PositionGrid::of(&self.common.sequence);
         // A frame is looked at again where it is tried in one way and coded in another.
         if number >= self.looked_at {
             self.looked_at = number + 1;
@@ -335,7 +351,7 @@ impl SequenceCoder<'_, '_> {
             IntraTarget {
                 chooser: self.chooser(),
                 compensator: compensator.as_ref(),
-                shows_top_prefixes: !(is_predicted && self.sequence.whole_anchor()),
+                shows_top_prefixes: !(is_predicted && self.common.sequence.whole_anchor()),
                 wanted,
                 order: &order,
                 rows: &target.rows,
@@ -348,11 +364,11 @@ impl SequenceCoder<'_, '_> {
         gop.intra_bytes = coded.bytes() / f64::from(coded.gaussians().max(1));
         if is_predicted && self.recorder.is_none() && !target.frame.is_empty() {
             let cameras = self.ranking.cameras(&target.frame);
-            gop.steadiness = Some(Steadiness::new(cameras, &target, &coded, &self.sequence)?);
+            gop.steadiness = Some(Steadiness::new(cameras, &target, &coded, &self.common.sequence)?);
         }
         if is_predicted {
-            gop.start_with(number, coded, self.sequence.whole_anchor());
-        } else if self.network.is_none() && !gop.in_one_layer {
+            gop.start_with(number, coded, self.common.sequence.whole_anchor());
+        } else if self.common.network.is_none() && !gop.in_one_layer {
             self.write(gop)?;
         }
         Ok(())
@@ -378,8 +394,8 @@ impl SequenceCoder<'_, '_> {
         survivors.book = book.as_ref();
         let cells = CellPlan {
             measure: &measure,
-            marks_stale: self.sequence.whole_anchor(),
-            max_cells: self.limits.max_cells,
+            marks_stale: self.common.sequence.whole_anchor(),
+            max_cells: self.common.limits.max_cells,
         };
         let from = PredictedTarget {
             coder: self.coder(gop, Some(book.as_ref())),
@@ -391,12 +407,12 @@ impl SequenceCoder<'_, '_> {
             survivors,
             compensation: &gop.compensation,
         };
-        let cells = Some(&cells).filter(|_| self.settings.tools.cell_motion);
+        let cells = Some(&cells).filter(|_| self.common.settings.tools.cell_motion);
         let coded = Predicted::new(from, cells, matching)?.code(goal.as_mut())?;
         if !self.is_within_limits(&coded) {
             return Ok(Verdict::Unlike);
         }
-        if self.settings.tools.survivors
+        if self.common.settings.tools.survivors
             && coded.bytes() > DEAR * gop.intra_bytes * f64::from(coded.gaussians())
         {
             return Ok(Verdict::Dear);
@@ -413,11 +429,11 @@ impl SequenceCoder<'_, '_> {
             }
             None => {
                 if let Some(steadiness) = &mut gop.steadiness {
-                    steadiness.follow(target, &coded, &self.sequence)?;
+                    steadiness.follow(target, &coded, &self.common.sequence)?;
                 }
             }
         }
-        if role.temporal_layer + 1 < self.settings.temporal_layers().max(2) {
+        if role.temporal_layer + 1 < self.common.settings.temporal_layers().max(2) {
             gop.keep(role.temporal_layer, number, coded.reference);
         }
         Ok(Verdict::Predicted)
@@ -426,8 +442,9 @@ impl SequenceCoder<'_, '_> {
     /// Prefixes of I frames are compensated where time is no matter: not in streams of one frame, or of frames that
     /// each stand for themselves, which are encoded quickly.
     fn compensator(&self, target: &Target) -> Option<Compensator> {
-        let takes_time = self.settings.preset != Preset::Fast && self.settings.profile() == Profile::Dynamic;
-        let has_prefixes = self.sequence.refinement_count > 1 && !target.frame.is_empty();
+        let takes_time =
+            self.common.settings.preset != Preset::Fast && self.common.settings.profile() == Profile::Dynamic;
+        let has_prefixes = self.common.sequence.refinement_count > 1 && !target.frame.is_empty();
         (takes_time && has_prefixes).then(|| Compensator::new(&target.frame))
     }
 
@@ -444,7 +461,8 @@ impl SequenceCoder<'_, '_> {
         let gaussians = coded.gaussians();
         let sh = gop.tools.sh.as_ref().map(|_| 0);
         let header = FrameHeader::new(role.frame_type, 0, sh, gaussians);
-        let payload = write_frame(&header, coded.carried_digest, coded.cells.as_ref(), &self.sequence)?;
+        let payload =
+            write_frame(&header, coded.carried_digest, coded.cells.as_ref(), &self.common.sequence)?;
         let cells = coded.cells.as_ref().map_or(0, |cells| cells.cell_count);
         let mut frame = FrameReport::new(role.frame_type, gaussians, cells);
         let start = gop.units.len();

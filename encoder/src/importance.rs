@@ -23,9 +23,12 @@ pub(crate) struct Ranking {
     importance: Importance,
     /// Shares of the Gaussians at which what is kept is weighed again, percent; falling.
     rounds: Vec<u8>,
+    /// The views of the GOP.
     cameras: Vec<Camera>,
     /// Whether the settings say which these are.
     are_given: bool,
+    /// Those that were made for the first frame of the sequence.
+    of_sequence: Vec<Camera>,
     preset: Preset,
     /// The order of the first frame, if it was needed early.
     known_order: Option<Vec<u32>>,
@@ -47,6 +50,7 @@ impl Ranking {
             rounds: rounds(&settings.refinements, settings.preset),
             cameras: settings.cameras.clone(),
             are_given: !settings.cameras.is_empty(),
+            of_sequence: Vec::new(),
             preset: settings.preset,
             known_order: None,
         }
@@ -57,8 +61,33 @@ impl Ranking {
         self.importance
     }
 
+    /// Whether the first frame of the sequence is to be [looked at](Ranking::look_at) still.
+    pub(crate) fn is_blind(&self) -> bool {
+        !self.are_given && self.of_sequence.is_empty()
+    }
+
+    /// Makes the views of the sequence, for its first frame.
+    pub(crate) fn look_at(&mut self, first: &GaussianFrame) {
+        if self.is_blind() {
+            self.of_sequence = self.made_for(first);
+            self.cameras.clone_from(&self.of_sequence);
+        }
+    }
+
+    /// The same for GOPs after the first.
+    pub(crate) fn for_later(&self) -> Self {
+        Self {
+            known_order: None,
+            rounds: self.rounds.clone(),
+            cameras: self.cameras.clone(),
+            of_sequence: self.of_sequence.clone(),
+            ..*self
+        }
+    }
+
     /// The first frame, whose order [`Ranking::order`] will not find again.
     pub(crate) fn rank_first(&mut self, frame: &GaussianFrame) -> Ranked {
+        self.look_at(frame);
         let mut ranked = self.ranked(frame);
         if ranked.shown.is_empty() {
             self.cameras(frame);
@@ -102,25 +131,32 @@ impl Ranking {
         Ranked { order, shown }
     }
 
-    /// A GOP begins: after a cut there is something else to see, from elsewhere. Views for which an order is known already
-    /// stay.
-    pub(crate) fn start_gop(&mut self) {
-        if !self.are_given && self.known_order.is_none() {
-            self.cameras.clear();
+    /// A GOP begins with a frame. Its views are those of the sequence, so that orders do not change from GOP to GOP, unless
+    /// there is something else to see, or from elsewhere: then they are made for the frame. Neither depends on other
+    /// GOPs. Views for which an order is known already stay.
+    pub(crate) fn start_gop(&mut self, frame: &GaussianFrame) {
+        if self.are_given || self.known_order.is_some() {
+            return;
         }
+        let own = self.made_for(frame);
+        self.cameras = if are_alike(&self.of_sequence, &own) { self.of_sequence.clone() } else { own };
     }
 
-    /// The cameras in use: those of the settings, or made for the first frame of a GOP that they are asked for.
+    /// The cameras in use: those of the settings, or made for the first frame of the GOP.
     pub(crate) fn cameras(&mut self, frame: &GaussianFrame) -> &[Camera] {
         if self.cameras.is_empty() {
-            let (count, height) = match self.preset {
-                Preset::Fast => (6, 180),
-                Preset::Balanced => (10, 270),
-                Preset::Small => (24, 360),
-            };
-            self.cameras = spiral(frame, Up::default(), count, height);
+            self.cameras = self.made_for(frame);
         }
         &self.cameras
+    }
+
+    fn made_for(&self, frame: &GaussianFrame) -> Vec<Camera> {
+        let (count, height) = match self.preset {
+            Preset::Fast => (6, 180),
+            Preset::Balanced => (10, 270),
+            Preset::Small => (24, 360),
+        };
+        spiral(frame, Up::default(), count, height)
     }
 
     /// What orders go by: some of the cameras, in small pictures.
@@ -161,6 +197,35 @@ impl Ranking {
         kept.extend(gone);
         kept
     }
+}
+
+/// Views all around stand apart by less than this part of their distance to what they show, if they show the same.
+const MOVED: f32 = 0.25;
+/// And one is no farther away than so many times the other.
+const NEARER: f32 = 1.25;
+
+/// Whether two sets of views all around show the same scene.
+fn are_alike(a: &[Camera], b: &[Camera]) -> bool {
+    let ([middle_a, middle_b], count) = ([a, b].map(middle), a.len());
+    let apart = |a: [f32; 3], b: [f32; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| a.get(axis).zip(b.get(axis)).map_or(0.0, |(a, b)| a - b));
+        (x * x + y * y + z * z).sqrt()
+    };
+    let distance = |cameras: &[Camera], middle| {
+        cameras.iter().map(|camera| apart(camera.position, middle)).sum::<f32>() / count as f32
+    };
+    let (far_a, far_b) = (distance(a, middle_a), distance(b, middle_b));
+    let [near, far] = [far_a.min(far_b), far_a.max(far_b)];
+    count == b.len() && apart(middle_a, middle_b) <= MOVED * near && far <= NEARER * near
+}
+
+/// The mean position of cameras.
+fn middle(cameras: &[Camera]) -> [f32; 3] {
+    let sum = cameras.iter().fold([0.0; 3], |[x, y, z], camera| {
+        let [a, b, c] = camera.position;
+        [x + a, y + b, z + c]
+    });
+    sum.map(|axis: f32| axis / cameras.len().max(1) as f32)
 }
 
 /// What pictures would show of each Gaussian if no other hid it: from its opacity, and from the pixels that it covers.
@@ -215,11 +280,32 @@ fn rounds(refinements: &[u8], preset: Preset) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use splatstream_files::builtin::BuiltinScene;
 
     #[test]
     fn rounds_fall_to_the_first_refinement() {
         assert_eq!(rounds(&[10, 20, 30, 50, 100], Preset::Balanced), [50, 30, 20, 10]);
         assert_eq!(rounds(&[10, 50, 100], Preset::Small), [75, 56, 50, 37, 27, 20, 15, 11, 10]);
+    }
+
+    #[test]
+    fn a_gop_has_the_views_of_the_sequence_unless_its_scene_is_elsewhere() {
+        let scene = BuiltinScene { gaussians: 500, frames: 9, ..BuiltinScene::default() };
+        let mut ranking = Ranking::new(&Settings::default());
+        ranking.look_at(&scene.frame(0));
+        let of_sequence = ranking.cameras.clone();
+        ranking.start_gop(&scene.frame(8));
+        assert_eq!(ranking.cameras, of_sequence);
+        let mut far = scene.frame(8);
+        far.planes_mut().position[0].iter_mut().for_each(|x| *x += 100.0);
+        ranking.start_gop(&far);
+        assert_eq!(ranking.cameras, ranking.made_for(&far));
+        ranking.start_gop(&scene.frame(4));
+        assert_eq!(ranking.cameras, of_sequence, "whatever was there in between");
+        let mut large = scene.frame(8);
+        large.planes_mut().position.into_iter().flatten().for_each(|axis| *axis *= 2.0);
+        ranking.start_gop(&large);
+        assert_ne!(ranking.cameras, of_sequence);
     }
 
     #[test]

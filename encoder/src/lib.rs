@@ -20,6 +20,8 @@ pub mod canonical;
 mod checked;
 mod clusters;
 mod colour;
+mod concat;
+
 mod entropy_cost;
 mod error;
 mod frame;
@@ -35,6 +37,7 @@ mod motion;
 mod parametric_fit;
 mod pass;
 mod pca;
+mod plan;
 mod progress;
 mod push;
 mod quantised;
@@ -48,7 +51,9 @@ mod sensitivity;
 mod sequence;
 mod settings;
 mod shape;
+mod shard;
 mod source;
+mod spans;
 mod steps;
 mod stream;
 mod strips;
@@ -56,12 +61,15 @@ mod target;
 pub mod transformer;
 mod verification;
 mod vq;
+mod window;
 mod writer;
 
+pub use concat::{ConcatError, Concatenated, PartError, StreamPart, concat};
 pub use error::Error;
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;
+pub use plan::{Plan, PlanRecord, PlannedSteps, PlannedTarget, Single, plan};
 pub use progress::Progress;
 pub use push::Encoder;
 pub use report::{Dropped, FrameReport, GopReport, PictureReport, Report, TargetReport, VerifiedFrame};
@@ -69,6 +77,7 @@ pub use settings::{
     Anchor, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings,
     ShChoice, Size, Structure, Tools,
 };
+pub use shard::Shard;
 pub use source::FrameSource;
 pub use steps::Steps;
 pub use stream::encode;

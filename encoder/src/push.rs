@@ -3,24 +3,24 @@
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;
 use crate::frame::learning;
-use crate::gop::SequenceCoder;
 use crate::importance::Ranking;
 use crate::isolated::Isolated;
-use crate::report::{Dropped, Report};
+use crate::report::Report;
 use crate::room::{Announced, announce};
-use crate::sequence::Survey;
+use crate::sequence::{Analysis, Survey};
 use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
+use crate::spans::{Coding, Common, Spans, at_once};
 use crate::target;
-use crate::writer::{Record, UnitWriter};
+use crate::window::{FirstFrames, Window};
+use crate::writer::{Head, Record, UnitWriter};
+use core::ops::Range;
 use splatstream_format::Limits;
 use splatstream_format::payload::Network;
-use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
-use std::collections::VecDeque;
 use std::io::Write;
 
-/// Encodes frames as they come: each GOP is written once its frames are there, and one more.
+/// Encodes frames as they come: each GOP is written once its frames are there, the first with one more.
 ///
 /// A stream begins with the ranges of all its frames. They are taken from the frames of the first GOP, with room for
 /// later ones, and so are the steps where the [settings](Settings) ask for a PSNR or for bits per Gaussian. What leaves
@@ -28,7 +28,8 @@ use std::io::Write;
 /// encoded as [`encode`](crate::encode()) does, which looks at all frames first and writes a slightly smaller stream.
 ///
 /// Memory is that of the frames of a GOP and of coding them, whatever the number of frames; the report takes some 150
-/// bytes for each.
+/// bytes for each. Who has more threads than a GOP keeps busy lets [several](Encoder::with_gops_at_once) be coded at
+/// once.
 ///
 /// ```
 /// use splatstream_encoder::{Encoder, Settings};
@@ -48,58 +49,39 @@ pub struct Encoder<W> {
     sink: W,
     settings: Settings,
     window: Window,
+    /// GOPs whose frames are waited for.
+    gops_at_once: u32,
     /// None until there are more frames than the first GOP may have.
     stream: Option<Stream>,
-}
-
-/// The frames that are not coded yet.
-#[derive(Default)]
-struct Window {
-    /// The number of the first.
-    first: u32,
-    frames: VecDeque<GaussianFrame>,
-}
-
-impl FrameSource for Window {
-    fn len(&self) -> u32 {
-        self.first.saturating_add(u32::try_from(self.frames.len()).unwrap_or(u32::MAX))
-    }
-
-    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
-        let at = number.checked_sub(self.first).and_then(|at| self.frames.get(at as usize));
-        at.cloned().ok_or_else(|| format!("frame {number} is not there any more").into())
-    }
-}
-
-impl Window {
-    /// Forgets the frames before one.
-    fn drop_before(&mut self, number: u32) {
-        self.frames.drain(..(number.saturating_sub(self.first) as usize).min(self.frames.len()));
-        self.first = number;
-    }
 }
 
 /// A stream of which some GOPs have been written.
 struct Stream {
     /// With steps that are settled.
     settings: Settings,
-    sequence: SequenceParameters,
+    analysis: Analysis,
     announced: Announced,
-    limits: Limits,
+    /// Of the first GOP.
     ranking: Ranking,
     network: Option<Network>,
     record: Record,
     report: Report,
-    looked_at: u32,
 }
 
 impl<W: Write> Encoder<W> {
     /// An encoder that writes to `sink`.
     pub fn new(sink: W, settings: Settings) -> Self {
-        Self { sink, settings, window: Window::default(), stream: None }
+        Self { sink, settings, window: Window::default(), gops_at_once: 1, stream: None }
     }
 
-    /// Takes the next frame, and writes the GOP that it completes.
+    /// The same that waits for the frames of so many GOPs, 1 or more, and codes them at the same time, as far as the
+    /// [memory](Settings::gop_memory) is for. The bytes are the same; they come later, and sooner altogether.
+    #[must_use]
+    pub fn with_gops_at_once(self, gops_at_once: u32) -> Self {
+        Self { gops_at_once: gops_at_once.max(1), ..self }
+    }
+
+    /// Takes the next frame, and writes the GOPs that it completes.
     ///
     /// # Errors
     /// Settings or frames that cannot be coded, a sink that cannot be written. No stream comes of what was written then.
@@ -110,9 +92,11 @@ impl<W: Write> Encoder<W> {
             None => frame,
         };
         self.window.frames.push_back(frame);
-        // With one frame more, what would be left of the sequence is known not to be one frame.
-        if self.window.frames.len() as u64 > u64::from(self.settings.gop_length()) {
-            self.gop()?;
+        let complete = u64::from(self.gop_length()).saturating_mul(self.gops_at_once.into());
+        // With one frame more, the sequence is known to have more than one GOP.
+        let waits_for = complete.saturating_add(self.stream.is_none().into());
+        if self.window.frames.len() as u64 >= waits_for {
+            self.code()?;
         }
         Ok(())
     }
@@ -122,14 +106,16 @@ impl<W: Write> Encoder<W> {
     /// # Errors
     /// As [`Encoder::push`]; no frame at all.
     pub fn finish(mut self) -> Result<Report, Error> {
+        let is_one_gop = self.window.len() <= self.gop_length();
+        if self.stream.is_none() && !is_one_gop {
+            self.code()?;
+        }
         if self.stream.is_none() {
             let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut |_, _| ())?;
             self.sink.flush()?;
             return Ok(report);
         }
-        while !self.window.frames.is_empty() {
-            self.gop()?;
-        }
+        self.code_up_to(self.window.len())?;
         let Some(Stream { mut record, mut report, .. }) = self.stream else { return Err(Error::NoFrames) };
         UnitWriter::new(&mut self.sink, &mut record).finish()?;
         self.sink.flush()?;
@@ -137,19 +123,42 @@ impl<W: Write> Encoder<W> {
         Ok(report)
     }
 
-    /// Codes the first GOP of the frames that are there.
-    fn gop(&mut self) -> Result<(), Error> {
-        if self.stream.is_none() {
-            let mut source = CheckedSource::new(&mut self.window, self.settings.drop_invalid);
-            self.stream = Some(Stream::start(&mut source, &self.settings, &mut self.sink).map_err(named)?);
+    /// Frames of a GOP, at most.
+    fn gop_length(&self) -> u32 {
+        self.stream.as_ref().map_or_else(|| self.settings.gop_length(), |stream| stream.settings.gop_length())
+    }
+
+    /// Begins the stream with what its first GOP and one frame more announce; later frames that are there already are held
+    /// to it.
+    fn start(&mut self) -> Result<(), Error> {
+        let frames = self.gop_length().saturating_add(1);
+        let mut first = FirstFrames { source: &mut self.window, frames };
+        let mut source = CheckedSource::new(&mut first, self.settings.drop_invalid);
+        let mut stream = Stream::start(&mut source, &self.settings, &mut self.sink).map_err(named)?;
+        for (number, frame) in (0..).zip(&mut self.window.frames).skip(frames as usize) {
+            *frame = stream.hold(core::mem::take(frame), number)?;
         }
+        self.stream = Some(stream);
+        Ok(())
+    }
+
+    /// Codes the GOPs of which all frames are there.
+    fn code(&mut self) -> Result<(), Error> {
+        if self.stream.is_none() {
+            self.start()?;
+        }
+        let there = self.window.len();
+        let gops = there.checked_div(self.gop_length()).unwrap_or(0);
+        self.code_up_to(gops.saturating_mul(self.gop_length()))
+    }
+
+    /// Codes the frames before one, at which a GOP begins.
+    fn code_up_to(&mut self, end: u32) -> Result<(), Error> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
-        let first = self.window.first;
-        let last = self.window.len().min(first.saturating_add(stream.settings.gop_length()));
+        let frames = self.window.first..end;
         let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
-        let end = stream.gop(&mut source, (first, last), &mut self.sink).map_err(named)?;
-        let coded = |dropped: &Dropped| dropped.frame < end;
-        stream.report.leave_out(source.into_dropped().into_iter().filter(coded));
+        stream.code(&mut source, frames, &mut self.sink).map_err(named)?;
+        stream.report.leave_out(source.into_dropped());
         self.window.drop_before(end);
         Ok(())
     }
@@ -166,20 +175,13 @@ impl Stream {
             report.target = tried.target;
             report.stands_alone = tried.stands_alone;
         }
-        let mut record = Record::new(settings.profile(), &analysis.parameters);
-        UnitWriter::new(sink, &mut record).start(&analysis, &settings.description)?;
+        let mut record = Record::new(settings.profile(), &analysis.parameters, 0);
+        let description = analysis.description(&settings);
+        let head = Head { level: analysis.level, description: Some(&description), shard: None };
+        UnitWriter::new(sink, &mut record).start(&head)?;
+        let ranking = target::looking(source, ranking, &settings)?;
         let network = learning::network(source, &settings, &analysis)?;
-        Ok(Self {
-            sequence: analysis.parameters,
-            announced,
-            limits: Limits::of_level(analysis.level),
-            settings,
-            ranking,
-            network,
-            record,
-            report,
-            looked_at: 0,
-        })
+        Ok(Self { analysis, announced, settings, ranking, network, record, report })
     }
 
     /// A frame within what was announced.
@@ -189,29 +191,34 @@ impl Stream {
         Ok(frame)
     }
 
-    /// Codes a GOP of the frames from `first` to `last` at most, and gives the frame after it.
-    fn gop(
+    /// Codes frames that begin and end with a GOP.
+    fn code(
         &mut self,
         source: &mut dyn FrameSource,
-        (first, last): (u32, u32),
+        frames: Range<u32>,
         sink: &mut dyn Write,
-    ) -> Result<u32, Error> {
-        let mut writer = UnitWriter::new(sink, &mut self.record);
-        let mut coder = SequenceCoder {
-            source,
-            settings: &self.settings,
-            sequence: self.sequence,
-            ranking: &mut self.ranking,
-            writer: &mut writer,
-            report: &mut self.report,
-            network: self.network.take(),
-            limits: self.limits,
-            recorder: None,
-            looked_at: self.looked_at,
+    ) -> Result<(), Error> {
+        let settings = &self.settings;
+        let ranking =
+            if self.record.gops.is_empty() { self.ranking.clone() } else { self.ranking.for_later() };
+        let spans = Spans::new(frames, settings.gop_length());
+        let at_once = at_once(settings, &self.analysis, &spans);
+        let common = Common {
+            settings,
+            sequence: self.analysis.parameters,
+            limits: Limits::of_level(self.analysis.level),
+            network: self.network.as_ref(),
         };
-        let end = coder.gop(first, last, &mut |_, _| ())?;
-        (self.network, self.looked_at) = (coder.network, coder.looked_at);
-        Ok(end)
+        let mut coding = Coding {
+            source,
+            common,
+            head: None,
+            writer: &mut UnitWriter::new(sink, &mut self.record),
+            report: &mut self.report,
+            progress: &mut |_| (),
+        };
+        coding.run(spans, ranking, at_once, None)?;
+        Ok(())
     }
 }
 

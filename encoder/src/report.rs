@@ -78,6 +78,19 @@ impl Report {
         }
     }
 
+    /// Adds what was coded after it. How spherical harmonics are coded is told of the first GOP.
+    pub(crate) fn append(&mut self, later: Self) {
+        if self.coded.is_empty() {
+            (self.sh_rank, self.sh_trial) = (later.sh_rank, later.sh_trial);
+            self.sh_codebook_entries = later.sh_codebook_entries;
+        }
+        self.gaussians = self.gaussians.saturating_add(later.gaussians);
+        self.invisible = self.invisible.saturating_add(later.invisible);
+        later.isolated.into_iter().for_each(|found| Isolated::add(Some(found), &mut self.isolated));
+        self.coded.extend(later.coded);
+        self.digests.extend(later.digests);
+    }
+
     /// Adds Gaussians that were left out because of their values. They were counted as invisible, which left them out.
     pub(crate) fn leave_out(&mut self, dropped: impl IntoIterator<Item = Dropped>) {
         for dropped in dropped {

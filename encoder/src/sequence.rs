@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use splatstream_decoder::attribute::ROTATION_RANGE;
 use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_format::Limits;
+use splatstream_format::payload::SceneDescription;
 use splatstream_format::syntax::{MAX_REFINEMENTS, Profile, SequenceParameters};
 use splatstream_gaussians::{GaussianFrame, sh_coefficients};
 
@@ -26,12 +27,23 @@ pub(crate) struct Analysis {
     pub(crate) parameters: SequenceParameters,
     /// The lowest level that holds every frame.
     pub(crate) level: u8,
+    /// Gaussians of the largest frame that can be seen.
+    pub(crate) largest: usize,
     /// SH degree of the source.
     pub(crate) source_sh_degree: u8,
     /// Bits per Gaussian of scale and rotation with sorted axes, and as they come.
     pub(crate) axes_trial: [f64; 2],
     /// The corners of the box of all Gaussians that can be seen, scene units.
     pub(crate) bounds: Option<[[f32; 3]; 2]>,
+    /// Gaussians of each frame, as it is read.
+    pub(crate) counts: Vec<u32>,
+}
+
+impl Analysis {
+    /// What the stream says of its scene: what the settings say, and the bounds.
+    pub(crate) fn description(&self, settings: &Settings) -> SceneDescription {
+        SceneDescription { bounds: self.bounds, ..settings.description.clone() }
+    }
 }
 
 /// Looks at every frame once.
@@ -52,6 +64,8 @@ pub(crate) struct Survey {
     pub(crate) source_degree: u8,
     pub(crate) antialiased: bool,
     axes_trial: [f64; 2],
+    /// Gaussians of each frame.
+    counts: Vec<u32>,
 }
 
 impl Survey {
@@ -71,6 +85,7 @@ impl Survey {
             source_degree: 0,
             antialiased: false,
             axes_trial: [0.0; 2],
+            counts: Vec::new(),
         };
         for number in 0..source.len() {
             let frame = source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
@@ -80,6 +95,7 @@ impl Survey {
     }
 
     fn add(&mut self, frame: &GaussianFrame, number: u32, settings: &Settings) -> Result<(), Error> {
+        self.counts.push(u32::try_from(frame.len()).unwrap_or(u32::MAX));
         let shown = visible(frame, settings.keep_invisible);
         check_reach(frame, &shown, (settings.steps.log_scale, settings.steps.opacity), number)?;
         if shown.len() > self.largest.1 {
@@ -111,9 +127,11 @@ impl Survey {
         Ok(Analysis {
             parameters,
             level,
+            largest: self.largest.1,
             source_sh_degree: self.source_degree,
             axes_trial: self.axes_trial,
             bounds: self.scene.extent.bounds(),
+            counts: self.counts.clone(),
         })
     }
 }

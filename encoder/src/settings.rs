@@ -297,6 +297,9 @@ pub struct Settings {
     pub tools: Tools,
     /// log2 of the Gaussians in an entropy block.
     pub block_log2: u8,
+    /// Memory that GOPs coded at the same time may take together, bytes, as far as it can be estimated; one GOP at a
+    /// time takes what it takes. The stream is the same whatever stands here.
+    pub gop_memory: u64,
     /// Ticks in a second, and from one frame to the next.
     pub ticks: (u32, u32),
     /// What the stream says about its scene. The bounds are those of the Gaussians, whatever stands here.
@@ -310,6 +313,16 @@ impl Settings {
             Preset::Fast => Fidelity::Attributes,
             Preset::Balanced | Preset::Small => Fidelity::Pictures,
         })
+    }
+
+    /// Whether steps are found for what is asked for.
+    pub(crate) fn has_target(&self) -> bool {
+        self.psnr.is_some() || self.size.is_some()
+    }
+
+    /// Whether frames may refer to others.
+    pub(crate) fn may_predict(&self) -> bool {
+        self.temporal_layers() > 0 && self.tools.survivors
     }
 
     /// The profile that the layers and the structure take.
@@ -338,8 +351,9 @@ impl Settings {
         self.spatial_layers.min(Ladder::most_layers(self.refinements.len()))
     }
 
-    /// Frames of a GOP, at most.
-    pub(crate) fn gop_length(&self) -> u32 {
+    /// Frames of a GOP, at most. GOPs begin at multiples of it, and where a frame has too little in common with the one
+    /// before.
+    pub fn gop_length(&self) -> u32 {
         self.gop.min(if self.temporal_layers() > 0 { MAX_PREDICTED_FRAMES } else { u32::MAX })
     }
 
@@ -377,6 +391,7 @@ impl Default for Settings {
             tolerance: 0.3,
             tools: Tools::default(),
             block_log2: 14,
+            gop_memory: 2 << 30,
             ticks: (30, 1),
             description: SceneDescription::default(),
         }

@@ -11,7 +11,9 @@ use crate::source::FrameSource;
 use crate::target;
 use std::io::Write;
 
-/// Encodes all frames of `source` to `sink`.
+/// Encodes all frames of `source` to `sink`. GOPs are coded several at a time, as many as there are threads and as the
+/// [memory](Settings::gop_memory) is for; their bytes are those of any other number of threads. But for a stream whose
+/// [size](Settings::size) is given, of which a copy is kept, memory does not grow with the number of frames.
 ///
 /// # Errors
 /// Settings or frames that cannot be coded, a source that cannot be read, a sink that cannot be written.
@@ -22,8 +24,7 @@ pub fn encode(
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
     let mut source = CheckedSource::new(source, settings.drop_invalid);
-    let has_target = settings.psnr.is_some() || settings.size.is_some();
-    let encoded = match has_target && !source.is_empty() {
+    let encoded = match settings.has_target() && !source.is_empty() {
         true => target::reach(&mut source, settings, sink, progress),
         false => encode_once(&mut source, settings, Ranking::new(settings), sink, progress),
     };

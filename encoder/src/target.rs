@@ -19,6 +19,7 @@ use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
 use crate::steps::Steps;
 use crate::verification;
+use crate::window::FirstFrames;
 use splatstream_format::syntax::FrameType;
 use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
@@ -60,11 +61,70 @@ pub(crate) fn reach(
 ) -> Result<Report, Error> {
     // Before anything is fitted to what no stream can carry.
     sequence::check(settings)?;
-    let fitting = Fitting::new(source, settings)?;
-    let mut seeker = Seeker { source, fitting, progress, encodings: 0, trials: 0 };
-    let encoded = seeker.encode()?;
-    sink.write_all(&encoded.bytes)?;
-    Ok(encoded.report)
+    let mut seeker = Seeker::new(source, settings, progress)?;
+    let Found { fitted, encoded } = seeker.find()?;
+    let mut report = match encoded {
+        Some(encoded) => {
+            sink.write_all(&encoded.bytes)?;
+            encoded.report
+        }
+        None => seeker.whole(fitted, sink)?,
+    };
+    report.target = Some(seeker.told(fitted));
+    Ok(report)
+}
+
+/// Settings that reach what is asked for on the frames of `source`, the ranking of the first frame, and how they were found.
+///
+/// # Errors
+/// As [`encode`](fn@crate::encode).
+pub(crate) fn fit(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+) -> Result<(Settings, Ranking, TargetReport), Error> {
+    let mut progress = |_, _| ();
+    let mut seeker = Seeker::new(source, settings, &mut progress)?;
+    let found = seeker.find()?;
+    // The one that the plan is made for.
+    seeker.encodings += u32::from(found.encoded.is_none());
+    Ok((seeker.fitting.at(found.fitted)?, seeker.fitting.ranking.clone(), seeker.told(found.fitted)))
+}
+
+/// The ranking of the first frame that steps are fitted with, which knows its order.
+///
+/// # Errors
+/// A frame that cannot be read.
+pub(crate) fn first_ranking(source: &mut dyn FrameSource, settings: &Settings) -> Result<Ranking, Error> {
+    let (_, frame) = first_frame(source, settings)?;
+    let mut ranking = Ranking::new(settings);
+    ranking.rank_first(&frame);
+    Ok(ranking)
+}
+
+/// The ranking with the views of the sequence, if they are to be made.
+///
+/// # Errors
+/// A frame that cannot be read.
+pub(crate) fn looking(
+    source: &mut dyn FrameSource,
+    mut ranking: Ranking,
+    settings: &Settings,
+) -> Result<Ranking, Error> {
+    if ranking.is_blind() {
+        ranking.look_at(&first_frame(source, settings)?.1);
+    }
+    Ok(ranking)
+}
+
+/// The first frame as it is read, and as it is coded.
+fn first_frame(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+) -> Result<(GaussianFrame, GaussianFrame), Error> {
+    let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
+    let shown = visible(&first, settings.keep_invisible);
+    let frame = canonicalise(first.clone().into_selected(&shown), true);
+    Ok((first, isolated::colours(frame, &shown, 0).0))
 }
 
 /// Settings that reach what is asked for on the frames of `source`, the order of the first frame, and how they were found.
@@ -75,9 +135,14 @@ pub(crate) fn settle(
     source: &mut dyn FrameSource,
     settings: &Settings,
 ) -> Result<(Settings, Ranking, Report), Error> {
-    let fitting = Fitting::new(source, settings)?;
-    let mut seeker = Seeker { source, fitting, progress: &mut |_, _| (), encodings: 0, trials: 0 };
-    let Encoded { fitted, report, .. } = seeker.encode()?;
+    let mut progress = |_, _| ();
+    let mut seeker = Seeker::new(source, settings, &mut progress)?;
+    let Found { fitted, encoded } = seeker.find()?;
+    let mut report = match encoded {
+        Some(encoded) => encoded.report,
+        None => seeker.whole(fitted, &mut std::io::sink())?,
+    };
+    report.target = Some(seeker.told(fitted));
     let mut settled = Settings { psnr: None, size: None, ..seeker.fitting.at(fitted)? };
     if report.stands_alone {
         settled = settled.alone();
@@ -97,11 +162,9 @@ struct Fitting<'a> {
 
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
-        let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
+        let (first, frame) = first_frame(source, settings)?;
         let views = verification::views(&first, settings);
-        let shown = visible(&first, settings.keep_invisible);
-        let frame = canonicalise(first.into_selected(&shown), true);
-        let (frame, _) = isolated::colours(frame, &shown, 0);
+        drop(first);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
         Ok(Self { settings, fit: Fit::new(&frame, &ranked, &views, settings), ranking, known: Vec::new() })
@@ -133,46 +196,60 @@ struct Seeker<'a> {
     trials: u32,
 }
 
-/// A stream and what it was fitted for.
+/// A stream in memory.
 struct Encoded {
-    fitted: f64,
     bytes: Vec<u8>,
     report: Report,
 }
 
-impl Seeker<'_> {
-    /// A stream with what the settings ask for.
-    fn encode(&mut self) -> Result<Encoded, Error> {
-        let mut encoded = match (self.fitting.settings.size, self.fitting.settings.psnr) {
-            (Some(size), _) => self.size(size)?,
-            (None, Some(decibels)) => self.quality(decibels.into())?,
-            (None, None) => {
-                return Err(Error::Setting {
-                    name: "target",
-                    value: "none".to_owned(),
-                    allowed: "a PSNR or a size, if steps are to be found for one",
-                });
-            }
-        };
-        let (fitted, encodings, trials) = (encoded.fitted as f32, self.encodings, self.trials);
-        encoded.report.target = Some(TargetReport { fitted, encodings, trials });
-        Ok(encoded)
+/// The PSNR to fit for, and the stream that it gives, if all frames were encoded to find it.
+struct Found {
+    fitted: f64,
+    encoded: Option<Encoded>,
+}
+
+impl<'a> Seeker<'a> {
+    fn new(
+        source: &'a mut dyn FrameSource,
+        settings: &'a Settings,
+        progress: Progress<'a>,
+    ) -> Result<Self, Error> {
+        let fitting = Fitting::new(source, settings)?;
+        Ok(Self { source, fitting, progress, encodings: 0, trials: 0 })
     }
 
-    /// A stream with pictures of a PSNR. Of a sequence its first frames are tried: one of each type.
-    fn quality(&mut self, wanted: f64) -> Result<Encoded, Error> {
+    /// What to fit for, so that the stream has what the settings ask for.
+    fn find(&mut self) -> Result<Found, Error> {
+        match (self.fitting.settings.size, self.fitting.settings.psnr) {
+            (Some(size), _) => self.size(size),
+            (None, Some(decibels)) => self.quality(decibels.into()),
+            (None, None) => Err(Error::Setting {
+                name: "target",
+                value: "none".to_owned(),
+                allowed: "a PSNR or a size, if steps are to be found for one",
+            }),
+        }
+    }
+
+    /// How it was found.
+    fn told(&self, fitted: f64) -> TargetReport {
+        TargetReport { fitted: fitted as f32, encodings: self.encodings, trials: self.trials }
+    }
+
+    /// What to fit for pictures of a PSNR. Of a sequence its first frames are tried: one of each type.
+    fn quality(&mut self, wanted: f64) -> Result<Found, Error> {
         let mut secant = Secant::new(wanted + ABOVE, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
         let frames_of_part = match self.fitting.settings.temporal_layers() {
             0 => 1,
             layers => 1 + (1 << (layers - 1)),
         };
         let is_sequence = self.source.len() > frames_of_part;
-        let mut best: Option<Encoded> = None;
+        let mut best: Option<Found> = None;
         // The PSNR that was measured first.
         let mut start = None;
         let mut next = Some(wanted);
         while let Some(at) = next {
-            let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.whole(at)? };
+            let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.kept(at)? };
             // Where nothing can be seen nothing is too bad.
             let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.psnr());
             let measured = measured.unwrap_or(wanted);
@@ -182,16 +259,15 @@ impl Seeker<'_> {
                 break;
             }
             if secant.take(at, measured) {
-                best = Some(encoded);
+                best = Some(Found { fitted: at, encoded: (!is_sequence).then_some(encoded) });
             }
             next = secant.next();
         }
-        let Some(best) = best else { return Err(Error::NoFrames) };
-        if is_sequence { self.whole(best.fitted) } else { Ok(best) }
+        best.ok_or(Error::NoFrames)
     }
 
-    /// A stream of a size. Of a long sequence a part is tried first.
-    fn size(&mut self, size: Size) -> Result<Encoded, Error> {
+    /// What to fit for a stream of a size. Of a long sequence a part is tried first.
+    fn size(&mut self, size: Size) -> Result<Found, Error> {
         let goal = libm::log(match size {
             Size::BitsPerGaussian(bits) => bits,
             Size::Bytes(bytes) => bytes as f64,
@@ -209,13 +285,13 @@ impl Seeker<'_> {
             (first, slope) = (secant.best(), secant.slope());
         }
         let mut secant = Secant::new(goal, NEAR_SIZE, slope, MOST_FOR_SIZE);
-        let mut best: Option<Encoded> = None;
+        let mut best: Option<Found> = None;
         let mut next = Some(first);
         while let Some(at) = next {
-            let encoded = self.whole(at)?;
+            let encoded = self.kept(at)?;
             let measured = size_of(size, encoded.report.bytes as f64, encoded.report.gaussians as f64);
             if secant.take(at, libm::log(measured)) {
-                best = Some(encoded);
+                best = Some(Found { fitted: at, encoded: Some(encoded) });
             }
             next = secant.next();
         }
@@ -250,11 +326,17 @@ impl Seeker<'_> {
     }
 
     /// All frames, with the steps for a PSNR.
-    fn whole(&mut self, fitted: f64) -> Result<Encoded, Error> {
+    fn whole(&mut self, fitted: f64, sink: &mut dyn Write) -> Result<Report, Error> {
         self.encodings += 1;
         let (settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
-        let (bytes, report) = encode_smaller(self.source, &settings, ranking, self.progress)?;
-        Ok(Encoded { fitted, bytes, report })
+        encode_smaller(self.source, &settings, ranking, sink, self.progress)
+    }
+
+    /// The same in memory.
+    fn kept(&mut self, fitted: f64) -> Result<Encoded, Error> {
+        let mut bytes = Vec::new();
+        let report = self.whole(fitted, &mut bytes)?;
+        Ok(Encoded { bytes, report })
     }
 
     /// The first frames.
@@ -264,7 +346,7 @@ impl Seeker<'_> {
         let mut bytes = Vec::new();
         let mut part = FirstFrames { source: self.source, frames };
         let report = encode_once(&mut part, &settings, ranking, &mut bytes, &mut |_, _| ())?;
-        Ok(Encoded { fitted, bytes, report })
+        Ok(Encoded { bytes, report })
     }
 }
 
@@ -273,21 +355,5 @@ fn size_of(size: Size, bytes: f64, gaussians: f64) -> f64 {
     match size {
         Size::BitsPerGaussian(_) => 8.0 * bytes / gaussians.max(1.0),
         Size::Bytes(_) => bytes,
-    }
-}
-
-/// The first frames of a source.
-struct FirstFrames<'a> {
-    source: &'a mut dyn FrameSource,
-    frames: u32,
-}
-
-impl FrameSource for FirstFrames<'_> {
-    fn len(&self) -> u32 {
-        self.frames.min(self.source.len())
-    }
-
-    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
-        self.source.frame(number)
     }
 }

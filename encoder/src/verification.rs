@@ -10,6 +10,7 @@ use crate::report::{PictureReport, VerifiedFrame};
 use crate::settings::{Preset, Settings};
 use crate::source::FrameSource;
 use crate::strips::StripViews;
+use core::ops::Range;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
 use splatstream_format::Limits;
@@ -29,6 +30,8 @@ const EVERY_FAST: u32 = 12;
 
 /// Keeps units while they are written, and the frames that they decode to.
 pub(crate) struct Verifier {
+    /// The frame of the sequence that the stream begins with.
+    first: u32,
     /// Display indices of the first, the middle and the last frame.
     wanted: [u32; 3],
     /// The file header and the sequence parameters.
@@ -55,10 +58,10 @@ enum Taken {
 }
 
 impl Verifier {
-    /// For a sequence of so many frames.
-    pub(crate) fn new(frames: u32) -> Self {
-        let last = frames.saturating_sub(1);
-        Self { wanted: [0, last / 2, last], head: Vec::new(), gop: None, frames: Vec::new() }
+    /// For a stream of these frames of a sequence.
+    pub(crate) fn new(frames: Range<u32>) -> Self {
+        let (first, last) = (frames.start, frames.end.saturating_sub(frames.start).saturating_sub(1));
+        Self { first, wanted: [0, last / 2, last], head: Vec::new(), gop: None, frames: Vec::new() }
     }
 
     /// Takes what stands at the beginning of the stream.
@@ -147,6 +150,7 @@ impl Verifier {
         self.frames.sort_by_key(|decoded| decoded.number);
         let mut frames = Vec::new();
         for Decoded { number, frame_type, frame } in self.frames {
+            let number = self.first.saturating_add(number);
             // The source is read again rather than kept beside what was decoded: a frame may fill the memory.
             let mut original =
                 || source.frame(number).map_err(|source| Error::Source { frame: number, source });

@@ -98,7 +98,7 @@ impl Pictures {
             view_height: pictures.height,
             encodings: report.target.map_or(1, |target| target.encodings),
             trials: report.target.map_or(0, |target| target.trials),
-            gops: report.gops.iter().map(|gop| Gop::of(gop, report.frames, settings.gop)).collect(),
+            gops: report.gops.iter().map(|gop| Gop::of(gop, report, settings)).collect(),
         }
     }
 
@@ -148,9 +148,10 @@ impl Pictures {
 }
 
 impl Gop {
-    /// A GOP of a sequence of so many frames, where it should have `length`.
-    fn of(gop: &GopReport, frames: u32, length: u32) -> Self {
-        let ends_early = gop.frames < length && gop.first + gop.frames < frames;
-        Self { first_frame: gop.first, frames: gop.frames, cut: ends_early }
+    /// A GOP ends where a multiple of the length does, unless a frame has too little in common with the one before.
+    fn of(gop: &GopReport, report: &Report, settings: &Settings) -> Self {
+        let (length, end) = (settings.gop_length(), gop.first + gop.frames);
+        let is_last = report.gops.last() == Some(gop);
+        Self { first_frame: gop.first, frames: gop.frames, cut: end % length != 0 && !is_last }
     }
 }

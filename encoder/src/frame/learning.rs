@@ -2,14 +2,15 @@
 
 use super::recorder::Recorder;
 use crate::error::Error;
-use crate::gop::SequenceCoder;
+use crate::gop::SpanCoder;
 use crate::importance::Ranking;
-use crate::report::Report;
 use crate::sequence::{Analysis, analyse};
 use crate::settings::{NetworkSource, Preset, Settings};
 use crate::source::FrameSource;
+use crate::spans::{Common, Spans};
+use crate::target::looking;
 use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, TrainingReport, train};
-use crate::writer::{Record, UnitWriter};
+use crate::writer::Coded;
 use core::ops::ControlFlow;
 use splatstream_decoder::predictor::Predictor;
 use splatstream_format::Limits;
@@ -78,22 +79,15 @@ fn recorded(
     architecture: &Architecture,
 ) -> Result<Vec<Sample>, Error> {
     let recorder = Recorder::default();
-    let (mut report, mut nowhere) = (Report::default(), std::io::sink());
-    let mut record = Record::new(settings.profile(), sequence);
-    let mut writer = UnitWriter::new(&mut nowhere, &mut record);
-    let coder = SequenceCoder {
-        source,
-        settings,
-        sequence: *sequence,
-        ranking: &mut Ranking::new(settings),
-        writer: &mut writer,
-        report: &mut report,
-        network: Some(zero(architecture)?),
-        limits: Limits::default(),
-        recorder: Some(&recorder),
-        looked_at: 0,
-    };
-    coder.run(&mut |_, _| {})?;
+    let network = zero(architecture)?;
+    let (sequence, network, limits) = (*sequence, Some(&network), Limits::default());
+    let common = Common { settings, sequence, limits, network };
+    let ranking = looking(source, Ranking::new(settings), settings)?;
+    for span in Spans::new(0..source.len(), settings.gop_length()) {
+        let (mut coded, mut progress) = (Coded::default(), |_| ());
+        let coder = SpanCoder::new(source, common, ranking.clone(), &mut coded, &mut progress);
+        SpanCoder { recorder: Some(&recorder), ..coder }.code(span)?;
+    }
     Ok(recorder.into_samples())
 }
 

@@ -1,6 +1,6 @@
 //! What the frames of a GOP are coded with.
 
-use super::{Gop, SequenceCoder};
+use super::{Gop, SpanCoder};
 use crate::colour;
 use crate::frame::cells::ReferenceCloud;
 use crate::frame::predictors::Chooser;
@@ -29,7 +29,7 @@ const RESIDUAL_ENTRIES: usize = 256;
 /// Rows of the same Gaussian may differ by this many steps in attributes that motion leaves alone.
 const SAME: f32 = 1.5;
 
-impl SequenceCoder<'_, '_> {
+impl SpanCoder<'_> {
     /// Which Gaussian of a frame continues each of a reference; none if they share too little.
     pub(super) fn matching(
         &self,
@@ -37,14 +37,14 @@ impl SequenceCoder<'_, '_> {
         target: &Target,
         measure: &Measure,
     ) -> Option<Matching> {
-        let cloud = ReferenceCloud::new(reference, &self.sequence);
-        let mut matching = cloud.matching(target, measure, self.sequence.position_bits);
+        let cloud = ReferenceCloud::new(reference, &self.common.sequence);
+        let mut matching = cloud.matching(target, measure, self.common.sequence.position_bits);
         // Who goes by pictures has a use for partners that differ a lot.
         let useful = self.by_pictures() && shares_much(&matching);
         if shares_little(&matching) && !useful && !target.frame.is_empty() {
             return None;
         }
-        if !self.settings.tools.survivors {
+        if !self.common.settings.tools.survivors {
             matching.target_of.iter_mut().for_each(|partner| *partner = None);
         }
         Some(matching)
@@ -54,15 +54,15 @@ impl SequenceCoder<'_, '_> {
     /// any of the source.
     pub(super) fn is_within_limits(&self, coded: &CodedFrame) -> bool {
         let gaussians = coded.gaussians();
-        let rate = self.sequence.gaussian_rate(gaussians);
-        gaussians <= self.limits.max_gaussians && rate <= self.limits.max_gaussian_rate
+        let rate = self.common.sequence.gaussian_rate(gaussians);
+        gaussians <= self.common.limits.max_gaussians && rate <= self.common.limits.max_gaussian_rate
     }
 
     /// What becomes of the Gaussians of a reference is found with this.
     pub(super) fn survivors<'s>(&'s self, gop: &'s Gop, target: &'s Target) -> Survivors<'s> {
         Survivors {
             target,
-            sequence: &self.sequence,
+            sequence: &self.common.sequence,
             dc: &gop.tools.dc,
             sh: gop.tools.sh.as_ref().map(|(transform, _)| transform),
             namings: Namings::new(),
@@ -73,15 +73,15 @@ impl SequenceCoder<'_, '_> {
     }
 
     pub(super) fn measure(&self) -> Measure {
-        let steps = Measure::steps_beside(&self.settings.steps);
-        Measure { position_step: self.sequence.position_step(), steps, same: SAME }
+        let steps = Measure::steps_beside(&self.common.settings.steps);
+        Measure { position_step: self.common.sequence.position_step(), steps, same: SAME }
     }
 
     /// Whether frames of which no row keeps its meaning are true to their pictures. What a network is trained with is
     /// the same either way, and sooner found without them.
     pub(super) fn by_pictures(&self) -> bool {
-        let may = self.settings.tools.survivors && self.recorder.is_none();
-        may && self.settings.fidelity() == Fidelity::Pictures
+        let may = self.common.settings.tools.survivors && self.recorder.is_none();
+        may && self.common.settings.fidelity() == Fidelity::Pictures
     }
 
     /// How good the pictures of a frame must be, if it is them that the frame is true to.
@@ -92,7 +92,7 @@ impl SequenceCoder<'_, '_> {
         let cameras = self.ranking.cameras(&target.frame).to_vec();
         Some(Goal {
             pictures: ReferencePictures::new(&target.frame, cameras),
-            tolerance: f64::from(self.settings.tolerance),
+            tolerance: f64::from(self.common.settings.tolerance),
             least: Vec::new(),
             level: gop.price_level,
         })
@@ -120,11 +120,11 @@ impl SequenceCoder<'_, '_> {
         plan.codebooks.first()?;
         let rank = usize::from(transform.header.rank);
         let pairs = matching.target_of.iter().flatten().count();
-        let grains = Grains::new(self.settings, &self.sequence);
-        let rule = |list: u8| StepRule::new(&self.sequence, grains.of(list).attribute_step);
-        let rules: Vec<StepRule> = (0..self.sequence.refinement_count).map(rule).collect();
+        let grains = Grains::new(self.common.settings, &self.common.sequence);
+        let rule = |list: u8| StepRule::new(&self.common.sequence, grains.of(list).attribute_step);
+        let rules: Vec<StepRule> = (0..self.common.sequence.refinement_count).map(rule).collect();
         let rows = survivors.sh_rows(&reference.lists, &rules, &matching.target_of, pairs / TRIAL);
-        let forced = self.settings.sh == ShChoice::VectorQuantised;
+        let forced = self.common.settings.sh == ShChoice::VectorQuantised;
         let entries = vq::entry_count(pairs, false).min(RESIDUAL_ENTRIES);
         if rows.len() < 4 * rank || !forced && !colour::compare(&rows, rank, pairs, entries).1 {
             return None;
@@ -139,12 +139,12 @@ impl SequenceCoder<'_, '_> {
     /// How new Gaussians are predicted.
     pub(super) fn chooser(&self) -> Chooser<'_> {
         Chooser {
-            predictors: match self.settings.profile() {
+            predictors: match self.common.settings.profile() {
                 Profile::Intra => Predictors::NONE,
-                Profile::Dynamic => self.settings.predictors,
+                Profile::Dynamic => self.common.settings.predictors,
             },
-            choice: self.settings.predictor_choice,
-            neighbours: self.settings.neighbours,
+            choice: self.common.settings.predictor_choice,
+            neighbours: self.common.settings.neighbours,
             recorder: self.recorder,
         }
     }
@@ -168,7 +168,7 @@ impl SequenceCoder<'_, '_> {
             _ => [None; 4],
         };
         UnitCoder {
-            sequence: &self.sequence,
+            sequence: &self.common.sequence,
             colour: Colour {
                 dc: &gop.tools.dc,
                 sh: sh.map(|(transform, _)| transform),
@@ -177,15 +177,15 @@ impl SequenceCoder<'_, '_> {
             },
             sh: coding.header(books.iter().flatten().map(|book| book.header.codebook_id)),
             plan: SectionPlan {
-                block_log2: self.sequence.block_log2,
-                preset: self.settings.preset,
-                tools: self.settings.tools,
+                block_log2: self.common.sequence.block_log2,
+                preset: self.common.settings.preset,
+                tools: self.common.settings.tools,
             },
-            grains: Grains::new(self.settings, &self.sequence),
+            grains: Grains::new(self.common.settings, &self.common.sequence),
             has_differences: self.chooser().predictors != Predictors::NONE
-                || self.sequence.spatial_layer_count > 1,
-            network: self.network.as_ref(),
-            max_learned: self.limits.max_learned,
+                || self.common.sequence.spatial_layer_count > 1,
+            network: self.common.network,
+            max_learned: self.common.limits.max_learned,
         }
     }
 }

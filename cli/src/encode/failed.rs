@@ -1,0 +1,41 @@
+//! Errors of the encoder in the words of the command line.
+
+use crate::failure::Failure;
+use crate::frame_files::FrameFiles;
+use splatstream_chart::numbers::grouped;
+use splatstream_encoder::Error;
+use splatstream_gaussians::Defect;
+use std::path::Path;
+
+/// The encoder counts frames; a user has files.
+pub(super) fn failed(source: &FrameFiles, out: &Path, error: &Error) -> Failure {
+    match error {
+        // Errors of reading name the file.
+        Error::Source { source, .. } => Failure::other(source.to_string()),
+        Error::Invalid { frame, count, first } => {
+            let Defect { row, property, value, kind } = first;
+            let path = source.name(*frame);
+            let more = match count - 1 {
+                0 => String::new(),
+                more => {
+                    format!(", and {} more Gaussians of this frame have such values", grouped(more as u64))
+                }
+            };
+            Failure::other(format!(
+                "{path}: frame {frame}, Gaussian {row}: {property} is {value}: {kind}{more}\n  \
+                 repair the file, or leave such Gaussians out with --drop-invalid"
+            ))
+        }
+        Error::OutOfGrid { frame, farthest_row, .. } => Failure::other(format!(
+            "{}: {error}\n  repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from \
+             all others can put the rest out of reach",
+            source.name(*frame)
+        )),
+        Error::TooManyGaussians { frame, .. }
+        | Error::TooManyPerSecond { frame, .. }
+        | Error::OtherFrame { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
+        Error::Output(cause) => Failure::file("write", out, cause),
+        Error::Setting { .. } => Failure::Usage(error.to_string()),
+        _ => Failure::other(error.to_string()),
+    }
+}

@@ -1,0 +1,242 @@
+//! What holds for all frames of a sequence, found once: with it, parts of the sequence are encoded anywhere.
+
+mod record;
+
+pub use record::{PlanRecord, PlannedSteps, PlannedTarget, Single};
+
+use crate::checked::{CheckedSource, named};
+use crate::error::Error;
+use crate::frame::learning;
+use crate::gop::SpanCoder;
+use crate::importance::Ranking;
+use crate::pass::is_better_alone;
+use crate::report::{Report, TargetReport};
+use crate::sequence::{Analysis, analyse, check};
+use crate::settings::Settings;
+use crate::shard::Shard;
+use crate::source::FrameSource;
+use crate::spans::{Coding, Common, Judge, Span, Spans, at_once};
+use crate::target;
+use crate::verification::Verifier;
+use crate::writer::{Coded, Head, Record, UnitWriter};
+use core::ops::Range;
+use splatstream_format::Limits;
+use splatstream_format::payload::Network;
+use splatstream_format::syntax::SequenceParameters;
+use std::io::Write;
+
+/// What holds for all frames of a sequence: steps, ranges, layers, the network.
+///
+/// [`encode`](fn@crate::encode) finds it and codes all GOPs with it. Where that takes too long for one machine, each
+/// machine [encodes a shard](Plan::encode_shard), and [`concat`](fn@crate::concat) joins them to the stream that
+/// `encode` would have written, byte for byte. Plans are the same wherever they are made; a
+/// [record](Plan::record) carries one from machine to machine.
+///
+/// ```
+/// use splatstream_encoder::{Settings, plan};
+/// use splatstream_files::builtin::BuiltinScene;
+///
+/// let scene = BuiltinScene { gaussians: 100, frames: 4, ..BuiltinScene::default() };
+/// let mut frames: Vec<_> = (0..scene.frames).map(|number| scene.frame(number)).collect();
+/// let settings = Settings { gop: 2, ..Settings::default() };
+/// let plan = plan(&mut frames, &settings)?;
+/// assert_eq!(plan.shards(), 2);
+/// let mut shard = Vec::new();
+/// plan.encode_shard(&mut frames, (1, 2), &mut shard, &mut |_, _| ())?;
+/// # Ok::<(), splatstream_encoder::Error>(())
+/// ```
+pub struct Plan {
+    /// What was asked for, as it was asked for.
+    asked: Settings,
+    /// With steps that are settled.
+    settings: Settings,
+    analysis: Analysis,
+    network: Option<Network>,
+    /// Knows the order of the first frame, where that was needed; none where the plan comes from a record.
+    ranking: Option<Ranking>,
+    target: Option<TargetReport>,
+    stands_alone: bool,
+}
+
+/// Looks at every frame once, finds steps for the quality or the size that is asked for, and codes the first GOP, which
+/// shows whether frames are predicted at all.
+///
+/// For a [size](Settings::size) the whole sequence is encoded, several times: with a plan, only the last of these
+/// encodings is shared among machines.
+///
+/// # Errors
+/// Settings or frames that cannot be coded, a source that cannot be read.
+pub fn plan(source: &mut dyn FrameSource, settings: &Settings) -> Result<Plan, Error> {
+    let mut source = CheckedSource::new(source, settings.drop_invalid);
+    planned(&mut source, settings).map_err(named)
+}
+
+fn planned(source: &mut dyn FrameSource, asked: &Settings) -> Result<Plan, Error> {
+    check(asked)?;
+    if !asked.has_target() || source.is_empty() {
+        return Plan::new(source, asked, asked.clone(), Ranking::new(asked));
+    }
+    let (settings, ranking, found) = target::fit(source, asked)?;
+    let mut plan = Plan::new(source, asked, settings, ranking)?;
+    let Some(first) = plan.spans(0..source.len()).next() else { return Ok(plan) };
+    if plan.settings.may_predict() {
+        let (coded, report) = plan.code(source, first)?;
+        if let Some(alone) = is_better_alone(&plan, source, &coded, &report)? {
+            plan = alone;
+        }
+    }
+    plan.target = Some(found);
+    Ok(plan)
+}
+
+impl Plan {
+    /// With steps that are settled.
+    pub(crate) fn new(
+        source: &mut dyn FrameSource,
+        asked: &Settings,
+        settings: Settings,
+        ranking: Ranking,
+    ) -> Result<Self, Error> {
+        let analysis = analyse(source, &settings)?;
+        let ranking = target::looking(source, ranking, &settings)?;
+        let network = learning::network(source, &settings, &analysis)?;
+        let (asked, ranking) = (asked.clone(), Some(ranking));
+        Ok(Self { asked, settings, analysis, network, ranking, target: None, stands_alone: false })
+    }
+
+    /// The same with frames that each stand for themselves, in one layer.
+    pub(crate) fn alone(&self, source: &mut dyn FrameSource) -> Result<Self, Error> {
+        let (settings, ranking) = (self.settings.clone().alone(), self.ranking(source, true)?);
+        let plan = Self::new(source, &self.asked, settings, ranking)?;
+        Ok(Self { target: self.target, stands_alone: true, ..plan })
+    }
+
+    /// Shards that the sequence can be cut into, at most: the GOPs that it has if no frame forces another one.
+    pub fn shards(&self) -> u32 {
+        self.spans(0..self.analysis.parameters.frame_count).left()
+    }
+
+    /// The frames of shard `number` of `count`, counted from 1.
+    ///
+    /// # Errors
+    /// A number that is not from 1 to `count`, or more shards than there can be.
+    pub fn frames_of_shard(&self, (number, count): (u32, u32)) -> Result<Range<u32>, Error> {
+        let (spans, frames) = (self.shards(), self.analysis.parameters.frame_count);
+        if !(1..=count).contains(&number) {
+            return Err(Error::Setting {
+                name: "shard",
+                value: format!("{number}/{count}"),
+                allowed: "1/N to N/N",
+            });
+        }
+        if count > spans {
+            return Err(Error::Shards { count, most: spans });
+        }
+        let length = self.settings.gop_length();
+        let start = |number: u32| {
+            let span = u64::from(number).saturating_mul(spans.into()).checked_div(count.into()).unwrap_or(0);
+            (span as u32).saturating_mul(length).min(frames)
+        };
+        Ok(start(number.saturating_sub(1))..start(number))
+    }
+
+    /// Encodes shard `number` of `count`, counted from 1: a stream of its own, that begins with frame 0. It says in a
+    /// unit of private data what it is a part of, which [`concat`](fn@crate::concat) leaves out. `progress` is called with frames of the
+    /// shard. Frames in the report and in errors are counted in the whole sequence.
+    ///
+    /// # Errors
+    /// As [`encode`](fn@crate::encode) and [`Plan::frames_of_shard`]; a source that is not the one of the plan.
+    pub fn encode_shard(
+        &self,
+        source: &mut dyn FrameSource,
+        (number, count): (u32, u32),
+        sink: &mut dyn Write,
+        progress: crate::Progress<'_>,
+    ) -> Result<Report, Error> {
+        let frames = self.frames_of_shard((number, count))?;
+        let (shards, sequence_frames) = ((number, count), self.analysis.parameters.frame_count);
+        let shard = Shard { plan: self.record()?.digest(), shards, frames: frames.clone(), sequence_frames };
+        if source.len() != sequence_frames {
+            return Err(Error::OtherFrames { found: source.len(), planned: sequence_frames });
+        }
+        let mut source =
+            CheckedSource::new(source, self.settings.drop_invalid).expecting(&self.analysis.counts);
+        let encoded = self.encode(&mut source, (frames, Some(shard)), sink, progress, None);
+        let mut report = encoded.map_err(named)?.unwrap_or_default();
+        (report.target, report.stands_alone) = (self.target, self.stands_alone);
+        report.leave_out(source.into_dropped());
+        Ok(report)
+    }
+
+    /// Encodes frames of the sequence, all of them or those of a shard. Nothing is written and none is given where
+    /// `judge` refuses the first span.
+    pub(crate) fn encode(
+        &self,
+        source: &mut dyn FrameSource,
+        (frames, shard): (Range<u32>, Option<Shard>),
+        sink: &mut dyn Write,
+        progress: crate::Progress<'_>,
+        judge: Option<Judge<'_>>,
+    ) -> Result<Option<Report>, Error> {
+        let settings = &self.settings;
+        let frame_count = frames.end.saturating_sub(frames.start);
+        let sequence = SequenceParameters { frame_count, ..self.analysis.parameters };
+        let ranking = self.ranking(source, frames.start == 0)?;
+        let mut report = Report::new(&self.analysis, settings, ranking.importance());
+        let mut record = Record::new(settings.profile(), &sequence, frames.start);
+        let is_verified = settings.verify || settings.has_target();
+        record.verifier = is_verified.then(|| Verifier::new(frames.clone()));
+        let mut writer = UnitWriter::new(sink, &mut record);
+        let spans = self.spans(frames);
+        let at_once = at_once(settings, &self.analysis, &spans);
+        let description = self.analysis.description(settings);
+        let head =
+            Head { level: self.analysis.level, description: Some(&description), shard: shard.as_ref() };
+        let mut coding = Coding {
+            source,
+            common: self.common(),
+            head: Some(head),
+            writer: &mut writer,
+            report: &mut report,
+            progress: &mut |done| progress(done, frame_count),
+        };
+        if !coding.run(spans, ranking, at_once, judge)? {
+            return Ok(None);
+        }
+        writer.finish()?;
+        (report.bytes, report.gops, report.frames) = (record.offset, record.gops, frame_count);
+        report.pictures = record.verifier.map(|verifier| verifier.compare(source, settings)).transpose()?;
+        Ok(Some(report))
+    }
+
+    /// Codes a span to memory.
+    pub(crate) fn code(&self, source: &mut dyn FrameSource, span: Span) -> Result<(Coded, Report), Error> {
+        let mut coded = Coded::default();
+        let (ranking, mut progress) = (self.ranking(source, true)?, |_| ());
+        let report = SpanCoder::new(source, self.common(), ranking, &mut coded, &mut progress).code(span)?;
+        Ok((coded, report))
+    }
+
+    /// The ranking that the first GOP is coded with, or those after it.
+    fn ranking(&self, source: &mut dyn FrameSource, is_first: bool) -> Result<Ranking, Error> {
+        match &self.ranking {
+            Some(ranking) if is_first => Ok(ranking.clone()),
+            Some(ranking) => Ok(ranking.for_later()),
+            None if is_first && self.asked.has_target() => target::first_ranking(source, &self.asked),
+            None => target::looking(source, Ranking::new(&self.settings), &self.settings),
+        }
+    }
+
+    pub(crate) fn spans(&self, frames: Range<u32>) -> Spans {
+        Spans::new(frames, self.settings.gop_length())
+    }
+
+    fn common(&self) -> Common<'_> {
+        Common {
+            settings: &self.settings,
+            sequence: self.analysis.parameters,
+            limits: Limits::of_level(self.analysis.level),
+            network: self.network.as_ref(),
+        }
+    }
+}
