@@ -98,7 +98,7 @@ struct Fitting<'a> {
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
         let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
-        let views = verification::views(&first, settings);
+        let [views, _] = verification::views(&first, settings);
         let shown = visible(&first, settings.keep_invisible);
         let frame = canonicalise(first.into_selected(&shown), true);
         let (frame, _) = isolated::colours(frame, &shown, 0);
@@ -174,7 +174,7 @@ impl Seeker<'_> {
         while let Some(at) = next {
             let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.whole(at)? };
             // Where nothing can be seen nothing is too bad.
-            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.psnr());
+            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr());
             let measured = measured.unwrap_or(wanted);
             let first = *start.get_or_insert(measured);
             // Something else than the steps spoils the pictures: finer ones would only cost bits.
