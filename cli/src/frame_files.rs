@@ -186,7 +186,7 @@ fn is_sog(path: &Path) -> bool {
 }
 
 /// Orders names as people count: frame_9 before frame_10.
-fn natural_order(a: &str, b: &str) -> Ordering {
+pub(crate) fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);
     loop {
         let (text_a, number_a, rest_a) = split_number(left);

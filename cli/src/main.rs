@@ -13,6 +13,7 @@ mod demo;
 mod encode;
 mod extract;
 mod failure;
+mod fit;
 mod frame_files;
 mod frames;
 mod input_args;
@@ -27,6 +28,7 @@ mod render;
 mod seek;
 mod serve;
 mod setting_names;
+mod simulate;
 mod stream_file;
 mod structure;
 mod train;
@@ -82,6 +84,8 @@ enum Command {
     Play(play::Play),
     View(view::View),
     Train(train::Train),
+    Simulate(simulate::Simulate),
+    Fit(fit::Fit),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
     Manual(manual::Manual),
@@ -159,6 +163,8 @@ impl Command {
             Self::Play(command) => command.run(console),
             Self::View(command) => command.run(console),
             Self::Train(command) => command.run(console),
+            Self::Simulate(command) => command.run(console),
+            Self::Fit(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),
             Self::Manual(command) => command.run(console),
