@@ -104,7 +104,7 @@ fn direction(axis: UpAxis) -> Option<Up> {
 /// Where cameras come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Views {
-    /// A `cameras.json` or `transforms.json`.
+    /// A `cameras.json`, a `transforms.json`, or a directory with one of the latter or a model of COLMAP.
     File(PathBuf),
     /// So many around the scene.
     Ring(u32),

@@ -14,6 +14,7 @@ mod demo;
 mod encode;
 mod extract;
 mod failure;
+mod fit;
 mod frame_files;
 mod frames;
 mod input_args;
@@ -29,6 +30,7 @@ mod render;
 mod seek;
 mod serve;
 mod setting_names;
+mod simulate;
 mod stream_file;
 mod structure;
 mod train;
@@ -85,6 +87,8 @@ enum Command {
     Play(play::Play),
     View(view::View),
     Train(train::Train),
+    Simulate(simulate::Simulate),
+    Fit(fit::Fit),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
     Manual(manual::Manual),
@@ -153,6 +157,8 @@ impl Command {
             Self::Play(command) => command.run(console),
             Self::View(command) => command.run(console),
             Self::Train(command) => command.run(console),
+            Self::Simulate(command) => command.run(console),
+            Self::Fit(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),
             Self::Manual(command) => command.run(console),

@@ -32,7 +32,7 @@ pub(crate) struct Render {
     /// A stream, a scene file, or a directory of frames; - is a stream on standard input.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// A cameras.json or transforms.json; ring:N and forward:N make N cameras for the first frame. Default: the cameras
+    /// A cameras.json or transforms.json, or a directory with a model of COLMAP; ring:N and forward:N make N cameras for the first frame. Default: the cameras
     /// of the stream, or ring:8.
     #[arg(long, visible_alias = "cameras", value_name = "CAMS.json|ring:N|forward:N")]
     camera: Option<Views>,

@@ -158,6 +158,8 @@ fn reports_of_encoders_have_the_keys_they_had() {
         ("encode_each", "encode still.ply other.ply no-such.ply --each -o streams --preset fast --psnr 40"),
         ("chart", "chart --builtin --quick -o report"),
         ("train", "train --builtin 1 --frames 2 --quality low -o network.bin"),
+        ("capture", "simulate -o capture --views 4 --height 36 --samples 1 --points 300"),
+        ("fit", "fit capture -o scene.ply --iterations 4 --hold-out 4"),
         ("completions", "completions bash"),
         ("manual", "manual -o pages"),
     ] {

@@ -15,7 +15,7 @@ pub struct Image {
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The decoder of the file format refused.
-    #[error("not a picture that can be read: {0}; give a PNG file")]
+    #[error("not a picture that can be read: {0}; give a PNG, JPEG or WebP file")]
     Format(#[from] ::image::ImageError),
     /// The file could not be read.
     #[error("cannot read: {0}")]
@@ -99,6 +99,23 @@ impl Image {
         let pixels = picture.pixels().map(|pixel| pixel.0.map(|byte| f32::from(byte) / 255.0)).collect();
         Ok(Self::new((picture.width() as usize).max(1), pixels))
     }
+
+    /// The picture in a PNG, JPEG or WebP file, over one colour where it lets light pass, in the values of the file. 16 bits
+    /// become 8. What a JPEG file holds may differ by a level from one version of its decoder to another.
+    ///
+    /// # Errors
+    /// Bytes that are no such file, or a picture that takes more than 512 MiB of memory.
+    pub fn decoded(bytes: &[u8], background: [f32; 3]) -> Result<Self, ImageError> {
+        let picture = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?.decode()?.to_rgba8();
+        let over = |[r, g, b, a]: [u8; 4]| {
+            let [r, g, b, alpha] = [r, g, b, a].map(|byte| f32::from(byte) / 255.0);
+            let [back_r, back_g, back_b] = background;
+            [[r, back_r], [g, back_g], [b, back_b]]
+                .map(|[own, back]| if a == 255 { own } else { back + (own - back) * alpha })
+        };
+        let pixels = picture.pixels().map(|pixel| over(pixel.0)).collect();
+        Ok(Self::new((picture.width() as usize).max(1), pixels))
+    }
 }
 
 /// The pixels that one of `to` pixels on an axis covers of `from`, and their shares in its mean.
@@ -123,6 +140,21 @@ mod tests {
         }
         assert_eq!(line.averaged(3, 1), line);
         assert_eq!(line.averaged(1, 4).pixels(), [[0.6; 3]; 4]);
+    }
+
+    #[test]
+    fn what_lets_light_pass_is_over_the_background() {
+        let picture = ::image::RgbaImage::from_raw(2, 1, vec![255, 0, 51, 255, 255, 0, 51, 51]).unwrap();
+        let mut file = Cursor::new(Vec::new());
+        picture.write_to(&mut file, ImageFormat::Png).unwrap();
+        let read = Image::decoded(&file.into_inner(), [0.0, 1.0, 0.2]).unwrap();
+        for (read, expected) in read.pixels().iter().zip([[1.0, 0.0, 0.2], [0.2, 0.8, 0.2]]) {
+            assert!(
+                read.iter().zip(expected).all(|(read, expected)| (read - expected).abs() < 1e-6),
+                "{read:?}"
+            );
+        }
+        assert!(Image::decoded(b"no picture", [0.0; 3]).unwrap_err().to_string().contains("JPEG"));
     }
 
     #[test]

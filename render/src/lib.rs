@@ -1,6 +1,7 @@
 //! Gaussians to pixels, and how far apart two pictures are.
 //!
-//! * [`camera`]: pinhole cameras, read from the JSON files in use or made for a scene that has none;
+//! * [`camera`]: pinhole cameras, read from the JSON files in use and models of COLMAP, with pictures and points, or made
+//!   for a scene that has none;
 //! * [`rasterise`]: a frame of Gaussians to a picture, as 3D Gaussian splatting defines it;
 //! * [`ReferencePictures`]: a frame as cameras see it, to compare other frames with;
 //! * [`PreparedFrame::tiles`]: some tiles of a picture, which show nearly the errors of all of it;

@@ -1,10 +1,15 @@
-//! Camera files: the `cameras.json` of INRIA's trainer, and nerfstudio's and Blender's `transforms.json`.
+//! Files of cameras, their pictures and points: the `cameras.json` of INRIA's trainer, nerfstudio's, instant-ngp's and
+//! Blender's `transforms.json`, and COLMAP's models, as text or binary.
 //!
-//! Lens distortion in a `transforms.json` is not drawn.
+//! Cameras are pinholes: what a lens bends is said ([`CapturedView::is_distorted`]) and not drawn.
+
+mod colmap;
+mod json;
 
 use super::Camera;
-use serde::Deserialize;
-use std::path::Path;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 /// Why a file gives no cameras.
 #[derive(Debug, thiserror::Error)]
@@ -26,152 +31,118 @@ pub enum CameraError {
         /// What is wrong and what to do.
         why: &'static str,
     },
+    /// A file of COLMAP that is not one.
+    #[error("{file}: {place}: {why}")]
+    Colmap {
+        /// Which file of the model.
+        file: String,
+        /// The line, from 1, or the byte, from 0.
+        place: String,
+        /// What is wrong and what to do.
+        why: String,
+    },
+    /// A directory without a model.
+    #[error(
+        "there is neither a transforms.json nor a model of COLMAP (cameras and images, .bin or .txt) in this directory, \
+         in its sparse/0 or in its sparse; give the directory that has them"
+    )]
+    Directory,
 }
 
-/// The cameras of a file.
+/// What was captured: views with their pictures, and points of the scene where the file has any.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Capture {
+    /// From where pictures were taken, in the order of the file; of COLMAP by name.
+    pub views: Vec<CapturedView>,
+    /// Points of the scene, in the order of the file.
+    pub points: Vec<CapturedPoint>,
+    /// A PLY file of points that a `transforms.json` names.
+    pub points_file: Option<PathBuf>,
+    /// The directory that names of pictures start from.
+    pub pictures: PathBuf,
+}
+
+/// A view and its picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CapturedView {
+    /// From where it was taken.
+    pub camera: Camera,
+    /// The name of the picture as the file has it, which may lack its ending.
+    pub picture: Option<PathBuf>,
+    /// Whether the lens bends straight lines, which the camera does not say.
+    pub is_distorted: bool,
+}
+
+/// A point of the scene with its colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CapturedPoint {
+    /// Where it is, scene units.
+    pub position: [f32; 3],
+    /// Red, green, blue, as in pictures.
+    pub colour: [u8; 3],
+}
+
+/// The largest file of cameras in JSON, bytes.
+const MAX_JSON: u64 = 1 << 26;
+
+/// The cameras of a file, or of a directory as [`read_capture`] takes it.
 ///
 /// # Errors
 /// A file that cannot be read, that has another form, or a camera without size, focal length or finite pose.
 pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, CameraError> {
-    parse_cameras(&std::fs::read(path)?)
+    // Points are read with a model only where they are asked for.
+    let capture = if path.is_dir() { colmap_or_json(path, false) } else { json_file(path) };
+    Ok(cameras_of(capture?))
 }
 
-/// The cameras in the bytes of a file.
-pub(crate) fn parse_cameras(bytes: &[u8]) -> Result<Vec<Camera>, CameraError> {
-    let value: serde_json::Value = serde_json::from_slice(bytes)?;
-    let cameras = if value.is_array() {
-        let cameras: Vec<TrainerCamera> = serde_json::from_value(value)?;
-        cameras.into_iter().enumerate().map(|(at, camera)| camera.camera(at)).collect()
-    } else {
-        let transforms: Transforms = serde_json::from_value(value)?;
-        transforms.cameras()?
+/// What was captured: of a `cameras.json`, a `transforms.json`, or a directory that has a `transforms.json` or a model of
+/// COLMAP in itself, in its `sparse/0` or in its `sparse`.
+///
+/// Pictures are neither opened nor looked for. At most 100,000 views and 10,000,000 points are read, and nothing else is
+/// kept of a model, whatever its size.
+///
+/// # Errors
+/// As [`read_cameras`]; more views or points than that.
+pub fn read_capture(path: &Path) -> Result<Capture, CameraError> {
+    if path.is_dir() { colmap_or_json(path, true) } else { json_file(path) }
+}
+
+fn colmap_or_json(folder: &Path, with_points: bool) -> Result<Capture, CameraError> {
+    let capture = match (folder.join("transforms.json"), colmap::find(folder)) {
+        (file, _) if file.is_file() => return json_file(&file),
+        (_, Some(model)) => colmap::read(&model, with_points)?,
+        (_, None) => return Err(CameraError::Directory),
     };
-    cameras.iter().enumerate().try_for_each(|(at, camera)| check(at, camera))?;
-    Ok(cameras)
+    checked(capture)
 }
 
-/// A camera of INRIA's `cameras.json`: `rotation` and `position` lead from the camera to the world.
-#[derive(Deserialize)]
-struct TrainerCamera {
-    img_name: Option<String>,
-    width: u32,
-    height: u32,
-    position: [f32; 3],
-    rotation: [[f32; 3]; 3],
-    fx: f32,
-    fy: f32,
-}
-
-impl TrainerCamera {
-    fn camera(self, at: usize) -> Camera {
-        Camera {
-            name: self.img_name.unwrap_or_else(|| format!("camera_{at:04}")),
-            width: self.width,
-            height: self.height,
-            focal: [self.fx, self.fy],
-            principal: [0.5 * self.width as f32, 0.5 * self.height as f32],
-            rotation: transposed(self.rotation),
-            position: self.position,
-        }
+fn json_file(path: &Path) -> Result<Capture, CameraError> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_JSON.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_JSON {
+        let error = format!("the file has more than {MAX_JSON} bytes");
+        return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, error).into());
     }
+    of_json(&bytes, path.parent().unwrap_or(Path::new("")))
 }
 
-/// `transforms.json`. Intrinsics stand in the file or with a frame, which wins.
-#[derive(Deserialize)]
-struct Transforms {
-    #[serde(flatten)]
-    intrinsics: Intrinsics,
-    frames: Vec<TransformFrame>,
+/// What the bytes of a file in `folder` say.
+fn of_json(bytes: &[u8], folder: &Path) -> Result<Capture, CameraError> {
+    checked(json::parse(bytes, folder)?)
 }
 
-#[derive(Deserialize, Clone, Copy)]
-struct Intrinsics {
-    w: Option<f64>,
-    h: Option<f64>,
-    fl_x: Option<f32>,
-    fl_y: Option<f32>,
-    cx: Option<f32>,
-    cy: Option<f32>,
-    camera_angle_x: Option<f32>,
+fn cameras_of(capture: Capture) -> Vec<Camera> {
+    capture.views.into_iter().map(|view| view.camera).collect()
 }
 
-#[derive(Deserialize)]
-struct TransformFrame {
-    file_path: Option<String>,
-    transform_matrix: Vec<Vec<f32>>,
-    #[serde(flatten)]
-    intrinsics: Intrinsics,
+fn checked(capture: Capture) -> Result<Capture, CameraError> {
+    capture.views.iter().enumerate().try_for_each(|(at, view)| check(at, &view.camera))?;
+    Ok(capture)
 }
 
-/// The side of the pictures of NeRF-synthetic, pixels.
-const NERF_SYNTHETIC_SIDE: f64 = 800.0;
-
-impl Transforms {
-    fn cameras(self) -> Result<Vec<Camera>, CameraError> {
-        let shared = self.intrinsics;
-        let camera = |(at, frame): (usize, &TransformFrame)| {
-            frame.camera(&shared, at).map_err(|why| CameraError::Camera { camera: at, why })
-        };
-        self.frames.iter().enumerate().map(camera).collect()
-    }
-}
-
-impl TransformFrame {
-    fn camera(&self, shared: &Intrinsics, at: usize) -> Result<Camera, &'static str> {
-        let own = &self.intrinsics;
-        // The files of the NeRF-synthetic scenes say nothing but the angle: their pictures are squares of one size.
-        let is_bare = [own.w, own.h, shared.w, shared.h].iter().all(Option::is_none)
-            && [own.fl_x, shared.fl_x].iter().all(Option::is_none);
-        let assumed = is_bare.then_some(NERF_SYNTHETIC_SIDE);
-        let side = |own: Option<f64>, shared: Option<f64>| {
-            let side = own.or(shared).or(assumed).map(|side| side as u32);
-            side.ok_or("there is no picture size: add w and h to the file")
-        };
-        let (width, height) = (side(own.w, shared.w)?, side(own.h, shared.h)?);
-        let from_angle = own
-            .camera_angle_x
-            .or(shared.camera_angle_x)
-            .map(|angle| 0.5 * width as f32 / libm::tanf(0.5 * angle));
-        let focal_x = own.fl_x.or(shared.fl_x).or(from_angle);
-        let focal_x = focal_x.ok_or("there is no focal length: add fl_x or camera_angle_x to the file")?;
-        let [rows @ .., _] = self.transform_matrix.as_slice() else {
-            return Err("transform_matrix has no rows: it must have 4");
-        };
-        let [right, up, back, position] =
-            columns(rows).ok_or("transform_matrix must have 4 rows of 4 numbers")?;
-        Ok(Camera {
-            name: self.file_path.as_deref().and_then(stem).unwrap_or_else(|| format!("camera_{at:04}")),
-            width,
-            height,
-            focal: [focal_x, own.fl_y.or(shared.fl_y).unwrap_or(focal_x)],
-            principal: [
-                own.cx.or(shared.cx).unwrap_or(0.5 * width as f32),
-                own.cy.or(shared.cy).unwrap_or(0.5 * height as f32),
-            ],
-            // Their camera looks back along z, with y up.
-            rotation: [right, up.map(|part| -part), back.map(|part| -part)],
-            position,
-        })
-    }
-}
-
-/// The columns of the first three rows of a 4 x 4 matrix.
-fn columns(rows: &[Vec<f32>]) -> Option<[[f32; 3]; 4]> {
-    let [x, y, z] = rows else { return None };
-    let mut columns = [[0.0; 3]; 4];
-    for (column, values) in columns.iter_mut().enumerate() {
-        *values = [*x.get(column)?, *y.get(column)?, *z.get(column)?];
-    }
-    Some(columns)
-}
-
+/// What a view is called that took this picture.
 fn stem(path: &str) -> Option<String> {
     Some(Path::new(path).file_stem()?.to_str()?.to_owned())
-}
-
-#[expect(clippy::indexing_slicing, reason = "columns are 0, 1 and 2")]
-fn transposed(rows: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
-    [0, 1, 2].map(|column| rows.map(|row| row[column]))
 }
 
 /// The largest side of a picture, pixels.
@@ -199,6 +170,10 @@ fn check(at: usize, camera: &Camera) -> Result<(), CameraError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parse_cameras(bytes: &[u8]) -> Result<Vec<Camera>, CameraError> {
+        Ok(cameras_of(of_json(bytes, Path::new(""))?))
+    }
 
     #[test]
     fn both_forms_give_the_same_camera() {

@@ -105,6 +105,44 @@ fn a_step_against_the_slopes_makes_the_loss_less() {
     );
 }
 
+/// Where the loss counts each pixel by its column, a Gaussian that moves by one pixel to the right adds its light once.
+#[test]
+fn slopes_in_the_picture_are_those_by_pixels_of_movement() {
+    let camera = camera(120, 80);
+    let mut frame = random(3, 3, 0, false);
+    let planes = frame.planes_mut();
+    // Apart from each other and from the border, on a plane that the camera sees at an angle.
+    for (row, x) in [-0.4, 0.0, 0.4].into_iter().enumerate() {
+        for (plane, value) in [x, 0.1 * x, 3.0].into_iter().enumerate() {
+            planes.position[plane][row] = value;
+        }
+    }
+    planes.log_scale.into_iter().for_each(|plane| plane.copy_from_slice(&[-2.2, -2.0, -2.4]));
+    planes.opacity_logit.fill(1.0);
+    planes.dc.into_iter().for_each(|plane| plane.copy_from_slice(&[1.0, 0.5, 0.0]));
+    let columns = (0..80).flat_map(|_| (0..120).map(|x| [x as f32, 0.0, 0.0]));
+    let slopes = Image::new(120, columns.collect());
+    for row in 0..3 {
+        let one = frame.select(&[row]);
+        let prepared = PreparedFrame::new(&one);
+        let drawing = prepared.draw(&camera, [0.0; 3]);
+        let light: f64 = drawing.rendering().colour.pixels().iter().map(|pixel| f64::from(pixel[0])).sum();
+        let (mut with, mut without) = (Gradients::zero(&one), Gradients::zero(&one));
+        let footprints = drawing.backward_in_picture(&slopes, &mut with).unwrap();
+        drawing.backward(&slopes, &mut without).unwrap();
+        assert_eq!(with, without);
+        let [footprint] = footprints[..] else { panic!("{footprints:?}") };
+        let [across, down] = footprint.slope;
+        // The step of alpha at 1/255, where it ends, is left out: about 2 % of the light.
+        assert!(
+            (across / light - 0.98).abs() < 0.015 && (down / light).abs() < 0.01,
+            "{footprint:?} {light}"
+        );
+        let [wide, tall] = footprint.extent;
+        assert!(wide > 5.0 && wide < 40.0 && tall > 5.0 && tall < 40.0, "{footprint:?}");
+    }
+}
+
 /// Frames of finite values, however far from anything trained.
 #[test]
 fn slopes_are_finite_however_extreme_the_frame() {

@@ -13,7 +13,7 @@
 mod gaussian;
 mod light;
 mod movers;
-mod noise;
+pub mod noise;
 mod random;
 mod recapture;
 mod surface;

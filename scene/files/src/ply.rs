@@ -6,9 +6,11 @@
 //! Written: binary little endian `f32` in the original order, normals zero.
 
 mod header;
+mod points;
 mod table;
 
 pub(crate) use header::{Element, Header, is_ply, parse as parse_header};
+pub use points::{PointCloud, read_points};
 pub(crate) use table::Body;
 
 use crate::error::SceneError;

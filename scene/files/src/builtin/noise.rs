@@ -1,4 +1,4 @@
-//! Smooth noise in space, for textures.
+//! Smooth noise in space, for textures: the same on every machine. Coordinates must be below 10^15.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use splatstream_gaussians::random::mix;
 
 /// Value noise: random numbers on the integer lattice, smoothly interpolated; 0 to 1, one feature a unit.
 /// `layer` chooses among unrelated noises.
-pub(super) fn smooth(at: DVec3, layer: u64) -> f64 {
+pub fn smooth(at: DVec3, layer: u64) -> f64 {
     let cell = at.floor();
     let inside = at - cell;
     let weight = inside * inside * (DVec3::splat(3.0) - 2.0 * inside);
@@ -17,13 +17,13 @@ pub(super) fn smooth(at: DVec3, layer: u64) -> f64 {
 }
 
 /// Three octaves of [`smooth`], each of half the size and strength; 0 to 1.
-pub(super) fn rough(at: DVec3, layer: u64) -> f64 {
+pub fn rough(at: DVec3, layer: u64) -> f64 {
     let octave = |scale: f64, strength: f64| strength * smooth(at * scale, layer);
     (octave(1.0, 1.0) + octave(2.0, 0.5) + octave(4.0, 0.25)) / 1.75
 }
 
 /// Three components of [`smooth`], each −1 to 1.
-pub(super) fn drift(at: DVec3, layer: u64) -> DVec3 {
+pub fn drift(at: DVec3, layer: u64) -> DVec3 {
     2.0 * DVec3::new(smooth(at, layer), smooth(at, layer + 1), smooth(at, layer + 2)) - DVec3::ONE
 }
 

@@ -34,6 +34,12 @@ impl Cell for u32 {
     }
 }
 
+impl Cell for u8 {
+    fn from_f64(value: f64) -> Self {
+        value as u8
+    }
+}
+
 impl<'a> Body<'a> {
     /// The values that follow `header` in `file`, which starts with it.
     pub(crate) fn new(file: &'a [u8], header: &Header) -> Self {

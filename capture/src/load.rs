@@ -1,0 +1,156 @@
+//! Pictures and points of a capture, from their files.
+
+use crate::photograph::{Photograph, SizeError};
+use rayon::prelude::*;
+use splatstream_files::{ReadLimits, SceneError, ply};
+use splatstream_render::camera::{Capture, CapturedPoint, CapturedView};
+use splatstream_render::image::ImageError;
+use splatstream_render::{Camera, Image};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why the pictures or points of a capture cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// A file could not be read.
+    #[error("{path}: cannot read: {error}; check the path", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// A file that is no picture.
+    #[error("{path}: {error}", path = path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: ImageError,
+    },
+    /// A picture of another shape than its camera's.
+    #[error("{path}: {error}", path = path.display())]
+    Size {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: SizeError,
+    },
+    /// Points that cannot be read.
+    #[error("{path}: {error}", path = path.display())]
+    Points {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: SceneError,
+    },
+    /// A view that names no picture.
+    #[error("view {0} names no picture; give a capture whose views do (file_path, or img_name)")]
+    Unnamed(
+        /// What the view is called.
+        String,
+    ),
+    /// A lens that is no pinhole.
+    #[error(
+        "view {0} has a lens that bends straight lines, which is not undone here; undistort the pictures first, with \
+         colmap image_undistorter or the like"
+    )]
+    Distorted(
+        /// What the view is called.
+        String,
+    ),
+    /// Too many pixels.
+    #[error("the pictures take {bytes} bytes of memory, at most {most} are allowed; give a smaller --height")]
+    OverLimit {
+        /// Bytes that all pictures would take.
+        bytes: u64,
+        /// Bytes that they may.
+        most: u64,
+    },
+}
+
+/// Memory that all pictures of one capture may take: 100 of 4K, or 400 of 1080 lines.
+const MAX_BYTES: u64 = 1 << 32;
+
+/// Endings of pictures whose names lack one.
+const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "JPG", "webp"];
+
+/// The pictures of a capture, in the order of its views, in `height` rows if that is fewer than they have; where they let
+/// light pass, over a colour. `folder` is where to look for them instead of where the capture says.
+///
+/// # Errors
+/// A picture that is not there, is none, or is of another shape than its camera says; lenses that are not pinholes; more than
+/// 4 GiB.
+pub fn load_photographs(
+    capture: &Capture,
+    folder: Option<&Path>,
+    height: Option<u32>,
+    background: [f32; 3],
+) -> Result<Vec<Photograph>, LoadError> {
+    let bytes = |view: &CapturedView| {
+        let Camera { width, height: all, .. } = view.camera;
+        let rows = u64::from(height.unwrap_or(all).min(all));
+        let width = u64::from(width).saturating_mul(rows).div_ceil(u64::from(all.max(1)));
+        width.saturating_mul(rows).saturating_mul(3)
+    };
+    let bytes = capture.views.iter().map(bytes).fold(0, u64::saturating_add);
+    if bytes > MAX_BYTES {
+        return Err(LoadError::OverLimit { bytes, most: MAX_BYTES });
+    }
+    let load = |view: &CapturedView| photograph(capture, view, folder, height, background);
+    capture.views.par_iter().map(load).collect()
+}
+
+fn photograph(
+    capture: &Capture,
+    view: &CapturedView,
+    folder: Option<&Path>,
+    height: Option<u32>,
+    background: [f32; 3],
+) -> Result<Photograph, LoadError> {
+    let name = || view.camera.name.clone();
+    if view.is_distorted {
+        return Err(LoadError::Distorted(name()));
+    }
+    let picture = view.picture.as_deref().ok_or_else(|| LoadError::Unnamed(name()))?;
+    let path = found(folder.unwrap_or(&capture.pictures), picture, folder.is_some());
+    let bytes = std::fs::read(&path).map_err(|error| LoadError::Io { path: path.clone(), error })?;
+    let picture = Image::decoded(&bytes, background)
+        .map_err(|error| LoadError::Picture { path: path.clone(), error })?;
+    Photograph::new(&view.camera, &picture, height).map_err(|error| LoadError::Size { path, error })
+}
+
+/// The file of a picture: as it is named, or with an ending; in a folder that was given also by its last part.
+fn found(folder: &Path, name: &Path, is_given: bool) -> PathBuf {
+    let last = name.file_name().map(Path::new).filter(|_| is_given);
+    let names = [Some(name), last].into_iter().flatten();
+    let with_ending = |path: PathBuf, ending: &str| {
+        let mut text = path.into_os_string();
+        text.push(format!(".{ending}"));
+        PathBuf::from(text)
+    };
+    let mut places = names.flat_map(|name| {
+        let path = folder.join(name);
+        let endings = ENDINGS.map(|ending| with_ending(path.clone(), ending));
+        std::iter::once(path).chain(endings)
+    });
+    places.find(|path| path.is_file()).unwrap_or_else(|| folder.join(name))
+}
+
+/// The points of a capture: those of its model, or of the PLY file that it names; none if it has neither.
+///
+/// # Errors
+/// A file of points that cannot be read.
+pub fn load_points(capture: &Capture) -> Result<Vec<CapturedPoint>, LoadError> {
+    let Some(path) = capture.points_file.as_ref().filter(|_| capture.points.is_empty()) else {
+        return Ok(capture.points.clone());
+    };
+    let bytes = std::fs::read(path).map_err(|error| LoadError::Io { path: path.clone(), error })?;
+    let points = ply::read_points(&bytes, &ReadLimits::default())
+        .map_err(|error| LoadError::Points { path: path.clone(), error })?;
+    let [x, y, z] = points.position;
+    let [r, g, b] = points.colour;
+    let positions = x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]);
+    let colours = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]);
+    Ok(positions.zip(colours).map(|(position, colour)| CapturedPoint { position, colour }).collect())
+}

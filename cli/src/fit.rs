@@ -1,0 +1,204 @@
+//! `splatstream fit`: pictures and cameras to Gaussians.
+
+mod captures;
+mod report;
+mod training;
+
+use crate::cameras::BackgroundArg;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::frames::{Frames, Opened};
+use crate::input_args::InputArgs;
+use crate::numbers::FrameRange;
+use crate::output_file::{OutputFile, check_directory, make_directory, refuse_standard};
+use crate::stream_file::LimitArgs;
+use captures::Captures;
+use clap::Args;
+use report::{Fitted, FittedFrame};
+use splatstream_files::{ply, read_scene};
+use splatstream_format::payload::SceneDescription;
+use splatstream_gaussians::GaussianFrame;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use training::Training;
+
+/// Train a scene of Gaussians from pictures and their cameras.
+///
+/// A capture is a directory with a transforms.json (nerfstudio, instant-ngp, NeRF) or a model of COLMAP (text or binary, in it,
+/// in sparse/0 or in sparse); a directory of captures is a sequence. Every eighth picture is not trained with, and the PSNR
+/// that is reported is that of these. The same pictures and settings give the same scene.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  splatstream simulate -o capture/ --height 360\n  splatstream fit capture/ -o scene.ply\n  \
+    splatstream fit walk/ -o frames/ --warm                  # each frame starts from the one before, Gaussian by Gaussian\n  \
+    splatstream fit capture/ --start scene.gss --iterations 0  # only what a scene is worth beside the pictures"
+)]
+pub(crate) struct Fit {
+    /// A capture, a camera file, or a directory of captures.
+    #[arg(value_name = "CAPTURE")]
+    input: PathBuf,
+    /// The scene, .ply; of a sequence a directory for frame_0000.ply and so on. May be left out with --iterations 0.
+    #[arg(short, long, value_name = "OUT", required_unless_present = "start")]
+    out: Option<PathBuf>,
+    /// Steps of each frame, each on one picture.
+    #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    iterations: u32,
+    /// Gaussians at most.
+    #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
+    gaussians: u32,
+    /// Degree of the spherical harmonics.
+    #[arg(long, value_name = "0..3", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
+    sh_degree: u8,
+    /// Rows that pictures are made smaller to.
+    #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(16..=8640))]
+    height: Option<u32>,
+    /// Where the pictures are, if not where the capture says.
+    #[arg(long, value_name = "DIR")]
+    images: Option<PathBuf>,
+    /// Every so many pictures one is kept from training, to be judged by; 0 keeps none.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    hold_out: u32,
+    /// A scene, sequence or stream to start from, frame by frame, instead of the points of the capture.
+    #[arg(long, value_name = "IN")]
+    start: Option<PathBuf>,
+    /// Random points to start from where the capture has none.
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    random_points: u32,
+    /// Start each frame but the first from the one before, and keep its Gaussians: the same number in the same order.
+    #[arg(long)]
+    warm: bool,
+    /// Steps of each frame that starts from the one before.
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    warm_iterations: u32,
+    /// Train for renderers that make up for their low-pass filter.
+    #[arg(long)]
+    antialiased: bool,
+    #[command(flatten)]
+    background: BackgroundArg,
+    /// Frames of a sequence, A..B: from A up to and without B.
+    #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
+    frames: Option<FrameRange>,
+    /// Seconds of training of each frame, after which it is ended as it is. Then the result depends on the machine.
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
+    time_budget: Option<u32>,
+    /// Keep frames of a sequence that are there already, as an earlier run with the same settings left them.
+    #[arg(long)]
+    resume: bool,
+    /// Chooses the order of pictures and where new Gaussians go.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    limits: LimitArgs,
+    #[command(flatten)]
+    reading: InputArgs,
+}
+
+impl Fit {
+    /// Reads, trains, writes, frame by frame.
+    pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        let begin = Instant::now();
+        let captures = Captures::find(&self.input)?;
+        self.check(&captures)?;
+        let opened = self.start.as_ref().map(|path| Opened::open(path, self.reading)).transpose()?;
+        let limits = self.limits.limits();
+        let mut starts = opened.as_ref().map(|opened| opened.frames(&limits, None)).transpose()?;
+        let span = self.frames.unwrap_or(FrameRange::ALL);
+        let mut report = Fitted::new(self.out.clone(), captures.is_sequence());
+        let mut before: Option<GaussianFrame> = None;
+        for number in (0..captures.len()).take_while(|number| !span.is_over(*number)) {
+            let start = match &mut starts {
+                Some(starts) => Some(self.start_of(starts, number)?),
+                None => None,
+            };
+            if !span.contains(number) {
+                continue;
+            }
+            let out = self.out.as_deref().map(|out| captures.output(out, number));
+            let kept = out.as_deref().filter(|out| self.resume && out.is_file());
+            let (frame, fitted) = match kept {
+                Some(path) => self.kept(path)?,
+                None => self.fit(&captures, number, start, before.take())?,
+            };
+            if let (Some(out), None) = (&out, kept) {
+                OutputFile::write(out, &ply::write(&frame))?;
+            }
+            // The next one starts from what is in the file, as it does when it is resumed.
+            before = match &out {
+                Some(out) if self.warm => Some(self.kept(out)?.0),
+                _ => None,
+            };
+            report.add(number, out, fitted);
+        }
+        if report.is_empty() {
+            return Err(Failure::Usage(format!("{}: it has no such frame", self.input.display())));
+        }
+        report.finish(begin.elapsed());
+        console.report(&report, || report.text())
+    }
+
+    /// # Errors
+    /// Arguments that do not go together.
+    fn check(&self, captures: &Captures) -> Result<(), Failure> {
+        match &self.out {
+            None if self.iterations > 0 => Err(Failure::Usage(
+                "there is nowhere to write what is trained: give -o, or --iterations 0 to measure only"
+                    .to_owned(),
+            )),
+            None => Ok(()),
+            Some(out) if captures.is_sequence() => {
+                check_directory(out, "frames of a sequence")?;
+                make_directory(out)
+            }
+            Some(out) => {
+                refuse_standard(out)?;
+                let is_ply = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
+                if is_ply {
+                    return Ok(());
+                }
+                let out = out.display();
+                Err(Failure::Usage(format!(
+                    "{out}: the result is a PLY file; give it a name that ends in .ply, and `splatstream encode` makes a \
+                     stream of it"
+                )))
+            }
+        }
+    }
+
+    /// The frame of a start that belongs to a capture.
+    fn start_of(&self, starts: &mut Frames<'_>, number: u32) -> Result<GaussianFrame, Failure> {
+        let lacking = || {
+            let path = self.start.as_deref().unwrap_or(Path::new("")).display();
+            Failure::other(format!(
+                "{path}: it has no frame {number}; give as many as there are captures, or --frames"
+            ))
+        };
+        match starts.next()? {
+            Some((found, frame)) if found == number => Ok(frame),
+            _ => {
+                starts.verdict()?;
+                Err(lacking())
+            }
+        }
+    }
+
+    /// A frame that an earlier run has left.
+    fn kept(&self, path: &Path) -> Result<(GaussianFrame, FittedFrame), Failure> {
+        let frame = read_scene(path, &self.reading.limits(path))
+            .map_err(|error| Failure::other(error.to_string()))?;
+        let fitted = FittedFrame::kept(&frame);
+        Ok((frame, fitted))
+    }
+
+    fn fit(
+        &self,
+        captures: &Captures,
+        number: u32,
+        start: Option<GaussianFrame>,
+        before: Option<GaussianFrame>,
+    ) -> Result<(GaussianFrame, FittedFrame), Failure> {
+        let background = self.background.colour(&SceneDescription::default());
+        let capture = captures.read(number)?;
+        let training = Training::open(&capture, captures.path(number), self, background)?;
+        training.run(start, before, self.time_budget.map(|seconds| Duration::from_secs(seconds.into())))
+    }
+}

@@ -1,0 +1,192 @@
+//! The `cameras.json` of INRIA's trainer, and nerfstudio's, instant-ngp's and Blender's `transforms.json`.
+
+use super::{CameraError, Capture, CapturedView};
+use crate::camera::Camera;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// What the bytes of a file in `folder` say.
+///
+/// # Errors
+/// Neither of the two forms, or a camera without size, focal length or pose.
+pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<Capture, CameraError> {
+    let value: serde_json::Value = serde_json::from_slice(bytes)?;
+    if value.is_array() {
+        let cameras: Vec<TrainerCamera> = serde_json::from_value(value)?;
+        let views = cameras.into_iter().enumerate().map(|(at, camera)| camera.view(at)).collect();
+        return Ok(Capture { views, pictures: folder.join("images"), ..Capture::default() });
+    }
+    let transforms: Transforms = serde_json::from_value(value)?;
+    Ok(Capture {
+        views: transforms.views()?,
+        points_file: transforms.ply_file_path.as_ref().map(|file| folder.join(file)),
+        pictures: folder.to_path_buf(),
+        points: Vec::new(),
+    })
+}
+
+/// A camera of INRIA's `cameras.json`: `rotation` and `position` lead from the camera to the world.
+#[derive(Deserialize)]
+struct TrainerCamera {
+    img_name: Option<String>,
+    width: u32,
+    height: u32,
+    position: [f32; 3],
+    rotation: [[f32; 3]; 3],
+    fx: f32,
+    fy: f32,
+}
+
+impl TrainerCamera {
+    fn view(self, at: usize) -> CapturedView {
+        let camera = Camera {
+            name: self.img_name.clone().unwrap_or_else(|| format!("camera_{at:04}")),
+            width: self.width,
+            height: self.height,
+            focal: [self.fx, self.fy],
+            principal: [0.5 * self.width as f32, 0.5 * self.height as f32],
+            rotation: transposed(self.rotation),
+            position: self.position,
+        };
+        CapturedView { camera, picture: self.img_name.map(PathBuf::from), is_distorted: false }
+    }
+}
+
+/// `transforms.json`. Intrinsics stand in the file or with a frame, which wins.
+#[derive(Deserialize)]
+struct Transforms {
+    #[serde(flatten)]
+    intrinsics: Intrinsics,
+    frames: Vec<TransformFrame>,
+    /// Points of nerfstudio: a PLY file beside this one.
+    ply_file_path: Option<String>,
+}
+
+#[derive(Deserialize, Clone)]
+struct Intrinsics {
+    w: Option<f64>,
+    h: Option<f64>,
+    fl_x: Option<f32>,
+    fl_y: Option<f32>,
+    cx: Option<f32>,
+    cy: Option<f32>,
+    camera_angle_x: Option<f32>,
+    camera_angle_y: Option<f32>,
+    camera_model: Option<String>,
+    is_fisheye: Option<bool>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+}
+
+impl Intrinsics {
+    /// Whether the lens bends straight lines.
+    fn is_distorted(&self) -> bool {
+        let Self { k1, k2, k3, k4, p1, p2, .. } = self;
+        [k1, k2, k3, k4, p1, p2].into_iter().flatten().any(|&part| part != 0.0)
+    }
+
+    /// # Errors
+    /// A model of a camera that is not a pinhole, even without distortion.
+    fn check_model(&self) -> Result<(), &'static str> {
+        let is_pinhole = match self.camera_model.as_deref() {
+            None => true,
+            Some(model) => ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV"]
+                .contains(&model),
+        };
+        if is_pinhole && self.is_fisheye != Some(true) {
+            return Ok(());
+        }
+        Err(
+            "camera_model is that of a fisheye or panoramic lens: undistort the pictures to PINHOLE cameras first",
+        )
+    }
+}
+
+#[derive(Deserialize)]
+struct TransformFrame {
+    file_path: Option<String>,
+    transform_matrix: Vec<Vec<f32>>,
+    #[serde(flatten)]
+    intrinsics: Intrinsics,
+}
+
+/// The side of the pictures of NeRF-synthetic, pixels.
+const NERF_SYNTHETIC_SIDE: f64 = 800.0;
+
+impl Transforms {
+    fn views(&self) -> Result<Vec<CapturedView>, CameraError> {
+        let shared = &self.intrinsics;
+        let view = |(at, frame): (usize, &TransformFrame)| {
+            let refused = |why| CameraError::Camera { camera: at, why };
+            shared.check_model().and_then(|()| frame.intrinsics.check_model()).map_err(refused)?;
+            Ok(CapturedView {
+                camera: frame.camera(shared, at).map_err(refused)?,
+                picture: frame.file_path.as_ref().map(PathBuf::from),
+                is_distorted: shared.is_distorted() || frame.intrinsics.is_distorted(),
+            })
+        };
+        self.frames.iter().enumerate().map(view).collect()
+    }
+}
+
+impl TransformFrame {
+    fn camera(&self, shared: &Intrinsics, at: usize) -> Result<Camera, &'static str> {
+        let own = &self.intrinsics;
+        // The files of the NeRF-synthetic scenes say nothing but the angle: their pictures are squares of one size.
+        let is_bare = [own.w, own.h, shared.w, shared.h].iter().all(Option::is_none)
+            && [own.fl_x, shared.fl_x].iter().all(Option::is_none);
+        let assumed = is_bare.then_some(NERF_SYNTHETIC_SIDE);
+        let side = |own: Option<f64>, shared: Option<f64>| {
+            let side = own.or(shared).or(assumed).map(|side| side as u32);
+            side.ok_or("there is no picture size: add w and h to the file")
+        };
+        let (width, height) = (side(own.w, shared.w)?, side(own.h, shared.h)?);
+        let of_angle =
+            |angle: Option<f32>, side: u32| angle.map(|angle| 0.5 * side as f32 / libm::tanf(0.5 * angle));
+        let from_angle = of_angle(own.camera_angle_x.or(shared.camera_angle_x), width);
+        let from_height = of_angle(own.camera_angle_y.or(shared.camera_angle_y), height);
+        let focal_x = own.fl_x.or(shared.fl_x).or(from_angle);
+        let focal_x = focal_x.ok_or("there is no focal length: add fl_x or camera_angle_x to the file")?;
+        let [rows @ .., _] = self.transform_matrix.as_slice() else {
+            return Err("transform_matrix has no rows: it must have 4");
+        };
+        let [right, up, back, position] =
+            columns(rows).ok_or("transform_matrix must have 4 rows of 4 numbers")?;
+        Ok(Camera {
+            name: self
+                .file_path
+                .as_deref()
+                .and_then(super::stem)
+                .unwrap_or_else(|| format!("camera_{at:04}")),
+            width,
+            height,
+            focal: [focal_x, own.fl_y.or(shared.fl_y).or(from_height).unwrap_or(focal_x)],
+            principal: [
+                own.cx.or(shared.cx).unwrap_or(0.5 * width as f32),
+                own.cy.or(shared.cy).unwrap_or(0.5 * height as f32),
+            ],
+            // Their camera looks back along z, with y up.
+            rotation: [right, up.map(|part| -part), back.map(|part| -part)],
+            position,
+        })
+    }
+}
+
+/// The columns of the first three rows of a 4 x 4 matrix.
+fn columns(rows: &[Vec<f32>]) -> Option<[[f32; 3]; 4]> {
+    let [x, y, z] = rows else { return None };
+    let mut columns = [[0.0; 3]; 4];
+    for (column, values) in columns.iter_mut().enumerate() {
+        *values = [*x.get(column)?, *y.get(column)?, *z.get(column)?];
+    }
+    Some(columns)
+}
+
+#[expect(clippy::indexing_slicing, reason = "columns are 0, 1 and 2")]
+fn transposed(rows: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
+    [0, 1, 2].map(|column| rows.map(|row| row[column]))
+}
