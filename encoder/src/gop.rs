@@ -8,6 +8,7 @@ mod means;
 
 use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
+use crate::finetune::finetuned;
 use crate::frame::cells::CellPlan;
 use crate::frame::compensation::Compensator;
 use crate::frame::intra::{IntraTarget, code_intra};
@@ -324,7 +325,14 @@ impl SequenceCoder<'_, '_> {
         let Intra { mut target, order } = intra;
         let known = gop.tools.take_components();
         let coder = self.coder(gop, None);
-        let wanted = Wanted::new(&target.frame, known, &coder);
+        let wanted = match self.settings.finetune.as_ref().filter(|_| self.recorder.is_none()) {
+            None => Wanted::new(&target.frame, known, &coder),
+            Some(finetune) => {
+                let (percents, cameras) = (&self.settings.refinements, &self.settings.cameras);
+                let fitted = finetuned(&target.frame, &order, &coder, percents, finetune, cameras)?;
+                Wanted::new(&fitted, None, &coder)
+            }
+        };
         let compensator = self.compensator(&target);
         let is_predicted = gop.header.is_predicted();
         if !is_predicted {

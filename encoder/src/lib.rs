@@ -22,6 +22,7 @@ mod clusters;
 mod colour;
 mod entropy_cost;
 mod error;
+mod finetune;
 mod frame;
 mod gop;
 mod gop_tools;
@@ -59,6 +60,7 @@ mod vq;
 mod writer;
 
 pub use error::Error;
+pub use finetune::Finetune;
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;
