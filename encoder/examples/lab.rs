@@ -42,10 +42,19 @@ fn main() {
     let mut out = Vec::new();
     let plain = encode(&mut One(frame.clone()), &settings, &mut out, &mut |_, _| ()).unwrap();
     report("fit  ", &out, &plain, start.elapsed().as_secs_f64());
+    if std::env::var("TARGET").is_ok() {
+        let start = Instant::now();
+        let mut out = Vec::new();
+        let settings = Settings { finetune: Some(Finetune { iterations, ..Finetune::default() }), ..settings };
+        let tuned = encode(&mut One(frame.clone()), &settings, &mut out, &mut |_, _| ()).unwrap();
+        report("tuned to target", &out, &tuned, start.elapsed().as_secs_f64());
+        println!("{:?} {:?}", tuned.target, tuned.finetuned);
+        return;
+    }
     let given = Settings { psnr: None, verify: true, steps: plain.steps.unwrap(), laws: plain.laws.unwrap(), ..Settings::default() };
     let start = Instant::now();
     let mut out = Vec::new();
-    let settings = Settings { finetune: Some(Finetune { iterations }), ..given };
+    let settings = Settings { finetune: Some(Finetune { iterations, ..Finetune::default() }), ..given };
     let tuned = encode(&mut One(frame.clone()), &settings, &mut out, &mut |_, _| ()).unwrap();
     report("tuned", &out, &tuned, start.elapsed().as_secs_f64());
 }

@@ -60,7 +60,7 @@ mod vq;
 mod writer;
 
 pub use error::Error;
-pub use finetune::Finetune;
+pub use finetune::{Attribute, Finetune, FinetuneReport, Photograph};
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;

@@ -1,179 +1,178 @@
-//! Goes down the slope of what pictures miss and what bits cost.
+//! Down the slope of what pictures miss and of what values take in bits.
+//!
+//! Each iteration decodes the values as they would be coded now, draws the result in a few views, and takes the slopes of
+//! what is missing there for those of the values before they were rounded: so each goes on until it is rounded to the
+//! other side, and no further. Values are counted in their own steps, which makes one rate right for all attributes.
+//!
+//! A bit is worth what it would bring elsewhere: steps that are halved cost a bit for nearly each value and divide the error
+//! by four, so that at the margin a bit brings 2 ln 2 of the error by the bits of an octave.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of views")]
-#![expect(clippy::indexing_slicing, reason = "planes are those of the latent values")]
-#![allow(clippy::print_stderr, reason = "experiment")]
 
-use super::Finetune;
-use super::latent::{Decoded, Latent, POSITION, LOG_SCALE, OPACITY, ROTATION, DC, ranks};
-use super::pictures::{signs, squared_error};
+use super::latent::{Decoded, Latent};
+use super::pictures::{BACKGROUND, Pictures, View, squared_error};
 use super::rate::Rate;
+use super::{Finetune, FinetuneReport};
 use crate::error::Error;
-use rayon::prelude::*;
-use splatstream_render::camera::{Scattered, Up};
-use splatstream_render::gradient::Gradients;
-use splatstream_render::{Camera, PreparedFrame, ReferencePictures, render};
+use core::f64::consts::{LN_2, PI};
+use splatstream_gaussians::GaussianFrame;
+use splatstream_render::PreparedFrame;
+use splatstream_render::gradient::{Adam, Gradients, Rates};
+use std::time::Instant;
 
-fn parameter(name: &str, default: f64) -> f64 {
+/// Views of an iteration.
+const VIEWS: usize = 2;
+
+/// How far an iteration takes a value at first, steps.
+const RATE: f32 = 0.02;
+
+/// The price of a bit, of what it would bring where steps are made finer.
+const PRICE: f64 = 1.0;
+
+/// Iterations from one choice of models, and one look of the judges, to the next.
+const EVERY: u32 = 25;
+
+/// The error that prices go by is that of about so many of the last views.
+const REMEMBERED: f64 = 20.0;
+
+/// Looks of the judges without anything better after which it ends.
+const PATIENCE: u32 = 5;
+
+/// What halving all steps brings, dB.
+const DECIBELS_AN_OCTAVE: f64 = 6.02;
+
+fn lab(name: &str, default: f64) -> f64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Lines of pictures.
-const LINES: u32 = 540;
-
+/// A fit under way.
 pub(super) struct Descent<'a> {
-    pub(super) latent: Latent<'a>,
-    iterations: u32,
-    views: Scattered,
-    validation: ReferencePictures,
-    curvature: Vec<Vec<f32>>,
-    momentum: Vec<Vec<f32>>,
-    share: Vec<f32>,
+    latent: Latent<'a>,
+    pictures: Pictures<'a>,
+    finetune: &'a Finetune,
+    adam: Adam,
+    start: Instant,
+    /// The error of a view, about.
     error: f64,
+    best: Option<Best>,
+}
+
+/// What judges liked most.
+struct Best {
+    /// Decibels, less what its bits would have brought by finer steps.
+    worth: f64,
+    offsets: GaussianFrame,
+    /// The first look, and the one at this.
+    before: Look,
+    after: Look,
+    /// Looks since then.
+    waited: u32,
+}
+
+/// What judges saw.
+#[derive(Clone, Copy)]
+struct Look {
+    psnr: f64,
+    bits: f64,
 }
 
 impl<'a> Descent<'a> {
-    pub(super) fn new(latent: Latent<'a>, finetune: &Finetune, cameras: &[Camera]) -> Result<Self, Error> {
-        let source = latent.source;
-        let views = Scattered::new(source, Up::default(), cameras, 1, LINES);
-        let of_validation = Scattered::new(source, Up::default(), cameras, 2, LINES).take(6).collect();
-        let zeros = || vec![vec![0.0; source.len()]; latent.offsets.len()];
-        Ok(Self {
-            iterations: finetune.iterations,
-            views,
-            validation: ReferencePictures::new(source, of_validation),
-            curvature: zeros(),
-            momentum: zeros(),
-            error: 0.0,
-            share: vec![1.0; source.len()],
-            latent,
-        })
+    pub(super) fn new(latent: Latent<'a>, pictures: Pictures<'a>, finetune: &'a Finetune) -> Self {
+        let adam = Adam::new(&latent.offsets);
+        Self { latent, pictures, finetune, adam, start: Instant::now(), error: 0.0, best: None }
     }
 
-    fn measure_curvature(&mut self, count: usize) -> Result<(), Error> {
-        let decoded = self.latent.decoded()?;
-        let prepared = PreparedFrame::new(&decoded.frame);
-        let mut sums = vec![[0.0_f32; 2]; self.latent.source.len()];
-        for number in 0..count {
-            let Some(camera) = self.views.next() else { break };
-            let target = render(self.latent.source, &camera, [0.0; 3]).colour;
-            let drawing = prepared.draw(&camera, [0.0; 3]);
-            let (error, _) = squared_error(&target, &drawing.rendering().colour);
-            self.error += error / count as f64;
-            let mut gradients = Gradients::zero(&decoded.frame);
-            drawing.backward(&signs(target.width(), target.pixels().len(), number as u64), &mut gradients).map_err(|_| Error::NoFrames)?;
-            let unit = splatstream_gaussians::SH_C0 as f32;
-            let mut ones = Gradients::zero(&decoded.frame);
-            let all = splatstream_render::Image::new(target.width(), vec![[1.0; 3]; target.pixels().len()]);
-            drawing.backward(&all, &mut ones).map_err(|_| Error::NoFrames)?;
-            for channel in 0..3 {
-                for ((sum, one), sign) in sums.iter_mut().zip(&ones.planes().dc[channel]).zip(&gradients.planes().dc[channel]) {
-                    sum[0] += one / unit;
-                    sum[1] += sign * sign / unit / unit;
-                }
-            }
-            let slopes = self.latent.slopes(&decoded.frame, gradients.planes());
-            self.curvature.par_iter_mut().zip(&slopes).for_each(|(sum, slopes)| {
-                sum.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += 2.0 * slope * slope / count as f32);
-            });
-        }
-        self.share = sums.iter().map(|[one, square]| if *one > 0.0 { (square / one).clamp(1e-3, 1.0) } else { 1.0 }).collect();
-        let mut sorted = self.share.clone();
-        sorted.sort_by(f32::total_cmp);
-        let at = |p: usize| sorted[(sorted.len() - 1) * p / 100];
-        eprintln!("share 1% {} 10% {} 50% {} 90% {}", at(1), at(10), at(50), at(90));
-        Ok(())
-    }
-
-    fn validate(&self, decoded: &Decoded) -> f64 {
-        self.validation.psnr(&decoded.frame).sum::<f64>() / self.validation.len() as f64
-    }
-
-    pub(super) fn run(&mut self) -> Result<(), Error> {
-        let start = std::time::Instant::now();
-        self.measure_curvature(parameter("CURV", 12.0) as usize)?;
-        let per_iteration = parameter("VIEWS", 2.0) as usize;
-        let lambda = parameter("LAMBDA", 1.0);
-        let eta = parameter("ETA", 0.05) as f32;
-        let beta = parameter("BETA", 0.8) as f32;
-        let floor = parameter("FLOOR", 0.05) as f32;
-        let most = parameter("MOST", 0.2) as f32;
-        let every = parameter("EVERY", 25.0) as u32;
-        let power = parameter("POWER", 1.0) as f32;
-        self.share.iter_mut().for_each(|share| *share = libm::powf(*share, power));
-        let share = &self.share;
-        let adam = parameter("ADAM", 0.0) > 0.0;
-        let mask = parameter("MASK", 63.0) as u32;
-        let [dc_rank, _] = ranks(self.latent.coder);
-        let class = |plane: usize| match plane {
-            p if p < LOG_SCALE => { let _ = POSITION; 0 }
-            p if p < OPACITY => 1,
-            p if p < ROTATION => 2,
-            p if p < DC => 3,
-            p if p < DC + dc_rank => 4,
-            _ => 5,
-        };
-        let floors: Vec<f32> = self.curvature.iter().map(|plane| {
-            let mean = plane.iter().map(|&c| f64::from(c)).sum::<f64>() / plane.len().max(1) as f64;
-            floor * mean as f32
-        }).collect();
-        let mut second: Vec<Vec<f32>> = if adam { self.momentum.clone() } else { Vec::new() };
+    /// Goes on as long as it may; gives the values that judges like most, and what has been done.
+    pub(super) fn run(mut self) -> Result<(Latent<'a>, FinetuneReport), Error> {
         let mut rate = Rate::new(&self.latent)?;
-        let bits0 = rate.bits;
-        for iteration in 0..self.iterations {
-            if iteration > 0 && iteration % every == 0 {
-                rate = Rate::new(&self.latent)?;
-            }
+        let mut done = 0;
+        while done < self.finetune.iterations && self.share(done) < 1.0 {
             let decoded = self.latent.decoded()?;
-            if iteration % every == 0 {
-                let n = self.latent.source.len() as f64;
-                eprintln!("{iteration:4} {:6.1}s validation {:.3} dB bits {:.3} ({:+.3}) per octave {:.2} error {:.1}", start.elapsed().as_secs_f64(),
-                    self.validate(&decoded), rate.bits / n, (rate.bits - bits0) / n, rate.bits_an_octave / n, self.error);
-            }
-            let prepared = PreparedFrame::new(&decoded.frame);
-            let mut gradients = Gradients::zero(&decoded.frame);
-            let mut total = 0.0;
-            for _ in 0..per_iteration {
-                let Some(camera) = self.views.next() else { break };
-                let target = render(self.latent.source, &camera, [0.0; 3]).colour;
-                let drawing = prepared.draw(&camera, [0.0; 3]);
-                let (error, slopes) = squared_error(&target, &drawing.rendering().colour);
-                total += error;
-                drawing.backward(&slopes, &mut gradients).map_err(|_| Error::NoFrames)?;
-            }
-            self.error += 0.1 * (total / per_iteration as f64 - self.error);
-            let mut slopes = self.latent.slopes(&decoded.frame, gradients.planes());
-            slopes.par_iter_mut().flatten().for_each(|slope| *slope /= per_iteration as f32);
-            let weight = lambda * self.error * 2.0 * core::f64::consts::LN_2 / rate.bits_an_octave;
-            rate.add(&self.latent, &decoded, weight as f32, &mut slopes);
-            let progress = f64::from(iteration) / f64::from(self.iterations);
-            let eta = eta * (0.5 + 0.5 * libm::cos(core::f64::consts::PI * progress)) as f32;
-            if adam {
-                for ((plane, offsets), (momentum, second)) in (0..).zip(&mut self.latent.offsets).zip(self.momentum.iter_mut().zip(&mut second)) {
-                    if mask >> class(plane) & 1 == 0 { continue; }
-                    let t = (iteration + 1) as i32;
-                    for (((o, m), v), g) in offsets.iter_mut().zip(momentum).zip(second).zip(&slopes[plane]) {
-                        *m += 0.1 * (g - *m);
-                        *v += 0.01 * (g * g - *v);
-                        let (m, v) = (*m / (1.0 - 0.9_f32.powi(t)), *v / (1.0 - 0.99_f32.powi(t)));
-                        *o -= eta * m / (v.sqrt() + 1e-12);
-                    }
+            if done % EVERY == 0 {
+                rate = Rate::new(&self.latent)?;
+                self.look(&decoded, &rate);
+                if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
+                    break;
                 }
-                continue;
             }
-            let planes = self.latent.offsets.par_iter_mut().zip(&mut self.momentum).zip(&self.curvature).zip(&slopes).zip(&floors);
-            planes.enumerate().for_each(|(plane, ((((offsets, momentum), curvature), slopes), floor))| {
-                if mask >> class(plane) & 1 == 0 { return; }
-                for ((((offset, momentum), curvature), slope), share) in offsets.iter_mut().zip(momentum).zip(curvature).zip(slopes).zip(share) {
-                    *momentum = beta * *momentum + (1.0 - beta) * (share * slope / (curvature + floor));
-                    *offset -= (eta * *momentum).clamp(-most, most);
-                }
-            });
+            self.step(&decoded, &rate, done)?;
+            done += 1;
         }
-        let decoded = self.latent.decoded()?;
-        let rate = Rate::new(&self.latent)?;
-        let n = self.latent.source.len() as f64;
-        let (db, bits) = (self.validate(&decoded), (rate.bits - bits0) / n);
-        eprintln!("end {:6.1}s validation {db:.3} dB bits {:.3} ({bits:+.3})", start.elapsed().as_secs_f64(), rate.bits / n);
+        self.look(&self.latent.decoded()?, &Rate::new(&self.latent)?);
+        let mut report = FinetuneReport {
+            iterations: done,
+            seconds: self.start.elapsed().as_secs_f64(),
+            ..FinetuneReport::default()
+        };
+        if let Some(Best { offsets, before, after, .. }) = self.best {
+            self.latent.offsets = offsets;
+            report.psnr = [before.psnr, after.psnr];
+            report.bits = [before.bits, after.bits];
+        }
+        Ok((self.latent, report))
+    }
+
+    /// The share of the iterations, or of the time, that has gone.
+    fn share(&self, done: u32) -> f64 {
+        let of_time = |budget: core::time::Duration| self.start.elapsed().as_secs_f64() / budget.as_secs_f64();
+        let of_time = self.finetune.time_budget.map_or(0.0, of_time);
+        (f64::from(done) / f64::from(self.finetune.iterations.max(1))).max(of_time)
+    }
+
+    /// Lets the judges look. What is worse than the start is never kept, whatever bits it saves.
+    fn look(&mut self, decoded: &Decoded, rate: &Rate) {
+        let now = Look { psnr: self.pictures.judge(&decoded.frame), bits: rate.bits };
+        let before = self.best.as_ref().map_or(now, |best| best.before);
+        let worth = now.psnr - DECIBELS_AN_OCTAVE * (now.bits - before.bits) / rate.bits_an_octave.max(1.0);
+        #[allow(clippy::print_stderr, reason = "lab")]
+        {
+            let n = self.latent.source.len() as f64;
+            eprintln!("{:6.1}s {:.3} dB {:+.3} bits per octave {:.2} worth {:.3}", self.start.elapsed().as_secs_f64(), now.psnr, (now.bits - before.bits) / n, rate.bits_an_octave / n, worth);
+        }
+        let is_better = |best: &Best| worth > best.worth && now.psnr >= before.psnr;
+        match &mut self.best {
+            Some(best) if !is_better(best) => best.waited += 1,
+            best => {
+                let offsets = self.latent.offsets.clone();
+                *best = Some(Best { worth, offsets, before, after: now, waited: 0 });
+            }
+        }
+    }
+
+    /// One iteration.
+    fn step(&mut self, decoded: &Decoded, rate: &Rate, done: u32) -> Result<(), Error> {
+        let mut gradients = Gradients::zero(&decoded.frame);
+        let prepared = PreparedFrame::new(&decoded.frame);
+        let mut views = 0.0;
+        for View { camera, wanted } in (0..lab("VIEWS", VIEWS as f64) as usize).map_while(|_| self.pictures.next()) {
+            let drawing = prepared.draw(&camera, BACKGROUND);
+            let (error, slopes) = squared_error(&wanted, &drawing.rendering().colour);
+            drawing.backward(&slopes, &mut gradients)?;
+            let is_first = done == 0 && views == 0.0;
+            self.error += (error - self.error) * if is_first { 1.0 } else { 1.0 / REMEMBERED };
+            views += 1.0;
+        }
+        self.latent.to_steps(&decoded.frame, &mut gradients);
+        // Slopes are sums over the views.
+        let price = lab("PRICE", PRICE) * views * 2.0 * LN_2 * self.error / rate.bits_an_octave.max(1.0);
+        rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
+        let slower = (0.5 + 0.5 * libm::cos(PI * self.share(done))) as f32;
+        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(lab("RATE", RATE.into()) as f32 * slower))?;
         Ok(())
+    }
+}
+
+impl Finetune {
+    /// The rates of the attributes that are fitted.
+    fn rates(&self, rate: f32) -> Rates {
+        let of = |attribute: super::Attribute| if self.held.contains(&attribute) { 0.0 } else { rate };
+        use super::Attribute::{Dc, LogScale, Opacity, Position, Rotation, Sh};
+        Rates {
+            position: of(Position),
+            log_scale: of(LogScale),
+            rotation: of(Rotation),
+            opacity_logit: of(Opacity),
+            dc: of(Dc),
+            sh: of(Sh),
+        }
     }
 }
