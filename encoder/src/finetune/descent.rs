@@ -11,7 +11,7 @@
 use super::latent::{Decoded, Latent};
 use super::pictures::{BACKGROUND, Pictures, View, squared_error};
 use super::rate::Rate;
-use super::{Finetune, FinetuneReport};
+use super::{Attribute, Finetune, FinetuneReport};
 use crate::error::Error;
 use core::f64::consts::{LN_2, PI};
 use splatstream_gaussians::GaussianFrame;
@@ -29,20 +29,16 @@ const RATE: f32 = 0.02;
 const PRICE: f64 = 1.0;
 
 /// Iterations from one choice of models, and one look of the judges, to the next.
-const EVERY: u32 = 25;
+const EVERY: u32 = 20;
 
 /// The error that prices go by is that of about so many of the last views.
 const REMEMBERED: f64 = 20.0;
 
-/// Looks of the judges without anything better after which it ends.
+/// Looks of the judges, one after the other, at nothing better after which it ends: each halves the rate.
 const PATIENCE: u32 = 5;
 
 /// What halving all steps brings, dB.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
-
-fn lab(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-}
 
 /// A fit under way.
 pub(super) struct Descent<'a> {
@@ -50,6 +46,7 @@ pub(super) struct Descent<'a> {
     pictures: Pictures<'a>,
     finetune: &'a Finetune,
     adam: Adam,
+    rate: f32,
     start: Instant,
     /// The error of a view, about.
     error: f64,
@@ -78,7 +75,7 @@ struct Look {
 impl<'a> Descent<'a> {
     pub(super) fn new(latent: Latent<'a>, pictures: Pictures<'a>, finetune: &'a Finetune) -> Self {
         let adam = Adam::new(&latent.offsets);
-        Self { latent, pictures, finetune, adam, start: Instant::now(), error: 0.0, best: None }
+        Self { latent, pictures, finetune, adam, rate: RATE, start: Instant::now(), error: 0.0, best: None }
     }
 
     /// Goes on as long as it may; gives the values that judges like most, and what has been done.
@@ -86,18 +83,22 @@ impl<'a> Descent<'a> {
         let mut rate = Rate::new(&self.latent)?;
         let mut done = 0;
         while done < self.finetune.iterations && self.share(done) < 1.0 {
-            let decoded = self.latent.decoded()?;
+            let mut decoded = self.latent.decoded()?;
             if done % EVERY == 0 {
                 rate = Rate::new(&self.latent)?;
-                self.look(&decoded, &rate);
-                if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
-                    break;
+                if !self.look(&decoded, &rate) {
+                    if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
+                        break;
+                    }
+                    decoded = self.back()?;
+                    rate = Rate::new(&self.latent)?;
                 }
             }
             self.step(&decoded, &rate, done)?;
             done += 1;
         }
-        self.look(&self.latent.decoded()?, &Rate::new(&self.latent)?);
+        let last = self.latent.decoded()?;
+        self.look(&last, &Rate::new(&self.latent)?);
         let mut report = FinetuneReport {
             iterations: done,
             seconds: self.start.elapsed().as_secs_f64(),
@@ -118,22 +119,32 @@ impl<'a> Descent<'a> {
         (f64::from(done) / f64::from(self.finetune.iterations.max(1))).max(of_time)
     }
 
-    /// Lets the judges look. What is worse than the start is never kept, whatever bits it saves.
-    fn look(&mut self, decoded: &Decoded, rate: &Rate) {
+    /// Goes back to the best values, with shorter steps from there.
+    fn back(&mut self) -> Result<Decoded, Error> {
+        if let Some(best) = &self.best {
+            self.latent.offsets = best.offsets.clone();
+        }
+        self.adam = Adam::new(&self.latent.offsets);
+        self.rate *= 0.5;
+        self.latent.decoded()
+    }
+
+    /// Lets the judges look; whether there was nothing better before. What is worse than the start is never kept, whatever
+    /// bits it saves.
+    fn look(&mut self, decoded: &Decoded, rate: &Rate) -> bool {
         let now = Look { psnr: self.pictures.judge(&decoded.frame), bits: rate.bits };
         let before = self.best.as_ref().map_or(now, |best| best.before);
         let worth = now.psnr - DECIBELS_AN_OCTAVE * (now.bits - before.bits) / rate.bits_an_octave.max(1.0);
-        #[allow(clippy::print_stderr, reason = "lab")]
-        {
-            let n = self.latent.source.len() as f64;
-            eprintln!("{:6.1}s {:.3} dB {:+.3} bits per octave {:.2} worth {:.3}", self.start.elapsed().as_secs_f64(), now.psnr, (now.bits - before.bits) / n, rate.bits_an_octave / n, worth);
-        }
         let is_better = |best: &Best| worth > best.worth && now.psnr >= before.psnr;
         match &mut self.best {
-            Some(best) if !is_better(best) => best.waited += 1,
+            Some(best) if !is_better(best) => {
+                best.waited += 1;
+                false
+            }
             best => {
                 let offsets = self.latent.offsets.clone();
                 *best = Some(Best { worth, offsets, before, after: now, waited: 0 });
+                true
             }
         }
     }
@@ -143,7 +154,7 @@ impl<'a> Descent<'a> {
         let mut gradients = Gradients::zero(&decoded.frame);
         let prepared = PreparedFrame::new(&decoded.frame);
         let mut views = 0.0;
-        for View { camera, wanted } in (0..lab("VIEWS", VIEWS as f64) as usize).map_while(|_| self.pictures.next()) {
+        for View { camera, wanted } in (0..VIEWS).map_while(|_| self.pictures.next()) {
             let drawing = prepared.draw(&camera, BACKGROUND);
             let (error, slopes) = squared_error(&wanted, &drawing.rendering().colour);
             drawing.backward(&slopes, &mut gradients)?;
@@ -153,10 +164,10 @@ impl<'a> Descent<'a> {
         }
         self.latent.to_steps(&decoded.frame, &mut gradients);
         // Slopes are sums over the views.
-        let price = lab("PRICE", PRICE) * views * 2.0 * LN_2 * self.error / rate.bits_an_octave.max(1.0);
+        let price = PRICE * views * 2.0 * LN_2 * self.error / rate.bits_an_octave.max(1.0);
         rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
         let slower = (0.5 + 0.5 * libm::cos(PI * self.share(done))) as f32;
-        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(lab("RATE", RATE.into()) as f32 * slower))?;
+        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate * slower))?;
         Ok(())
     }
 }
@@ -164,15 +175,14 @@ impl<'a> Descent<'a> {
 impl Finetune {
     /// The rates of the attributes that are fitted.
     fn rates(&self, rate: f32) -> Rates {
-        let of = |attribute: super::Attribute| if self.held.contains(&attribute) { 0.0 } else { rate };
-        use super::Attribute::{Dc, LogScale, Opacity, Position, Rotation, Sh};
+        let of = |attribute: Attribute| if self.held.contains(&attribute) { 0.0 } else { rate };
         Rates {
-            position: of(Position),
-            log_scale: of(LogScale),
-            rotation: of(Rotation),
-            opacity_logit: of(Opacity),
-            dc: of(Dc),
-            sh: of(Sh),
+            position: of(Attribute::Position),
+            log_scale: of(Attribute::LogScale),
+            rotation: of(Attribute::Rotation),
+            opacity_logit: of(Attribute::Opacity),
+            dc: of(Attribute::Dc),
+            sh: of(Attribute::Sh),
         }
     }
 }
