@@ -10,6 +10,7 @@ mod latent;
 mod pictures;
 mod rate;
 
+use crate::allocation::Attribute;
 use crate::error::Error;
 use crate::frame::ladder::Ladder;
 use crate::frame::residuals::Wanted;
@@ -24,8 +25,6 @@ use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, Image};
-
-pub use crate::allocation::Attribute;
 
 /// How values of I frames are fitted to pictures.
 ///
@@ -48,7 +47,13 @@ pub struct Finetune {
 impl Default for Finetune {
     /// 200 iterations, against pictures of the source.
     fn default() -> Self {
-        Self { iterations: 200, time_budget: None, photographs: Vec::new(), lines: Vec::new(), held: Vec::new() }
+        Self {
+            iterations: 200,
+            time_budget: None,
+            photographs: Vec::new(),
+            lines: Vec::new(),
+            held: Vec::new(),
+        }
     }
 }
 
@@ -160,15 +165,21 @@ pub(crate) fn finetuned(
     let lists = |layer: u8, parents: Option<Vec<GaussianList>>| -> Vec<List> {
         let mut parents = parents.map(Vec::into_iter);
         let parts = (0..).zip(parts(&settings.refinements, order.len()));
-        let list = |(list, rows)| {
-            List { rows, grain: grain(layer, list), parents: parents.as_mut().and_then(Iterator::next) }
+        let list = |(list, rows)| List {
+            rows,
+            grain: grain(layer, list),
+            parents: parents.as_mut().and_then(Iterator::next),
         };
         parts.map(list).collect()
     };
     let run = |latent: Latent<'_>, layer: u8| {
         let pictures = Pictures::new(&ordered, finetune, settings, finetune.lines_of(layer, layers));
         let (latent, report) = Descent::new(latent, pictures, finetune).run()?;
-        Ok::<_, Error>((latent.frame()?.select(&back), latent.lists()?, FinetuneReport { spatial_layer: layer, ..report }))
+        Ok::<_, Error>((
+            latent.frame()?.select(&back),
+            latent.lists()?,
+            FinetuneReport { spatial_layer: layer, ..report },
+        ))
     };
     let (first, parents, report) = run(Latent::new(coder, &ordered, lists(0, None))?, 0)?;
     let Some(highest) = layers.checked_sub(1).filter(|&highest| highest > 0) else {
@@ -180,12 +191,7 @@ pub(crate) fn finetuned(
 }
 
 /// The Gaussians list after list, within each along the curve that they are coded along, nearly: moves may change that.
-fn coded_order(
-    frame: &GaussianFrame,
-    order: &[u32],
-    coder: &UnitCoder<'_>,
-    settings: &Settings,
-) -> Vec<u32> {
+fn coded_order(frame: &GaussianFrame, order: &[u32], coder: &UnitCoder<'_>, settings: &Settings) -> Vec<u32> {
     let wanted = Wanted::new(frame, None, coder);
     let mut rows = order.to_vec();
     for part in parts(&settings.refinements, order.len()) {

@@ -59,8 +59,9 @@ mod verification;
 mod vq;
 mod writer;
 
+pub use allocation::Attribute;
 pub use error::Error;
-pub use finetune::{Attribute, Finetune, FinetuneReport, Photograph};
+pub use finetune::{Finetune, FinetuneReport, Photograph};
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;

@@ -114,7 +114,8 @@ impl<'a> Fitting<'a> {
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
     fn gain(&self) -> f64 {
         let is_fitted = self.settings.temporal_layers() == 0;
-        let finetune = self.settings.finetune.as_ref().filter(|finetune| is_fitted && finetune.photographs.is_empty());
+        let finetune =
+            self.settings.finetune.as_ref().filter(|finetune| is_fitted && finetune.photographs.is_empty());
         finetune.map_or(0.0, |finetune| {
             let [most, iterations] = GAIN;
             most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations))

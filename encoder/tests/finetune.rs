@@ -24,8 +24,13 @@ const ALL: [Attribute; 6] = [
     Attribute::Sh,
 ];
 
+/// In pictures of a few lines: small scenes do not need more, and tests are done soon.
+fn quick(iterations: u32) -> Finetune {
+    Finetune { iterations, lines: vec![108], ..Finetune::default() }
+}
+
 fn settings(iterations: u32) -> Settings {
-    let finetune = Some(Finetune { iterations, ..Finetune::default() });
+    let finetune = Some(quick(iterations));
     Settings { preset: Preset::Fast, verify: true, finetune, ..Settings::default() }
 }
 
@@ -81,7 +86,7 @@ fn every_attribute_is_reached_and_the_others_are_held() {
     let before = planes(&encoded(scene(), &plain()).0);
     for own in ALL {
         let held = ALL.into_iter().filter(|&attribute| attribute != own).collect();
-        let finetune = Some(Finetune { iterations: 30, held, ..Finetune::default() });
+        let finetune = Some(Finetune { held, ..quick(20) });
         let after = planes(&encoded(scene(), &Settings { finetune, ..plain() }).0);
         // Other steps follow from log-scales and opacities, and the order of coding from positions.
         let sorted = |planes: &[Vec<i32>]| planes.iter().map(|plane| sorted(plane)).collect::<Vec<_>>();
@@ -130,7 +135,7 @@ fn photographs(count: u32) -> Vec<Photograph> {
 
 #[test]
 fn photographs_are_what_the_stream_comes_to_look_like() {
-    let finetune = Some(Finetune { iterations: 60, photographs: photographs(16), ..Finetune::default() });
+    let finetune = Some(Finetune { photographs: photographs(16), ..quick(60) });
     let (_, report) = encoded(scene(), &Settings { finetune, ..plain() });
     let [before, after] = report.finetuned[0].psnr;
     assert!(after > before + 2.0, "{before} {after}");
@@ -140,7 +145,8 @@ fn photographs_are_what_the_stream_comes_to_look_like() {
 fn frames_that_others_refer_to_stay_near_the_source() {
     let scene = BuiltinScene { gaussians: 300, frames: 3, sh_degree: 0, ..BuiltinScene::default() };
     let frames = || (0..3).map(|number| scene.frame(number)).collect::<Vec<_>>();
-    let predicted = |settings: Settings| Settings { structure: Structure::Predicted { layers: 1 }, ..settings };
+    let predicted =
+        |settings: Settings| Settings { structure: Structure::Predicted { layers: 1 }, ..settings };
     let (bytes, report) = encoded(frames(), &predicted(settings(2)));
     assert!(report.finetuned.is_empty());
     assert_eq!(bytes, encoded(frames(), &predicted(plain())).0);

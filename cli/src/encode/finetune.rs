@@ -80,7 +80,9 @@ impl FinetuneArgs {
         let is_held = |name: &&AttributeName| !self.finetune_only.contains(name);
         let held = match self.finetune_only.is_empty() {
             true => Vec::new(),
-            false => AttributeName::value_variants().iter().filter(is_held).map(|&name| name.into()).collect(),
+            false => {
+                AttributeName::value_variants().iter().filter(is_held).map(|&name| name.into()).collect()
+            }
         };
         let photographs = match &self.images {
             Some(directory) => {
@@ -98,8 +100,8 @@ fn photograph(directory: &Path, camera: &Camera) -> Result<Photograph, Failure> 
     let name = Path::new(&camera.name).file_name().unwrap_or_default();
     let path = directory.join(name).with_extension("png");
     let bytes = std::fs::read(&path).map_err(|cause| Failure::file("read", &path, &cause))?;
-    let picture = Image::from_png(&bytes)
-        .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+    let picture =
+        Image::from_png(&bytes).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
     let (width, height) = (picture.width(), picture.height());
     let camera = camera.scaled_to_height(u32::try_from(height).unwrap_or(u32::MAX));
     if camera.width as usize != width {
@@ -167,10 +169,12 @@ impl Fitted {
                 fitted.values_bpg_after,
             )
         };
-        let first = all.iter().take_while(|fitted| all.first().is_some_and(|first| first.frame == fitted.frame));
+        let first =
+            all.iter().take_while(|fitted| all.first().is_some_and(|first| first.frame == fitted.frame));
         let mut text: String = first.map(line).collect();
         if !all.is_empty() {
-            text += &format!("  fine-tuning        {} frames and layers in {seconds:.1} seconds\n", all.len());
+            text +=
+                &format!("  fine-tuning        {} frames and layers in {seconds:.1} seconds\n", all.len());
         }
         text
     }

@@ -11,7 +11,8 @@
 use super::latent::{Decoded, Latent};
 use super::pictures::{BACKGROUND, Pictures, View, squared_error};
 use super::rate::Rate;
-use super::{Attribute, Finetune, FinetuneReport};
+use super::{Finetune, FinetuneReport};
+use crate::allocation::Attribute;
 use crate::error::Error;
 use core::f64::consts::{LN_2, PI};
 use splatstream_gaussians::GaussianFrame;
@@ -114,7 +115,8 @@ impl<'a> Descent<'a> {
 
     /// The share of the iterations, or of the time, that has gone.
     fn share(&self, done: u32) -> f64 {
-        let of_time = |budget: core::time::Duration| self.start.elapsed().as_secs_f64() / budget.as_secs_f64();
+        let of_time =
+            |budget: core::time::Duration| self.start.elapsed().as_secs_f64() / budget.as_secs_f64();
         let of_time = self.finetune.time_budget.map_or(0.0, of_time);
         (f64::from(done) / f64::from(self.finetune.iterations.max(1))).max(of_time)
     }

@@ -234,7 +234,9 @@ impl<'a> Latent<'a> {
             }
         }
         by_w.fill(0.0);
-        for (transform, colours) in self.transforms().into_iter().zip([planes.dc.as_mut_slice(), &mut planes.sh]) {
+        for (transform, colours) in
+            self.transforms().into_iter().zip([planes.dc.as_mut_slice(), &mut planes.sh])
+        {
             let Some(transform) = transform else { continue };
             let of_component = |weights: &[i16]| -> Vec<f32> {
                 let mut sums = vec![0.0; w.len()];

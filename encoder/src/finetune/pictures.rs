@@ -59,14 +59,16 @@ impl<'a> Pictures<'a> {
         if !finetune.photographs.is_empty() {
             let numbered = || finetune.photographs.iter().enumerate();
             let is_judge = |number: usize| number % JUDGE_OF == JUDGE_OF / 2;
-            let judges = numbered().filter(|(number, _)| is_judge(*number)).map(|(_, photograph)| photograph.view(of_judges));
-            let others = numbered().filter(|(number, _)| !is_judge(*number)).map(|(_, photograph)| photograph);
+            let judges = numbered()
+                .filter(|(number, _)| is_judge(*number))
+                .map(|(_, photograph)| photograph.view(of_judges));
+            let others =
+                numbered().filter(|(number, _)| !is_judge(*number)).map(|(_, photograph)| photograph);
             let supply = Supply::Photographs(others.collect());
             return Self { judges: judges.collect(), supply, lines, taken };
         }
-        let [own, others] = SEEDS.map(|seed| {
-            Scattered::new(source, Up::default(), &settings.cameras, seed, of_judges)
-        });
+        let [own, others] =
+            SEEDS.map(|seed| Scattered::new(source, Up::default(), &settings.cameras, seed, of_judges));
         let judges = others.take(JUDGES).map(|camera| drawn(source, camera)).collect();
         Self { supply: Supply::Scattered(source, own), judges, lines, taken }
     }

@@ -2,7 +2,10 @@
 //!
 //! Contexts are held: a value is not rewarded for what it makes cheaper after it. Positions take the same bits wherever a
 //! Gaussian moves, nearly, and have no slope.
-#![expect(clippy::arithmetic_side_effects, reason = "coded values are below 2^17; counts of what is in memory")]
+#![expect(
+    clippy::arithmetic_side_effects,
+    reason = "coded values are below 2^17; counts of what is in memory"
+)]
 #![expect(
     clippy::indexing_slicing,
     reason = "rows and planes are those of the lists that the models are of; places are clamped"
@@ -73,7 +76,8 @@ impl Rate {
         let rows = |list: &List| list.rows.clone().map(|row| row as u32).collect();
         let added = latent.lists.iter().map(|list| (rows(list), list.grain)).collect();
         let new = NewList::all(coder, &wanted, added, &ModelsInForce::default());
-        let mut rate = Self { lists: Vec::new(), bits: 0.0, bits_an_octave: 3.0 * latent.source.len() as f64 };
+        let mut rate =
+            Self { lists: Vec::new(), bits: 0.0, bits_an_octave: 3.0 * latent.source.len() as f64 };
         for (list, new) in latent.lists.iter().zip(&new) {
             let count = list.rows.len() as f64;
             let costs = new.coded.costs(&new.values, &coder.plan);
@@ -81,7 +85,11 @@ impl Rate {
             let of_octave = |plane: &PlaneCosts| (plane.bits / ONE_MORE).min(count);
             rate.bits_an_octave += costs.iter().map(of_octave).sum::<f64>();
             let planes = costs.into_par_iter().map(|costs| PlaneRate::new(costs, &list.rows, &new.added));
-            rate.lists.push(ListRate { rows: list.rows.clone(), planes: planes.collect(), moves: Vec::new() });
+            rate.lists.push(ListRate {
+                rows: list.rows.clone(),
+                planes: planes.collect(),
+                moves: Vec::new(),
+            });
         }
         Ok(rate)
     }
@@ -93,16 +101,17 @@ impl Rate {
         for list in &latent.lists {
             let steps = coder.steps(list.grain.attribute_step);
             let added: Vec<u32> = list.rows.clone().map(|row| row as u32).collect();
-            let [planes, moves] = [(Section::Updates, &decoded.values), (Section::Moves, &decoded.moves)].map(|(section, planes)| {
-                let own = planes.iter().map(|plane| plane[list.rows.clone()].to_vec()).collect();
-                let values = coder.section(own);
-                let draft = coder.section_draft(section, &values, steps, &ModelsInForce::default());
-                let costs = draft.costs(&values, &coder.plan);
-                rate.bits += costs.iter().map(|plane| plane.bits).sum::<f64>();
-                // Halving the steps of both layers adds to the lower one; here values stay as they are.
-                rate.bits_an_octave += costs.len() as f64 * list.rows.len() as f64;
-                costs.into_iter().map(|costs| PlaneRate::new(costs, &list.rows, &added)).collect()
-            });
+            let [planes, moves] = [(Section::Updates, &decoded.values), (Section::Moves, &decoded.moves)]
+                .map(|(section, planes)| {
+                    let own = planes.iter().map(|plane| plane[list.rows.clone()].to_vec()).collect();
+                    let values = coder.section(own);
+                    let draft = coder.section_draft(section, &values, steps, &ModelsInForce::default());
+                    let costs = draft.costs(&values, &coder.plan);
+                    rate.bits += costs.iter().map(|plane| plane.bits).sum::<f64>();
+                    // Halving the steps of both layers adds to the lower one; here values stay as they are.
+                    rate.bits_an_octave += costs.len() as f64 * list.rows.len() as f64;
+                    costs.into_iter().map(|costs| PlaneRate::new(costs, &list.rows, &added)).collect()
+                });
             rate.lists.push(ListRate { rows: list.rows.clone(), planes, moves });
         }
         Ok(rate)
