@@ -86,13 +86,16 @@ impl Finetune {
         if self.time_budget.is_some_and(|budget| budget.is_zero()) {
             return setting("finetune time budget", "0 seconds".to_owned(), "more than 0");
         }
+        if let Some(lines) = self.lines.iter().find(|lines| !LINES_ALLOWED.contains(lines)) {
+            return setting("finetune lines", lines.to_string(), "1 to 8640");
+        }
         if (1..LEAST_PHOTOGRAPHS).contains(&self.photographs.len()) {
             let count = format!("{} photographs", self.photographs.len());
             return setting("finetune photographs", count, "none, or 8 or more: some are kept to judge by");
         }
         for Photograph { camera, picture } in &self.photographs {
             let size = [picture.width(), picture.height()];
-            if size != [camera.width as usize, camera.height as usize] {
+            if size != [camera.width as usize, camera.height as usize] || size.contains(&0) {
                 let value = format!("of {size:?} pixels in {}", camera.name);
                 return setting("finetune photograph", value, "of as many pixels as its camera has");
             }
@@ -100,6 +103,9 @@ impl Finetune {
         Ok(())
     }
 }
+
+/// Lines that a picture may have.
+const LINES_ALLOWED: core::ops::RangeInclusive<u32> = 1..=8640;
 
 /// Photographs at least, if there are any.
 const LEAST_PHOTOGRAPHS: usize = 8;

@@ -6,13 +6,19 @@ mod common;
 
 use common::{builtin, decoded, encoded, strict};
 use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::{Decoder, Options};
 use splatstream_encoder::{
     Attribute, Error, Finetune, Photograph, Preset, Report, Settings, Structure, encode,
 };
 use splatstream_files::builtin::BuiltinScene;
+use splatstream_format::Limits;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::unit::Stream;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, ring};
-use splatstream_render::{Image, render};
+use splatstream_render::{Image, ReferencePictures, render};
 use std::time::Duration;
 
 const ALL: [Attribute; 6] = [
@@ -164,6 +170,35 @@ fn a_quality_is_reached_after_fitting_with_fewer_bytes() {
 }
 
 #[test]
+fn the_lowest_layer_is_fitted_to_pictures_of_its_own_lines() {
+    let layered = |settings: Settings| Settings { spatial_layers: 2, ..settings };
+    let lowest = |bytes: &[u8]| {
+        let operating_point = OperatingPoint { spatial: 0, ..OperatingPoint::ALL };
+        let frame = decoded(bytes, &Options { operating_point, ..strict() }).0.remove(0).into_shown();
+        let frame = to_gaussians(frame, &sequence(bytes)).unwrap();
+        let source = scene().remove(0);
+        let views = ReferencePictures::new(&source, ring(&source, Up::default(), 5, 108));
+        views.psnr(&frame).sum::<f64>() / 5.0
+    };
+    let (before, _) = encoded(scene(), &layered(plain()));
+    let finetune = Some(Finetune { lines: vec![108, 216], ..quick(40) });
+    let (after, report) = encoded(scene(), &layered(Settings { finetune, ..plain() }));
+    assert_eq!(report.finetuned.iter().map(|fitted| fitted.spatial_layer).collect::<Vec<_>>(), [0, 1]);
+    assert!(lowest(&after) > lowest(&before) + 0.5, "{} {}", lowest(&before), lowest(&after));
+}
+
+fn sequence(bytes: &[u8]) -> SequenceParameters {
+    let limits = Limits::default();
+    let stream = Stream::open(bytes, &limits).unwrap();
+    let mut decoder = Decoder::new(stream.header(), Options { limits, ..Options::default() });
+    let mut units = stream.units();
+    while decoder.sequence().is_none() {
+        let _frame = decoder.unit(&units.next_unit().unwrap().unwrap());
+    }
+    *decoder.sequence().unwrap()
+}
+
+#[test]
 fn nothing_is_fitted_where_there_is_nothing() {
     let empty = builtin(100, 0).select(&[]);
     let (_, report) = encoded(vec![empty], &settings(3));
@@ -185,6 +220,7 @@ fn what_cannot_be_done_is_refused() {
     assert_eq!(refused(Finetune { iterations: 0, ..Finetune::default() }), "finetune iterations");
     let time_budget = Some(Duration::ZERO);
     assert_eq!(refused(Finetune { time_budget, ..Finetune::default() }), "finetune time budget");
+    assert_eq!(refused(Finetune { lines: vec![540, 0], ..Finetune::default() }), "finetune lines");
     let few = photographs(3);
     assert_eq!(refused(Finetune { photographs: few, ..Finetune::default() }), "finetune photographs");
     let mut other = photographs(8);
