@@ -3,6 +3,7 @@
 mod choices;
 mod each;
 mod failed;
+mod finetune;
 mod output;
 mod pictures;
 mod shards;
@@ -23,6 +24,7 @@ use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use failed::failed;
+use finetune::{FinetuneArgs, Fitted};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
@@ -53,6 +55,7 @@ use warnings::{Warning, unlike_frames, warnings};
     splatstream encode frames.zip -o talk.gss\n  \
     splatstream encode kitchen.splatv -o kitchen.gss --samples 100\n  \
     splatstream encode frames/ -o talk.html\n  \
+    splatstream encode garden.ply -o garden.gss --psnr 45 --finetune\n  \
     splatstream encode garden.ply plant.spz talk/ --each -o streams/\n  \
     splatstream encode frames/ --write-plan -o plan.json\n  \
     splatstream encode frames/ --plan plan.json --shard 2/8 -o shard-2.gss")]
@@ -170,6 +173,8 @@ pub(crate) struct Encode {
     /// Tools to leave out, to see what each is worth.
     #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
     without: Vec<ToolName>,
+    #[command(flatten)]
+    finetune: FinetuneArgs,
 }
 
 /// Cameras that a stream can hold.
@@ -279,6 +284,8 @@ struct Encoded {
     chosen: Vec<Choice>,
     #[serde(flatten)]
     pictures: Pictures,
+    /// What fitting frames to pictures has done; empty where it was not asked for.
+    finetuned: Vec<Fitted>,
     warnings: Vec<Warning>,
     digests: Vec<String>,
 }
@@ -410,6 +417,7 @@ impl Encode {
             keep_invisible: self.keep_invisible,
             ticks: self.fps,
             importance: self.importance.map(Into::into),
+            finetune: self.finetune.settings(&cameras, &self.layers)?,
             cameras,
             fidelity: self.fidelity.map(Into::into),
             tolerance: self.tolerance,
@@ -454,6 +462,7 @@ impl Encoded {
             dropped: report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum(),
             chosen: choices(report, settings),
             pictures: Pictures::of(report, settings, Goal::of(settings)),
+            finetuned: Fitted::of(report),
             warnings: warnings(report, settings, &|frame| source.name(frame)),
             digests: report.digests.iter().copied().map(hex_digest).collect(),
         }
@@ -466,7 +475,7 @@ impl Encoded {
         let shard = self.shard.as_ref().map(ShardReport::text).unwrap_or_default();
         format!(
             "{}\n{shard}  frames             {}\n  Gaussians          {}\n  bytes              {}{page}\n  \
-             bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}chosen\n{chosen}",
+             bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}{}chosen\n{chosen}",
             self.output.display(),
             grouped(self.frames.into()),
             grouped(self.gaussians),
@@ -474,6 +483,7 @@ impl Encoded {
             self.bpg,
             self.seconds,
             self.pictures.text(),
+            Fitted::text(&self.finetuned),
         )
     }
 }

@@ -8,6 +8,7 @@ use super::Camera;
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
+use splatstream_gaussians::random::SplitMix64;
 use std::f32::consts::{PI, TAU};
 
 /// Vertical angle of view, radians: 40 degrees.
@@ -87,7 +88,8 @@ pub fn spiral(frame: &GaussianFrame, up: Up, count: u32, height: u32) -> Vec<Cam
     (0..count).map(view).collect()
 }
 
-/// The angle by which [`held_out`] turns given cameras about the scene, radians: 5 degrees.
+/// The angle by which [`held_out`] turns given cameras about the scene, and up to which those of [`Scattered`] turn, radians: 5
+/// degrees.
 const TURN: f32 = 5.0 / 180.0 * PI;
 
 /// `count` cameras that coincide with none of a ring or a spiral, between 10 degrees below and 40 above: to judge what
@@ -108,6 +110,97 @@ pub fn held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, hei
     (0..count).map(|number| turned(number).unwrap_or_else(|| made(number))).collect()
 }
 
+/// How far the elevation of a scattered camera reaches below and above, sine.
+const SCATTERED: [f32; 2] = [-0.5, 0.9];
+
+/// Cameras that look random, without end, and the same for the same seed on every machine: to fit something to pictures that
+/// shall be good from anywhere.
+///
+/// Around a scene without cameras they stand from 30 degrees below to 64 above, between half and one and a half times as far
+/// away as those of a [`ring`], with an angle of view of 30 to 60 degrees, and look past its middle by up to a third of its
+/// radius. Where the scene comes with cameras each stands near one of these: moved by up to a tenth of its distance and turned
+/// by up to 5 degrees, with 0.8 to 1.25 times its focal length.
+///
+/// ```
+/// use splatstream_files::builtin::BuiltinScene;
+/// use splatstream_render::camera::{Scattered, Up};
+///
+/// let frame = BuiltinScene { gaussians: 100, ..BuiltinScene::default() }.frame(0);
+/// let cameras = || Scattered::new(&frame, Up::default(), &[], 7, 540).take(3);
+/// assert!(cameras().eq(cameras()));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Scattered {
+    subject: Subject,
+    given: Vec<Camera>,
+    random: SplitMix64,
+    height: u32,
+    number: u32,
+}
+
+impl Scattered {
+    /// Of pictures of `height` lines of a frame, near the cameras that are given, if any are.
+    pub fn new(frame: &GaussianFrame, up: Up, given: &[Camera], seed: u64, height: u32) -> Self {
+        let (subject, random) = (Subject::of(frame, up), SplitMix64::new(seed));
+        Self { subject, given: given.to_vec(), random, height, number: 0 }
+    }
+
+    fn within(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.random.unit() as f32
+    }
+
+    /// A vector within a ball of radius 1, nearly: of three coordinates the middle is most likely.
+    fn aside(&mut self) -> Vec3 {
+        Vec3::from([(); 3].map(|()| 0.5 * (self.random.signed() + self.random.signed())))
+    }
+
+    fn made(&mut self, name: String) -> Camera {
+        let turn = self.within(0.0, TAU);
+        let [low, high] = SCATTERED;
+        let elevation = libm::asinf(self.within(low, high));
+        let field = self.within(30.0, 60.0) / 180.0 * PI;
+        let away = libm::exp2f(self.within(-1.0, 0.6));
+        let aside = self.aside() * (self.subject.radius / 3.0);
+        let seen = self.subject.seen_from(name, turn, elevation, self.height);
+        let middle = self.subject.middle;
+        let position = middle + (Vec3::from(seen.position) - middle) * away;
+        let down = -self.subject.axes[1];
+        Camera::look_at(seen.name, position, middle + aside, down, field, [seen.width, seen.height])
+    }
+
+    fn near(&mut self, name: String, camera: &Camera) -> Camera {
+        let [position, ahead] = [camera.position, camera.rotation[2]].map(Vec3::from);
+        let depth = ahead.dot(self.subject.middle - position).max(0.1 * self.subject.radius);
+        let moved = position + self.aside() * (0.1 * depth);
+        let axis = self.aside().normalize_or(Vec3::Y);
+        let half = self.within(-0.5 * TURN, 0.5 * TURN);
+        let turn = Quat::from_vec4((axis * libm::sinf(half)).extend(libm::cosf(half)));
+        let zoom = libm::exp2f(self.within(-0.32, 0.32));
+        let camera = camera.scaled_to_height(self.height);
+        Camera {
+            name,
+            rotation: camera.rotation.map(|axis| (turn * Vec3::from(axis)).to_array()),
+            position: moved.to_array(),
+            focal: camera.focal.map(|focal| focal * zoom),
+            ..camera
+        }
+    }
+}
+
+impl Iterator for Scattered {
+    type Item = Camera;
+
+    fn next(&mut self) -> Option<Camera> {
+        let name = format!("scattered_{:04}", self.number);
+        self.number = self.number.wrapping_add(1);
+        let place = self.random.below(self.given.len());
+        Some(match self.given.get(place).cloned() {
+            Some(camera) => self.near(name, &camera),
+            None => self.made(name),
+        })
+    }
+}
+
 /// Percentiles between which the box of a scene is measured, from the outermost to the innermost.
 const BOXES: [[usize; 2]; 3] = [[3, 97], [20, 80], [35, 65]];
 
@@ -116,6 +209,7 @@ const BOXES: [[usize; 2]; 3] = [[3, 97], [20, 80], [35, 65]];
 const SURROUNDINGS: f32 = 4.0;
 
 /// What a camera looks at.
+#[derive(Debug, Clone)]
 struct Subject {
     middle: Vec3,
     /// Radius of the sphere that a picture holds.
