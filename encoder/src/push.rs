@@ -6,6 +6,7 @@ use crate::frame::learning;
 use crate::gop::SequenceCoder;
 use crate::importance::Ranking;
 use crate::isolated::Isolated;
+use crate::progress::Progress;
 use crate::report::{Dropped, Report};
 use crate::room::{Announced, announce};
 use crate::sequence::Survey;
@@ -13,6 +14,7 @@ use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
 use crate::target;
 use crate::writer::{Record, UnitWriter};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_format::Limits;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::SequenceParameters;
@@ -50,6 +52,8 @@ pub struct Encoder<W> {
     window: Window,
     /// None until there are more frames than the first GOP may have.
     stream: Option<Stream>,
+    /// Told how many frames have been coded.
+    told: Option<Box<dyn FnMut(u32) + Send>>,
 }
 
 /// The frames that are not coded yet.
@@ -58,6 +62,7 @@ struct Window {
     /// The number of the first.
     first: u32,
     frames: VecDeque<GaussianFrame>,
+    cancel: Interrupt,
 }
 
 impl FrameSource for Window {
@@ -66,6 +71,10 @@ impl FrameSource for Window {
     }
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        // Whatever is tried or coded asks for its frames, one after the other.
+        if self.cancel.is_requested() {
+            return Err(Error::Cancelled.into());
+        }
         let at = number.checked_sub(self.first).and_then(|at| self.frames.get(at as usize));
         at.cloned().ok_or_else(|| format!("frame {number} is not there any more").into())
     }
@@ -96,13 +105,40 @@ struct Stream {
 impl<W: Write> Encoder<W> {
     /// An encoder that writes to `sink`.
     pub fn new(sink: W, settings: Settings) -> Self {
-        Self { sink, settings, window: Window::default(), stream: None }
+        Self { sink, settings, window: Window::default(), stream: None, told: None }
+    }
+
+    /// Lets another thread end the work: [`Encoder::push`] and [`Encoder::finish`] then give [`Error::Cancelled`], before
+    /// they turn to another frame.
+    ///
+    /// ```
+    /// use splatstream_decoder::interrupt::Interrupt;
+    /// use splatstream_encoder::{Encoder, Error, Settings};
+    /// use splatstream_files::builtin::BuiltinScene;
+    ///
+    /// let cancel = Interrupt::new();
+    /// let mut encoder = Encoder::new(Vec::new(), Settings::default());
+    /// encoder.set_cancel(cancel.clone());
+    /// encoder.push(BuiltinScene { gaussians: 100, ..BuiltinScene::default() }.frame(0))?;
+    /// std::thread::spawn(move || cancel.request()).join().ok();
+    /// assert!(matches!(encoder.finish(), Err(Error::Cancelled)));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn set_cancel(&mut self, cancel: Interrupt) {
+        self.window.cancel = cancel;
+    }
+
+    /// Calls `told` with the number of frames that have been coded, after each. Where the settings ask for a PSNR or a size,
+    /// a sequence of one GOP is coded several times, and told of each time.
+    pub fn set_progress(&mut self, told: impl FnMut(u32) + Send + 'static) {
+        self.told = Some(Box::new(told));
     }
 
     /// Takes the next frame, and writes the GOP that it completes.
     ///
     /// # Errors
-    /// Settings or frames that cannot be coded, a sink that cannot be written. No stream comes of what was written then.
+    /// Settings or frames that cannot be coded, a sink that cannot be written, a [cancellation](Encoder::set_cancel). No
+    /// stream comes of what was written then.
     pub fn push(&mut self, frame: GaussianFrame) -> Result<(), Error> {
         let number = self.window.len();
         let frame = match &mut self.stream {
@@ -123,7 +159,9 @@ impl<W: Write> Encoder<W> {
     /// As [`Encoder::push`]; no frame at all.
     pub fn finish(mut self) -> Result<Report, Error> {
         if self.stream.is_none() {
-            let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut |_, _| ())?;
+            let mut told = |done, _| tell(&mut self.told, done);
+            let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut told)
+                .map_err(cancelled)?;
             self.sink.flush()?;
             return Ok(report);
         }
@@ -141,13 +179,16 @@ impl<W: Write> Encoder<W> {
     fn gop(&mut self) -> Result<(), Error> {
         if self.stream.is_none() {
             let mut source = CheckedSource::new(&mut self.window, self.settings.drop_invalid);
-            self.stream = Some(Stream::start(&mut source, &self.settings, &mut self.sink).map_err(named)?);
+            let started = Stream::start(&mut source, &self.settings, &mut self.sink);
+            self.stream = Some(started.map_err(|error| cancelled(named(error)))?);
         }
         let Some(stream) = &mut self.stream else { return Ok(()) };
         let first = self.window.first;
         let last = self.window.len().min(first.saturating_add(stream.settings.gop_length()));
         let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
-        let end = stream.gop(&mut source, (first, last), &mut self.sink).map_err(named)?;
+        let mut told = |done, _| tell(&mut self.told, done);
+        let end = stream.gop(&mut source, (first, last), &mut self.sink, &mut told);
+        let end = end.map_err(|error| cancelled(named(error)))?;
         let coded = |dropped: &Dropped| dropped.frame < end;
         stream.report.leave_out(source.into_dropped().into_iter().filter(coded));
         self.window.drop_before(end);
@@ -195,6 +236,7 @@ impl Stream {
         source: &mut dyn FrameSource,
         (first, last): (u32, u32),
         sink: &mut dyn Write,
+        progress: Progress<'_>,
     ) -> Result<u32, Error> {
         let mut writer = UnitWriter::new(sink, &mut self.record);
         let mut coder = SequenceCoder {
@@ -209,9 +251,23 @@ impl Stream {
             recorder: None,
             looked_at: self.looked_at,
         };
-        let end = coder.gop(first, last, &mut |_, _| ())?;
+        let end = coder.gop(first, last, progress)?;
         (self.network, self.looked_at) = (coder.network, coder.looked_at);
         Ok(end)
+    }
+}
+
+fn tell(told: &mut Option<Box<dyn FnMut(u32) + Send>>, done: u32) {
+    told.iter_mut().for_each(|told| told(done));
+}
+
+/// A frame that was not given out because of a cancellation is no fault of its source.
+fn cancelled(error: Error) -> Error {
+    match &error {
+        Error::Source { source, .. } if matches!(source.downcast_ref(), Some(Error::Cancelled)) => {
+            Error::Cancelled
+        }
+        _ => error,
     }
 }
 
