@@ -2,6 +2,7 @@
 
 mod choices;
 mod each;
+mod options;
 mod output;
 mod pictures;
 pub(crate) mod warnings;
@@ -20,6 +21,7 @@ use crate::setting_names::{
 use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
+pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
@@ -293,7 +295,8 @@ impl Encode {
             .map_err(|error| failed(&source, out, &error))?;
         drop(progress);
         let page_bytes = file.finish()?;
-        let mut encoded = Encoded::new(out, &report, &settings, &source, start.elapsed().as_secs_f64());
+        let name_of = |frame| source.name(frame);
+        let mut encoded = Encoded::new(out, &report, &settings, &name_of, start.elapsed().as_secs_f64());
         encoded.page_bytes = page_bytes;
         encoded.chosen.extend(guess.map(choices::up));
         if inputs.len() > 1 {
@@ -345,7 +348,7 @@ impl Encode {
     }
 
     /// The settings, and what was taken to point up if nobody says it.
-    fn settings(&self, source: &mut FrameFiles) -> Result<(Settings, Option<UpGuess>), Failure> {
+    fn settings(&self, source: &mut dyn FrameSource) -> Result<(Settings, Option<UpGuess>), Failure> {
         let is_predicted = source.len() > 1 && !self.all_intra;
         let layers = self.layer_count(is_predicted)?;
         check_refinements(&self.refinements)?;
@@ -443,7 +446,13 @@ fn failed(source: &FrameFiles, out: &Path, error: &splatstream_encoder::Error) -
 }
 
 impl Encoded {
-    fn new(out: &Path, report: &Report, settings: &Settings, source: &FrameFiles, seconds: f64) -> Self {
+    fn new(
+        out: &Path,
+        report: &Report,
+        settings: &Settings,
+        name_of: &dyn Fn(u32) -> String,
+        seconds: f64,
+    ) -> Self {
         Self {
             output: out.to_path_buf(),
             bytes: report.bytes,
@@ -456,7 +465,7 @@ impl Encoded {
             dropped: report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum(),
             chosen: choices(report, settings),
             pictures: Pictures::of(report, settings, Goal::of(settings)),
-            warnings: warnings(report, settings, &|frame| source.name(frame)),
+            warnings: warnings(report, settings, name_of),
             digests: report.digests.iter().copied().map(hex_digest).collect(),
         }
     }
