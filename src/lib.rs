@@ -41,7 +41,7 @@
 //! (group of pictures) that it is in.
 //!
 //! Programs in C and C++ use the same decoder through `bindings/c` of the repository: a static or shared library, and the
-//! header `splatstream.h`. Compiled for wasm32-unknown-unknown it imports nothing; `bindings/web` has it as an npm package,
+//! header `splatstream.h`; those in Python through `bindings/python`. Compiled for wasm32-unknown-unknown it imports nothing; `bindings/web` has it as an npm package,
 //! and a player for web pages.
 //!
 //! The format is specified in the `spec/` folder of the repository. The crates below this one are its parts, for

@@ -4,6 +4,7 @@ mod choices;
 mod each;
 mod failed;
 mod finetune;
+mod options;
 mod output;
 mod pictures;
 mod shards;
@@ -25,6 +26,7 @@ use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use failed::failed;
 use finetune::{FinetuneArgs, Fitted};
+pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
@@ -326,9 +328,10 @@ impl Encode {
         let report = report.map_err(|error| failed(&source, out, &error))?;
         drop(progress);
         let page_bytes = file.finish()?;
+        let name_of = |frame| source.name(frame);
         // The size that was asked for is that of the whole stream.
         let settings = if shard.is_some() { Settings { size: None, ..settings } } else { settings };
-        let mut encoded = Encoded::new(out, &report, &settings, &source, start.elapsed().as_secs_f64());
+        let mut encoded = Encoded::new(out, &report, &settings, &name_of, start.elapsed().as_secs_f64());
         encoded.shard = shard.map(|shard| shard.report);
         encoded.page_bytes = page_bytes;
         encoded.chosen.extend(guess.map(choices::up));
@@ -382,7 +385,7 @@ impl Encode {
     }
 
     /// The settings, and what was taken to point up if nobody says it.
-    fn settings(&self, source: &mut FrameFiles) -> Result<(Settings, Option<UpGuess>), Failure> {
+    fn settings(&self, source: &mut dyn FrameSource) -> Result<(Settings, Option<UpGuess>), Failure> {
         let is_predicted = source.len() > 1 && !self.all_intra;
         let layers = self.layer_count(is_predicted)?;
         check_refinements(&self.refinements)?;
@@ -448,7 +451,13 @@ impl Encode {
 }
 
 impl Encoded {
-    fn new(out: &Path, report: &Report, settings: &Settings, source: &FrameFiles, seconds: f64) -> Self {
+    fn new(
+        out: &Path,
+        report: &Report,
+        settings: &Settings,
+        name_of: &dyn Fn(u32) -> String,
+        seconds: f64,
+    ) -> Self {
         Self {
             output: out.to_path_buf(),
             bytes: report.bytes,
@@ -463,7 +472,7 @@ impl Encoded {
             chosen: choices(report, settings),
             pictures: Pictures::of(report, settings, Goal::of(settings)),
             finetuned: Fitted::of(report),
-            warnings: warnings(report, settings, &|frame| source.name(frame)),
+            warnings: warnings(report, settings, name_of),
             digests: report.digests.iter().copied().map(hex_digest).collect(),
         }
     }

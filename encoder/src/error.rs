@@ -147,6 +147,9 @@ pub enum Error {
         /// Why.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// Somebody has ended the work: see [`Encoder::set_cancel`](crate::Encoder::set_cancel).
+    #[error("encoding was cancelled")]
+    Cancelled,
     /// The stream could not be written.
     #[error("the stream cannot be written: {0}")]
     Output(#[from] std::io::Error),

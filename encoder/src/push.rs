@@ -15,6 +15,7 @@ use crate::target;
 use crate::window::{FirstFrames, Window};
 use crate::writer::{Head, Record, UnitWriter};
 use core::ops::Range;
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_format::Limits;
 use splatstream_format::payload::Network;
 use splatstream_gaussians::GaussianFrame;
@@ -53,6 +54,8 @@ pub struct Encoder<W> {
     gops_at_once: u32,
     /// None until there are more frames than the first GOP may have.
     stream: Option<Stream>,
+    /// Told how many frames have been coded.
+    told: Option<Box<dyn FnMut(u32) + Send>>,
 }
 
 /// A stream of which some GOPs have been written.
@@ -71,7 +74,33 @@ struct Stream {
 impl<W: Write> Encoder<W> {
     /// An encoder that writes to `sink`.
     pub fn new(sink: W, settings: Settings) -> Self {
-        Self { sink, settings, window: Window::default(), gops_at_once: 1, stream: None }
+        Self { sink, settings, window: Window::default(), gops_at_once: 1, stream: None, told: None }
+    }
+
+    /// Lets another thread end the work: [`Encoder::push`] and [`Encoder::finish`] then give [`Error::Cancelled`], before
+    /// they turn to another frame.
+    ///
+    /// ```
+    /// use splatstream_decoder::interrupt::Interrupt;
+    /// use splatstream_encoder::{Encoder, Error, Settings};
+    /// use splatstream_files::builtin::BuiltinScene;
+    ///
+    /// let cancel = Interrupt::new();
+    /// let mut encoder = Encoder::new(Vec::new(), Settings::default());
+    /// encoder.set_cancel(cancel.clone());
+    /// encoder.push(BuiltinScene { gaussians: 100, ..BuiltinScene::default() }.frame(0))?;
+    /// std::thread::spawn(move || cancel.request()).join().ok();
+    /// assert!(matches!(encoder.finish(), Err(Error::Cancelled)));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn set_cancel(&mut self, cancel: Interrupt) {
+        self.window.cancel = cancel;
+    }
+
+    /// Calls `told` with the number of frames that have been coded, after each. Where the settings ask for a PSNR or a size,
+    /// a sequence of one GOP is coded several times, and told of each time.
+    pub fn set_progress(&mut self, told: impl FnMut(u32) + Send + 'static) {
+        self.told = Some(Box::new(told));
     }
 
     /// The same that waits for the frames of so many GOPs, 1 or more, and codes them at the same time, as far as the
@@ -84,7 +113,8 @@ impl<W: Write> Encoder<W> {
     /// Takes the next frame, and writes the GOPs that it completes.
     ///
     /// # Errors
-    /// Settings or frames that cannot be coded, a sink that cannot be written. No stream comes of what was written then.
+    /// Settings or frames that cannot be coded, a sink that cannot be written, a [cancellation](Encoder::set_cancel). No
+    /// stream comes of what was written then.
     pub fn push(&mut self, frame: GaussianFrame) -> Result<(), Error> {
         let number = self.window.len();
         let frame = match &mut self.stream {
@@ -111,7 +141,9 @@ impl<W: Write> Encoder<W> {
             self.code()?;
         }
         if self.stream.is_none() {
-            let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut |_, _| ())?;
+            let mut told = |done, _| tell(&mut self.told, done);
+            let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut told)
+                .map_err(cancelled)?;
             self.sink.flush()?;
             return Ok(report);
         }
@@ -134,7 +166,8 @@ impl<W: Write> Encoder<W> {
         let frames = self.gop_length().saturating_add(1);
         let mut first = FirstFrames { source: &mut self.window, frames };
         let mut source = CheckedSource::new(&mut first, self.settings.drop_invalid);
-        let mut stream = Stream::start(&mut source, &self.settings, &mut self.sink).map_err(named)?;
+        let mut stream = Stream::start(&mut source, &self.settings, &mut self.sink)
+            .map_err(|error| cancelled(named(error)))?;
         for (number, frame) in (0..).zip(&mut self.window.frames).skip(frames as usize) {
             *frame = stream.hold(core::mem::take(frame), number)?;
         }
@@ -157,7 +190,10 @@ impl<W: Write> Encoder<W> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
         let frames = self.window.first..end;
         let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
-        stream.code(&mut source, frames, &mut self.sink).map_err(named)?;
+        let before = self.window.first;
+        let mut told = |done: u32| tell(&mut self.told, before.saturating_add(done));
+        let coded = stream.code(&mut source, frames, &mut self.sink, &mut told);
+        coded.map_err(|error| cancelled(named(error)))?;
         stream.report.leave_out(source.into_dropped());
         self.window.drop_before(end);
         Ok(())
@@ -197,6 +233,7 @@ impl Stream {
         source: &mut dyn FrameSource,
         frames: Range<u32>,
         sink: &mut dyn Write,
+        progress: &mut dyn FnMut(u32),
     ) -> Result<(), Error> {
         let settings = &self.settings;
         let ranking =
@@ -215,10 +252,24 @@ impl Stream {
             head: None,
             writer: &mut UnitWriter::new(sink, &mut self.record),
             report: &mut self.report,
-            progress: &mut |_| (),
+            progress,
         };
         coding.run(spans, ranking, at_once, None)?;
         Ok(())
+    }
+}
+
+fn tell(told: &mut Option<Box<dyn FnMut(u32) + Send>>, done: u32) {
+    told.iter_mut().for_each(|told| told(done));
+}
+
+/// A frame that was not given out because of a cancellation is no fault of its source.
+fn cancelled(error: Error) -> Error {
+    match &error {
+        Error::Source { source, .. } if matches!(source.downcast_ref(), Some(Error::Cancelled)) => {
+            Error::Cancelled
+        }
+        _ => error,
     }
 }
 

@@ -1,6 +1,8 @@
 //! Parts of sequences: frames that are in memory, and the first frames of a source.
 
+use crate::error::Error;
 use crate::source::FrameSource;
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_gaussians::GaussianFrame;
 use std::collections::VecDeque;
 
@@ -10,6 +12,8 @@ pub(crate) struct Window {
     /// The number of the first.
     pub(crate) first: u32,
     pub(crate) frames: VecDeque<GaussianFrame>,
+    /// Ends the work on them.
+    pub(crate) cancel: Interrupt,
 }
 
 impl FrameSource for Window {
@@ -18,6 +22,10 @@ impl FrameSource for Window {
     }
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        // Whatever is tried or coded asks for its frames, one after the other.
+        if self.cancel.is_requested() {
+            return Err(Error::Cancelled.into());
+        }
         let at = number.checked_sub(self.first).and_then(|at| self.frames.get(at as usize));
         at.cloned().ok_or_else(|| format!("frame {number} is not there any more").into())
     }

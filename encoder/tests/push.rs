@@ -4,11 +4,13 @@
 mod common;
 
 use common::{decoded, encoded, strict};
+use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::Frames;
 use splatstream_encoder::{Encoder, Error, Preset, Report, Settings, Size, Structure};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_gaussians::GaussianFrame;
+use std::sync::{Arc, Mutex};
 
 fn settings() -> Settings {
     let structure = Structure::Predicted { layers: 2 };
@@ -155,4 +157,32 @@ fn invalid_gaussians_are_refused_or_left_out() {
     assert_eq!(report.dropped.len(), 1);
     assert_eq!((report.dropped[0].frame, report.dropped[0].gaussians, report.invisible), (6, 1, 0));
     assert_eq!(decoded(&bytes, &strict()).0[6].planes.len(), 799);
+}
+
+#[test]
+fn coded_frames_are_told_one_by_one() {
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let mut encoder = Encoder::new(Vec::new(), settings());
+    let sender = told.clone();
+    encoder.set_progress(move |done| sender.lock().unwrap().push(done));
+    for frame in frames(10) {
+        encoder.push(frame).unwrap();
+    }
+    encoder.finish().unwrap();
+    let told = told.lock().unwrap();
+    assert!(told.is_sorted() && told.len() >= 10, "{told:?}");
+    assert_eq!(told.last(), Some(&10));
+}
+
+#[test]
+fn a_cancellation_ends_encoding_before_the_next_frame() {
+    let cancel = Interrupt::new();
+    let mut encoder = Encoder::new(Vec::new(), settings());
+    encoder.set_cancel(cancel.clone());
+    let mut frames = frames(10).into_iter();
+    // All of a GOP but the frame that completes it.
+    frames.by_ref().take(settings().gop as usize).for_each(|frame| encoder.push(frame).unwrap());
+    cancel.request();
+    assert!(matches!(encoder.push(frames.next().unwrap()), Err(Error::Cancelled)));
+    assert!(matches!(encoder.finish(), Err(Error::Cancelled)));
 }

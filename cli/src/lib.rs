@@ -1,6 +1,7 @@
 //! The `splatstream` command. The only crate of the workspace that prints, exits or opens files by name.
 //!
-//! One file a subcommand; `console` speaks to the user, `failure` says what went wrong and what to do.
+//! One file a subcommand; `console` speaks to the user, `failure` says what went wrong and what to do. A library, so that
+//! the Python package has the same command ([`main`]) and the same options of encoding ([`EncodeOptions`]).
 
 mod cameras;
 mod chart;
@@ -44,8 +45,10 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::Console;
 use failure::{Failure, FailureReport};
 use splatstream_format::syntax::SPECIFICATION;
+use std::ffi::OsString;
 use std::iter;
-use std::process::ExitCode;
+
+pub use encode::{EncodeOptions, OptionsError, Prepared};
 
 /// SplatStream: scalable, exact bitstreams of dynamic 3D Gaussian splatting.
 #[derive(Parser)]
@@ -94,26 +97,29 @@ enum Command {
     Manual(manual::Manual),
 }
 
-fn main() -> ExitCode {
-    let matches = Cli::command().try_get_matches().unwrap_or_else(|error| refuse(&error));
+/// Runs the command with its arguments, the first of which is its name, and gives the exit code. Ends the process by
+/// itself where arguments make no command, and after help.
+pub fn main(arguments: &[OsString]) -> u8 {
+    let matches =
+        Cli::command().try_get_matches_from(arguments).unwrap_or_else(|error| refuse(&error, arguments));
     let command = name_of(&matches);
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let console = Console::new(cli.json);
     match in_threads(cli.threads, || cli.command.run(&console)) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             console.fail(&failure);
             if matches!(failure, Failure::Usage(_)) {
                 console.complain(&format!("  {command} --help shows an example"));
             }
-            ExitCode::from(failure.exit_code())
+            failure.exit_code()
         }
     }
 }
 
 /// Arguments that make no command: told as usual, and as JSON where that is among them. Help is no error.
-fn refuse(error: &clap::Error) -> ! {
-    if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+fn refuse(error: &clap::Error, arguments: &[OsString]) -> ! {
+    if error.use_stderr() && arguments.iter().any(|argument| argument == "--json") {
         let failure = Failure::Usage(error.to_string().trim_end().to_owned());
         let _nobody_listens = Console::new(true).report(&FailureReport::from(&failure), String::new);
     }

@@ -1,0 +1,126 @@
+//! The options of `encode` for programs that have frames in memory.
+
+use super::{Encode, Encoded, choices};
+use crate::up_guess::UpGuess;
+use clap::Parser;
+use splatstream_encoder::{FrameSource, Report, Settings};
+use splatstream_gaussians::GaussianFrame;
+use std::fmt;
+use std::path::Path;
+
+/// What a user asks of the encoder, in the words of the command line; frames come from elsewhere.
+pub struct EncodeOptions(Encode);
+
+/// The settings that follow from options and from the first frame.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    /// For the encoder.
+    pub settings: Settings,
+    guess: Option<UpGuess>,
+}
+
+/// The options as they stand after `splatstream encode`.
+#[derive(Parser)]
+#[command(no_binary_name = true)]
+struct Line {
+    #[command(flatten)]
+    encode: Encode,
+}
+
+/// Options that make no sense: which, and what would be allowed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OptionsError(String);
+
+impl fmt::Display for OptionsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for OptionsError {}
+
+/// The start of a sequence: what settings follow from.
+struct Start<'a> {
+    first: &'a GaussianFrame,
+    is_sequence: bool,
+}
+
+impl FrameSource for Start<'_> {
+    fn len(&self) -> u32 {
+        if self.is_sequence { 2 } else { 1 }
+    }
+
+    fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        match number {
+            0 => Ok(self.first.clone()),
+            _ => Err("settings follow from the first frame".into()),
+        }
+    }
+}
+
+impl EncodeOptions {
+    /// The options in words as `--psnr`, `52`, without inputs and output.
+    ///
+    /// # Errors
+    /// What the command line would refuse.
+    pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Self, OptionsError> {
+        let files = ["-", "-o", "-"].map(str::to_owned);
+        match Line::try_parse_from(words.into_iter().chain(files)) {
+            Ok(line) => Ok(Self(line.encode)),
+            Err(error) => {
+                let text = error.render().to_string();
+                let cause = text.split("\n\n").next().unwrap_or_default();
+                Err(OptionsError(cause.trim_start_matches("error: ").to_owned()))
+            }
+        }
+    }
+
+    /// The settings for frames of which this is the first. A sequence gets layers and predicted frames; one frame does not.
+    ///
+    /// # Errors
+    /// Options that do not go together; a file of cameras or of a network that cannot be read.
+    pub fn prepare(&self, first: &GaussianFrame, is_sequence: bool) -> Result<Prepared, OptionsError> {
+        let settings = self.0.settings(&mut Start { first, is_sequence });
+        let (settings, guess) = settings.map_err(|failure| OptionsError(failure.to_string()))?;
+        Ok(Prepared { settings, guess })
+    }
+}
+
+impl Prepared {
+    /// The JSON that `splatstream encode --json` prints of a stream that was written with these settings, without the name
+    /// of a file: see `cli/json.md`.
+    pub fn report(&self, report: &Report, seconds: f64) -> String {
+        let name_of = |frame| format!("frame {frame}");
+        let mut encoded = Encoded::new(Path::new(""), report, &self.settings, &name_of, seconds);
+        encoded.chosen.extend(self.guess.map(choices::up));
+        serde_json::to_string(&encoded).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::EncodeOptions;
+    use splatstream_encoder::Structure;
+    use splatstream_files::builtin::BuiltinScene;
+
+    fn words(text: &str) -> impl Iterator<Item = String> {
+        text.split(' ').map(str::to_owned)
+    }
+
+    #[test]
+    fn settings_are_those_of_the_command_line() {
+        let options = EncodeOptions::parse(words("--psnr 52 --gop 8 --layers 540,1080")).unwrap();
+        let first = BuiltinScene { gaussians: 50, ..BuiltinScene::default() }.frame(0);
+        let settings = options.prepare(&first, true).unwrap().settings;
+        assert_eq!((settings.psnr, settings.gop, settings.spatial_layers), (Some(52.0), 8, 2));
+        assert_eq!(settings.structure, Structure::Predicted { layers: 2 });
+        assert_eq!(options.prepare(&first, false).unwrap().settings.structure, Structure::Intra);
+    }
+
+    #[test]
+    fn an_error_names_the_option_and_what_is_allowed() {
+        let error = |text| EncodeOptions::parse(words(text)).err().map(|error| error.to_string());
+        assert!(error("--psnr 95").unwrap().ends_with("'95' is not a PSNR from 20 to 90 decibels"));
+        assert!(error("--psnr 52 --quality low").unwrap().contains("cannot be used with"));
+    }
+}
