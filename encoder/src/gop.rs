@@ -25,7 +25,7 @@ use crate::isolated::{self, Isolated};
 use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
 use crate::report::{FrameReport, Report};
-use crate::settings::{Predictors, Preset, Settings};
+use crate::settings::{Predictors, Preset};
 use crate::source::FrameSource;
 use crate::spans::{Common, Span};
 use crate::writer::GopSink;
@@ -345,11 +345,14 @@ impl<'a> SpanCoder<'a> {
         let is_predicted = gop.header.is_predicted();
         // What other frames refer to stays near the source, as they do.
         let is_fitted = !is_predicted && self.recorder.is_none() && !target.frame.is_empty();
-        let fitted = match self.settings.finetune.as_ref().filter(|_| is_fitted) {
+        let fitted = match self.common.settings.finetune.as_ref().filter(|_| is_fitted) {
             Some(finetune) => Some(finetuned(
                 (&target.frame, &order),
                 &coder,
-                (self.settings, if gop.in_one_layer { 1 } else { self.sequence.spatial_layer_count }),
+                (
+                    self.common.settings,
+                    if gop.in_one_layer { 1 } else { self.common.sequence.spatial_layer_count },
+                ),
                 finetune,
             )?),
             None => None,

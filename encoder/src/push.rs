@@ -188,9 +188,9 @@ impl<W: Write> Encoder<W> {
     /// Codes the frames before one, at which a GOP begins.
     fn code_up_to(&mut self, end: u32) -> Result<(), Error> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
-        let frames = self.window.first..end;
-        let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
         let before = self.window.first;
+        let frames = before..end;
+        let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
         let mut told = |done: u32| tell(&mut self.told, before.saturating_add(done));
         let coded = stream.code(&mut source, frames, &mut self.sink, &mut told);
         coded.map_err(|error| cancelled(named(error)))?;

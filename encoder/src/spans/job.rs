@@ -82,7 +82,8 @@ impl Job {
 
 fn read(source: &mut dyn FrameSource, span: Span) -> Result<Window, Error> {
     let read = |number| source.frame(number).map_err(|source| Error::Source { frame: number, source });
-    Ok(Window { first: span.first, frames: (span.first..span.end).map(read).collect::<Result<_, _>>()? })
+    let frames = (span.first..span.end).map(read).collect::<Result<_, _>>()?;
+    Ok(Window { first: span.first, frames, ..Window::default() })
 }
 
 fn code(mut window: Window, common: Common<'_>, span: Span, ranking: Ranking, sender: &Sender<Event>) {
