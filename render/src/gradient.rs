@@ -4,6 +4,7 @@
 //!   each pixel to slopes by centre, log-scale, rotation, opacity logit and colour of each Gaussian: [`Gradients`].
 //! * [`Loss`] is the loss of 3D Gaussian splatting, L1 and SSIM, with its slope by each pixel.
 //! * [`MultiResolution`] sums it over pictures of 540, 720 and 1080 lines.
+//! * [`Adam`] goes down the slopes.
 //!
 //! Gradients are those of exactly the picture that [`render`](crate::render) draws, kernel with or without the
 //! compensation of the low-pass filter, for the Gaussians, pixels and order that it chose. They do not follow what is
@@ -43,6 +44,7 @@
 //! Source of blending and projection backwards: Kerbl et al., "3D Gaussian splatting for real-time radiance field
 //! rendering", 2023, appendix A; derived again for the kernel as [`rasterise`](crate::rasterise) writes it.
 
+mod adam;
 mod blend;
 mod harmonics;
 mod loss;
@@ -50,13 +52,14 @@ mod project;
 mod resolutions;
 mod similarity;
 
+pub use adam::{Adam, Rates};
 pub use loss::{Judged, Loss};
 pub use resolutions::{MultiResolution, Resolution, Target};
 
 use crate::camera::Camera;
 use crate::image::Image;
-use crate::rasterise::{PreparedFrame, Rendering, Sight, View, paint};
-use splatstream_gaussians::{GaussianFrame, Planes, sh_planes};
+use crate::rasterise::{PreparedFrame, Rendering, Sight, Splat, View, paint};
+use splatstream_gaussians::{FrameError, GaussianFrame, Planes, sh_planes};
 
 /// Pictures or frames that do not go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -109,6 +112,15 @@ impl Gradients {
         Self { sh_degree: frame.sh_degree(), planes }
     }
 
+    /// Slopes from elsewhere, such as those of a term of a loss that no picture shows.
+    ///
+    /// # Errors
+    /// Planes that make no frame of that SH degree.
+    pub fn from_planes(sh_degree: u8, planes: Planes) -> Result<Self, FrameError> {
+        let planes = GaussianFrame::from_planes(sh_degree, planes)?.into_planes();
+        Ok(Self { sh_degree, planes })
+    }
+
     /// The slopes.
     #[must_use]
     pub fn planes(&self) -> &Planes {
@@ -133,6 +145,17 @@ impl Gradients {
             ((self.planes.opacity_logit.len(), self.sh_degree), (frame.len(), frame.sh_degree()));
         if own == needed { Ok(()) } else { Err(GradientError::Frame(own.0, own.1, needed.0, needed.1)) }
     }
+}
+
+/// What one picture says of a Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Its row in the frame.
+    pub gaussian: u32,
+    /// What the loss gains where its centre moves by one pixel to the right, and down, of the picture.
+    pub slope: [f64; 2],
+    /// From its centre to where its alpha falls below 1/255, pixels, to the side and down.
+    pub extent: [f32; 2],
 }
 
 /// A picture that was drawn, and what is needed to go back through it.
@@ -173,13 +196,41 @@ impl Drawing<'_> {
     /// # Errors
     /// Slopes of another size than the picture, or gradients of another frame; then nothing is added.
     pub fn backward(&self, slopes: &Image, gradients: &mut Gradients) -> Result<(), GradientError> {
+        self.shares(slopes, gradients).map(drop)
+    }
+
+    /// As [`Drawing::backward`]; gives what the picture says of each Gaussian that it may show, in no order that means
+    /// anything. Trainers add Gaussians where these slopes are steep.
+    ///
+    /// # Errors
+    /// As [`Drawing::backward`].
+    pub fn backward_in_picture(
+        &self,
+        slopes: &Image,
+        gradients: &mut Gradients,
+    ) -> Result<Vec<Footprint>, GradientError> {
+        let shares = self.shares(slopes, gradients)?;
+        let footprint = |(splat, sums): (&Splat, &blend::Sums<f64>)| Footprint {
+            gaussian: splat.gaussian,
+            slope: project::by_centre(splat, sums),
+            extent: splat.extent,
+        };
+        Ok(self.view.splats.iter().zip(&shares).map(footprint).collect())
+    }
+
+    /// Goes back through the picture, and gives the sums of each ellipse.
+    fn shares(
+        &self,
+        slopes: &Image,
+        gradients: &mut Gradients,
+    ) -> Result<Vec<blend::Sums<f64>>, GradientError> {
         let picture = &self.rendering.colour;
         same_size(slopes, picture)?;
         gradients.check(self.prepared.frame)?;
         let shares = blend::backward(&self.view, picture, slopes);
         let projection = project::Projection::new(self.prepared, self.camera);
         projection.backward(&self.view.splats, &shares, &mut gradients.planes);
-        Ok(())
+        Ok(shares)
     }
 }
 

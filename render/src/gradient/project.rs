@@ -143,9 +143,9 @@ impl<'a> Projection<'a> {
     /// D = |u × v|² + λ (A + C + λ). The renderer has xx = −h (C + λ) / D, skew = −B / (C + λ), yy = −h / (C + λ) with
     /// h = log2(e) / 2; and where it compensates for the filter, log2 of |u × v| / √D in the exponent.
     fn ellipse(&self, splat: &Splat, sums: &Sums<f64>, u: DVec3, v: DVec3) -> Ellipse {
-        let [.., level, along, square, down, steep, cross] = *sums;
-        let [xx, skew, yy] = [splat.xx, splat.skew, splat.yy].map(f64::from);
-        let centre = [-2.0 * xx * along, -2.0 * (xx * skew * along + yy * down)];
+        let [.., level, _, square, _, steep, cross] = *sums;
+        let xx = f64::from(splat.xx);
+        let centre = by_centre(splat, sums);
         let low_pass = f64::from(LOW_PASS);
         let normal = u.cross(v);
         let sharp = normal.length_squared();
@@ -193,6 +193,13 @@ impl<'a> Projection<'a> {
         let outward: f64 = slopes.iter().zip(unit).map(|(slope, unit)| slope * unit).sum();
         [0, 1, 2, 3].map(|part: usize| (slopes[part] - outward * unit[part]) / length)
     }
+}
+
+/// What a loss gains where the centre of an ellipse moves by a pixel to the right and down.
+pub(super) fn by_centre(splat: &Splat, sums: &Sums<f64>) -> [f64; 2] {
+    let [.., along, _, down, _, _] = *sums;
+    let [xx, skew, yy] = [splat.xx, splat.skew, splat.yy].map(f64::from);
+    [-2.0 * xx * along, -2.0 * (xx * skew * along + yy * down)]
 }
 
 /// Planes in parts of so many rows as a thread goes back through.

@@ -42,6 +42,15 @@ pub struct PlanesMut<'a> {
     pub sh: Vec<&'a mut [f32]>,
 }
 
+impl PlanesMut<'_> {
+    /// Every plane to change, in the order of the fields.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut [f32]> {
+        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
+        let before = position.iter_mut().chain(log_scale).chain(rotation).chain([opacity_logit]);
+        before.chain(dc).chain(sh).map(|plane| &mut **plane)
+    }
+}
+
 /// A frame of Gaussians: structure of arrays, equal lengths by construction, `f32`, PLY's domain. A clone shares the
 /// values until either is changed.
 ///
