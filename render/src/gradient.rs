@@ -127,6 +127,12 @@ impl Gradients {
         &self.planes
     }
 
+    /// The slopes, to change: another term of a loss, or values of which those of the frame are made.
+    #[must_use]
+    pub fn planes_mut(&mut self) -> &mut Planes {
+        &mut self.planes
+    }
+
     /// The slopes, to keep.
     #[must_use]
     pub fn into_planes(self) -> Planes {

@@ -1,7 +1,6 @@
 //! Steps against the slopes: Adam over the values of a frame.
 //!
 //! Source: Kingma, Ba, "Adam: a method for stochastic optimization", 2015, algorithm 1.
-#![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats")]
 
 use super::{GradientError, Gradients};
 use rayon::prelude::*;
