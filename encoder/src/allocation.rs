@@ -50,12 +50,18 @@ const LARGEST_CHANGE: f64 = 8.0;
 
 /// What has a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Attribute {
+pub enum Attribute {
+    /// Centres.
     Position,
+    /// Natural logs of semi-axes.
     LogScale,
+    /// Quaternions.
     Rotation,
+    /// Opacity logits.
     Opacity,
+    /// The constant part of the colour.
     Dc,
+    /// Spherical harmonics of degree 1 and up.
     Sh,
 }
 

@@ -1,6 +1,7 @@
 //! What an encoder can be given that it cannot encode.
 
 use splatstream_gaussians::{Defect, FrameError};
+use splatstream_render::gradient::GradientError;
 
 /// Errors of encoding. Those of reading a frame are the source's own.
 #[derive(Debug, thiserror::Error)]
@@ -110,6 +111,9 @@ pub enum Error {
     /// The planes that were reconstructed make no frame: the encoder is at fault.
     #[error("reconstruction failed: {0}; please report this, with the scene")]
     Reconstruction(#[from] FrameError),
+    /// Pictures that values are fitted to do not go together: the encoder is at fault.
+    #[error("fitting to pictures failed: {0}; please report this, with the scene")]
+    Finetune(#[from] GradientError),
     /// The syntax refuses what the encoder wants to write.
     #[error("the bitstream cannot carry this: {0}")]
     Syntax(#[from] splatstream_format::Error),

@@ -11,7 +11,7 @@ pub(crate) mod intra;
 pub(crate) mod ladder;
 pub(crate) mod learning;
 mod moves;
-mod new_list;
+pub(crate) mod new_list;
 pub(crate) mod predicted;
 pub(crate) mod predictors;
 pub(crate) mod rate_distortion;

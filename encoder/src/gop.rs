@@ -8,10 +8,12 @@ mod means;
 
 use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
+use crate::finetune::{FinetuneReport, finetuned};
 use crate::frame::cells::CellPlan;
 use crate::frame::compensation::Compensator;
 use crate::frame::intra::{IntraTarget, code_intra};
 use crate::frame::predicted::{Predicted, PredictedTarget};
+use crate::frame::predictors::Chooser;
 use crate::frame::recorder::{Recorder, weights};
 use crate::frame::residuals::Wanted;
 use crate::frame::steadiness::Steadiness;
@@ -24,7 +26,7 @@ use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
 use crate::progress::Progress;
 use crate::report::{FrameReport, Report};
-use crate::settings::{Preset, Settings};
+use crate::settings::{Predictors, Preset, Settings};
 use crate::source::FrameSource;
 use crate::writer::UnitWriter;
 use splatstream_decoder::list::GaussianList;
@@ -324,16 +326,35 @@ impl SequenceCoder<'_, '_> {
         let Intra { mut target, order } = intra;
         let known = gop.tools.take_components();
         let coder = self.coder(gop, None);
-        let wanted = Wanted::new(&target.frame, known, &coder);
-        let compensator = self.compensator(&target);
         let is_predicted = gop.header.is_predicted();
+        // What other frames refer to stays near the source, as they do.
+        let is_fitted = !is_predicted && self.recorder.is_none() && !target.frame.is_empty();
+        let fitted = match self.settings.finetune.as_ref().filter(|_| is_fitted) {
+            Some(finetune) => Some(finetuned(
+                (&target.frame, &order),
+                &coder,
+                (self.settings, if gop.in_one_layer { 1 } else { self.sequence.spatial_layer_count }),
+                finetune,
+            )?),
+            None => None,
+        };
+        let wanted = match &fitted {
+            Some(fitted) => Wanted::new(&fitted.highest, None, &coder),
+            None => Wanted::new(&target.frame, known, &coder),
+        };
+        let lowest = fitted.as_ref().and_then(|fitted| fitted.lowest.as_ref());
+        let lowest = lowest.map(|frame| Wanted::new(frame, None, &coder));
+        // Predictions would move the grids that values were fitted on.
+        let predictors = if fitted.is_some() { Predictors::NONE } else { self.chooser().predictors };
+        let compensator = self.compensator(&target);
         if !is_predicted {
             target.forget();
         }
         let coded = code_intra(
             &coder,
             IntraTarget {
-                chooser: self.chooser(),
+                chooser: Chooser { predictors, ..self.chooser() },
+                lowest,
                 compensator: compensator.as_ref(),
                 shows_top_prefixes: !(is_predicted && self.sequence.whole_anchor()),
                 wanted,
@@ -343,6 +364,8 @@ impl SequenceCoder<'_, '_> {
                 in_one_layer: gop.in_one_layer,
             },
         )?;
+        let reports = fitted.into_iter().flat_map(|fitted| fitted.reports);
+        self.report.finetuned.extend(reports.map(|report| FinetuneReport { frame: number, ..report }));
         let role = FrameRole { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
         self.add(gop, number, &role, &target, &coded)?;
         gop.intra_bytes = coded.bytes() / f64::from(coded.gaussians().max(1));

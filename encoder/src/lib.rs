@@ -4,9 +4,9 @@
 //! (`target`), looks at every frame once (`sequence`), writes the beginning of the stream, its GOPs and its end
 //! (`writer`). `gop` goes from frame to frame: each GOP gets its colour transforms and codebooks (`gop_tools`), each frame
 //! (`frame`) its units, and each unit its sections (`section`, `models`, `blocks`). An I frame of one layer and a
-//! predicted frame take the same way. The result is decoded and looked at (`verification`). Prediction, contexts and
-//! reconstruction are the decoder's own functions. Same frames and settings, same bytes, on every machine and with any
-//! number of threads.
+//! predicted frame take the same way. Where that is asked for, the values of I frames are fitted to pictures (`finetune`).
+//! The result is decoded and looked at (`verification`). Prediction, contexts and reconstruction are the decoder's own
+//! functions. Same frames and settings, same bytes, on every machine and with any number of threads.
 //!
 //! Kernels of numbers index what they have counted themselves; each says at its head why that cannot fail.
 
@@ -22,6 +22,7 @@ mod clusters;
 mod colour;
 mod entropy_cost;
 mod error;
+mod finetune;
 mod frame;
 mod gop;
 mod gop_tools;
@@ -58,7 +59,9 @@ mod verification;
 mod vq;
 mod writer;
 
+pub use allocation::Attribute;
 pub use error::Error;
+pub use finetune::{Finetune, FinetuneReport, Photograph};
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;

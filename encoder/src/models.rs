@@ -338,6 +338,61 @@ fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedB
     Some(bits)
 }
 
+/// What the values of a plane cost.
+pub(crate) struct PlaneCosts {
+    /// Taken off each value.
+    pub(crate) bias: i32,
+    /// The table of each value.
+    pub(crate) table_of_value: Vec<u8>,
+    /// Bits of values under each table.
+    pub(crate) tables: Vec<ValueBits>,
+    /// Bits of all values.
+    pub(crate) bits: f64,
+}
+
+/// Bits of values under one table.
+pub(crate) struct ValueBits {
+    of_token: Vec<f32>,
+    direct_log2: u8,
+}
+
+/// Bits of a token that a table does not have.
+const ABSENT: f32 = 14.0;
+
+impl ValueBits {
+    fn new(table: &Frequencies, direct_log2: u8) -> Self {
+        let bits = |cost: f64| (cost as f32).min(ABSENT);
+        Self { of_token: token_costs(table).into_iter().map(bits).collect(), direct_log2 }
+    }
+
+    /// Of a value, less the bias.
+    pub(crate) fn of(&self, value: i32) -> f32 {
+        let token = split(zigzag(value).into(), self.direct_log2);
+        let bits = self.of_token.get(usize::from(token.token)).copied().unwrap_or(ABSENT);
+        bits + token.raw_bits as f32
+    }
+}
+
+/// What the values of each plane of a section cost under its models.
+pub(crate) fn costs(models: &[PlaneModel], blocks: &Blocks<'_>) -> Vec<PlaneCosts> {
+    let (planes, cut) = (blocks.planes(), blocks.cut(0..blocks.len()));
+    let of_plane = |(plane, model): (usize, &PlaneModel)| {
+        let of_block = |block: &CodedBlock| -> Vec<u8> {
+            let contexts = contexts(model, planes[plane], plane, block);
+            let context = |index: usize| usize::from(contexts.get(index).copied().unwrap_or(0));
+            (0..block.len()).map(|index| model.table_of_context[context(index)]).collect()
+        };
+        let bits = cut.iter().filter_map(|block| symbol_bits(model, planes[plane], plane, block)).sum();
+        PlaneCosts {
+            bias: model.bias,
+            table_of_value: cut.iter().flat_map(of_block).collect(),
+            tables: model.tables.iter().map(|table| ValueBits::new(table, model.direct_log2)).collect(),
+            bits,
+        }
+    };
+    models.par_iter().enumerate().map(of_plane).collect()
+}
+
 /// Bits of a model that is carried, to the next byte.
 fn model_bits(model: &PlaneModel, alphabet: Alphabet) -> f64 {
     8.0 * write_models(slice::from_ref(model), &[alphabet], None).len() as f64

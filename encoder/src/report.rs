@@ -1,5 +1,6 @@
 //! What was written, what was chosen, and why.
 
+use crate::finetune::FinetuneReport;
 use crate::isolated::Isolated;
 use crate::laws::Laws;
 use crate::sequence::Analysis;
@@ -56,6 +57,8 @@ pub struct Report {
     pub target: Option<TargetReport>,
     /// Gaussians left out because a value of theirs is not finite, by frame.
     pub dropped: Vec<Dropped>,
+    /// What fitting I frames to pictures has done, frame by frame; none where it was not asked for.
+    pub finetuned: Vec<FinetuneReport>,
     /// Whether each frame stands for itself in one layer although frames might have been predicted: that is smaller.
     pub stands_alone: bool,
 }

@@ -2,7 +2,7 @@
 
 use crate::blocks::{Blocks, first_value_plane};
 use crate::error::Error;
-use crate::models;
+use crate::models::{self, PlaneCosts};
 use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
 use splatstream_decoder::increment::values::SectionValues;
@@ -73,6 +73,12 @@ impl SectionDraft {
         };
         let model = write_models(&chosen, &self.layout.alphabets(), before);
         self.code_with(section, &blocks, chosen, model, in_force)
+    }
+
+    /// What values cost under the models of the section: one entry for each plane after the position.
+    pub(crate) fn costs(&self, values: &SectionValues, plan: &SectionPlan) -> Vec<PlaneCosts> {
+        let blocks = self.blocks(values, plan);
+        models::costs(&self.own, &blocks).split_off(first_value_plane(&self.layout))
     }
 
     /// The same with more bits than are needed: A.2 allows no more than so many new Gaussians in a byte.

@@ -156,6 +156,9 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
     if !(1.0..=20.0).contains(&settings.steps.position_bits) {
         return setting("position_bits", settings.steps.position_bits.to_string(), "1 to 20");
     }
+    if let Some(finetune) = &settings.finetune {
+        finetune.check()?;
+    }
     if settings.gop == 0 {
         return setting("gop", "0".into(), "1 or more");
     }

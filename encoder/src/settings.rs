@@ -1,5 +1,6 @@
 //! What a user asks for: quality, effort, layers.
 
+use crate::finetune::Finetune;
 use crate::frame::ladder::Ladder;
 use crate::laws::Laws;
 use crate::steps::Steps;
@@ -293,6 +294,8 @@ pub struct Settings {
     /// How far the pictures of a frame that is true to them may be below what they would be if every difference were
     /// sent, which is what the steps of the quality give: decibels above 0, mean of the views, against the source.
     pub tolerance: f32,
+    /// Fit the values of I frames to pictures; none: each is the nearest to that of the source.
+    pub finetune: Option<Finetune>,
     /// Tools that may be used.
     pub tools: Tools,
     /// log2 of the Gaussians in an entropy block.
@@ -375,6 +378,7 @@ impl Default for Settings {
             cameras: Vec::new(),
             fidelity: None,
             tolerance: 0.3,
+            finetune: None,
             tools: Tools::default(),
             block_log2: 14,
             ticks: (30, 1),

@@ -33,6 +33,8 @@ pub(crate) struct IntraTarget<'a> {
     pub(crate) shows_top_prefixes: bool,
     /// Goes when it is not needed any more.
     pub(crate) wanted: Wanted,
+    /// What the lowest layer has of them, if that is to be something else.
+    pub(crate) lowest: Option<Wanted>,
     /// Most important first.
     pub(crate) order: &'a [u32],
     /// Row of each Gaussian in its file, and rows of the file.
@@ -103,7 +105,9 @@ impl Intra<'_> {
             added.push((rows.to_vec(), self.grain(layer, refinement)));
             before = after;
         }
-        let new = NewList::all(self.coder, &self.target.wanted, added, self.models.before(0));
+        // Layers above add nothing: they refine.
+        let lowest = self.target.lowest.as_ref().unwrap_or(&self.target.wanted);
+        let new = NewList::all(self.coder, lowest, added, self.models.before(0));
         if !self.target.chooser.predicts() && !self.ladder.refines_from(layer) {
             self.target.wanted = self.target.wanted.select(&[]);
         }

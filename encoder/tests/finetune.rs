@@ -1,0 +1,229 @@
+//! What fitting I frames to pictures may do, and what it must not.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is a failed test")]
+
+#[path = "common/mod.rs"]
+mod common;
+
+use common::{builtin, decoded, encoded, strict};
+use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::process::{Decoder, Options};
+use splatstream_encoder::{
+    Attribute, Error, Finetune, Photograph, Preset, Report, Settings, Structure, encode,
+};
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_format::Limits;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::unit::Stream;
+use splatstream_gaussians::GaussianFrame;
+use splatstream_render::camera::{Up, ring};
+use splatstream_render::{Image, ReferencePictures, render};
+use std::time::Duration;
+
+const ALL: [Attribute; 6] = [
+    Attribute::Position,
+    Attribute::LogScale,
+    Attribute::Rotation,
+    Attribute::Opacity,
+    Attribute::Dc,
+    Attribute::Sh,
+];
+
+/// In pictures of a few lines: small scenes do not need more, and tests are done soon.
+fn quick(iterations: u32) -> Finetune {
+    Finetune { iterations, lines: vec![108], ..Finetune::default() }
+}
+
+fn settings(iterations: u32) -> Settings {
+    let finetune = Some(quick(iterations));
+    Settings { preset: Preset::Fast, verify: true, finetune, ..Settings::default() }
+}
+
+fn plain() -> Settings {
+    Settings { finetune: None, ..settings(1) }
+}
+
+fn scene() -> Vec<GaussianFrame> {
+    vec![builtin(1_500, 1)]
+}
+
+fn psnr(report: &Report) -> f64 {
+    report.pictures.as_ref().and_then(|pictures| pictures.psnr()).unwrap()
+}
+
+fn planes(bytes: &[u8]) -> QuantizedFrame {
+    decoded(bytes, &strict()).0.remove(0).into_shown()
+}
+
+#[test]
+fn pictures_from_elsewhere_gain_and_the_stream_stays_as_small() {
+    let (before, plain) = encoded(scene(), &plain());
+    let (after, tuned) = encoded(scene(), &settings(40));
+    assert!(psnr(&tuned) > psnr(&plain) + 0.5, "{} {}", psnr(&plain), psnr(&tuned));
+    assert!(after.len() as f64 <= 1.03 * before.len() as f64, "{} {}", before.len(), after.len());
+    let [report] = tuned.finetuned.as_slice() else { panic!("{:?}", tuned.finetuned) };
+    assert_eq!((report.frame, report.iterations), (0, 40));
+    assert!(report.psnr[1] > report.psnr[0]);
+}
+
+#[test]
+fn judges_never_see_less_than_without() {
+    for iterations in [1, 2, 26] {
+        let (_, report) = encoded(scene(), &settings(iterations));
+        let [before, after] = report.finetuned[0].psnr;
+        assert!(after >= before, "{iterations}: {before} {after}");
+    }
+}
+
+#[test]
+fn the_bytes_are_the_same_for_any_number_of_threads() {
+    let of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| encoded(scene(), &settings(6)).0)
+    };
+    let one = of(1);
+    assert_eq!(one, of(3));
+    assert_ne!(one, encoded(scene(), &plain()).0);
+}
+
+#[test]
+fn every_attribute_is_reached_and_the_others_are_held() {
+    let before = planes(&encoded(scene(), &plain()).0);
+    for own in ALL {
+        let held = ALL.into_iter().filter(|&attribute| attribute != own).collect();
+        let finetune = Some(Finetune { held, ..quick(20) });
+        let after = planes(&encoded(scene(), &Settings { finetune, ..plain() }).0);
+        // Other steps follow from log-scales and opacities, and the order of coding from positions.
+        let sorted = |planes: &[Vec<i32>]| planes.iter().map(|plane| sorted(plane)).collect::<Vec<_>>();
+        let same = [
+            (Attribute::LogScale, sorted(&before.log_scale) == sorted(&after.log_scale)),
+            (Attribute::Opacity, self::sorted(&before.opacity) == self::sorted(&after.opacity)),
+            (Attribute::Rotation, sorted(&before.rotation) == sorted(&after.rotation)),
+            (Attribute::Dc, sorted(&before.dc) == sorted(&after.dc)),
+            (Attribute::Sh, sorted(&before.sh) == sorted(&after.sh)),
+        ];
+        let follows = |attribute| match own {
+            Attribute::LogScale => true,
+            Attribute::Opacity => attribute != Attribute::LogScale,
+            _ => attribute == own,
+        };
+        for (attribute, is_same) in same {
+            assert!(attribute != own || !is_same, "{own:?} changes nothing");
+            assert!(follows(attribute) || is_same, "{own:?} changes {attribute:?}");
+        }
+        let position = |frame: &QuantizedFrame| frame.position.each_ref().map(|plane| sorted_of(plane));
+        assert_eq!(position(&before) == position(&after), own != Attribute::Position, "{own:?}");
+    }
+}
+
+fn sorted(plane: &[i32]) -> Vec<i32> {
+    sorted_of(plane)
+}
+
+fn sorted_of<T: Ord + Copy>(plane: &[T]) -> Vec<T> {
+    let mut plane = plane.to_vec();
+    plane.sort_unstable();
+    plane
+}
+
+/// Photographs of a scene that is brighter than the one that is encoded.
+fn photographs(count: u32) -> Vec<Photograph> {
+    let mut bright = scene().remove(0);
+    bright.planes_mut().dc.into_iter().flatten().for_each(|value| *value += 0.3);
+    let cameras = ring(&bright, Up::default(), count, 90);
+    let photograph = |camera: splatstream_render::Camera| Photograph {
+        picture: render(&bright, &camera, [0.0; 3]).colour,
+        camera,
+    };
+    cameras.into_iter().map(photograph).collect()
+}
+
+#[test]
+fn photographs_are_what_the_stream_comes_to_look_like() {
+    let finetune = Some(Finetune { photographs: photographs(16), ..quick(60) });
+    let (_, report) = encoded(scene(), &Settings { finetune, ..plain() });
+    let [before, after] = report.finetuned[0].psnr;
+    assert!(after > before + 2.0, "{before} {after}");
+}
+
+#[test]
+fn frames_that_others_refer_to_stay_near_the_source() {
+    let scene = BuiltinScene { gaussians: 300, frames: 3, sh_degree: 0, ..BuiltinScene::default() };
+    let frames = || (0..3).map(|number| scene.frame(number)).collect::<Vec<_>>();
+    let predicted =
+        |settings: Settings| Settings { structure: Structure::Predicted { layers: 1 }, ..settings };
+    let (bytes, report) = encoded(frames(), &predicted(settings(2)));
+    assert!(report.finetuned.is_empty());
+    assert_eq!(bytes, encoded(frames(), &predicted(plain())).0);
+    let (_, intra) = encoded(frames(), &settings(2));
+    assert_eq!(intra.finetuned.iter().map(|report| report.frame).collect::<Vec<_>>(), [0, 1, 2]);
+}
+
+#[test]
+fn a_quality_is_reached_after_fitting_with_fewer_bytes() {
+    let wanted = |settings: Settings| Settings { psnr: Some(44.0), ..settings };
+    let (before, _) = encoded(scene(), &wanted(plain()));
+    let (after, report) = encoded(scene(), &wanted(settings(50)));
+    assert!((psnr(&report) - 44.0).abs() <= 0.5, "{}", psnr(&report));
+    assert!((after.len() as f64) < 0.97 * before.len() as f64, "{} {}", before.len(), after.len());
+}
+
+#[test]
+fn the_lowest_layer_is_fitted_to_pictures_of_its_own_lines() {
+    let layered = |settings: Settings| Settings { spatial_layers: 2, ..settings };
+    let lowest = |bytes: &[u8]| {
+        let operating_point = OperatingPoint { spatial: 0, ..OperatingPoint::ALL };
+        let frame = decoded(bytes, &Options { operating_point, ..strict() }).0.remove(0).into_shown();
+        let frame = to_gaussians(frame, &sequence(bytes)).unwrap();
+        let source = scene().remove(0);
+        let views = ReferencePictures::new(&source, ring(&source, Up::default(), 5, 108));
+        views.psnr(&frame).sum::<f64>() / 5.0
+    };
+    let (before, _) = encoded(scene(), &layered(plain()));
+    let finetune = Some(Finetune { lines: vec![108, 216], ..quick(40) });
+    let (after, report) = encoded(scene(), &layered(Settings { finetune, ..plain() }));
+    assert_eq!(report.finetuned.iter().map(|fitted| fitted.spatial_layer).collect::<Vec<_>>(), [0, 1]);
+    assert!(lowest(&after) > lowest(&before) + 0.5, "{} {}", lowest(&before), lowest(&after));
+}
+
+fn sequence(bytes: &[u8]) -> SequenceParameters {
+    let limits = Limits::default();
+    let stream = Stream::open(bytes, &limits).unwrap();
+    let mut decoder = Decoder::new(stream.header(), Options { limits, ..Options::default() });
+    let mut units = stream.units();
+    while decoder.sequence().is_none() {
+        let _frame = decoder.unit(&units.next_unit().unwrap().unwrap());
+    }
+    *decoder.sequence().unwrap()
+}
+
+#[test]
+fn nothing_is_fitted_where_there_is_nothing() {
+    let empty = builtin(100, 0).select(&[]);
+    let (_, report) = encoded(vec![empty], &settings(3));
+    assert!(report.finetuned.is_empty());
+    let one = builtin(100, 0).select(&[0]);
+    let (_, report) = encoded(vec![one], &settings(3));
+    assert_eq!(report.finetuned.len(), 1);
+}
+
+#[test]
+fn what_cannot_be_done_is_refused() {
+    let refused = |finetune: Finetune| {
+        let settings = Settings { finetune: Some(finetune), ..plain() };
+        match encode(&mut scene(), &settings, &mut Vec::new(), &mut |_, _| ()) {
+            Err(Error::Setting { name, .. }) => name,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(refused(Finetune { iterations: 0, ..Finetune::default() }), "finetune iterations");
+    let time_budget = Some(Duration::ZERO);
+    assert_eq!(refused(Finetune { time_budget, ..Finetune::default() }), "finetune time budget");
+    assert_eq!(refused(Finetune { lines: vec![540, 0], ..Finetune::default() }), "finetune lines");
+    let few = photographs(3);
+    assert_eq!(refused(Finetune { photographs: few, ..Finetune::default() }), "finetune photographs");
+    let mut other = photographs(8);
+    other[2].picture = Image::new(2, vec![[0.0; 3]; 4]);
+    assert_eq!(refused(Finetune { photographs: other, ..Finetune::default() }), "finetune photograph");
+}
