@@ -2,6 +2,7 @@
 
 mod choices;
 mod each;
+mod finetune;
 mod output;
 mod pictures;
 pub(crate) mod warnings;
@@ -20,6 +21,7 @@ use crate::setting_names::{
 use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
+use finetune::{FinetuneArgs, Fitted};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use serde::Serialize;
@@ -46,6 +48,7 @@ use warnings::{Warning, unlike_frames, warnings};
     splatstream encode garden.ply -o garden.gss --quality visually-lossless --preset small\n  \
     splatstream encode garden.ply -o garden.gss --target-mb 8\n  \
     splatstream encode frames/ -o talk.html\n  \
+    splatstream encode garden.ply -o garden.gss --psnr 45 --finetune\n  \
     splatstream encode garden.ply plant.spz talk/ --each -o streams/")]
 pub(crate) struct Encode {
     /// Files, or one directory of frames; - is one .ply, .spz or .sog file on standard input.
@@ -155,6 +158,8 @@ pub(crate) struct Encode {
     /// Tools to leave out, to see what each is worth.
     #[arg(long, value_enum, value_name = "TOOL,...", value_delimiter = ',')]
     without: Vec<ToolName>,
+    #[command(flatten)]
+    finetune: FinetuneArgs,
 }
 
 /// Cameras that a stream can hold.
@@ -262,6 +267,8 @@ struct Encoded {
     chosen: Vec<Choice>,
     #[serde(flatten)]
     pictures: Pictures,
+    /// What fitting frames to pictures has done; empty where it was not asked for.
+    finetuned: Vec<Fitted>,
     warnings: Vec<Warning>,
     digests: Vec<String>,
 }
@@ -379,6 +386,7 @@ impl Encode {
             keep_invisible: self.keep_invisible,
             ticks: self.fps,
             importance: self.importance.map(Into::into),
+            finetune: self.finetune.settings(&cameras, &self.layers)?,
             cameras,
             fidelity: self.fidelity.map(Into::into),
             tolerance: self.tolerance,
@@ -456,6 +464,7 @@ impl Encoded {
             dropped: report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum(),
             chosen: choices(report, settings),
             pictures: Pictures::of(report, settings, Goal::of(settings)),
+            finetuned: Fitted::of(report),
             warnings: warnings(report, settings, &|frame| source.name(frame)),
             digests: report.digests.iter().copied().map(hex_digest).collect(),
         }
@@ -467,7 +476,7 @@ impl Encoded {
             self.page_bytes.map(|bytes| format!(", in a page of {}", grouped(bytes))).unwrap_or_default();
         format!(
             "{}\n  frames             {}\n  Gaussians          {}\n  bytes              {}{page}\n  \
-             bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}chosen\n{chosen}",
+             bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}{}chosen\n{chosen}",
             self.output.display(),
             grouped(self.frames.into()),
             grouped(self.gaussians),
@@ -475,6 +484,7 @@ impl Encoded {
             self.bpg,
             self.seconds,
             self.pictures.text(),
+            Fitted::text(&self.finetuned),
         )
     }
 }

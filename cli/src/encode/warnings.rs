@@ -63,6 +63,7 @@ pub(crate) fn warnings(
     }
     warnings.extend(pulses(report));
     warnings.extend(short_gops(report, settings));
+    warnings.extend(not_fitted(report, settings));
     warnings
 }
 
@@ -184,6 +185,22 @@ fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
             report.frames
         );
         Warning::new("short-gops", message)
+    })
+}
+
+/// Frames that fitting to pictures has left as they are.
+fn not_fitted(report: &Report, settings: &Settings) -> Option<Warning> {
+    let coded = report.coded.iter().filter(|frame| frame.gaussians > 0).count();
+    // Of frames with layers each layer is listed.
+    let fitted = report.finetuned.iter().filter(|fitted| fitted.spatial_layer == 0).count();
+    let left = coded.saturating_sub(fitted);
+    (settings.finetune.is_some() && left > 0).then(|| {
+        let message = format!(
+            "{left} of {} frames are not fine-tuned: those of a GOP of which others are predicted stay near the source; --all-intra \
+             has every frame fine-tuned",
+            report.frames
+        );
+        Warning::new("not-fine-tuned", message)
     })
 }
 

@@ -1,0 +1,181 @@
+//! What fits frames to pictures, and what that has done.
+
+use crate::failure::Failure;
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use splatstream_chart::numbers::bits_per_gaussian;
+use splatstream_encoder::{Attribute, Finetune, Photograph, Report};
+use splatstream_render::{Camera, Image};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Iterations where none are given.
+const ITERATIONS: &str = "200";
+
+/// Options of fitting to pictures.
+#[derive(Args, Debug)]
+pub(super) struct FinetuneArgs {
+    /// Choose the values of frames by pictures of what is decoded, in so many iterations at most, 200 if none are given:
+    /// fewer bits for the same PSNR, and minutes for each frame. Frames of sequences are fitted where each stands for
+    /// itself, as with --all-intra.
+    #[arg(long, value_name = "ITERATIONS", num_args = 0..=1, default_missing_value = ITERATIONS)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    finetune: Option<u32>,
+    /// Seconds of that for each frame, each time it is encoded. How far it gets in them depends on the machine, and so do
+    /// the bytes that are written; of iterations alone they do not.
+    #[arg(long, value_name = "SECONDS", requires = "finetune", value_parser = parse_seconds)]
+    time_budget: Option<f64>,
+    /// Fit the frame to photographs and not to pictures of the source: PNG files in this directory, named as the cameras of
+    /// the file that --cameras gives.
+    #[arg(long, value_name = "DIR", requires = "finetune", requires = "cameras")]
+    images: Option<PathBuf>,
+    /// Fit these attributes only, to see what each is worth.
+    #[arg(long, value_enum, value_name = "ATTRIBUTE,...", value_delimiter = ',', requires = "finetune")]
+    finetune_only: Vec<AttributeName>,
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|seconds| (0.001..=1e7).contains(seconds));
+    seconds.ok_or_else(|| format!("'{text}' is not a number of seconds above 0"))
+}
+
+/// An attribute of Gaussians.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum AttributeName {
+    /// Centres.
+    Position,
+    /// Semi-axes.
+    LogScale,
+    /// Rotations.
+    Rotation,
+    /// Opacities.
+    Opacity,
+    /// The constant part of colours.
+    Dc,
+    /// What colours change with the direction of view.
+    Sh,
+}
+
+impl From<AttributeName> for Attribute {
+    fn from(name: AttributeName) -> Self {
+        match name {
+            AttributeName::Position => Self::Position,
+            AttributeName::LogScale => Self::LogScale,
+            AttributeName::Rotation => Self::Rotation,
+            AttributeName::Opacity => Self::Opacity,
+            AttributeName::Dc => Self::Dc,
+            AttributeName::Sh => Self::Sh,
+        }
+    }
+}
+
+impl FinetuneArgs {
+    /// The settings of the encoder; none where nothing is to be fitted. `layers`: lines that spatial layers are for, if they
+    /// were given.
+    ///
+    /// # Errors
+    /// A photograph that is not there, cannot be read or has another shape than its camera.
+    pub(super) fn settings(&self, cameras: &[Camera], layers: &[u32]) -> Result<Option<Finetune>, Failure> {
+        let Some(iterations) = self.finetune else { return Ok(None) };
+        let is_held = |name: &&AttributeName| !self.finetune_only.contains(name);
+        let held = match self.finetune_only.is_empty() {
+            true => Vec::new(),
+            false => {
+                AttributeName::value_variants().iter().filter(is_held).map(|&name| name.into()).collect()
+            }
+        };
+        let photographs = match &self.images {
+            Some(directory) => {
+                cameras.iter().map(|camera| photograph(directory, camera)).collect::<Result<_, _>>()?
+            }
+            None => Vec::new(),
+        };
+        let time_budget = self.time_budget.map(Duration::from_secs_f64);
+        Ok(Some(Finetune { iterations, time_budget, photographs, lines: layers.to_vec(), held }))
+    }
+}
+
+/// The photograph that a camera took.
+fn photograph(directory: &Path, camera: &Camera) -> Result<Photograph, Failure> {
+    let name = Path::new(&camera.name).file_name().unwrap_or_default();
+    let path = directory.join(name).with_extension("png");
+    let bytes = std::fs::read(&path).map_err(|cause| Failure::file("read", &path, &cause))?;
+    let picture =
+        Image::from_png(&bytes).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+    let (width, height) = (picture.width(), picture.height());
+    let camera = camera.scaled_to_height(u32::try_from(height).unwrap_or(u32::MAX));
+    if camera.width as usize != width {
+        return Err(Failure::other(format!(
+            "{}: the photograph has {width} x {height} pixels, its camera {} x {height} at that height: give the camera the shape \
+             of the photograph",
+            path.display(),
+            camera.width
+        )));
+    }
+    Ok(Photograph { camera, picture })
+}
+
+/// What fitting one frame has done.
+#[derive(Serialize)]
+pub(super) struct Fitted {
+    frame: u32,
+    spatial_layer: u8,
+    iterations: u32,
+    seconds: f64,
+    /// In views that no slope was taken of.
+    psnr_db_before: f64,
+    psnr_db_after: f64,
+    /// Of all values but positions, as estimated.
+    values_bpg_before: f64,
+    values_bpg_after: f64,
+}
+
+impl Fitted {
+    /// Every frame that was fitted.
+    pub(super) fn of(report: &Report) -> Vec<Self> {
+        let fitted = |one: &splatstream_encoder::FinetuneReport| {
+            let coded = report.coded.get(one.frame as usize);
+            let gaussians = coded.map_or(0, |frame| u64::from(frame.gaussians));
+            let [psnr_db_before, psnr_db_after] = one.psnr;
+            let [values_bpg_before, values_bpg_after] =
+                one.bits.map(|bits| bits_per_gaussian((bits / 8.0) as u64, gaussians));
+            Self {
+                frame: one.frame,
+                spatial_layer: one.spatial_layer,
+                iterations: one.iterations,
+                seconds: one.seconds,
+                psnr_db_before,
+                psnr_db_after,
+                values_bpg_before,
+                values_bpg_after,
+            }
+        };
+        report.finetuned.iter().map(fitted).collect()
+    }
+
+    /// Lines for people: each layer of the first frame, and how many there are.
+    pub(super) fn text(all: &[Self]) -> String {
+        let seconds: f64 = all.iter().map(|fitted| fitted.seconds).sum();
+        let line = |fitted: &Self| {
+            format!(
+                "  fine-tuned         frame {}, spatial layer {}, {} iterations: {:.2} to {:.2} dB in views that it was not fitted \
+                 to, {:.2} to {:.2} bits per Gaussian\n",
+                fitted.frame,
+                fitted.spatial_layer,
+                fitted.iterations,
+                fitted.psnr_db_before,
+                fitted.psnr_db_after,
+                fitted.values_bpg_before,
+                fitted.values_bpg_after,
+            )
+        };
+        let first =
+            all.iter().take_while(|fitted| all.first().is_some_and(|first| first.frame == fitted.frame));
+        let mut text: String = first.map(line).collect();
+        if !all.is_empty() {
+            text +=
+                &format!("  fine-tuning        {} frames and layers in {seconds:.1} seconds\n", all.len());
+        }
+        text
+    }
+}
