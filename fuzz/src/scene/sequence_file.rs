@@ -107,7 +107,7 @@ pub fn tar(input: &[u8]) -> Vec<u8> {
         let mut header = [0; 512];
         let name = names[usize::from(name) % names.len()];
         header[..name.len()].copy_from_slice(name.as_bytes());
-        let size = content.len() as u64 + (u64::from(wrong) << (wrong % 30));
+        let size = content.len() as u64 + (u64::from(wrong) << (wrong % 25));
         header[124..136].copy_from_slice(format!("{size:011o}\0").as_bytes());
         header[156] = [b'0', b'L', b'x', b'g', b'5', b'1', b'K', kind][usize::from(kind % 8)];
         header[257..265].copy_from_slice(b"ustar\x0000");
