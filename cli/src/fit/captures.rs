@@ -56,8 +56,8 @@ impl Captures {
 /// Whether a directory has cameras, as [`read_capture`] finds them.
 fn is_capture(path: &Path) -> bool {
     let places = ["", "sparse/0", "sparse"];
-    let has = |place: &&str| {
+    let has = |place: &str| {
         ["bin", "txt"].iter().any(|ending| path.join(place).join(format!("images.{ending}")).is_file())
     };
-    path.is_dir() && (path.join("transforms.json").is_file() || places.iter().any(|place| has(&place)))
+    path.is_dir() && (path.join("transforms.json").is_file() || places.iter().any(|place| has(place)))
 }
