@@ -24,18 +24,25 @@ pub(crate) trait GopSink {
 /// GOPs that are coded and not written yet.
 #[derive(Default)]
 pub(crate) struct Coded {
-    gops: Vec<(GopHeader, u32, Vec<(UnitId, Vec<u8>)>)>,
+    gops: Vec<CodedGop>,
+}
+
+struct CodedGop {
+    header: GopHeader,
+    /// Its first frame.
+    frame: u32,
+    units: Vec<(UnitId, Vec<u8>)>,
 }
 
 impl GopSink for Coded {
     fn gop(&mut self, header: &GopHeader, frame: u32) -> Result<(), Error> {
-        self.gops.push((*header, frame, Vec::new()));
+        self.gops.push(CodedGop { header: *header, frame, units: Vec::new() });
         Ok(())
     }
 
     fn unit(&mut self, id: UnitId, payload: Vec<u8>) -> Result<(), Error> {
-        if let Some((_, _, units)) = self.gops.last_mut() {
-            units.push((id, payload));
+        if let Some(gop) = self.gops.last_mut() {
+            gop.units.push((id, payload));
         }
         Ok(())
     }
@@ -44,13 +51,13 @@ impl GopSink for Coded {
 impl Coded {
     /// Bytes of the units.
     pub(crate) fn bytes(&self) -> usize {
-        let units = self.gops.iter().flat_map(|(_, _, units)| units);
+        let units = self.gops.iter().flat_map(|gop| &gop.units);
         units.map(|(_, payload)| UnitHeader::SIZE.saturating_add(payload.len())).sum()
     }
 
     /// Writes all of it.
     pub(crate) fn write_to(self, writer: &mut UnitWriter<'_>) -> Result<(), Error> {
-        for (header, frame, units) in self.gops {
+        for CodedGop { header, frame, units } in self.gops {
             writer.gop(&header, frame)?;
             units.into_iter().try_for_each(|(id, payload)| GopSink::unit(writer, id, payload))?;
         }
