@@ -78,7 +78,8 @@ impl SectionDraft {
     /// What values cost under the models of the section: one entry for each plane after the position.
     pub(crate) fn costs(&self, values: &SectionValues, plan: &SectionPlan) -> Vec<PlaneCosts> {
         let blocks = self.blocks(values, plan);
-        models::costs(&self.own, &blocks).split_off(first_value_plane(&self.layout))
+        // A section without values has no models.
+        models::costs(&self.own, &blocks).into_iter().skip(first_value_plane(&self.layout)).collect()
     }
 
     /// The same with more bits than are needed: A.2 allows no more than so many new Gaussians in a byte.
