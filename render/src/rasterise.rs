@@ -135,7 +135,7 @@ impl Tiles {
     #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory; `every` is 1 or more")]
     fn start(self, row: usize) -> usize {
         let every = self.every.max(1) as usize;
-        (self.first as usize + row * ((3 * every / 8) | 1)) % every
+        (self.first as usize + row * (3 * every / 8 | 1)) % every
     }
 
     /// The columns that are drawn of a row with so many tiles.
