@@ -4,7 +4,7 @@
 //! more. The sum of errors that is allowed then costs least where every attribute's share of it is in proportion
 //! to its n. Both are estimated on a sample of the Gaussians: k from what pictures [show](crate::sensitivity) of each, n
 //! by counting symbols. From there k is measured, but for the fast preset, and in the end what all attributes together do
-//! to pictures: by drawing [some tiles](crate::sampled_views) of a few views.
+//! to pictures: by drawing [strips](crate::strips) of a few views.
 #![expect(
     clippy::indexing_slicing,
     reason = "rows are those of the frame that all planes are of; parts and axes are constants"
@@ -16,12 +16,12 @@ use crate::laws::Laws;
 use crate::pca::Components;
 use crate::quantised::Trial;
 use crate::refinements::parts;
-use crate::sampled_views::{SampledView, SampledViews, mean};
 use crate::secant::Secant;
 use crate::sensitivity::Sensitivity;
 use crate::sequence::Scene;
 use crate::settings::{Preset, Settings};
 use crate::steps::Steps;
+use crate::strips::{StripView, StripViews, mean};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
@@ -29,8 +29,8 @@ use splatstream_render::camera::{Up, spiral};
 /// Views made for the scene, and their height, where none are given; of given ones no more are taken.
 const VIEWS: u32 = 4;
 const HEIGHT: u32 = 540;
-/// Of so many tiles of a view one is drawn.
-const EVERY: u32 = 12;
+/// Of so many strips of a view one is drawn.
+const EVERY: u32 = 8;
 /// Views in which attributes are measured alone: shares need not be exact.
 const ALONE: usize = 2;
 /// Frames of fewer Gaussians are measured so for the fast preset too.
@@ -41,7 +41,7 @@ const SAMPLE: usize = 1 << 14;
 const ROUNDS: usize = 2;
 /// How often pictures are measured, at most, and how near is near enough, dB: a stream that misses more costs another
 /// encoding.
-const CORRECTIONS: usize = 8;
+const CORRECTIONS: usize = 6;
 const NEAR: f64 = 0.2;
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
@@ -110,9 +110,9 @@ pub(crate) struct Fit {
     /// Principal components of dc and of sh.
     pub(crate) bases: [Components; 2],
     /// The source as the views show it that quality is measured in.
-    views: Vec<SampledView>,
+    views: Vec<StripView>,
     /// The source as those views show it in which attributes are measured alone.
-    alone: Vec<SampledView>,
+    alone: Vec<StripView>,
     /// Some of the Gaussians, and which these are.
     sample: (GaussianFrame, Vec<u32>),
     sensitivity: Sensitivity,
@@ -124,7 +124,7 @@ impl Fit {
     pub(crate) fn new(
         frame: &GaussianFrame,
         ranked: &Ranked,
-        views: &SampledViews,
+        views: &StripViews,
         settings: &Settings,
     ) -> Self {
         let laws = match settings.tools.adaptive_steps {
@@ -214,7 +214,7 @@ impl Fit {
         Ok(self.sensitivity.errors(sample, &decoded))
     }
 
-    /// The same as some tiles of a few views show it.
+    /// The same as strips of a few views show it.
     fn measured(&self, steps: &Steps) -> Result<[f64; 6], Error> {
         let views = self.alone.iter();
         let trials: Vec<Trial<'_>> =
@@ -225,7 +225,7 @@ impl Fit {
                 continue;
             }
             let of_view =
-                |(view, trial): (&SampledView, &Trial<'_>)| Ok(view.psnr(&trial.decoded(&[attribute])?));
+                |(view, trial): (&StripView, &Trial<'_>)| Ok(view.psnr(&trial.decoded(&[attribute])?));
             let decibels = mean(self.alone.iter().zip(&trials).map(of_view))?;
             *error = decibels.map_or(0.0, |decibels| libm::pow(10.0, -0.1 * decibels));
         }
@@ -264,7 +264,7 @@ impl Fit {
 
 /// What attributes are measured alone in: nothing for the fast preset, unless there are so few Gaussians that estimates are
 /// poor and pictures cost little.
-fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Vec<SampledView> {
+fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Vec<StripView> {
     if settings.preset == Preset::Fast && frame.len() >= FEW {
         return Vec::new();
     }
@@ -272,7 +272,7 @@ fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Ve
     let first = usize::from(cameras.len() > 1);
     let apart = cameras.len().div_ceil(ALONE).max(1);
     let places = (first..cameras.len()).step_by(apart).take(ALONE);
-    SampledViews::new(cameras, EVERY, frame.len()).of(frame, places)
+    StripViews::new(cameras, EVERY, frame.len()).of(frame, places)
 }
 
 /// The views that shares are fitted in.

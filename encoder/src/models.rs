@@ -23,7 +23,6 @@ use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 /// Gaussians that are looked at for the choice of a model, nearly: whole blocks.
 const SAMPLE: usize = 1 << 15;
 const SAMPLE_FAST: usize = 1 << 14;
-const SAMPLE_SMALL: usize = 1 << 17;
 /// Gaussians whose tokens are counted at once.
 const COUNTED: usize = 1 << 16;
 /// Thresholds of the first and of the second axis.
@@ -31,12 +30,16 @@ const FIRST_THRESHOLDS: usize = 15;
 const SECOND_THRESHOLDS: usize = 3;
 
 /// The unsigned values of a plane of one block, as they are split in tokens.
-pub(crate) fn unsigned_values(info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u64> {
+pub(crate) fn unsigned_values<'a>(
+    info: PlaneInfo,
+    plane: usize,
+    block: &'a CodedBlock,
+) -> Box<dyn ExactSizeIterator<Item = u64> + 'a> {
     let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
     match info.alphabet {
-        Alphabet::Position => block.deltas.clone(),
-        Alphabet::Index => coded.iter().map(|&index| u64::from(index.unsigned_abs())).collect(),
-        Alphabet::Attribute => coded.iter().map(|&value| u64::from(zigzag(value))).collect(),
+        Alphabet::Position => Box::new(block.deltas.iter().copied()),
+        Alphabet::Index => Box::new(coded.iter().map(|&index| u64::from(index.unsigned_abs()))),
+        Alphabet::Attribute => Box::new(coded.iter().map(|&value| u64::from(zigzag(value)))),
     }
 }
 
@@ -223,7 +226,7 @@ fn count(
 ) {
     for block in blocks {
         let contexts = contexts(model, info, plane, block);
-        for (index, value) in unsigned_values(info, plane, block).into_iter().enumerate() {
+        for (index, value) in unsigned_values(info, plane, block).enumerate() {
             let context = usize::from(contexts.get(index).copied().unwrap_or(0));
             let table = usize::from(model.table_of_context[context]);
             histograms[table].add(split(value, model.direct_log2).token);
@@ -257,7 +260,7 @@ pub(crate) fn choose_all(blocks: &Blocks<'_>, preset: Preset, tools: Tools) -> V
     let most = match preset {
         Preset::Fast => SAMPLE_FAST,
         Preset::Balanced => SAMPLE,
-        Preset::Small => SAMPLE_SMALL,
+        Preset::Small => usize::MAX,
     };
     let stride = blocks.values().div_ceil(most).max(1);
     let two_axes = preset != Preset::Fast && blocks.values() >= 1024;
@@ -325,7 +328,7 @@ fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedB
     let contexts = contexts(model, info, plane, block);
     let costs: Vec<Vec<f64>> = model.tables.iter().map(token_costs).collect();
     let mut bits = 0.0;
-    for (index, value) in unsigned_values(info, plane, block).into_iter().enumerate() {
+    for (index, value) in unsigned_values(info, plane, block).enumerate() {
         let context = usize::from(contexts.get(index).copied().unwrap_or(0));
         let token = split(value, model.direct_log2);
         let costs = &costs[usize::from(model.table_of_context[context])];

@@ -18,7 +18,7 @@ pub enum Preset {
     /// Two context sources a plane; vector quantisation is tried on a sample.
     #[default]
     Balanced,
-    /// As balanced, with every source tried for both axes on a larger sample, and an order from more and larger views.
+    /// As balanced, with every source tried for both axes on all Gaussians.
     Small,
 }
 
@@ -250,7 +250,7 @@ pub struct Settings {
     pub steps: Steps,
     /// How steps follow from what is known of a Gaussian.
     pub laws: Laws,
-    /// Fit steps and laws to the first frame, so that pictures have this PSNR in views that are made for that,
+    /// Fit steps and laws to the first frame, so that pictures have this PSNR in views that nothing is chosen by,
     /// decibels; 20 to 90.
     pub psnr: Option<f32>,
     /// Fit the steps so that the stream has this size, to 3 %; `psnr` is not looked at then.

@@ -167,7 +167,7 @@ struct Fitting<'a> {
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
         let (first, frame) = first_frame(source, settings)?;
-        let [views, _] = verification::views(&first, settings);
+        let views = verification::views(&first, settings);
         drop(first);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
@@ -266,7 +266,7 @@ impl<'a> Seeker<'a> {
         while let Some(at) = next {
             let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.kept(at)? };
             // Where nothing can be seen nothing is too bad.
-            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr());
+            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.psnr());
             let measured = measured.unwrap_or(wanted);
             let first = *start.get_or_insert(measured);
             // Something else than the steps spoils the pictures: finer ones would only cost bits.

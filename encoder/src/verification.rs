@@ -1,16 +1,15 @@
-//! The finished stream, decoded and looked at: what its pictures are worth, in the views that decide how fine all steps
-//! together are, and in as many others that decide nothing.
+//! The finished stream, decoded and looked at: what its pictures are worth, in views that nothing else was chosen by
+//! than how fine all steps together are.
 //!
 //! While a stream is written the units of up to three of its GOPs are kept: those of the first, the middle and the last
 //! frame. Each is decoded when it is complete, as any receiver would who starts there, and a few of its frames are
-//! drawn beside those of the source: some tiles of each picture, which have nearly the errors of all of it. What is measured
-//! is the stream, not what the encoder believes of it.
+//! drawn beside those of the source: some strips of each picture, which have nearly the errors of all of it. What is measured is the stream, not what the encoder believes of it.
 
 use crate::error::Error;
 use crate::report::{PictureReport, VerifiedFrame};
-use crate::sampled_views::SampledViews;
 use crate::settings::{Preset, Settings};
 use crate::source::FrameSource;
+use crate::strips::StripViews;
 use core::ops::Range;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
@@ -21,14 +20,13 @@ use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Rendering;
 use splatstream_render::camera::{Up, held_out};
 
-/// Views of each frame that decide, as many as there are that do not, and their height: with other heights PSNR is another
-/// number.
+/// Views of each frame, and their height: with other heights PSNR is another number.
 const VIEWS: u32 = 4;
 const HEIGHT: u32 = 540;
 
-/// Of so many tiles of a view one is drawn; for the fast preset.
-const EVERY: u32 = 24;
-const EVERY_FAST: u32 = 36;
+/// Of so many strips of a view one is drawn; for the fast preset.
+const EVERY: u32 = 6;
+const EVERY_FAST: u32 = 12;
 
 /// Keeps units while they are written, and the frames that they decode to.
 pub(crate) struct Verifier {
@@ -157,28 +155,18 @@ impl Verifier {
             let mut original =
                 || source.frame(number).map_err(|source| Error::Source { frame: number, source });
             let views = views(&original()?, settings);
-            let draw = |views: &SampledViews| views.draw(&frame).collect::<Vec<Rendering>>();
-            let decoded = views.each_ref().map(draw);
+            let decoded: Vec<Rendering> = views.draw(&frame).collect();
             drop(frame);
-            let original = original()?;
-            let [of_fit, others] = views;
-            let [drawn_of_fit, drawn_of_others] = decoded;
-            let fitted_psnr = of_fit.mean_psnr(&original, &drawn_of_fit)?;
-            let psnr = others.mean_psnr(&original, &drawn_of_others)?;
-            frames.push(VerifiedFrame { number, frame_type, psnr, fitted_psnr });
+            let psnr = views.mean_psnr(&original()?, &decoded)?;
+            frames.push(VerifiedFrame { number, frame_type, psnr });
         }
         Ok(PictureReport { frames, views: VIEWS, height: HEIGHT })
     }
 }
 
-/// Views of a frame that decide how fine all steps together are, and views that decide nothing.
-pub(crate) fn views(frame: &GaussianFrame, settings: &Settings) -> [SampledViews; 2] {
+/// Views of a frame that nothing is chosen by but how fine all steps together are.
+pub(crate) fn views(frame: &GaussianFrame, settings: &Settings) -> StripViews {
     let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
-    let cameras = held_out(frame, Up::default(), &settings.cameras, 2 * VIEWS, HEIGHT);
-    // They rise from below to above: of four that follow each other each side takes the outer or the inner two.
-    let is_of_fit = |number: usize| matches!(number % 4, 0 | 3);
-    [true, false].map(|of_fit| {
-        let cameras = cameras.iter().enumerate().filter(|(number, _)| is_of_fit(*number) == of_fit);
-        SampledViews::new(cameras.map(|(_, camera)| camera.clone()).collect(), every, frame.len())
-    })
+    let cameras = held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
+    StripViews::new(cameras, every, frame.len())
 }

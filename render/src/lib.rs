@@ -4,7 +4,7 @@
 //!   for a scene that has none;
 //! * [`rasterise`]: a frame of Gaussians to a picture, as 3D Gaussian splatting defines it;
 //! * [`ReferencePictures`]: a frame as cameras see it, to compare other frames with;
-//! * [`PreparedFrame::tiles`]: some tiles of a picture, which show nearly the errors of all of it;
+//! * [`PreparedFrame::strips`]: strips of a picture, which show nearly the errors of all of it;
 //! * [`contribution`]: how much each Gaussian shows in a set of views;
 //! * [`gradient`]: how a loss on pictures changes with every value of a frame;
 //! * [`metrics`]: PSNR, SSIM, a learned metric, and the mean difference of two rate-distortion curves.
@@ -28,5 +28,5 @@ mod reference;
 
 pub use camera::Camera;
 pub use image::Image;
-pub use rasterise::{PreparedFrame, Rendering, Tiles, render};
+pub use rasterise::{PreparedFrame, Rendering, Strips, render};
 pub use reference::ReferencePictures;

@@ -12,14 +12,15 @@ mod tile;
 
 use crate::camera::Camera;
 use crate::image::Image;
-pub(crate) use block::Block;
-pub(crate) use project::{LOW_PASS, Shapes, Splat, near, seen_slopes};
+pub(crate) use project::Shapes;
+pub(crate) use project::Splat;
+pub(crate) use project::{LOW_PASS, seen_slopes};
 use project::{project, touching};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::TileRows;
 use splatstream_gaussians::GaussianFrame;
-pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, Lanes, MAX_ALPHA, Tile, blend_tile, exp2};
+pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, Lanes, Tile, blend_tile};
 
 /// Pixels on a side of a tile.
 pub(crate) const TILE: usize = 16;
@@ -40,7 +41,7 @@ pub struct Rendering {
 /// not finite, are left out.
 /// Gaussians at one depth are drawn in the order of the frame.
 pub fn render(frame: &GaussianFrame, camera: &Camera, background: [f32; 3]) -> Rendering {
-    PreparedFrame::new(frame).tiles(camera, background, Tiles::ALL)
+    PreparedFrame::new(frame).strips(camera, background, Strips::ALL)
 }
 
 /// A frame, and what is the same of it in all views, worked out once.
@@ -56,17 +57,17 @@ impl<'a> PreparedFrame<'a> {
         Self { frame, shapes: Shapes::of(frame) }
     }
 
-    /// Draws some tiles of a picture. Each pixel is as in the [whole picture](render); those of less than all tiles come one
-    /// below the other, the lines of a row of tiles from the top.
+    /// Draws some strips of a picture, one below the other. Each pixel is as in the [whole picture](render).
     #[must_use]
-    pub fn tiles(&self, camera: &Camera, background: [f32; 3], tiles: Tiles) -> Rendering {
-        draw(self, camera, background, (tiles, pulp::Arch::new()))
+    pub fn strips(&self, camera: &Camera, background: [f32; 3], strips: Strips) -> Rendering {
+        draw(self, camera, background, (strips, pulp::Arch::new()))
     }
 
-    /// The Gaussians that may touch some tiles of a picture, by rising row: a frame of these draws the same tiles.
+    /// The Gaussians that touch some strips of a picture, by rising row: a frame of these draws the same strips.
     #[must_use]
-    pub fn touching(&self, camera: &Camera, tiles: Tiles) -> Vec<u32> {
-        touching(self.frame, &self.shapes, &Sight::of_tiles(camera, tiles))
+    pub fn touching(&self, camera: &Camera, strips: Strips) -> Vec<u32> {
+        let strips = strips.within((camera.height as usize).div_ceil(TILE));
+        touching(self.frame, &self.shapes, &Sight { strips, ..Sight::of(camera) })
     }
 }
 
@@ -75,9 +76,10 @@ fn draw(
     prepared: &PreparedFrame<'_>,
     camera: &Camera,
     background: [f32; 3],
-    (tiles, arch): (Tiles, pulp::Arch),
+    (strips, arch): (Strips, pulp::Arch),
 ) -> Rendering {
-    let sight = Sight::of_tiles(camera, tiles);
+    let strips = strips.within((camera.height as usize).div_ceil(TILE));
+    let sight = Sight { strips, ..Sight::of(camera) };
     paint(&View::new(prepared.frame, &prepared.shapes, &sight), &sight, background, arch)
 }
 
@@ -85,72 +87,39 @@ fn draw(
 #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
 pub(crate) fn paint(view: &View, sight: &Sight<'_>, background: [f32; 3], arch: pulp::Arch) -> Rendering {
     let (width, height) = (sight.camera.width as usize, sight.camera.height as usize);
-    let of_row = |row: usize| {
-        let widths = sight.tiles.columns(row, width.div_ceil(TILE)).map(|column| across(column, width));
-        widths.sum::<usize>() * across(row, height)
-    };
-    let sizes: Vec<usize> = (0..height.div_ceil(TILE)).map(of_row).collect();
-    let mut pixels = vec![[0.0; 3]; sizes.iter().sum()];
-    let mut alpha = vec![0.0; pixels.len()];
-    let mut left = (pixels.as_mut_slice(), alpha.as_mut_slice());
-    let row = |(row, size): (usize, usize)| {
-        let (pixels, rest) = core::mem::take(&mut left.0).split_at_mut(size);
-        let (alpha, other) = core::mem::take(&mut left.1).split_at_mut(size);
-        left = (rest, other);
-        DrawRow { view, row, tiles: sight.tiles, pixels, alpha, background }
-    };
-    let rows: Vec<DrawRow<'_>> = sizes.into_iter().enumerate().map(row).collect();
-    rows.into_par_iter().with_max_len(1).for_each(|row| arch.dispatch(row));
-    let line = if sight.tiles == Tiles::ALL { width } else { 1 };
-    Rendering { colour: Image::new(line, pixels), alpha }
+    let rows: Vec<usize> = sight.strips.rows(height.div_ceil(TILE)).collect();
+    let lines: usize = rows.iter().map(|row| TILE.min(height - row * TILE)).sum();
+    let mut pixels = vec![[0.0; 3]; width * lines];
+    let mut alpha = vec![0.0; width * lines];
+    let bands = pixels.par_chunks_mut(width * TILE).zip(alpha.par_chunks_mut(width * TILE));
+    bands.zip(rows).with_max_len(1).for_each(|((pixels, alpha), row)| {
+        arch.dispatch(DrawRow { view, row, pixels, alpha, background });
+    });
+    Rendering { colour: Image::new(width, pixels), alpha }
 }
 
-/// Pixels of a row or column of tiles, of a picture of so many.
-#[expect(clippy::arithmetic_side_effects, reason = "tiles begin within the picture")]
-fn across(tile: usize, size: usize) -> usize {
-    TILE.min(size - tile * TILE)
-}
-
-/// Some of the tiles of a picture, squares of 16 pixels, spread evenly over all of it: the errors of a few of them are
-/// nearly those of the whole picture, and cost little.
+/// Strips of 16 lines of a picture: errors of a few of them are nearly those of the whole picture, and cost little.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Tiles {
-    /// The first tile of the first row, counted from the left.
+pub struct Strips {
+    /// The first strip, counted from the top.
     pub first: u32,
-    /// From one tile of a row to the next, 1 or more; of a row with fewer tiles than this one is drawn.
+    /// From one strip to the next, 1 or more. Of a picture with fewer strips than this, one is drawn.
     pub every: u32,
 }
 
-impl Tiles {
+impl Strips {
     /// The whole picture.
     pub const ALL: Self = Self { first: 0, every: 1 };
 
-    /// As many of them, of a picture that has so many in a row.
-    pub(crate) fn within(self, across: usize) -> Self {
-        let every = self.every.clamp(1, across.max(1) as u32);
+    /// As many of them, of a picture of so many strips.
+    fn within(self, count: usize) -> Self {
+        let every = self.every.clamp(1, count.max(1) as u32);
         Self { first: self.first.checked_rem(every).unwrap_or_default(), every }
     }
 
-    /// The first that is drawn in a row: further to the right from row to row, so that none of their columns stand out.
-    #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory; `every` is 1 or more")]
-    fn start(self, row: usize) -> usize {
-        let every = self.every.max(1) as usize;
-        (self.first as usize + row * (3 * every / 8 | 1)) % every
-    }
-
-    /// The columns that are drawn of a row with so many tiles.
-    pub(crate) fn columns(self, row: usize, across: usize) -> impl Iterator<Item = usize> {
-        (self.start(row)..across).step_by(self.every.max(1) as usize)
-    }
-
-    /// Whether one of those is drawn that lie from the first to the second column and row.
-    #[inline(always)]
-    #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory; `every` is 1 or more")]
-    pub(crate) fn any(self, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) -> bool {
-        let every = self.every.max(1) as usize;
-        // Every so many columns of a row, or rows of a column, hold one.
-        let wide = right + 1 - left;
-        wide >= every || (top..=bottom).any(|row| (self.start(row) + every - left % every) % every < wide)
+    /// The rows of tiles among so many.
+    fn rows(self, count: usize) -> impl Iterator<Item = usize> {
+        (self.first as usize..count).step_by(self.every.max(1) as usize)
     }
 }
 
@@ -158,18 +127,18 @@ impl Tiles {
 #[derive(Clone, Copy)]
 pub(crate) struct Sight<'a> {
     pub(crate) camera: &'a Camera,
-    pub(crate) tiles: Tiles,
+    pub(crate) strips: Strips,
+    /// The Gaussians that are drawn, by rising row; none: all.
+    pub(crate) rows: Option<&'a [u32]>,
+    /// The side of a pixel of the picture that this one stands for, pixels of this one, at most 1. Where that is
+    /// finer, a Gaussian covers as much as it does there, however small it is here.
+    pub(crate) fine: f32,
 }
 
 impl<'a> Sight<'a> {
-    /// A whole picture.
+    /// A whole picture of all Gaussians that stands for itself.
     pub(crate) const fn of(camera: &'a Camera) -> Self {
-        Self { camera, tiles: Tiles::ALL }
-    }
-
-    /// Some tiles of a picture.
-    fn of_tiles(camera: &'a Camera, tiles: Tiles) -> Self {
-        Self { camera, tiles: tiles.within((camera.width as usize).div_ceil(TILE)) }
+        Self { camera, strips: Strips::ALL, rows: None, fine: 1.0 }
     }
 }
 
@@ -184,17 +153,20 @@ pub(crate) struct View {
 impl View {
     /// Projects and sorts.
     pub(crate) fn new(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Self {
-        let splats = project(frame, shapes, sight);
+        Self::of(project(frame, shapes, sight), sight)
+    }
+
+    /// Sorts ellipses that are projected already, nearest first.
+    pub(crate) fn of(splats: Vec<Splat>, sight: &Sight<'_>) -> Self {
         let rows = TileRows::new(&splats, sight);
         Self { splats, rows }
     }
 }
 
-/// Draws the tiles of a row, side by side.
+/// Draws one row of tiles into the pixels of its lines.
 struct DrawRow<'a> {
     view: &'a View,
     row: usize,
-    tiles: Tiles,
     pixels: &'a mut [[f32; 3]],
     alpha: &'a mut [f32],
     background: [f32; 3],
@@ -209,23 +181,20 @@ impl WithSimd for DrawRow<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let View { splats, rows } = self.view;
         let entries = rows.entries(self.row, splats);
-        let [width, height] = rows.size();
-        let line = self.pixels.len() / across(self.row, height);
-        let mut left = 0;
-        for column in self.tiles.columns(self.row, entries.tiles()) {
+        let [width, _] = rows.size();
+        for column in 0..entries.tiles() {
             let mut tile = Tile::new(self.row, column, rows.size());
             let mut ink = Ink::default();
             blend_tile(splats, entries.of_tile(column), &mut tile, &mut ink);
-            let right = left + across(column, width);
-            let lines = self.pixels.chunks_mut(line).zip(self.alpha.chunks_mut(line));
+            let left = column * TILE;
+            let lines = self.pixels.chunks_mut(width).zip(self.alpha.chunks_mut(width));
             for ((pixels, alpha), (light, passed)) in lines.zip(ink.light.iter().zip(tile.transmittance())) {
-                let line = pixels[left..right].iter_mut().zip(&mut alpha[left..right]);
+                let line = pixels[left..].iter_mut().zip(&mut alpha[left..]).take(TILE);
                 for (lane, (pixel, alpha)) in line.enumerate() {
                     *pixel = [0, 1, 2].map(|c| light[c][lane] + passed[lane] * self.background[c]);
                     *alpha = 1.0 - passed[lane];
                 }
             }
-            left = right;
         }
     }
 }
@@ -262,52 +231,23 @@ mod tests {
         let frame = BuiltinScene { gaussians: 5_000, ..BuiltinScene::default() }.frame(0);
         for camera in ring(&frame, Up::default(), 2, 133) {
             let plain =
-                draw(&PreparedFrame::new(&frame), &camera, [0.5; 3], (Tiles::ALL, pulp::Arch::Scalar));
+                draw(&PreparedFrame::new(&frame), &camera, [0.5; 3], (Strips::ALL, pulp::Arch::Scalar));
             assert_eq!(render(&frame, &camera, [0.5; 3]), plain);
         }
     }
 
     #[test]
-    fn tiles_are_parts_of_the_picture() {
+    fn strips_are_parts_of_the_picture() {
         let frame = BuiltinScene { gaussians: 5_000, ..BuiltinScene::default() }.frame(0);
         for (camera, first) in ring(&frame, Up::default(), 3, 133).iter().zip(0..) {
             let whole = render(&frame, camera, [0.5; 3]);
-            let (width, height) = (camera.width as usize, camera.height as usize);
-            let tiles = Tiles { first, every: 4 };
-            let mut expected = Vec::new();
-            for row in 0..height.div_ceil(TILE) {
-                let columns: Vec<usize> = tiles.columns(row, width.div_ceil(TILE)).collect();
-                for line in row * TILE..height.min((row + 1) * TILE) {
-                    for column in &columns {
-                        let part = column * TILE..width.min((column + 1) * TILE);
-                        expected.extend_from_slice(&whole.colour.pixels()[line * width..][part]);
-                    }
-                }
-            }
-            let prepared = PreparedFrame::new(&frame);
-            assert_eq!(prepared.tiles(camera, [0.5; 3], tiles).colour.pixels(), expected);
-            // So do those alone that touch them, where the near plane is the same.
-            let touching = prepared.touching(camera, tiles);
-            assert!(touching.len() < frame.len());
-            let alone = frame.select(&touching);
-            let drawn = PreparedFrame::new(&alone).tiles(camera, [0.5; 3], tiles);
+            let strips = Strips { first, every: 4 };
+            let drawn = PreparedFrame::new(&frame).strips(camera, [0.5; 3], strips);
+            let line = camera.width as usize * TILE;
+            let chunks: Vec<&[[f32; 3]]> = whole.colour.pixels().chunks(line).collect();
+            let expected: Vec<[f32; 3]> =
+                strips.within(chunks.len()).rows(chunks.len()).flat_map(|row| chunks[row]).copied().collect();
             assert_eq!(drawn.colour.pixels(), expected);
-        }
-    }
-
-    #[test]
-    fn a_part_of_a_picture_holds_a_tile_where_one_is_drawn_in_it() {
-        for (every, first) in [(1, 0), (3, 2), (7, 4), (16, 9)] {
-            let tiles = Tiles { first, every };
-            for left in 0..20 {
-                for right in left..left + 5 {
-                    for top in 0..9 {
-                        let is_drawn = |row| tiles.columns(row, 30).any(|c| (left..=right).contains(&c));
-                        let expected = (top..=top + 1).any(is_drawn);
-                        assert_eq!(tiles.any([left, right], [top, top + 1]), expected);
-                    }
-                }
-            }
         }
     }
 }

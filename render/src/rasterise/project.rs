@@ -3,7 +3,7 @@
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
 
 use super::block::Block;
-use super::{Sight, TILE, Tiles};
+use super::{Sight, Strips, TILE};
 use crate::camera::Camera;
 use glam::{Mat3, Vec3};
 use pulp::{Simd, WithSimd};
@@ -67,11 +67,6 @@ impl Shapes {
         Self { axes, longest, opacity: logits.map(|logit| 1.0 / (1.0 + libm::expf(-logit))).collect() }
     }
 
-    /// Opacity of each Gaussian.
-    pub(crate) fn opacity(&self) -> &[f32] {
-        &self.opacity
-    }
-
     /// The semi-axes of a Gaussian.
     pub(crate) fn axes(&self, row: usize) -> [Vec3; 3] {
         self.axes[row]
@@ -81,11 +76,11 @@ impl Shapes {
 /// The ellipses of the Gaussians that touch the picture, nearest first.
 pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Vec<Splat> {
     let view = View::new(frame, shapes, sight);
-    let count = frame.len();
+    let count = sight.rows.map_or(frame.len(), <[u32]>::len);
     let starts: Vec<usize> = (0..count).step_by(CHUNK).collect();
     let chunk = |&start: &usize| {
         let places = start..count.min(start + CHUNK);
-        pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows: places })
+        pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows: sight.rows, places })
     };
     let chunks: Vec<Vec<(f32, Splat)>> = starts.par_iter().map(chunk).collect();
     // Positive floats order as their bits; equal depths keep the order of the frame.
@@ -107,10 +102,11 @@ pub(crate) fn touching(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>
     rows.filter(|&row| view.ellipse(row).is_some()).map(|row| row as u32).collect()
 }
 
-/// Projects some Gaussians.
+/// Projects some Gaussians: places of the rows, or of the frame where there are none.
 struct ProjectChunk<'a> {
     view: &'a View<'a>,
-    rows: Range<usize>,
+    rows: Option<&'a [u32]>,
+    places: Range<usize>,
 }
 
 impl WithSimd for ProjectChunk<'_> {
@@ -118,10 +114,10 @@ impl WithSimd for ProjectChunk<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let Self { view, rows } = self;
-        let mut splats = Vec::with_capacity(rows.len());
-        for start in rows.clone().step_by(TILE) {
-            let block = Block::new(None, start..rows.end.min(start + TILE));
+        let Self { view, rows, places } = self;
+        let mut splats = Vec::with_capacity(places.len());
+        for start in places.clone().step_by(TILE) {
+            let block = Block::new(rows, start..places.end.min(start + TILE));
             let first = splats.len();
             for (lane, row) in block.rows() {
                 if let Some((depth, splat)) = view.ellipse(row) {
@@ -154,7 +150,9 @@ struct View<'a> {
     focal: [f32; 2],
     principal: [f32; 2],
     size: [f32; 2],
-    tiles: Tiles,
+    strips: Strips,
+    /// Variance of the low-pass filter in the picture that this one stands for, square pixels of this one.
+    fine_pass: f32,
     slopes: [(f32, f32); 2],
 }
 
@@ -173,7 +171,8 @@ impl<'a> View<'a> {
             focal: camera.focal,
             principal: camera.principal,
             size,
-            tiles: sight.tiles,
+            strips: sight.strips,
+            fine_pass: LOW_PASS * sight.fine * sight.fine,
             slopes: seen_slopes(camera),
         }
     }
@@ -189,7 +188,12 @@ impl<'a> View<'a> {
         let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(row, at);
         let (wide, tall) = (xx + LOW_PASS, yy + LOW_PASS);
         let determinant = sharp + LOW_PASS * (xx + tall);
-        let kept = if self.frame.antialiased() { (sharp / determinant).sqrt() } else { 1.0 };
+        // What it covers in the picture that this one stands for.
+        let fine = match self.frame.antialiased() {
+            true => sharp,
+            false => sharp + self.fine_pass * (xx + (yy + self.fine_pass)),
+        };
+        let kept = (fine / determinant).sqrt();
         let opacity = self.shapes.opacity[row] * kept;
         let peak = libm::log2f(opacity);
         // Squared Mahalanobis distance at which alpha is 1/255.
@@ -205,8 +209,7 @@ impl<'a> View<'a> {
         if !(touches(0) && touches(1) && extent[0].is_finite() && extent[1].is_finite()) {
             return None;
         }
-        let around = |axis: usize| (centre[axis] - extent[axis], centre[axis] + extent[axis]);
-        if !self.is_in_tiles([around(0), around(1)]) {
+        if !self.is_in_strips(centre[1] - extent[1], centre[1] + extent[1]) {
             return None;
         }
         let splat = Splat {
@@ -237,23 +240,20 @@ impl<'a> View<'a> {
             (centre - reach, centre + reach)
         });
         let is_beside = (0..2).any(|axis: usize| bounds[axis].1 < 0.0 || bounds[axis].0 > self.size[axis]);
-        is_beside || !self.is_in_tiles(bounds)
+        is_beside || !self.is_in_strips(bounds[1].0, bounds[1].1)
     }
 
-    /// Whether a part of the picture, from and to a place on each axis, has to do with a tile that is drawn. What is not
-    /// finite does.
+    /// Whether lines between these belong to a strip that is drawn. What is not finite does.
     #[inline(always)]
-    fn is_in_tiles(&self, part: [(f32, f32); 2]) -> bool {
-        if self.tiles.every <= 1 {
+    fn is_in_strips(&self, top: f32, bottom: f32) -> bool {
+        let every = self.strips.every as f32;
+        if self.strips.every <= 1 {
             return true;
         }
-        let [columns, rows] = [0, 1].map(|axis: usize| {
-            let last = (self.size[axis] - 1.0).max(0.0);
-            let tile = |at: f32| (at.max(0.0).min(last) as usize) / TILE;
-            [tile(part[axis].0), tile(part[axis].1)]
-        });
-        let is_finite = part.iter().all(|(from, to)| from.is_finite() && to.is_finite());
-        !is_finite || self.tiles.any(columns, rows)
+        let [top, bottom] = [top, bottom].map(|line| line / TILE as f32 - self.strips.first as f32);
+        // The first strip that ends below the top begins above the bottom.
+        let strip = ((top - 1.0) / every).ceil() * every;
+        strip <= bottom || strip.is_nan()
     }
 
     /// Covariance of the projection, without low-pass.
@@ -290,7 +290,7 @@ pub(crate) fn seen_slopes(camera: &Camera) -> [(f32, f32); 2] {
 ///
 /// The bits of a positive float, read as an integer, are close to a logarithm of it: their mean is exact and does not
 /// depend on the order.
-pub(crate) fn near(frame: &GaussianFrame, camera: &Camera) -> f32 {
+fn near(frame: &GaussianFrame, camera: &Camera) -> f32 {
     let [x, y, z] = frame.position();
     let [ahead, position] = [camera.rotation[2], camera.position].map(Vec3::from);
     let depth = |row: usize| ahead.dot(Vec3::new(x[row], y[row], z[row]) - position);

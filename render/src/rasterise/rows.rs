@@ -5,14 +5,13 @@
 )]
 
 use super::project::{LOG2_255, Splat};
-use super::{Sight, TILE, Tiles};
+use super::{Sight, TILE};
 use rayon::prelude::*;
 
 /// The ellipses that touch each row of tiles, nearest first.
 pub(crate) struct TileRows {
     /// Width and height of the picture, pixels.
     size: [usize; 2],
-    tiles: Tiles,
     rows: Vec<Vec<u32>>,
 }
 
@@ -33,6 +32,8 @@ impl TileRows {
         let camera = sight.camera;
         let count = (camera.height as usize).div_ceil(TILE);
         let mut rows = vec![Vec::new(); count];
+        let mut is_drawn = vec![false; count];
+        sight.strips.rows(count).for_each(|row| is_drawn[row] = true);
         let of_splat = |splat: &Splat| tiles_across(splat.centre[1], splat.extent[1], count);
         let across: Vec<(u32, u32)> = splats.par_iter().with_min_len(4096).map(of_splat).collect();
         // Bands of rows, so that threads share no row.
@@ -42,11 +43,13 @@ impl TileRows {
             for (place, &(top, bottom)) in (0..).zip(&across) {
                 let top = (top as usize).max(first);
                 for row in top..(bottom as usize + 1).min(first + rows.len()) {
-                    rows[row - first].push(place);
+                    if is_drawn[row] {
+                        rows[row - first].push(place);
+                    }
                 }
             }
         });
-        Self { size: [camera.width as usize, camera.height as usize], tiles: sight.tiles, rows }
+        Self { size: [camera.width as usize, camera.height as usize], rows }
     }
 
     /// Width and height of the picture, pixels.
@@ -65,7 +68,7 @@ impl TileRows {
         self.rows.len()
     }
 
-    /// Sorts the ellipses of a row into those of its tiles that are drawn.
+    /// Sorts the ellipses of a row into its tiles.
     #[inline(always)]
     #[expect(
         clippy::indexing_slicing,
@@ -74,17 +77,14 @@ impl TileRows {
     pub(crate) fn entries(&self, row: usize, splats: &[Splat]) -> RowEntries {
         let tiles = self.size[0].div_ceil(TILE);
         let top = (row * TILE) as f32 + 0.5;
-        let mut is_drawn = vec![false; tiles];
-        self.tiles.columns(row, tiles).for_each(|column| is_drawn[column] = true);
-        let drawn = |(left, right): (i32, i32)| {
-            (left..=right).map(|tile| tile as usize).filter(|&tile| is_drawn[tile])
-        };
         let mut starts = vec![0; tiles + 1];
         let mut spans = Vec::with_capacity(self.rows[row].len());
         for &place in &self.rows[row] {
             let (left, right) = span(&splats[place as usize], top, top + (TILE - 1) as f32);
             let (left, right) = (left.max(0), right.min(tiles as i32 - 1));
-            drawn((left, right)).for_each(|tile| starts[tile + 1] += 1);
+            for tile in left..=right {
+                starts[tile as usize + 1] += 1;
+            }
             spans.push((left, right));
         }
         for tile in 0..tiles {
@@ -92,9 +92,9 @@ impl TileRows {
         }
         let mut next = starts.clone();
         let mut entries = vec![0; starts[tiles] as usize];
-        for (&place, &span) in self.rows[row].iter().zip(&spans) {
-            for tile in drawn(span) {
-                let slot = &mut next[tile];
+        for (&place, &(left, right)) in self.rows[row].iter().zip(&spans) {
+            for tile in left..=right {
+                let slot = &mut next[tile as usize];
                 entries[*slot as usize] = place;
                 *slot += 1;
             }

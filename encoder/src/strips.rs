@@ -1,58 +1,58 @@
-//! Some tiles of the pictures of a frame, to compare those of another frame with.
+//! Strips of the pictures of a frame, to compare those of another frame with.
 //!
-//! Tiles that are spread over a picture have nearly the errors of all of it, and are drawn in a part of the time. They are
+//! Every so many lines of a picture have nearly the errors of all of them, and are drawn in a part of the time. They are
 //! of the size at which quality is meant, since small pictures hide errors that large ones show.
 
 use crate::error::Error;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
-use splatstream_render::{Camera, PreparedFrame, Rendering, Tiles};
+use splatstream_render::{Camera, PreparedFrame, Rendering, Strips};
 
 /// Around the scene.
 const BACKGROUND: [f32; 3] = [0.0; 3];
 
-/// Of frames of fewer Gaussians than the first more tiles are drawn, for the errors of a few Gaussians are in few places; of
-/// those of more than the second fewer.
-const FEW: usize = 1 << 17;
+/// Frames of fewer Gaussians than the first have more strips, for the errors of a few Gaussians are in few places; those
+/// of more than the second have fewer.
+const FEW: usize = 1 << 15;
 const MANY: usize = 1 << 19;
 
-/// A tile in so many, of a frame of so many Gaussians, where it is one in `every` of usual frames.
+/// A strip in so many, of a frame of so many Gaussians, where it is one in `every` of usual frames.
 #[expect(clippy::arithmetic_side_effects, reason = "small constants, and Gaussians in memory")]
-fn tile_of(every: u32, gaussians: usize) -> u32 {
+fn strip_of(every: u32, gaussians: usize) -> u32 {
     match gaussians < FEW {
         true => (every as usize * gaussians / FEW).max(1) as u32,
         false => every * gaussians.div_ceil(MANY) as u32,
     }
 }
 
-/// Which tiles are taken of a view: at other places in each.
+/// Which strips are taken of a view: at another height in each.
 #[expect(clippy::arithmetic_side_effects, reason = "counts of cameras, and small constants")]
-fn tiles(number: u32, every: u32) -> Tiles {
-    Tiles { first: every / 2 + number * (every / 3).max(1), every }
+fn strips(number: u32, every: u32) -> Strips {
+    Strips { first: every / 2 + number * (every / 3).max(1), every }
 }
 
-/// A view of some tiles, and the Gaussians that these show.
-pub(crate) struct SampledView {
+/// A view of some strips, and the Gaussians that these show.
+pub(crate) struct StripView {
     camera: Camera,
-    tiles: Tiles,
+    strips: Strips,
     picture: Rendering,
     /// The Gaussians, and which they are.
     pub(crate) frame: GaussianFrame,
     pub(crate) rows: Vec<u32>,
 }
 
-impl SampledView {
+impl StripView {
     /// Of a frame that is prepared.
-    fn new(frame: &GaussianFrame, prepared: &PreparedFrame<'_>, camera: &Camera, tiles: Tiles) -> Self {
-        let rows = prepared.touching(camera, tiles);
+    fn new(frame: &GaussianFrame, prepared: &PreparedFrame<'_>, camera: &Camera, strips: Strips) -> Self {
+        let rows = prepared.touching(camera, strips);
         let frame = frame.select(&rows);
-        let picture = PreparedFrame::new(&frame).tiles(camera, BACKGROUND, tiles);
-        Self { camera: camera.clone(), tiles, picture, frame, rows }
+        let picture = PreparedFrame::new(&frame).strips(camera, BACKGROUND, strips);
+        Self { camera: camera.clone(), strips, picture, frame, rows }
     }
 
     /// PSNR of another version of the same Gaussians, dB; none if nothing can be seen.
     pub(crate) fn psnr(&self, frame: &GaussianFrame) -> Option<f64> {
-        let drawn = PreparedFrame::new(frame).tiles(&self.camera, BACKGROUND, self.tiles);
+        let drawn = PreparedFrame::new(frame).strips(&self.camera, BACKGROUND, self.strips);
         compared(&self.picture, &drawn)
     }
 }
@@ -63,24 +63,24 @@ pub(crate) fn mean(decibels: impl Iterator<Item = Result<Option<f64>, Error>>) -
     Ok((!decibels.is_empty()).then(|| decibels.iter().sum::<f64>() / decibels.len() as f64))
 }
 
-/// Tiles of views in which frames are compared that are not in memory at the same time.
-pub(crate) struct SampledViews {
+/// Strips of views in which frames are compared that are not in memory at the same time.
+pub(crate) struct StripViews {
     cameras: Vec<Camera>,
     every: u32,
 }
 
-impl SampledViews {
-    /// One tile in `every` of each view, for frames of so many Gaussians.
+impl StripViews {
+    /// One strip in `every` of each view, for frames of so many Gaussians.
     pub(crate) fn new(cameras: Vec<Camera>, every: u32, gaussians: usize) -> Self {
-        Self { cameras, every: tile_of(every, gaussians) }
+        Self { cameras, every: strip_of(every, gaussians) }
     }
 
-    /// The tiles of a frame, to compare others of the same Gaussians with: of the views at some places.
-    pub(crate) fn of(&self, frame: &GaussianFrame, places: impl Iterator<Item = usize>) -> Vec<SampledView> {
+    /// The strips of a frame, to compare others of the same Gaussians with: of the views at some places.
+    pub(crate) fn of(&self, frame: &GaussianFrame, places: impl Iterator<Item = usize>) -> Vec<StripView> {
         let prepared = PreparedFrame::new(frame);
         let view = |place: usize| {
-            let tiles = tiles(place as u32, self.every);
-            Some(SampledView::new(frame, &prepared, self.cameras.get(place)?, tiles))
+            let strips = strips(place as u32, self.every);
+            Some(StripView::new(frame, &prepared, self.cameras.get(place)?, strips))
         };
         places.filter_map(view).collect()
     }
@@ -90,11 +90,11 @@ impl SampledViews {
         self.cameras.len()
     }
 
-    /// The tiles of a frame, view by view.
+    /// The strips of a frame, view by view.
     pub(crate) fn draw(&self, frame: &GaussianFrame) -> impl Iterator<Item = Rendering> {
         let prepared = PreparedFrame::new(frame);
         let views = self.cameras.iter().zip(0..);
-        views.map(move |(camera, number)| prepared.tiles(camera, BACKGROUND, tiles(number, self.every)))
+        views.map(move |(camera, number)| prepared.strips(camera, BACKGROUND, strips(number, self.every)))
     }
 
     /// Their mean PSNR where those of another frame have been drawn, dB; none if nothing can be seen in any.
