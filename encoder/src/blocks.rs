@@ -103,7 +103,7 @@ impl<'v> Blocks<'v> {
                 self.planes().iter().zip(models).zip(&encoders).enumerate()
             {
                 let contexts = models::contexts(model, info, plane, &block);
-                writer.plane(encoder, &contexts, models::unsigned_values(info, plane, &block))?;
+                writer.plane(encoder, &contexts, models::unsigned_values(info, plane, &block).into_iter())?;
             }
             Ok(writer.finish())
         };

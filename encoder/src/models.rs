@@ -30,16 +30,12 @@ const FIRST_THRESHOLDS: usize = 15;
 const SECOND_THRESHOLDS: usize = 3;
 
 /// The unsigned values of a plane of one block, as they are split in tokens.
-pub(crate) fn unsigned_values<'a>(
-    info: PlaneInfo,
-    plane: usize,
-    block: &'a CodedBlock,
-) -> Box<dyn ExactSizeIterator<Item = u64> + 'a> {
+pub(crate) fn unsigned_values(info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u64> {
     let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
     match info.alphabet {
-        Alphabet::Position => Box::new(block.deltas.iter().copied()),
-        Alphabet::Index => Box::new(coded.iter().map(|&index| u64::from(index.unsigned_abs()))),
-        Alphabet::Attribute => Box::new(coded.iter().map(|&value| u64::from(zigzag(value)))),
+        Alphabet::Position => block.deltas.clone(),
+        Alphabet::Index => coded.iter().map(|&index| u64::from(index.unsigned_abs())).collect(),
+        Alphabet::Attribute => coded.iter().map(|&value| u64::from(zigzag(value))).collect(),
     }
 }
 
@@ -226,7 +222,7 @@ fn count(
 ) {
     for block in blocks {
         let contexts = contexts(model, info, plane, block);
-        for (index, value) in unsigned_values(info, plane, block).enumerate() {
+        for (index, value) in unsigned_values(info, plane, block).into_iter().enumerate() {
             let context = usize::from(contexts.get(index).copied().unwrap_or(0));
             let table = usize::from(model.table_of_context[context]);
             histograms[table].add(split(value, model.direct_log2).token);
@@ -328,7 +324,7 @@ fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedB
     let contexts = contexts(model, info, plane, block);
     let costs: Vec<Vec<f64>> = model.tables.iter().map(token_costs).collect();
     let mut bits = 0.0;
-    for (index, value) in unsigned_values(info, plane, block).enumerate() {
+    for (index, value) in unsigned_values(info, plane, block).into_iter().enumerate() {
         let context = usize::from(contexts.get(index).copied().unwrap_or(0));
         let token = split(value, model.direct_log2);
         let costs = &costs[usize::from(model.table_of_context[context])];

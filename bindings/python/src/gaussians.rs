@@ -175,7 +175,7 @@ impl Gaussians {
     #[pyo3(signature = (path, *, max_memory=4 << 30))]
     fn load(py: Python<'_>, path: PathBuf, max_memory: u64) -> PyResult<Self> {
         let read = py.detach(|| read_scene_as_is(&path, &ReadLimits { max_memory }));
-        read.map(|frame| Self::new(Source::Given(frame))).map_err(|error| scene_error(py, error))
+        read.map(|scene| Self::new(Source::Given(scene.frame))).map_err(|error| scene_error(py, error))
     }
 
     /// Writes a .ply file as trainers write it: float32, which keeps every value as it is.

@@ -8,41 +8,41 @@ use crate::bits::BitWriter;
 use crate::payload::write_leb128;
 use crate::{Error, ErrorKind, Result};
 
-/// The intervals of a frequency table.
-#[derive(Debug, Clone)]
-struct EncodeTable {
-    /// Frequency and first slot of each token.
-    interval_of_token: Vec<(u16, u16)>,
-}
-
 /// A plane model arranged for coding. Built once a unit, shared by its blocks.
 #[derive(Debug, Clone)]
 pub struct PlaneEncoder {
     direct_log2: u8,
-    tables: Vec<EncodeTable>,
-    table_of_context: Vec<u8>,
+    /// Frequency and first slot of each token, table by table, as many of each table as the longest has.
+    intervals: Vec<(u16, u16)>,
+    tokens: usize,
+    /// Where the intervals of the table of each context start.
+    start_of_context: Vec<usize>,
 }
 
 impl PlaneEncoder {
     /// Expands the tables of a model.
     pub fn new(model: &PlaneModel) -> Self {
-        let expand = |of_token: &[u16]| {
+        let tokens = model.tables.iter().map(|table| table.of_token().len()).max().unwrap_or(0);
+        let mut intervals = Vec::with_capacity(tokens.wrapping_mul(model.tables.len()));
+        for table in &model.tables {
             let mut first = 0_u16;
-            let interval_of_token = of_token
-                .iter()
-                .map(|&frequency| {
-                    let interval = (frequency, first);
-                    first = first.wrapping_add(frequency);
-                    interval
-                })
-                .collect();
-            EncodeTable { interval_of_token }
-        };
-        Self {
-            direct_log2: model.direct_log2,
-            tables: model.tables.iter().map(|table| expand(table.of_token())).collect(),
-            table_of_context: model.table_of_context.clone(),
+            for token in 0..tokens {
+                let frequency = table.of_token().get(token).copied().unwrap_or(0);
+                intervals.push((frequency, first));
+                first = first.wrapping_add(frequency);
+            }
         }
+        let start = |&table: &u8| usize::from(table).wrapping_mul(tokens);
+        let start_of_context = model.table_of_context.iter().map(start).collect();
+        Self { direct_log2: model.direct_log2, intervals, tokens, start_of_context }
+    }
+
+    /// Frequency and first slot of a token in a context; none if it has no frequency.
+    #[inline]
+    fn interval(&self, context: u8, token: u8) -> Option<(u16, u16)> {
+        let token = usize::from(token);
+        let start = self.start_of_context.get(usize::from(context)).filter(|_| token < self.tokens)?;
+        self.intervals.get(start.wrapping_add(token)).copied().filter(|&(frequency, _)| frequency > 0)
     }
 }
 
@@ -84,21 +84,19 @@ impl BlockWriter {
             "8.3",
             ErrorKind::Constraint { rule: "a coded token has a frequency of at least 1" },
         );
-        for (lane, index) in Segments::new(values.len(), self.lanes_log2).order() {
-            let value = values.get(index).copied().unwrap_or(0);
-            let context = contexts.get(index).copied().unwrap_or(0);
-            let token = split(value, encoder.direct_log2);
-            let (frequency, first) = encoder
-                .table_of_context
-                .get(usize::from(context))
-                .and_then(|&table| encoder.tables.get(usize::from(table)))
-                .and_then(|table| table.interval_of_token.get(usize::from(token.token)).copied())
-                .filter(|&(frequency, _)| frequency > 0)
-                .ok_or(uncodable)?;
-            let lane = u8::try_from(lane).unwrap_or(0);
-            self.symbols.push(Symbol { lane, frequency, first });
-            if token.raw_bits > 0 {
-                self.raw.bits(token.raw, token.raw_bits);
+        let segments = Segments::new(values.len(), self.lanes_log2);
+        for step in 0..segments.length() {
+            let mut index = step;
+            for lane in 0..u8::try_from(segments.active(step)).unwrap_or(u8::MAX) {
+                let value = values.get(index).copied().unwrap_or(0);
+                let context = contexts.get(index).copied().unwrap_or(0);
+                let token = split(value, encoder.direct_log2);
+                let (frequency, first) = encoder.interval(context, token.token).ok_or(uncodable)?;
+                self.symbols.push(Symbol { lane, frequency, first });
+                if token.raw_bits > 0 {
+                    self.raw.bits(token.raw, token.raw_bits);
+                }
+                index = index.wrapping_add(segments.length());
             }
         }
         Ok(())
