@@ -65,7 +65,7 @@ impl Section {
             return (0, 0, 0);
         }
         let count = self.count.min(MAX_GAUSSIANS);
-        (count / self.bucket, u32::from(count % self.bucket > 0), count % self.bucket)
+        (count / self.bucket, u32::from(!count.is_multiple_of(self.bucket)), count % self.bucket)
     }
 
     fn stride(&self, level: usize) -> u32 {
