@@ -92,6 +92,7 @@ impl Report {
         later.isolated.into_iter().for_each(|found| Isolated::add(Some(found), &mut self.isolated));
         self.coded.extend(later.coded);
         self.digests.extend(later.digests);
+        self.finetuned.extend(later.finetuned);
     }
 
     /// Adds Gaussians that were left out because of their values. They were counted as invisible, which left them out.
