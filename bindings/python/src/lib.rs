@@ -1,7 +1,7 @@
 //! The Python package of SplatStream: what `splatstream_codec` cannot say in Python itself.
 //!
 //! `decoder`, `frame` and `slots` are those of the crate `splatstream`; `encoder` takes its options in the words of the
-//! command line, which is in this module too ([`main`]). Arrays go in and out by `arrays`, files of Python by `file_object`,
+//! command line, which is in this module too (`main`). Arrays go in and out by `arrays`, files of Python by `file_object`,
 //! exceptions by `errors`; `work` lets other threads of Python run meanwhile, and Ctrl-C end it.
 
 mod arrays;
