@@ -3,8 +3,8 @@
 //! Source: Kerbl et al., "3D Gaussian splatting for real-time radiance field rendering", 2023: L1 and SSIM of one picture at a
 //! time, Adam, Gaussians cloned and split where the picture's slopes by their centres are steep, faint ones removed. What
 //! differs, because pictures are few and drawn on a CPU: coarse pictures come first, rates fall over as many steps as
-//! are asked for, the number of Gaussians grows evenly to a budget, the steepest first, and opacities are not reset (that
-//! did not pay: rationale, 1.22).
+//! are asked for, the number of Gaussians grows evenly to a budget, the steepest first, and opacities are not reset
+//! (rationale, 1.23).
 //!
 //! ```
 //! use splatstream_capture::Photograph;

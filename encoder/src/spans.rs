@@ -27,8 +27,8 @@ use splatstream_format::payload::Network;
 use splatstream_format::syntax::SequenceParameters;
 use std::collections::VecDeque;
 
-/// Memory that coding a GOP takes beside its frames, bytes for each Gaussian of its largest frame: measured on scenes
-/// without spherical harmonics, with some room.
+/// Memory that coding a GOP takes beside its frames, bytes for each Gaussian of its largest frame: an
+/// estimate, which has not been compared with measured memory.
 const BESIDE_FRAMES: u64 = 700;
 
 /// What all spans of a sequence are coded with.
