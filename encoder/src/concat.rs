@@ -1,7 +1,7 @@
 //! Streams one after the other, as one stream. Nothing is decoded.
 //!
 //! Every part is read twice: [`StreamPart::scan`] looks for damage and takes note of what holds for all of it, and
-//! [`concat`](fn@concat) copies its units. Frames, GOPs, the index and the operating points are counted anew, by what
+//! [`concat`](fn@concat) copies its units. Frames, GOPs, the index and the operating points are counted again, by what
 //! writes them for the encoder: shards of one plan give the stream that one encoder writes.
 
 mod agreement;
@@ -196,7 +196,7 @@ impl From<StreamError> for CopyError {
     }
 }
 
-/// Writes a unit of a part whose frame 0 is frame `start` of the stream. What describes a whole stream is written anew.
+/// Writes a unit of a part whose frame 0 is frame `start` of the stream. What describes a whole stream is written again.
 fn copy(
     writer: &mut UnitWriter<'_>,
     (profile, unit): (Profile, &Unit<'_>),

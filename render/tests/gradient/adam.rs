@@ -133,7 +133,7 @@ fn a_slope_that_is_not_finite_moves_nothing_of_its_gaussian() {
 }
 
 #[test]
-fn gaussians_that_stay_keep_their_means_and_new_ones_start_anew() {
+fn gaussians_that_stay_keep_their_means_and_new_ones_start_at_zero() {
     let frame = random(7, 5, 1, false);
     let mut all = frame.clone();
     let mut adam = Adam::new(&all);

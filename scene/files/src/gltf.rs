@@ -1,7 +1,7 @@
 //! glTF 2.0 with the extension KHR_gaussian_splatting: `.glb`, and `.gltf` with its buffers beside it or inside it.
 //!
 //! Gaussians are primitives of points. All of the scene are read, placed by the transforms of their nodes and joined in the
-//! order of the nodes; other primitives are passed over. Compressed primitives hold an SPZ file
+//! order of the nodes; other primitives are ignored. Compressed primitives hold an SPZ file
 //! (KHR_gaussian_splatting_compression_spz_2, and the drafts before it).
 //!
 //! | attribute | type | value |

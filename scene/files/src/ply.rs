@@ -1,7 +1,7 @@
 //! Standard 3D Gaussian splatting PLY, as the original training code writes it.
 //!
 //! Read: ascii and both byte orders, any scalar type, any property order; other properties and elements are
-//! passed over. `f_rest_*` holds one channel after another and may have 0, 9, 24, 45 or 72 properties, those of degree 4, which
+//! ignored. `f_rest_*` holds one channel after another and may have 0, 9, 24, 45 or 72 properties, those of degree 4, which
 //! is reduced to 3. Without `scale_2`, Gaussians are flat (2DGS): they get a third semi-axis of 1e-6.
 //! Written: binary little endian `f32` in the original order, normals zero.
 

@@ -2,7 +2,7 @@
 //!
 //! Source: the documentation of COLMAP, "Output format", and "Camera models". A world-to-camera rotation is a quaternion w, x, y,
 //! z; camera axes are x right, y down, z forward, and the middle of the top left pixel is at 0.5, as with
-//! [`Camera`]. Where in pictures points were found is passed over.
+//! [`Camera`]. Where in pictures points were found is ignored.
 
 mod binary;
 mod text;

@@ -165,7 +165,7 @@ fn sign(signs: &[f32; 3], axis: usize) -> f32 {
     signs.get(axis).copied().unwrap_or(1.0)
 }
 
-/// The degree whose attributes are all there. A degree with some of them is an error; a fourth is noted and passed over.
+/// The degree whose attributes are all there. A degree with some of them is an error; a fourth is noted and ignored.
 fn sh_degree(part: &Part<'_>, budget: &mut Budget) -> Result<u8, SceneError> {
     let found = &part.primitive.attributes;
     let mut degree = 0_u8;

@@ -14,7 +14,7 @@ pub struct PointCloud {
 }
 
 /// Reads the points of a PLY file: `x`, `y`, `z` and, if it has them, `red`, `green`, `blue` of 0 to 255, of the element
-/// `vertex`; other properties are passed over.
+/// `vertex`; other properties are ignored.
 ///
 /// # Errors
 /// A header that is not understood, missing coordinates, fewer bytes than the header promises, more than `limits` allow, or a

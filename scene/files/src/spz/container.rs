@@ -61,7 +61,7 @@ pub(crate) struct Shape {
     pub(crate) gaussians: usize,
     /// Of the planes, 3 at most.
     pub(crate) sh_degree: u8,
-    /// Of the file, whose coefficients of degree 4 are passed over.
+    /// Of the file, whose coefficients of degree 4 are ignored.
     pub(crate) stored_degree: u8,
     pub(crate) fractional_bits: u8,
     pub(crate) antialiased: bool,
