@@ -16,7 +16,7 @@ pub fn pack(input: &[u8]) -> Vec<u8> {
     let gaussians = u32::from_le_bytes(input.array());
     let sections: Vec<Section> = (0..sections % 5).map(|_| Section::of(&mut input)).collect();
     let fits = flags & FITS != 0;
-    let sum = sections.iter().map(|section| section.count).sum();
+    let sum = sections.iter().fold(0, |sum: u32, section| sum.saturating_add(section.count));
     let mut header = vec![0; 4096];
     header[1] = version;
     put(&mut header, 4, sections.len() as u32);
