@@ -79,6 +79,44 @@ pub mod scene {
     pub use splatstream_format::syntax::Camera;
 }
 
+/// A sequence encoded in parts, on as many machines as there are, and streams that are joined.
+///
+/// A plan settles what holds for all frames; each machine encodes a shard, some whole GOPs, by it; joined, they are the bytes
+/// of [`encode`], whatever the number of shards. Streams with the same parameters are joined one after the other.
+///
+/// ```
+/// # use splatstream_files::builtin::BuiltinScene;
+/// use splatstream::parts::{StreamPart, concat, plan};
+/// use splatstream::{Settings, encode};
+///
+/// # let scene = BuiltinScene { gaussians: 60, frames: 4, ..BuiltinScene::default() };
+/// # let mut frames: Vec<_> = (0..4).map(|number| scene.frame(number)).collect();
+/// let settings = Settings { gop: 2, ..Settings::default() };
+/// let plan = plan(&mut frames, &settings)?;
+/// let mut shards = vec![Vec::new(); 2];
+/// for (number, shard) in (1..).zip(&mut shards) {
+///     plan.encode_shard(&mut frames, (number, 2), shard, &mut |_, _| ())?;
+/// }
+///
+/// let limits = splatstream::parts::StreamLimits::default();
+/// let parts = shards.iter().map(|shard| StreamPart::scan(&mut shard.as_slice(), &limits)).collect::<Result<Vec<_>, _>>()?;
+/// let mut joined = Vec::new();
+/// concat(&parts, &mut |part| Ok(Box::new(shards[part].as_slice())), &mut joined, &limits)?;
+///
+/// let mut single = Vec::new();
+/// encode(&mut frames, &settings, &mut single, &mut |_, _| ())?;
+/// assert_eq!(joined, single);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[cfg(feature = "encode")]
+pub mod parts {
+    pub use splatstream_encoder::{
+        ConcatError, Concatenated, PartError, Plan, PlanRecord, StreamPart, concat, plan,
+    };
+    /// What a part may hold: bounds of syntax elements, by level.
+    pub use splatstream_format::Limits as StreamLimits;
+}
+
 /// What the fields of [`Settings`] hold.
 #[cfg(feature = "encode")]
 pub mod settings {

@@ -1,7 +1,10 @@
 #!/usr/bin/env bash
 # Compiles the programs in C against the static library, with AddressSanitizer where the compiler has it, and runs them;
 # then decodes with the library for WebAssembly in Node.
+# usage: bindings/c/check.sh [LIBRARY]
+# LIBRARY is the static library where it is compiled already, as the gate has it; otherwise it is compiled for release.
 set -euo pipefail
+library=${1:+$(cd "$(dirname "$1")" && pwd)/$(basename "$1")}
 cd "$(dirname "$0")/../.."
 mkdir -p "${CARGO_TARGET_DIR:=target}/c"
 built=$(cd "$CARGO_TARGET_DIR" && pwd)
@@ -17,7 +20,7 @@ has_sanitizer() {
 
 compile() {
     # What the standard library of Rust needs: rustc --print native-static-libs.
-    "$compiler" "${flags[@]}" "${sanitizer[@]}" "$1" "$built/release/libsplatstream_c.a" -lpthread -ldl -lm -o "$2"
+    "$compiler" "${flags[@]}" "${sanitizer[@]}" "$1" "$library" -lpthread -ldl -lm -o "$2"
 }
 
 native() {
@@ -29,7 +32,10 @@ native() {
         echo "skipped: AddressSanitizer, which $compiler does not have; the programs run without"
         sanitizer=()
     fi
-    cargo build --release -p splatstream-c
+    if [ -z "$library" ]; then
+        cargo build --release -p splatstream-c
+        library=$built/release/libsplatstream_c.a
+    fi
     compile bindings/c/examples/decode.c "$built/c/decode"
     compile bindings/c/tests/interface.c "$built/c/interface"
     "$built/c/decode" "$stream" | tee "$built/c/frames"

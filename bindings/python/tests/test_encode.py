@@ -236,10 +236,12 @@ def test_other_threads_run_meanwhile(frames: list[gss.Gaussians]) -> None:
 @pytest.mark.parametrize("frames", ["list", "iter"])
 def test_ctrl_c_ends_encoding_and_leaves_nothing(frames: str, tmp_path: Path) -> None:
     program = f"""
-        import sys
+        import signal, sys
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         import splatstream_codec as gss
         from conftest import moving
+        # What shells start in the background ignores the signal.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         frames = [gss.Gaussians(**moving(number, count=4000)) for number in range(60)]
         print("ready", flush=True)
         try:

@@ -1,0 +1,180 @@
+//! `splatstream chart` leaves a page that needs nothing else, and the numbers behind it.
+
+use crate::common::{directory, json, run, succeed, text, write_frames};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).expect("a text file")
+}
+
+/// The values of an attribute in a page.
+fn values<'a>(page: &'a str, attribute: &str) -> Vec<&'a str> {
+    let start = format!(" {attribute}=\"");
+    page.split(&start).skip(1).filter_map(|rest| rest.split('"').next()).collect()
+}
+
+#[test]
+fn a_quick_chart_is_one_page_without_anything_from_outside() {
+    let directory = directory();
+    let out = directory.path().join("report");
+    let output = run(&["chart", "--builtin", "--quick", "-o", text(&out), "--json"]);
+    assert!(output.status.success(), "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    // Where nobody sees a bar, lines say that it works.
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("0 of ") && said.contains(" done: "), "{said}");
+    let page = read(&out.join("index.html"));
+    for word in ["http://", "https://", "<link", "<script", "@import", "url("] {
+        assert!(!page.contains(word), "{word}");
+    }
+    assert!(values(&page, "src").iter().all(|source| source.starts_with("data:image/png;base64,")));
+    for address in values(&page, "href").into_iter().filter(|address| !address.starts_with('#')) {
+        assert!(out.join(address).is_file(), "{address}");
+    }
+    for word in
+        ["How to read:", "<span>--builtin</span> <span>--quick</span>", "not measured: no weights given"]
+    {
+        assert!(page.contains(word), "{word}");
+    }
+    let scene = &report["scenes"][0];
+    assert_eq!((scene["scene"].as_str(), scene["frames"].as_u64()), (Some("builtin"), Some(2)));
+    assert!(scene["psnr_db"].as_f64().unwrap() > 25.0, "{scene}");
+    assert_eq!(scene["variants"][0]["variant"], "without contexts");
+    assert!(scene["variants"][0]["bd_rate_percent"].as_f64().unwrap() > 0.0, "{scene}");
+}
+
+#[test]
+fn figures_are_well_formed_and_say_what_they_show() {
+    let directory = directory();
+    let out = directory.path().join("report");
+    let report = json(&["chart", "--builtin", "--quick", "-o", text(&out)]);
+    let files = report["files"].as_array().unwrap().iter().filter_map(|file| file.as_str());
+    let figures: Vec<&str> = files.filter(|file| file.ends_with(".svg")).collect();
+    // Two points are no figure of speeds; where the bits go is always drawn.
+    assert!(figures.iter().any(|figure| figure.ends_with("-cost-units.svg")), "{figures:?}");
+    assert!(!figures.iter().any(|figure| figure.contains("speed")), "{figures:?}");
+    for figure in figures {
+        let drawing = read(&out.join(figure));
+        let document = roxmltree::Document::parse(&drawing).expect(figure);
+        let text_of = |name: &str| {
+            let mut children = document.root_element().children();
+            children
+                .find(|child| child.has_tag_name(("http://www.w3.org/2000/svg", name)))
+                .and_then(|c| c.text())
+        };
+        assert!(text_of("title").is_some_and(|title| title.starts_with("builtin: ")), "{figure}");
+        assert!(text_of("desc").is_some_and(|description| description.len() > 20), "{figure}");
+        assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{figure}");
+    }
+}
+
+#[test]
+fn the_numbers_of_a_sequence_and_of_a_peer_are_beside_the_page() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let peers = directory.path().join("peers.json");
+    let results = r#"{"version": 1,
+        "scenes": [{"scene": "small", "source": "frames", "reference": "frames", "gaussians": 1800, "frames": 3}],
+        "results": [{"scene": "small", "peer": "Copy", "version": "1", "options": "", "bytes": 300000,
+            "gaussians": 1800, "frames": 3, "encode_s": 0.5, "decode_s": 0.25, "timing": "process",
+            "decoded": "frames", "command": "cp"}],
+        "missing": [{"peer": "Nobody", "scene": null, "why": "does not exist"}]}"#;
+    std::fs::write(&peers, results).unwrap();
+    let out = directory.path().join("report");
+    let arguments = ["--quick", "--frames", "2", "--peers", text(&peers), "-o", text(&out)];
+    let report = json(&[&["chart", text(&frames)], &arguments[..]].concat());
+    let scene = &report["scenes"][0];
+    assert_eq!(scene["peers"][0], "Copy");
+    assert_eq!(scene["peers_missing"][0], "Nobody: does not exist");
+    let points = read(&out.join("points.csv"));
+    let mut lines = points.lines();
+    assert_eq!(
+        lines.next(),
+        Some(
+            "scene,group,variant,quality,op,percent,frames,bytes,gaussians_source,gaussians_shown,bpg_source,\
+             bpg_shown,mbit_s,psnr_db,psnr_masked_db,yuv_psnr_db,ssim,ssim_masked,st_lpips"
+        )
+    );
+    // Two qualities: of the baseline two levels each, without contexts one each.
+    assert_eq!(lines.count(), 2 * 2 + 2);
+    let peer = read(&out.join("peers.csv"));
+    assert!(peer.contains("frames,Copy,1,300000,3,2,") && peer.contains(",100.000000,"), "{peer}");
+    assert_eq!(read(&out.join("bandwidth.csv")).lines().count(), 1 + 4);
+}
+
+/// The lines of a CSV file, each as its cells by name.
+fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_path(path).expect("a file");
+    reader.deserialize().map(|row| row.expect("cells under headings")).collect()
+}
+
+/// A whole number in a cell.
+fn count(row: &BTreeMap<String, String>, name: &str) -> u64 {
+    row[name].parse().unwrap_or_else(|_| panic!("{name} is '{}' in {row:?}", row[name]))
+}
+
+#[test]
+fn the_operating_points_of_a_sequence_add_up() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let out = directory.path().join("report");
+    let options =
+        ["--quick", "--height", "60", "--cameras", "ring:1", "--qualities", "high", "-o", text(&out)];
+    let report = succeed(&[&["chart", text(&frames)], &options[..]].concat());
+    let modes = rows(&out.join("operating_points.csv"));
+    let names: Vec<&str> = modes.iter().map(|mode| mode["mode"].rsplit(' ').next().unwrap()).collect();
+    assert_eq!(names, ["Startup", "quality", "anchor", "temporal", "%", "%"]);
+    let shown: Vec<&str> = modes.iter().map(|mode| mode["frames"].as_str()).collect();
+    assert_eq!(shown, ["0", "0", "0", "0 2", "0 1 2", "0 1 2"]);
+    assert_eq!(modes[1]["units"], "I0 s0 + I0 s1");
+    assert_eq!(modes[3]["units"], "I0 s0-s2 + P2 r0-r1");
+    let intra: Vec<u64> = modes.iter().take(3).map(|mode| count(mode, "gop_bytes")).collect();
+    assert!(intra.is_sorted_by(|a, b| a < b), "{intra:?}");
+    let refinements = rows(&out.join("refinements.csv"));
+    let levels: Vec<_> = refinements.iter().filter(|row| row["frames_coded"] == "predicted").collect();
+    assert_eq!(levels.len(), 2);
+    for (level, mode) in levels.iter().zip(&modes[4..]) {
+        assert_eq!(level["units"], "P2 B1");
+        let units: u64 = level["unit_bytes"].split(' ').map(|bytes| bytes.parse::<u64>().unwrap()).sum();
+        assert_eq!(count(level, "added_bytes"), units);
+        assert_eq!(count(level, "total_bytes"), intra[2] + units);
+        assert_eq!(count(level, "total_bytes"), count(mode, "gop_bytes"));
+        assert_eq!(count(level, "gaussians"), count(mode, "gaussians"));
+        assert!(!level["inter_psnr_db"].is_empty() && !level["subset_psnr_db"].is_empty());
+    }
+    assert!(count(levels[1], "gaussians") > count(levels[1], "subset_gaussians"));
+    let tools = rows(&out.join("tools.csv"));
+    assert_eq!(tools.len(), 5);
+    let everything = levels[1]["added_bytes"].parse::<u64>().unwrap();
+    assert_eq!(count(&tools[0], "inter_bytes"), everything);
+    assert!(["Low-frame-rate temporal", "without survivors"].iter().all(|words| report.contains(words)));
+}
+
+#[test]
+fn a_look_at_stability_has_every_case_and_says_what_is_silent() {
+    let directory = directory();
+    let out = directory.path().join("report");
+    let report = json(&["chart", "--stability", "--quick", "--height", "60", "-o", text(&out)]);
+    let table = rows(&out.join("stability.csv"));
+    let cases: BTreeSet<&str> = table.iter().map(|row| row["case"].as_str()).collect();
+    let tools: BTreeSet<&str> = table.iter().map(|row| row["tool"].as_str()).collect();
+    assert_eq!(cases.len(), 21, "{cases:?}");
+    assert_eq!(tools.into_iter().collect::<Vec<_>>(), [".splat", "SOG", "SPZ", "SplatStream", "all intra"]);
+    // Ten scenes for four tools, eleven sequences for two, one strength each.
+    assert_eq!(table.len(), 10 * 4 + 11 * 2);
+    let silent = table.iter().filter(|row| row["verdict"] == "silent failure");
+    let ours = silent.filter(|row| ["SplatStream", "all intra"].contains(&row["tool"].as_str()));
+    assert_eq!(report["silent_failures"].as_u64(), Some(ours.count() as u64));
+    let one = |case: &str, tool: &str| {
+        table.iter().find(|row| row["case"] == case && row["tool"] == tool).expect("a row")
+    };
+    assert_eq!(one("floater-visible", "SPZ")["verdict"], "warned");
+    assert!(one("loss", "SplatStream")["detected"].starts_with("decoder: "));
+    assert!(one("transparent", "SplatStream")["fallback"].contains("invisible"));
+    let page = read(&out.join("index.html"));
+    for file in report["files"].as_array().unwrap().iter().filter_map(|file| file.as_str()) {
+        assert!(out.join(file).is_file() && page.contains(file), "{file}");
+    }
+    assert!(!page.contains("NaN") && !page.contains("http://") && !page.contains("https://"));
+}

@@ -1,0 +1,80 @@
+//! From simulated pictures to scenes.
+
+use crate::common::{directory, fail, json, succeed, text};
+use std::fs;
+use std::path::Path;
+
+/// Two frames of a capture of four small views.
+fn simulated(at: &Path) -> String {
+    let out = at.join("walk");
+    let simulate =
+        ["simulate", "-o", text(&out), "--frames", "2", "--fps", "5", "--views", "5", "--height", "36"];
+    succeed(&[simulate.as_slice(), &["--samples", "1", "--points", "400", "--rig", "forward"]].concat());
+    text(&out).to_owned()
+}
+
+#[test]
+fn a_sequence_is_trained_warm_measured_and_resumed() {
+    let directory = directory();
+    let at = directory.path();
+    let walk = simulated(at);
+    let frames = at.join("frames");
+    let fit =
+        ["fit", &walk, "-o", text(&frames), "--iterations", "20", "--gaussians", "500", "--sh-degree", "1"];
+    let fit = [fit.as_slice(), &["--warm", "--warm-iterations", "5", "--hold-out", "5"]].concat();
+    let report = json(&fit);
+    let all = report["frames"].as_array().unwrap();
+    assert_eq!((&all[0]["iterations"], &all[1]["iterations"]), (&20.into(), &5.into()));
+    // Warm frames have the same Gaussians.
+    assert_eq!(all[0]["gaussians"], all[1]["gaussians"]);
+    assert!(report["held_out_psnr_db"].as_f64().unwrap() > 8.0);
+    assert_eq!(all[0]["views"].as_array().unwrap().iter().filter(|view| view["held_out"] == true).count(), 1);
+
+    // Only measured, the scene is worth what it was when it was trained.
+    let measure = ["fit", &walk, "--start", text(&frames), "--iterations", "0", "--hold-out", "5"];
+    let measured = json(&measure);
+    assert!(measured["output"].is_null());
+    for key in ["psnr_db", "held_out_psnr_db"] {
+        // Rotations are brought to unit length again where they are read.
+        let [found, expected] = [&measured, &report].map(|report| report[key].as_f64().unwrap());
+        assert!((found - expected).abs() < 1e-3, "{key} {found} {expected}");
+    }
+
+    // A lost frame comes back as it was, from the one before; the other is kept.
+    let second = frames.join("frame_0001.ply");
+    let before = fs::read(&second).unwrap();
+    fs::remove_file(&second).unwrap();
+    let resumed = json(&[fit.as_slice(), &["--resume"]].concat());
+    assert_eq!((&resumed["frames"][0]["kept"], &resumed["frames"][1]["kept"]), (&true.into(), &false.into()));
+    assert!(fs::read(&second).unwrap() == before);
+}
+
+#[test]
+fn what_cannot_be_trained_is_said() {
+    let directory = directory();
+    let at = directory.path();
+    let walk = simulated(at);
+    let one = format!("{walk}/frame_0000");
+    let out = at.join("scene.ply");
+    assert!(fail(1, &["fit", text(at), "-o", text(&out)]).contains("transforms.json"));
+    assert!(fail(1, &["fit", text(&at.join("none")), "-o", text(&out)]).contains("check the path"));
+    assert!(fail(2, &["fit", &one, "-o", text(&at.join("scene.gss"))]).contains("ends in .ply"));
+    assert!(fail(2, &["fit", &one, "--start", &one]).contains("--iterations 0"));
+    assert!(fail(2, &["fit", &walk, "-o", text(&out)]).contains("looks like the name of a file"));
+    fs::remove_file(at.join("walk/frame_0000/images/view_001.png")).unwrap();
+    assert!(fail(1, &["fit", &one, "-o", text(&out)]).contains("view_001"));
+    assert!(!out.exists());
+}
+
+#[test]
+fn pictures_are_the_same_again() {
+    let directory = directory();
+    let [one, other] = ["one", "other"].map(|name| directory.path().join(name));
+    for (out, threads) in [(&one, "1"), (&other, "3")] {
+        let simulate = ["simulate", "-o", text(out), "--views", "1", "--height", "27", "--threads", threads];
+        succeed(&[simulate.as_slice(), &["--samples", "2", "--points", "50"]].concat());
+    }
+    for file in ["images/view_000.png", "transforms.json", "sparse_pc.ply", "sparse/0/images.txt"] {
+        assert_eq!(fs::read(one.join(file)).unwrap(), fs::read(other.join(file)).unwrap(), "{file}");
+    }
+}

@@ -1,0 +1,32 @@
+//! Runs the command as its users do. One program, since every one more is linked with all of the command's libraries.
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, reason = "a panic is a failed test")]
+
+mod chart;
+mod common;
+mod conformance;
+#[cfg(target_os = "linux")]
+mod cycles;
+mod demo;
+mod dynamic;
+mod errors;
+mod exit_codes;
+mod file_formats;
+mod fit;
+mod inspect;
+mod json_reports;
+#[cfg(unix)]
+mod live;
+mod manual;
+mod messages;
+mod outputs;
+mod packages;
+mod play;
+#[cfg(unix)]
+mod readme;
+mod registered_network;
+mod round_trip;
+#[cfg(unix)]
+mod serve;
+mod shards;
+mod targets;
+mod view;

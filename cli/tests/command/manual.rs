@@ -1,0 +1,37 @@
+//! Completions and manual pages, which are made from the options.
+
+use crate::common::{directory, fail, json, succeed, text};
+use std::fs;
+
+#[test]
+fn every_shell_completes_commands_and_options() {
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = succeed(&["completions", shell]);
+        for word in ["splatstream", "encode", "refinements"] {
+            assert!(script.contains(word), "{shell} does not complete {word}");
+        }
+        // Elvish and PowerShell complete no values.
+        let completes_values = ["bash", "fish", "zsh"].contains(&shell);
+        assert_eq!(script.contains("visually-lossless"), completes_values, "{shell}");
+        assert_eq!(json(&["completions", shell])["shell"], shell);
+    }
+    assert!(fail(2, &["completions", "cmd"]).contains("possible values"));
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let directory = directory();
+    let out = directory.path().join("man1");
+    let said = json(&["manual", "-o", text(&out)]);
+    let pages: Vec<&str> =
+        said["pages"].as_array().unwrap().iter().map(|page| page.as_str().unwrap()).collect();
+    assert_eq!(fs::read_dir(&out).unwrap().count(), pages.len());
+    for command in ["encode", "decode", "inspect", "conformance-run", "manual"] {
+        assert!(pages.contains(&format!("splatstream-{command}.1").as_str()), "{pages:?}");
+    }
+    let page = fs::read_to_string(out.join("splatstream-extract.1")).unwrap();
+    assert!(page.contains("splatstream extract talk.gss"), "the example is missing: {page}");
+    // Pages that are there are written again; a file in the place of the directory stays.
+    succeed(&["manual", "-o", text(&out)]);
+    fail(1, &["manual", "-o", text(&out.join("splatstream.1"))]);
+}

@@ -1,0 +1,211 @@
+//! What people and scripts are told: the messages of documented cases, and the JSON beside them.
+
+use crate::common::{directory, fail, json, run, scene, succeed, text, write_frames, write_still};
+use serde_json::Value;
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::ply;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Three frames in two temporal layers.
+fn sequence(directory: &Path) -> PathBuf {
+    let (frames, stream) = (write_frames(directory), directory.join("talk.gss"));
+    succeed(&["encode", text(&frames), "-o", text(&stream), "--preset", "fast", "--gop", "3"]);
+    stream
+}
+
+/// A text without the directory of this test.
+fn plain(said: &str, directory: &Path) -> String {
+    said.replace(text(directory), "DIR")
+}
+
+/// A report without the directory of this test, and without times.
+fn report(arguments: &[&str], directory: &Path) -> Value {
+    let mut report: Value =
+        serde_json::from_str(&plain(&json(arguments).to_string(), directory)).expect("JSON");
+    for (key, value) in report.as_object_mut().unwrap() {
+        if key.contains("second") {
+            *value = "redacted".into();
+        }
+    }
+    report
+}
+
+#[test]
+fn a_scene_for_a_stream_and_a_stream_for_a_scene() {
+    let directory = directory();
+    let (still, stream) = (write_still(directory.path()), directory.path().join("still.gss"));
+    succeed(&["encode", text(&still), "-o", text(&stream), "--preset", "fast", "--psnr", "40"]);
+    let validate = fail(10, &["validate", text(&still)]);
+    let encode = fail(1, &["encode", text(&stream), "-o", text(&directory.path().join("again.gss"))]);
+    insta::assert_snapshot!(plain(&[validate, encode].concat(), directory.path()));
+}
+
+#[test]
+fn wrong_settings_are_usage() {
+    let directory = directory();
+    let (still, out) = (write_still(directory.path()), directory.path().join("out.gss"));
+    let encode = ["encode", text(&still), "-o", text(&out)];
+    let said = [["--refinements", "10,20"], ["--layers", "1080,540"], ["--refinements", "20,10,100"]]
+        .map(|wrong| fail(2, &[&encode[..], &wrong].concat()));
+    insta::assert_snapshot!(said.concat());
+}
+
+#[test]
+fn a_scene_that_takes_too_much_memory_names_the_option() {
+    let directory = directory();
+    let (still, out) = (write_still(directory.path()), directory.path().join("out.gss"));
+    let encode = ["encode", text(&still), "-o", text(&out), "--preset", "fast", "--psnr", "40"];
+    let said = fail(1, &[&encode[..], &["--max-input-memory", "100K"]].concat());
+    assert!(said.contains("at most 102400 are allowed (max_memory)"), "{said}");
+    assert!(said.contains("if you trust the file, give --max-input-memory 1G"), "{said}");
+    assert!(said.contains(text(&still)) && !out.exists(), "{said}");
+    succeed(&[&encode[..], &["--max-input-memory", "1G"]].concat());
+}
+
+#[test]
+fn outputs_are_refused_in_words() {
+    let directory = directory();
+    let stream = sequence(directory.path());
+    let at = |name: &str| directory.path().join(name);
+    let decode = |out: &Path| fail(2, &["decode", text(&stream), "-o", text(out)]);
+    succeed(&["decode", text(&stream), "-o", text(&at("out"))]);
+    let said = [
+        decode(&at("o.gltf")),
+        decode(&at("o.compressed.ply")),
+        decode(&at("o.ply")),
+        decode(&at("out")),
+        decode(Path::new("-")),
+        fail(2, &["encode", "x.ply", "-o", "x.spz"]),
+        fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&stream)]),
+    ];
+    insta::assert_snapshot!(plain(&said.concat(), directory.path()));
+}
+
+#[test]
+fn errors_are_json_where_json_is_asked_for() {
+    let directory = directory();
+    let (still, damaged) = (write_still(directory.path()), directory.path().join("damaged.gss"));
+    fs::write(&damaged, b"\x89GSS").unwrap();
+    let mut said = String::new();
+    for (code, arguments) in [
+        (1, &["validate", "no-such.gss"][..]),
+        (2, &["encode", text(&still), "-o", "x.spz"]),
+        (2, &["decode"]),
+        (14, &["extract", text(&damaged), "--op", "s0,t0,r0", "-o", "x.gss"]),
+    ] {
+        let output = run(&[arguments, &["--json"]].concat());
+        assert_eq!(output.status.code(), Some(code), "{output:?}");
+        let error: Value = serde_json::from_slice(&output.stdout).expect("one JSON value");
+        assert_eq!(error["error"]["exit_code"], code);
+        assert!(!output.stderr.is_empty(), "people are told too");
+        said += &format!("{error:#}\n");
+    }
+    insta::assert_snapshot!(plain(&said, directory.path()));
+    // A report that says it is enough: there is one value on standard output.
+    let output = run(&["validate", text(&damaged), "--json"]);
+    let verdict: Value = serde_json::from_slice(&output.stdout).expect("one JSON value");
+    assert_eq!(verdict["outcome"], "truncated");
+}
+
+#[test]
+fn a_point_says_how_many_frames_it_shows() {
+    let directory = directory();
+    let (stream, part) = (sequence(directory.path()), directory.path().join("part.gss"));
+    let extract = ["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&part)];
+    assert!(succeed(&extract).contains("2 of 3 frames"));
+    let extracted = report(&extract, directory.path());
+    assert_eq!((&extracted["complete"], &extracted["lost"]), (&true.into(), &serde_json::json!([])));
+    assert_eq!((&extracted["frames"], &extracted["frames_in_stream"]), (&2.into(), &3.into()));
+    let decode = ["decode", text(&stream), "--dry-run", "--op", "s0,t0,r0"];
+    assert!(succeed(&decode).contains("2 of 3 (1 I, 1 P)"));
+    assert_eq!(report(&decode, directory.path())["frames_in_stream"], 3);
+    let pictures = directory.path().join("pictures");
+    let render = ["render", text(&stream), "-o", text(&pictures), "--op", "s0,t0,r0", "--camera", "ring:1"];
+    assert!(succeed(&[&render[..], &["--height", "20"]].concat()).contains("2 pictures of 2 of 3 frames"));
+    let keys: Vec<String> = extracted.as_object().unwrap().keys().cloned().collect();
+    insta::assert_snapshot!(keys.join(" "));
+}
+
+#[test]
+fn extract_says_what_is_damaged_and_what_is_not_there() {
+    let directory = directory();
+    let (stream, part) = (sequence(directory.path()), directory.path().join("part.gss"));
+    let units = json(&["inspect", text(&stream), "--units"]);
+    let units = units["units"].as_array().unwrap();
+    let of = |kind: &str, frame: u64| {
+        let unit = units.iter().find(|unit| unit["type"] == kind && unit["frame"] == frame).unwrap();
+        (unit["at"].as_u64().unwrap() as usize, unit["bytes"].as_u64().unwrap() as usize)
+    };
+    let whole = fs::read(&stream).unwrap();
+    let extract = |bytes: &[u8]| {
+        fs::write(&stream, bytes).unwrap();
+        json(&["extract", text(&stream), "--op", "s2,t1,r4", "-o", text(&part)])
+    };
+    let (at, length) = of("increment", 1);
+    let mut damaged = whole.clone();
+    damaged[at + length - 1] ^= 1;
+    let report = extract(&damaged);
+    assert_eq!((&report["damaged"], &report["complete"]), (&serde_json::json!([1]), &false.into()));
+    // Without the B frame, its header and increments.
+    let own = |unit: &&Value| {
+        unit["frame"] == 1 && ["increment", "frame_header"].contains(&unit["type"].as_str().unwrap())
+    };
+    let mut shorter = whole.clone();
+    for unit in units.iter().rev().filter(own) {
+        let at = unit["at"].as_u64().unwrap() as usize;
+        shorter.drain(at..at + unit["bytes"].as_u64().unwrap() as usize);
+    }
+    let report = extract(&shorter);
+    assert_eq!((&report["lost"], &report["complete"]), (&serde_json::json!([[1, 1]]), &false.into()));
+}
+
+#[test]
+fn scenes_of_their_own_become_streams_of_their_own() {
+    let directory = directory();
+    let still = write_still(directory.path());
+    let small = BuiltinScene { gaussians: 150, frames: 1, ..scene() };
+    let (other, out) = (directory.path().join("other.ply"), directory.path().join("streams"));
+    fs::write(&other, ply::write(&small.frame(0))).unwrap();
+    let fast = ["--preset", "fast", "--psnr", "40"];
+    let each = ["encode", text(&still), text(&other), "no-such.ply", "--each", "-o", text(&out)];
+    let output = run(&[&each[..], &fast, &["--json"]].concat());
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["failed"][0]["input"], "no-such.ply");
+    assert_eq!(report["streams"].as_array().unwrap().len(), 2);
+    for (name, gaussians) in [("still.gss", 600), ("other.gss", 150)] {
+        let stream = json(&["validate", text(&out.join(name))]);
+        assert!(stream["frames"] == 1 && stream["gaussians"].as_u64().unwrap() <= gaussians, "{stream}");
+    }
+    let twice = ["encode", text(&still), text(&still), "--each", "-o", text(&out)];
+    assert!(fail(2, &twice).contains("both would become"));
+    // As one sequence they are taken, and that is said.
+    let one = directory.path().join("one.gss");
+    let encode = ["encode", text(&still), text(&other), "-o", text(&one)];
+    let report = json(&[&encode[..], &fast].concat());
+    let warnings = report["warnings"].as_array().unwrap();
+    let unlike = warnings.iter().find(|warning| warning["code"] == "unlike-frames").unwrap();
+    insta::assert_snapshot!(unlike["message"].as_str().unwrap());
+}
+
+#[test]
+fn cameras_of_nerf_synthetic_are_taken() {
+    let directory = directory();
+    let (still, cameras) = (write_still(directory.path()), directory.path().join("transforms.json"));
+    let bare = r#"{"camera_angle_x": 0.69, "frames": [{"file_path": "./train/r_0", "rotation": 0.01,
+        "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]}]}"#;
+    fs::write(&cameras, bare).unwrap();
+    let out = directory.path().join("out");
+    let render = ["render", text(&still), "--camera", text(&cameras), "-o", text(&out), "--height", "40"];
+    let drawn = json(&render);
+    assert_eq!((&drawn["pictures"][0]["width"], &drawn["pictures"][0]["height"]), (&40.into(), &40.into()));
+}
+
+#[test]
+fn one_frame_is_not_frames() {
+    let directory = directory();
+    let still = write_still(directory.path());
+    let said = succeed(&["compare", text(&still), text(&still)]);
+    assert!(said.contains(": 1 frame, ") && said.contains("1 frame compared") && !said.contains("1 frames"));
+}

@@ -1,0 +1,202 @@
+//! What commands write: whole files under the names that they were given, in the place of nothing that somebody needs.
+
+use crate::common::{directory, fail, json, run, run_with, succeed, text, write_still, write_stream};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// A directory with a scene, and a stream of three frames.
+fn files() -> (TempDir, PathBuf, PathBuf) {
+    let directory = directory();
+    let stream = write_stream(directory.path());
+    let still = write_still(directory.path());
+    (directory, still, stream)
+}
+
+/// The names in a directory.
+fn names(directory: &Path) -> Vec<String> {
+    let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<String> = fs::read_dir(directory).unwrap().map(name).collect();
+    names.sort();
+    names
+}
+
+#[cfg(unix)]
+#[test]
+fn no_output_replaces_an_input() {
+    let (directory, still, stream) = files();
+    let (link, hard) = (directory.path().join("link.gss"), directory.path().join("hard.gss"));
+    std::os::unix::fs::symlink(&stream, &link).unwrap();
+    fs::hard_link(&stream, &hard).unwrap();
+    let before = fs::read(&stream).unwrap();
+    for out in [&stream, &link, &hard] {
+        let said = fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(out)]);
+        assert!(said.contains("this command reads that file"), "{said}");
+    }
+    let (scene, frame) = (directory.path().join("scene.gss"), directory.path().join("frame.ply"));
+    fs::hard_link(&still, &scene).unwrap();
+    fail(2, &["encode", text(&still), "-o", text(&scene), "--preset", "fast"]);
+    fs::hard_link(&stream, &frame).unwrap();
+    fail(2, &["decode", text(&stream), "-o", text(&frame), "--frames", "0..1"]);
+    let frames = directory.path().join("out");
+    fs::create_dir(&frames).unwrap();
+    fs::hard_link(&stream, frames.join("frame_0001.ply")).unwrap();
+    fail(2, &["decode", text(&stream), "-o", text(&frames), "--force"]);
+    assert_eq!(fs::read(&stream).unwrap(), before);
+    assert_eq!(names(&frames), ["frame_0001.ply"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_devices_and_modes_stay() {
+    use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
+    let (directory, _, stream) = files();
+    let (link, target) = (directory.path().join("link.gss"), directory.path().join("target.gss"));
+    let extract = |out: &Path| run(&["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(out)]);
+    // Through a link to nothing, and to a file with a mode of its own.
+    symlink("target.gss", &link).unwrap();
+    assert!(extract(&link).status.success());
+    fs::set_permissions(&target, fs::Permissions::from_mode(0o600)).unwrap();
+    assert!(extract(&link).status.success());
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert_eq!(fs::metadata(&target).unwrap().permissions().mode() & 0o777, 0o600);
+    // Devices take what is written to them.
+    let full = extract(Path::new("/dev/full"));
+    assert_eq!(full.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&full.stderr).contains("make room"), "{full:?}");
+    assert!(extract(Path::new("/dev/null")).status.success());
+    for device in ["/dev/full", "/dev/null"] {
+        assert!(fs::metadata(device).unwrap().file_type().is_char_device(), "{device}");
+    }
+    assert_eq!(extract(directory.path()).status.code(), Some(1));
+}
+
+#[test]
+fn names_say_what_is_written() {
+    let (directory, still, stream) = files();
+    let before = names(directory.path());
+    let at = |name: &str| directory.path().join(name);
+    for name in ["o.gltf", "o.ksplat", "o.splatv", "o.png"] {
+        let said = fail(2, &["decode", text(&stream), "-o", text(&at(name)), "--frames", "0..1"]);
+        assert!(said.contains(".glb, .sog or .compressed.ply") && said.contains("directory in /"), "{said}");
+    }
+    for name in ["x.spz", "x.ply"] {
+        let said = fail(2, &["encode", text(&still), "-o", text(&at(name))]);
+        assert!(said.contains("ends in .gss"), "{said}");
+        fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&at(name))]);
+    }
+    let said = fail(2, &["render", text(&stream), "-o", text(&at("x.png")), "--height", "20"]);
+    assert!(said.contains("looks like the name of a file"), "{said}");
+    fail(2, &["render", text(&stream), "-o", "-", "--height", "20"]);
+    fail(2, &["chart", text(&still), "-o", text(&at("x.html"))]);
+    assert_eq!(names(directory.path()), before);
+    // Who means it gets it.
+    let out = at("run.2/");
+    succeed(&["decode", text(&stream), "-o", text(&out), "--frames", "0..1"]);
+    assert_eq!(names(&out), ["frame_0000.ply"]);
+}
+
+#[test]
+fn a_dash_is_a_pipe() {
+    let (directory, still, stream) = files();
+    let bytes = fs::read(&stream).unwrap();
+    let file = directory.path().join("file");
+    let part = ["extract", "-", "--op", "s0,t0,r0", "-o", "-"];
+    succeed(&["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&file)]);
+    assert_eq!(run_with(&part, &bytes).stdout, fs::read(&file).unwrap());
+    let frame = ["decode", "-", "-o", "-", "--frames", "1..2", "--format", "spz"];
+    let decoded = run_with(&frame, &bytes);
+    assert!(decoded.status.success() && decoded.stdout.starts_with(&[0x1f, 0x8b]), "{decoded:?}");
+    assert!(String::from_utf8_lossy(&decoded.stderr).contains("1 of 3"), "the report is beside it");
+    let encode = ["encode", "-", "-o", "-", "--preset", "fast", "--psnr", "40"];
+    let encoded = run_with(&encode, &fs::read(&still).unwrap());
+    assert!(encoded.stdout.starts_with(b"\x89GSS"), "{encoded:?}");
+    for arguments in [&["validate", "-"][..], &["inspect", "-"], &["compare", "-", text(&stream)]] {
+        assert!(run_with(arguments, &bytes).status.success(), "{arguments:?}");
+    }
+    // Two things do not go through one pipe.
+    fail(2, &["decode", text(&stream), "-o", "-"]);
+    fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", "-", "--json"]);
+    fail(2, &["compare", "-", "-"]);
+    assert!(!Path::new("-").exists());
+    let wrong = run_with(&["encode", "-", "-o", text(&file)], b"no scene");
+    assert!(String::from_utf8_lossy(&wrong.stderr).starts_with("standard input: "), "{wrong:?}");
+}
+
+#[test]
+fn frames_of_an_earlier_run_are_not_mixed_with_new_ones() {
+    let (directory, _, stream) = files();
+    let out = directory.path().join("out");
+    succeed(&["decode", text(&stream), "-o", text(&out)]);
+    for name in ["notes.txt", "frame_12.ply", "frame_0009.spz"] {
+        fs::write(out.join(name), "mine").unwrap();
+    }
+    let again = ["decode", text(&stream), "-o", text(&out), "--frames", "0..2"];
+    let said = fail(2, &again);
+    assert!(said.contains("has 4 files with names of frames") && said.contains("--force"), "{said}");
+    json(&[&again[..], &["--force"]].concat());
+    assert_eq!(names(&out), ["frame_0000.ply", "frame_0001.ply", "frame_12.ply", "notes.txt"]);
+}
+
+/// Starts a long encoding in a directory, and gives it back once its unfinished file is there.
+#[cfg(unix)]
+fn encoding(directory: &Path, still: &Path) -> std::process::Child {
+    let child = Command::new(env!("CARGO_BIN_EXE_splatstream"))
+        .args(["encode", text(still), "-o", text(&directory.join("out.gss")), "--preset", "small"])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while !names(directory).iter().any(|name| name.starts_with(".splatstream-")) {
+        assert!(start.elapsed() < Duration::from_secs(20), "it never began to write");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_leave_nothing_behind() {
+    let (directory, still, _) = files();
+    for signal in ["INT", "TERM", "HUP"] {
+        let out = directory.path().join(signal);
+        fs::create_dir(&out).unwrap();
+        fs::write(out.join("out.gss"), "old").unwrap();
+        let child = encoding(&out, &still);
+        let id = child.id().to_string();
+        assert!(Command::new("kill").args([&format!("-{signal}"), &id]).status().unwrap().success());
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(130), "{ended:?}");
+        assert_eq!(names(&out), ["out.gss"]);
+        assert_eq!(fs::read(out.join("out.gss")).unwrap(), b"old");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn where_nothing_can_be_written_nothing_is_left_and_no_other_name_is_told() {
+    let (_directory, _, stream) = files();
+    let said = fail(1, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", "/proc/out.gss"]);
+    assert!(said.starts_with("/proc/out.gss: cannot write") && !said.contains(".splatstream-"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_nothing_behind() {
+    let (directory, _, stream) = files();
+    let out = directory.path().join("out");
+    fs::create_dir(&out).unwrap();
+    // A limit of no bytes for files does what a full disk does: writing fails.
+    let program = env!("CARGO_BIN_EXE_splatstream");
+    let (stream, file) = (text(&stream), out.join("a.gss"));
+    let line = format!(
+        "trap '' XFSZ; ulimit -f 0; exec {program} extract {stream} --op s0,t0,r4 -o {}",
+        text(&file)
+    );
+    let ended = Command::new("sh").args(["-c", &line]).output().unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{ended:?}");
+    assert!(names(&out).is_empty(), "{:?}", names(&out));
+}

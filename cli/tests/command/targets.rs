@@ -1,0 +1,106 @@
+//! Qualities, sizes and faults of scenes, as `encode` and `compare` report them.
+
+use crate::common::{directory, fail, json, run, scene, text, write_frames, write_still};
+use serde_json::Value;
+use splatstream_files::ply;
+use splatstream_gaussians::GaussianFrame;
+use std::fs;
+
+/// The codes of the warnings in a report.
+fn codes(report: &Value) -> Vec<&str> {
+    report["warnings"].as_array().unwrap().iter().filter_map(|warning| warning["code"].as_str()).collect()
+}
+
+#[test]
+fn a_quality_is_a_psnr_that_is_measured() {
+    let directory = directory();
+    let (still, stream) = (write_still(directory.path()), directory.path().join("still.gss"));
+    for (arguments, wanted) in [(["--quality", "low"], 40.0), (["--psnr", "47"], 47.0)] {
+        let report = json(&[&["encode", text(&still), "-o", text(&stream)][..], &arguments].concat());
+        let psnr = report["psnr_db"].as_f64().unwrap();
+        assert_eq!(report["wanted_psnr_db"], wanted);
+        // Quantisers of so few Gaussians cannot be set as finely.
+        assert!((psnr - wanted).abs() <= 1.0, "{report}");
+        assert_eq!((psnr - wanted).abs() <= 0.5, codes(&report).is_empty(), "{report}");
+        let views = ["--cameras", "ring:5", "--height", "540"];
+        let compared = json(&[&["compare", text(&still), text(&stream)][..], &views].concat());
+        // Views of so few Gaussians differ.
+        assert!((compared["psnr_db"].as_f64().unwrap() - wanted).abs() < 4.0, "{compared}");
+    }
+}
+
+#[test]
+fn a_sequence_reports_types_and_gops() {
+    let directory = directory();
+    let (frames, stream) = (write_frames(directory.path()), directory.path().join("small.gss"));
+    let report = json(&["encode", text(&frames), "-o", text(&stream), "--preset", "fast", "--gop", "3"]);
+    for frame_type in ["I", "P", "B"] {
+        assert!(report["psnr_db_by_type"][frame_type].is_number(), "{report}");
+    }
+    let gop = serde_json::json!({"first_frame": 0, "frames": 3, "cut": false});
+    assert_eq!(report["gops"], Value::Array(vec![gop]));
+    let said = run(&["encode", text(&frames), "-o", text(&stream), "--preset", "fast", "--gop", "3"]);
+    let said = String::from_utf8(said.stdout).unwrap();
+    assert!(said.contains("PSNR by type") && said.contains("GOPs               1 of 3 frames"), "{said}");
+}
+
+#[test]
+fn a_size_is_reached_or_a_warning() {
+    let directory = directory();
+    let (still, stream) = (write_still(directory.path()), directory.path().join("still.gss"));
+    let encode = |arguments: &[&str]| {
+        json(&[&["encode", text(&still), "-o", text(&stream), "--preset", "fast"][..], arguments].concat())
+    };
+    let report = encode(&["--target-bpg", "90"]);
+    assert!((report["bpg"].as_f64().unwrap() / 90.0 - 1.0).abs() <= 0.03, "{report}");
+    let report = encode(&["--target-mb", "0.006"]);
+    assert!((report["bytes"].as_f64().unwrap() / 6000.0 - 1.0).abs() <= 0.03, "{report}");
+    assert!(codes(&report).is_empty(), "{report}");
+    assert_eq!(codes(&encode(&["--target-bpg", "0.5"])), ["size-missed"]);
+    let output =
+        run(&["encode", text(&still), "-o", text(&stream), "--preset", "fast", "--target-bpg", "0.5"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.starts_with("warning: the stream has ") && said.contains("--sh-degree 0"), "{said}");
+    fail(2, &["encode", text(&still), "-o", text(&stream), "--target-bpg", "8", "--quality", "low"]);
+    fail(2, &["encode", text(&still), "-o", text(&stream), "--target-mb", "0"]);
+}
+
+#[test]
+fn invalid_gaussians_are_named_or_left_out() {
+    let directory = directory();
+    let frames = write_frames(directory.path());
+    let mut planes = scene().frame(1).into_planes();
+    planes.dc[2][11] = f32::INFINITY;
+    planes.sh[0][12] = f32::NAN;
+    planes.opacity_logit[12] = f32::NEG_INFINITY;
+    let broken = GaussianFrame::from_planes(1, planes).unwrap();
+    fs::write(frames.join("f9.ply"), ply::write(&broken)).unwrap();
+    let stream = directory.path().join("out.gss");
+    let encode = ["encode", text(&frames), "-o", text(&stream), "--preset", "fast"];
+    let said = fail(1, &encode);
+    for part in ["f9.ply", "frame 1", "Gaussian 11", "f_dc_2 is inf", "1 more", "--drop-invalid"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let report = json(&[&encode[..], &["--drop-invalid"]].concat());
+    assert_eq!((&report["dropped"], codes(&report).contains(&"dropped")), (&2.into(), true), "{report}");
+    let decoded = json(&["decode", text(&stream), "--dry-run"]);
+    assert_eq!(decoded["gaussians"], report["gaussians"]);
+}
+
+#[test]
+fn blank_pictures_are_no_quality() {
+    let directory = directory();
+    let (still, cameras) = (write_still(directory.path()), directory.path().join("cameras.json"));
+    let camera = r#"[{"id": 0, "img_name": "away", "width": 64, "height": 48, "position": [0, 0, -1000],
+        "rotation": [[-1, 0, 0], [0, 1, 0], [0, 0, -1]], "fx": 50, "fy": 50}]"#;
+    fs::write(&cameras, camera).unwrap();
+    let compare = ["compare", text(&still), text(&still), "--cameras"];
+    let report = json(&[&compare[..], &[text(&cameras)]].concat());
+    assert_eq!((&report["psnr_db"], &report["pictures"]), (&Value::Null, &0.into()));
+    assert_eq!(report["blank_pictures"], 1);
+    let output = run(&[&compare[..], &[text(&cameras)]].concat());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("1 of 1 pictures are blank"), "{said}");
+    let report = json(&[&compare[..], &["ring:1", "--height", "60"]].concat());
+    assert_eq!((&report["psnr_db"], &report["blank_pictures"]), (&100.0.into(), &0.into()));
+}
