@@ -20,7 +20,7 @@ fn on_vectors<'a>(command: &'a str, vectors: &'a Path, more: &[&'a str]) -> Vec<
 #[test]
 fn the_reference_passes_every_case_of_the_suite() {
     let vectors = vectors();
-    let report = json(&on_vectors("run", &vectors, &[]));
+    let report = json(&on_vectors("run", &vectors, &["--strict"]));
     let summary = &report["summary"];
     assert_eq!(
         summary["pass"].as_u64().unwrap(),
