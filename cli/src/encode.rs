@@ -7,6 +7,7 @@ mod finetune;
 mod options;
 mod output;
 mod pictures;
+mod prune;
 mod shards;
 pub(crate) mod warnings;
 
@@ -29,6 +30,7 @@ use finetune::{FinetuneArgs, Fitted};
 pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
+use prune::PruneArgs;
 use serde::Serialize;
 use shards::{ShardArgs, ShardReport};
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
@@ -135,6 +137,8 @@ pub(crate) struct Encode {
     /// Keep Gaussians whose opacity is below 1/255 everywhere.
     #[arg(long)]
     keep_invisible: bool,
+    #[command(flatten)]
+    prune: PruneArgs,
     /// Leave out Gaussians with values that are NaN or infinite, or a rotation of length 0, and count them; without
     /// this option they are an error.
     #[arg(long)]
@@ -395,6 +399,10 @@ impl Encode {
             true => Structure::Predicted { layers: self.temporal_layers },
             false => Structure::Intra,
         };
+        let psnr = match self.size() {
+            Some(_) => None,
+            None => Some(self.psnr.unwrap_or_else(|| Quality::from(self.quality).decibels())),
+        };
         let mut settings = Settings {
             structure,
             anchor: self.anchor.into(),
@@ -405,10 +413,7 @@ impl Encode {
             network: self.network.as_ref().map(NetworkName::source).transpose()?,
             preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
-            psnr: match self.size() {
-                Some(_) => None,
-                None => Some(self.psnr.unwrap_or_else(|| Quality::from(self.quality).decibels())),
-            },
+            psnr,
             size: self.size(),
             verify: true,
             drop_invalid: self.drop_invalid,
@@ -418,6 +423,7 @@ impl Encode {
             sh_degree: self.sh_degree,
             sh: self.sh.into(),
             keep_invisible: self.keep_invisible,
+            prune: self.prune.threshold(psnr)?,
             ticks: self.fps,
             importance: self.importance.map(Into::into),
             finetune: self.finetune.settings(&cameras, &self.layers)?,

@@ -16,6 +16,7 @@ use crate::laws::Laws;
 use crate::pca::Components;
 use crate::quantised::Trial;
 use crate::refinements::parts;
+use crate::savings::{Saving, Tool};
 use crate::secant::Secant;
 use crate::sensitivity::Sensitivity;
 use crate::sequence::Scene;
@@ -119,10 +120,10 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it; `views` are those that
+    /// Measures a canonical frame; `whole` is what its pictures are compared with, if that has more Gaussians. `settings` have the quality that is wanted, or something near it; `views` are those that
     /// it is measured in.
     pub(crate) fn new(
-        frame: &GaussianFrame,
+        (frame, whole): (&GaussianFrame, Option<&GaussianFrame>),
         ranked: &Ranked,
         views: &StripViews,
         settings: &Settings,
@@ -150,7 +151,10 @@ impl Fit {
             settings: Settings { laws, ..settings.clone() },
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),
-            views: views.of(frame, 0..views.len()),
+            views: match whole {
+                Some(whole) => views.beside(frame, whole),
+                None => views.of(frame, 0..views.len()),
+            },
             alone: alone(frame, cameras, settings),
             sample: (sample, rows),
         }
@@ -159,6 +163,46 @@ impl Fit {
     /// How steps follow from what is known of a Gaussian.
     pub(crate) fn laws(&self) -> Laws {
         self.settings.laws
+    }
+
+    /// What laws save against the same steps for all Gaussians, estimated; none where there are none.
+    pub(crate) fn worth_of_laws(&self, steps: &Steps) -> Result<Option<Saving>, Error> {
+        let (sample, rows) = &self.sample;
+        if sample.is_empty() || self.laws() == Laws::default() {
+            return Ok(None);
+        }
+        let cost = |laws: Laws| -> Result<(f64, f64), Error> {
+            let trial = Trial::with(self, laws, sample, Some(rows), steps);
+            let bits: f64 = ATTRIBUTES.into_iter().map(|attribute| trial.bits(attribute)).sum();
+            let errors = self.sensitivity.errors(sample, &trial.decoded(&ATTRIBUTES)?);
+            Ok((bits - trial.position_bits_left_out(), errors.iter().sum()))
+        };
+        let [(own, own_error), (other, other_error)] = [cost(self.laws())?, cost(Laws::default())?];
+        let count = rows.len().max(1) as f64;
+        // Other errors are brought to the same by steps that are finer or coarser.
+        let octaves = 0.5 * libm::log2(other_error / own_error);
+        let octave: f64 = self.bits_an_octave(steps).iter().sum();
+        let bits = (other - own) / count + octaves * octave;
+        Ok(bits.is_finite().then(|| Saving::estimated(Tool::AdaptiveSteps, bits)))
+    }
+
+    /// Bits per Gaussian that each attribute takes more where its steps are halved.
+    fn bits_an_octave(&self, steps: &Steps) -> [f64; 6] {
+        let (sample, rows) = &self.sample;
+        let trial = |octaves: f64| {
+            let mut steps = *steps;
+            ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, libm::exp2(octaves)));
+            Trial::new(self, sample, Some(rows), &steps)
+        };
+        let [finer, coarser] = [trial(-0.25), trial(0.25)];
+        ATTRIBUTES.map(|attribute| match attribute {
+            // Every bit of a sorted position costs one bit an axis.
+            Attribute::Position => 3.0,
+            _ => {
+                let bits = finer.bits(attribute) - coarser.bits(attribute);
+                (bits / 0.5 / rows.len().max(1) as f64).max(0.0)
+            }
+        })
     }
 
     /// The steps with which renderings have a PSNR of about `decibels`.
@@ -234,21 +278,7 @@ impl Fit {
 
     /// Steps with the same sum of errors as some, and with the shares in it that cost the fewest bits.
     fn allocated(&self, steps: &Steps, errors: [f64; 6]) -> Steps {
-        let (sample, rows) = &self.sample;
-        let trial = |octaves: f64| {
-            let mut steps = *steps;
-            ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, libm::exp2(octaves)));
-            Trial::new(self, sample, Some(rows), &steps)
-        };
-        let [finer, coarser] = [trial(-0.25), trial(0.25)];
-        let slopes = ATTRIBUTES.map(|attribute| match attribute {
-            // Every bit of a sorted position costs one bit an axis.
-            Attribute::Position => 3.0,
-            _ => {
-                let bits = finer.bits(attribute) - coarser.bits(attribute);
-                (bits / 0.5 / rows.len().max(1) as f64).max(0.0)
-            }
-        });
+        let slopes = self.bits_an_octave(steps);
         let [error, slope]: [f64; 2] = [errors.iter().sum(), slopes.iter().sum()];
         let mut steps = *steps;
         for (attribute, (own, share)) in ATTRIBUTES.into_iter().zip(errors.into_iter().zip(slopes)) {

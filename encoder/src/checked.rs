@@ -94,7 +94,7 @@ pub(crate) fn named(error: Error) -> Error {
 /// A frame in which some rows hold nothing: their opacity is 0, that is, its logit is minus infinity, which
 /// [`visible`](crate::canonical::visible) leaves out. All other rows keep their places, by which frames are tracked.
 #[expect(clippy::indexing_slicing, reason = "rows of defects are rows of the frame that they were found in")]
-fn without(mut frame: GaussianFrame, rows: &[u32]) -> GaussianFrame {
+pub(crate) fn without(mut frame: GaussianFrame, rows: &[u32]) -> GaussianFrame {
     // A row that is in the scene, so that nothing else is told apart from the rest.
     let model = (0..frame.len() as u32).find(|row| rows.binary_search(row).is_err());
     let mut planes = frame.planes_mut();

@@ -7,6 +7,7 @@
 use crate::entropy_cost::entropy_of;
 use crate::grid::nearest_integer;
 use crate::pca::Components;
+use crate::savings::{Saving, Tool};
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
 use rayon::prelude::*;
@@ -90,6 +91,10 @@ pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<f32>>,
     transform.header.rank = used as u8;
 }
 
+/// What a bit is worth, squared steps: halving the step of a uniform quantiser takes a bit more and divides its error of a
+/// twelfth of a square by four.
+pub(crate) const BIT: f64 = 2.0 * core::f64::consts::LN_2 / 12.0;
+
 /// How SH of a GOP is coded, and the figures that the choice rests on.
 #[derive(Debug, Clone)]
 pub(crate) struct ShPlan {
@@ -102,8 +107,7 @@ pub(crate) struct ShPlan {
 
 /// Chooses between coefficients and codebooks.
 ///
-/// The multiplier is that of a uniform quantiser at high rate: one bit more a component divides its error
-/// of step^2/12 by four, so a bit is worth 2 ln 2 / 12 squared steps.
+/// A bit is worth [`BIT`].
 pub(crate) fn plan_sh(
     components: &[Vec<f32>],
     exponents: &[u8],
@@ -144,7 +148,6 @@ pub(crate) fn compare(
     let carried = vq::bits_of(&book, rank) / gaussians.max(1) as f64;
     let by_vq = (entropy_of(&indices) / tested + carried, error / tested);
     let by_coefficients = coefficient_cost(&test, rank);
-    const BIT: f64 = 2.0 * core::f64::consts::LN_2 / 12.0;
     let cost = |(bits, error): (f64, f64)| error + BIT * bits;
     ([by_coefficients, by_vq], cost(by_vq) < cost(by_coefficients))
 }
@@ -157,6 +160,28 @@ fn sampled_rows(components: &[Vec<f32>], exponents: &[u8], stride: usize) -> Vec
         components.iter().map(move |plane| plane[row] / step)
     };
     (0..exponents.len()).step_by(stride).flat_map(of_row).collect()
+}
+
+/// What principal components save against coefficients as they are, on some of the Gaussians.
+pub(crate) fn worth_of_transform(
+    components: &[Vec<f32>],
+    planes: &[&[f32]],
+    exponents: &[u8],
+    step: f32,
+) -> Saving {
+    let stride = (exponents.len() / TRIAL).max(1);
+    let some = |plane: &&[f32]| -> Vec<f32> { plane.iter().step_by(stride).copied().collect() };
+    let planes: Vec<Vec<f32>> = planes.iter().map(some).collect();
+    let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
+    let identity = transform(TransformKind::Sh, &Components::identity(planes.len()), step);
+    let plain = self::components(&identity, &planes, step);
+    let exponents_of_some: Vec<u8> = exponents.iter().step_by(stride).copied().collect();
+    let [own, other] = [
+        (sampled_rows(components, exponents, stride), components.len()),
+        (sampled_rows(&plain, &exponents_of_some, 1), plain.len()),
+    ]
+    .map(|(rows, rank)| coefficient_cost(&rows, rank));
+    Saving::between(Tool::ShTransform, own, other)
 }
 
 /// Bits and squared error per Gaussian of rounding every component.

@@ -22,12 +22,14 @@ pub(crate) mod survivors;
 pub(crate) mod unit;
 mod update_decision;
 pub(crate) mod visible_difference;
+mod worth;
 
 pub(crate) use axis_matching::{Namings, Pose};
 pub(crate) use update_decision::pixel;
 pub(crate) use visible_difference::{Seen, Shown};
 
 use crate::matching::Cloud;
+use crate::savings::Saving;
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::CellsBytes;
@@ -87,6 +89,10 @@ pub(crate) struct CodedUnit {
     pub(crate) payload: Vec<u8>,
     /// New Gaussians by predictor.
     pub(crate) predicted: [u64; 4],
+    /// Bytes that prediction saves, where both were coded.
+    pub(crate) prediction_saves: usize,
+    /// Bytes that models of the refinement before save, where that was measured.
+    pub(crate) reuse_saves: usize,
 }
 
 /// A frame ready to be written.
@@ -96,6 +102,8 @@ pub(crate) struct CodedFrame {
     pub(crate) units: Vec<CodedUnit>,
     /// The frame as others refer to it.
     pub(crate) reference: Reference,
+    /// What choices save, where that was asked for.
+    pub(crate) savings: Vec<Saving>,
 }
 
 impl CodedFrame {
@@ -107,6 +115,18 @@ impl CodedFrame {
             cells.section.model.len() + cells.section.blocks.iter().map(Vec::len).sum::<usize>()
         });
         (units + cells) as f64
+    }
+
+    /// Bits of a Gaussian of the last refinement that adds any, its updates included; 0 if none does.
+    #[expect(clippy::arithmetic_side_effects, reason = "lengths of what is in memory")]
+    pub(crate) fn least_bits(&self) -> f64 {
+        let last =
+            self.units.iter().filter(|unit| unit.header.new_count > 0).map(|unit| unit.refinement).max();
+        let units = self.units.iter().filter(|unit| Some(unit.refinement) == last);
+        let (bytes, new) = units.fold((0, 0.0), |(bytes, new), unit| {
+            (bytes + unit.payload.len(), new + f64::from(unit.header.new_count))
+        });
+        if new > 0.0 { 8.0 * bytes as f64 / new } else { 0.0 }
     }
 
     /// Gaussians of the frame.

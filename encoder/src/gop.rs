@@ -25,6 +25,7 @@ use crate::isolated::{self, Isolated};
 use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
 use crate::report::{FrameReport, Report};
+use crate::savings::{Saving, Tool};
 use crate::settings::{Predictors, Preset};
 use crate::source::FrameSource;
 use crate::spans::{Common, Span};
@@ -150,7 +151,11 @@ impl<'a> SpanCoder<'a> {
         self.ranking.start_gop(&target.frame);
         let intra = Intra { order: self.ranking.order(&target.frame), target };
         let mut gop = self.start(first, last - first, &intra)?;
+        let order = self.weighs_layers(first).then(|| intra.order.clone());
         self.intra(&mut gop, first, intra)?;
+        if let Some(order) = order {
+            self.weigh_layers(&gop, last, order)?;
+        }
         let (end, verdict) = self.others(&mut gop, span)?;
         gop.header = self.header(end - first);
         if end == first + 1 && (verdict != Verdict::Predicted || self.is_rest(first, last)) {
@@ -224,6 +229,26 @@ impl<'a> SpanCoder<'a> {
         gop.in_one_layer = true;
         self.intra(&mut gop, first, intra)?;
         Ok(gop)
+    }
+
+    /// Whether it is told what spatial layers save a frame.
+    fn weighs_layers(&self, number: u32) -> bool {
+        let has_layers = self.common.sequence.spatial_layer_count > 1;
+        has_layers && self.common.settings.finetune.is_none() && self.tells_savings(number)
+    }
+
+    /// Tells what spatial layers save the first frame, or rather cost it: it is coded without them as well.
+    fn weigh_layers(&mut self, gop: &Gop, last: u32, order: Vec<u32>) -> Result<(), Error> {
+        let before = self.report.clone();
+        let intra = Intra { target: self.target(gop.first)?, order };
+        let mut alone = self.start(gop.first, last - gop.first, &intra)?;
+        alone.header = GopHeader::intra(UNNUMBERED, last - gop.first);
+        alone.in_one_layer = true;
+        self.intra(&mut alone, gop.first, intra)?;
+        self.report = before;
+        let bits = 8.0 * (alone.intra_bytes - gop.intra_bytes);
+        self.report.savings.push(Saving::measured(Tool::SpatialLayers, bits));
+        Ok(())
     }
 
     /// Codes a GOP of I frames, where the second could not be predicted from the first, and gives the frame after it.
@@ -381,8 +406,12 @@ impl<'a> SpanCoder<'a> {
                 rows: &target.rows,
                 row_count: target.row_count,
                 in_one_layer: gop.in_one_layer,
+                tells_savings: self.tells_savings(number),
             },
         )?;
+        if self.report.coded.is_empty() {
+            self.report.savings.extend(coded.savings.iter().chain(&worth_of_reuse(&coded)));
+        }
         let reports = fitted.into_iter().flat_map(|fitted| fitted.reports);
         self.report.finetuned.extend(reports.map(|report| FinetuneReport { frame: number, ..report }));
         let role = FrameRole { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
@@ -398,6 +427,15 @@ impl<'a> SpanCoder<'a> {
             self.write(gop)?;
         }
         Ok(())
+    }
+
+    /// Whether it is told what choices save a frame: the first one, if it has Gaussians; not where time counts.
+    fn tells_savings(&self, number: u32) -> bool {
+        let settings = self.common.settings;
+        number == 0
+            && self.report.coded.is_empty()
+            && settings.preset != Preset::Fast
+            && self.recorder.is_none()
     }
 
     /// Codes a frame that refers to another, if that is worth it.
@@ -498,8 +536,10 @@ impl<'a> SpanCoder<'a> {
             let id = UnitId::of_increment(number, unit.refinement);
             gop.units.push((id.on_layers(unit.spatial_layer, role.temporal_layer), unit.payload.clone()));
             frame.add(&unit.header, unit.predicted);
+            frame.prediction_saves += unit.prediction_saves as u64;
             gop.has_learned |= unit.predicted[3] > 0;
         }
+        frame.least_bits = coded.least_bits();
         let bytes = |(_, payload): &(UnitId, Vec<u8>)| (UnitHeader::SIZE + payload.len()) as u64;
         frame.bytes = gop.units[start..].iter().map(bytes).sum();
         self.report.invisible += u64::from(target.row_count) - target.rows.len() as u64;
@@ -508,6 +548,13 @@ impl<'a> SpanCoder<'a> {
         self.report.digests.push(coded.units.last().map_or(0, |unit| unit.header.refinement_digest));
         Ok(())
     }
+}
+
+/// What tables of the refinement before save an I frame, if that was measured.
+fn worth_of_reuse(coded: &CodedFrame) -> Option<Saving> {
+    let bytes: usize = coded.units.iter().map(|unit| unit.reuse_saves).sum();
+    let bits = 8.0 * bytes as f64 / f64::from(coded.gaussians().max(1));
+    (!coded.savings.is_empty()).then(|| Saving::measured(Tool::TableReuse, bits))
 }
 
 impl Gop {

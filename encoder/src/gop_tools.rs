@@ -6,7 +6,8 @@ use crate::grid::{Geometry, geometry};
 use crate::pca::Components;
 use crate::refinements::parts;
 use crate::report::Report;
-use crate::settings::Settings;
+use crate::savings::{Saving, Tool};
+use crate::settings::{Preset, Settings};
 use crate::shape::Shape;
 use rayon::prelude::*;
 use splatstream_decoder::layout::ShCoding;
@@ -20,6 +21,8 @@ use splatstream_gaussians::GaussianFrame;
 pub(crate) struct GopTools {
     pub(crate) dc: Transform,
     pub(crate) sh: Option<(Transform, ShPlan)>,
+    /// What the transform saves, if it was looked at.
+    worth_of_transform: Option<Saving>,
     /// SH components of the first frame, steps, which were needed to find the rank.
     first_components: Option<Vec<Vec<f32>>>,
 }
@@ -51,7 +54,7 @@ impl GopTools {
         let dc = Components::of(&dc_planes(frame));
         let dc = colour::transform(TransformKind::Dc, &dc, sequence.dc_step());
         let zeros = vec![0.0; frame.len()];
-        let mut first_components = None;
+        let (mut first_components, mut worth_of_transform) = (None, None);
         let sh = (sequence.sh_degree > 0).then(|| {
             let planes = sh_planes(frame, sequence, &zeros);
             let step = sequence.sh_step();
@@ -66,6 +69,9 @@ impl GopTools {
             if frames == 1 {
                 colour::drop_unused(&mut transform, &mut components, &exponents);
             }
+            if settings.tools.sh_transform && settings.preset != Preset::Fast && !frame.is_empty() {
+                worth_of_transform = Some(colour::worth_of_transform(&components, &planes, &exponents, step));
+            }
             let gaussians = frame.len().saturating_mul(frames as usize);
             let mut plan = colour::plan_sh(&components, &exponents, gaussians, settings.sh, settings.preset);
             if settings.profile() == Profile::Dynamic {
@@ -74,7 +80,7 @@ impl GopTools {
             first_components = Some(components);
             (transform, plan)
         });
-        Self { dc, sh, first_components }
+        Self { dc, sh, worth_of_transform, first_components }
     }
 
     /// The units that define them, for the GOP that starts with a frame.
@@ -101,6 +107,11 @@ impl GopTools {
         if let Some((transform, plan)) = &self.sh {
             report.sh_rank = transform.header.rank;
             report.sh_trial = plan.trial;
+            let worth_of_coding = plan.trial.map(|[coefficients, book]| match plan.codebooks.is_empty() {
+                true => Saving::between(Tool::ShCoding, coefficients, book),
+                false => Saving::between(Tool::ShCoding, book, coefficients),
+            });
+            report.savings.extend(self.worth_of_transform.into_iter().chain(worth_of_coding));
             report.sh_codebook_entries =
                 plan.codebooks.first().map_or(0, |book| u32::from(book.header.entry_count_minus1) + 1);
         }

@@ -230,7 +230,7 @@ fn middle(cameras: &[Camera]) -> [f32; 3] {
 
 /// What pictures would show of each Gaussian if no other hid it: from its opacity, and from the pixels that it covers.
 #[expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
-fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
+pub(crate) fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     let of_row = |row: usize| {
         let scales = frame.log_scale().each_ref().map(|plane| plane[row]);
         let least = scales.into_iter().fold(f32::INFINITY, f32::min);

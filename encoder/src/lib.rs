@@ -39,12 +39,14 @@ mod pass;
 mod pca;
 mod plan;
 mod progress;
+mod prune;
 mod push;
 mod quantised;
 mod reach;
 mod refinements;
 mod report;
 mod room;
+mod savings;
 mod secant;
 mod section;
 mod sensitivity;
@@ -74,7 +76,10 @@ pub use laws::Laws;
 pub use plan::{Plan, PlanRecord, PlannedSteps, PlannedTarget, Single, plan};
 pub use progress::Progress;
 pub use push::Encoder;
-pub use report::{Dropped, FrameReport, GopReport, PictureReport, Report, TargetReport, VerifiedFrame};
+pub use report::{
+    Dropped, FrameReport, GopReport, PictureReport, Pruned, Report, TargetReport, VerifiedFrame,
+};
+pub use savings::{Basis, Saving, Tool};
 pub use settings::{
     Anchor, Fidelity, Importance, NetworkSource, PredictorChoice, Predictors, Preset, Quality, Settings,
     ShChoice, Size, Structure, Tools,

@@ -389,6 +389,42 @@ pub(crate) fn costs(models: &[PlaneModel], blocks: &Blocks<'_>) -> Vec<PlaneCost
     models.par_iter().enumerate().map(of_plane).collect()
 }
 
+/// Bits of a section: under its models, and with one table for each plane, all included; and those of the models alone.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ContextWorth {
+    pub(crate) own: f64,
+    pub(crate) plain: f64,
+    pub(crate) models: f64,
+}
+
+/// What contexts are worth to a section, from some of its blocks.
+pub(crate) fn worth_of_contexts(models: &[PlaneModel], blocks: &Blocks<'_>) -> ContextWorth {
+    let planes = blocks.planes();
+    let stride = blocks.values().div_ceil(SAMPLE_FAST).max(1);
+    let sample = blocks.cut((0..blocks.len()).step_by(stride));
+    let taken: usize = sample.iter().map(CodedBlock::len).sum();
+    let scale = blocks.values() as f64 / taken.max(1) as f64;
+    let of_plane = |(plane, model): (usize, &PlaneModel)| {
+        let info = planes[plane];
+        let axes = [ContextAxis::NONE, ContextAxis::NONE];
+        let mut plain = PlaneModel { axes, table_of_context: vec![0], tables: Vec::new(), ..model.clone() };
+        let mut histogram = [Histogram::default()];
+        count(&mut histogram, &plain, info, plane, &sample);
+        plain.tables = histogram.map(|h| table(&h.counts(), info.alphabet, model.direct_log2)).to_vec();
+        let symbols = |model: &PlaneModel| -> f64 {
+            scale * sample.iter().filter_map(|block| symbol_bits(model, info, plane, block)).sum::<f64>()
+        };
+        let [own, other] = [model, &plain].map(|model| model_bits(model, info.alphabet));
+        ContextWorth { own: symbols(model) + own, plain: symbols(&plain) + other, models: own }
+    };
+    let worths: Vec<ContextWorth> = models.par_iter().enumerate().map(of_plane).collect();
+    worths.into_iter().fold(ContextWorth::default(), |sum, worth| ContextWorth {
+        own: sum.own + worth.own,
+        plain: sum.plain + worth.plain,
+        models: sum.models + worth.models,
+    })
+}
+
 /// Bits of a model that is carried, to the next byte.
 fn model_bits(model: &PlaneModel, alphabet: Alphabet) -> f64 {
     8.0 * write_models(slice::from_ref(model), &[alphabet], None).len() as f64

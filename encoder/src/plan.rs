@@ -10,6 +10,7 @@ use crate::frame::learning;
 use crate::gop::SpanCoder;
 use crate::importance::Ranking;
 use crate::pass::is_better_alone;
+use crate::prune::refuse_pruning;
 use crate::report::{Report, TargetReport};
 use crate::sequence::{Analysis, analyse, check};
 use crate::settings::Settings;
@@ -73,6 +74,7 @@ pub fn plan(source: &mut dyn FrameSource, settings: &Settings) -> Result<Plan, E
 
 fn planned(source: &mut dyn FrameSource, asked: &Settings) -> Result<Plan, Error> {
     check(asked)?;
+    refuse_pruning(asked)?;
     if !asked.has_target() || source.is_empty() {
         return Plan::new(source, asked, asked.clone(), Ranking::new(asked));
     }

@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::frame::learning;
 use crate::importance::Ranking;
 use crate::isolated::Isolated;
+use crate::prune::refuse_pruning;
 use crate::report::Report;
 use crate::room::{Announced, announce};
 use crate::sequence::{Analysis, Survey};
@@ -203,6 +204,7 @@ impl<W: Write> Encoder<W> {
 impl Stream {
     /// Settles what holds for all frames, and writes what stands before the first GOP.
     fn start(source: &mut dyn FrameSource, settings: &Settings, sink: &mut dyn Write) -> Result<Self, Error> {
+        refuse_pruning(settings)?;
         let (settings, ranking, tried) = settled(source, settings)?;
         let (analysis, announced) = announce(Survey::of(source, &settings)?, &settings)?;
         let mut report = Report::new(&analysis, &settings, ranking.importance());

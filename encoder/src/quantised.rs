@@ -10,6 +10,7 @@ use crate::entropy_cost::entropy_of;
 use crate::error::Error;
 use crate::frame::unit::Grains;
 use crate::grid::{Geometry, geometry, nearest_integer};
+use crate::laws::Laws;
 use crate::pca::Components;
 use crate::settings::Settings;
 use crate::shape::{Shape, nearest_multiple};
@@ -46,7 +47,18 @@ struct Coded {
 impl<'a> Trial<'a> {
     /// `rows`: which Gaussians of the fit these are; none: all.
     pub(crate) fn new(fit: &'a Fit, frame: &'a GaussianFrame, rows: Option<&[u32]>, steps: &Steps) -> Self {
-        let settings = Settings { steps: *steps, spatial_layers: 1, ..fit.settings.clone() };
+        Self::with(fit, fit.laws(), frame, rows, steps)
+    }
+
+    /// The same with other laws.
+    pub(crate) fn with(
+        fit: &'a Fit,
+        laws: Laws,
+        frame: &'a GaussianFrame,
+        rows: Option<&[u32]>,
+        steps: &Steps,
+    ) -> Self {
+        let settings = Settings { steps: *steps, laws, spatial_layers: 1, ..fit.settings.clone() };
         let flags = SequenceParameters::flags(true, frame.antialiased(), false);
         let sequence = fit.scene.parameters(&settings, 1, frame.sh_degree(), flags);
         let grains = Grains::new(&settings, &sequence);
@@ -180,6 +192,11 @@ impl<'a> Trial<'a> {
             plane
         };
         (0..components.len()).into_par_iter().map(plane).collect()
+    }
+
+    /// Low bits of positions that are left out, of all Gaussians and axes together.
+    pub(crate) fn position_bits_left_out(&self) -> f64 {
+        self.coded.iter().map(|coded| 3.0 * f64::from(coded.position_shift)).sum()
     }
 
     /// Zero-order bits of an attribute; of positions, which are sorted, none are counted.

@@ -3,6 +3,7 @@
 use crate::finetune::FinetuneReport;
 use crate::isolated::Isolated;
 use crate::laws::Laws;
+use crate::savings::{Saving, Tool};
 use crate::sequence::Analysis;
 use crate::settings::{Importance, Settings};
 use crate::steps::Steps;
@@ -39,6 +40,8 @@ pub struct Report {
     pub sh_codebook_entries: u32,
     /// Bits per Gaussian and mean squared error in steps, of coefficients and of codebooks, if compared.
     pub sh_trial: Option<[(f64, f64); 2]>,
+    /// What choices save, as far as that is known.
+    pub savings: Vec<Saving>,
     /// Quantiser steps.
     pub steps: Option<Steps>,
     /// How steps follow from what is known of a Gaussian.
@@ -57,6 +60,8 @@ pub struct Report {
     pub target: Option<TargetReport>,
     /// Gaussians left out because a value of theirs is not finite, by frame.
     pub dropped: Vec<Dropped>,
+    /// Gaussians left out because pictures hardly miss them, by frame; none where it was not asked for.
+    pub pruned: Vec<Pruned>,
     /// What fitting I frames to pictures has done, frame by frame; none where it was not asked for.
     pub finetuned: Vec<FinetuneReport>,
     /// Whether each frame stands for itself in one layer although frames might have been predicted: that is smaller.
@@ -74,6 +79,7 @@ impl Report {
             position_bits: sequence.position_bits,
             position_step: sequence.position_step(),
             canonical_axes: (sequence.canonical_axes(), analysis.axes_trial),
+            savings: vec![worth_of_axes(sequence.canonical_axes(), analysis.axes_trial)],
             steps: Some(settings.steps),
             laws: Some(settings.laws),
             importance: Some(importance),
@@ -86,6 +92,7 @@ impl Report {
         if self.coded.is_empty() {
             (self.sh_rank, self.sh_trial) = (later.sh_rank, later.sh_trial);
             self.sh_codebook_entries = later.sh_codebook_entries;
+            self.savings.extend(later.savings);
         }
         self.gaussians = self.gaussians.saturating_add(later.gaussians);
         self.invisible = self.invisible.saturating_add(later.invisible);
@@ -102,6 +109,22 @@ impl Report {
             self.dropped.push(dropped);
         }
     }
+
+    /// The same of Gaussians that pictures hardly miss.
+    pub(crate) fn leave_pruned_out(&mut self, pruned: Vec<Pruned>) {
+        let gaussians: u64 = pruned.iter().map(|pruned| u64::from(pruned.gaussians)).sum();
+        self.invisible = self.invisible.saturating_sub(gaussians);
+        let of_frame = |pruned: Pruned| {
+            let bits = self.coded.get(pruned.frame as usize).map_or(0.0, |frame| frame.least_bits);
+            Pruned { bytes: (f64::from(pruned.gaussians) * bits / 8.0) as u64, ..pruned }
+        };
+        self.pruned = pruned.into_iter().map(of_frame).collect();
+    }
+}
+
+/// What the order of axes saves, of bits per Gaussian if they are sorted and if not.
+fn worth_of_axes(are_sorted: bool, [sorted, unsorted]: [f64; 2]) -> Saving {
+    Saving::estimated(Tool::Axes, if are_sorted { unsorted - sorted } else { sorted - unsorted })
 }
 
 /// A GOP.
@@ -178,6 +201,20 @@ pub struct Dropped {
     pub first: Defect,
 }
 
+/// Gaussians of a frame that were left out because pictures hardly miss them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pruned {
+    /// The frame.
+    pub frame: u32,
+    /// Gaussians left out.
+    pub gaussians: u32,
+    /// Bytes that they would take, estimated: those of as many Gaussians of the last refinement.
+    pub bytes: u64,
+    /// PSNR of pictures without them against pictures with them, in the view that misses them most, decibels; none if nothing
+    /// was left out.
+    pub psnr: Option<f64>,
+}
+
 /// What a frame is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameReport {
@@ -201,6 +238,10 @@ pub struct FrameReport {
     pub new: u32,
     /// New Gaussians by predictor: none, knn, bilateral, transformer.
     pub predicted: [u64; 4],
+    /// Bits of a Gaussian of the last refinement that adds any; 0 if none does.
+    pub least_bits: f64,
+    /// Bytes that prediction of new Gaussians saves, as far as both were coded.
+    pub prediction_saves: u64,
     /// Whether it is true to its pictures, not to its attributes.
     pub by_pictures: bool,
 }
@@ -219,6 +260,8 @@ impl FrameReport {
             removed: 0,
             new: 0,
             predicted: [0; 4],
+            least_bits: 0.0,
+            prediction_saves: 0,
             by_pictures: false,
         }
     }

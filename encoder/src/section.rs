@@ -2,7 +2,7 @@
 
 use crate::blocks::{Blocks, first_value_plane};
 use crate::error::Error;
-use crate::models::{self, PlaneCosts};
+use crate::models::{self, ContextWorth, PlaneCosts};
 use crate::settings::{Preset, Tools};
 use rayon::prelude::*;
 use splatstream_decoder::increment::values::SectionValues;
@@ -80,6 +80,11 @@ impl SectionDraft {
         let blocks = self.blocks(values, plan);
         // A section without values has no models.
         models::costs(&self.own, &blocks).into_iter().skip(first_value_plane(&self.layout)).collect()
+    }
+
+    /// What contexts are worth to the values, on some of them.
+    pub(crate) fn worth_of_contexts(&self, values: &SectionValues, plan: &SectionPlan) -> ContextWorth {
+        models::worth_of_contexts(&self.own, &self.blocks(values, plan))
     }
 
     /// The same with more bits than are needed: A.2 allows no more than so many new Gaussians in a byte.

@@ -174,6 +174,14 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
     if !(1.0..=20.0).contains(&settings.steps.position_bits) {
         return setting("position_bits", settings.steps.position_bits.to_string(), "1 to 20");
     }
+    if let Some(decibels) = settings.prune {
+        if !(20.0..=90.0).contains(&decibels) {
+            return setting("prune", decibels.to_string(), "20 to 90");
+        }
+        if settings.structure != Structure::Intra {
+            return setting("prune", decibels.to_string(), "nothing where frames refer to others");
+        }
+    }
     if let Some(finetune) = &settings.finetune {
         finetune.check()?;
     }

@@ -17,6 +17,14 @@ pub trait FrameSource {
     /// # Errors
     /// The frame cannot be had; the error says which file and why.
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>>;
+
+    /// The same as pictures of the stream are compared with it: what a source leaves out of a frame is still there.
+    ///
+    /// # Errors
+    /// As [`frame`](Self::frame).
+    fn original(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        self.frame(number)
+    }
 }
 
 /// Frames in memory.

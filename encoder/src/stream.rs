@@ -5,7 +5,9 @@ use crate::error::Error;
 use crate::importance::Ranking;
 use crate::pass::encode_once;
 use crate::progress::Progress;
+use crate::prune::PrunedSource;
 use crate::report::Report;
+use crate::sequence;
 use crate::settings::Settings;
 use crate::source::FrameSource;
 use crate::target;
@@ -24,11 +26,30 @@ pub fn encode(
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
     let mut source = CheckedSource::new(source, settings.drop_invalid);
-    let encoded = match settings.has_target() && !source.is_empty() {
-        true => target::reach(&mut source, settings, sink, progress),
-        false => encode_once(&mut source, settings, Ranking::new(settings), sink, progress),
+    let mut report = match settings.prune {
+        None => encode_checked(&mut source, settings, sink, progress)?,
+        Some(least) => {
+            // Before anything is weighed for what no stream can carry.
+            sequence::check(settings)?;
+            let mut pruned = PrunedSource::new(&mut source, settings, least);
+            let mut report = encode_checked(&mut pruned, settings, sink, progress)?;
+            report.leave_pruned_out(pruned.into_pruned());
+            report
+        }
     };
-    let mut report = encoded.map_err(named)?;
     report.leave_out(source.into_dropped());
     Ok(report)
+}
+
+fn encode_checked(
+    source: &mut dyn FrameSource,
+    settings: &Settings,
+    sink: &mut dyn Write,
+    progress: Progress<'_>,
+) -> Result<Report, Error> {
+    let encoded = match settings.has_target() && !source.is_empty() {
+        true => target::reach(source, settings, sink, progress),
+        false => encode_once(source, settings, Ranking::new(settings), sink, progress),
+    };
+    encoded.map_err(named)
 }

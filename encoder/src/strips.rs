@@ -85,6 +85,13 @@ impl StripViews {
         places.filter_map(view).collect()
     }
 
+    /// The same with the pictures of a frame that has more Gaussians.
+    pub(crate) fn beside(&self, frame: &GaussianFrame, whole: &GaussianFrame) -> Vec<StripView> {
+        let views = self.of(frame, 0..self.len());
+        let pictures = self.draw(whole);
+        views.into_iter().zip(pictures).map(|(view, picture)| StripView { picture, ..view }).collect()
+    }
+
     /// How many views there are.
     pub(crate) fn len(&self) -> usize {
         self.cameras.len()
@@ -104,6 +111,15 @@ impl StripViews {
         decoded: &[Rendering],
     ) -> Result<Option<f64>, Error> {
         mean(self.draw(original).zip(decoded).map(|(original, decoded)| Ok(compared(&original, decoded))))
+    }
+}
+
+impl StripViews {
+    /// The lowest PSNR of the views, between strips that have been drawn and those of another frame, dB; none if nothing can be
+    /// seen in any.
+    pub(crate) fn least_psnr(&self, frame: &GaussianFrame, drawn: &[Rendering]) -> Option<f64> {
+        let decibels = self.draw(frame).zip(drawn).filter_map(|(one, other)| compared(&one, other));
+        decibels.reduce(f64::min)
     }
 }
 

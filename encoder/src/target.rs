@@ -13,9 +13,10 @@ use crate::isolated;
 use crate::pass::{encode_once, encode_smaller};
 use crate::progress::Progress;
 use crate::report::{Report, TargetReport};
+use crate::savings::Saving;
 use crate::secant::Secant;
 use crate::sequence;
-use crate::settings::{Settings, Size};
+use crate::settings::{Preset, Settings, Size};
 use crate::source::FrameSource;
 use crate::steps::Steps;
 use crate::verification;
@@ -75,6 +76,7 @@ pub(crate) fn reach(
         None => seeker.whole(fitted, sink)?,
     };
     report.target = Some(seeker.told(fitted));
+    report.savings.extend(seeker.fitting.worth_of_laws(fitted)?);
     Ok(report)
 }
 
@@ -126,9 +128,15 @@ fn first_frame(
     settings: &Settings,
 ) -> Result<(GaussianFrame, GaussianFrame), Error> {
     let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
-    let shown = visible(&first, settings.keep_invisible);
-    let frame = canonicalise(first.clone().into_selected(&shown), true);
-    Ok((first, isolated::colours(frame, &shown, 0).0))
+    let frame = coded_form(first.clone(), settings);
+    Ok((first, frame))
+}
+
+/// A first frame as it is coded.
+fn coded_form(frame: GaussianFrame, settings: &Settings) -> GaussianFrame {
+    let shown = visible(&frame, settings.keep_invisible);
+    let frame = canonicalise(frame.into_selected(&shown), true);
+    isolated::colours(frame, &shown, 0).0
 }
 
 /// Settings that reach what is asked for on the frames of `source`, the order of the first frame, and how they were found.
@@ -169,9 +177,18 @@ impl<'a> Fitting<'a> {
         let (first, frame) = first_frame(source, settings)?;
         let views = verification::views(&first, settings);
         drop(first);
+        // What is left out counts as an error.
+        let whole = match settings.prune {
+            Some(_) => {
+                let original = source.original(0).map_err(|source| Error::Source { frame: 0, source })?;
+                Some(coded_form(original, settings))
+            }
+            None => None,
+        };
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
-        Ok(Self { settings, fit: Fit::new(&frame, &ranked, &views, settings), ranking, known: Vec::new() })
+        let fit = Fit::new((&frame, whole.as_ref()), &ranked, &views, settings);
+        Ok(Self { settings, fit, ranking, known: Vec::new() })
     }
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
@@ -199,6 +216,19 @@ impl<'a> Fitting<'a> {
             }
         };
         Ok(Settings { steps, laws: self.fit.laws(), ..self.settings.clone() })
+    }
+}
+
+impl Fitting<'_> {
+    /// What laws save with the steps for a PSNR; not where time counts.
+    fn worth_of_laws(&mut self, decibels: f64) -> Result<Option<Saving>, Error> {
+        match self.settings.preset {
+            Preset::Fast => Ok(None),
+            Preset::Balanced | Preset::Small => {
+                let steps = self.at(decibels)?.steps;
+                self.fit.worth_of_laws(&steps)
+            }
+        }
     }
 }
 

@@ -153,7 +153,7 @@ impl Verifier {
             let number = self.first.saturating_add(number);
             // The source is read again rather than kept beside what was decoded: a frame may fill the memory.
             let mut original =
-                || source.frame(number).map_err(|source| Error::Source { frame: number, source });
+                || source.original(number).map_err(|source| Error::Source { frame: number, source });
             let views = views(&original()?, settings);
             let decoded: Vec<Rendering> = views.draw(&frame).collect();
             drop(frame);

@@ -53,4 +53,8 @@ impl FrameSource for FirstFrames<'_> {
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
         self.source.frame(number)
     }
+
+    fn original(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
+        self.source.original(number)
+    }
 }

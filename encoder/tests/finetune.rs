@@ -4,18 +4,15 @@
 #[path = "common/mod.rs"]
 mod common;
 
-use common::{builtin, decoded, encoded, strict};
+use common::{builtin, decoded, encoded, sequence, strict};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
-use splatstream_decoder::process::{Decoder, Options};
+use splatstream_decoder::process::Options;
 use splatstream_encoder::{
     Attribute, Error, Finetune, Photograph, Preset, Report, Settings, Structure, encode,
 };
 use splatstream_files::builtin::BuiltinScene;
-use splatstream_format::Limits;
-use splatstream_format::syntax::SequenceParameters;
-use splatstream_format::unit::Stream;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, ring};
 use splatstream_render::{Image, ReferencePictures, render};
@@ -189,17 +186,6 @@ fn ring_psnr(bytes: &[u8], &operating_point: &OperatingPoint) -> f64 {
     let source = scene().remove(0);
     let views = ReferencePictures::new(&source, ring(&source, Up::default(), 5, 108));
     views.psnr(&frame).sum::<f64>() / 5.0
-}
-
-fn sequence(bytes: &[u8]) -> SequenceParameters {
-    let limits = Limits::default();
-    let stream = Stream::open(bytes, &limits).unwrap();
-    let mut decoder = Decoder::new(stream.header(), Options { limits, ..Options::default() });
-    let mut units = stream.units();
-    while decoder.sequence().is_none() {
-        let _frame = decoder.unit(&units.next_unit().unwrap().unwrap());
-    }
-    *decoder.sequence().unwrap()
 }
 
 #[test]

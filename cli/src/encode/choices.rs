@@ -1,10 +1,12 @@
 //! What the encoder chose, and why.
 
+use super::prune::pruned;
 use crate::up_guess::UpGuess;
 use serde::Serialize;
-use splatstream_chart::numbers::{grouped, percent};
+use splatstream_chart::numbers::{bits_per_gaussian, grouped, percent};
 use splatstream_encoder::{
-    FrameReport, Importance, PredictorChoice, Predictors, Report, Settings, ShChoice, Steps, Structure, Tools,
+    Basis, FrameReport, Importance, Laws, PredictorChoice, Predictors, Preset, Report, Settings, ShChoice,
+    Steps, Structure, Tool, Tools,
 };
 use splatstream_format::syntax::FrameType;
 
@@ -14,32 +16,61 @@ pub(crate) struct Choice {
     tool: &'static str,
     choice: String,
     why: String,
+    /// Bits per Gaussian that it takes less than the other choice, below 0 more; none if that is not known.
+    saved_bpg: Option<f64>,
+    /// How that is known.
+    basis: Option<&'static str>,
 }
 
 impl Choice {
-    fn new(tool: &'static str, choice: impl Into<String>, why: impl Into<String>) -> Self {
-        Self { tool, choice: choice.into(), why: why.into() }
+    pub(super) fn new(tool: &'static str, choice: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { tool, choice: choice.into(), why: why.into(), saved_bpg: None, basis: None }
+    }
+
+    /// With what it saves, if that is known.
+    pub(super) fn saving(self, saving: Option<(f64, Basis)>) -> Self {
+        let basis = saving.map(|(_, basis)| match basis {
+            Basis::Measured => "measured",
+            Basis::Estimated => "estimated",
+        });
+        Self { saved_bpg: saving.map(|(bits, _)| bits), basis, ..self }
     }
 
     /// A line for people.
     pub(crate) fn text(&self) -> String {
-        format!("  {:<18} {}: {}\n", self.tool, self.choice, self.why)
+        let saved = self.saved_bpg.zip(self.basis).map(|(bits, basis)| {
+            let verb = if bits < 0.0 { "costs" } else { "saves" };
+            format!("; {verb} {:.2} bits per Gaussian, {basis}", bits.abs())
+        });
+        format!("  {:<18} {}: {}{}\n", self.tool, self.choice, self.why, saved.unwrap_or_default())
     }
+}
+
+/// What a tool saves, if the report says it.
+fn saved(report: &Report, tool: Tool) -> Option<(f64, Basis)> {
+    report.savings.iter().find(|saving| saving.tool == tool).map(|saving| (saving.bits, saving.basis))
 }
 
 /// Every decision in the report.
 pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     let mut choices = vec![positions(report, settings), axes(report), degree(report, settings)];
     choices.extend(steps(report, settings));
+    choices.extend(laws(report, settings));
+    choices.extend(tables(report));
     if report.sh_degree.1 > 0 {
         choices.push(harmonics(report, settings));
+        choices.push(transform(report, settings));
     }
     choices.extend(order(report, settings));
+    choices.extend(refinements(report, settings));
     choices.extend(layers(report, settings));
+    choices.extend(prediction(report, settings));
     choices.extend(survivors(report));
     choices.extend(fidelity(report, settings));
     choices.extend(predictors(report, settings));
+    choices.extend(network(report, settings));
     choices.push(invisible(report, settings));
+    choices.extend(pruned(report, settings));
     choices.extend(left_out(settings));
     choices
 }
@@ -81,7 +112,8 @@ fn axes(report: &Report) -> Choice {
     let why = format!(
         "scale and rotation take {bits_sorted:.2} bits per Gaussian sorted, {bits_unsorted:.2} as they come"
     );
-    Choice::new("axes", if sorted { "sorted by size" } else { "as they come" }, why)
+    let choice = Choice::new("axes", if sorted { "sorted by size" } else { "as they come" }, why);
+    choice.saving(saved(report, Tool::Axes))
 }
 
 fn degree(report: &Report, settings: &Settings) -> Choice {
@@ -116,7 +148,46 @@ fn harmonics(report: &Report, settings: &Settings) -> Choice {
     };
     let reasons: Vec<String> = asked.into_iter().chain(trial).collect();
     let why = if reasons.is_empty() { "the only one tried".to_owned() } else { reasons.join("; ") };
-    Choice::new("sh coding", choice, why)
+    Choice::new("sh coding", choice, why).saving(saved(report, Tool::ShCoding))
+}
+
+/// How many of the components of spherical harmonics are needed, and what they are.
+fn transform(report: &Report, settings: &Settings) -> Choice {
+    let degree = report.sh_degree.1;
+    let coefficients = 3 * (usize::from(degree + 1).pow(2) - 1);
+    let choice = match settings.tools.sh_transform {
+        true => format!("{} of {coefficients} principal components", report.sh_rank),
+        false => format!("{} coefficients as they are", report.sh_rank),
+    };
+    let why = match usize::from(report.sh_rank) < coefficients {
+        true => "all others round to 0 for every Gaussian",
+        false => "each of them is needed by some Gaussian",
+    };
+    Choice::new("sh transform", choice, why).saving(saved(report, Tool::ShTransform))
+}
+
+/// Steps by size, opacity and importance.
+fn laws(report: &Report, settings: &Settings) -> Option<Choice> {
+    let laws = report.laws.filter(|laws| *laws != Laws::default())?;
+    let refinements = settings.refinements.len();
+    let coarser: Vec<String> = laws.coarser.iter().take(refinements).map(ToString::to_string).collect();
+    let choice = format!("size to -{}, opacity to -{}", laws.area, laws.opacity);
+    let why =
+        format!("what pictures show least is coarsest: refinements by {} half octaves", coarser.join(", "));
+    Some(Choice::new("step laws", choice, why).saving(saved(report, Tool::AdaptiveSteps)))
+}
+
+/// How tables of symbols are chosen.
+fn tables(report: &Report) -> Vec<Choice> {
+    let contexts = saved(report, Tool::Contexts).map(|saving| {
+        let why = "against one table for each plane of a unit";
+        Choice::new("contexts", "tables chosen by what is decoded before", why).saving(Some(saving))
+    });
+    let reuse = saved(report, Tool::TableReuse).map(|saving| {
+        let choice = if saving.0 > 0.0 { "some are those of the refinement before" } else { "all are sent" };
+        Choice::new("tables", choice, "whichever takes fewer bits, plane by plane").saving(Some(saving))
+    });
+    contexts.into_iter().chain(reuse).collect()
 }
 
 fn order(report: &Report, settings: &Settings) -> Option<Choice> {
@@ -139,6 +210,15 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
         (_, count) => format!("; {count} views given"),
     };
     Some(Choice::new("order", choice, format!("{why}{views}")))
+}
+
+/// The refinements, and what they cost.
+fn refinements(report: &Report, settings: &Settings) -> Option<Choice> {
+    let saving = saved(report, Tool::Refinements)?;
+    let percents: Vec<String> = settings.refinements.iter().map(ToString::to_string).collect();
+    let choice = format!("{} of up to {} %", percents.len(), percents.join(", "));
+    let why = "positions and tables take more in several lists; their steps are in step laws";
+    Some(Choice::new("refinements", choice, why).saving(Some(saving)))
 }
 
 /// Layers of a stream, and what its frames cost by type.
@@ -168,7 +248,33 @@ fn layers(report: &Report, settings: &Settings) -> Option<Choice> {
     };
     let types = [FrameType::Intra, FrameType::Predicted, FrameType::Enhancement];
     let costs: Vec<String> = types.into_iter().filter_map(of_type).collect();
-    Some(Choice::new("layers", format!("{spatial} spatial, {temporal}"), costs.join(", ")))
+    let choice = Choice::new("layers", format!("{spatial} spatial, {temporal}"), costs.join(", "));
+    Some(choice.saving(saved(report, Tool::SpatialLayers)))
+}
+
+/// What predicted frames save against I frames like those that there are, and what longer GOPs would.
+fn prediction(report: &Report, settings: &Settings) -> Option<Choice> {
+    let sum = |is_intra: bool| {
+        let frames = report.coded.iter().filter(|frame| (frame.frame_type == FrameType::Intra) == is_intra);
+        frames.fold((0, 0, 0_u64), |(count, bytes, gaussians), frame| {
+            (count + 1, bytes + frame.bytes, gaussians + u64::from(frame.gaussians))
+        })
+    };
+    let ((count, bytes, gaussians), (others, other_bytes, other_gaussians)) = (sum(true), sum(false));
+    if gaussians == 0 || other_gaussians == 0 {
+        return None;
+    }
+    let [intra, predicted] =
+        [bits_per_gaussian(bytes, gaussians), bits_per_gaussian(other_bytes, other_gaussians)];
+    let all = bits_per_gaussian(bytes + other_bytes, gaussians + other_gaussians);
+    // Half of the I frames would be predicted.
+    let longer = 0.5 * percent(count, count + others) * (intra - predicted) / all;
+    let choice = format!("{} of {} frames", grouped(others), grouped(count + others));
+    let why = format!(
+        "GOPs of {} frames; twice as many would save about {longer:.1} %, where they can be predicted",
+        settings.gop_length()
+    );
+    Some(Choice::new("prediction", choice, why).saving(Some((intra - all, Basis::Estimated))))
 }
 
 /// What became of the Gaussians of references.
@@ -215,7 +321,33 @@ fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
         (_, PredictorChoice::Bits) => "of new Gaussians; a unit is predicted where that makes it smaller",
         (_, PredictorChoice::Difference) => "of new Gaussians; the smallest sum of residuals, --choose-by l1",
     };
-    Some(Choice::new("predictors", choice, why))
+    let bytes: u64 = report.coded.iter().map(|frame| frame.prediction_saves).sum();
+    let saving = (bits_per_gaussian(bytes, report.gaussians), Basis::Measured);
+    let is_measured =
+        settings.predictor_choice == PredictorChoice::Bits && counts.iter().skip(1).any(|&count| count > 0);
+    Some(Choice::new("predictors", choice, why).saving(Some(saving).filter(|_| is_measured)))
+}
+
+/// Whether there is a network, where one may be.
+fn network(report: &Report, settings: &Settings) -> Option<Choice> {
+    let predicted: [u64; 4] =
+        [0, 1, 2, 3].map(|index| report.coded.iter().map(|frame| frame.predicted[index]).sum());
+    let [.., by_network] = predicted;
+    let may_predict = settings.structure != Structure::Intra || settings.spatial_layers > 1;
+    if !may_predict || predicted.iter().all(|&count| count == 0) {
+        return None;
+    }
+    let is_tried = settings.network.is_some() || settings.preset == Preset::Small;
+    Some(match (by_network, is_tried) {
+        (0, false) => {
+            Choice::new("network", "none", "not tried: --network trained or --preset small try one")
+        }
+        (0, true) => Choice::new("network", "none", "no unit of new Gaussians takes fewer bytes with it"),
+        (count, _) => {
+            let why = format!("it predicts {} new Gaussians", grouped(count));
+            Choice::new("network", "sent with each GOP that needs it", why)
+        }
+    })
 }
 
 fn left_out(settings: &Settings) -> Option<Choice> {

@@ -9,8 +9,9 @@ use super::new_list::NewList;
 use super::predictors::{Chooser, used};
 use super::residuals::Wanted;
 use super::unit::{Draft, Grain, UnitCoder};
-use super::{CodedFrame, CodedUnit, Reference};
+use super::{CodedFrame, CodedUnit, Reference, worth};
 use crate::error::Error;
+use crate::savings::Saving;
 use splatstream_decoder::digest::{ListDigest, lists_digest};
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::increment::Situation;
@@ -42,6 +43,8 @@ pub(crate) struct IntraTarget<'a> {
     pub(crate) row_count: u32,
     /// Whether the lowest spatial layer holds everything, and those above add nothing.
     pub(crate) in_one_layer: bool,
+    /// Whether it is told what choices save.
+    pub(crate) tells_savings: bool,
 }
 
 /// An I frame being coded.
@@ -54,6 +57,7 @@ struct Intra<'a> {
     members: Vec<Vec<u32>>,
     models: ModelsOfFrame,
     units: Vec<CodedUnit>,
+    savings: Vec<Saving>,
 }
 
 /// Codes an I frame.
@@ -73,11 +77,12 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: IntraTarget<'_>) -> Resu
         members: vec![Vec::new(); refinements],
         models: ModelsOfFrame::default(),
         units: Vec::new(),
+        savings: Vec::new(),
     };
     for layer in 0..sequence.spatial_layer_count {
         intra.layer(layer)?;
     }
-    let Intra { target, lists, members, models, units, .. } = intra;
+    let Intra { target, lists, members, models, units, savings, .. } = intra;
     let rows = members.iter().map(|list| list.iter().map(|&index| target.rows[index as usize]).collect());
     let reference = Reference {
         rows: rows.collect(),
@@ -88,7 +93,7 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: IntraTarget<'_>) -> Resu
         span_log2: 0,
         models: models.first,
     };
-    Ok(CodedFrame { cells: None, carried_digest: None, units, reference })
+    Ok(CodedFrame { cells: None, carried_digest: None, units, reference, savings })
 }
 
 impl Intra<'_> {
@@ -108,6 +113,9 @@ impl Intra<'_> {
         // Layers above add nothing: they refine.
         let lowest = self.target.lowest.as_ref().unwrap_or(&self.target.wanted);
         let new = NewList::all(self.coder, lowest, added, self.models.before(0));
+        if self.target.tells_savings && layer == 0 {
+            self.savings = worth::of_lists(self.coder, &self.target, &new);
+        }
         if !self.target.chooser.predicts() && !self.ladder.refines_from(layer) {
             self.target.wanted = self.target.wanted.select(&[]);
         }
@@ -137,13 +145,27 @@ impl Intra<'_> {
         let situation = Situation { around: [&lower, &[]], temporal: None };
         let mut models = self.models.before(refinement).clone();
         let chooser = self.target.chooser;
-        chooser.choose(self.coder, &mut draft, &parents, &situation, (&self.target.wanted, &new), &models)?;
+        let prediction_saves = chooser.choose(
+            self.coder,
+            &mut draft,
+            &parents,
+            &situation,
+            (&self.target.wanted, &new),
+            &models,
+        )?;
         let applied = self.coder.apply(&draft, parents, &situation)?;
         digests.push(applied.list.digest());
         draft.header.refinement_digest = lists_digest(digests);
         self.lists[list] = applied.list;
         self.compensate(&mut draft, layer, refinement)?;
         let payload = self.coder.code(&draft, &new, &mut models)?;
+        let reuse_saves = match self.target.tells_savings {
+            true => {
+                let before = self.models.before(refinement);
+                worth::of_reuse(self.coder, (&draft, &new), before, payload.len())?
+            }
+            false => 0,
+        };
         self.models.follow(refinement, models);
         self.units.push(CodedUnit {
             spatial_layer: layer,
@@ -151,6 +173,8 @@ impl Intra<'_> {
             payload,
             header: draft.header,
             predicted: used(&draft),
+            prediction_saves,
+            reuse_saves,
         });
         self.members[list].extend(new.added);
         Ok(())

@@ -146,7 +146,7 @@ impl<'a> Predicted<'a> {
         let row_count = self.from.target.row_count;
         let span_log2 = self.from.span_log2;
         let reference = Reference { lists, span_log2, carried, models: models.first, rows, row_count };
-        Ok(CodedFrame { cells: self.cells, carried_digest, units, reference })
+        Ok(CodedFrame { cells: self.cells, carried_digest, units, reference, savings: Vec::new() })
     }
 
     /// Codes the unit of a list. `new`: its new Gaussians, which shall become what `wanted` says.
@@ -170,7 +170,8 @@ impl<'a> Predicted<'a> {
         let temporal = self.temporal(list, space);
         let situation = Situation { around: [&lower, &after], temporal: Some(temporal) };
         let mut models = done.models.before(refinement).clone();
-        chooser.choose(coder, &mut draft, parents, &situation, (wanted, &new), &models)?;
+        let prediction_saves =
+            chooser.choose(coder, &mut draft, parents, &situation, (wanted, &new), &models)?;
         let applied = coder.apply(&draft, parents.clone(), &situation)?;
         space.settle(&applied.list, &applied.keep);
         done.digests.push(applied.list.digest());
@@ -186,6 +187,8 @@ impl<'a> Predicted<'a> {
             header: draft.header,
             payload,
             predicted: used(&draft),
+            prediction_saves,
+            reuse_saves: 0,
         });
         done.lists.push(applied.list);
         done.added.push(applied.added);

@@ -5,11 +5,13 @@ pub(crate) mod closeness;
 pub(crate) mod dynamic;
 
 use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::process::{DecodedFrame, Options};
+use splatstream_decoder::process::{DecodedFrame, Decoder, Options};
 use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_encoder::{Report, Settings, encode};
 use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_format::Limits;
+use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::unit::Stream;
 use splatstream_gaussians::random::SplitMix64;
 use splatstream_gaussians::{GaussianFrame, Planes, sh_coefficients};
 use std::ops::ControlFlow;
@@ -50,6 +52,18 @@ pub(crate) fn decoded(bytes: &[u8], options: &Options) -> (Vec<DecodedFrame>, Su
         ControlFlow::Continue(())
     });
     (frames, summary)
+}
+
+/// The parameters of a stream.
+pub(crate) fn sequence(bytes: &[u8]) -> SequenceParameters {
+    let limits = Limits::default();
+    let stream = Stream::open(bytes, &limits).unwrap();
+    let mut decoder = Decoder::new(stream.header(), Options { limits, ..Options::default() });
+    let mut units = stream.units();
+    while decoder.sequence().is_none() {
+        let _frame = decoder.unit(&units.next_unit().unwrap().unwrap());
+    }
+    *decoder.sequence().unwrap()
 }
 
 /// Options with limits that suit small streams, to stop at the first error.

@@ -44,6 +44,7 @@ class EncodeOptions(TypedDict, total=False):
     sh: "auto", "coefficients" or "vq".
     fps: Frames per second, as 30, 29.97 or Fraction(30000, 1001).
     keep_invisible: Keep Gaussians whose opacity is below 1/255 everywhere.
+    prune: Leave out the Gaussians that pictures miss least, down to this PSNR of pictures without them, decibels.
     drop_invalid: Leave out Gaussians with values that are not finite; otherwise they are an error.
     importance: "removal", "contribution", "footprint" or "volume": what puts Gaussians into the first refinements.
     cameras: Views to measure in: a cameras.json or transforms.json, "ring:8" or "forward:8".
@@ -73,6 +74,7 @@ class EncodeOptions(TypedDict, total=False):
     sh: Literal["auto", "coefficients", "vq"]
     fps: float | Fraction
     keep_invisible: bool
+    prune: float
     drop_invalid: bool
     importance: Literal["removal", "contribution", "footprint", "volume"]
     cameras: str | os.PathLike[str]

@@ -1,0 +1,87 @@
+//! What contexts, refinements and tables of the refinement before are worth to an I frame.
+#![expect(clippy::arithmetic_side_effects, reason = "counts of bits and of what is in memory")]
+
+use super::intra::IntraTarget;
+use super::new_list::{NewList, deltas};
+use super::unit::{Draft, UnitCoder};
+use crate::entropy_cost::Histogram;
+use crate::error::Error;
+use crate::savings::{Saving, Tool};
+use crate::section::SectionPlan;
+use crate::settings::Tools;
+use rayon::prelude::*;
+use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::entropy::token::split;
+
+/// What contexts and refinements save the Gaussians that the lowest layer adds, estimated.
+pub(super) fn of_lists(coder: &UnitCoder<'_>, target: &IntraTarget<'_>, new: &[NewList]) -> Vec<Saving> {
+    let worths: Vec<_> =
+        new.par_iter().map(|list| list.coded.worth_of_contexts(&list.values, &coder.plan)).collect();
+    let count = target.order.len().max(1) as f64;
+    let contexts: f64 = worths.iter().map(|worth| worth.plain - worth.own).sum();
+    let mut savings = vec![Saving::estimated(Tool::Contexts, contexts / count)];
+    if new.len() > 1 {
+        let models = |worth: &crate::models::ContextWorth| worth.models;
+        let tables = worths.iter().map(models).sum::<f64>() - worths.iter().map(models).fold(0.0, f64::max);
+        let positions = positions_in_lists(coder, new) - positions_in_one(coder, target);
+        savings.push(Saving::estimated(Tool::Refinements, -(tables + positions) / count));
+    }
+    savings
+}
+
+/// Bits of positions in their lists, with the low bits that these leave out.
+fn positions_in_lists(coder: &UnitCoder<'_>, new: &[NewList]) -> f64 {
+    let of_list = |(refinement, list): (u8, &NewList)| {
+        let left_out = 3.0 * f64::from(coder.grains.of(refinement).position_shift);
+        position_bits(&list.values.deltas) + left_out * list.len() as f64
+    };
+    (0..).zip(new).map(of_list).sum()
+}
+
+/// Bits of positions if all Gaussians stood in one list.
+fn positions_in_one(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> f64 {
+    let lowest = target.lowest.as_ref().unwrap_or(&target.wanted);
+    let mut codes: Vec<u64> = target.order.par_iter().map(|&row| lowest.code(row, 0)).collect();
+    codes.par_sort_unstable();
+    position_bits(&deltas(&codes, coder.block()))
+}
+
+/// Zero-order bits of differences of codes.
+fn position_bits(deltas: &[u64]) -> f64 {
+    const DIRECT_LOG2: u8 = 4;
+    let mut histogram = Histogram::default();
+    let mut raw = 0_u64;
+    for &delta in deltas {
+        let token = split(delta, DIRECT_LOG2);
+        histogram.add(token.token);
+        raw += u64::from(token.raw_bits);
+    }
+    histogram.entropy_bits() + raw as f64
+}
+
+/// Bytes that a unit, of `bytes`, takes less because it may use tables of the one before. `models`: those in force before it.
+///
+/// # Errors
+/// As [`UnitCoder::code`].
+pub(super) fn of_reuse(
+    coder: &UnitCoder<'_>,
+    (draft, new): (&Draft, &NewList),
+    models: &ModelsInForce,
+    bytes: usize,
+) -> Result<usize, Error> {
+    let plan = SectionPlan { tools: Tools { table_reuse: false, ..coder.plan.tools }, ..coder.plan };
+    let alone = UnitCoder { plan, ..*coder }.code(draft, new, &mut models.clone())?;
+    Ok(alone.len().saturating_sub(bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_differences_take_their_raw_bits_only() {
+        assert_eq!(position_bits(&[3; 100]), 0.0);
+        let raw = f64::from(split(1 << 20, 4).raw_bits);
+        assert_eq!(position_bits(&[1 << 20; 10]), 10.0 * raw);
+    }
+}
