@@ -175,7 +175,7 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
         return setting("position_bits", settings.steps.position_bits.to_string(), "1 to 20");
     }
     if let Some(finetune) = &settings.finetune {
-        finetune.check()?;
+        finetune.check(settings)?;
     }
     if settings.gop == 0 {
         return setting("gop", "0".into(), "1 or more");
