@@ -36,9 +36,9 @@ pub(super) struct FinetuneArgs {
     /// Fit these attributes only, to see what each is worth.
     #[arg(long, value_enum, value_name = "ATTRIBUTE,...", value_delimiter = ',', requires = "finetune")]
     finetune_only: Vec<AttributeName>,
-    /// Operating points that matter, and what a decibel at each is worth, as in s0,t0,r1=1,s2,t0,r4=3; a weight that is left out is
-    /// 1. Frames are fitted to what receivers at these points see, and not at others. Default is all Gaussians of each spatial
-    /// layer.
+    /// Operating points that matter, and what a decibel at each is worth, as in s0,t0,r1=1,s2,t0,r4=3; a point without a weight
+    /// has weight 1. Frames are fitted to what receivers at these points see, and not at others. Default is all Gaussians of
+    /// each spatial layer.
     #[arg(long, value_name = "POINT=WEIGHT,...", requires = "finetune")]
     optimise_for: Option<PointWeights>,
     /// Lines of the pictures to fit to, in turn, as in 540,720,1080; default is those that each spatial layer is for.

@@ -183,9 +183,8 @@ impl<'a> Descent<'a> {
 
     /// PSNR of each receiver in views by which nothing is chosen.
     fn witnessed(&self, decoded: &Decoded) -> Result<Vec<f64>, Error> {
-        let of_sight = |sight: &Sight| {
-            Ok(self.pictures.witness(&sight.receiver, &self.shown(decoded, sight)?.into_owned()))
-        };
+        let of_sight =
+            |sight: &Sight| Ok(self.pictures.witness(&sight.receiver, self.shown(decoded, sight)?.as_ref()));
         self.sights.iter().map(of_sight).collect()
     }
 
