@@ -9,9 +9,11 @@ mod descent;
 mod latent;
 mod pictures;
 mod rate;
+mod receivers;
 
 use crate::allocation::Attribute;
 use crate::error::Error;
+use crate::frame::compensation::Compensator;
 use crate::frame::ladder::Ladder;
 use crate::frame::residuals::Wanted;
 use crate::frame::unit::UnitCoder;
@@ -20,9 +22,12 @@ use crate::settings::Settings;
 use core::time::Duration;
 use descent::Descent;
 use latent::{Latent, List};
-use pictures::{LINES, Pictures};
+use pictures::Pictures;
+pub use receivers::PointWeight;
+use receivers::Receiver;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
+use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, Image};
 
@@ -40,6 +45,12 @@ pub struct Finetune {
     /// Lines of the pictures that each spatial layer is for, from the lowest up; where there are too few, 540, 720, 1080 and
     /// 2160, or of two layers 540 and 1080.
     pub lines: Vec<u32>,
+    /// Lines of the pictures that slopes are taken of, in turn, whatever layer they are of; none: those of the layer. Quality is
+    /// reported at the lines of the layer in any case.
+    pub resolutions: Vec<u32>,
+    /// The operating points that matter, of which receivers see pictures; values that none of these points shows stay the nearest.
+    /// None: all Gaussians of each spatial layer.
+    pub optimise_for: Vec<PointWeight>,
     /// Attributes that keep the nearest values, to see what fitting the others is worth.
     pub held: Vec<Attribute>,
 }
@@ -52,33 +63,20 @@ impl Default for Finetune {
             time_budget: None,
             photographs: Vec::new(),
             lines: Vec::new(),
+            resolutions: Vec::new(),
+            optimise_for: Vec::new(),
             held: Vec::new(),
         }
     }
 }
 
 impl Finetune {
-    /// Lines of the pictures that a layer of so many is fitted to, in turn: its own, and of the highest one those of each
-    /// layer that refines the lowest.
-    fn lines_of(&self, layer: u8, layers: u8) -> Vec<u32> {
-        let usual = match layers {
-            1 => [LINES; 4],
-            2 => [LINES, 2 * LINES, 2 * LINES, 2 * LINES],
-            _ => [LINES, LINES / 3 * 4, 2 * LINES, 4 * LINES],
-        };
-        let of = |layer: u8| {
-            let place = usize::from(layer);
-            self.lines.get(place).or(usual.get(place)).copied().unwrap_or(LINES)
-        };
-        let from = layer.min(1);
-        (from..=layer).map(of).collect()
-    }
-
     /// Whether it can be done.
     ///
     /// # Errors
-    /// The first value that is out of range, or photographs of which none is left to judge by.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    /// The first value that is out of range, an operating point that the stream will not have, or photographs of which none is
+    /// left to judge by.
+    pub(crate) fn check(&self, settings: &Settings) -> Result<(), Error> {
         let setting = |name, value: String, allowed| Err(Error::Setting { name, value, allowed });
         if self.iterations == 0 {
             return setting("finetune iterations", "0".to_owned(), "1 or more");
@@ -86,9 +84,12 @@ impl Finetune {
         if self.time_budget.is_some_and(|budget| budget.is_zero()) {
             return setting("finetune time budget", "0 seconds".to_owned(), "more than 0");
         }
-        if let Some(lines) = self.lines.iter().find(|lines| !LINES_ALLOWED.contains(lines)) {
+        if let Some(lines) =
+            self.lines.iter().chain(&self.resolutions).find(|lines| !LINES_ALLOWED.contains(lines))
+        {
             return setting("finetune lines", lines.to_string(), "1 to 8640");
         }
+        self.check_points(settings)?;
         if (1..LEAST_PHOTOGRAPHS).contains(&self.photographs.len()) {
             let count = format!("{} photographs", self.photographs.len());
             return setting("finetune photographs", count, "none, or 8 or more: some are kept to judge by");
@@ -120,7 +121,7 @@ pub struct Photograph {
 }
 
 /// What fitting an I frame has done.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FinetuneReport {
     /// Display index of the frame.
     pub frame: u32,
@@ -130,10 +131,24 @@ pub struct FinetuneReport {
     pub iterations: u32,
     /// How long it took.
     pub seconds: f64,
-    /// Mean PSNR before and after, decibels, in views that no slope was taken of, but by which it was chosen what is kept.
+    /// PSNR before and after, decibels, in views that no slope was taken of, but by which it was chosen what is kept: the mean of
+    /// the operating points by their weights.
     pub psnr: [f64; 2],
     /// Bits of all values but positions before and after, as their models estimate them.
     pub bits: [f64; 2],
+    /// What receivers of each operating point that was optimised for see.
+    pub points: Vec<PointReport>,
+}
+
+/// What fitting has done at an operating point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointReport {
+    /// The operating point.
+    pub point: OperatingPoint,
+    /// What a decibel there was worth beside one at others.
+    pub weight: f64,
+    /// Mean PSNR before and after, decibels, in views of the lines of its layer by which nothing was chosen.
+    pub psnr: [f64; 2],
 }
 
 /// The values that pictures want, Gaussian by Gaussian as they come.
@@ -146,54 +161,102 @@ pub(crate) struct Fitted {
     pub(crate) reports: Vec<FinetuneReport>,
 }
 
-/// Fits a canonical frame to pictures. `order`: most important first; `layers`: spatial layers.
-///
-/// With spatial layers the lowest one, which has all Gaussians, is fitted to pictures of the lines it is for. Then it stays as it
-/// is, and what refines it is fitted to pictures of the lines of the others.
-///
-/// # Errors
-/// What the decoder's own checks refuse.
-pub(crate) fn finetuned(
-    (frame, order): (&GaussianFrame, &[u32]),
-    coder: &UnitCoder<'_>,
-    (settings, layers): (&Settings, u8),
-    finetune: &Finetune,
-) -> Result<Fitted, Error> {
-    let rows = coded_order(frame, order, coder, settings);
-    let ordered = frame.select(&rows);
-    let back = inverse(&rows);
-    let ladder = Ladder::new(layers, &settings.refinements);
-    let has_books = matches!(coder.colour.mode, ShCoding::VectorQuantised { .. });
-    let grain = |layer: u8, list: u8| {
-        let last = coder.grains.of(list);
-        ladder.grain(layer, list.into(), last, has_books, coder.sequence.position_bits)
-    };
-    let lists = |layer: u8, parents: Option<Vec<GaussianList>>| -> Vec<List> {
+/// An I frame that is to be fitted to pictures.
+pub(crate) struct Fit<'a> {
+    /// Canonical.
+    pub(crate) frame: &'a GaussianFrame,
+    /// Its Gaussians, most important first.
+    pub(crate) order: &'a [u32],
+    pub(crate) coder: &'a UnitCoder<'a>,
+    /// Spatial layers that the frame is coded in.
+    pub(crate) layers: u8,
+    pub(crate) settings: &'a Settings,
+    pub(crate) finetune: &'a Finetune,
+    /// What prefixes will be compensated by.
+    pub(crate) compensator: Option<&'a Compensator>,
+}
+
+/// The values of a layer.
+struct Layer {
+    /// In the order of the lists.
+    frame: GaussianFrame,
+    lists: Vec<GaussianList>,
+    /// None where no operating point shows it.
+    report: Option<FinetuneReport>,
+}
+
+impl Fit<'_> {
+    /// Fits the values.
+    ///
+    /// With spatial layers the lowest one, which has all Gaussians, is fitted to what its receivers see. Then it stays as it is, and
+    /// what refines it is fitted to what receivers of the others see.
+    ///
+    /// # Errors
+    /// What the decoder's own checks refuse.
+    pub(crate) fn run(&self) -> Result<Fitted, Error> {
+        let rows = coded_order(self.frame, self.order, self.coder, self.settings);
+        let ordered = self.frame.select(&rows);
+        let back = inverse(&rows);
+        let first = self.layer(&ordered, 0, None)?;
+        let Some(highest) = self.layers.checked_sub(1).filter(|&highest| highest > 0) else {
+            let reports = first.report.into_iter().collect();
+            return Ok(Fitted { lowest: None, highest: first.frame.select(&back), reports });
+        };
+        let second = self.layer(&ordered, highest, Some(first.lists))?;
+        Ok(Fitted {
+            lowest: Some(first.frame.select(&back)),
+            highest: second.frame.select(&back),
+            reports: first.report.into_iter().chain(second.report).collect(),
+        })
+    }
+
+    /// Fits the values of a layer. `parents`: what the lowest layer has, where this is another.
+    fn layer(
+        &self,
+        ordered: &GaussianFrame,
+        layer: u8,
+        parents: Option<Vec<GaussianList>>,
+    ) -> Result<Layer, Error> {
+        let ladder = Ladder::new(self.layers, &self.settings.refinements);
+        let receivers = Receiver::of_layer(layer, self.layers, &ladder, (self.settings, self.finetune));
+        let lists = self.lists(layer, &ladder, parents, &receivers);
+        let mut latent = Latent::new(self.coder, ordered, lists)?;
+        let mut report = None;
+        if !receivers.is_empty() {
+            let pictures = Pictures::new(ordered, self.finetune, self.settings, &receivers);
+            let descent = Descent::new(latent, (receivers, pictures), self.compensator, self.finetune);
+            let (fitted, done) = descent.run()?;
+            latent = fitted;
+            report = Some(FinetuneReport { spatial_layer: layer, ..done });
+        }
+        Ok(Layer { frame: latent.frame()?, lists: latent.lists()?, report })
+    }
+
+    /// The lists of a layer.
+    fn lists(
+        &self,
+        layer: u8,
+        ladder: &Ladder,
+        parents: Option<Vec<GaussianList>>,
+        receivers: &[Receiver],
+    ) -> Vec<List> {
+        let has_books = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
+        let position_bits = self.coder.sequence.position_bits;
         let mut parents = parents.map(Vec::into_iter);
-        let parts = (0..).zip(parts(&settings.refinements, order.len()));
         let list = |(list, rows)| List {
             rows,
-            grain: grain(layer, list),
+            grain: ladder.grain(
+                layer,
+                usize::from(list),
+                self.coder.grains.of(list),
+                has_books,
+                position_bits,
+            ),
             parents: parents.as_mut().and_then(Iterator::next),
+            is_fitted: receivers.iter().any(|receiver| receiver.lists.get(usize::from(list)) == Some(&true)),
         };
-        parts.map(list).collect()
-    };
-    let run = |latent: Latent<'_>, layer: u8| {
-        let pictures = Pictures::new(&ordered, finetune, settings, finetune.lines_of(layer, layers));
-        let (latent, report) = Descent::new(latent, pictures, finetune).run()?;
-        Ok::<_, Error>((
-            latent.frame()?.select(&back),
-            latent.lists()?,
-            FinetuneReport { spatial_layer: layer, ..report },
-        ))
-    };
-    let (first, parents, report) = run(Latent::new(coder, &ordered, lists(0, None))?, 0)?;
-    let Some(highest) = layers.checked_sub(1).filter(|&highest| highest > 0) else {
-        return Ok(Fitted { lowest: None, highest: first, reports: vec![report] });
-    };
-    let latent = Latent::new(coder, &ordered, lists(highest, Some(parents)))?;
-    let (second, _, of_second) = run(latent, highest)?;
-    Ok(Fitted { lowest: Some(first), highest: second, reports: vec![report, of_second] })
+        (0..).zip(parts(&self.settings.refinements, self.order.len())).map(list).collect()
+    }
 }
 
 /// The Gaussians list after list, within each along the curve that they are coded along, nearly: moves may change that.

@@ -8,7 +8,7 @@ mod means;
 
 use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
-use crate::finetune::{FinetuneReport, finetuned};
+use crate::finetune::{FinetuneReport, Fit};
 use crate::frame::cells::CellPlan;
 use crate::frame::compensation::Compensator;
 use crate::frame::intra::{IntraTarget, code_intra};
@@ -370,18 +370,18 @@ impl<'a> SpanCoder<'a> {
         let is_predicted = gop.header.is_predicted();
         // What other frames refer to stays near the source, as they do.
         let is_fitted = !is_predicted && self.recorder.is_none() && !target.frame.is_empty();
-        let fitted = match self.common.settings.finetune.as_ref().filter(|_| is_fitted) {
-            Some(finetune) => Some(finetuned(
-                (&target.frame, &order),
-                &coder,
-                (
-                    self.common.settings,
-                    if gop.in_one_layer { 1 } else { self.common.sequence.spatial_layer_count },
-                ),
-                finetune,
-            )?),
-            None => None,
+        let finetune = self.common.settings.finetune.as_ref().filter(|_| is_fitted);
+        let compensator = self.compensator(&target, finetune.is_some());
+        let fit = |finetune| Fit {
+            frame: &target.frame,
+            order: &order,
+            coder: &coder,
+            layers: if gop.in_one_layer { 1 } else { self.common.sequence.spatial_layer_count },
+            settings: self.common.settings,
+            finetune,
+            compensator: compensator.as_ref(),
         };
+        let fitted = finetune.map(|finetune| fit(finetune).run()).transpose()?;
         let wanted = match &fitted {
             Some(fitted) => Wanted::new(&fitted.highest, None, &coder),
             None => Wanted::new(&target.frame, known, &coder),
@@ -390,7 +390,6 @@ impl<'a> SpanCoder<'a> {
         let lowest = lowest.map(|frame| Wanted::new(frame, None, &coder));
         // Predictions would move the grids that values were fitted on.
         let predictors = if fitted.is_some() { Predictors::NONE } else { self.chooser().predictors };
-        let compensator = self.compensator(&target);
         if !is_predicted {
             target.forget();
         }
@@ -504,10 +503,11 @@ impl<'a> SpanCoder<'a> {
     }
 
     /// Prefixes of I frames are compensated where time is no matter: not in streams of one frame, or of frames that
-    /// each stand for themselves, which are encoded quickly.
-    fn compensator(&self, target: &Target) -> Option<Compensator> {
+    /// each stand for themselves, which are encoded quickly, unless they are fitted to pictures.
+    fn compensator(&self, target: &Target, is_fitted: bool) -> Option<Compensator> {
+        let settings = self.common.settings;
         let takes_time =
-            self.common.settings.preset != Preset::Fast && self.common.settings.profile() == Profile::Dynamic;
+            is_fitted || settings.preset != Preset::Fast && settings.profile() == Profile::Dynamic;
         let has_prefixes = self.common.sequence.refinement_count > 1 && !target.frame.is_empty();
         (takes_time && has_prefixes).then(|| Compensator::new(&target.frame))
     }

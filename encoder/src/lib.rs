@@ -69,7 +69,7 @@ mod writer;
 pub use allocation::Attribute;
 pub use concat::{ConcatError, Concatenated, PartError, StreamPart, concat};
 pub use error::Error;
-pub use finetune::{Finetune, FinetuneReport, Photograph};
+pub use finetune::{Finetune, FinetuneReport, Photograph, PointReport, PointWeight};
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;

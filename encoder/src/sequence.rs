@@ -183,7 +183,7 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
         }
     }
     if let Some(finetune) = &settings.finetune {
-        finetune.check()?;
+        finetune.check(settings)?;
     }
     if settings.gop == 0 {
         return setting("gop", "0".into(), "1 or more");

@@ -198,7 +198,8 @@ impl<'a> Fitting<'a> {
             self.settings.finetune.as_ref().filter(|finetune| is_fitted && finetune.photographs.is_empty());
         finetune.map_or(0.0, |finetune| {
             let [most, iterations] = GAIN;
-            most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations))
+            let gain = most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations));
+            gain * finetune.share_of_everything(self.settings)
         })
     }
 

@@ -10,11 +10,12 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_encoder::{
-    Attribute, Error, Finetune, Photograph, Preset, Report, Settings, Structure, encode,
+    Attribute, Error, Finetune, Photograph, PointReport, PointWeight, Preset, Report, Settings, Structure,
+    encode,
 };
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::camera::{Up, ring};
+use splatstream_render::camera::{Up, held_out, ring};
 use splatstream_render::{Image, ReferencePictures, render};
 use std::time::Duration;
 
@@ -179,6 +180,66 @@ fn the_lowest_layer_is_fitted_to_pictures_of_its_own_lines() {
     assert!(lowest(&after) > lowest(&before), "{} {}", lowest(&before), lowest(&after));
 }
 
+fn point(spatial: u8, refinement: u8) -> OperatingPoint {
+    OperatingPoint { spatial, temporal: 0, refinement }
+}
+
+/// Two lists, and points that count.
+fn for_points(optimise_for: Vec<PointWeight>, iterations: u32) -> Settings {
+    let finetune = Some(Finetune { optimise_for, ..quick(iterations) });
+    Settings { finetune, refinements: vec![30, 100], ..plain() }
+}
+
+#[test]
+fn a_point_gains_by_its_weight_and_the_others_pay_for_it() {
+    let weights = |prefix: f64, all: f64| {
+        let weight = |refinement, weight| PointWeight { point: point(0, refinement), weight };
+        let bytes = encoded(scene(), &for_points(vec![weight(0, prefix), weight(1, all)], 60)).0;
+        [0, 1].map(|refinement| ring_psnr(&bytes, &point(0, refinement)))
+    };
+    let [of_prefix, of_all] = [weights(200.0, 1.0), weights(1.0, 200.0)];
+    assert!(of_prefix[0] > of_all[0] && of_prefix[1] < of_all[1], "{of_prefix:?} {of_all:?}");
+}
+
+#[test]
+fn what_no_point_shows_stays_the_nearest() {
+    let only = PointWeight { point: point(0, 0), weight: 2.0 };
+    let after = planes(&encoded(scene(), &for_points(vec![only], 20)).0);
+    let before = planes(&encoded(scene(), &Settings { finetune: None, ..for_points(Vec::new(), 1) }).0);
+    let list = before.len() * 30 / 100;
+    let same = |plane: usize, rows: core::ops::Range<usize>| {
+        before.dc[plane][rows.clone()] == after.dc[plane][rows.clone()]
+            && before.log_scale[plane][rows.clone()] == after.log_scale[plane][rows]
+    };
+    assert!((0..3).all(|plane| same(plane, list..before.len())));
+    assert!((0..3).any(|plane| !same(plane, 0..list)));
+}
+
+#[test]
+fn reports_are_of_what_receivers_of_the_stream_see() {
+    let points = [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 1.0), (1, 1, 4.0), (2, 1, 1.0)];
+    let optimise_for = points
+        .map(|(spatial, refinement, weight)| PointWeight { point: point(spatial, refinement), weight })
+        .to_vec();
+    let settings = for_points(optimise_for, 8);
+    let finetune = settings.finetune.map(|finetune| Finetune { lines: vec![60, 80, 108], ..finetune });
+    let settings = Settings { finetune, spatial_layers: 3, refinements: vec![20, 50, 100], ..plain() };
+    let (bytes, report) = encoded(scene(), &settings);
+    let reports: Vec<PointReport> =
+        report.finetuned.iter().flat_map(|fitted| fitted.points.clone()).collect();
+    assert_eq!(reports.len(), points.len());
+    let source = scene().remove(0);
+    for PointReport { point, psnr: [_, after], .. } in reports {
+        let lines = [60, 80, 108][usize::from(point.spatial)];
+        let cameras = held_out(&source, Up::default(), &[], 5, 540);
+        let cameras = cameras.iter().map(|camera| camera.scaled_to_height(lines)).collect();
+        let frame = decoded(&bytes, &Options { operating_point: point, ..strict() }).0.remove(0);
+        let frame = to_gaussians(frame.into_shown(), &sequence(&bytes)).unwrap();
+        let seen = ReferencePictures::new(&source, cameras).psnr(&frame).sum::<f64>() / 5.0;
+        assert!((seen - after).abs() < 0.02, "{point}: {seen} where {after} is reported");
+    }
+}
+
 /// Mean PSNR of what is decoded, in five views of 108 lines that nothing was fitted to.
 fn ring_psnr(bytes: &[u8], &operating_point: &OperatingPoint) -> f64 {
     let frame = decoded(bytes, &Options { operating_point, ..strict() }).0.remove(0).into_shown();
@@ -211,6 +272,15 @@ fn what_cannot_be_done_is_refused() {
     let time_budget = Some(Duration::ZERO);
     assert_eq!(refused(Finetune { time_budget, ..Finetune::default() }), "finetune time budget");
     assert_eq!(refused(Finetune { lines: vec![540, 0], ..Finetune::default() }), "finetune lines");
+    assert_eq!(refused(Finetune { resolutions: vec![0], ..Finetune::default() }), "finetune lines");
+    let for_point = |point, weight| {
+        let optimise_for = vec![PointWeight { point, weight }];
+        refused(Finetune { optimise_for, ..Finetune::default() })
+    };
+    assert_eq!(for_point(point(1, 0), 1.0), "operating point to optimise for");
+    assert_eq!(for_point(point(0, 5), 1.0), "operating point to optimise for");
+    assert_eq!(for_point(point(0, 4), 0.0), "weight of an operating point");
+    assert_eq!(for_point(point(0, 4), f64::NAN), "weight of an operating point");
     let few = photographs(3);
     assert_eq!(refused(Finetune { photographs: few, ..Finetune::default() }), "finetune photographs");
     let mut other = photographs(8);

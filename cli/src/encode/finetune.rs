@@ -4,9 +4,13 @@ use crate::failure::Failure;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use splatstream_chart::numbers::bits_per_gaussian;
-use splatstream_encoder::{Attribute, Finetune, Photograph, Report};
+use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_encoder::{
+    Attribute, Finetune, FinetuneReport, Photograph, PointReport, PointWeight, Report,
+};
 use splatstream_render::{Camera, Image};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Duration;
 
 /// Iterations where none are given.
@@ -32,6 +36,44 @@ pub(super) struct FinetuneArgs {
     /// Fit these attributes only, to see what each is worth.
     #[arg(long, value_enum, value_name = "ATTRIBUTE,...", value_delimiter = ',', requires = "finetune")]
     finetune_only: Vec<AttributeName>,
+    /// Operating points that matter, and what a decibel at each is worth, as in s0,t0,r1=1,s2,t0,r4=3; a point without a weight
+    /// has weight 1. Frames are fitted to what receivers at these points see, and not at others. Default is all Gaussians of
+    /// each spatial layer.
+    #[arg(long, value_name = "POINT=WEIGHT,...", requires = "finetune")]
+    optimise_for: Option<PointWeights>,
+    /// Lines of the pictures to fit to, in turn, as in 540,720,1080; default is those that each spatial layer is for.
+    #[arg(long, value_name = "LINES,...", value_delimiter = ',', requires = "finetune")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=8640))]
+    finetune_lines: Vec<u32>,
+}
+
+/// Operating points and their weights, as a user writes them.
+#[derive(Debug, Clone, PartialEq)]
+struct PointWeights(Vec<PointWeight>);
+
+impl FromStr for PointWeights {
+    type Err = String;
+
+    /// Points are separated by commas, as their parts are: each begins with an s.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut points: Vec<String> = Vec::new();
+        for part in text.split(',') {
+            match points.last_mut() {
+                Some(point) if !part.starts_with('s') => *point += &format!(",{part}"),
+                _ => points.push(part.to_owned()),
+            }
+        }
+        points.iter().map(|point| point_weight(point)).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+/// A point and its weight, as in s0,t0,r1=2.
+fn point_weight(text: &str) -> Result<PointWeight, String> {
+    let (point, weight) = text.split_once('=').unwrap_or((text, "1"));
+    let point = point.parse::<OperatingPoint>().map_err(|error| error.to_string())?;
+    let weight = weight.parse().ok().filter(|weight| (1e-6..=1e6).contains(weight));
+    let weight = weight.ok_or_else(|| format!("'{text}' has no weight above 0; write it as s0,t0,r1=2"))?;
+    Ok(PointWeight { point, weight })
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {
@@ -91,7 +133,15 @@ impl FinetuneArgs {
             None => Vec::new(),
         };
         let time_budget = self.time_budget.map(Duration::from_secs_f64);
-        Ok(Some(Finetune { iterations, time_budget, photographs, lines: layers.to_vec(), held }))
+        Ok(Some(Finetune {
+            iterations,
+            time_budget,
+            photographs,
+            lines: layers.to_vec(),
+            resolutions: self.finetune_lines.clone(),
+            optimise_for: self.optimise_for.clone().map_or_else(Vec::new, |points| points.0),
+            held,
+        }))
     }
 }
 
@@ -128,12 +178,30 @@ pub(super) struct Fitted {
     /// Of all values but positions, as estimated.
     values_bpg_before: f64,
     values_bpg_after: f64,
+    points: Vec<FittedPoint>,
+}
+
+/// What it has done for receivers of an operating point.
+#[derive(Serialize)]
+struct FittedPoint {
+    point: String,
+    weight: f64,
+    /// In views by which nothing was chosen.
+    psnr_db_before: f64,
+    psnr_db_after: f64,
+}
+
+impl From<&PointReport> for FittedPoint {
+    fn from(report: &PointReport) -> Self {
+        let PointReport { point, weight, psnr: [psnr_db_before, psnr_db_after] } = *report;
+        Self { point: point.to_string(), weight, psnr_db_before, psnr_db_after }
+    }
 }
 
 impl Fitted {
     /// Every frame that was fitted.
     pub(super) fn of(report: &Report) -> Vec<Self> {
-        let fitted = |one: &splatstream_encoder::FinetuneReport| {
+        let fitted = |one: &FinetuneReport| {
             let coded = report.coded.get(one.frame as usize);
             let gaussians = coded.map_or(0, |frame| u64::from(frame.gaussians));
             let [psnr_db_before, psnr_db_after] = one.psnr;
@@ -148,6 +216,7 @@ impl Fitted {
                 psnr_db_after,
                 values_bpg_before,
                 values_bpg_after,
+                points: one.points.iter().map(FittedPoint::from).collect(),
             }
         };
         report.finetuned.iter().map(fitted).collect()
@@ -157,7 +226,7 @@ impl Fitted {
     pub(super) fn text(all: &[Self]) -> String {
         let seconds: f64 = all.iter().map(|fitted| fitted.seconds).sum();
         let line = |fitted: &Self| {
-            format!(
+            let layer = format!(
                 "  fine-tuned         frame {}, spatial layer {}, {} iterations: {:.2} to {:.2} dB in views that it was not fitted \
                  to, {:.2} to {:.2} bits per Gaussian\n",
                 fitted.frame,
@@ -167,7 +236,15 @@ impl Fitted {
                 fitted.psnr_db_after,
                 fitted.values_bpg_before,
                 fitted.values_bpg_after,
-            )
+            );
+            let point = |point: &FittedPoint| {
+                let FittedPoint { point, weight, psnr_db_before, psnr_db_after } = point;
+                format!(
+                    "  point {point:<12} weight {weight}: {psnr_db_before:.2} to {psnr_db_after:.2} dB in views that nothing was \
+                     chosen by\n"
+                )
+            };
+            fitted.points.iter().map(point).fold(layer, |text, line| text + &line)
         };
         let first =
             all.iter().take_while(|fitted| all.first().is_some_and(|first| first.frame == fitted.frame));
@@ -177,5 +254,35 @@ impl Fitted {
                 &format!("  fine-tuning        {} frames and layers in {seconds:.1} seconds\n", all.len());
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PointWeight, PointWeights};
+    use splatstream_decoder::operating_point::OperatingPoint;
+
+    #[test]
+    fn points_and_weights_read_as_they_are_written() {
+        let point = |spatial, temporal, refinement, weight| PointWeight {
+            point: OperatingPoint { spatial, temporal, refinement },
+            weight,
+        };
+        let parsed = |text: &str| text.parse::<PointWeights>();
+        let both = PointWeights(vec![point(0, 0, 1, 1.0), point(2, 1, 4, 3.5)]);
+        assert_eq!(parsed("s0,t0,r1=1,s2,t1,r4=3.5"), Ok(both.clone()));
+        assert_eq!(parsed("s0,t0,r1,s2,t1,r4=3.5"), Ok(both));
+        for text in [
+            "",
+            "s0,t0,r1=",
+            "s0,t0,r1=0",
+            "s0,t0,r1=-1",
+            "s0,t0,r1=NaN",
+            "s0,t0=1",
+            "r1=1,s0,t0",
+            "s0,t0,r1=1,2",
+        ] {
+            assert!(parsed(text).is_err(), "{text}");
+        }
     }
 }

@@ -191,8 +191,9 @@ fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
 /// Frames that fitting to pictures has left as they are.
 fn not_fitted(report: &Report, settings: &Settings) -> Option<Warning> {
     let coded = report.coded.iter().filter(|frame| frame.gaussians > 0).count();
-    // Of frames with layers each layer is listed.
-    let fitted = report.finetuned.iter().filter(|fitted| fitted.spatial_layer == 0).count();
+    // Of frames with layers each layer is listed, one after the other.
+    let frames: Vec<u32> = report.finetuned.iter().map(|fitted| fitted.frame).collect();
+    let fitted = frames.chunk_by(|frame, next| frame == next).count();
     let left = coded.saturating_sub(fitted);
     (settings.finetune.is_some() && left > 0).then(|| {
         let message = format!(

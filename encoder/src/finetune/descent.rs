@@ -4,20 +4,28 @@
 //! what is missing there for those of the values before they were rounded: so each goes on until it is rounded to the
 //! other side, and no further. Values are counted in their own steps, which makes one rate right for all attributes.
 //!
+//! What is summed over the operating points that count, each as its receivers see it and by its weight, are logarithms of squared
+//! errors: decibels. Of errors themselves those of prefixes, a hundred times as large, would be all that matters.
+//!
 //! A bit is worth what it would bring elsewhere: steps that are halved cost a bit for nearly each value and divide the error
-//! by four, so that at the margin a bit brings 2 ln 2 of the error by the bits of an octave.
+//! of the whole frame by four, so that at the margin a bit brings 2 ln 2 of its logarithm by the bits of an octave.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of views")]
 
 use super::latent::{Decoded, Latent};
 use super::pictures::{BACKGROUND, Pictures, View, squared_error};
 use super::rate::Rate;
-use super::{Finetune, FinetuneReport};
+use super::receivers::Receiver;
+use super::{Finetune, FinetuneReport, PointReport};
 use crate::allocation::Attribute;
 use crate::error::Error;
+use crate::frame::compensation::{Compensator, compensated};
 use core::f64::consts::{LN_2, PI};
+use core::ops::Range;
+use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::PreparedFrame;
 use splatstream_render::gradient::{Adam, Gradients, Rates};
+use std::borrow::Cow;
 use std::time::Instant;
 
 /// Views of an iteration.
@@ -32,11 +40,14 @@ const PRICE: f64 = 1.0;
 /// Iterations from one choice of models, and one look of the judges, to the next.
 const EVERY: u32 = 20;
 
-/// The error that prices go by is that of about so many of the last views.
+/// Slopes are divided by the error of about so many of the last views of the same receiver.
 const REMEMBERED: f64 = 20.0;
 
 /// Looks of the judges, one after the other, at nothing better after which it ends: each halves the rate.
 const PATIENCE: u32 = 5;
+
+/// A squared error of a picture below which it shows what it should.
+const NOTHING: f64 = 1e-9;
 
 /// What halving all steps brings, dB.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
@@ -44,14 +55,23 @@ const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// A fit under way.
 pub(super) struct Descent<'a> {
     latent: Latent<'a>,
+    sights: Vec<Sight>,
+    compensator: Option<&'a Compensator>,
     pictures: Pictures<'a>,
     finetune: &'a Finetune,
     adam: Adam,
     rate: f32,
     start: Instant,
-    /// The error of a view, about.
-    error: f64,
     best: Option<Best>,
+}
+
+/// How a receiver sees the frame.
+struct Sight {
+    receiver: Receiver,
+    /// What it adds to log-scales and opacities.
+    compensation: (i8, i8),
+    /// The squared error of a view, about; none before the first.
+    error: Option<f64>,
 }
 
 /// What judges liked most.
@@ -59,6 +79,7 @@ struct Best {
     /// Decibels, less what its bits would have brought by finer steps.
     worth: f64,
     offsets: GaussianFrame,
+    compensation: Vec<(i8, i8)>,
     /// The first look, and the one at this.
     before: Look,
     after: Look,
@@ -74,20 +95,40 @@ struct Look {
 }
 
 impl<'a> Descent<'a> {
-    pub(super) fn new(latent: Latent<'a>, pictures: Pictures<'a>, finetune: &'a Finetune) -> Self {
+    pub(super) fn new(
+        latent: Latent<'a>,
+        (receivers, pictures): (Vec<Receiver>, Pictures<'a>),
+        compensator: Option<&'a Compensator>,
+        finetune: &'a Finetune,
+    ) -> Self {
         let adam = Adam::new(&latent.offsets);
-        Self { latent, pictures, finetune, adam, rate: RATE, start: Instant::now(), error: 0.0, best: None }
+        let sight = |receiver| Sight { receiver, compensation: (0, 0), error: None };
+        let sights = receivers.into_iter().map(sight).collect();
+        Self {
+            latent,
+            sights,
+            compensator,
+            pictures,
+            finetune,
+            adam,
+            rate: RATE,
+            start: Instant::now(),
+            best: None,
+        }
     }
 
     /// Goes on as long as it may; gives the values that judges like most, and what has been done.
     pub(super) fn run(mut self) -> Result<(Latent<'a>, FinetuneReport), Error> {
         let mut rate = Rate::new(&self.latent)?;
+        let before = self.latent.decoded()?;
+        self.compensate(&before)?;
+        let before = self.witnessed(&before)?;
         let mut done = 0;
         while done < self.finetune.iterations && self.share(done) < 1.0 {
             let mut decoded = self.latent.decoded()?;
             if done % EVERY == 0 {
                 rate = Rate::new(&self.latent)?;
-                if !self.look(&decoded, &rate) {
+                if !self.look(&decoded, &rate)? {
                     if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
                         break;
                     }
@@ -99,18 +140,52 @@ impl<'a> Descent<'a> {
             done += 1;
         }
         let last = self.latent.decoded()?;
-        self.look(&last, &Rate::new(&self.latent)?);
+        self.look(&last, &Rate::new(&self.latent)?)?;
         let mut report = FinetuneReport {
             iterations: done,
             seconds: self.start.elapsed().as_secs_f64(),
             ..FinetuneReport::default()
         };
-        if let Some(Best { offsets, before, after, .. }) = self.best {
-            self.latent.offsets = offsets;
+        let kept = self.back()?;
+        if let Some(Best { before, after, .. }) = &self.best {
             report.psnr = [before.psnr, after.psnr];
             report.bits = [before.bits, after.bits];
         }
+        let points = self.sights.iter().zip(before.into_iter().zip(self.witnessed(&kept)?));
+        let of_point = |(sight, (before, after)): (&Sight, (f64, f64))| {
+            let Receiver { point, given_weight: weight, .. } = sight.receiver;
+            PointReport { point, weight, psnr: [before, after] }
+        };
+        report.points = points.map(of_point).collect();
         Ok((self.latent, report))
+    }
+
+    /// What a receiver sees.
+    fn shown<'b>(&'b self, decoded: &'b Decoded, sight: &Sight) -> Result<Cow<'b, GaussianFrame>, Error> {
+        if self.latent.is_complete(&sight.receiver) {
+            return Ok(Cow::Borrowed(&decoded.frame));
+        }
+        let lists = self.latent.received(decoded, &sight.receiver);
+        compensated(&lists, sight.compensation, self.latent.coder.sequence).map(Cow::Owned)
+    }
+
+    /// Finds what fills the holes of prefixes, as the encoder will when it codes them.
+    fn compensate(&mut self, decoded: &Decoded) -> Result<(), Error> {
+        let Some(compensator) = self.compensator else { return Ok(()) };
+        for Sight { receiver, compensation, .. } in &mut self.sights {
+            if receiver.lists.len() < self.latent.lists.len() {
+                let lists = self.latent.received(decoded, receiver);
+                *compensation = compensator.offsets(&lists, self.latent.coder.sequence)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// PSNR of each receiver in views by which nothing is chosen.
+    fn witnessed(&self, decoded: &Decoded) -> Result<Vec<f64>, Error> {
+        let of_sight =
+            |sight: &Sight| Ok(self.pictures.witness(&sight.receiver, self.shown(decoded, sight)?.as_ref()));
+        self.sights.iter().map(of_sight).collect()
     }
 
     /// The share of the iterations, or of the time, that has gone.
@@ -125,6 +200,8 @@ impl<'a> Descent<'a> {
     fn back(&mut self) -> Result<Decoded, Error> {
         if let Some(best) = &self.best {
             self.latent.offsets = best.offsets.clone();
+            let sights = self.sights.iter_mut().zip(&best.compensation);
+            sights.for_each(|(sight, &compensation)| sight.compensation = compensation);
         }
         self.adam = Adam::new(&self.latent.offsets);
         self.rate *= 0.5;
@@ -133,20 +210,27 @@ impl<'a> Descent<'a> {
 
     /// Lets the judges look; whether there was nothing better before. What is worse than the start is never kept, whatever
     /// bits it saves.
-    fn look(&mut self, decoded: &Decoded, rate: &Rate) -> bool {
-        let now = Look { psnr: self.pictures.judge(&decoded.frame), bits: rate.bits };
+    fn look(&mut self, decoded: &Decoded, rate: &Rate) -> Result<bool, Error> {
+        self.compensate(decoded)?;
+        let mut psnr = 0.0;
+        for sight in &self.sights {
+            let judged = self.pictures.judge(&sight.receiver, self.shown(decoded, sight)?.as_ref());
+            psnr += sight.receiver.weight * judged;
+        }
+        let now = Look { psnr, bits: rate.bits };
         let before = self.best.as_ref().map_or(now, |best| best.before);
         let worth = now.psnr - DECIBELS_AN_OCTAVE * (now.bits - before.bits) / rate.bits_an_octave.max(1.0);
         let is_better = |best: &Best| worth > best.worth && now.psnr >= before.psnr;
         match &mut self.best {
             Some(best) if !is_better(best) => {
                 best.waited += 1;
-                false
+                Ok(false)
             }
             best => {
                 let offsets = self.latent.offsets.clone();
-                *best = Some(Best { worth, offsets, before, after: now, waited: 0 });
-                true
+                let compensation = self.sights.iter().map(|sight| sight.compensation).collect();
+                *best = Some(Best { worth, offsets, compensation, before, after: now, waited: 0 });
+                Ok(true)
             }
         }
     }
@@ -154,24 +238,57 @@ impl<'a> Descent<'a> {
     /// One iteration.
     fn step(&mut self, decoded: &Decoded, rate: &Rate, done: u32) -> Result<(), Error> {
         let mut gradients = Gradients::zero(&decoded.frame);
-        let prepared = PreparedFrame::new(&decoded.frame);
         let mut views = 0.0;
-        for View { camera, wanted } in (0..VIEWS).map_while(|_| self.pictures.next()) {
-            let drawing = prepared.draw(&camera, BACKGROUND);
-            let (error, slopes) = squared_error(&wanted, &drawing.rendering().colour);
-            drawing.backward(&slopes, &mut gradients)?;
-            let is_first = done == 0 && views == 0.0;
-            self.error += (error - self.error) * if is_first { 1.0 } else { 1.0 / REMEMBERED };
+        for (place, view) in (0..VIEWS).map_while(|_| self.pictures.next()).collect::<Vec<_>>() {
+            self.look_from(decoded, place, &view, &mut gradients)?;
             views += 1.0;
         }
         self.latent.to_steps(&decoded.frame, &mut gradients);
         // Slopes are sums over the views.
-        let price = PRICE * views * 2.0 * LN_2 * self.error / rate.bits_an_octave.max(1.0);
+        let price = PRICE * views * 2.0 * LN_2 / rate.bits_an_octave.max(1.0);
         rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
         let slower = (0.5 + 0.5 * libm::cos(PI * self.share(done))) as f32;
         self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate * slower))?;
         Ok(())
     }
+
+    /// Adds the slopes of the logarithm of what a receiver misses in a view, by each value of this layer that it sees.
+    fn look_from(
+        &mut self,
+        decoded: &Decoded,
+        place: usize,
+        view: &View,
+        sum: &mut Gradients,
+    ) -> Result<(), Error> {
+        let Some(sight) = self.sights.get(place) else { return Ok(()) };
+        let shown = self.shown(decoded, sight)?;
+        let prepared = PreparedFrame::new(&shown);
+        let drawing = prepared.draw(&view.camera, BACKGROUND);
+        let (error, slopes) = squared_error(&view.wanted, &drawing.rendering().colour);
+        let before = sight.error.unwrap_or(error);
+        let mean = before + (error - before) / REMEMBERED;
+        let mut own = Gradients::zero(&shown);
+        drawing.backward(&slopes, &mut own)?;
+        // Where nothing is missing there is nowhere to go.
+        let scale = if mean > NOTHING { 1.0 / mean } else { 0.0 };
+        add(&own, scale as f32, &self.latent.seen(&sight.receiver), sum);
+        if let Some(sight) = self.sights.get_mut(place) {
+            sight.error = Some(mean);
+        }
+        Ok(())
+    }
+}
+
+/// Adds multiples of the slopes of some rows.
+fn add(own: &Gradients, scale: f32, rows: &[Range<usize>], sum: &mut Gradients) {
+    let planes: Vec<_> = sum.planes_mut().iter_mut().zip(own.planes().iter()).collect();
+    planes.into_par_iter().for_each(|(sum, own)| {
+        for rows in rows {
+            let own = own.get(rows.clone()).unwrap_or_default();
+            let sum = sum.get_mut(rows.clone()).unwrap_or_default();
+            sum.iter_mut().zip(own).for_each(|(sum, slope)| *sum += scale * slope);
+        }
+    });
 }
 
 impl Finetune {

@@ -8,6 +8,7 @@
     reason = "rows are those of the frame that all planes are of; transforms have a weight for each plane"
 )]
 
+use super::receivers::Receiver;
 use crate::error::Error;
 use crate::frame::residuals::Wanted;
 use crate::frame::unit::{Grain, UnitCoder};
@@ -38,6 +39,8 @@ pub(super) struct List {
     pub(super) grain: Grain,
     /// What a lower layer has made of them; none: they are new.
     pub(super) parents: Option<GaussianList>,
+    /// Whether an operating point that counts shows its values.
+    pub(super) is_fitted: bool,
 }
 
 /// The values of a frame beside those of its source.
@@ -56,7 +59,10 @@ pub(super) struct Latent<'a> {
 
 /// What a decoder has.
 pub(super) struct Decoded {
+    /// All Gaussians as this layer has them.
     pub(super) frame: GaussianFrame,
+    /// The same list by list, in integers.
+    lists: Vec<QuantizedFrame>,
     /// Coded values of the planes after the position, list after list.
     pub(super) values: Vec<Vec<i32>>,
     /// Coded moves, list after list, where there are parents.
@@ -139,14 +145,42 @@ impl<'a> Latent<'a> {
         let sequence = self.coder.sequence;
         let mut planes = QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
         let [mut values, mut moves] = [const { Vec::<Vec<i32>>::new() }; 2];
+        let mut lists = Vec::new();
         for part in self.parts(&wanted)? {
             for (planes, own) in [(&mut values, &part.values), (&mut moves, &part.moves)] {
                 planes.resize(own.len(), Vec::new());
                 planes.iter_mut().zip(own).for_each(|(plane, own)| plane.extend(own));
             }
-            planes.append(&part.into_planes());
+            let own = part.into_planes();
+            planes.append(&own);
+            lists.push(own);
         }
-        Ok(Decoded { frame: to_gaussians(planes, sequence)?, values, moves })
+        Ok(Decoded { frame: to_gaussians(planes, sequence)?, lists, values, moves })
+    }
+
+    /// The lists that a receiver has.
+    pub(super) fn received<'b>(
+        &'b self,
+        decoded: &'b Decoded,
+        receiver: &Receiver,
+    ) -> Vec<&'b QuantizedFrame> {
+        let lists = self.lists.iter().zip(&decoded.lists).zip(&receiver.lists);
+        let list = |((list, own), &is_own): ((&'b List, &'b QuantizedFrame), &bool)| match &list.parents {
+            Some(parents) if !is_own => &parents.planes,
+            _ => own,
+        };
+        lists.map(list).collect()
+    }
+
+    /// Whether a receiver has all that this layer has.
+    pub(super) fn is_complete(&self, receiver: &Receiver) -> bool {
+        receiver.lists.len() == self.lists.len() && receiver.lists.iter().all(|&is_own| is_own)
+    }
+
+    /// The rows of the values that a receiver sees of this layer.
+    pub(super) fn seen(&self, receiver: &Receiver) -> Vec<Range<usize>> {
+        let lists = self.lists.iter().zip(&receiver.lists);
+        lists.filter(|(_, is_own)| **is_own).map(|(list, _)| list.rows.clone()).collect()
     }
 
     /// The lists as a decoder has them, for a layer above to refine.

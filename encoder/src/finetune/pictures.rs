@@ -1,10 +1,11 @@
 //! The pictures that values are fitted to, and how far those of the decoded frame are from them.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of pictures")]
 
+use super::receivers::Receiver;
 use super::{Finetune, Photograph};
 use crate::settings::Settings;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::camera::{Scattered, Up};
+use splatstream_render::camera::{Scattered, Up, held_out};
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
 use splatstream_render::{Camera, Image, PreparedFrame, render};
 
@@ -17,8 +18,11 @@ pub(super) const LINES: u32 = if cfg!(fuzzing) { 12 } else { 540 };
 /// Views by which it is judged what is kept, of none of which a slope is taken.
 const JUDGES: usize = 6;
 
-/// Of so many photographs one is a judge.
-const JUDGE_OF: usize = 8;
+/// Views by which nothing is chosen, to report by.
+const WITNESSES: u32 = 5;
+
+/// Of so many photographs one is for judges, and one to report by.
+const OF_PHOTOGRAPHS: usize = 8;
 
 /// Seeds of the views that slopes are taken of, and of those of judges.
 const SEEDS: [u64; 2] = [1, 2];
@@ -37,13 +41,37 @@ enum Supply<'a> {
     Photographs(Vec<&'a Photograph>),
 }
 
-/// Views without end, and some to judge by.
+/// Views without end for receivers of operating points, and some to judge and to report by.
 pub(super) struct Pictures<'a> {
     supply: Supply<'a>,
-    judges: Vec<View>,
-    /// Lines of the views, in turn.
+    taken: usize,
+    turns: Vec<Turn>,
+    judges: Vec<Judges>,
+    witnesses: Vec<Judges>,
+}
+
+/// When a receiver is the next to look.
+struct Turn {
+    weight: f64,
+    /// How much it has waited for.
+    due: f64,
+    /// Lines of its pictures in turn, and how many it has had.
     lines: Vec<u32>,
     taken: usize,
+}
+
+/// Views of some lines, each the next of them in turn; receivers whose pictures have the same lines share them.
+struct Judges {
+    lines: Vec<u32>,
+    views: Vec<View>,
+}
+
+/// What photographs are used for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Fit,
+    Judge,
+    Witness,
 }
 
 impl<'a> Pictures<'a> {
@@ -51,50 +79,116 @@ impl<'a> Pictures<'a> {
     pub(super) fn new(
         source: &'a GaussianFrame,
         finetune: &'a Finetune,
-        settings: &Settings,
-        lines: Vec<u32>,
+        settings: &'a Settings,
+        receivers: &[Receiver],
     ) -> Self {
-        let taken = 0;
-        let of_judges = lines.first().copied().unwrap_or(LINES);
-        if !finetune.photographs.is_empty() {
-            let numbered = || finetune.photographs.iter().enumerate();
-            let is_judge = |number: usize| number % JUDGE_OF == JUDGE_OF / 2;
-            let judges = numbered()
-                .filter(|(number, _)| is_judge(*number))
-                .map(|(_, photograph)| photograph.view(of_judges));
-            let others =
-                numbered().filter(|(number, _)| !is_judge(*number)).map(|(_, photograph)| photograph);
-            let supply = Supply::Photographs(others.collect());
-            return Self { judges: judges.collect(), supply, lines, taken };
-        }
-        let [own, others] =
-            SEEDS.map(|seed| Scattered::new(source, Up::default(), &settings.cameras, seed, of_judges));
-        let judges = others.take(JUDGES).map(|camera| drawn(source, camera)).collect();
-        Self { supply: Supply::Scattered(source, own), judges, lines, taken }
-    }
-
-    /// Mean PSNR of a frame as judges see it, dB.
-    pub(super) fn judge(&self, frame: &GaussianFrame) -> f64 {
-        let prepared = PreparedFrame::new(frame);
-        let of_view = |View { camera, wanted }: &View| {
-            psnr(wanted, &prepared.draw(camera, BACKGROUND).rendering().colour).min(LOSSLESS_DB)
+        let turn = |receiver: &Receiver| Turn {
+            weight: receiver.weight,
+            due: 0.0,
+            lines: receiver.lines.clone(),
+            taken: 0,
         };
-        self.judges.iter().map(of_view).sum::<f64>() / self.judges.len().max(1) as f64
+        let turns = receivers.iter().map(turn).collect();
+        let views = |role: Role, lines: &[u32]| match finetune.photographs.is_empty() {
+            true => drawn_for(role, lines, source, settings),
+            false => finetune
+                .of_role(role)
+                .zip(lines.iter().cycle())
+                .map(|(one, &lines)| one.view(lines))
+                .collect(),
+        };
+        let all = |role: Role, lines: &dyn Fn(&Receiver) -> Vec<u32>| {
+            let mut all: Vec<Judges> = Vec::new();
+            for lines in receivers.iter().map(lines) {
+                if all.iter().all(|judges| judges.lines != lines) {
+                    all.push(Judges { views: views(role, &lines), lines });
+                }
+            }
+            all
+        };
+        let judges = all(Role::Judge, &|receiver| receiver.lines.clone());
+        let witnesses = all(Role::Witness, &|receiver| vec![receiver.own_lines]);
+        let supply = match finetune.photographs.is_empty() {
+            true => {
+                let [own, _] = SEEDS;
+                Supply::Scattered(
+                    source,
+                    Scattered::new(source, Up::default(), &settings.cameras, own, LINES),
+                )
+            }
+            false => Supply::Photographs(finetune.of_role(Role::Fit).collect()),
+        };
+        Self { supply, taken: 0, turns, judges, witnesses }
     }
 
-    /// The next view.
-    pub(super) fn next(&mut self) -> Option<View> {
-        let lines = self.lines.get(self.taken % self.lines.len().max(1)).copied().unwrap_or(LINES);
+    /// Mean PSNR of what a receiver has as judges see it, dB.
+    pub(super) fn judge(&self, receiver: &Receiver, frame: &GaussianFrame) -> f64 {
+        mean_psnr(&self.judges, &receiver.lines, frame)
+    }
+
+    /// The same in views of the lines of its layer by which nothing is chosen.
+    pub(super) fn witness(&self, receiver: &Receiver, frame: &GaussianFrame) -> f64 {
+        mean_psnr(&self.witnesses, &[receiver.own_lines], frame)
+    }
+
+    /// The next view, and which receiver looks: each as often as its weight says.
+    pub(super) fn next(&mut self) -> Option<(usize, View)> {
+        self.turns.iter_mut().for_each(|turn| turn.due += turn.weight);
+        let longest = |best: (usize, f64), (place, turn): (usize, &Turn)| {
+            if turn.due > best.1 { (place, turn.due) } else { best }
+        };
+        let (place, _) = self.turns.iter().enumerate().fold((0, f64::NEG_INFINITY), longest);
+        let turn = self.turns.get_mut(place)?;
+        turn.due -= 1.0;
+        let lines = turn.lines.get(turn.taken % turn.lines.len().max(1)).copied().unwrap_or(LINES);
+        turn.taken = turn.taken.wrapping_add(1);
         let number = self.taken;
         self.taken = number.wrapping_add(1);
-        match &mut self.supply {
+        let view = match &mut self.supply {
             Supply::Scattered(source, cameras) => {
                 cameras.next().map(|camera| drawn(source, camera.scaled_to_height(lines)))
             }
             Supply::Photographs(photographs) => {
                 Some(photographs.get(number % photographs.len().max(1))?.view(lines))
             }
+        };
+        view.map(|view| (place, view))
+    }
+}
+
+/// Mean PSNR of a frame in the views of some lines, dB.
+fn mean_psnr(judges: &[Judges], lines: &[u32], frame: &GaussianFrame) -> f64 {
+    let views = judges.iter().find(|judges| judges.lines == lines).map_or(&[][..], |judges| &judges.views);
+    let prepared = PreparedFrame::new(frame);
+    let of_view = |View { camera, wanted }: &View| {
+        psnr(wanted, &prepared.draw(camera, BACKGROUND).rendering().colour).min(LOSSLESS_DB)
+    };
+    views.iter().map(of_view).sum::<f64>() / views.len().max(1) as f64
+}
+
+/// Views of a source from elsewhere than slopes are taken.
+fn drawn_for(role: Role, lines: &[u32], source: &GaussianFrame, settings: &Settings) -> Vec<View> {
+    let [_, others] = SEEDS;
+    let cameras = match role {
+        Role::Witness => held_out(source, Up::default(), &settings.cameras, WITNESSES, LINES),
+        Role::Fit | Role::Judge => {
+            Scattered::new(source, Up::default(), &settings.cameras, others, LINES).take(JUDGES).collect()
         }
+    };
+    let of_lines = cameras.into_iter().zip(lines.iter().cycle());
+    of_lines.map(|(camera, &lines)| drawn(source, camera.scaled_to_height(lines))).collect()
+}
+
+impl Finetune {
+    /// The photographs that are used for something.
+    fn of_role(&self, role: Role) -> impl Iterator<Item = &Photograph> {
+        let role_of = |number: usize| match number % OF_PHOTOGRAPHS {
+            0 => Role::Witness,
+            place if place == OF_PHOTOGRAPHS / 2 => Role::Judge,
+            _ => Role::Fit,
+        };
+        let numbered = self.photographs.iter().enumerate();
+        numbered.filter(move |(number, _)| role_of(*number) == role).map(|(_, photograph)| photograph)
     }
 }
 

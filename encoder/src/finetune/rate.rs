@@ -117,7 +117,7 @@ impl Rate {
         Ok(rate)
     }
 
-    /// Adds to slopes what a step of each latent value takes, bits times `weight`.
+    /// Adds to slopes what a step of each latent value takes, bits times `weight`. Values that nobody sees are not to become cheap.
     pub(super) fn add(&self, latent: &Latent<'_>, decoded: &Decoded, weight: f32, slopes: &mut Planes) {
         let sh_planes = match latent.coder.colour.mode {
             ShCoding::Coefficients { rank } => usize::from(rank),
@@ -125,7 +125,8 @@ impl Rate {
             ShCoding::None | ShCoding::VectorQuantised { .. } => 0,
         };
         let steps = &latent.steps().log_scale;
-        for list in &self.lists {
+        let fitted = self.lists.iter().zip(&latent.lists).filter(|(_, list)| list.is_fitted);
+        for (list, _) in fitted {
             let slope = |plane: usize, row: usize| {
                 let at = list.rows.start + row;
                 weight * list.planes[plane].slope(row, decoded.values[plane][at])

@@ -2,7 +2,6 @@
 
 use crate::error::Error;
 use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
@@ -39,7 +38,7 @@ impl Compensator {
     )]
     pub(crate) fn offsets(
         &self,
-        lists: &[GaussianList],
+        lists: &[&QuantizedFrame],
         sequence: &SequenceParameters,
     ) -> Result<(i8, i8), Error> {
         let steps = [sequence.log_scale_step(), sequence.opacity_step()];
@@ -61,21 +60,32 @@ impl Compensator {
     }
 
     /// Decibels below the whole frame, so that less is better.
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "offsets are below 6 times the largest single one, values on the grid far below 2^31"
-    )]
     fn error(
         &self,
-        lists: &[GaussianList],
-        (scale, opacity): (i8, i8),
+        lists: &[&QuantizedFrame],
+        offsets: (i8, i8),
         sequence: &SequenceParameters,
     ) -> Result<f64, Error> {
-        let mut planes = QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
-        lists.iter().for_each(|list| planes.append(&list.planes));
-        planes.log_scale.iter_mut().flatten().for_each(|value| *value += i32::from(scale));
-        planes.opacity.iter_mut().for_each(|value| *value += i32::from(opacity));
-        let shown = to_gaussians(planes, sequence)?;
-        Ok(-self.views.psnr(&shown).sum::<f64>())
+        Ok(-self.views.psnr(&compensated(lists, offsets, sequence)?).sum::<f64>())
     }
+}
+
+/// What receivers of some lists see, with offsets of log-scale and opacity.
+///
+/// # Errors
+/// Lists whose planes make no frame.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "offsets are below 2^7, values on the grid far below 2^31"
+)]
+pub(crate) fn compensated(
+    lists: &[&QuantizedFrame],
+    (scale, opacity): (i8, i8),
+    sequence: &SequenceParameters,
+) -> Result<GaussianFrame, Error> {
+    let mut planes = QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
+    lists.iter().for_each(|list| planes.append(list));
+    planes.log_scale.iter_mut().flatten().for_each(|value| *value += i32::from(scale));
+    planes.opacity.iter_mut().for_each(|value| *value += i32::from(opacity));
+    Ok(to_gaussians(planes, sequence)?)
 }

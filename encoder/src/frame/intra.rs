@@ -191,8 +191,9 @@ impl Intra<'_> {
         let is_shown = !is_top || self.target.shows_top_prefixes;
         let is_prefix = refinement + 1 < sequence.refinement_count && is_shown;
         let Some(compensator) = self.target.compensator.filter(|_| is_prefix) else { return Ok(()) };
-        let lists = &self.lists[..=usize::from(refinement)];
-        let (log_scale, opacity) = compensator.offsets(lists, sequence)?;
+        let lists = self.lists[..=usize::from(refinement)].iter().map(|list| &list.planes);
+        let lists: Vec<&QuantizedFrame> = lists.collect();
+        let (log_scale, opacity) = compensator.offsets(&lists, sequence)?;
         (draft.header.compensation_log_scale, draft.header.compensation_opacity) = (log_scale, opacity);
         Ok(())
     }

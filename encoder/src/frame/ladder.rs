@@ -57,6 +57,11 @@ impl Ladder {
         layer > 0 && self.refined_at.get(list) == Some(&layer)
     }
 
+    /// Whether a list has its final steps in a layer.
+    pub(crate) fn is_final(&self, layer: u8, list: usize) -> bool {
+        self.refined_at.get(list).is_none_or(|&refined| refined <= layer)
+    }
+
     /// Whether a layer or one above it brings a list to its final steps.
     pub(crate) fn refines_from(&self, layer: u8) -> bool {
         self.refined_at.iter().any(|&refined| refined >= layer.max(1))
@@ -74,7 +79,7 @@ impl Ladder {
         has_books: bool,
         position_bits: u8,
     ) -> Grain {
-        if self.refined_at.get(list).is_none_or(|&refined| refined <= layer) {
+        if self.is_final(layer, list) {
             return last;
         }
         let coarse = |stage: usize| (last.attribute_step[stage] + COARSER[stage]).min(MAX_ATTRIBUTE_STEP);
