@@ -18,7 +18,7 @@ use crate::sequence;
 use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
 use crate::steps::Steps;
-use crate::verification;
+use crate::verification::Views;
 use crate::window::FirstFrames;
 use splatstream_format::syntax::FrameType;
 use splatstream_gaussians::GaussianFrame;
@@ -167,11 +167,11 @@ struct Fitting<'a> {
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
         let (first, frame) = first_frame(source, settings)?;
-        let views = verification::views(&first, settings);
+        let Views { of_fit, .. } = Views::of(&first, settings);
         drop(first);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
-        Ok(Self { settings, fit: Fit::new(&frame, &ranked, &views, settings), ranking, known: Vec::new() })
+        Ok(Self { settings, fit: Fit::new(&frame, &ranked, &of_fit, settings), ranking, known: Vec::new() })
     }
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
@@ -266,7 +266,7 @@ impl<'a> Seeker<'a> {
         while let Some(at) = next {
             let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.kept(at)? };
             // Where nothing can be seen nothing is too bad.
-            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.psnr());
+            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr());
             let measured = measured.unwrap_or(wanted);
             let first = *start.get_or_insert(measured);
             // Something else than the steps spoils the pictures: finer ones would only cost bits.
