@@ -15,7 +15,7 @@ use crate::progress::Progress;
 use crate::report::{Report, TargetReport};
 use crate::secant::Secant;
 use crate::sequence;
-use crate::settings::{Settings, Size};
+use crate::settings::{Settings, ShChoice, Size};
 use crate::source::FrameSource;
 use crate::steps::Steps;
 use crate::verification::Views;
@@ -162,6 +162,8 @@ struct Fitting<'a> {
     ranking: Ranking,
     /// Steps by the PSNR that they were fitted for.
     known: Vec<(f64, Steps)>,
+    /// How SH is coded: as the settings say, until a codebook turns out to cost pictures too much.
+    sh: ShChoice,
 }
 
 impl<'a> Fitting<'a> {
@@ -171,7 +173,8 @@ impl<'a> Fitting<'a> {
         drop(first);
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
-        Ok(Self { settings, fit: Fit::new(&frame, &ranked, &of_fit, settings), ranking, known: Vec::new() })
+        let (fit, sh) = (Fit::new(&frame, &ranked, &of_fit, settings), settings.sh);
+        Ok(Self { settings, fit, ranking, known: Vec::new(), sh })
     }
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
@@ -183,6 +186,19 @@ impl<'a> Fitting<'a> {
             let [most, iterations] = GAIN;
             most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations))
         })
+    }
+
+    /// Gives up a codebook with which pictures miss a PSNR, if nobody asked for one; whether there was one.
+    ///
+    /// The fit knows of coefficients only. What a codebook costs pictures beyond these, all other attributes would have to
+    /// make up for with finer steps, which takes more bits than the codebook saves.
+    fn gives_up_codebook(&mut self, report: &Report, missed: f64) -> bool {
+        let has_one = report.sh_codebook_entries > 0 && self.sh == ShChoice::Auto;
+        let is_dear = has_one && missed > NEAR_DECIBELS;
+        if is_dear {
+            self.sh = ShChoice::Coefficients;
+        }
+        is_dear
     }
 
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
@@ -198,7 +214,7 @@ impl<'a> Fitting<'a> {
                 steps
             }
         };
-        Ok(Settings { steps, laws: self.fit.laws(), ..self.settings.clone() })
+        Ok(Settings { steps, laws: self.fit.laws(), sh: self.sh, ..self.settings.clone() })
     }
 }
 
@@ -268,6 +284,10 @@ impl<'a> Seeker<'a> {
             // Where nothing can be seen nothing is too bad.
             let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr());
             let measured = measured.unwrap_or(wanted);
+            // The same steps with coefficients.
+            if self.fitting.gives_up_codebook(&encoded.report, wanted + ABOVE - measured) {
+                continue;
+            }
             let first = *start.get_or_insert(measured);
             // Something else than the steps spoils the pictures: finer ones would only cost bits.
             if at > wanted && measured - first < LEAST_GAIN * (at - wanted) {
