@@ -122,7 +122,7 @@ impl Ranking {
             let shown = unhidden(frame, &self.cameras);
             return Ranked { order: by(&shown, |worth| worth.energy), shown };
         }
-        let mut views = self.views(frame);
+        let views = self.views(frame);
         let shown = views.worth();
         let order = match self.importance {
             Importance::Removal => self.eliminate(views, &volume, &shown),

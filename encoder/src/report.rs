@@ -136,7 +136,7 @@ pub struct GopReport {
     pub frames: u32,
 }
 
-/// Pictures of the finished stream beside those of the source, in views that nothing was chosen by.
+/// Pictures of the finished stream beside those of the source, in views that decide nothing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PictureReport {
     /// The frames that were looked at.
@@ -156,22 +156,33 @@ pub struct VerifiedFrame {
     pub frame_type: FrameType,
     /// Mean of the PSNR of its views, decibels; none if nothing can be seen in any of them.
     pub psnr: Option<f64>,
+    /// The same of as many other views: those that decide how fine all steps together are. None where no PSNR is asked for.
+    pub fitted_psnr: Option<f64>,
 }
 
 impl PictureReport {
     /// Mean PSNR of all frames that were looked at, decibels.
     pub fn psnr(&self) -> Option<f64> {
-        self.mean(|_| true)
+        self.mean(|_| true, |frame| frame.psnr)
+    }
+
+    /// The same in the views that decide how fine all steps together are; none where no PSNR is asked for.
+    pub fn fitted_psnr(&self) -> Option<f64> {
+        self.mean(|_| true, |frame| frame.fitted_psnr)
     }
 
     /// The same of frames of a type.
     pub fn psnr_of(&self, frame_type: FrameType) -> Option<f64> {
-        self.mean(|frame| frame.frame_type == frame_type)
+        self.mean(|frame| frame.frame_type == frame_type, |frame| frame.psnr)
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "counts of what is in memory")]
-    fn mean(&self, counts: impl Fn(&VerifiedFrame) -> bool) -> Option<f64> {
-        let values = self.frames.iter().filter(|frame| counts(frame)).filter_map(|frame| frame.psnr);
+    fn mean(
+        &self,
+        counts: impl Fn(&VerifiedFrame) -> bool,
+        psnr: impl Fn(&VerifiedFrame) -> Option<f64>,
+    ) -> Option<f64> {
+        let values = self.frames.iter().filter(|frame| counts(frame)).filter_map(psnr);
         let (sum, count) = values.fold((0.0, 0), |(sum, count), decibels| (sum + decibels, count + 1));
         (count > 0).then(|| sum / f64::from(count))
     }

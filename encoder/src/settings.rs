@@ -250,7 +250,7 @@ pub struct Settings {
     pub steps: Steps,
     /// How steps follow from what is known of a Gaussian.
     pub laws: Laws,
-    /// Fit steps and laws to the first frame, so that pictures have this PSNR in views that nothing is chosen by,
+    /// Fit steps and laws to the first frame, so that pictures have this PSNR in views that decide nothing else,
     /// decibels; 20 to 90.
     pub psnr: Option<f32>,
     /// Fit the steps so that the stream has this size, to 3 %; `psnr` is not looked at then.

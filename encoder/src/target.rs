@@ -16,10 +16,10 @@ use crate::report::{Report, TargetReport};
 use crate::savings::Saving;
 use crate::secant::Secant;
 use crate::sequence;
-use crate::settings::{Preset, Settings, Size};
+use crate::settings::{Preset, Settings, ShChoice, Size};
 use crate::source::FrameSource;
 use crate::steps::Steps;
-use crate::verification;
+use crate::verification::Views;
 use crate::window::FirstFrames;
 use splatstream_format::syntax::FrameType;
 use splatstream_gaussians::GaussianFrame;
@@ -170,12 +170,14 @@ struct Fitting<'a> {
     ranking: Ranking,
     /// Steps by the PSNR that they were fitted for.
     known: Vec<(f64, Steps)>,
+    /// How SH is coded: as the settings say, until a codebook turns out to cost pictures too much.
+    sh: ShChoice,
 }
 
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
         let (first, frame) = first_frame(source, settings)?;
-        let views = verification::views(&first, settings);
+        let Views { of_fit, .. } = Views::of(&first, settings);
         drop(first);
         // What is left out counts as an error.
         let whole = match settings.prune {
@@ -187,8 +189,8 @@ impl<'a> Fitting<'a> {
         };
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
-        let fit = Fit::new((&frame, whole.as_ref()), &ranked, &views, settings);
-        Ok(Self { settings, fit, ranking, known: Vec::new() })
+        let fit = Fit::new((&frame, whole.as_ref()), &ranked, &of_fit, settings);
+        Ok(Self { settings, fit, ranking, known: Vec::new(), sh: settings.sh })
     }
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
@@ -201,6 +203,19 @@ impl<'a> Fitting<'a> {
             let gain = most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations));
             gain * finetune.share_of_everything(self.settings)
         })
+    }
+
+    /// Gives up a codebook with which pictures miss a PSNR, if nobody asked for one; whether there was one.
+    ///
+    /// The fit knows of coefficients only. What a codebook costs pictures beyond these, all other attributes would have to
+    /// make up for with finer steps, which takes more bits than the codebook saves.
+    fn gives_up_codebook(&mut self, report: &Report, missed: f64) -> bool {
+        let has_one = report.sh_codebook_entries > 0 && self.sh == ShChoice::Auto;
+        let is_dear = has_one && missed > NEAR_DECIBELS;
+        if is_dear {
+            self.sh = ShChoice::Coefficients;
+        }
+        is_dear
     }
 
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
@@ -216,7 +231,7 @@ impl<'a> Fitting<'a> {
                 steps
             }
         };
-        Ok(Settings { steps, laws: self.fit.laws(), ..self.settings.clone() })
+        Ok(Settings { steps, laws: self.fit.laws(), sh: self.sh, ..self.settings.clone() })
     }
 }
 
@@ -297,8 +312,12 @@ impl<'a> Seeker<'a> {
         while let Some(at) = next {
             let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.kept(at)? };
             // Where nothing can be seen nothing is too bad.
-            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.psnr());
+            let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr());
             let measured = measured.unwrap_or(wanted);
+            // The same steps with coefficients.
+            if self.fitting.gives_up_codebook(&encoded.report, wanted + ABOVE - measured) {
+                continue;
+            }
             let first = *start.get_or_insert(measured);
             // Something else than the steps spoils the pictures: finer ones would only cost bits.
             if at > wanted && measured - first < LEAST_GAIN * (at - wanted) {

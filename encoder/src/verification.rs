@@ -1,9 +1,10 @@
-//! The finished stream, decoded and looked at: what its pictures are worth, in views that nothing else was chosen by
-//! than how fine all steps together are.
+//! The finished stream, decoded and looked at: what its pictures are worth in views that decide nothing, and, where a PSNR is
+//! asked for, in the views that decide how fine all steps together are.
 //!
 //! While a stream is written the units of up to three of its GOPs are kept: those of the first, the middle and the last
 //! frame. Each is decoded when it is complete, as any receiver would who starts there, and a few of its frames are
-//! drawn beside those of the source: some strips of each picture, which have nearly the errors of all of it. What is measured is the stream, not what the encoder believes of it.
+//! drawn beside those of the source: some strips of each picture, which have nearly the errors of all of it. What is
+//! measured is the stream, not what the encoder believes of it.
 
 use crate::error::Error;
 use crate::report::{PictureReport, VerifiedFrame};
@@ -17,10 +18,11 @@ use splatstream_format::Limits;
 use splatstream_format::syntax::{FrameType, GopHeader, UnitHeader};
 use splatstream_format::unit::Stream;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::Rendering;
 use splatstream_render::camera::{Up, held_out};
+use splatstream_render::{Camera, Rendering};
 
-/// Views of each frame, and their height: with other heights PSNR is another number.
+/// Views of each frame that decide nothing, as many as there are that decide, and their height: with other heights PSNR is
+/// another number.
 const VIEWS: u32 = 4;
 const HEIGHT: u32 = 540;
 
@@ -154,19 +156,40 @@ impl Verifier {
             // The source is read again rather than kept beside what was decoded: a frame may fill the memory.
             let mut original =
                 || source.original(number).map_err(|source| Error::Source { frame: number, source });
-            let views = views(&original()?, settings);
-            let decoded: Vec<Rendering> = views.draw(&frame).collect();
+            let Views { unseen, of_fit } = Views::of(&original()?, settings);
+            let of_fit = Some(of_fit).filter(|_| settings.psnr.is_some() && settings.size.is_none());
+            let draw = |views: &StripViews| -> Vec<Rendering> { views.draw(&frame).collect() };
+            let (drawn_unseen, drawn_of_fit) = (draw(&unseen), of_fit.as_ref().map(draw));
             drop(frame);
-            let psnr = views.mean_psnr(&original()?, &decoded)?;
-            frames.push(VerifiedFrame { number, frame_type, psnr });
+            let original = original()?;
+            let psnr = unseen.mean_psnr(&original, &drawn_unseen)?;
+            let of_fit = of_fit.zip(drawn_of_fit);
+            let fitted_psnr = of_fit.map(|(views, drawn)| views.mean_psnr(&original, &drawn)).transpose()?;
+            frames.push(VerifiedFrame { number, frame_type, psnr, fitted_psnr: fitted_psnr.flatten() });
         }
         Ok(PictureReport { frames, views: VIEWS, height: HEIGHT })
     }
 }
 
-/// Views of a frame that nothing is chosen by but how fine all steps together are.
-pub(crate) fn views(frame: &GaussianFrame, settings: &Settings) -> StripViews {
-    let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
-    let cameras = held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
-    StripViews::new(cameras, every, frame.len())
+/// Views of a frame.
+pub(crate) struct Views {
+    /// Those that decide nothing.
+    pub(crate) unseen: StripViews,
+    /// Those that decide how fine all steps together are.
+    pub(crate) of_fit: StripViews,
+}
+
+impl Views {
+    /// Both lie between each other: held-out views rise from below to above, and of four that follow each other each side
+    /// takes the outer or the inner two.
+    pub(crate) fn of(frame: &GaussianFrame, settings: &Settings) -> Self {
+        let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
+        let cameras = held_out(frame, Up::default(), &settings.cameras, 2 * VIEWS, HEIGHT);
+        let some = |outer: bool| {
+            let is_taken = |&(number, _): &(usize, &Camera)| matches!(number % 4, 0 | 3) == outer;
+            let cameras = cameras.iter().enumerate().filter(is_taken).map(|(_, camera)| camera.clone());
+            StripViews::new(cameras.collect(), every, frame.len())
+        };
+        Self { unseen: some(false), of_fit: some(true) }
+    }
 }

@@ -1,5 +1,9 @@
 //! How much each Gaussian matters to a set of views.
 
+mod small_views;
+
+pub use small_views::SmallViews;
+
 use crate::camera::Camera;
 use crate::rasterise::{Blend, Ink, Lanes, Light, Shapes, Sight, Splat, TILE, Tile, View, blend_tile};
 use pulp::{Simd, WithSimd};
@@ -43,93 +47,6 @@ pub fn worth(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
         add(&View::new(frame, &shapes, &Sight::of(camera)), &mut sums);
     }
     sums
-}
-
-/// A frame as cameras see it in pictures smaller than theirs, which cost less and show nearly the same of each Gaussian.
-///
-/// A Gaussian smaller than a pixel covers as much of it as it would cover in the large picture, whatever the filter of
-/// the renderer makes of it.
-pub struct SmallViews<'a> {
-    frame: &'a GaussianFrame,
-    shapes: Shapes,
-    views: Vec<SmallView>,
-    /// The Gaussians that are left, by rising row; none if all are.
-    left: Option<Vec<u32>>,
-}
-
-/// One of the small pictures.
-struct SmallView {
-    camera: Camera,
-    /// The side of a pixel of the large picture in pixels of this one.
-    fine: f32,
-    /// The ellipses of the Gaussians that were left when it was looked at last, nearest first, if they are kept.
-    ellipses: Option<Vec<Splat>>,
-}
-
-/// Bytes of ellipses that are kept from one look to the next, at most, where all Gaussians are left: they take half the
-/// time, but ten views of a large scene would take more than the scene.
-const KEPT: usize = 1 << 24;
-
-impl<'a> SmallViews<'a> {
-    /// Pictures of at most so many lines.
-    #[must_use]
-    pub fn new(frame: &'a GaussianFrame, cameras: &[Camera], lines: u32) -> Self {
-        let small = |camera: &Camera| {
-            let (camera, fine) = match camera.height > lines {
-                true => (camera.scaled_to_height(lines), lines as f32 / camera.height as f32),
-                false => (camera.clone(), 1.0),
-            };
-            SmallView { camera, fine, ellipses: None }
-        };
-        let views = cameras.iter().map(small).collect();
-        Self { frame, shapes: Shapes::of(frame), views, left: None }
-    }
-
-    /// Takes all Gaussians away but those of some rows, which rise and were left so far.
-    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
-    pub fn leave(&mut self, rows: &[u32]) {
-        let mut is_left = vec![false; self.frame.len()];
-        rows.iter().for_each(|&row| is_left[row as usize] = true);
-        let kept = self.views.par_iter_mut().filter_map(|view| view.ellipses.as_mut());
-        kept.for_each(|ellipses| {
-            ellipses.retain(|ellipse| is_left[ellipse.gaussian as usize]);
-            ellipses.shrink_to_fit();
-        });
-        self.left = Some(rows.to_vec());
-    }
-
-    /// What each of the Gaussians that are left is to the pictures if there are no others, by rising row.
-    #[must_use]
-    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
-    pub fn worth(&mut self) -> Vec<Worth> {
-        let mut sums = vec![Worth::default(); self.frame.len()];
-        let bytes = |view: &SmallView| view.ellipses.as_deref().map_or(0, size_of_val);
-        let mut kept: usize = self.views.iter().map(bytes).sum();
-        // Of each Gaussian that is gone there would be another ellipse while those of a view are sorted.
-        let gone = self.left.as_ref().map_or(0, |left| self.frame.len().saturating_sub(left.len()));
-        let room = KEPT.max(gone.saturating_mul(size_of::<Splat>()));
-        for view in &mut self.views {
-            let SmallView { camera, fine, ellipses } = view;
-            let sight = Sight { rows: self.left.as_deref(), fine: *fine, ..Sight::of(camera) };
-            let view = match ellipses.take() {
-                Some(splats) => {
-                    kept = kept.saturating_sub(size_of_val(splats.as_slice()));
-                    View::of(splats, &sight)
-                }
-                None => View::new(self.frame, &self.shapes, &sight),
-            };
-            add(&view, &mut sums);
-            kept = kept.saturating_add(size_of_val(view.splats.as_slice()));
-            match kept <= room {
-                true => *ellipses = Some(view.splats),
-                false => kept = kept.saturating_sub(size_of_val(view.splats.as_slice())),
-            }
-        }
-        match &self.left {
-            Some(rows) => rows.iter().map(|&row| sums[row as usize]).collect(),
-            None => sums,
-        }
-    }
 }
 
 /// Adds what each Gaussian is to a view.

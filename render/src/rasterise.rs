@@ -12,15 +12,14 @@ mod tile;
 
 use crate::camera::Camera;
 use crate::image::Image;
-pub(crate) use project::Shapes;
-pub(crate) use project::Splat;
-pub(crate) use project::{LOW_PASS, seen_slopes};
+pub(crate) use block::Block;
+pub(crate) use project::{LOW_PASS, Shapes, Splat, near, seen_slopes};
 use project::{project, touching};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::TileRows;
 use splatstream_gaussians::GaussianFrame;
-pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, Lanes, Tile, blend_tile};
+pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, Lanes, MAX_ALPHA, Tile, blend_tile, exp2};
 
 /// Pixels on a side of a tile.
 pub(crate) const TILE: usize = 16;
@@ -67,7 +66,7 @@ impl<'a> PreparedFrame<'a> {
     #[must_use]
     pub fn touching(&self, camera: &Camera, strips: Strips) -> Vec<u32> {
         let strips = strips.within((camera.height as usize).div_ceil(TILE));
-        touching(self.frame, &self.shapes, &Sight { strips, ..Sight::of(camera) })
+        touching(self.frame, &self.shapes, &Sight { camera, strips })
     }
 }
 
@@ -79,7 +78,7 @@ fn draw(
     (strips, arch): (Strips, pulp::Arch),
 ) -> Rendering {
     let strips = strips.within((camera.height as usize).div_ceil(TILE));
-    let sight = Sight { strips, ..Sight::of(camera) };
+    let sight = Sight { camera, strips };
     paint(&View::new(prepared.frame, &prepared.shapes, &sight), &sight, background, arch)
 }
 
@@ -128,17 +127,12 @@ impl Strips {
 pub(crate) struct Sight<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) strips: Strips,
-    /// The Gaussians that are drawn, by rising row; none: all.
-    pub(crate) rows: Option<&'a [u32]>,
-    /// The side of a pixel of the picture that this one stands for, pixels of this one, at most 1. Where that is
-    /// finer, a Gaussian covers as much as it does there, however small it is here.
-    pub(crate) fine: f32,
 }
 
 impl<'a> Sight<'a> {
-    /// A whole picture of all Gaussians that stands for itself.
+    /// A whole picture.
     pub(crate) const fn of(camera: &'a Camera) -> Self {
-        Self { camera, strips: Strips::ALL, rows: None, fine: 1.0 }
+        Self { camera, strips: Strips::ALL }
     }
 }
 
@@ -153,11 +147,7 @@ pub(crate) struct View {
 impl View {
     /// Projects and sorts.
     pub(crate) fn new(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Self {
-        Self::of(project(frame, shapes, sight), sight)
-    }
-
-    /// Sorts ellipses that are projected already, nearest first.
-    pub(crate) fn of(splats: Vec<Splat>, sight: &Sight<'_>) -> Self {
+        let splats = project(frame, shapes, sight);
         let rows = TileRows::new(&splats, sight);
         Self { splats, rows }
     }

@@ -39,6 +39,8 @@ pub(super) struct Pictures {
     /// What was asked for, and what was measured; null where there is none.
     wanted_psnr_db: Option<f64>,
     psnr_db: Option<f64>,
+    /// The same in the views that steps were fitted in.
+    fitted_psnr_db: Option<f64>,
     psnr_db_by_type: ByType,
     verified: Vec<Verified>,
     /// Views of each verified frame, and their rows.
@@ -88,6 +90,7 @@ impl Pictures {
         Self {
             wanted_psnr_db: goal.psnr(),
             psnr_db: pictures.psnr(),
+            fitted_psnr_db: pictures.fitted_psnr(),
             psnr_db_by_type: ByType {
                 intra: pictures.psnr_of(FrameType::Intra),
                 predicted: pictures.psnr_of(FrameType::Predicted),
@@ -105,11 +108,13 @@ impl Pictures {
     /// Lines for people.
     pub(super) fn text(&self) -> String {
         let Some(psnr) = self.psnr_db else { return self.gops_text() };
-        let wanted = self.wanted_psnr_db.map(|wanted| format!(", wanted {wanted}")).unwrap_or_default();
+        let fitted = |fitted| format!(" ({fitted:.2} dB in the views that quantisers were fitted in)");
+        let wanted = self.wanted_psnr_db.map(|wanted| format!(", wanted {wanted}")).unwrap_or_default()
+            + &self.fitted_psnr_db.map(fitted).unwrap_or_default();
         let frames = self.verified.len();
         let mut text = format!(
             "  PSNR               {psnr:.2} dB{wanted}: decoded again, {frames} {}, {} views of {} lines that \
-             nothing was chosen by\n",
+             decide nothing\n",
             if frames == 1 { "frame" } else { "frames" },
             self.views,
             self.view_height,

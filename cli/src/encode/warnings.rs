@@ -6,8 +6,9 @@ use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{Dropped, Isolated, Report, Settings, Size};
 use splatstream_format::syntax::FrameType;
 
-/// A PSNR is missed by more than this, decibels.
-const MISSED: f64 = 0.5;
+/// A PSNR is missed by more than this, decibels: views that decide nothing differ by a decibel from those that steps are fitted
+/// in.
+const MISSED: f64 = 1.5;
 
 /// P and B frames may be below I frames by so much, decibels.
 const PULSE: f64 = 1.0;

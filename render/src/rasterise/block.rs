@@ -1,14 +1,15 @@
-//! Colours of sixteen Gaussians at a time.
+//! Sixteen Gaussians at a time: their values and colours.
 #![expect(clippy::arithmetic_side_effects, reason = "floats; counts of Gaussians in memory")]
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; lanes and axes are constants")]
 
 use super::TILE;
+use super::project::Shapes;
 use super::tile::Lanes;
 use splatstream_gaussians::{GaussianFrame, SH_C0, sh_basis, sh_coefficients};
 use std::ops::Range;
 
 /// Some Gaussians of a frame, side by side.
-pub(super) struct Block {
+pub(crate) struct Block {
     rows: [u32; TILE],
     /// How many there are: further lanes repeat the last.
     count: usize,
@@ -19,7 +20,7 @@ pub(super) struct Block {
 impl Block {
     /// Those at at most sixteen places of `rows`, or of the frame where there are none.
     #[inline(always)]
-    pub(super) fn new(rows: Option<&[u32]>, places: Range<usize>) -> Self {
+    pub(crate) fn new(rows: Option<&[u32]>, places: Range<usize>) -> Self {
         let of_lane = |lane: usize| {
             let place = (places.start + lane).min(places.end - 1);
             rows.map_or(place as u32, |rows| rows[place])
@@ -31,7 +32,7 @@ impl Block {
 
     /// Each with its lane.
     #[inline(always)]
-    pub(super) fn rows(&self) -> impl Iterator<Item = (usize, usize)> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (usize, usize)> {
         self.rows[..self.count].iter().map(|&row| row as usize).enumerate()
     }
 
@@ -79,9 +80,21 @@ impl Block {
         offsets
     }
 
+    /// Their semi-axes, x, y and z of each.
+    #[inline(always)]
+    pub(crate) fn axes(&self, shapes: &Shapes) -> [[Lanes; 3]; 3] {
+        let mut axes = [[[0.0; TILE]; 3]; 3];
+        for (lane, &row) in self.rows.iter().enumerate() {
+            for (axis, of_row) in axes.iter_mut().zip(shapes.axes(row as usize)) {
+                axis.iter_mut().zip(of_row.to_array()).for_each(|(part, value)| part[lane] = value);
+            }
+        }
+        axes
+    }
+
     /// Their values in a plane of the frame.
     #[inline(always)]
-    fn of(&self, plane: &[f32]) -> Lanes {
+    pub(crate) fn of(&self, plane: &[f32]) -> Lanes {
         let first = self.rows[0] as usize;
         let mut lanes = [0.0; TILE];
         match self.is_run {

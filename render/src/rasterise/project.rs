@@ -67,6 +67,11 @@ impl Shapes {
         Self { axes, longest, opacity: logits.map(|logit| 1.0 / (1.0 + libm::expf(-logit))).collect() }
     }
 
+    /// Opacity of each Gaussian.
+    pub(crate) fn opacity(&self) -> &[f32] {
+        &self.opacity
+    }
+
     /// The semi-axes of a Gaussian.
     pub(crate) fn axes(&self, row: usize) -> [Vec3; 3] {
         self.axes[row]
@@ -76,11 +81,11 @@ impl Shapes {
 /// The ellipses of the Gaussians that touch the picture, nearest first.
 pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Vec<Splat> {
     let view = View::new(frame, shapes, sight);
-    let count = sight.rows.map_or(frame.len(), <[u32]>::len);
+    let count = frame.len();
     let starts: Vec<usize> = (0..count).step_by(CHUNK).collect();
     let chunk = |&start: &usize| {
-        let places = start..count.min(start + CHUNK);
-        pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows: sight.rows, places })
+        let rows = start..count.min(start + CHUNK);
+        pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows })
     };
     let chunks: Vec<Vec<(f32, Splat)>> = starts.par_iter().map(chunk).collect();
     // Positive floats order as their bits; equal depths keep the order of the frame.
@@ -102,11 +107,10 @@ pub(crate) fn touching(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>
     rows.filter(|&row| view.ellipse(row).is_some()).map(|row| row as u32).collect()
 }
 
-/// Projects some Gaussians: places of the rows, or of the frame where there are none.
+/// Projects some Gaussians.
 struct ProjectChunk<'a> {
     view: &'a View<'a>,
-    rows: Option<&'a [u32]>,
-    places: Range<usize>,
+    rows: Range<usize>,
 }
 
 impl WithSimd for ProjectChunk<'_> {
@@ -114,10 +118,10 @@ impl WithSimd for ProjectChunk<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let Self { view, rows, places } = self;
-        let mut splats = Vec::with_capacity(places.len());
-        for start in places.clone().step_by(TILE) {
-            let block = Block::new(rows, start..places.end.min(start + TILE));
+        let Self { view, rows } = self;
+        let mut splats = Vec::with_capacity(rows.len());
+        for start in rows.clone().step_by(TILE) {
+            let block = Block::new(None, start..rows.end.min(start + TILE));
             let first = splats.len();
             for (lane, row) in block.rows() {
                 if let Some((depth, splat)) = view.ellipse(row) {
@@ -151,8 +155,6 @@ struct View<'a> {
     principal: [f32; 2],
     size: [f32; 2],
     strips: Strips,
-    /// Variance of the low-pass filter in the picture that this one stands for, square pixels of this one.
-    fine_pass: f32,
     slopes: [(f32, f32); 2],
 }
 
@@ -172,7 +174,6 @@ impl<'a> View<'a> {
             principal: camera.principal,
             size,
             strips: sight.strips,
-            fine_pass: LOW_PASS * sight.fine * sight.fine,
             slopes: seen_slopes(camera),
         }
     }
@@ -188,12 +189,7 @@ impl<'a> View<'a> {
         let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(row, at);
         let (wide, tall) = (xx + LOW_PASS, yy + LOW_PASS);
         let determinant = sharp + LOW_PASS * (xx + tall);
-        // What it covers in the picture that this one stands for.
-        let fine = match self.frame.antialiased() {
-            true => sharp,
-            false => sharp + self.fine_pass * (xx + (yy + self.fine_pass)),
-        };
-        let kept = (fine / determinant).sqrt();
+        let kept = if self.frame.antialiased() { (sharp / determinant).sqrt() } else { 1.0 };
         let opacity = self.shapes.opacity[row] * kept;
         let peak = libm::log2f(opacity);
         // Squared Mahalanobis distance at which alpha is 1/255.
@@ -290,7 +286,7 @@ pub(crate) fn seen_slopes(camera: &Camera) -> [(f32, f32); 2] {
 ///
 /// The bits of a positive float, read as an integer, are close to a logarithm of it: their mean is exact and does not
 /// depend on the order.
-fn near(frame: &GaussianFrame, camera: &Camera) -> f32 {
+pub(crate) fn near(frame: &GaussianFrame, camera: &Camera) -> f32 {
     let [x, y, z] = frame.position();
     let [ahead, position] = [camera.rotation[2], camera.position].map(Vec3::from);
     let depth = |row: usize| ahead.dot(Vec3::new(x[row], y[row], z[row]) - position);

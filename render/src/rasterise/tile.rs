@@ -5,7 +5,7 @@ use super::project::{LOG2_255, Splat};
 use std::f32::consts::LN_2;
 
 /// The most that one Gaussian may cover.
-const MAX_ALPHA: f32 = 0.99;
+pub(crate) const MAX_ALPHA: f32 = 0.99;
 
 /// log2 of that.
 pub(crate) const LOG2_MAX_ALPHA: f32 = -0.014_499_556;
@@ -147,7 +147,7 @@ fn blend_line(splat: &Splat, origin: [f32; 2], line: usize, passing: &mut Lanes)
 
 /// 2^x for -126 < x < 128, relative error below 2^-22; only operations that vectorise everywhere.
 #[inline(always)]
-fn exp2(x: f32) -> f32 {
+pub(crate) fn exp2(x: f32) -> f32 {
     // Adding 1.5 * 2^23 rounds to the nearest integer, which is then in the low bits.
     const ROUND: f32 = 12_582_912.0;
     let rounded = x + ROUND;
