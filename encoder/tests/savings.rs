@@ -68,6 +68,9 @@ fn layers_cost_what_is_told() {
     let (_, report) = encoded(frames, &layered);
     let told = saving(&report, Tool::SpatialLayers);
     assert!(told.basis == Basis::Measured && (-12.0..0.0).contains(&told.bits), "{told:?}");
+    // Positions of the lowest layer are coarser than those that all layers add up to.
+    let refinements = saving(&report, Tool::Refinements).bits;
+    assert!((-8.0..-0.5).contains(&refinements), "{refinements}");
 }
 
 #[test]

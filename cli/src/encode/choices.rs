@@ -267,13 +267,13 @@ fn prediction(report: &Report, settings: &Settings) -> Option<Choice> {
     let [intra, predicted] =
         [bits_per_gaussian(bytes, gaussians), bits_per_gaussian(other_bytes, other_gaussians)];
     let all = bits_per_gaussian(bytes + other_bytes, gaussians + other_gaussians);
-    // Half of the I frames would be predicted.
-    let longer = 0.5 * percent(count, count + others) * (intra - predicted) / all;
     let choice = format!("{} of {} frames", grouped(others), grouped(count + others));
-    let why = format!(
-        "GOPs of {} frames; twice as many would save about {longer:.1} %, where they can be predicted",
-        settings.gop_length()
-    );
+    // With twice as many frames in a GOP half of the I frames would be predicted.
+    let longer = (count > 1).then(|| {
+        let percent = 0.5 * percent(count, count + others) * (intra - predicted) / all;
+        format!("; twice as many would save about {percent:.1} %, where they can be predicted")
+    });
+    let why = format!("GOPs of up to {} frames{}", settings.gop_length(), longer.unwrap_or_default());
     Some(Choice::new("prediction", choice, why).saving(Some((intra - all, Basis::Estimated))))
 }
 

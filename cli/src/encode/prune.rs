@@ -3,8 +3,8 @@
 use super::choices::Choice;
 use crate::failure::Failure;
 use clap::Args;
-use splatstream_chart::numbers::{bits_per_gaussian, grouped, percent};
-use splatstream_encoder::{Basis, Report, Settings};
+use splatstream_chart::numbers::{grouped, percent};
+use splatstream_encoder::{Report, Settings};
 
 /// How much better pictures without some Gaussians are than those of the stream, decibels, where nothing is said: a sixth of
 /// the squared error of the view that misses them most.
@@ -76,12 +76,11 @@ pub(super) fn pruned(report: &Report, settings: &Settings) -> Option<Choice> {
     });
     let why = format!(
         "pictures without them have {worst:.1} dB against pictures with them in the worst view{}; about {} bytes \
-         fewer",
+         fewer, before steps become finer for what is lost",
         lost.unwrap_or_default(),
         grouped(bytes)
     );
-    let saved = bits_per_gaussian(bytes, report.gaussians);
-    Some(Choice::new("pruned", choice, why).saving(Some((saved, Basis::Estimated))))
+    Some(Choice::new("pruned", choice, why))
 }
 
 #[cfg(test)]

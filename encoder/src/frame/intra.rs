@@ -112,9 +112,10 @@ impl Intra<'_> {
         }
         // Layers above add nothing: they refine.
         let lowest = self.target.lowest.as_ref().unwrap_or(&self.target.wanted);
+        let shifts: Vec<u8> = added.iter().map(|(_, grain)| grain.position_shift).collect();
         let new = NewList::all(self.coder, lowest, added, self.models.before(0));
         if self.target.tells_savings && layer == 0 {
-            self.savings = worth::of_lists(self.coder, &self.target, &new);
+            self.savings = worth::of_lists(self.coder, &self.target, &new, &shifts);
         }
         if !self.target.chooser.predicts() && !self.ladder.refines_from(layer) {
             self.target.wanted = self.target.wanted.select(&[]);

@@ -13,8 +13,14 @@ use rayon::prelude::*;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::entropy::token::split;
 
-/// What contexts and refinements save the Gaussians that the lowest layer adds, estimated.
-pub(super) fn of_lists(coder: &UnitCoder<'_>, target: &IntraTarget<'_>, new: &[NewList]) -> Vec<Saving> {
+/// What contexts and refinements save the Gaussians that the lowest layer adds, estimated. `shifts`: low bits of positions that
+/// each list leaves out.
+pub(super) fn of_lists(
+    coder: &UnitCoder<'_>,
+    target: &IntraTarget<'_>,
+    new: &[NewList],
+    shifts: &[u8],
+) -> Vec<Saving> {
     let worths: Vec<_> =
         new.par_iter().map(|list| list.coded.worth_of_contexts(&list.values, &coder.plan)).collect();
     let count = target.order.len().max(1) as f64;
@@ -23,19 +29,18 @@ pub(super) fn of_lists(coder: &UnitCoder<'_>, target: &IntraTarget<'_>, new: &[N
     if new.len() > 1 {
         let models = |worth: &crate::models::ContextWorth| worth.models;
         let tables = worths.iter().map(models).sum::<f64>() - worths.iter().map(models).fold(0.0, f64::max);
-        let positions = positions_in_lists(coder, new) - positions_in_one(coder, target);
+        let positions = positions_in_lists(new, shifts) - positions_in_one(coder, target);
         savings.push(Saving::estimated(Tool::Refinements, -(tables + positions) / count));
     }
     savings
 }
 
 /// Bits of positions in their lists, with the low bits that these leave out.
-fn positions_in_lists(coder: &UnitCoder<'_>, new: &[NewList]) -> f64 {
-    let of_list = |(refinement, list): (u8, &NewList)| {
-        let left_out = 3.0 * f64::from(coder.grains.of(refinement).position_shift);
-        position_bits(&list.values.deltas) + left_out * list.len() as f64
+fn positions_in_lists(new: &[NewList], shifts: &[u8]) -> f64 {
+    let of_list = |(list, &shift): (&NewList, &u8)| {
+        position_bits(&list.values.deltas) + 3.0 * f64::from(shift) * list.len() as f64
     };
-    (0..).zip(new).map(of_list).sum()
+    new.iter().zip(shifts).map(of_list).sum()
 }
 
 /// Bits of positions if all Gaussians stood in one list.
