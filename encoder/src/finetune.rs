@@ -243,7 +243,6 @@ impl Fit<'_> {
         let has_books = matches!(self.coder.colour.mode, ShCoding::VectorQuantised { .. });
         let position_bits = self.coder.sequence.position_bits;
         let mut parents = parents.map(Vec::into_iter);
-        let counts_above = layer == 0 && Receiver::any_above(self.layers, (self.settings, self.finetune));
         let list = |(list, rows)| List {
             rows,
             grain: ladder.grain(
@@ -255,7 +254,6 @@ impl Fit<'_> {
             ),
             parents: parents.as_mut().and_then(Iterator::next),
             is_fitted: receivers.iter().any(|receiver| receiver.lists.get(usize::from(list)) == Some(&true)),
-            is_refined: counts_above && !ladder.is_final(0, usize::from(list)),
         };
         (0..).zip(parts(&self.settings.refinements, self.order.len())).map(list).collect()
     }

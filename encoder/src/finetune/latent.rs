@@ -41,8 +41,6 @@ pub(super) struct List {
     pub(super) parents: Option<GaussianList>,
     /// Whether an operating point that counts shows its values.
     pub(super) is_fitted: bool,
-    /// Whether a layer above that counts as well brings its values to their final steps.
-    pub(super) is_refined: bool,
 }
 
 /// The values of a frame beside those of its source.

@@ -31,10 +31,6 @@ const STEEPEST: f32 = 3.0;
 /// A plane whose values take this many bits or more takes one more where its steps are halved; one with fewer, so much less.
 const ONE_MORE: f64 = 2.0;
 
-/// Bits of a layer above that a step of a value away from the nearest takes, so that the layer can come back: where values are the
-/// nearest it codes -1, 0 or 1, and of log-scales nothing.
-const BACK: f32 = 1.5;
-
 /// Planes of values of log-scales, opacity, rotation and dc, and the first of sh.
 const LOG_SCALES: usize = 3;
 const ROTATION: usize = 4;
@@ -44,7 +40,7 @@ const SH: usize = 10;
 /// Slopes of the bits of a frame.
 pub(super) struct Rate {
     lists: Vec<ListRate>,
-    /// Bits of all values but positions, as they were when the models were chosen, and of what a layer above takes to come back.
+    /// Bits of all values but positions, as they were when the models were chosen.
     pub(super) bits: f64,
     /// Bits that halving all steps would add, positions and all, nearly.
     pub(super) bits_an_octave: f64,
@@ -80,8 +76,8 @@ impl Rate {
         let rows = |list: &List| list.rows.clone().map(|row| row as u32).collect();
         let added = latent.lists.iter().map(|list| (rows(list), list.grain)).collect();
         let new = NewList::all(coder, &wanted, added, &ModelsInForce::default());
-        let bits = latent.lists.iter().map(|list| bits_back(latent, list)).sum();
-        let mut rate = Self { lists: Vec::new(), bits, bits_an_octave: 3.0 * latent.source.len() as f64 };
+        let mut rate =
+            Self { lists: Vec::new(), bits: 0.0, bits_an_octave: 3.0 * latent.source.len() as f64 };
         for (list, new) in latent.lists.iter().zip(&new) {
             let count = list.rows.len() as f64;
             let costs = new.coded.costs(&new.values, &coder.plan);
@@ -130,7 +126,7 @@ impl Rate {
         };
         let steps = &latent.steps().log_scale;
         let fitted = self.lists.iter().zip(&latent.lists).filter(|(_, list)| list.is_fitted);
-        for (list, of_latent) in fitted {
+        for (list, _) in fitted {
             let slope = |plane: usize, row: usize| {
                 let at = list.rows.start + row;
                 weight * list.planes[plane].slope(row, decoded.values[plane][at])
@@ -163,12 +159,6 @@ impl Rate {
             (ROTATION..DC).zip(rotation.iter_mut().skip(1)).for_each(|(plane, slopes)| add(plane, slopes));
             (DC..SH).zip(dc).for_each(|(plane, slopes)| add(plane, slopes));
             (SH..).zip(sh.iter_mut().take(sh_planes)).for_each(|(plane, slopes)| add(plane, slopes));
-            if of_latent.is_refined {
-                for (slopes, offsets) in slopes.iter_mut().zip(latent.offsets.planes().iter()) {
-                    let values = slopes[list.rows.clone()].iter_mut().zip(&offsets[list.rows.clone()]);
-                    values.for_each(|(slope, offset)| *slope += weight * BACK * offset.clamp(-1.0, 1.0));
-                }
-            }
         }
     }
 }
@@ -188,19 +178,6 @@ impl PlaneRate {
         let place = (value - self.bias).clamp(-REACH, REACH) + REACH;
         self.tables[usize::from(self.table_of_row[row])][place as usize]
     }
-}
-
-/// Bits that a layer above takes for what is not the nearest, about.
-fn bits_back(latent: &Latent<'_>, list: &List) -> f64 {
-    if !list.is_refined {
-        return 0.0;
-    }
-    let of_step = |&offset: &f32| {
-        let far = offset.abs();
-        f64::from(BACK * if far < 1.0 { 0.5 * far * far } else { far - 0.5 })
-    };
-    let planes = latent.offsets.planes().iter();
-    planes.map(|plane| plane[list.rows.clone()].iter().map(of_step).sum::<f64>()).sum()
 }
 
 /// Slopes of the bits of values, between the neighbours of each; where values share a token, between values farther off.

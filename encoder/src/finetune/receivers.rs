@@ -72,11 +72,6 @@ impl Receiver {
         };
         points.iter().filter(is_own).map(receiver).collect()
     }
-
-    /// Whether there are any who see more than the lowest layer.
-    pub(super) fn any_above(layers: u8, (settings, finetune): (&Settings, &Finetune)) -> bool {
-        layers > 1 && finetune.points(layers, settings).iter().any(|given| given.point.spatial > 0)
-    }
 }
 
 impl Finetune {
