@@ -108,7 +108,7 @@ impl Pictures {
     /// Lines for people.
     pub(super) fn text(&self) -> String {
         let Some(psnr) = self.psnr_db else { return self.gops_text() };
-        let fitted = |fitted| format!(" ({fitted:.2} dB in the views that quantisers were fitted in)");
+        let fitted = |fitted: f64| format!(" ({fitted:.2} dB in the views that quantisers were fitted in)");
         let wanted = self.wanted_psnr_db.map(|wanted| format!(", wanted {wanted}")).unwrap_or_default()
             + &self.fitted_psnr_db.map(fitted).unwrap_or_default();
         let frames = self.verified.len();
