@@ -4,7 +4,8 @@ use crate::up_guess::UpGuess;
 use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
 use splatstream_encoder::{
-    FrameReport, Importance, PredictorChoice, Predictors, Report, Settings, ShChoice, Steps, Structure, Tools,
+    FrameReport, Importance, PredictorChoice, Predictors, Preset, Report, Settings, ShChoice, Steps,
+    Structure, Tools,
 };
 use splatstream_format::syntax::FrameType;
 
@@ -17,7 +18,7 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    fn new(tool: &'static str, choice: impl Into<String>, why: impl Into<String>) -> Self {
+    pub(super) fn new(tool: &'static str, choice: impl Into<String>, why: impl Into<String>) -> Self {
         Self { tool, choice: choice.into(), why: why.into() }
     }
 
@@ -39,6 +40,7 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     choices.extend(survivors(report));
     choices.extend(fidelity(report, settings));
     choices.extend(predictors(report, settings));
+    choices.extend(fitting(settings));
     choices.push(invisible(report, settings));
     choices.extend(left_out(settings));
     choices
@@ -216,6 +218,24 @@ fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
         (_, PredictorChoice::Difference) => "of new Gaussians; the smallest sum of residuals, --choose-by l1",
     };
     Some(Choice::new("predictors", choice, why))
+}
+
+/// Whether values are fitted to pictures, where that was asked for or belongs to the preset.
+fn fitting(settings: &Settings) -> Option<Choice> {
+    let belongs = settings.preset == Preset::Small;
+    let (choice, why) = match (&settings.finetune, settings.structure) {
+        (Some(finetune), _) => {
+            let choice = format!("{} iterations", finetune.iterations);
+            (choice, "values of frames that stand for themselves are chosen by pictures")
+        }
+        (None, Structure::Predicted { .. }) if belongs => (
+            "none".to_owned(),
+            "frames of GOPs with predicted frames stay near the source; --all-intra has them fitted",
+        ),
+        (None, _) if belongs => ("none".to_owned(), "--finetune 0"),
+        (None, _) => return None,
+    };
+    Some(Choice::new("fitting", choice, why))
 }
 
 fn left_out(settings: &Settings) -> Option<Choice> {
