@@ -81,7 +81,7 @@ impl Row for FrontRow {
                 Value::number(row.encode.work(), 2)
             }),
             Column::new("encode_s", "", |row: &Self| Value::number(row.encode.median, 2)).on(PROGRAMS),
-            Column::new("encode_gaussians_per_processor_second", "a second", |row: &Self| {
+            Column::new("encode_gaussians_per_processor_second", "Gaussians a second", |row: &Self| {
                 Value::Speed(row.encode_speed())
             }),
             Column::new("encoding", "Encoding", |row: &Self| row.encoding.value()),
