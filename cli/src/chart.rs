@@ -26,9 +26,10 @@ use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
 use sweep_args::SweepArgs;
 
-/// Draw rate-distortion and speed-accuracy charts of scenes: one page, SVG and CSV.
+/// Draw rate-distortion and speed-size charts of scenes: one page, SVG and CSV.
 ///
-/// Every scene is encoded with every variant at every quality, decoded, rendered and compared with its source.
+/// Every scene is encoded with every variant at every quality, decoded, rendered and compared with its source. Presets and
+/// fitting to pictures stand on one front of processor time against bits at equal PSNR, and so do choices that decoders feel.
 /// A directory of frames is one sequence: of its first GOP with predicted frames, every operating point is measured
 /// too, and what the tools of predicted frames are worth. The page holds everything and needs no network.
 ///
@@ -38,6 +39,7 @@ use sweep_args::SweepArgs;
 #[command(after_help = "Examples:\n  splatstream chart --builtin --quick -o look/\n  \
     splatstream chart garden.ply frames/ -o report/ --height 720\n  \
     splatstream chart frames/ -o report/ --presets balanced --qualities high --without contexts\n  \
+    splatstream chart garden.ply -o report/ --qualities high --finetune 5,20,60,200 --cameras ring:7\n  \
     splatstream chart frames/ -o report/ --quick --ablation --gop 8\n  \
     splatstream chart frames/ -o report/ --frames 8 --peers peers.json --st-lpips weights.npz\n  \
     splatstream chart --stability -o stability/")]

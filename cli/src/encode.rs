@@ -1,7 +1,9 @@
 //! `splatstream encode`: frames in files to a stream.
 
 mod choices;
+mod decided;
 mod each;
+mod effort;
 mod failed;
 mod finetune;
 mod options;
@@ -25,6 +27,8 @@ use crate::setting_names::{
 use crate::up_guess::UpGuess;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
+use decided::Decided;
+use effort::Budget;
 use failed::failed;
 use finetune::{FinetuneArgs, Fitted};
 pub use options::{EncodeOptions, OptionsError, Prepared};
@@ -35,7 +39,7 @@ use serde::Serialize;
 use shards::{ShardArgs, ShardReport};
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{
-    FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, encode,
+    FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, Work, encode,
 };
 use splatstream_format::payload::{Network, SceneDescription};
 use splatstream_gaussians::GaussianFrame;
@@ -60,6 +64,7 @@ use warnings::{Warning, unlike_frames, warnings};
     splatstream encode kitchen.splatv -o kitchen.gss --samples 100\n  \
     splatstream encode frames/ -o talk.html\n  \
     splatstream encode garden.ply -o garden.gss --psnr 45 --finetune\n  \
+    splatstream encode garden.ply -o garden.gss --time-budget 30\n  \
     splatstream encode garden.ply plant.spz talk/ --each -o streams/\n  \
     splatstream encode frames/ --write-plan -o plan.json\n  \
     splatstream encode frames/ --plan plan.json --shard 2/8 -o shard-2.gss")]
@@ -74,9 +79,9 @@ pub(crate) struct Encode {
     /// Every input is a scene of its own: encode each to a stream of its name in the directory OUT.
     #[arg(long)]
     each: bool,
-    /// How much to search: smaller files take longer.
-    #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
-    preset: PresetName,
+    /// How much to do: smaller files take longer [default: balanced].
+    #[arg(long, value_enum)]
+    preset: Option<PresetName>,
     /// How close pictures of the decoded scene are to those of the source: PSNR at 540 lines. The quantisers are fitted
     /// to the first frame for it.
     #[arg(long, value_enum, default_value_t = QualityName::High)]
@@ -118,8 +123,7 @@ pub(crate) struct Encode {
     #[arg(value_parser = clap::value_parser!(u8).range(1..=16))]
     neighbours: u8,
     /// The network of the transformer: registered, trained (on this sequence, and carried in the stream), or a file
-    /// that train has made; default is trained for the small preset and for --predictor transformer, and none
-    /// otherwise.
+    /// that train has made; default is trained for --predictor transformer, and none otherwise.
     #[arg(long, value_name = "registered|trained|FILE")]
     network: Option<NetworkName>,
     /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100.
@@ -318,7 +322,7 @@ impl Encode {
         let read = self.read_files(&source);
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
-        let (settings, guess) = self.settings(&mut source)?;
+        let (settings, decided) = self.settings(&mut source)?;
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
         let shard = self.shards.open(&mut source, &settings)?;
@@ -338,7 +342,8 @@ impl Encode {
         let mut encoded = Encoded::new(out, &report, &settings, &name_of, start.elapsed().as_secs_f64());
         encoded.shard = shard.map(|shard| shard.report);
         encoded.page_bytes = page_bytes;
-        encoded.chosen.extend(guess.map(choices::up));
+        encoded.chosen.extend(decided.choices());
+        encoded.warnings.extend(decided.warnings());
         if inputs.len() > 1 {
             encoded.warnings.extend(unlike_frames(source.counts()));
         }
@@ -388,13 +393,22 @@ impl Encode {
         Ok((description, cameras, guess))
     }
 
-    /// The settings, and what was taken to point up if nobody says it.
-    fn settings(&self, source: &mut dyn FrameSource) -> Result<(Settings, Option<UpGuess>), Failure> {
+    /// The settings, and what was decided where the options leave it open.
+    fn settings(&self, source: &mut dyn FrameSource) -> Result<(Settings, Decided), Failure> {
         let is_predicted = source.len() > 1 && !self.all_intra;
         let layers = self.layer_count(is_predicted)?;
         check_refinements(&self.refinements)?;
         let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
         let (description, cameras, guess) = self.scene(&first)?;
+        let work = Work {
+            gaussians: first.len() as u64,
+            sh_degree: first.sh_degree().min(self.sh_degree.unwrap_or(u8::MAX)),
+            frames: source.len(),
+            is_predicted,
+        };
+        let budget = self.finetune.budget(self.preset.is_some())?.map(|seconds| Budget::of(seconds, work));
+        let preset = self.preset.unwrap_or(PresetName::Balanced).into();
+        let usual = budget.map_or_else(|| Settings::of(preset), |budget| budget.effort().settings());
         let structure = match is_predicted {
             true => Structure::Predicted { layers: self.temporal_layers },
             false => Structure::Intra,
@@ -411,7 +425,6 @@ impl Encode {
             predictor_choice: self.choose_by.into(),
             neighbours: self.neighbours,
             network: self.network.as_ref().map(NetworkName::source).transpose()?,
-            preset: self.preset.into(),
             steps: Quality::from(self.quality).steps(),
             psnr,
             size: self.size(),
@@ -426,15 +439,21 @@ impl Encode {
             prune: self.prune.threshold(psnr)?,
             ticks: self.fps,
             importance: self.importance.map(Into::into),
-            finetune: self.finetune.settings(&cameras, &self.layers)?,
+            finetune: match &usual.finetune {
+                // Frames that others are predicted from stay near the source.
+                Some(usual) if !is_predicted => {
+                    self.finetune.settings(usual.iterations, &cameras, &self.layers)?
+                }
+                _ => self.finetune.settings(0, &cameras, &self.layers)?,
+            },
             cameras,
             fidelity: self.fidelity.map(Into::into),
             tolerance: self.tolerance,
             description,
-            ..Settings::default()
+            ..usual
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
-        Ok((settings, guess))
+        Ok((settings, Decided { guess, budget }))
     }
 
     /// The size that was asked for.

@@ -9,11 +9,11 @@ use splatstream_encoder::{
 /// How much to search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PresetName {
-    /// One context per plane, no trials.
+    /// One context per plane, no trials, no pictures for the order.
     Fast,
-    /// Two contexts per plane, trials on samples.
+    /// Two contexts per plane, trials on samples, orders by pictures.
     Balanced,
-    /// Everything is tried.
+    /// As balanced, and values of single frames are fitted to pictures: --finetune 20.
     Small,
 }
 
@@ -155,6 +155,16 @@ impl From<PresetName> for Preset {
             PresetName::Fast => Self::Fast,
             PresetName::Balanced => Self::Balanced,
             PresetName::Small => Self::Small,
+        }
+    }
+}
+
+impl From<Preset> for PresetName {
+    fn from(preset: Preset) -> Self {
+        match preset {
+            Preset::Fast => Self::Fast,
+            Preset::Balanced => Self::Balanced,
+            Preset::Small => Self::Small,
         }
     }
 }

@@ -153,8 +153,7 @@ impl Ranking {
     fn made_for(&self, frame: &GaussianFrame) -> Vec<Camera> {
         let (count, height) = match self.preset {
             Preset::Fast => (6, 180),
-            Preset::Balanced => (10, 270),
-            Preset::Small => (24, 360),
+            Preset::Balanced | Preset::Small => (10, 270),
         };
         spiral(frame, Up::default(), count, height)
     }
@@ -163,8 +162,7 @@ impl Ranking {
     fn views<'f>(&self, frame: &'f GaussianFrame) -> SmallViews<'f> {
         let (most, lines) = match self.preset {
             Preset::Fast => (3, 96),
-            Preset::Balanced => (10, 144),
-            Preset::Small => (24, 360),
+            Preset::Balanced | Preset::Small => (10, 144),
         };
         let stride = self.cameras.len().div_ceil(most).max(1);
         let cameras: Vec<Camera> = self.cameras.iter().step_by(stride).cloned().collect();

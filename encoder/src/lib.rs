@@ -16,6 +16,7 @@
 
 mod allocation;
 mod blocks;
+mod budget;
 pub mod canonical;
 mod checked;
 mod clusters;
@@ -67,6 +68,7 @@ mod window;
 mod writer;
 
 pub use allocation::Attribute;
+pub use budget::{Effort, Work};
 pub use concat::{ConcatError, Concatenated, PartError, StreamPart, concat};
 pub use error::Error;
 pub use finetune::{Finetune, FinetuneReport, Photograph, PointReport, PointWeight};

@@ -255,8 +255,7 @@ pub(crate) fn choose_all(blocks: &Blocks<'_>, preset: Preset, tools: Tools) -> V
     }
     let most = match preset {
         Preset::Fast => SAMPLE_FAST,
-        Preset::Balanced => SAMPLE,
-        Preset::Small => usize::MAX,
+        Preset::Balanced | Preset::Small => SAMPLE,
     };
     let stride = blocks.values().div_ceil(most).max(1);
     let two_axes = preset != Preset::Fast && blocks.values() >= 1024;

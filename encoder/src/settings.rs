@@ -10,7 +10,7 @@ use splatstream_format::payload::{Network, SceneDescription};
 use splatstream_format::syntax::Profile;
 use splatstream_render::Camera;
 
-/// How much is searched.
+/// How much is searched. [`Settings::of`] has everything that a preset stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
     /// One context source a plane, no trial of vector quantisation.
@@ -18,7 +18,7 @@ pub enum Preset {
     /// Two context sources a plane; vector quantisation is tried on a sample.
     #[default]
     Balanced,
-    /// As balanced, with every source tried for both axes on all Gaussians.
+    /// As balanced, with every source tried for both axes, and more rounds of ordering.
     Small,
 }
 
@@ -274,8 +274,7 @@ pub struct Settings {
     pub predictor_choice: PredictorChoice,
     /// Neighbours of a prediction, 1 to 16.
     pub neighbours: u8,
-    /// Where the network comes from; none: it is trained for the small preset, and where no other predictor is allowed;
-    /// else there is none.
+    /// Where the network comes from; none: it is trained where no other predictor is allowed, else there is none.
     pub network: Option<NetworkSource>,
     /// Refinement percentages, increasing, the last 100; at most 10.
     pub refinements: Vec<u8>,
@@ -313,7 +312,20 @@ pub struct Settings {
     pub description: SceneDescription,
 }
 
+/// Iterations of fitting values to pictures that the small preset takes.
+const ITERATIONS_OF_SMALL: u32 = 20;
+
 impl Settings {
+    /// Everything that a preset stands for: how much is searched, and for the small one
+    /// [fitting to pictures](Settings::finetune), which takes most of its time and gains most of what it gains.
+    pub fn of(preset: Preset) -> Self {
+        let finetune = match preset {
+            Preset::Fast | Preset::Balanced => None,
+            Preset::Small => Some(Finetune { iterations: ITERATIONS_OF_SMALL, ..Finetune::default() }),
+        };
+        Self { preset, finetune, ..Self::default() }
+    }
+
     /// What predicted frames are true to.
     pub(crate) fn fidelity(&self) -> Fidelity {
         self.fidelity.unwrap_or(match self.preset {

@@ -1,6 +1,7 @@
 //! What quality costs: every scene with every variant at every quality, decoded, rendered, compared with its source.
 
 use crate::Progress;
+use crate::front;
 use crate::gop;
 use crate::page::{Page, SceneFigures};
 use crate::peers::Peers;
@@ -10,9 +11,9 @@ use crate::scene_chart::SceneChart;
 use crate::scenes::Scene;
 use crate::summary::Summary;
 use crate::svg::Figure;
-use crate::sweep::Sweep;
+use crate::sweep::{Sweep, Variant};
 use crate::variant_comparison::bytes_for_the_same;
-use crate::{Error, csv_files, figures, measure, pictures};
+use crate::{Error, csv_files, figures, front_figures, measure, pictures};
 use splatstream_render::Camera;
 use splatstream_render::metrics::StLpips;
 
@@ -48,7 +49,10 @@ impl Charting<'_> {
         let of_scene = |Subject { scene, .. }: &Subject| {
             let of_gop = if gop::is_sequence(scene, self.gop) { gop::steps(self.ablation) } else { 0 };
             let of_peers = self.peers.as_ref().map_or(0, |peers| peers.count(scene));
-            scene.frames.len() as u32 + measure::steps(&self.sweep) + of_gop + of_peers
+            let of_fronts: usize =
+                self.fronts(scene).into_iter().map(|frames| self.contenders(scene, frames).len()).sum();
+            let of_runs = measure::steps(&self.sweep) + of_fronts as u32;
+            scene.frames.len() as u32 + of_runs + of_gop + of_peers
         };
         subjects.iter().map(of_scene).sum()
     }
@@ -65,7 +69,7 @@ impl Charting<'_> {
             .iter()
             .map(|scene| SceneFigures {
                 rates: figures::rate_figures(scene),
-                speeds: figures::speed_figures(scene),
+                speeds: front_figures::figures(scene),
                 costs: figures::cost_figures(scene),
             })
             .collect();
@@ -73,6 +77,17 @@ impl Charting<'_> {
         files.extend(figures.iter().flat_map(SceneFigures::all).map(Figure::file));
         let page = Page { charts: &charts, figures: &figures, sweep: &self.sweep, command: &self.command };
         Ok(Report { files, pictures: kept, page: page.html(), summary: Summary::new(&charts) })
+    }
+
+    /// Frames of each front: the first by itself, and the first GOP unless charts are to be quick.
+    fn fronts(&self, scene: &Scene) -> Vec<u32> {
+        let is_sequence = self.sweep.choices && gop::is_sequence(scene, self.gop);
+        let of_gop = is_sequence.then(|| self.gop.min(scene.frames.len() as u32));
+        core::iter::once(1).chain(of_gop).collect()
+    }
+
+    fn contenders(&self, scene: &Scene, frames: u32) -> Vec<Variant> {
+        front::contenders(&self.sweep, (frames, scene.sh_degree()))
     }
 
     fn chart(
@@ -87,6 +102,11 @@ impl Charting<'_> {
         let runs = measure::measure(&mut scene, &self.sweep, &mut judge, progress)?;
         let quality = self.sweep.quality().name().to_owned();
         let mut chart = SceneChart::new(&scene, judge.cameras(), runs, quality, self.fps);
+        for frames in self.fronts(&scene) {
+            let variants = self.contenders(&scene, frames);
+            let mut some = scene.frames.iter().take(frames as usize).cloned().collect();
+            chart.fronts.push(front::measure(&mut some, &variants, &self.sweep, &mut judge, progress)?);
+        }
         if gop::is_sequence(&scene, self.gop) {
             let settings = gop::settings(self.sweep.headline(), self.gop);
             let asked = (self.fps, self.ablation);

@@ -13,9 +13,10 @@ use splatstream_render::metrics::Comparison;
 /// A file and how it is made.
 type CsvFile = (&'static str, fn(&[SceneChart]) -> Result<Vec<u8>, Error>);
 
-const FILES: [CsvFile; 9] = [
+const FILES: [CsvFile; 10] = [
     ("points.csv", |scenes| table(scenes, points)),
     ("speed.csv", |scenes| table(scenes, SceneChart::runs_compared)),
+    ("front.csv", |scenes| table(scenes, |scene| scene.fronts.concat())),
     ("operating_points.csv", |scenes| table(scenes, |scene| of_gop(scene, |gop| gop.modes.clone()))),
     ("refinements.csv", |scenes| {
         table(scenes, |scene| [of_gop(scene, |gop| gop.levels.clone()), scene.intra_levels()].concat())

@@ -5,7 +5,6 @@ use super::svg::Figure;
 use super::svg::bars::{Bar, Bars};
 use super::svg::plot::{Dot, Line, Plot, Series};
 use super::sweep::Group;
-use super::variant_comparison::{Standing, pareto_front};
 use crate::costs::Costs;
 
 /// Styles of curves: the first are qualities, then come peers, the last is what all have in common.
@@ -110,70 +109,6 @@ fn peers(scene: &SceneChart, metric: &Metric) -> Vec<Series> {
         Series { style: PEER_STYLES[place % PEER_STYLES.len()], line: Line::None, dots }
     };
     names.iter().enumerate().map(one).collect()
-}
-
-/// A speed, and what it is a speed of.
-type Speed = (&'static str, fn(&Standing) -> f64);
-/// An accuracy: name, name on the axis, figure, and whether less is better.
-type Accuracy = (&'static str, &'static str, fn(&Standing) -> Option<f64>, bool);
-
-/// Speed of encoding and decoding against PSNR at equal rate and against BD-rate.
-pub(super) fn speed_figures(scene: &SceneChart) -> Vec<Figure> {
-    let speeds: [Speed; 2] =
-        [("encode", |standing| standing.encode_speed()), ("decode", |standing| standing.decode_speed())];
-    let accuracies: [Accuracy; 2] = [
-        ("PSNR", "PSNR at the baseline's rate, dB", |standing| standing.psnr_at_rate, false),
-        ("BD-rate", "BD-rate against the baseline, % (less is better)", |standing| standing.bd_rate, true),
-    ];
-    let standings = scene.standings();
-    let plots = accuracies
-        .iter()
-        .flat_map(|accuracy| speeds.iter().map(|speed| speed_plot(scene, &standings, speed, accuracy)));
-    plots.flatten().filter_map(|plot| plot.figure()).collect()
-}
-
-/// Variants that a figure of speeds has at least: over two points, axes make a great difference of any.
-const FEWEST: usize = 3;
-
-/// None of fewer variants than make a figure.
-fn speed_plot(
-    scene: &SceneChart,
-    standings: &[Standing],
-    (verb, speed): &Speed,
-    (name, axis, accuracy, less_is_better): &Accuracy,
-) -> Option<Plot> {
-    let placed: Vec<(&Standing, (f64, f64))> = standings
-        .iter()
-        .filter_map(|standing| Some((standing, (speed(standing) / 1e6, accuracy(standing)?))))
-        .collect();
-    if placed.len() < FEWEST {
-        return None;
-    }
-    let better = |&(_, (x, y)): &(&Standing, (f64, f64))| (x, if *less_is_better { -y } else { y });
-    let front = pareto_front(&placed.iter().map(better).collect::<Vec<_>>());
-    let on_front = front.iter().map(|&place| Dot { at: placed[place].1, label: None, hint: String::new() });
-    let mut series = vec![Series { style: COMMON_STYLE, line: Line::Front, dots: on_front.collect() }];
-    for (style, group) in [(COMMON_STYLE, Group::Baseline), (0, Group::Preset), (1, Group::Without)] {
-        let of_group = placed.iter().filter(|(standing, _)| standing.group == group);
-        let dot = |&(standing, at): &(&Standing, (f64, f64))| Dot {
-            at,
-            label: Some(standing.name.clone()),
-            hint: format!("{}: {:.3} million Gaussians/s, {:.2}", standing.name, at.0, at.1),
-        };
-        series.push(Series { style, line: Line::None, dots: of_group.map(dot).collect() });
-    }
-    Some(Plot {
-        id: format!("{}-{verb}-speed-{}", scene.name, name.to_lowercase()),
-        title: format!("{}: speed to {verb} and {name}", scene.name),
-        description: format!(
-            "Each variant's speed to {verb}, in million Gaussians per second, against {axis}; the band joins \
-             the variants that no other beats in both."
-        ),
-        x: format!("million Gaussians per second to {verb}"),
-        y: (*axis).to_owned(),
-        top: None,
-        series,
-    })
 }
 
 /// What attributes cost, and what units cost.

@@ -24,6 +24,8 @@ mod csv_files;
 mod decoding;
 mod error;
 mod figures;
+mod front;
+mod front_figures;
 mod gop;
 mod levels;
 mod measure;
@@ -35,6 +37,7 @@ mod progress;
 mod report;
 mod scene_chart;
 mod svg;
+mod timing;
 mod variant_comparison;
 
 pub use error::Error;

@@ -3,6 +3,7 @@
 use super::picture_comparison::Judge;
 use super::scenes::Scene;
 use super::sweep::{Group, Sweep, Variant};
+use super::timing::{Spent, Timing};
 use crate::Error;
 use crate::Progress;
 use crate::costs::Costs;
@@ -14,30 +15,9 @@ use splatstream_encoder::{Quality, Settings, encode};
 use splatstream_format::Limits;
 use splatstream_format::syntax::{UnitHeader, UnitType};
 use splatstream_format::unit::Stream;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::Comparison;
 use std::hint::black_box;
-use std::time::Instant;
-
-/// Seconds of several measurements.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Timing {
-    /// The one in the middle.
-    pub(crate) median: f64,
-    /// The shortest.
-    pub(crate) least: f64,
-    /// The longest.
-    pub(crate) most: f64,
-}
-
-impl Timing {
-    fn of(mut seconds: Vec<f64>) -> Self {
-        seconds.sort_by(f64::total_cmp);
-        let at = |index: usize| seconds.get(index).copied().unwrap_or(f64::NAN);
-        let middle = seconds.len() / 2;
-        let low = if seconds.len().is_multiple_of(2) { middle.saturating_sub(1) } else { middle };
-        Self { median: 0.5 * (at(low) + at(middle)), least: at(0), most: at(seconds.len().saturating_sub(1)) }
-    }
-}
 
 /// A frame at an operating point.
 #[derive(Debug, Clone)]
@@ -61,6 +41,8 @@ pub(crate) struct Point {
     pub(crate) frames: Vec<FramePoint>,
     /// Means over cameras and frames.
     pub(crate) figures: Comparison,
+    /// Seconds to decode it, from bytes in memory to Gaussians in memory.
+    pub(crate) decode: Timing,
 }
 
 /// A variant at a quality.
@@ -80,7 +62,7 @@ pub(crate) struct Run {
     pub(crate) gaussians: u64,
     /// Seconds to encode, from Gaussians in memory to bytes in memory.
     pub(crate) encode: Timing,
-    /// Seconds to decode, from bytes in memory to Gaussians in memory.
+    /// Seconds to decode everything.
     pub(crate) decode: Timing,
     /// Operating points, everything last; of a variant that is not the baseline, only that.
     pub(crate) points: Vec<Point>,
@@ -120,20 +102,23 @@ fn run(
     progress: &dyn Progress,
 ) -> Result<Run, Error> {
     let what = format!("{}: {}, {}", scene.name, variant.name, quality.name().to_owned());
-    progress.step(format!("{what}: encoding and decoding"));
+    progress.step(format!("{what}: encoding"));
     let settings = variant.at(quality);
-    let (stream, gaussians, encode) = encoded(scene, &settings, sweep.repeats(quality))?;
-    let decode = decoded(&stream, sweep.repeats(quality))?;
+    let repeat = sweep.repeats(quality);
+    let (stream, gaussians, encode) = encoded(&mut scene.frames, &settings, repeat)
+        .map_err(|error| Error::other(format!("{}: {error}", scene.name)))?;
     progress.advance();
     let limits = Limits::default();
     let infos = operating_points(&stream, &limits)?;
     let passed = infos.len().saturating_sub(sweep.points(variant, quality));
     let mut points = Vec::new();
     for &info in infos.iter().skip(passed) {
-        progress.step(format!("{what}: pictures of {} %", info.percent));
-        points.push(point(&stream, info, judge)?);
+        progress.step(format!("{what}: decoding {} %, and its pictures", info.percent));
+        points.push(point(&stream, info, repeat, judge)?);
         progress.advance();
     }
+    let decode = points.last().map(|point| point.decode);
+    let decode = decode.ok_or_else(|| Error::other("a stream just encoded has no operating point"))?;
     Ok(Run {
         variant: variant.name.clone(),
         group: variant.group,
@@ -148,35 +133,54 @@ fn run(
     })
 }
 
-fn encoded(scene: &mut Scene, settings: &Settings, repeat: u32) -> Result<(Vec<u8>, u64, Timing), Error> {
-    let mut seconds = Vec::new();
+/// Encodes some frames a few times: the stream, the Gaussians in it, and what an encoding takes.
+///
+/// # Errors
+/// The encoder refuses the frames or the settings.
+pub(crate) fn encoded(
+    frames: &mut Vec<GaussianFrame>,
+    settings: &Settings,
+    repeat: u32,
+) -> Result<(Vec<u8>, u64, Timing), Error> {
+    let mut spent = Vec::new();
     let mut result = (Vec::new(), 0);
-    for _ in 0..repeat {
+    for _ in 0..repeat.max(1) {
         let mut stream = Vec::new();
-        let start = Instant::now();
-        let report = encode(&mut scene.frames, settings, &mut stream, &mut |_, _| {})
-            .map_err(|error| Error::other(format!("{}: {error}", scene.name)))?;
-        seconds.push(start.elapsed().as_secs_f64());
-        result = (stream, report.gaussians);
+        let (report, once) = Spent::of(|| encode(frames, settings, &mut stream, &mut |_, _| {}));
+        spent.push(once);
+        result = (stream, report.map_err(|error| Error::other(error.to_string()))?.gaussians);
     }
-    Ok((result.0, result.1, Timing::of(seconds)))
+    Ok((result.0, result.1, Timing::of(&spent)))
 }
 
-fn decoded(stream: &[u8], repeat: u32) -> Result<Timing, Error> {
-    let mut seconds = Vec::new();
-    for _ in 0..repeat {
-        let start = Instant::now();
-        each_frame(stream, &Options::default(), |sequence, frame| {
-            black_box(to_gaussians(frame.into_shown(), sequence)?);
-            Ok(())
-        })?;
-        seconds.push(start.elapsed().as_secs_f64());
+/// What decoding an operating point takes.
+///
+/// # Errors
+/// The stream has a fault.
+pub(crate) fn decoded(stream: &[u8], operating_point: OperatingPoint, repeat: u32) -> Result<Timing, Error> {
+    let options = Options { operating_point, ..Options::default() };
+    let mut spent = Vec::new();
+    for _ in 0..repeat.max(1) {
+        let (result, once) = Spent::of(|| {
+            each_frame(stream, &options, |sequence, frame| {
+                black_box(to_gaussians(frame.into_shown(), sequence)?);
+                Ok(())
+            })
+        });
+        result?;
+        spent.push(once);
     }
-    Ok(Timing::of(seconds))
+    Ok(Timing::of(&spent))
 }
 
 /// Decodes an operating point and judges its frames.
-fn point(stream: &[u8], info: OperatingPointInfo, judge: &mut Judge<'_>) -> Result<Point, Error> {
+fn point(
+    stream: &[u8],
+    info: OperatingPointInfo,
+    repeat: u32,
+    judge: &mut Judge<'_>,
+) -> Result<Point, Error> {
+    let decode = decoded(stream, info.point, repeat)?;
     let mut frames = Vec::new();
     let options = Options { operating_point: info.point, ..Options::default() };
     each_frame(stream, &options, |sequence, frame| {
@@ -191,7 +195,7 @@ fn point(stream: &[u8], info: OperatingPointInfo, judge: &mut Judge<'_>) -> Resu
     add_bytes(stream, info.point, &mut frames)?;
     let views: Vec<Comparison> = frames.iter().flat_map(|frame| frame.views.iter().copied()).collect();
     let figures = Comparison::mean(&views).ok_or_else(|| Error::other("there is no camera to look from"))?;
-    Ok(Point { info, frames, figures })
+    Ok(Point { info, frames, figures, decode })
 }
 
 /// What the units of each frame take.
@@ -217,6 +221,9 @@ fn add_bytes(stream: &[u8], point: OperatingPoint, frames: &mut [FramePoint]) ->
 #[cfg(test)]
 pub(crate) mod samples {
     use super::*;
+
+    /// A second, of two threads.
+    const TIMING: Timing = Timing { median: 1.0, least: 1.0, most: 1.0, processor: Some(2.0) };
 
     fn figures(psnr_db: f64) -> Comparison {
         Comparison {
@@ -246,6 +253,7 @@ pub(crate) mod samples {
             },
             frames: vec![frame(30.0), frame(20.0)],
             figures: figures(25.0),
+            decode: TIMING,
         }
     }
 
@@ -260,7 +268,6 @@ pub(crate) mod samples {
             frame_types: Vec::new(),
             units: Vec::new(),
         };
-        let timing = Timing { median: 1.0, least: 1.0, most: 1.0 };
         Run {
             variant: "balanced".to_owned(),
             group: Group::Baseline,
@@ -268,22 +275,10 @@ pub(crate) mod samples {
             stream: Vec::new(),
             gops: 1,
             gaussians: 200,
-            encode: timing,
-            decode: timing,
+            encode: TIMING,
+            decode: TIMING,
             points: vec![point(0, 20, 1000), point(1, 100, 4000)],
             costs,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_median_of_an_even_number_is_between_the_two_in_the_middle() {
-        assert_eq!(Timing::of(vec![3.0, 1.0, 2.0]), Timing { median: 2.0, least: 1.0, most: 3.0 });
-        assert_eq!(Timing::of(vec![4.0, 1.0, 2.0, 3.0]).median, 2.5);
-        assert_eq!(Timing::of(vec![7.0]).median, 7.0);
     }
 }

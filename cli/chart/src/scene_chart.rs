@@ -1,5 +1,6 @@
 //! Everything that was found out about a scene.
 
+use super::front::FrontRow;
 use super::gop::Gop;
 use super::levels::{Level, intra_levels};
 use super::measure::{Point, Run};
@@ -33,6 +34,8 @@ pub(crate) struct SceneChart {
     pub(crate) quality: String,
     /// All runs, the baseline first.
     pub(crate) runs: Vec<Run>,
+    /// Speed against size: of the first frame by itself, then of the first GOP with predicted frames, if there is one.
+    pub(crate) fronts: Vec<Vec<FrontRow>>,
     /// The first GOP with predicted frames; none if the scene has one frame.
     pub(crate) gop: Option<Gop>,
     /// Other codecs.
@@ -61,6 +64,7 @@ impl SceneChart {
             fps,
             quality,
             runs,
+            fronts: Vec::new(),
             gop: None,
             peers: Vec::new(),
             missing: Vec::new(),

@@ -1,5 +1,6 @@
 //! What `chart` says on the terminal.
 
+use super::front::FrontRow;
 use super::peers::MissingPeer;
 use super::scene_chart::SceneChart;
 use crate::columns::{Column, PROGRAMS, Row, Value, metrics, object, objects, text};
@@ -11,9 +12,9 @@ use splatstream_render::metrics::Comparison;
 #[derive(Serialize)]
 pub struct Summary {
     scenes: Vec<SceneSummary>,
-    /// The tables of sequences, in words.
+    /// The tables of fronts and sequences, in words.
     #[serde(skip)]
-    sequences: String,
+    tables: String,
 }
 
 /// A scene.
@@ -23,6 +24,8 @@ struct SceneSummary {
     baseline: Baseline,
     #[serde(serialize_with = "objects")]
     variants: Vec<Standing>,
+    #[serde(serialize_with = "objects")]
+    front: Vec<FrontRow>,
     peers: Vec<String>,
     peers_missing: Vec<String>,
 }
@@ -103,14 +106,14 @@ impl Row for Baseline {
 impl Summary {
     pub(super) fn new(charts: &[SceneChart]) -> Self {
         let scenes = charts.iter().filter_map(SceneSummary::new).collect();
-        let sequences = charts.iter().map(sequence).collect();
-        Self { scenes, sequences }
+        let tables = charts.iter().map(|chart| fronts(chart) + &sequence(chart)).collect();
+        Self { scenes, tables }
     }
 
     /// For people.
     pub fn text(&self) -> String {
         let rows: Vec<Baseline> = self.scenes.iter().map(|scene| scene.baseline.clone()).collect();
-        format!("{}\n{}", text(&rows), self.sequences)
+        format!("{}\n{}", text(&rows), self.tables)
     }
 }
 
@@ -119,6 +122,7 @@ impl SceneSummary {
         Some(Self {
             baseline: Baseline::new(chart)?,
             variants: chart.standings().into_iter().skip(1).collect(),
+            front: chart.fronts.concat(),
             peers: chart.peers.iter().map(|peer| peer.peer.clone()).collect(),
             peers_missing: chart.missing.iter().map(missing_text).collect(),
         })
@@ -127,6 +131,22 @@ impl SceneSummary {
 
 fn missing_text(missing: &MissingPeer) -> String {
     format!("{}: {}", missing.peer, missing.why)
+}
+
+/// Speed against size.
+fn fronts(chart: &SceneChart) -> String {
+    let table = |rows: &Vec<FrontRow>| {
+        let of_what = match rows.iter().any(|row| row.is_predicted) {
+            true => "the first GOP with predicted frames",
+            false => "the first frame by itself",
+        };
+        format!(
+            "{}: speed against size of {of_what}; seconds are of one processor\n{}\n",
+            chart.name,
+            text(rows)
+        )
+    };
+    chart.fronts.iter().map(table).collect()
 }
 
 /// The tables of the first GOP; nothing if the scene has one frame.

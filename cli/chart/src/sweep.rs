@@ -1,7 +1,8 @@
 //! What is swept: variants of the encoder's settings, each at every quality.
 //!
 //! A variant is a name, settings and a group. All of them code every frame by itself; what predicted frames gain is
-//! measured apart, on the first GOP of a sequence.
+//! measured apart, on the first GOP of a sequence. What takes another time, presets and fitting to pictures, stands on the
+//! front of speed and size, at the quality of comparison only.
 
 use splatstream_encoder::{Quality, Settings};
 
@@ -12,8 +13,12 @@ pub enum Group {
     Baseline,
     /// Another preset.
     Preset,
+    /// The baseline, with values that are fitted to pictures.
+    Fitted,
     /// The baseline less a tool.
     Without,
+    /// The baseline with a choice made for it.
+    Chosen,
 }
 
 impl Group {
@@ -22,7 +27,9 @@ impl Group {
         match self {
             Self::Baseline => "baseline",
             Self::Preset => "preset",
+            Self::Fitted => "fitted",
             Self::Without => "without",
+            Self::Chosen => "chosen",
         }
     }
 }
@@ -43,7 +50,12 @@ pub struct Variant {
 impl Variant {
     /// The settings at a quality: fitted to the scene, as `encode` does.
     pub fn at(&self, quality: Quality) -> Settings {
-        Settings { steps: quality.steps(), psnr: Some(quality.decibels()), ..self.settings.clone() }
+        Settings { steps: quality.steps(), ..self.at_decibels(quality.decibels()) }
+    }
+
+    /// The settings for a PSNR.
+    pub(crate) fn at_decibels(&self, decibels: f32) -> Settings {
+        Settings { psnr: Some(decibels), ..self.settings.clone() }
     }
 }
 
@@ -58,6 +70,10 @@ pub struct Sweep {
     pub refinements: Vec<u8>,
     /// Times that runs at the [quality of comparison](Self::quality) are timed; others are timed once.
     pub repeat: u32,
+    /// What stands on the front of speed and size: the baseline, other presets, and fitting to pictures.
+    pub efforts: Vec<Variant>,
+    /// Whether choices that decoders feel stand there too: tools left out, codebooks, refinements, predictors.
+    pub choices: bool,
 }
 
 impl Sweep {

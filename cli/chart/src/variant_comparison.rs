@@ -1,7 +1,8 @@
 //! How variants stand: speed, and quality at the rate of the baseline.
 
-use super::measure::{Point, Run, Timing};
+use super::measure::{Point, Run};
 use super::sweep::Group;
+use super::timing::Timing;
 use crate::columns::{Column, Medium, PROGRAMS, Row, Value};
 use splatstream_render::metrics::{RatePoint, bd_rate, quality_at_rate, rate_at_quality};
 
@@ -125,7 +126,7 @@ pub(crate) fn standings(runs: &[Run], quality: &str, source_gaussians: u64) -> V
             bd_rate: match run.group {
                 _ if !is_compared => None,
                 Group::Baseline => Some(0.0),
-                Group::Preset | Group::Without => bd_rate(&anchor, &test),
+                _ => bd_rate(&anchor, &test),
             },
         }
     };

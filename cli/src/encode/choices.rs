@@ -69,6 +69,7 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     choices.extend(fidelity(report, settings));
     choices.extend(predictors(report, settings));
     choices.extend(network(report, settings));
+    choices.extend(fitting(settings));
     choices.push(invisible(report, settings));
     choices.extend(pruned(report, settings));
     choices.extend(left_out(settings));
@@ -348,6 +349,24 @@ fn network(report: &Report, settings: &Settings) -> Option<Choice> {
             Choice::new("network", "sent with each GOP that needs it", why)
         }
     })
+}
+
+/// Whether values are fitted to pictures, where that was asked for or belongs to the preset.
+fn fitting(settings: &Settings) -> Option<Choice> {
+    let belongs = settings.preset == Preset::Small;
+    let (choice, why) = match (&settings.finetune, settings.structure) {
+        (Some(finetune), _) => {
+            let choice = format!("{} iterations", finetune.iterations);
+            (choice, "values of frames that stand for themselves are chosen by pictures")
+        }
+        (None, Structure::Predicted { .. }) if belongs => (
+            "none".to_owned(),
+            "frames of GOPs with predicted frames stay near the source; --all-intra has them fitted",
+        ),
+        (None, _) if belongs => ("none".to_owned(), "--finetune 0"),
+        (None, _) => return None,
+    };
+    Some(Choice::new("fitting", choice, why))
 }
 
 fn left_out(settings: &Settings) -> Option<Choice> {

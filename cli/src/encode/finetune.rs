@@ -20,14 +20,15 @@ const ITERATIONS: &str = "200";
 #[derive(Args, Debug)]
 pub(super) struct FinetuneArgs {
     /// Choose the values of frames by pictures of what is decoded, in so many iterations at most, 200 if none are given:
-    /// fewer bits for the same PSNR, and minutes for each frame. Frames of sequences are fitted where each stands for
-    /// itself, as with --all-intra.
+    /// fewer bits for the same PSNR, and minutes for each frame. The small preset takes 20; 0 takes none. Frames of
+    /// sequences are fitted where each stands for itself, as with --all-intra.
     #[arg(long, value_name = "ITERATIONS", num_args = 0..=1, default_missing_value = ITERATIONS)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     finetune: Option<u32>,
-    /// Seconds of that for each frame, each time it is encoded. How far it gets in them depends on the machine, and so do
-    /// the bytes that are written; of iterations alone they do not.
-    #[arg(long, value_name = "SECONDS", requires = "finetune", value_parser = parse_seconds)]
+    /// Seconds that encoding may take: the preset and the iterations are chosen for them, by counts and a model of costs
+    /// and not by the clock, so that the same command writes the same bytes anywhere. They are seconds of one core of a
+    /// busy machine of 2025. With --finetune instead: seconds on the clock for each frame, each time it is encoded; how far it
+    /// gets in them depends on the machine, and so do the bytes.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     time_budget: Option<f64>,
     /// Fit the frame to photographs and not to pictures of the source: PNG files in this directory, named as the cameras of
     /// the file that --cameras gives.
@@ -112,13 +113,38 @@ impl From<AttributeName> for Attribute {
 }
 
 impl FinetuneArgs {
-    /// The settings of the encoder; none where nothing is to be fitted. `layers`: lines that spatial layers are for, if they
-    /// were given.
+    /// The time that a preset and iterations are to be chosen for, seconds; none: they are given, or the usual ones.
+    ///
+    /// # Errors
+    /// A preset is given too, or there is nothing to limit.
+    pub(super) fn budget(&self, has_preset: bool) -> Result<Option<f64>, Failure> {
+        match (self.time_budget, self.finetune) {
+            (Some(_), None) if has_preset => Err(Failure::Usage(
+                "--time-budget chooses the preset: leave out --preset, or give --finetune and the time that it may take".to_owned(),
+            )),
+            (Some(_), Some(0)) => Err(Failure::Usage(
+                "--time-budget has nothing to limit with --finetune 0: leave out one of them".to_owned(),
+            )),
+            (Some(seconds), None) => Ok(Some(seconds)),
+            _ => Ok(None),
+        }
+    }
+
+    /// The settings of the encoder; none where nothing is to be fitted. `usual`: iterations where none are given, or 0;
+    /// `layers`: lines that spatial layers are for, if they were given.
     ///
     /// # Errors
     /// A photograph that is not there, cannot be read or has another shape than its camera.
-    pub(super) fn settings(&self, cameras: &[Camera], layers: &[u32]) -> Result<Option<Finetune>, Failure> {
-        let Some(iterations) = self.finetune else { return Ok(None) };
+    pub(super) fn settings(
+        &self,
+        usual: u32,
+        cameras: &[Camera],
+        layers: &[u32],
+    ) -> Result<Option<Finetune>, Failure> {
+        let iterations = self.finetune.unwrap_or(usual);
+        if iterations == 0 {
+            return Ok(None);
+        }
         let is_held = |name: &&AttributeName| !self.finetune_only.contains(name);
         let held = match self.finetune_only.is_empty() {
             true => Vec::new(),
@@ -132,7 +158,7 @@ impl FinetuneArgs {
             }
             None => Vec::new(),
         };
-        let time_budget = self.time_budget.map(Duration::from_secs_f64);
+        let time_budget = self.finetune.and(self.time_budget).map(Duration::from_secs_f64);
         Ok(Some(Finetune {
             iterations,
             time_budget,

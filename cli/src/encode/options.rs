@@ -1,7 +1,6 @@
 //! The options of `encode` for programs that have frames in memory.
 
-use super::{Encode, Encoded, choices};
-use crate::up_guess::UpGuess;
+use super::{Decided, Encode, Encoded};
 use clap::Parser;
 use splatstream_encoder::{FrameSource, Report, Settings};
 use splatstream_gaussians::GaussianFrame;
@@ -16,7 +15,7 @@ pub struct EncodeOptions(Encode);
 pub struct Prepared {
     /// For the encoder.
     pub settings: Settings,
-    guess: Option<UpGuess>,
+    decided: Decided,
 }
 
 /// The options as they stand after `splatstream encode`.
@@ -81,8 +80,8 @@ impl EncodeOptions {
     /// Options that do not go together; a file of cameras or of a network that cannot be read.
     pub fn prepare(&self, first: &GaussianFrame, is_sequence: bool) -> Result<Prepared, OptionsError> {
         let settings = self.0.settings(&mut Start { first, is_sequence });
-        let (settings, guess) = settings.map_err(|failure| OptionsError(failure.to_string()))?;
-        Ok(Prepared { settings, guess })
+        let (settings, decided) = settings.map_err(|failure| OptionsError(failure.to_string()))?;
+        Ok(Prepared { settings, decided })
     }
 }
 
@@ -92,7 +91,8 @@ impl Prepared {
     pub fn report(&self, report: &Report, seconds: f64) -> String {
         let name_of = |frame| format!("frame {frame}");
         let mut encoded = Encoded::new(Path::new(""), report, &self.settings, &name_of, seconds);
-        encoded.chosen.extend(self.guess.map(choices::up));
+        encoded.chosen.extend(self.decided.choices());
+        encoded.warnings.extend(self.decided.warnings());
         serde_json::to_string(&encoded).unwrap_or_default()
     }
 }

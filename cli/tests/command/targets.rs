@@ -65,6 +65,55 @@ fn a_size_is_reached_or_a_warning() {
     fail(2, &["encode", text(&still), "-o", text(&stream), "--target-mb", "0"]);
 }
 
+/// What a choice of the encoder is, if it was made.
+fn chosen<'a>(report: &'a Value, tool: &str) -> Option<&'a str> {
+    let choices = report["chosen"].as_array().unwrap();
+    choices.iter().find(|choice| choice["tool"] == tool).and_then(|choice| choice["choice"].as_str())
+}
+
+#[test]
+fn a_time_chooses_what_is_done_and_not_the_clock() {
+    let directory = directory();
+    let (still, stream) = (write_still(directory.path()), directory.path().join("still.gss"));
+    let encode = |arguments: &[&str]| {
+        let report = json(&[&["encode", text(&still), "-o", text(&stream)][..], arguments].concat());
+        (report, fs::read(&stream).unwrap())
+    };
+    let (least, _) = encode(&["--time-budget", "0.001"]);
+    assert_eq!((chosen(&least, "time budget"), codes(&least)), (Some("fast"), vec!["time-budget-exceeded"]));
+    let (some, bytes) = encode(&["--time-budget", "2.5"]);
+    assert_eq!(chosen(&some, "time budget"), Some("balanced"));
+    assert_eq!(bytes, encode(&["--preset", "balanced"]).1);
+    let usage = |arguments: &[&str]| {
+        fail(
+            2,
+            &[&["encode", text(&still), "-o", text(&stream), "--time-budget", "1"][..], arguments].concat(),
+        )
+    };
+    assert!(usage(&["--preset", "fast"]).contains("leave out --preset"));
+    assert!(usage(&["--finetune", "0"]).contains("nothing to limit"));
+}
+
+#[test]
+fn the_small_preset_is_fitted_to_pictures_unless_told_otherwise() {
+    let directory = directory();
+    let (still, stream) = (write_still(directory.path()), directory.path().join("still.gss"));
+    let encode = |arguments: &[&str]| {
+        let small = ["encode", text(&still), "-o", text(&stream), "--preset", "small", "--psnr", "40"];
+        json(&[&small[..], arguments].concat())
+    };
+    let fitted = encode(&[]);
+    assert_eq!(fitted["finetuned"][0]["iterations"], 20, "{fitted}");
+    let plain = encode(&["--finetune", "0"]);
+    assert_eq!(
+        (plain["finetuned"].as_array().map(Vec::len), chosen(&plain, "fitting")),
+        (Some(0), Some("none"))
+    );
+    let frames = write_frames(directory.path());
+    let sequence = json(&["encode", text(&frames), "-o", text(&stream), "--preset", "small", "--psnr", "40"]);
+    assert!(chosen(&sequence, "fitting") == Some("none") && codes(&sequence).is_empty(), "{sequence}");
+}
+
 #[test]
 fn invalid_gaussians_are_named_or_left_out() {
     let directory = directory();

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::gop::SpanCoder;
 use crate::importance::Ranking;
 use crate::sequence::{Analysis, analyse};
-use crate::settings::{NetworkSource, Preset, Settings};
+use crate::settings::{NetworkSource, Settings};
 use crate::source::FrameSource;
 use crate::spans::{Common, Spans};
 use crate::target::looking;
@@ -37,7 +37,7 @@ pub(crate) fn network(
         return Ok(None);
     }
     // Among other predictors it seldom saves what it takes.
-    let sought = settings.preset == Preset::Small || !settings.predictors.allows(Predictor::Bilateral);
+    let sought = !settings.predictors.allows(Predictor::Bilateral);
     match settings.network.clone().or(sought.then_some(NetworkSource::Fitted)) {
         None => Ok(None),
         Some(NetworkSource::Given(network)) => Ok(Some(*network)),

@@ -13,13 +13,13 @@ use splatstream_render::metrics::Comparison;
 use std::collections::BTreeMap;
 
 /// A GOP at an operating point.
-pub(super) struct Shown {
+pub(crate) struct Shown {
     /// The frames that are output, in display order.
     pub(super) frames: Vec<ShownFrame>,
 }
 
 /// A frame at an operating point.
-pub(super) struct ShownFrame {
+pub(crate) struct ShownFrame {
     /// Display index.
     pub(super) number: u32,
     /// How it is coded.
@@ -56,7 +56,7 @@ impl Shown {
     }
 
     /// Means over the frames that count.
-    pub(super) fn figures(&self, counts: impl Fn(&ShownFrame) -> bool) -> Result<Comparison, Error> {
+    pub(crate) fn figures(&self, counts: impl Fn(&ShownFrame) -> bool) -> Result<Comparison, Error> {
         let counted = self.frames.iter().filter(|frame| counts(frame));
         mean(counted.flat_map(|frame| frame.views.iter().copied()))
     }
@@ -91,7 +91,7 @@ pub(super) fn label(frame: &ShownFrame) -> String {
 }
 
 /// Decodes an operating point and judges its frames.
-pub(super) fn shown(stream: &[u8], point: OperatingPoint, judge: &mut Judge<'_>) -> Result<Shown, Error> {
+pub(crate) fn shown(stream: &[u8], point: OperatingPoint, judge: &mut Judge<'_>) -> Result<Shown, Error> {
     let sizes = sizes(stream, point)?;
     let mut frames = Vec::new();
     let options = Options { operating_point: point, ..Options::default() };

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-const TERMS: [(&str, &str); 18] = [
+const TERMS: [(&str, &str); 19] = [
     ("Gaussian", "a soft coloured ellipsoid; some hundred thousand of them make a scene."),
     (
         "bits per Gaussian",
@@ -35,7 +35,7 @@ const TERMS: [(&str, &str); 18] = [
         "a piece of the stream that can be sent or left out by itself. I0 is the intra-coded first frame, r0 its first refinement.",
     ),
     ("GOP", "group of pictures: frames that share tables; decoding can start at each."),
-    ("preset", "how much the encoder searches: fast, balanced, small."),
+    ("preset", "how much the encoder does: fast, balanced, small."),
     ("baseline", "the variant that all others are compared with."),
     ("without …", "the baseline with one tool left out: what the tool is worth."),
     (
@@ -46,7 +46,11 @@ const TERMS: [(&str, &str); 18] = [
         "BD-rate",
         "Bjøntegaard: the mean difference in size at equal PSNR over all qualities, per cent; −5 % is 5 % smaller.",
     ),
-    ("Pareto front", "the variants that no other beats in speed and accuracy at once."),
+    ("Pareto front", "the settings that no other beats in speed and size at once."),
+    (
+        "iterations",
+        "of fitting values to pictures: each draws the decoded scene in two views and moves values to where the pictures miss less.",
+    ),
     (
         "dc, sh",
         "the colour of a Gaussian, and how it changes with the direction of view (spherical harmonics).",

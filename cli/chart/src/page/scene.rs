@@ -64,18 +64,24 @@ fn rates(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
 
 fn speeds(chart: &SceneChart, drawn: &SceneFigures) -> Markup {
     html! {
-        h3 { "Speed against accuracy" }
+        h3 { "Speed against size" }
         (how_to_read(
-            "each row is a variant of the encoder, compared at the rate of the baseline; – where its rates do not reach \
-             there."
+            "each point is a setting, at the PSNR that the baseline has: further left is faster, further down is smaller. The broad \
+             band is the Pareto front; what lies off it is beaten by a setting that is no slower and no larger, which the table \
+             names. Times are of all processors together. For encoding presets and fitting to pictures are compared, for decoding \
+             everything; what leaves out a tool or a choice gives something up for it. The last figure shows what pictures are \
+             worth that take so long to decode."
         ))
-        @if !drawn.speeds.is_empty() {
-            (how_to_read(
-                "each point of a figure is a variant: further right is faster; higher PSNR or lower BD-rate is better; the \
-                 broad band is the Pareto front, and what lies off it is beaten in both."
-            ))
-            (figures(&drawn.speeds))
+        (figures(&drawn.speeds))
+        @for rows in &chart.fronts {
+            @if rows.iter().any(|row| row.is_predicted) { h4 { "The first GOP with predicted frames" } }
+            (columns::html(rows))
         }
+        h3 { "What tools are worth" }
+        (how_to_read(
+            "each row is a variant of the encoder over all qualities, compared at the rate of the baseline; – where its rates do \
+             not reach there. Speeds are by the clock."
+        ))
         (columns::html(&chart.standings()))
     }
 }
