@@ -44,8 +44,6 @@ const ROUNDS: usize = 2;
 /// encoding.
 const CORRECTIONS: usize = 6;
 const NEAR: f64 = 0.2;
-/// The same for the fast preset, which saves a trial of four or five.
-const NEAR_FAST: f64 = 0.35;
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// Steps change by no more than this factor at once: the model is local.
@@ -231,8 +229,7 @@ impl Fit {
     ///
     /// Values that lie on a grid already leap where steps pass its own: what is found is looked at before it is taken.
     fn levelled(&self, steps: Steps, decibels: f64) -> Result<Steps, Error> {
-        let near = if self.settings.preset == Preset::Fast { NEAR_FAST } else { NEAR };
-        let mut secant = Secant::new(decibels, near, 1.0, CORRECTIONS);
+        let mut secant = Secant::new(decibels, NEAR, 1.0, CORRECTIONS);
         let mut best = steps;
         let mut next = Some(decibels);
         while let Some(at) = next {

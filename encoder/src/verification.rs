@@ -18,8 +18,8 @@ use splatstream_format::Limits;
 use splatstream_format::syntax::{FrameType, GopHeader, UnitHeader};
 use splatstream_format::unit::Stream;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::camera::{Up, held_out};
-use splatstream_render::{Camera, Rendering};
+use splatstream_render::Rendering;
+use splatstream_render::camera::{Up, between_held_out, held_out};
 
 /// Views of each frame that decide nothing, as many as there are that decide, and their height: with other heights PSNR is
 /// another number.
@@ -180,16 +180,12 @@ pub(crate) struct Views {
 }
 
 impl Views {
-    /// Both lie between each other: held-out views rise from below to above, and of four that follow each other each side
-    /// takes the outer or the inner two.
+    /// Of the views that a scene comes with, or all around it; each set lies between the other.
     pub(crate) fn of(frame: &GaussianFrame, settings: &Settings) -> Self {
         let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
-        let cameras = held_out(frame, Up::default(), &settings.cameras, 2 * VIEWS, HEIGHT);
-        let some = |outer: bool| {
-            let is_taken = |&(number, _): &(usize, &Camera)| matches!(number % 4, 0 | 3) == outer;
-            let cameras = cameras.iter().enumerate().filter(is_taken).map(|(_, camera)| camera.clone());
-            StripViews::new(cameras.collect(), every, frame.len())
-        };
-        Self { unseen: some(false), of_fit: some(true) }
+        let strips = |cameras| StripViews::new(cameras, every, frame.len());
+        let of_fit = held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
+        let unseen = between_held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
+        Self { unseen: strips(unseen), of_fit: strips(of_fit) }
     }
 }

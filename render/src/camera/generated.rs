@@ -96,16 +96,42 @@ const TURN: f32 = 5.0 / 180.0 * PI;
 /// was chosen by other views. Where the scene comes with cameras they stand near some of these, turned about the middle
 /// of what they see by 5 degrees to one side or the other.
 pub fn held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, height: u32) -> Vec<Camera> {
+    apart(frame, up, given, (count, height), ("held_out", 0.5))
+}
+
+/// As many other cameras as [`held_out`] gives, between those: to judge what was chosen by them.
+pub fn between_held_out(
+    frame: &GaussianFrame,
+    up: Up,
+    given: &[Camera],
+    count: u32,
+    height: u32,
+) -> Vec<Camera> {
+    apart(frame, up, given, (count, height), ("between_held_out", 0.0))
+}
+
+/// Cameras that rise while they go around the scene, the first of them `shift` parts of a camera above the lowest elevation.
+fn apart(
+    frame: &GaussianFrame,
+    up: Up,
+    given: &[Camera],
+    (count, height): (u32, u32),
+    (name, shift): (&str, f32),
+) -> Vec<Camera> {
     let subject = Subject::of(frame, up);
     let golden = PI * (3.0 - 5.0_f32.sqrt());
     let made = |number: u32| {
-        let share = (number as f32 + 0.5) / count as f32;
+        let share = (number as f32 + shift) / count as f32;
         let elevation = libm::asinf(-0.174 + (0.643 + 0.174) * share);
-        subject.seen_from(format!("held_out_{number:02}"), 1.9 + golden * number as f32, elevation, height)
+        let azimuth = 1.9 + golden * (number as f32 + 0.5 - shift);
+        subject.seen_from(format!("{name}_{number:02}"), azimuth, elevation, height)
     };
     let turned = |number: u32| {
-        let at = (2 * number as usize + 1) * given.len() / (2 * count as usize);
-        given.get(at).map(|camera| subject.turned(camera, number, height))
+        let place = (2.0 * (number as f32 + shift)) as usize;
+        let at = place * given.len() / (2 * count as usize);
+        // To the other side, where the same camera serves both sets.
+        let side = number + u32::from(shift < 0.5);
+        given.get(at).map(|camera| subject.turned(camera, (name, side), height))
     };
     (0..count).map(|number| turned(number).unwrap_or_else(|| made(number))).collect()
 }
@@ -258,7 +284,7 @@ impl Subject {
     }
 
     /// A camera that has gone a little way around the part of the scene that it sees, to one side or the other.
-    fn turned(&self, camera: &Camera, number: u32, height: u32) -> Camera {
+    fn turned(&self, camera: &Camera, (name, number): (&str, u32), height: u32) -> Camera {
         let [down, ahead] = [camera.rotation[1], camera.rotation[2]].map(Vec3::from);
         let position = Vec3::from(camera.position);
         // A camera that looks past the scene turns about a point near it.
@@ -267,7 +293,7 @@ impl Subject {
         let turn = Quat::from_vec4((down * libm::sinf(half)).extend(libm::cosf(half)));
         let middle = position + ahead * depth;
         Camera {
-            name: format!("held_out_{number:02}"),
+            name: format!("{name}_{number:02}"),
             rotation: camera.rotation.map(|axis| (turn * Vec3::from(axis)).to_array()),
             position: (middle + turn * (position - middle)).to_array(),
             ..camera.scaled_to_height(height)

@@ -3,7 +3,8 @@
 use crate::gaussian::{BALL, Gaussian, frame};
 use glam::Vec3;
 use proptest::prelude::*;
-use splatstream_render::camera::{Up, forward, held_out, read_cameras, ring, spiral};
+use splatstream_gaussians::GaussianFrame;
+use splatstream_render::camera::{Up, between_held_out, forward, held_out, read_cameras, ring, spiral};
 use splatstream_render::{Camera, render};
 
 const UPS: [Up; 6] = [Up::MinusY, Up::PlusY, Up::MinusZ, Up::PlusZ, Up::MinusX, Up::PlusX];
@@ -103,13 +104,17 @@ fn cameras_of_one_view_are_all_different() {
     let frame = frame(&[BALL, Gaussian { position: [1.0, 1.0, 4.0], ..BALL }]);
     let mut cameras = ring(&frame, Up::MinusY, 8, 90);
     cameras.extend(spiral(&frame, Up::MinusY, 8, 90));
-    cameras.extend(held_out(&frame, Up::MinusY, &[], 8, 90));
     let given = spiral(&frame, Up::MinusY, 8, 90);
-    cameras.extend(
-        held_out(&frame, Up::MinusY, &given, 3, 80)
-            .into_iter()
-            .map(|camera| Camera { name: format!("turned {}", camera.name), ..camera }),
-    );
+    for made in [held_out, between_held_out] {
+        cameras.extend(made(&frame, Up::MinusY, &[], 8, 90));
+        let turned = made(&frame, Up::MinusY, &given, 3, 80).into_iter();
+        cameras.extend(turned.map(|camera| Camera { name: format!("turned {}", camera.name), ..camera }));
+    }
+    // Both sets turn the one camera that there is, each to another side.
+    let one = |made: fn(&GaussianFrame, Up, &[Camera], u32, u32) -> Vec<Camera>| {
+        made(&frame, Up::MinusY, &given[..1], 1, 80)[0].position
+    };
+    assert_ne!(one(held_out), one(between_held_out));
     for (at, camera) in cameras.iter().enumerate() {
         assert!(
             cameras[..at].iter().all(|other| other.position != camera.position && other.name != camera.name)
