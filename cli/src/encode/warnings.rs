@@ -3,12 +3,15 @@
 use super::pictures::Goal;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
-use splatstream_encoder::{Dropped, Isolated, Report, Settings, Size};
+use splatstream_encoder::{Dropped, Isolated, Report, Settings, Size, VerifiedFrame};
 use splatstream_format::syntax::FrameType;
 
-/// A PSNR is missed by more than this, decibels: views that decide nothing differ by a decibel from those that steps are fitted
-/// in.
-const MISSED: f64 = 1.5;
+/// A PSNR is missed by more than this in the views that steps are fitted in, decibels.
+const MISSED: f64 = 0.5;
+
+/// And by more than this in views that decide nothing, decibels: a scene of few Gaussians fills more of some pictures than of
+/// others, by which they differ.
+const MISSED_UNSEEN: f64 = 3.0;
 
 /// P and B frames may be below I frames by so much, decibels.
 const PULSE: f64 = 1.0;
@@ -86,8 +89,9 @@ fn psnr(report: &Report, wanted: f64) -> Vec<Warning> {
                        give views of it with --cameras";
         return vec![Warning::new("blank-pictures", message.to_owned())];
     };
-    let below = wanted - measured;
-    if below > MISSED {
+    let fitted = pictures.fitted_psnr().unwrap_or(measured);
+    let below = wanted - measured.min(fitted);
+    if wanted - fitted > MISSED || wanted - measured > MISSED_UNSEEN {
         let advice = match report.isolated.is_empty() {
             true => {
                 "give a higher --psnr, or look for Gaussians that are far larger or brighter than all others"
@@ -95,19 +99,21 @@ fn psnr(report: &Report, wanted: f64) -> Vec<Warning> {
             false => "repair the values that are far beyond what a scene has",
         };
         let message = format!(
-            "pictures have a PSNR of {measured:.1} dB, {below:.1} dB less than the {wanted} dB asked for; {advice}"
+            "pictures have a PSNR of {:.1} dB, {below:.1} dB less than the {wanted} dB asked for; {advice}",
+            wanted - below
         );
         return vec![Warning::new("psnr-missed", message)];
     }
-    if below < -MISSED {
+    if fitted - wanted > MISSED {
         let message = format!(
-            "pictures have a PSNR of {measured:.1} dB, {:.1} dB more than the {wanted} dB asked for; \
+            "pictures have a PSNR of {fitted:.1} dB, {:.1} dB more than the {wanted} dB asked for; \
              the stream is larger than it needs to be",
-            -below
+            fitted - wanted
         );
         return vec![Warning::new("psnr-exceeded", message)];
     }
-    let worst = pictures.frames.iter().filter_map(|frame| Some((frame.psnr?, frame.number)));
+    let of_frame = |frame: &VerifiedFrame| Some((frame.fitted_psnr.or(frame.psnr)?, frame.number));
+    let worst = pictures.frames.iter().filter_map(of_frame);
     let worst = worst.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let far = worst.filter(|(psnr, _)| wanted - psnr > OUTLIER);
     far.map(|(psnr, frame)| {

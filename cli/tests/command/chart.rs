@@ -2,7 +2,27 @@
 
 use crate::common::{directory, json, run, succeed, text, write_frames};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// What a quick chart of the built-in scene leaves: it is made once for all tests.
+pub(crate) struct Quick {
+    pub(crate) report: serde_json::Value,
+    out: PathBuf,
+    said: String,
+}
+
+pub(crate) fn quick() -> &'static Quick {
+    static QUICK: OnceLock<Quick> = OnceLock::new();
+    QUICK.get_or_init(|| {
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("chart");
+        let _none_before = std::fs::remove_dir_all(&out);
+        let output = run(&["chart", "--builtin", "--quick", "-o", text(&out), "--json"]);
+        assert!(output.status.success(), "{output:?}");
+        let report = serde_json::from_slice(&output.stdout).expect("JSON");
+        Quick { report, out, said: String::from_utf8(output.stderr).expect("text") }
+    })
+}
 
 fn read(path: &Path) -> String {
     std::fs::read_to_string(path).expect("a text file")
@@ -16,13 +36,8 @@ fn values<'a>(page: &'a str, attribute: &str) -> Vec<&'a str> {
 
 #[test]
 fn a_quick_chart_is_one_page_without_anything_from_outside() {
-    let directory = directory();
-    let out = directory.path().join("report");
-    let output = run(&["chart", "--builtin", "--quick", "-o", text(&out), "--json"]);
-    assert!(output.status.success(), "{output:?}");
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let Quick { report, out, said } = quick();
     // Where nobody sees a bar, lines say that it works.
-    let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("0 of ") && said.contains(" done: "), "{said}");
     let page = read(&out.join("index.html"));
     for word in ["http://", "https://", "<link", "<script", "@import", "url("] {
@@ -46,9 +61,7 @@ fn a_quick_chart_is_one_page_without_anything_from_outside() {
 
 #[test]
 fn figures_are_well_formed_and_say_what_they_show() {
-    let directory = directory();
-    let out = directory.path().join("report");
-    let report = json(&["chart", "--builtin", "--quick", "-o", text(&out)]);
+    let Quick { report, out, .. } = quick();
     let files = report["files"].as_array().unwrap().iter().filter_map(|file| file.as_str());
     let figures: Vec<&str> = files.filter(|file| file.ends_with(".svg")).collect();
     // Two points are no figure of speeds; where the bits go is always drawn.

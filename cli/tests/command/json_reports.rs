@@ -153,7 +153,6 @@ fn reports_of_encoders_have_the_keys_they_had() {
         ("view", "view talk.gss -o talk.html"),
         ("encode_size", "encode still.ply -o still.gss --preset fast --target-bpg 40"),
         ("encode_each", "encode still.ply other.ply no-such.ply --each -o streams --preset fast --psnr 40"),
-        ("chart", "chart --builtin --quick -o report"),
         ("train", "train --builtin 1 --frames 2 --quality low -o network.bin"),
         ("capture", "simulate -o capture --views 4 --height 36 --samples 1 --points 300"),
         ("fit", "fit capture -o scene.ply --iterations 4 --hold-out 4"),
@@ -162,6 +161,7 @@ fn reports_of_encoders_have_the_keys_they_had() {
     ] {
         insta::assert_json_snapshot!(name, shape(&report(at, line)));
     }
+    insta::assert_json_snapshot!("chart", shape(&crate::chart::quick().report));
 }
 
 #[test]

@@ -21,7 +21,8 @@ fn a_quality_is_a_psnr_that_is_measured() {
         assert_eq!(report["wanted_psnr_db"], wanted);
         // Quantisers of so few Gaussians cannot be set as finely.
         assert!((fitted - wanted).abs() <= 1.0, "{report}");
-        assert_eq!((psnr - wanted).abs() <= 1.5, codes(&report).is_empty(), "{report}");
+        let is_met = (fitted - wanted).abs() <= 0.5 && wanted - psnr <= 3.0;
+        assert_eq!(is_met, codes(&report).is_empty(), "{report}");
         let views = ["--cameras", "ring:5", "--height", "540"];
         let compared = json(&[&["compare", text(&still), text(&stream)][..], &views].concat());
         // Views of so few Gaussians differ.

@@ -99,7 +99,7 @@ pub fn held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, hei
     apart(frame, up, given, (count, height), ("held_out", 0.5))
 }
 
-/// As many other cameras as [`held_out`] gives, between those: to judge what was chosen by them.
+/// As many other cameras as [`held_out`] gives, as high, from other sides: to judge what was chosen by them.
 pub fn between_held_out(
     frame: &GaussianFrame,
     up: Up,
@@ -110,7 +110,7 @@ pub fn between_held_out(
     apart(frame, up, given, (count, height), ("between_held_out", 0.0))
 }
 
-/// Cameras that rise while they go around the scene, the first of them `shift` parts of a camera above the lowest elevation.
+/// Cameras that rise while they go around the scene; `shift` says how far around they begin, or between which of the given ones.
 fn apart(
     frame: &GaussianFrame,
     up: Up,
@@ -121,7 +121,7 @@ fn apart(
     let subject = Subject::of(frame, up);
     let golden = PI * (3.0 - 5.0_f32.sqrt());
     let made = |number: u32| {
-        let share = (number as f32 + shift) / count as f32;
+        let share = (number as f32 + 0.5) / count as f32;
         let elevation = libm::asinf(-0.174 + (0.643 + 0.174) * share);
         let azimuth = 1.9 + golden * (number as f32 + 0.5 - shift);
         subject.seen_from(format!("{name}_{number:02}"), azimuth, elevation, height)
