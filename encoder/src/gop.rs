@@ -4,7 +4,9 @@
     reason = "numbers of frames rise from the first of a GOP to the end of the sequence, and sizes are of what is in memory"
 )]
 
+mod group;
 mod means;
+mod worth;
 
 use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
@@ -17,7 +19,7 @@ use crate::frame::predictors::Chooser;
 use crate::frame::recorder::{Recorder, weights};
 use crate::frame::residuals::Wanted;
 use crate::frame::steadiness::Steadiness;
-use crate::frame::{CodedFrame, Reference, Target};
+use crate::frame::{CodedFrame, Target};
 use crate::gop_tools::GopTools;
 use crate::grid::PositionGrid;
 use crate::importance::Ranking;
@@ -25,16 +27,16 @@ use crate::isolated::{self, Isolated};
 use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
 use crate::report::{FrameReport, Report};
-use crate::savings::{Saving, Tool};
 use crate::settings::{Predictors, Preset};
 use crate::source::FrameSource;
 use crate::spans::{Common, Span};
 use crate::writer::GopSink;
-use splatstream_decoder::list::GaussianList;
+use group::Gop;
 use splatstream_format::payload::write_frame;
 use splatstream_format::syntax::{
     FrameHeader, FrameRole, FrameType, GopHeader, Profile, UnitHeader, UnitId, UnitType,
 };
+use worth::worth_of_reuse;
 
 /// A predicted frame that takes more than this part of what an I frame would is not worth it: it is no easier to decode,
 /// and an I frame is where decoding can start.
@@ -80,34 +82,6 @@ enum Verdict {
     Unlike,
     /// It takes as many bits as an I frame.
     Dear,
-}
-
-/// A GOP while its frames are being coded.
-struct Gop {
-    /// Display index of its first frame.
-    first: u32,
-    header: GopHeader,
-    tools: GopTools,
-    /// The last frame of each temporal layer and its number.
-    references: Vec<Option<(u32, Reference)>>,
-    /// The lists of the I frame, where new Gaussians of other frames may be predicted from all of them.
-    anchor: Vec<GaussianList>,
-    /// What fills the holes of the prefixes of the I frame, and so of all frames.
-    compensation: Vec<(i8, i8)>,
-    /// The level of the price of a bit in pictures, of the last frame that had one.
-    price_level: i32,
-    /// What the I frame takes: bytes of a Gaussian.
-    intra_bytes: f64,
-    /// How good its frames are, where these are true to attributes.
-    steadiness: Option<Steadiness>,
-    /// Units that are not written yet.
-    units: Vec<(UnitId, Vec<u8>)>,
-    /// Whether the header has been written.
-    is_open: bool,
-    /// Whether a new Gaussian takes the network.
-    has_learned: bool,
-    /// Whether no frame refers to another although some might have: spatial layers would only cost bits.
-    in_one_layer: bool,
 }
 
 impl<'a> SpanCoder<'a> {
@@ -229,26 +203,6 @@ impl<'a> SpanCoder<'a> {
         gop.in_one_layer = true;
         self.intra(&mut gop, first, intra)?;
         Ok(gop)
-    }
-
-    /// Whether it is told what spatial layers save a frame.
-    fn weighs_layers(&self, number: u32) -> bool {
-        let has_layers = self.common.sequence.spatial_layer_count > 1;
-        has_layers && self.common.settings.finetune.is_none() && self.tells_savings(number)
-    }
-
-    /// Tells what spatial layers save the first frame, or rather cost it: it is coded without them as well.
-    fn weigh_layers(&mut self, gop: &Gop, last: u32, order: Vec<u32>) -> Result<(), Error> {
-        let before = self.report.clone();
-        let intra = Intra { target: self.target(gop.first)?, order };
-        let mut alone = self.start(gop.first, last - gop.first, &intra)?;
-        alone.header = GopHeader::intra(UNNUMBERED, last - gop.first);
-        alone.in_one_layer = true;
-        self.intra(&mut alone, gop.first, intra)?;
-        self.report = before;
-        let bits = 8.0 * (alone.intra_bytes - gop.intra_bytes);
-        self.report.savings.push(Saving::measured(Tool::SpatialLayers, bits));
-        Ok(())
     }
 
     /// Codes a GOP of I frames, where the second could not be predicted from the first, and gives the frame after it.
@@ -428,15 +382,6 @@ impl<'a> SpanCoder<'a> {
         Ok(())
     }
 
-    /// Whether it is told what choices save a frame: the first one, if it has Gaussians; not where time counts.
-    fn tells_savings(&self, number: u32) -> bool {
-        let settings = self.common.settings;
-        number == 0
-            && self.report.coded.is_empty()
-            && settings.preset != Preset::Fast
-            && self.recorder.is_none()
-    }
-
     /// Codes a frame that refers to another, if that is worth it.
     fn predicted(
         &mut self,
@@ -547,40 +492,5 @@ impl<'a> SpanCoder<'a> {
         self.report.coded.push(frame);
         self.report.digests.push(coded.units.last().map_or(0, |unit| unit.header.refinement_digest));
         Ok(())
-    }
-}
-
-/// What tables of the refinement before save an I frame, if that was measured.
-fn worth_of_reuse(coded: &CodedFrame) -> Option<Saving> {
-    let bytes: usize = coded.units.iter().map(|unit| unit.reuse_saves).sum();
-    let bits = 8.0 * bytes as f64 / f64::from(coded.gaussians().max(1));
-    (!coded.savings.is_empty()).then(|| Saving::measured(Tool::TableReuse, bits))
-}
-
-impl Gop {
-    /// Bytes of its units so far.
-    fn bytes(&self) -> usize {
-        self.units.iter().map(|(_, payload)| UnitHeader::SIZE + payload.len()).sum()
-    }
-
-    /// Keeps the I frame of a predicted GOP.
-    fn start_with(&mut self, number: u32, coded: CodedFrame, whole_anchor: bool) {
-        if whole_anchor {
-            self.anchor.clone_from(&coded.reference.lists);
-        } else {
-            let top = coded.units.last().map_or(0, |unit| unit.spatial_layer);
-            let highest = coded.units.iter().filter(|unit| unit.spatial_layer == top);
-            let offsets = highest.map(|u| (u.header.compensation_log_scale, u.header.compensation_opacity));
-            self.compensation = offsets.collect();
-        }
-        self.keep(0, number, coded.reference);
-    }
-
-    /// Keeps a frame that others refer to, and no frame of a higher temporal layer.
-    #[expect(clippy::indexing_slicing, reason = "units are counted by what they index, axes are constants")]
-    fn keep(&mut self, layer: u8, number: u32, reference: Reference) {
-        let layer = usize::from(layer);
-        self.references.iter_mut().skip(layer).for_each(|slot| *slot = None);
-        self.references[layer] = Some((number, reference));
     }
 }
