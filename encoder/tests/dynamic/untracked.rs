@@ -117,9 +117,9 @@ fn frames_with_rows_that_keep_their_meaning_are_true_to_attributes_whatever_is_a
     assert!(same(&[shuffled(0), shuffled(1), shuffled(2)], Quality::High));
 }
 
-/// A difference that nearly every difference is sent for, decibels, and what choices of earlier frames may change.
+/// A difference that nearly every difference is sent for, decibels, and by how much later frames may be below earlier ones.
 const HARDLY_ANY: f32 = 0.02;
-const CHANCE: f64 = 0.4;
+const CHANCE: f64 = 0.2;
 /// Prices are a factor of the square root of two apart, by which errors differ by 1.5 dB at most: a quarter of the largest
 /// tolerance that is tried.
 const LEVEL: f64 = 0.25;
@@ -135,14 +135,18 @@ fn pictures_are_as_good_as_the_tolerance_says_and_no_better_than_they_need_be() 
     let mut sizes = Vec::new();
     for tolerance in [1.0, 3.0, 6.0] {
         let (bytes, report, shown) = coded(&frames, &Settings { tolerance, ..settings.clone() });
-        // Errors do not add up: the last frame is as near to its source as the first predicted one.
-        for (number, (psnr, exact)) in of_all(&shown).iter().zip(&exact).enumerate().skip(1) {
-            let (below, allowed) = (exact - psnr, f64::from(tolerance));
-            assert!(report.coded[number].by_pictures);
-            assert!(below <= allowed + CHANCE, "frame {number}: {below} dB, allowed {tolerance}");
-            let near = (0.2 + CHANCE).max(LEVEL * allowed);
-            assert!(below >= allowed - near, "frame {number}: {below} dB, allowed {tolerance}");
-        }
+        assert!(report.coded.iter().skip(1).all(|frame| frame.by_pictures));
+        // A frame is judged against what would be shown if all of its own differences were sent. In another stream that is
+        // more or less by chance, since other frames came before, but not on average.
+        let below: Vec<f64> =
+            exact.iter().zip(of_all(&shown)).skip(1).map(|(exact, psnr)| exact - psnr).collect();
+        let mean = |frames: &[f64]| frames.iter().sum::<f64>() / frames.len() as f64;
+        let allowed = f64::from(tolerance);
+        assert!(mean(&below) <= allowed, "{below:?} dB, allowed {tolerance}");
+        assert!(mean(&below) >= allowed - LEVEL.max(LEVEL * allowed), "{below:?} dB, allowed {tolerance}");
+        // Errors do not add up: the last frames are as near to their sources as the first predicted ones.
+        let [first, last] = [mean(&below[..2]), mean(&below[3..])];
+        assert!(last <= first.max(allowed) + CHANCE, "{below:?} dB, allowed {tolerance}");
         sizes.push(bytes.len());
     }
     assert!(sizes.is_sorted_by(|a, b| a > b), "{sizes:?}");
