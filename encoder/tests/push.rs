@@ -118,7 +118,7 @@ fn steps_are_fitted_to_the_first_frames() {
     let asked = Settings { psnr: Some(42.0), ..settings() };
     let (bytes, report) = pushed(&frames(9), &asked);
     assert!(report.target.is_some());
-    let psnr = report.pictures.unwrap().psnr().unwrap();
+    let psnr = report.pictures.unwrap().fitted_psnr().unwrap();
     assert!((psnr - 42.0).abs() < 1.0, "{psnr}");
     assert_eq!(decoded(&bytes, &strict()).0.len(), 9);
     let rate = Settings { size: Some(Size::BitsPerGaussian(30.0)), ..settings() };
