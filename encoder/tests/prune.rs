@@ -59,7 +59,7 @@ fn the_psnr_asked_for_is_that_against_all_gaussians() {
     let dusty = with_dust(&builtin(1_500, 0));
     let asked = Settings { psnr: Some(45.0), ..settings(Some(50.0)) };
     let (bytes, report) = encoded(vec![dusty.clone()], &asked);
-    let told = report.pictures.unwrap().psnr().unwrap();
+    let told = report.pictures.unwrap().fitted_psnr().unwrap();
     assert!((told - 45.0).abs() < 0.6, "{told}");
     let frame = decoded(&bytes, &strict()).0.remove(0).into_shown();
     assert!(worst(&dusty, &to_gaussians(frame, &sequence(&bytes)).unwrap()) > 41.0);
