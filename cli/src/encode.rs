@@ -417,6 +417,9 @@ impl Encode {
             Some(_) => None,
             None => Some(self.psnr.unwrap_or_else(|| Quality::from(self.quality).decibels())),
         };
+        // Frames that others are predicted from stay near the source.
+        let fitted = usual.finetune.as_ref().filter(|_| !is_predicted);
+        let iterations = fitted.map_or(0, |finetune| finetune.iterations);
         let mut settings = Settings {
             structure,
             anchor: self.anchor.into(),
@@ -439,13 +442,7 @@ impl Encode {
             prune: self.prune.threshold(psnr)?,
             ticks: self.fps,
             importance: self.importance.map(Into::into),
-            finetune: match &usual.finetune {
-                // Frames that others are predicted from stay near the source.
-                Some(usual) if !is_predicted => {
-                    self.finetune.settings(usual.iterations, &cameras, &self.layers)?
-                }
-                _ => self.finetune.settings(0, &cameras, &self.layers)?,
-            },
+            finetune: self.finetune.settings(iterations, &cameras, &self.layers)?,
             cameras,
             fidelity: self.fidelity.map(Into::into),
             tolerance: self.tolerance,

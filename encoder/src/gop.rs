@@ -139,7 +139,8 @@ impl<'a> SpanCoder<'a> {
         if self.is_doubtful(&before.0, &gop) {
             let after = (self.report.clone(), self.looked_at);
             (self.report, self.looked_at) = before;
-            let mut alone = self.alone(first, last)?;
+            let intra = self.intra_target(first)?;
+            let mut alone = self.alone(first, last, intra)?;
             for number in first + 1..end {
                 let intra = self.intra_target(number)?;
                 self.intra(&mut alone, number, intra)?;
@@ -196,8 +197,7 @@ impl<'a> SpanCoder<'a> {
     }
 
     /// A GOP of I frames in one layer: its first frame.
-    fn alone(&mut self, first: u32, last: u32) -> Result<Gop, Error> {
-        let intra = self.intra_target(first)?;
+    fn alone(&mut self, first: u32, last: u32, intra: Intra) -> Result<Gop, Error> {
         let mut gop = self.start(first, last - first, &intra)?;
         gop.header = GopHeader::intra(UNNUMBERED, last - first);
         gop.in_one_layer = true;
@@ -211,7 +211,8 @@ impl<'a> SpanCoder<'a> {
     /// differences are dear are I frames as far as the GOP goes.
     fn intra_run(&mut self, first: u32, span: Span, verdict: Verdict) -> Result<u32, Error> {
         let last = span.end;
-        let mut gop = self.alone(first, last)?;
+        let intra = self.intra_target(first)?;
+        let mut gop = self.alone(first, last, intra)?;
         let mut end = first + 1;
         let mut next = (verdict == Verdict::Unlike).then(|| self.target(end)).transpose()?;
         while end < last {

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::camera::{Scattered, Up};
-use splatstream_render::contribution::SmallViews;
+use splatstream_render::contribution::{SmallViews, Worth};
 use std::collections::BTreeMap;
 
 /// Views in which Gaussians are weighed, and their lines.
@@ -134,10 +134,9 @@ fn order(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<u32> {
     let shown = SmallViews::new(frame, cameras, LINES).worth();
     let bare = unhidden(frame, &small);
     let views = cameras.len() as f64;
-    let score = |(worth, bare): (
-        &splatstream_render::contribution::Worth,
-        &splatstream_render::contribution::Worth,
-    )| { (worth.contribution * worth.loss).sqrt() + HIDDEN * views * bare.energy };
+    let score = |(worth, bare): (&Worth, &Worth)| {
+        (worth.contribution * worth.loss).sqrt() + HIDDEN * views * bare.energy
+    };
     let mut scored: Vec<(f64, u32)> = shown.iter().zip(&bare).map(score).zip(0..).collect();
     scored.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     scored.into_iter().map(|(_, row)| row).collect()

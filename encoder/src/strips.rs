@@ -112,9 +112,7 @@ impl StripViews {
     ) -> Result<Option<f64>, Error> {
         mean(self.draw(original).zip(decoded).map(|(original, decoded)| Ok(compared(&original, decoded))))
     }
-}
 
-impl StripViews {
     /// The lowest PSNR of the views, between strips that have been drawn and those of another frame, dB; none if nothing can be
     /// seen in any.
     pub(crate) fn least_psnr(&self, frame: &GaussianFrame, drawn: &[Rendering]) -> Option<f64> {

@@ -233,9 +233,7 @@ impl<'a> Fitting<'a> {
         };
         Ok(Settings { steps, laws: self.fit.laws(), sh: self.sh, ..self.settings.clone() })
     }
-}
 
-impl Fitting<'_> {
     /// What laws save with the steps for a PSNR; not where time counts.
     fn worth_of_laws(&mut self, decibels: f64) -> Result<Option<Saving>, Error> {
         match self.settings.preset {

@@ -53,30 +53,38 @@ pub fn worth(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
 #[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians in memory")]
 fn add(view: &View, sums: &mut [Worth]) {
     let rows = (0..view.rows.len()).into_par_iter().with_max_len(1);
-    let shares: Vec<Vec<Share>> =
+    let shares: Vec<Vec<OfTile>> =
         rows.map(|row| pulp::Arch::new().dispatch(RowShares { view, row })).collect();
     // Each thread adds what belongs to its part of the Gaussians, in the order of the rows.
     let part = sums.len().div_ceil(rayon::current_num_threads()).max(1);
     sums.par_chunks_mut(part).enumerate().for_each(|(number, sums)| {
         let first = (number * part) as u32;
-        for share in shares.iter().flatten() {
-            if let Some(sum) = sums.get_mut(share.gaussian.wrapping_sub(first) as usize) {
-                sum.contribution += f64::from(share.contribution);
-                sum.loss += f64::from(share.loss);
-                sum.energy += f64::from(share.energy);
+        for (gaussian, share) in shares.iter().flatten() {
+            if let Some(sum) = sums.get_mut(gaussian.wrapping_sub(first) as usize) {
+                share.add_to(sum);
             }
         }
     });
 }
 
-/// What an ellipse is to a tile: sums over its pixels.
+/// What an ellipse is to a tile or to a small picture: sums over its pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Share {
-    /// Which Gaussian of the frame.
-    gaussian: u32,
     contribution: f32,
     loss: f32,
     energy: f32,
 }
+
+impl Share {
+    fn add_to(&self, sum: &mut Worth) {
+        sum.contribution += f64::from(self.contribution);
+        sum.loss += f64::from(self.loss);
+        sum.energy += f64::from(self.energy);
+    }
+}
+
+/// A Gaussian of the frame, and what it is to a tile.
+type OfTile = (u32, Share);
 
 /// What each ellipse is to the tiles of a row.
 struct RowShares<'a> {
@@ -85,7 +93,7 @@ struct RowShares<'a> {
 }
 
 impl WithSimd for RowShares<'_> {
-    type Output = Vec<Share>;
+    type Output = Vec<OfTile>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
@@ -166,7 +174,7 @@ impl Trace {
     /// Sums what each Gaussian is to the tile: the light behind it is what is left of all of it.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lines are counted by the ellipses that have them")]
-    fn shares(&mut self, shares: &mut Vec<Share>) {
+    fn shares(&mut self, shares: &mut Vec<OfTile>) {
         let mut start = 0;
         for &(gaussian, colour, end) in &self.ellipses {
             shares.extend(share(gaussian, colour, &self.lines[start..end], &mut self.ink.light));
@@ -181,7 +189,7 @@ struct Again<'a> {
     light: Light,
     /// Lines of the Gaussian that is blended.
     lines: Vec<Line>,
-    shares: &'a mut Vec<Share>,
+    shares: &'a mut Vec<OfTile>,
 }
 
 impl Blend for Again<'_> {
@@ -201,7 +209,7 @@ impl Blend for Again<'_> {
 /// it is taken from.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "lines and lanes are those of a tile")]
-fn share(gaussian: u32, colour: [f32; 3], lines: &[Line], light: &mut Light) -> Option<Share> {
+fn share(gaussian: u32, colour: [f32; 3], lines: &[Line], light: &mut Light) -> Option<OfTile> {
     let [mut given, mut lost, mut squared] = [[0.0; TILE]; 3];
     for Line { line, visible, passing } in lines {
         for lane in 0..TILE {
@@ -224,5 +232,5 @@ fn share(gaussian: u32, colour: [f32; 3], lines: &[Line], light: &mut Light) -> 
     }
     let contribution: f32 = given.iter().sum();
     let (loss, energy) = (lost.iter().sum(), squared.iter().sum());
-    (contribution > 0.0).then_some(Share { gaussian, contribution, loss, energy })
+    (contribution > 0.0).then_some((gaussian, Share { contribution, loss, energy }))
 }

@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn settings_are_compared_at_the_psnr_of_the_baseline() {
         use splatstream_encoder::Preset;
-        let scene = BuiltinScene { gaussians: 400, frames: 1, sh_degree: 1, ..BuiltinScene::default() };
+        let scene = BuiltinScene { gaussians: 3000, frames: 1, sh_degree: 1, ..BuiltinScene::default() };
         let mut frames = vec![scene.frame(0)];
         let efforts = vec![
             effort("balanced", Group::Baseline, Preset::Balanced),
@@ -282,10 +282,8 @@ mod tests {
         let of = |name: &str| rows.iter().find(|row| row.name == name).unwrap();
         assert_eq!(of("balanced").more_percent, Some(0.0));
         assert!(rows.iter().all(|row| row.bpg.is_some_and(|bits| bits > 1.0)), "{rows:?}");
-        // Of so few Gaussians contexts need not save anything: that both are compared at one PSNR is what counts.
-        let (without, balanced) = (of("without contexts"), of("balanced"));
-        let more = 100.0 * (without.bpg.unwrap() / balanced.bpg.unwrap() - 1.0);
-        assert!((without.more_percent.unwrap() - more).abs() < 1e-9, "{without:?}");
+        // What contexts save costs nothing but time.
+        assert!(of("without contexts").bpg > of("balanced").bpg, "{rows:?}");
         assert_eq!(of("without contexts").encoding, Place::Apart);
         assert!(rows.iter().any(|row| row.decoding == Place::OnFront));
     }

@@ -4,6 +4,7 @@ use super::prune::pruned;
 use crate::up_guess::UpGuess;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped, percent};
+use splatstream_decoder::predictor::Predictor;
 use splatstream_encoder::{
     Basis, FrameReport, Importance, Laws, PredictorChoice, Predictors, Preset, Report, Settings, ShChoice,
     Steps, Structure, Tool, Tools,
@@ -307,9 +308,13 @@ fn fidelity(report: &Report, settings: &Settings) -> Option<Choice> {
     (frames > 0).then(|| Choice::new("fidelity", format!("pictures in {frames} frames"), why))
 }
 
+/// New Gaussians of all frames by predictor: none, knn, bilateral, transformer.
+fn predicted(report: &Report) -> [u64; 4] {
+    [0, 1, 2, 3].map(|index| report.coded.iter().map(|frame| frame.predicted[index]).sum())
+}
+
 fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
-    let count = |index: usize| report.coded.iter().map(|frame| frame.predicted[index]).sum::<u64>();
-    let counts = [0, 1, 2, 3].map(count);
+    let counts = predicted(report);
     let all: u64 = counts.iter().sum();
     if all == 0 {
         return None;
@@ -331,17 +336,16 @@ fn predictors(report: &Report, settings: &Settings) -> Option<Choice> {
 
 /// Whether there is a network, where one may be.
 fn network(report: &Report, settings: &Settings) -> Option<Choice> {
-    let predicted: [u64; 4] =
-        [0, 1, 2, 3].map(|index| report.coded.iter().map(|frame| frame.predicted[index]).sum());
+    let predicted = predicted(report);
     let [.., by_network] = predicted;
     let may_predict = settings.structure != Structure::Intra || settings.spatial_layers > 1;
     if !may_predict || predicted.iter().all(|&count| count == 0) {
         return None;
     }
-    let is_tried = settings.network.is_some() || settings.preset == Preset::Small;
+    let is_tried = settings.network.is_some() || !settings.predictors.allows(Predictor::Bilateral);
     Some(match (by_network, is_tried) {
         (0, false) => {
-            Choice::new("network", "none", "not tried: --network trained or --preset small try one")
+            Choice::new("network", "none", "not tried: --network trained or --predictor transformer try one")
         }
         (0, true) => Choice::new("network", "none", "no unit of new Gaussians takes fewer bytes with it"),
         (count, _) => {

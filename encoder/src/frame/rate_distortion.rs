@@ -1,11 +1,11 @@
 //! What a bit may cost in pictures, so that a frame is as good as it must be and no better.
 
+use super::compensation::compensated;
 use super::predicted::Predicted;
 use super::update_decision::Judge;
 use crate::error::Error;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::list::GaussianList;
-use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{ReferencePictures, metrics};
@@ -33,9 +33,8 @@ pub(crate) fn finite_psnr(pictures: &ReferencePictures, frame: &GaussianFrame) -
 /// # Errors
 /// Lists whose planes make no frame.
 pub(crate) fn shown(lists: &[GaussianList], sequence: &SequenceParameters) -> Result<GaussianFrame, Error> {
-    let mut planes = QuantizedFrame::zeroed(0, usize::from(sequence.sh_dimension()));
-    lists.iter().for_each(|list| planes.append(&list.planes));
-    Ok(to_gaussians(planes, sequence)?)
+    let lists: Vec<&QuantizedFrame> = lists.iter().map(|list| &list.planes).collect();
+    compensated(&lists, (0, 0), sequence)
 }
 
 /// How good pictures must be.

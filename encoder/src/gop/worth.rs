@@ -1,12 +1,10 @@
 //! What choices save the first frame, as far as coding it tells: `encode` says so beside each choice.
-#![expect(clippy::arithmetic_side_effects, reason = "counts of frames and of bytes in memory")]
 
-use super::{Gop, Intra, SpanCoder, UNNUMBERED};
+use super::{Gop, Intra, SpanCoder};
 use crate::error::Error;
 use crate::frame::CodedFrame;
 use crate::savings::{Saving, Tool};
 use crate::settings::Preset;
-use splatstream_format::syntax::GopHeader;
 
 impl SpanCoder<'_> {
     /// Whether it is told what choices save a frame: the first one, if it has Gaussians; not where time counts.
@@ -28,10 +26,7 @@ impl SpanCoder<'_> {
     pub(super) fn weigh_layers(&mut self, gop: &Gop, last: u32, order: Vec<u32>) -> Result<(), Error> {
         let before = self.report.clone();
         let intra = Intra { target: self.target(gop.first)?, order };
-        let mut alone = self.start(gop.first, last - gop.first, &intra)?;
-        alone.header = GopHeader::intra(UNNUMBERED, last - gop.first);
-        alone.in_one_layer = true;
-        self.intra(&mut alone, gop.first, intra)?;
+        let alone = self.alone(gop.first, last, intra)?;
         self.report = before;
         let bits = 8.0 * (alone.intra_bytes - gop.intra_bytes);
         self.report.savings.push(Saving::measured(Tool::SpatialLayers, bits));

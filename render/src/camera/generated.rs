@@ -96,7 +96,7 @@ const TURN: f32 = 5.0 / 180.0 * PI;
 /// was chosen by other views. Where the scene comes with cameras they stand near some of these, turned about the middle
 /// of what they see by 5 degrees to one side or the other.
 pub fn held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, height: u32) -> Vec<Camera> {
-    apart(frame, up, given, (count, height), ("held_out", 0.5))
+    held_out_views(frame, up, given, (count, height), ("held_out", 0))
 }
 
 /// As many other cameras as [`held_out`] gives, as high, from other sides: to judge what was chosen by them.
@@ -107,31 +107,30 @@ pub fn between_held_out(
     count: u32,
     height: u32,
 ) -> Vec<Camera> {
-    apart(frame, up, given, (count, height), ("between_held_out", 0.0))
+    held_out_views(frame, up, given, (count, height), ("between_held_out", 1))
 }
 
-/// Cameras that rise while they go around the scene; `shift` says how far around they begin, or between which of the given ones.
-fn apart(
+/// Cameras that rise while they go around the scene. Those of set 1 stand half the way from those of set 0 to the next, and near
+/// others of the given cameras.
+fn held_out_views(
     frame: &GaussianFrame,
     up: Up,
     given: &[Camera],
     (count, height): (u32, u32),
-    (name, shift): (&str, f32),
+    (name, set): (&str, u32),
 ) -> Vec<Camera> {
     let subject = Subject::of(frame, up);
     let golden = PI * (3.0 - 5.0_f32.sqrt());
     let made = |number: u32| {
         let share = (number as f32 + 0.5) / count as f32;
         let elevation = libm::asinf(-0.174 + (0.643 + 0.174) * share);
-        let azimuth = 1.9 + golden * (number as f32 + 0.5 - shift);
+        let azimuth = 1.9 + golden * (number as f32 + 0.5 * set as f32);
         subject.seen_from(format!("{name}_{number:02}"), azimuth, elevation, height)
     };
     let turned = |number: u32| {
-        let place = (2.0 * (number as f32 + shift)) as usize;
-        let at = place * given.len() / (2 * count as usize);
+        let at = (2 * number + 1 - set) as usize * given.len() / (2 * count as usize);
         // To the other side, where the same camera serves both sets.
-        let side = number + u32::from(shift < 0.5);
-        given.get(at).map(|camera| subject.turned(camera, (name, side), height))
+        given.get(at).map(|camera| subject.turned(camera, (name, number + set), height))
     };
     (0..count).map(|number| turned(number).unwrap_or_else(|| made(number))).collect()
 }

@@ -8,14 +8,14 @@
 mod ellipses;
 mod trace;
 
-use super::Worth;
+use super::{Share, Worth};
 use crate::camera::Camera;
 use crate::rasterise::{Shapes, near};
 use ellipses::Ellipses;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
-use trace::{Share, Trace};
+use trace::Trace;
 
 /// A frame as cameras see it in pictures smaller than theirs, which cost less and show nearly the same of each Gaussian.
 ///

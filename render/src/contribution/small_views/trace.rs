@@ -4,7 +4,7 @@
 
 use super::ellipses::{Ellipse, Ellipses, REACH};
 use crate::camera::Camera;
-use crate::contribution::Worth;
+use crate::contribution::Share;
 use crate::rasterise::{MAX_ALPHA, exp2};
 use std::f32::consts::LOG2_E;
 
@@ -19,22 +19,6 @@ const AHEAD: usize = 64;
 
 /// Pixels whose alphas are computed side by side, whether all are wanted or not.
 const LANES: usize = 8;
-
-/// What a Gaussian is to a view.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Share {
-    contribution: f32,
-    loss: f32,
-    energy: f32,
-}
-
-impl Share {
-    pub(super) fn add_to(&self, sum: &mut Worth) {
-        sum.contribution += f64::from(self.contribution);
-        sum.loss += f64::from(self.loss);
-        sum.energy += f64::from(self.energy);
-    }
-}
 
 /// What an ellipse adds to a pixel.
 struct Touch {
