@@ -1,11 +1,11 @@
 // How soon the first picture comes: node first.mjs IN.gss PACKAGE_DIR, with the variables of packages.test.mjs. Prints the
 // milliseconds from `open` to the picture with the first frame, of the package from `splatstream serve` and of the stream, on
 // pages that are opened for each.
-import { spawn } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { serve } from './server.mjs';
+import { serving } from './serving.mjs';
 
 const ROUNDS = 9;
 const [stream, folder] = process.argv.slice(2);
@@ -26,9 +26,8 @@ async function firstPicture(source) {
 
 const browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args });
 const pages = await serve({ '/scene.gss': readFileSync(stream) });
-const server = spawn(process.env.SPLATSTREAM, ['serve', folder, '--port', '0'], { stdio: ['ignore', 'ignore', 'pipe'] });
-const line = await new Promise((resolve) => server.stderr.once('data', (data) => resolve(String(data))));
-for (const [name, source] of [['package', { package: /http:\S+/.exec(line)[0] }], ['stream', { url: `${pages.url}scene.gss` }]]) {
+const { server, address } = await serving(folder);
+for (const [name, source] of [['package', { package: address }], ['stream', { url: `${pages.url}scene.gss` }]]) {
   const times = [];
   for (let round = 0; round < ROUNDS; round++) {
     const page = await browser.newPage({ viewport: { width: 320, height: 180 } });

@@ -55,9 +55,10 @@ if (!existsSync(broadcastPath)) {
 }
 
 /**
- * A live package whose bytes come in the time of the stream, with so many seconds in its manifest. Gives its folder, its files by their names as they are at that time, and what ends it.
+ * A live package whose bytes come in the time of the stream, with so many seconds in its manifest. Gives, once its manifest is
+ * there, its folder, its files by their names as they are at that time, and what ends it.
  */
-export function broadcast(window) {
+export async function broadcast(window) {
   const out = at(`live-${started++}`);
   rmSync(out, { recursive: true, force: true });
   const options = ['package', '-', '-o', out, '--live', '--window', String(window), '--target-latency', '0.6'];
@@ -76,6 +77,10 @@ export function broadcast(window) {
     packager.kill();
   };
   const get = (name) => (existsSync(`${out}/${name}`) ? readFileSync(`${out}/${name}`) : undefined);
+  while (!get('manifest.json')) {
+    if (packager.exitCode !== null) throw new Error(`the packager ended with ${packager.exitCode}`);
+    await pause(10);
+  }
   return { folder: out, files: { get }, close };
 }
 

@@ -239,7 +239,7 @@ const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
 
 /** A viewer of a broadcast that has gone on for a while. */
 async function liveViewer(window, behaviour) {
-  const live = broadcast(window);
+  const live = await broadcast(window);
   open.push(live.close);
   await pause(4500);
   return viewer(behaviour, { content: live.files });

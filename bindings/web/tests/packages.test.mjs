@@ -1,13 +1,13 @@
 // Packages in Chromium, from `splatstream serve` over good and bad networks: node --test packages.test.mjs, with the variables
 // of browser.test.mjs.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
 import { cpSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import test, { after, afterEach, before } from 'node:test';
 import { pathToFileURL } from 'node:url';
 import { FRAMES, broadcast, broadcastPath, digestsAt, files, manifestAt, packageFolder } from './package.mjs';
 import { serve } from './server.mjs';
+import { serving } from './serving.mjs';
 import { at } from './setting.mjs';
 
 const { chromium } = await import(pathToFileURL(join(process.env.PLAYWRIGHT, 'index.mjs')));
@@ -30,16 +30,20 @@ after(async () => {
   pages?.close();
 });
 
+/** The address of a folder, which the command serves with some options until the test ends. */
+async function addressOf(folder, ...options) {
+  const { server, address } = await serving(folder, ...options);
+  servers.push(server);
+  return address;
+}
+
 /** A package in which a frame lasts so many milliseconds, served by the command with some options: its address. */
 async function served(milliseconds = 40, ...options) {
   const folder = at(`package-${milliseconds}`);
   rmSync(folder, { recursive: true, force: true });
   cpSync(packageFolder, folder, { recursive: true });
   writeFileSync(join(folder, 'manifest.json'), JSON.stringify(manifestAt(milliseconds)));
-  const server = spawn(process.env.SPLATSTREAM, ['serve', folder, '--port', '0', ...options], { stdio: ['ignore', 'ignore', 'pipe'] });
-  servers.push(server);
-  const line = await new Promise((resolve) => server.stderr.once('data', (data) => resolve(String(data))));
-  return /http:\S+/.exec(line)[0];
+  return addressOf(folder, ...options);
 }
 
 /** A page with a player of a package; `frames` collects what is shown. */
@@ -162,12 +166,11 @@ test('the page of serve --player plays the package of its folder', async () => {
 });
 
 test('a presentation that grows is followed, gone back in and returned to, and is a recording when it has ended', async () => {
-  const live = broadcast(60);
-  const server = spawn(process.env.SPLATSTREAM, ['serve', live.folder, '--port', '0'], { stdio: ['ignore', 'ignore', 'pipe'] });
-  servers.push(server, { kill: live.close });
-  const line = await new Promise((resolve) => server.stderr.once('data', (data) => resolve(String(data))));
+  const live = await broadcast(60);
+  servers.push({ kill: live.close });
+  const address = await addressOf(live.folder);
   await new Promise((resolve) => setTimeout(resolve, 4500));
-  const page = await player(/http:\S+/.exec(line)[0]);
+  const page = await player(address);
   const key = page.locator('#live');
   const isLit = (wanted) => page.waitForFunction((is) => player.shadowRoot.getElementById('live').getAttribute('aria-pressed') === is, String(wanted));
   await isLit(true);
