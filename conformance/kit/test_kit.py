@@ -87,6 +87,12 @@ class Runner(unittest.TestCase):
     def test_a_decoder_that_does_not_end_is_killed(self):
         self.assertEqual(self.labels("time.sleep(600)", "codebook-two-bytes", "--time", "2"), {"timeout"})
 
+    def test_a_process_that_does_not_answer_fails_case_by_case(self):
+        for process in ("true", "%s -c 'input()'" % sys.executable):
+            code, _, report = run(["--stdio", process, "--filter", "codebook-two-*", "--jobs", "1"])
+            labels = {row.get("reason", row["outcome"]) for row in report["cases"]}
+            self.assertEqual((code, labels), (3, {"crash"}), process)
+
     def test_a_code_counts_if_that_is_asked(self):
         broken = next(v for v in Suite(VECTORS).vectors if v.record["kind"] == "invalid" and v.record.get("points"))
         name, after = broken.record["name"], "print('{\"code\": \"NONE\"}', file=sys.stderr)"

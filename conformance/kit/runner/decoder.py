@@ -67,7 +67,8 @@ class Session:
         return self.ask_line(request) if self.settings.stdio else self.ask_once(request)
 
     def start(self, words, **pipes):
-        process = subprocess.Popen(words, start_new_session=True, **pipes)
+        # Unbuffered: what a process that has ended was to get is not written once more when its pipe is closed.
+        process = subprocess.Popen(words, start_new_session=True, bufsize=0, **pipes)
         limit(process.pid, self.settings.memory, self.settings.output)
         return process
 
