@@ -100,7 +100,7 @@ class Checks:
         run([program, "encode", "-i", folder, "-o", coded, "--no-verify"])
         ours = self.box.scratch("frames.gss")
         self.ours("encode", coded, "-o", ours, "--psnr", "40", "--preset", "fast", "--keep-invisible")
-        count = json.loads(self.ours("inspect", ours, "--units", "--json"))["sequence"]["frame_count"]
+        count = json.loads(self.ours("decode", ours, "--dry-run", "--json"))["frames"]
         names = [name for name in os.listdir(folder) if name.endswith(".splat")]
         assert count == len(names), "%d frames, %d are wanted" % (count, len(names))
         run([program, "decode", coded, "--frame", 0, "-o", frame])
