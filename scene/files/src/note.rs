@@ -30,18 +30,25 @@ pub enum Note {
         /// How many.
         count: u64,
     },
+    /// Opacities were exactly 0 or 1, and were taken half a step of 8 bits inside.
+    ExactOpacity {
+        /// Of how many Gaussians.
+        count: u64,
+    },
     /// Colours are in linear light, and were taken as they are.
     LinearColours,
 }
 
 impl Note {
-    /// A word for programs, which does not change: `sh-reduced`, `flat`, `other-primitives`, `unusable`, `linear-colours`.
+    /// A word for programs, which does not change: `sh-reduced`, `flat`, `other-primitives`, `unusable`,
+    /// `exact-opacity`, `linear-colours`.
     pub fn code(&self) -> &'static str {
         match self {
             Self::ShDegree { .. } => "sh-reduced",
             Self::Flat { .. } => "flat",
             Self::OtherPrimitives { .. } => "other-primitives",
             Self::Unusable { .. } => "unusable",
+            Self::ExactOpacity { .. } => "exact-opacity",
             Self::LinearColours => "linear-colours",
         }
     }
@@ -71,6 +78,11 @@ impl fmt::Display for Note {
                 f,
                 "{} left out: their values are not finite, or they have no opacity, size or rotation",
                 number(*count, "Gaussian", "Gaussians")
+            ),
+            Self::ExactOpacity { count } => write!(
+                f,
+                "{} exactly 0 or 1 (an infinite logit), and taken half a step of 8 bits inside",
+                number(*count, "opacity", "opacities")
             ),
             Self::LinearColours => f.write_str(
                 "colours are in linear light (lin_rec709_display) and were kept as they are; they look too dark where \

@@ -2,7 +2,8 @@
 //!
 //! Read: ascii and both byte orders, any scalar type, any property order; other properties and elements are
 //! ignored. `f_rest_*` holds one channel after another and may have 0, 9, 24, 45 or 72 properties, those of degree 4, which
-//! is reduced to 3. Without `scale_2`, Gaussians are flat (2DGS): they get a third semi-axis of 1e-6.
+//! is reduced to 3. Without `scale_2`, Gaussians are flat (2DGS): they get a third semi-axis of 1e-6. Infinite `opacity`, which
+//! converters write for an opacity of exactly 0 or 1, becomes a finite logit, half a step of 8 bits inside.
 //! Written: binary little endian `f32` in the original order, normals zero.
 
 mod header;
@@ -13,6 +14,7 @@ pub(crate) use header::{Element, Header, is_ply, parse as parse_header};
 pub use points::{PointCloud, read_points};
 pub(crate) use table::Body;
 
+use crate::byte_values::logit_of_byte;
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::note::{MOST_SH_DEGREE, Note};
@@ -28,7 +30,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
     checked(read_as_is(bytes, &mut Budget::new(limits))?)
 }
 
-/// As [`read`], with values as they are: none is checked.
+/// As [`read`], with values as they are, but for infinite opacities: none is checked.
 pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
     let header = parse_header(bytes, budget)?;
     let vertex = header.element("vertex").ok_or_else(|| {
@@ -50,6 +52,7 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
     if is_flat(vertex) {
         thicken(&mut planes, budget)?;
     }
+    bound_opacities(&mut planes.opacity_logit, budget);
     frame_of(rest.sh_degree, planes)
 }
 
@@ -69,6 +72,18 @@ fn thicken(planes: &mut Planes, budget: &mut Budget) -> Result<(), SceneError> {
     third.resize(count, FLAT_LOG_SCALE);
     budget.note(Note::Flat { log_scale: FLAT_LOG_SCALE });
     Ok(())
+}
+
+/// Gives opacities of exactly 0 and 1, whose logits are infinite, the logits that readers of 8-bit opacities give them.
+fn bound_opacities(logits: &mut [f32], budget: &mut Budget) {
+    let mut count: u64 = 0;
+    for logit in logits.iter_mut().filter(|logit| logit.is_infinite()) {
+        *logit = logit_of_byte(if *logit > 0.0 { u8::MAX } else { 0 });
+        count = count.saturating_add(1);
+    }
+    if count > 0 {
+        budget.note(Note::ExactOpacity { count });
+    }
 }
 
 /// Writes a frame: every value exactly, whatever it is.

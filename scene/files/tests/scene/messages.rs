@@ -2,7 +2,10 @@
 
 use std::fs;
 
-use splatstream_files::{ReadLimits, SceneErrorKind, SceneFormat, detect, ply, read_scene, sog, splat};
+use splatstream_files::{
+    Note, ReadLimits, Scene, SceneErrorKind, SceneFormat, detect, ply, read_scene, read_scene_as_is, sog,
+    splat,
+};
 
 use super::samples::{LIMITS, meta, small_files, small_frame, sog_with};
 
@@ -26,7 +29,7 @@ fn values_that_no_frame_may_hold_are_named_by_row_and_property() {
     assert!(
         message(&ply_with(1, 0, f32::NAN)).starts_with("Gaussian 1: x is NaN: every value must be finite")
     );
-    assert!(message(&ply_with(2, 18, f32::INFINITY)).starts_with("Gaussian 2: opacity is inf"));
+    assert!(message(&ply_with(2, 18, f32::NAN)).starts_with("Gaussian 2: opacity is NaN"));
     assert!(message(&ply_with(0, 10, f32::NEG_INFINITY)).starts_with("Gaussian 0: f_rest_1 is -inf"));
     let mut bytes = ply_with(1, 22, 0.0);
     let length = bytes.len();
@@ -37,6 +40,24 @@ fn values_that_no_frame_may_hold_are_named_by_row_and_property() {
 #[test]
 fn an_unused_property_may_hold_anything() {
     assert!(ply::read(&ply_with(1, 3, f32::NAN), &LIMITS).is_ok());
+}
+
+#[test]
+fn infinite_opacities_are_opacities_of_0_and_1() {
+    for (value, opacity) in [(f32::INFINITY, 255), (f32::NEG_INFINITY, 0)] {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.ply");
+        fs::write(&path, ply_with(2, 18, value)).unwrap();
+        let Scene { frame, notes } = read_scene_as_is(&path, &LIMITS).unwrap();
+        let logit = frame.opacity_logit()[2];
+        assert!(logit.is_finite() && byte_of(logit).abs_diff(opacity) <= 1, "{logit}");
+        assert_eq!(notes, [Note::ExactOpacity { count: 1 }]);
+    }
+}
+
+/// The nearest 8-bit opacity.
+fn byte_of(logit: f32) -> u8 {
+    (255.0 / (1.0 + (-logit).exp())).round() as u8
 }
 
 #[test]
