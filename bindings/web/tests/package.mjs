@@ -45,7 +45,8 @@ export async function digestsAt({ spatial, temporal, refinement }, of = path) {
   return known.get(key);
 }
 
-const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
+/** Resolves after so many milliseconds. */
+export const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
 
 /** Milliseconds of a frame of a broadcast, which has all frames of the scene. */
 export const FRAME_TIME = 1000 / 12;
@@ -77,8 +78,11 @@ export async function broadcast(window) {
     packager.kill();
   };
   const get = (name) => (existsSync(`${out}/${name}`) ? readFileSync(`${out}/${name}`) : undefined);
-  while (!get('manifest.json')) {
-    if (packager.exitCode !== null) throw new Error(`the packager ended with ${packager.exitCode}`);
+  while (!existsSync(`${out}/manifest.json`)) {
+    if (packager.exitCode !== null) {
+      close();
+      throw new Error(`the packager ended with ${packager.exitCode}`);
+    }
     await pause(10);
   }
   return { folder: out, files: { get }, close };

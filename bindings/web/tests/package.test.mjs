@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import test, { afterEach } from 'node:test';
 import { GOP, pointOf } from './setting.mjs';
-import { FRAMES, FRAME_TIME, Viewer, broadcast, broadcastPath, digestsAt, files, manifestAt, network } from './package.mjs';
+import { FRAMES, FRAME_TIME, Viewer, broadcast, broadcastPath, digestsAt, files, manifestAt, network, pause } from './package.mjs';
 
 const ADDRESS = 'http://127.0.0.1/talk/manifest.json';
 /** Milliseconds of a frame in most tests: a GOP lasts 0.2 s. */
@@ -102,7 +102,7 @@ test('bytes that are always damaged are left out', async () => {
   const { player } = await viewer((request) => (isEnhancement(request) ? { change: (bytes) => (bytes[0] ^= 1) } : {}));
   player.worker.run(0);
   const first = await player.see(0);
-  await new Promise((resolve) => setTimeout(resolve, 1500));
+  await pause(1500);
   await check([first, await player.see(0), await player.see(GOP)]);
   assert.ok(player.warnings.some((line) => line.includes('digest')), player.warnings.join());
 });
@@ -130,7 +130,7 @@ test('responses that end early and connections that are lost are outlasted', asy
 test('what is fetched for another place is given up by a seek', async () => {
   const { player, requests } = await viewer((request) => (isEnhancement(request) ? { rate: 2000 } : {}), { content: served(400) });
   await player.see(0);
-  await new Promise((resolve) => setTimeout(resolve, 300));
+  await pause(300);
   const running = requests.at(-1);
   assert.ok(isEnhancement(running) && !running.isAborted);
   await check([await player.see(FRAMES - GOP)]);
@@ -168,7 +168,7 @@ test('what stands still gets better until nothing is missing', async () => {
   let frame = await player.see(4);
   const points = [quality(frame.point)];
   for (let wait = 0; wait < 200 && (frame.index < 4 || frame.point.refinement < best.refinement); wait++) {
-    await new Promise((resolve) => setTimeout(resolve, 20));
+    await pause(20);
     if (player.better === undefined) continue;
     player.better = undefined;
     frame = await player.see(4);
@@ -215,7 +215,7 @@ test('a package that becomes another one is refused in words', async () => {
   await assert.rejects(async () => {
     for (let index = 0; index < FRAMES; index += GOP) {
       await player.see(index);
-      await new Promise((resolve) => setTimeout(resolve, 500));
+      await pause(500);
     }
     throw new Error('nobody has noticed');
   }, /the package changed while it was played, from GOP 2 on/);
@@ -234,8 +234,6 @@ test('manifests that are none, or are not there, are refused with a reason', asy
   const { player: gone } = await viewer(() => ({ status: 404 }));
   await assert.rejects(gone.see(0), /404/);
 });
-
-const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
 
 /** A viewer of a broadcast that has gone on for a while. */
 async function liveViewer(window, behaviour) {

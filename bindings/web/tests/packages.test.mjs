@@ -5,7 +5,7 @@ import { cpSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import test, { after, afterEach, before } from 'node:test';
 import { pathToFileURL } from 'node:url';
-import { FRAMES, broadcast, broadcastPath, digestsAt, files, manifestAt, packageFolder } from './package.mjs';
+import { FRAMES, broadcast, broadcastPath, digestsAt, files, manifestAt, packageFolder, pause } from './package.mjs';
 import { serve } from './server.mjs';
 import { serving } from './serving.mjs';
 import { at } from './setting.mjs';
@@ -169,7 +169,7 @@ test('a presentation that grows is followed, gone back in and returned to, and i
   const live = await broadcast(60);
   servers.push({ kill: live.close });
   const address = await addressOf(live.folder);
-  await new Promise((resolve) => setTimeout(resolve, 4500));
+  await pause(4500);
   const page = await player(address);
   const key = page.locator('#live');
   const isLit = (wanted) => page.waitForFunction((is) => player.shadowRoot.getElementById('live').getAttribute('aria-pressed') === is, String(wanted));

@@ -12,7 +12,8 @@ export async function serving(folder, ...options) {
       if (found) resolve(found[0]);
     });
     server.once('error', reject);
-    server.once('exit', (status) => reject(new Error(`serve ended with ${status}: ${said}`)));
+    // Not at its exit: what it said may still be under way then.
+    server.once('close', (status) => reject(new Error(`serve ended with ${status}: ${said}`)));
   });
   return { server, address };
 }

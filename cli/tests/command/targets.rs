@@ -122,7 +122,7 @@ fn invalid_gaussians_are_named_or_left_out() {
     let mut planes = scene().frame(1).into_planes();
     planes.dc[2][11] = f32::INFINITY;
     planes.sh[0][12] = f32::NAN;
-    planes.opacity_logit[12] = f32::NEG_INFINITY;
+    planes.log_scale[0][12] = f32::NEG_INFINITY;
     let broken = GaussianFrame::from_planes(1, planes).unwrap();
     fs::write(frames.join("f9.ply"), ply::write(&broken)).unwrap();
     let stream = directory.path().join("out.gss");
