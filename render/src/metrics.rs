@@ -20,10 +20,11 @@ pub use temporal::still;
 
 use crate::image::Image;
 
-/// What a screen shows of a pixel.
+/// What a screen shows of a channel.
+#[inline(always)]
 #[expect(clippy::manual_clamp, reason = "unlike `clamp`, this makes a number of NaN")]
-fn shown(pixel: [f32; 3]) -> [f32; 3] {
-    pixel.map(|channel| channel.max(0.0).min(1.0))
+fn shown(channel: f32) -> f32 {
+    channel.max(0.0).min(1.0)
 }
 
 /// # Panics

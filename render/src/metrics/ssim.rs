@@ -161,7 +161,7 @@ fn compare_band(rows: [&[[f32; 3]]; 2], width: usize, weights: &[f64; TAPS], val
 fn fill_moments(reference: &[[f32; 3]], image: &[[f32; 3]], channel: usize, moments: &mut [Vec<f64>; 4]) {
     let [sums, differences, sum_squares, difference_squares] = moments;
     for (x, (&reference, &image)) in reference.iter().zip(image).enumerate() {
-        let (reference, image) = (f64::from(shown(reference)[channel]), f64::from(shown(image)[channel]));
+        let (reference, image) = (f64::from(shown(reference[channel])), f64::from(shown(image[channel])));
         let (sum, difference) = (reference + image, reference - image);
         (sums[x], differences[x]) = (sum, difference);
         (sum_squares[x], difference_squares[x]) = (sum * sum, difference * difference);

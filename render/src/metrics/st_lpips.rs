@@ -105,7 +105,7 @@ impl StLpips {
     fn input(&self, image: &Image) -> Maps {
         Maps::zero(3, image.height(), image.width()).fill(|channel, map| {
             for (value, &pixel) in map.iter_mut().zip(image.pixels()) {
-                *value = (2.0 * shown(pixel)[channel] - 1.0 - self.shift[channel]) / self.scale[channel];
+                *value = (2.0 * shown(pixel[channel]) - 1.0 - self.shift[channel]) / self.scale[channel];
             }
         })
     }

@@ -43,7 +43,7 @@ pub fn still(before: &Rendering, after: &Rendering) -> Mask {
     let place = |pixel: usize| pixel / width / BLOCK * across + pixel % width / BLOCK;
     let mut blocks = vec![Block::default(); across * a.height().div_ceil(BLOCK)];
     for (pixel, (&a, &b)) in a.pixels().iter().zip(b.pixels()).enumerate() {
-        let (a, b) = (shown(a), shown(b));
+        let (a, b) = (a.map(shown), b.map(shown));
         let block = &mut blocks[place(pixel)];
         block.pixels += 1.0;
         for (sum, (a, b)) in block.change.iter_mut().zip(a.iter().zip(b)) {
