@@ -1,4 +1,9 @@
 //! Peak signal to noise ratio, over a frame or the part of it that a scene covers.
+#![expect(clippy::arithmetic_side_effects, reason = "counts of pixels of a picture in memory")]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "components are 0, 1 and 2; a mask is as large as its picture; lanes are in runs of them"
+)]
 
 use super::{assert_same_size, shown};
 use crate::image::Image;
@@ -45,7 +50,6 @@ impl Mask {
 /// # Panics
 /// If the sizes differ.
 #[must_use]
-#[expect(clippy::arithmetic_side_effects, reason = "counts of pixels of a picture in memory")]
 pub fn psnr(reference: &Image, image: &Image) -> f64 {
     assert_same_size(reference, image);
     let [before, after] = [reference, image].map(|image| image.pixels().as_flattened().par_chunks(RUN));
@@ -95,8 +99,6 @@ fn square(before: f32, after: f32) -> f64 {
 /// # Panics
 /// If the sizes differ.
 #[must_use]
-#[expect(clippy::indexing_slicing, reason = "components are 0, 1 and 2; a mask is as large as its picture")]
-#[expect(clippy::arithmetic_side_effects, reason = "counts of pixels of a picture in memory")]
 pub fn psnr_masked(reference: &Image, image: &Image, mask: &Mask) -> Option<f64> {
     assert_eq!(
         mask.included.len(),
@@ -172,8 +174,6 @@ fn total(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> f6
 }
 
 /// Three sums at once.
-#[expect(clippy::indexing_slicing, reason = "components are 0, 1 and 2; a mask is as large as its picture")]
-#[expect(clippy::arithmetic_side_effects, reason = "counts of pixels of a picture in memory")]
 fn totals(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> [f64; 3] + Sync) -> [f64; 3] {
     assert_same_size(reference, image);
     let width = reference.width();
@@ -193,7 +193,6 @@ fn totals(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> [
     add(sums.into_iter())
 }
 
-#[expect(clippy::indexing_slicing, reason = "components are 0, 1 and 2; a mask is as large as its picture")]
 fn add(terms: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
     terms.fold([0.0; 3], |sum, term| [0, 1, 2].map(|component| sum[component] + term[component]))
 }
