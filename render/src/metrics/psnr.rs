@@ -52,9 +52,77 @@ impl Mask {
 #[must_use]
 pub fn psnr(reference: &Image, image: &Image) -> f64 {
     assert_same_size(reference, image);
-    let [before, after] = [reference, image].map(|image| image.pixels().as_flattened().par_chunks(RUN));
+    let sum = squared_error(reference.pixels(), image.pixels());
+    decibel(sum / (3 * reference.pixels().len()) as f64)
+}
+
+/// As [`psnr`], but the mean is over the pixels of the mask only. None if the mask is empty.
+///
+/// # Panics
+/// If the sizes differ.
+#[must_use]
+pub fn psnr_masked(reference: &Image, image: &Image, mask: &Mask) -> Option<f64> {
+    assert_eq!(
+        mask.included.len(),
+        reference.pixels().len(),
+        "the mask is of another size than the pictures"
+    );
+    assert_same_size(reference, image);
+    let count = mask.count();
+    let pixels = reference.pixels().iter().zip(image.pixels()).zip(&mask.included);
+    // Pixels that do not count are made equal.
+    let counted: Vec<[f32; 3]> =
+        pixels.map(|((&before, &after), &counts)| if counts { before } else { after }).collect();
+    (count > 0).then(|| decibel(squared_error(&counted, image.pixels()) / (3 * count) as f64))
+}
+
+/// PSNR of luma and the two colour differences, dB; infinite where a component is equal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct YuvPsnr {
+    /// Luma, Y'.
+    pub y: f64,
+    /// Blue difference, Cb.
+    pub u: f64,
+    /// Red difference, Cr.
+    pub v: f64,
+}
+
+impl YuvPsnr {
+    /// (6 Y + U + V) / 8, dB, of the three figures, each at most [`LOSSLESS_DB`]: grey pictures that differ in
+    /// luma only would be infinitely good otherwise.
+    ///
+    /// Source: the weights customary for video since the development of HEVC.
+    #[must_use]
+    pub fn weighted(&self) -> f64 {
+        let [y, u, v] = [self.y, self.u, self.v].map(|figure| figure.min(LOSSLESS_DB));
+        (6.0 * y + u + v) / 8.0
+    }
+}
+
+/// PSNR in full-range Y'CbCr of ITU-R BT.709, of components in 0..1 and -0.5..0.5 at the resolution of the
+/// picture, not rounded: Y' = 0.2126 R' + 0.7152 G' + 0.0722 B', Cb = (B' - Y') / 1.8556,
+/// Cr = (R' - Y') / 1.5748. The peak is 1 for each.
+///
+/// # Panics
+/// If the sizes differ.
+#[must_use]
+pub fn yuv_psnr(reference: &Image, image: &Image) -> YuvPsnr {
+    let count = reference.pixels().len() as f64;
+    // The components are linear, hence the component of a difference is the difference of the components.
+    let [y, u, v] = totals(reference, image, |[red, green, blue]| {
+        let luma = 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+        [luma, (blue - luma) / 1.8556, (red - luma) / 1.5748].map(|component| component * component)
+    })
+    .map(|sum| decibel(sum / count));
+    YuvPsnr { y, u, v }
+}
+
+/// The sum of the squared differences of all channels, as a screen shows them.
+fn squared_error(before: &[[f32; 3]], after: &[[f32; 3]]) -> f64 {
+    let [before, after] = [before, after].map(|pixels| pixels.as_flattened().par_chunks(RUN));
     let sums: Vec<f64> = before.zip(after).map(|run| pulp::Arch::new().dispatch(Run(run))).collect();
-    decibel(sums.iter().sum::<f64>() / (3 * reference.pixels().len()) as f64)
+    // Runs in their order, whoever compared them.
+    sums.into_iter().sum()
 }
 
 /// Channels that one thread compares at a time.
@@ -94,101 +162,23 @@ fn square(before: f32, after: f32) -> f64 {
     difference * difference
 }
 
-/// As [`psnr`], but the mean is over the pixels of the mask only. None if the mask is empty.
-///
-/// # Panics
-/// If the sizes differ.
-#[must_use]
-pub fn psnr_masked(reference: &Image, image: &Image, mask: &Mask) -> Option<f64> {
-    assert_eq!(
-        mask.included.len(),
-        reference.pixels().len(),
-        "the mask is of another size than the pictures"
-    );
-    let count = mask.count();
-    let sum: f64 =
-        total(
-            reference,
-            image,
-            |difference, pixel| {
-                if mask.included[pixel] { squares(difference).iter().sum() } else { 0.0 }
-            },
-        );
-    (count > 0).then(|| decibel(sum / (3 * count) as f64))
-}
-
-/// PSNR of luma and the two colour differences, dB; infinite where a component is equal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct YuvPsnr {
-    /// Luma, Y'.
-    pub y: f64,
-    /// Blue difference, Cb.
-    pub u: f64,
-    /// Red difference, Cr.
-    pub v: f64,
-}
-
-impl YuvPsnr {
-    /// (6 Y + U + V) / 8, dB, of the three figures, each at most [`LOSSLESS_DB`]: grey pictures that differ in
-    /// luma only would be infinitely good otherwise.
-    ///
-    /// Source: the weights customary for video since the development of HEVC.
-    #[must_use]
-    pub fn weighted(&self) -> f64 {
-        let [y, u, v] = [self.y, self.u, self.v].map(|figure| figure.min(LOSSLESS_DB));
-        (6.0 * y + u + v) / 8.0
-    }
-}
-
-/// PSNR in full-range Y'CbCr of ITU-R BT.709, of components in 0..1 and -0.5..0.5 at the resolution of the
-/// picture, not rounded: Y' = 0.2126 R' + 0.7152 G' + 0.0722 B', Cb = (B' - Y') / 1.8556,
-/// Cr = (R' - Y') / 1.5748. The peak is 1 for each.
-///
-/// # Panics
-/// If the sizes differ.
-#[must_use]
-pub fn yuv_psnr(reference: &Image, image: &Image) -> YuvPsnr {
-    let count = reference.pixels().len() as f64;
-    // The components are linear, hence the component of a difference is the difference of the components.
-    let [y, u, v] = totals(reference, image, |[red, green, blue], _| {
-        let luma = 0.2126 * red + 0.7152 * green + 0.0722 * blue;
-        squares([luma, (blue - luma) / 1.8556, (red - luma) / 1.5748])
-    })
-    .map(|sum| decibel(sum / count));
-    YuvPsnr { y, u, v }
-}
-
-fn squares(values: [f64; 3]) -> [f64; 3] {
-    values.map(|value| value * value)
-}
-
 /// PSNR, dB, of a mean square error where the peak is 1.
 fn decibel(mean_square_error: f64) -> f64 {
     // Not `-10.0 *`, which makes a negative zero of no signal at all.
     0.0 - 10.0 * libm::log10(mean_square_error)
 }
 
-/// The sum over all pixels of a function of the difference of their channels and their index.
-fn total(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> f64 + Sync) -> f64 {
-    totals(reference, image, |difference, pixel| [error(difference, pixel), 0.0, 0.0])[0]
-}
-
-/// Three sums at once.
-fn totals(reference: &Image, image: &Image, error: impl Fn([f64; 3], usize) -> [f64; 3] + Sync) -> [f64; 3] {
+/// The sums over all pixels of three functions of the difference of their channels.
+fn totals(reference: &Image, image: &Image, error: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> [f64; 3] {
     assert_same_size(reference, image);
     let width = reference.width();
     let rows = reference.pixels().par_chunks(width).zip(image.pixels().par_chunks(width));
-    let sums: Vec<[f64; 3]> = rows
-        .enumerate()
-        .map(|(row, (reference, image))| {
-            let pixels = reference.iter().zip(image).enumerate();
-            add(pixels.map(|(column, (&reference, &image))| {
-                let (reference, image) = (reference.map(shown), image.map(shown));
-                let difference = [0, 1, 2].map(|c| f64::from(reference[c]) - f64::from(image[c]));
-                error(difference, row * width + column)
-            }))
-        })
-        .collect();
+    let of_pixel = |(&before, &after): (&[f32; 3], &[f32; 3])| {
+        let (before, after) = (before.map(shown), after.map(shown));
+        error([0, 1, 2].map(|channel| f64::from(before[channel]) - f64::from(after[channel])))
+    };
+    let sums: Vec<[f64; 3]> =
+        rows.map(|(before, after)| add(before.iter().zip(after).map(of_pixel))).collect();
     // Rows in their order, whoever computed them.
     add(sums.into_iter())
 }
