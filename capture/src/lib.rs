@@ -3,6 +3,7 @@
 //! * [`Photograph`] is a picture with the camera that took it;
 //! * [`load_photographs`] and [`load_points`] open what [`read_capture`](splatstream_render::camera::read_capture) found;
 //! * [`trainer`] makes a frame of Gaussians of photographs and points;
+//! * [`follow`] makes one sequence of frames that were trained apart;
 //! * [`simulator`] makes captures of a scene that is known exactly: pictures, cameras, points.
 //!
 //! Results are equal for any number of threads and on every machine: single IEEE operations in a stated order, `libm` for the
@@ -22,6 +23,8 @@ pub mod trainer;
 
 mod load;
 mod photograph;
+mod tracker;
 
 pub use load::{LoadError, load_photographs, load_points};
 pub use photograph::{Photograph, SizeError};
+pub use tracker::{Followed, Following, follow};

@@ -31,7 +31,7 @@ mod start;
 
 pub use start::{start_at_random, start_of_points};
 
-use crate::photograph::Photograph;
+use crate::photograph::{Photograph, SizeError};
 use density::Density;
 use schedule::Schedule;
 use splatstream_gaussians::random::SplitMix64;
@@ -52,6 +52,9 @@ pub struct Settings {
     pub densify: bool,
     /// How long the first steps are, of those for a start from points; the last are as long for every pace.
     pub pace: f32,
+    /// How firmly each value stays what it is at the start, 0 to 1: the share of each step that is taken back
+    /// ([`Adam::step_held`]). Not used where Gaussians are added and removed.
+    pub hold: f32,
     /// What pictures are judged by.
     pub loss: Loss,
     /// Red, green and blue behind everything, 0 to 1.
@@ -75,6 +78,7 @@ impl Default for Settings {
             sh_degree: 2,
             densify: true,
             pace: 1.0,
+            hold: 0.0,
             loss: Loss::default(),
             background: [0.0; 3],
             antialiased: false,
@@ -98,6 +102,9 @@ pub enum TrainError {
     /// A fault of this program.
     #[error("{0}; please report this")]
     Frame(#[from] FrameError),
+    /// A fault of this program.
+    #[error("{0}; please report this")]
+    Picture(#[from] SizeError),
 }
 
 /// What a step came to.
@@ -117,6 +124,8 @@ pub struct Trainer<'a> {
     settings: Settings,
     schedule: Schedule,
     frame: GaussianFrame,
+    /// The start, where values are held to it.
+    anchor: Option<GaussianFrame>,
     adam: Adam,
     gradients: Gradients,
     density: Density,
@@ -152,6 +161,7 @@ impl<'a> Trainer<'a> {
             gradients: Gradients::zero(&frame),
             density: Density::new(frame.len()),
             random: SplitMix64::new(settings.seed),
+            anchor: (settings.hold > 0.0 && !settings.densify).then(|| frame.clone()),
             frame,
             settings,
             iteration: 0,
@@ -206,7 +216,14 @@ impl<'a> Trainer<'a> {
         if self.settings.densify {
             self.density.see(&footprints, photograph.camera());
         }
-        self.adam.step(&mut self.frame, &self.gradients, &self.schedule.rates(self.iteration))?;
+        let rates = self.schedule.rates(self.iteration);
+        let (frame, gradients) = (&mut self.frame, &self.gradients);
+        match &self.anchor {
+            Some(anchor) => {
+                self.adam.step_held(frame, gradients, &rates, (anchor, self.settings.hold))?;
+            }
+            None => self.adam.step(frame, gradients, &rates)?,
+        }
         self.frame = std::mem::take(&mut self.frame).with_unit_rotations();
         Ok(judged.value)
     }
@@ -238,6 +255,8 @@ impl<'a> Trainer<'a> {
         planes.sh.resize(sh_planes(degree), vec![0.0; planes.opacity_logit.len()]);
         self.frame = GaussianFrame::from_planes(degree, planes)?.with_antialiased(antialiased);
         self.adam.raise_sh_degree(degree);
+        // Without growth the degree rises before the first step: this is still the start.
+        self.anchor = self.anchor.take().map(|_| self.frame.clone());
         self.gradients = Gradients::zero(&self.frame);
         Ok(())
     }

@@ -82,6 +82,20 @@ fn a_warm_start_keeps_every_gaussian_in_its_row_and_follows_what_moves() {
     assert_eq!((after.len(), after.sh_degree()), (before.len(), before.sh_degree()));
     let [stale, fresh] = [&before, &after].map(|frame| psnr(frame, &others));
     assert!(fresh > stale + 0.5, "{stale} {fresh}");
+    // Held, it follows as well, and much of it has not changed at all.
+    let held = trained(&next, before.clone(), Settings { hold: 0.3, ..warm });
+    let equal = |frame: &GaussianFrame| {
+        let values = frame.planes().iter().flatten().zip(before.planes().iter().flatten());
+        let (mut equal, mut all) = (0, 0);
+        for (value, before) in values {
+            equal += usize::from(value == before);
+            all += 1;
+        }
+        equal as f64 / f64::from(all)
+    };
+    let follows = psnr(&held, &others);
+    assert!(follows > stale + 0.3, "{stale} {follows}");
+    assert!(equal(&after) < 0.2 && equal(&held) > 0.35, "{} {}", equal(&after), equal(&held));
 }
 
 #[test]

@@ -151,8 +151,7 @@ impl CameraArgs {
         description: &SceneDescription,
     ) -> Result<Vec<Camera>, Failure> {
         let height = self.height.unwrap_or(HEIGHT);
-        let said = self.up_axis(description);
-        let up = direction(said).or_else(|| direction(UpGuess::of(frame).axis)).unwrap_or_default();
+        let up = self.up(frame, description);
         match views {
             Some(Views::Ring(count)) => Ok(ring(frame, up, *count, height)),
             Some(Views::Forward(count)) => Ok(forward(frame, up, *count, height)),
@@ -160,6 +159,12 @@ impl CameraArgs {
             None if description.cameras.is_empty() => Ok(ring(frame, up, COUNT, height)),
             None => Ok(of_stream(description, height)),
         }
+    }
+
+    /// What points up, as the user, the stream, or else a guess from the first frame says.
+    pub(crate) fn up(&self, frame: &GaussianFrame, description: &SceneDescription) -> Up {
+        let said = direction(self.up_axis(description));
+        said.or_else(|| direction(UpGuess::of(frame).axis)).unwrap_or_default()
     }
 
     /// The axis that the user, or else the stream, says points up.

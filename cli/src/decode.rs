@@ -5,6 +5,8 @@ mod loss;
 mod report;
 mod target;
 
+pub(crate) use target::{earlier_frames, remove_frames};
+
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::FrameRange;

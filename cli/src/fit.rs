@@ -9,7 +9,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
-use crate::numbers::FrameRange;
+use crate::numbers::{FrameRange, parse_share};
 use crate::output_file::{OutputFile, check_directory, make_directory, refuse_standard};
 use crate::stream_file::LimitArgs;
 use captures::Captures;
@@ -70,6 +70,10 @@ pub(crate) struct Fit {
     /// Steps of each frame that starts from the one before.
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
     warm_iterations: u32,
+    /// With --warm: how firmly values stay what they were in the frame before, 0 to 1. More makes smaller streams that
+    /// follow the pictures less.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.2, value_parser = parse_share)]
+    hold: f64,
     /// Train for renderers that make up for their low-pass filter.
     #[arg(long)]
     antialiased: bool,

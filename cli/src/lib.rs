@@ -34,6 +34,7 @@ mod setting_names;
 mod simulate;
 mod stream_file;
 mod structure;
+mod track;
 mod train;
 mod unfinished;
 mod unpackage;
@@ -92,6 +93,7 @@ enum Command {
     Train(train::Train),
     Simulate(simulate::Simulate),
     Fit(fit::Fit),
+    Track(track::Track),
     Conformance(conformance::Conformance),
     Completions(completions::Completions),
     Manual(manual::Manual),
@@ -165,6 +167,7 @@ impl Command {
             Self::Train(command) => command.run(console),
             Self::Simulate(command) => command.run(console),
             Self::Fit(command) => command.run(console),
+            Self::Track(command) => command.run(console),
             Self::Conformance(command) => command.run(console),
             Self::Completions(command) => command.run(console),
             Self::Manual(command) => command.run(console),

@@ -56,6 +56,12 @@ impl FrameRange {
     }
 }
 
+/// A share, 0 to 1.
+pub(crate) fn parse_share(text: &str) -> Result<f64, String> {
+    let share = text.parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or_else(|| "write a share, 0 to 1".to_owned())
+}
+
 /// Frames per second as ticks per second and ticks per frame: `30`, `29.97` or `30000/1001`.
 pub(crate) fn parse_frame_rate(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("'{text}' is not a frame rate; write 30, 29.97 or 30000/1001");

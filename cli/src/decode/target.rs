@@ -77,12 +77,13 @@ impl Target {
         if is_standard(path) {
             refuse_terminal(io::stdout().is_terminal(), path)?;
         }
+        let inputs = vec![wanted.input.to_path_buf()];
         Ok(Self {
             path: path.to_path_buf(),
             format: format.or(named).unwrap_or(Format::Ply),
             is_directory,
-            inputs: vec![wanted.input.to_path_buf()],
-            stale: if is_directory { stale(&wanted)? } else { Vec::new() },
+            stale: if is_directory { earlier_frames(path, &inputs, wanted.force)? } else { Vec::new() },
+            inputs,
             losses: Losses::default(),
         })
     }
@@ -92,9 +93,7 @@ impl Target {
         if self.is_directory {
             make_directory(&self.path)?;
         }
-        for path in self.stale.drain(..) {
-            std::fs::remove_file(&path).map_err(|error| Failure::file("remove", &path, &error))?;
-        }
+        remove_frames(&mut self.stale)?;
         let path = self.path_of(number);
         let bytes = self
             .format
@@ -138,21 +137,29 @@ fn is_directory(path: &Path) -> Result<bool, Failure> {
     Ok(true)
 }
 
-/// The frames of an earlier run in a directory, if they may be removed.
-fn stale(wanted: &Wanted<'_>) -> Result<Vec<PathBuf>, Failure> {
-    let Ok(entries) = std::fs::read_dir(wanted.path) else { return Ok(Vec::new()) };
+/// The frames of an earlier run in a directory, if they may be removed (`force`); none of them may be among `inputs`.
+pub(crate) fn earlier_frames(path: &Path, inputs: &[PathBuf], force: bool) -> Result<Vec<PathBuf>, Failure> {
+    let Ok(entries) = std::fs::read_dir(path) else { return Ok(Vec::new()) };
     let mut stale: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     stale.retain(|path| is_frame(path) && !path.is_dir());
-    if !stale.is_empty() && !wanted.force {
-        let (path, count) = (wanted.path.display(), stale.len());
+    stale.iter().try_for_each(|path| refuse_inputs(path, inputs))?;
+    if !stale.is_empty() && !force {
+        let (path, count) = (path.display(), stale.len());
         let files = if count == 1 { "1 file" } else { &format!("{count} files") };
         return Err(Failure::Usage(format!(
             "{path}: the directory has {files} with names of frames, probably from an earlier run; \
              give another directory, or --force to remove them"
         )));
     }
-    stale.iter().try_for_each(|path| refuse_inputs(path, &[wanted.input.to_path_buf()]))?;
     Ok(stale)
+}
+
+/// Removes frames of an earlier run.
+pub(crate) fn remove_frames(stale: &mut Vec<PathBuf>) -> Result<(), Failure> {
+    let mut each = stale.drain(..);
+    each.try_for_each(|path| {
+        std::fs::remove_file(&path).map_err(|error| Failure::file("remove", &path, &error))
+    })
 }
 
 /// Whether a file has a name that frames are given.

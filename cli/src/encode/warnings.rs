@@ -3,7 +3,7 @@
 use super::pictures::Goal;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
-use splatstream_encoder::{Dropped, Isolated, Report, Settings, Size, VerifiedFrame};
+use splatstream_encoder::{Dropped, FrameReport, Isolated, Report, Settings, Size, Structure, VerifiedFrame};
 use splatstream_format::syntax::FrameType;
 
 /// A PSNR is missed by more than this in the views that steps are fitted in, decibels.
@@ -176,23 +176,31 @@ fn pulses(report: &Report) -> Option<Warning> {
     })
 }
 
+/// What helps frames that have nothing in common.
+const TRACK: &str = "`splatstream track` makes one sequence of frames that were trained apart";
+
 /// A sequence in which hardly any frame can be predicted.
 fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
-    if report.stands_alone {
-        let message = "no layers, and every frame by itself: frames have too little in common with the ones before to be \
-                       predicted for fewer bytes; --all-intra does the same, and faster";
-        return Some(Warning::new("short-gops", message.to_owned()));
-    }
+    let alone = "frames have too little in common with the ones before to be predicted for fewer bytes";
     let asked = (report.frames as usize).div_ceil(settings.gop.max(1) as usize);
     let count = report.gops.len();
-    (count > 2 * asked && 2 * count > report.frames as usize).then(|| {
-        let message = format!(
-            "{count} GOPs for {} frames: most frames have too little in common with the one before to be predicted; \
-             --all-intra codes them as small, and faster",
+    let is_intra = |frame: &FrameReport| frame.frame_type == FrameType::Intra;
+    let may_predict = settings.structure != Structure::Intra && (count as u64) < u64::from(report.frames);
+    let message = if report.stands_alone {
+        format!(
+            "no layers, and every frame by itself: {alone}; --all-intra does the same, and faster; {TRACK}"
+        )
+    } else if may_predict && report.coded.iter().all(is_intra) {
+        format!("no frame is predicted: {alone}; --all-intra does the same, and faster; {TRACK}")
+    } else if count > 2 * asked && 2 * count > report.frames as usize {
+        format!(
+            "{count} GOPs for {} frames: most {alone}; --all-intra codes them as small, and faster; {TRACK}",
             report.frames
-        );
-        Warning::new("short-gops", message)
-    })
+        )
+    } else {
+        return None;
+    };
+    Some(Warning::new("short-gops", message))
 }
 
 /// Frames that fitting to pictures has left as they are.

@@ -98,7 +98,8 @@ impl<'a> Training<'a> {
     }
 
     fn settings(&self, is_warm: bool, is_given: bool) -> Settings {
-        let Fit { iterations, warm_iterations, gaussians, sh_degree, antialiased, seed, .. } = *self.fit;
+        let Fit { iterations, warm_iterations, gaussians, sh_degree, antialiased, seed, hold, .. } =
+            *self.fit;
         let settings = Settings {
             iterations,
             gaussians: gaussians as usize,
@@ -111,9 +112,13 @@ impl<'a> Training<'a> {
         match (is_given, is_warm) {
             (false, false) => settings,
             (true, _) => Settings { densify: false, pace: Settings::NEAR, ..settings },
-            (false, true) => {
-                Settings { densify: false, pace: Settings::NEAR, iterations: warm_iterations, ..settings }
-            }
+            (false, true) => Settings {
+                densify: false,
+                pace: Settings::NEAR,
+                hold: hold as f32,
+                iterations: warm_iterations,
+                ..settings
+            },
         }
     }
 

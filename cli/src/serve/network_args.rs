@@ -1,6 +1,7 @@
 //! Arguments that make a bad network.
 
 use crate::failure::Failure;
+use crate::numbers::parse_share;
 use clap::Args;
 use splatstream_stream::server::Network;
 use splatstream_stream::simulation::Trace;
@@ -20,10 +21,10 @@ pub(super) struct NetworkArgs {
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=60_000))]
     latency: u32,
     /// Share of answers whose connection is closed in the middle of their body, 0 to 1.
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse_share)]
     drop: f64,
     /// Share of requests that are answered with 503, 0 to 1.
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse_share)]
     fail: f64,
     /// Decides, with the number of each request, which ones --drop and --fail take.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -45,9 +46,4 @@ impl NetworkArgs {
             seed: self.seed,
         })
     }
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    let share = text.parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
-    share.ok_or_else(|| "write a share, 0 to 1".to_owned())
 }

@@ -29,4 +29,5 @@ mod round_trip;
 mod serve;
 mod shards;
 mod targets;
+mod track;
 mod view;

@@ -121,6 +121,47 @@ impl Adam {
         gradients: &Gradients,
         rates: &Rates,
     ) -> Result<(), GradientError> {
+        self.descend(frame, gradients, rates).map(|_| ())
+    }
+
+    /// Takes one step, and then takes each value back to that of `anchor` by a share `hold` of its rate, or all the way where
+    /// that is less: the soft threshold of the sum of all changes, each in units of its rate.
+    ///
+    /// A step has the length of its rate where the slopes of the last steps agree, and less where they do not. So a value
+    /// stays exactly what the anchor has unless its slopes agree by more than `hold`, 0 to 1. Gaussians that take no step are
+    /// not taken back either.
+    ///
+    /// Source: Parikh, Boyd, "Proximal algorithms", 2014: the proximal operator of the l1 norm.
+    ///
+    /// # Errors
+    /// As [`Adam::step`], and an anchor of another size or SH degree; then nothing is changed.
+    pub fn step_held(
+        &mut self,
+        frame: &mut GaussianFrame,
+        gradients: &Gradients,
+        rates: &Rates,
+        (anchor, hold): (&GaussianFrame, f32),
+    ) -> Result<(), GradientError> {
+        gradients.check(anchor)?;
+        let scales = self.descend(frame, gradients, rates)?;
+        let mut values = frame.planes_mut();
+        let values = values.iter_mut().zip(anchor.planes().iter());
+        for ((values, anchors), rate) in values.zip(rates.of_planes()) {
+            let given = anchors.par_chunks(CHUNK).zip(scales.par_chunks(CHUNK));
+            values.par_chunks_mut(CHUNK).zip(given).for_each(|(values, (anchors, scales))| {
+                take_back(values, anchors, scales, hold * rate);
+            });
+        }
+        Ok(())
+    }
+
+    /// The step itself; gives the factors that correct the means of each Gaussian, as [`Adam::count`] does.
+    fn descend(
+        &mut self,
+        frame: &mut GaussianFrame,
+        gradients: &Gradients,
+        rates: &Rates,
+    ) -> Result<Vec<[f32; 2]>, GradientError> {
         gradients.check(frame)?;
         let (own, needed) = ((self.bias.len(), self.sh_degree), (frame.len(), frame.sh_degree()));
         if own != needed {
@@ -139,7 +180,7 @@ impl Adam {
                 },
             );
         }
-        Ok(())
+        Ok(scales)
     }
 
     /// Counts a step of each Gaussian that has slopes; gives the factors that correct its two means, 0 where there is no step.
@@ -221,5 +262,14 @@ fn descend(
         *first = if steps { next } else { *first };
         *second = if steps { next_square } else { *second };
         *value = if steps { *value - change } else { *value };
+    }
+}
+
+/// Takes values of Gaussians that took a step back to those of an anchor, by `most` at most.
+fn take_back(values: &mut [f32], anchors: &[f32], scales: &[[f32; 2]], most: f32) {
+    for ((value, &anchor), &[scale, _]) in values.iter_mut().zip(anchors).zip(scales) {
+        let change = *value - anchor;
+        let held = if change.abs() <= most { anchor } else { *value - most.copysign(change) };
+        *value = if scale > 0.0 { held } else { *value };
     }
 }

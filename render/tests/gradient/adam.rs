@@ -69,6 +69,41 @@ fn steps_are_those_of_the_algorithm() {
 }
 
 #[test]
+fn what_is_held_goes_back_towards_its_anchor_but_not_past_it() {
+    let anchor = random(7, 40, 1, false);
+    let (hold, rates) = (0.4, of_planes());
+    let (mut held, mut adam) = (anchor.clone(), Adam::new(&anchor));
+    let (mut still, mut moved) = (0, 0);
+    for seed in 0..12 {
+        let gradients = slopes_of(&held, seed);
+        let (mut free, mut freely) = (held.clone(), adam.clone());
+        freely.step(&mut free, &gradients, &RATES).unwrap();
+        adam.step_held(&mut held, &gradients, &RATES, (&anchor, hold)).unwrap();
+        assert!(adam == freely, "the means are those of a step that is not held");
+        for (plane, rate) in rates.iter().enumerate() {
+            for row in 0..40 {
+                let [anchor, free, held] =
+                    [&anchor, &free, &held].map(|frame| f64::from(values(frame)[plane][row]));
+                let expected =
+                    anchor + (free - anchor).signum() * ((free - anchor).abs() - 0.4 * rate).max(0.0);
+                let stays = gradients.planes().iter().all(|plane| plane[row] == 0.0);
+                assert!((held - expected).abs() < 1e-6 || stays, "{anchor} {free} {held} {expected}");
+                if held == anchor { still += 1 } else { moved += 1 }
+            }
+        }
+    }
+    assert!(still > 1000 && moved > 1000, "{still} {moved}");
+    // Not held at all, a step is a step.
+    let gradients = slopes_of(&held, 99);
+    let (mut free, mut freely) = (held.clone(), adam.clone());
+    freely.step(&mut free, &gradients, &RATES).unwrap();
+    adam.step_held(&mut held, &gradients, &RATES, (&anchor, 0.0)).unwrap();
+    assert_eq!(values(&held), values(&free));
+    let other = anchor.select(&[0, 1]);
+    assert!(adam.step_held(&mut held, &gradients, &RATES, (&other, 0.5)).is_err());
+}
+
+#[test]
 fn any_number_of_threads_takes_the_same_steps() {
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
