@@ -30,12 +30,13 @@ pub struct Slots {
     capacity: usize,
     sh_degree: u8,
     planes: Planes,
-    /// The Gaussians of the last frame, row by row: their identities and their slots.
-    rows: Vec<(u32, usize)>,
+    /// The Gaussians of the last frame, row by row: their identities, and their slots.
+    identities: Vec<u32>,
+    rows: Vec<u32>,
     /// The slot of each identity, once somebody asks.
     slot_of: OnceLock<ByIdentity>,
     /// Slots without a Gaussian; the lowest is taken first.
-    free: Vec<usize>,
+    free: Vec<u32>,
     is_dirty: Vec<bool>,
 }
 
@@ -57,7 +58,7 @@ pub struct Update {
 }
 
 /// Numbers by identity.
-type ByIdentity = HashMap<u32, usize, BuildHasherDefault<Spread>>;
+type ByIdentity = HashMap<u32, u32, BuildHasherDefault<Spread>>;
 
 /// Rows of the last frame that are looked at for the next Gaussian. Most keep their order, and few disappear at once; the
 /// others are found by their identity.
@@ -66,6 +67,12 @@ const AHEAD: usize = 16;
 /// Opacity before the sigmoid of a slot without a Gaussian.
 const ABSENT: f32 = f32::NEG_INFINITY;
 
+/// The slot of a Gaussian that has none yet. Planes of as many values do not fit in memory.
+const NONE: u32 = u32::MAX;
+
+/// Slots that are looked at for changes at once.
+const GROUP: usize = 32;
+
 impl Slots {
     /// Slots for frames of at most so many Gaussians.
     pub fn new(capacity: usize) -> Self {
@@ -73,9 +80,10 @@ impl Slots {
             capacity,
             sh_degree: 0,
             planes: empty(capacity),
+            identities: Vec::new(),
             rows: Vec::new(),
             slot_of: OnceLock::new(),
-            free: (0..capacity).rev().collect(),
+            free: (0..u32::try_from(capacity).unwrap_or(NONE)).rev().collect(),
             is_dirty: vec![false; capacity],
         }
     }
@@ -92,7 +100,8 @@ impl Slots {
 
     /// The slot of the Gaussian with an identity, if it is in the last frame.
     pub fn slot(&self, identity: u32) -> Option<usize> {
-        self.slot_of.get_or_init(|| self.rows.iter().copied().collect()).get(&identity).copied()
+        let pairs = || self.identities.iter().copied().zip(self.rows.iter().copied());
+        self.slot_of.get_or_init(|| pairs().collect()).get(&identity).map(|&slot| slot as usize)
     }
 
     /// Shows a frame.
@@ -111,88 +120,131 @@ impl Slots {
             self.planes.sh.resize_with(count, || vec![0.0; self.capacity]);
         }
         let (slots, gone) = self.found(frame.identities());
-        let kept = slots.iter().flatten().count();
+        let kept = slots.iter().filter(|&&slot| slot != NONE).count();
         gone.iter().for_each(|&slot| self.clear(slot));
         self.free.sort_unstable_by(|a, b| b.cmp(a));
-        let slots = self.place(frame.identities(), slots);
-        write(&mut self.planes, gaussians.planes(), &slots, &mut self.is_dirty);
+        self.place(frame.identities(), slots);
+        write(&mut self.planes, gaussians.planes(), &runs(&self.rows), &mut self.is_dirty);
         let (appeared, disappeared) = (frame.len() - kept, gone.len());
         Ok(Update { dirty: self.take_dirty(), kept, appeared, disappeared, has_new_planes })
     }
 
     /// The slots of those identities that were in the last frame, and the slots of Gaussians that are gone.
-    fn found(&self, identities: &[u32]) -> (Vec<Option<usize>>, Vec<usize>) {
-        let mut slots = vec![None; identities.len()];
+    fn found(&self, identities: &[u32]) -> (Vec<u32>, Vec<u32>) {
+        let mut slots = vec![NONE; identities.len()];
         let (mut left, mut missing) = (Vec::new(), Vec::new());
-        let mut rest = self.rows.as_slice();
+        let (mut rest, mut rest_slots) = (self.identities.as_slice(), self.rows.as_slice());
         for (&identity, slot) in identities.iter().zip(&mut slots) {
-            match rest.iter().take(AHEAD).position(|(other, _)| *other == identity) {
+            match rest.iter().take(AHEAD).position(|&other| other == identity) {
                 Some(skipped) => {
-                    let (passed, from) = rest.split_at(skipped);
-                    left.extend_from_slice(passed);
-                    if let Some((&(_, found), after)) = from.split_first() {
-                        *slot = Some(found);
-                        rest = after;
-                    }
+                    let (passed, passed_slots) = (rest.iter().take(skipped), rest_slots.iter().take(skipped));
+                    left.extend(passed.copied().zip(passed_slots.copied()));
+                    *slot = rest_slots.get(skipped).copied().unwrap_or(NONE);
+                    rest = rest.get(skipped + 1..).unwrap_or_default();
+                    rest_slots = rest_slots.get(skipped + 1..).unwrap_or_default();
                 }
                 None => missing.push((identity, slot)),
             }
         }
-        left.extend_from_slice(rest);
+        left.extend(rest.iter().copied().zip(rest_slots.iter().copied()));
         let mut gone = Vec::new();
         let mut others = ByIdentity::default();
         for (identity, slot) in left {
             // Identities are numbers of 32 bits: two Gaussians may have the same one.
             gone.extend(others.insert(identity, slot));
         }
-        missing.into_iter().for_each(|(identity, slot)| *slot = others.remove(&identity));
+        missing.into_iter().for_each(|(identity, slot)| *slot = others.remove(&identity).unwrap_or(NONE));
         gone.extend(others.into_values());
         (slots, gone)
     }
 
     /// Gives the Gaussians that have none a slot.
-    fn place(&mut self, identities: &[u32], slots: Vec<Option<usize>>) -> Vec<usize> {
+    fn place(&mut self, identities: &[u32], mut slots: Vec<u32>) {
         self.slot_of.take();
         // There are as many as are needed: the frame fits.
-        let slots: Vec<usize> =
-            slots.into_iter().map(|slot| slot.or_else(|| self.free.pop()).unwrap_or(usize::MAX)).collect();
-        self.rows.clear();
-        self.rows.extend(identities.iter().copied().zip(slots.iter().copied()));
-        slots
+        let without = slots.iter_mut().filter(|slot| **slot == NONE);
+        without.for_each(|slot| *slot = self.free.pop().unwrap_or(NONE));
+        self.rows = slots;
+        self.identities.clear();
+        self.identities.extend_from_slice(identities);
     }
 
-    fn clear(&mut self, slot: usize) {
+    fn clear(&mut self, slot: u32) {
         self.free.push(slot);
+        let slot = slot as usize;
         let set = |plane: &mut Vec<f32>, value| plane.get_mut(slot).into_iter().for_each(|to| *to = value);
         self.planes.iter_mut().for_each(|plane| set(plane, 0.0));
         set(&mut self.planes.opacity_logit, ABSENT);
         self.is_dirty.get_mut(slot).into_iter().for_each(|dirty| *dirty = true);
     }
 
+    /// Runs of slots that have changed; none has after that.
     fn take_dirty(&mut self) -> Vec<Range<usize>> {
         let mut ranges: Vec<Range<usize>> = Vec::new();
-        for (slot, is_dirty) in self.is_dirty.iter_mut().enumerate() {
-            if !core::mem::take(is_dirty) {
-                continue;
+        let mut add = |slots: Range<usize>| match ranges.last_mut() {
+            Some(last) if last.end == slots.start => last.end = slots.end,
+            _ => ranges.push(slots),
+        };
+        for (number, group) in self.is_dirty.chunks_mut(GROUP).enumerate() {
+            let first = number * GROUP;
+            match &*group {
+                all if *all == [true; GROUP] => add(first..first + GROUP),
+                none if *none == [false; GROUP] => continue,
+                some => {
+                    let slots = some.iter().enumerate().filter(|(_, is_dirty)| **is_dirty);
+                    slots.for_each(|(slot, _)| add(first + slot..first + slot + 1));
+                }
             }
-            match ranges.last_mut() {
-                Some(last) if last.end == slot => last.end = slot + 1,
-                _ => ranges.push(slot..slot + 1),
-            }
+            group.fill(false);
         }
         ranges
     }
 }
 
+/// Rows that follow each other in slots that do so too.
+struct Run {
+    rows: Range<usize>,
+    /// The slot of the first.
+    slot: usize,
+}
+
+/// The runs of the slots of all rows. Gaussians seldom change their order, so that there are few.
+fn runs(slots: &[u32]) -> Vec<Run> {
+    let mut first = 0;
+    let follow = slots.chunk_by(|slot, next| slot.checked_add(1) == Some(*next));
+    let run = |slots: &[u32]| {
+        let rows = first..first + slots.len();
+        first = rows.end;
+        Run { rows, slot: slots.first().map_or(0, |&slot| slot as usize) }
+    };
+    follow.map(run).collect()
+}
+
 /// Writes Gaussians to their slots, and takes note of those that change.
-fn write(to: &mut Planes, from: &Planes, slots: &[usize], is_dirty: &mut [bool]) {
+fn write(to: &mut Planes, from: &Planes, runs: &[Run], is_dirty: &mut [bool]) {
     for (to, from) in to.iter_mut().zip(from.iter()) {
-        for (&slot, value) in slots.iter().zip(from) {
-            if let (Some(to), Some(is_dirty)) = (to.get_mut(slot), is_dirty.get_mut(slot)) {
-                *is_dirty |= to.to_bits() != value.to_bits();
-                *to = *value;
+        for Run { rows, slot } in runs {
+            let slots = *slot..slot.saturating_add(rows.len());
+            if let (Some(to), Some(is_dirty), Some(from)) =
+                (to.get_mut(slots.clone()), is_dirty.get_mut(slots), from.get(rows.clone()))
+            {
+                let groups = to.chunks_mut(GROUP).zip(is_dirty.chunks_mut(GROUP)).zip(from.chunks(GROUP));
+                groups.for_each(|((to, is_dirty), from)| write_group(to, from, is_dirty));
             }
         }
+    }
+}
+
+/// Writes a plane of at most [`GROUP`] slots.
+fn write_group(to: &mut [f32], from: &[f32], is_dirty: &mut [bool]) {
+    // What an earlier plane has changed is not compared again.
+    if *is_dirty == [true; GROUP] {
+        to.copy_from_slice(from);
+        return;
+    }
+    for ((to, is_dirty), value) in to.iter_mut().zip(is_dirty).zip(from) {
+        *is_dirty |= to.to_bits() != value.to_bits();
+        *to = *value;
     }
 }
 
