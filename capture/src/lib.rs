@@ -27,4 +27,4 @@ mod tracker;
 
 pub use load::{LoadError, load_photographs, load_points};
 pub use photograph::{Photograph, SizeError};
-pub use tracker::{Followed, Following, follow};
+pub use tracker::{Followed, Following, follow, in_common};

@@ -13,7 +13,7 @@ use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::Args;
 use report::{Origin, Tracked, TrackedFrame};
-use splatstream_capture::{Following, follow};
+use splatstream_capture::{Following, follow, in_common};
 use splatstream_chart::Progress as _;
 use splatstream_encoder::FrameSource;
 use splatstream_files::{ply, read_scene};
@@ -22,12 +22,16 @@ use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// Frames that have at least this share of their Gaussians in common with the one before are sequences already.
+const MOST: f64 = 0.5;
+
 /// Make one sequence of frames that were trained apart.
 ///
 /// Frames that were trained each by itself have nothing in common that could be predicted, and what stands still flickers. Here
 /// the Gaussians of a frame are trained on until they look like the next, in pictures drawn of it, and change no more than that
 /// takes. Streams of the result are a third to a half as large. Every so many frames one is kept as it is, as the first of a GOP,
-/// so that what comes into view is taken up.
+/// so that what comes into view is taken up. So are frames that have most of their Gaussians in common with the one before:
+/// encode predicts these better as they are.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  splatstream track frames/ -o tracked/ --cameras capture/transforms.json\n  \
@@ -68,6 +72,9 @@ pub(crate) struct Track {
     /// A frame that comes no closer to its source than this PSNR in decibels is kept as it is: the scene was cut.
     #[arg(long, value_name = "DB", default_value_t = 20.0)]
     cut: f64,
+    /// Track frames too that have most of their Gaussians in common with the one before.
+    #[arg(long)]
+    all: bool,
     #[command(flatten)]
     background: BackgroundArg,
     /// Frames to make, A..B: from the first of the GOP that A is in, up to and without B. No GOP needs another, so that many
@@ -166,10 +173,15 @@ impl Track {
         number: u32,
     ) -> Result<TrackedFrame, Failure> {
         let begin = Instant::now();
-        let Some(before) = before.filter(|_| !source.is_empty()) else {
+        let keep = |origin, common| {
             OutputFile::write_apart(path, inputs, &ply::write(source))?;
-            return Ok(TrackedFrame::source());
+            Ok(TrackedFrame::source(origin, common))
         };
+        let Some(before) = before.filter(|_| !source.is_empty()) else { return keep(Origin::Source, None) };
+        let common = in_common(source, &before);
+        if common >= MOST && !self.all {
+            return keep(Origin::Alike, Some(common));
+        }
         // Other views for every frame: what one frame's views do not show, those of the next do.
         let settings = Following { seed: self.seed.wrapping_add(number.into()), ..settings.clone() };
         let progress = Progress::steps(settings.iterations);
@@ -183,6 +195,7 @@ impl Track {
         Ok(TrackedFrame {
             origin: if is_cut { Origin::Cut } else { Origin::Tracked },
             kept: false,
+            in_common: Some(common),
             psnr_before_db: Some(followed.psnr_before_db),
             psnr_db: Some(followed.psnr_db),
             seconds: begin.elapsed().as_secs_f64(),

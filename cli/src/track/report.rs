@@ -33,6 +33,8 @@ pub(super) struct TrackedFrame {
     pub(super) origin: Origin,
     /// Whether an earlier run has left it.
     pub(super) kept: bool,
+    /// The share of its Gaussians that the frame before has too, 0 to 1; null where nobody looked.
+    pub(super) in_common: Option<f64>,
     /// How close the frame before comes to the source, and what was trained from it; null where nothing was.
     pub(super) psnr_before_db: Option<f64>,
     pub(super) psnr_db: Option<f64>,
@@ -43,8 +45,10 @@ pub(super) struct TrackedFrame {
 #[derive(Serialize, Clone, Copy, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Origin {
-    /// The source, as it is.
+    /// The source, as it is: the first of a GOP.
     Source,
+    /// The source as well, since it has most of its Gaussians in common with the frame before.
+    Alike,
     /// The source as well, since tracking came too little close to it.
     Cut,
     /// The frame before.
@@ -54,12 +58,13 @@ pub(super) enum Origin {
 }
 
 impl TrackedFrame {
-    pub(super) fn source() -> Self {
-        Self { origin: Origin::Source, kept: false, psnr_before_db: None, psnr_db: None, seconds: 0.0 }
+    /// A frame in which nothing was trained.
+    pub(super) fn source(origin: Origin, in_common: Option<f64>) -> Self {
+        Self { origin, kept: false, in_common, psnr_before_db: None, psnr_db: None, seconds: 0.0 }
     }
 
     pub(super) fn kept() -> Self {
-        Self { origin: Origin::Unknown, kept: true, ..Self::source() }
+        Self { kept: true, ..Self::source(Origin::Unknown, None) }
     }
 }
 
@@ -91,15 +96,16 @@ impl Tracked {
             (Some(after), Some(before)) => format!("; {after:.2} dB to their sources, {before:.2} before"),
             _ => String::new(),
         };
-        let cuts = match of(Origin::Cut) {
+        let as_they_are = |origin: Origin, name: &str, why: &str| match of(origin) {
             0 => String::new(),
-            cuts => {
-                format!("  cut          {} as they are, too far from the one before\n", frames(cuts as u32))
-            }
+            count => format!("  {name:<12} {} as they are: {why}\n", frames(count as u32)),
         };
+        let alike = "most of their Gaussians are in the one before, so that encode predicts them";
+        let kept = as_they_are(Origin::Alike, "alike", alike)
+            + &as_they_are(Origin::Cut, "cut", "they come too little close to what was before");
         let count = frames(of(Origin::Tracked) as u32);
         format!(
-            "{name}\n{lines}  tracked      {count}{tracked}, in views that nothing was trained with\n{cuts}  \
+            "{name}\n{lines}  tracked      {count}{tracked}, in views that nothing was trained with\n{kept}  \
              time         {:.1} seconds\n",
             self.seconds,
         )
@@ -114,12 +120,15 @@ impl TrackedFrame {
 
 impl Numbered {
     fn text(&self) -> String {
-        let TrackedFrame { origin, psnr_before_db, psnr_db, seconds, .. } = &self.tracked;
+        let TrackedFrame { origin, in_common, psnr_before_db, psnr_db, seconds, .. } = &self.tracked;
         let decibels = |psnr: &Option<f64>| psnr.map_or("-".to_owned(), |psnr| format!("{psnr:.2} dB"));
         let close = || format!("{} to its source, {} before", decibels(psnr_db), decibels(psnr_before_db));
         let how = match origin {
             Origin::Source => "as it is".to_owned(),
             Origin::Unknown => "as it was".to_owned(),
+            Origin::Alike => {
+                format!("as it is: {:.0} % are in the frame before", 100.0 * in_common.unwrap_or_default())
+            }
             Origin::Cut => format!("as it is: only {}", close()),
             Origin::Tracked => format!("{}; {seconds:.1} seconds", close()),
         };

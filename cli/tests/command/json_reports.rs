@@ -156,7 +156,7 @@ fn reports_of_encoders_have_the_keys_they_had() {
         ("train", "train --builtin 1 --frames 2 --quality low -o network.bin"),
         ("capture", "simulate -o capture --views 4 --height 36 --samples 1 --points 300"),
         ("fit", "fit capture -o scene.ply --iterations 4 --hold-out 4"),
-        ("track", "track frames -o tracked --cameras ring:4 --views 2 --height 32 --iterations 2"),
+        ("track", "track frames -o tracked --cameras ring:4 --views 2 --height 32 --iterations 2 --all"),
         ("completions", "completions bash"),
         ("manual", "manual -o pages"),
     ] {

@@ -8,8 +8,11 @@ use std::path::Path;
 
 /// Frames of a moving scene with other Gaussians in each.
 fn write_apart(folder: &Path, frames: u32) {
-    let scene =
-        BuiltinScene { gaussians: 400, frames, tracking: Tracking::Untracked, ..BuiltinScene::default() };
+    write(folder, frames, Tracking::Untracked);
+}
+
+fn write(folder: &Path, frames: u32, tracking: Tracking) {
+    let scene = BuiltinScene { gaussians: 400, frames, tracking, ..BuiltinScene::default() };
     fs::create_dir_all(folder).unwrap();
     (0..frames).for_each(|number| {
         fs::write(folder.join(format!("{number:03}.ply")), ply::write(&scene.frame(number))).unwrap();
@@ -51,7 +54,6 @@ fn frames_trained_apart_become_a_sequence_that_is_predicted() {
         json(&[encode.as_slice(), &["--layers", "1080"]].concat())
     };
     let [alone, together] = [&apart, &out].map(|frames| bytes(frames)["bytes"].as_u64().unwrap());
-    // Frames that are copies with noise, as here, can be predicted before.
     assert!(together * 10 < alone * 9, "{together} of {alone} bytes");
 
     // Where nothing can be predicted, encode says what would help.
@@ -86,6 +88,24 @@ fn a_gop_can_be_made_by_itself_again_and_is_the_same() {
         resumed["frames"].as_array().unwrap().iter().map(|frame| frame["kept"] == true).collect();
     assert_eq!(kept, [true, true, false, true, true]);
     assert_eq!(fs::read(&lost).unwrap(), before);
+}
+
+#[test]
+fn frames_that_are_a_sequence_are_kept_as_they_are() {
+    let directory = directory();
+    let [walk, out] = ["walk", "tracked"].map(|name| directory.path().join(name));
+    write(&walk, 3, Tracking::Tracked);
+    let report = json(&track(&walk, &out, &[]));
+    for (number, frame) in report["frames"].as_array().unwrap().iter().enumerate() {
+        assert_eq!(frame["origin"], if number == 0 { "source" } else { "alike" });
+        let made = out.join(format!("frame_{number:04}.ply"));
+        assert_eq!(fs::read(walk.join(format!("{number:03}.ply"))).unwrap(), fs::read(made).unwrap());
+    }
+    assert_eq!(report["frames"][1]["in_common"], 1.0);
+    let said = succeed(&track(&walk, &out, &["--force"]));
+    assert!(said.contains("alike        2 frames as they are"), "{said}");
+    let all = json(&track(&walk, &out, &["--force", "--all"]));
+    assert_eq!(all["frames"][1]["origin"], "tracked");
 }
 
 #[test]
