@@ -1,5 +1,5 @@
 // How fast frames are decoded and sorted on one core, of some streams: node speed.mjs IN.gss... [--native PROGRAM]. Prints
-// nanoseconds of processor time per Gaussian, and frames a second; PROGRAM is the example `speed` of the crate
+// nanoseconds of processor time per Gaussian, and frames a second; PROGRAM is the example `page_speed` of the crate
 // splatstream-wasm, the same work compiled for this machine, and adds how fast this is beside it.
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';

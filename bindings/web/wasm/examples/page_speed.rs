@@ -1,4 +1,4 @@
-//! How fast this machine decodes, packs and sorts, with the code that pages run: `speed IN.gss` prints nanoseconds of processor
+//! How fast this machine decodes, packs and sorts, with the code that pages run: `page_speed IN.gss` prints nanoseconds of processor
 //! time per Gaussian of decoding, and of all. `tests/speed.mjs` compares.
 #![allow(clippy::print_stdout, reason = "a program")]
 
@@ -9,7 +9,7 @@ use std::time::Duration;
 const ROUNDS: u32 = 5;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let path = std::env::args().nth(1).ok_or("usage: speed IN.gss")?;
+    let path = std::env::args().nth(1).ok_or("usage: page_speed IN.gss")?;
     let stream = std::fs::read(path)?;
     let mut session = Session::default();
     session.push(&stream).then_some(()).ok_or("there is no memory")?;
