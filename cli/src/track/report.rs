@@ -92,8 +92,11 @@ impl Tracked {
         let name = self.output.display();
         let lines: String = self.frames.iter().map(Numbered::text).collect();
         let of = |origin: Origin| self.frames.iter().filter(|frame| frame.tracked.origin == origin).count();
+        let count = frames(of(Origin::Tracked) as u32);
         let tracked = match (self.psnr_db, self.psnr_before_db) {
-            (Some(after), Some(before)) => format!("; {after:.2} dB to their sources, {before:.2} before"),
+            (Some(after), Some(before)) => format!(
+                "  tracked      {count}; {after:.2} dB to their sources, {before:.2} before, in views that nothing was trained with\n"
+            ),
             _ => String::new(),
         };
         let as_they_are = |origin: Origin, name: &str, why: &str| match of(origin) {
@@ -103,12 +106,7 @@ impl Tracked {
         let alike = "most of their Gaussians are in the one before, so that encode predicts them";
         let kept = as_they_are(Origin::Alike, "alike", alike)
             + &as_they_are(Origin::Cut, "cut", "they come too little close to what was before");
-        let count = frames(of(Origin::Tracked) as u32);
-        format!(
-            "{name}\n{lines}  tracked      {count}{tracked}, in views that nothing was trained with\n{kept}  \
-             time         {:.1} seconds\n",
-            self.seconds,
-        )
+        format!("{name}\n{lines}{tracked}{kept}  time         {:.1} seconds\n", self.seconds)
     }
 }
 
