@@ -33,6 +33,8 @@ pub struct Slots {
     /// The Gaussians of the last frame, row by row: their identities, and their slots.
     identities: Vec<u32>,
     rows: Vec<u32>,
+    /// Room for the slots of the next frame.
+    spare: Vec<u32>,
     /// The slot of each identity, once somebody asks.
     slot_of: OnceLock<ByIdentity>,
     /// Slots without a Gaussian; the lowest is taken first.
@@ -82,6 +84,7 @@ impl Slots {
             planes: empty(capacity),
             identities: Vec::new(),
             rows: Vec::new(),
+            spare: Vec::new(),
             slot_of: OnceLock::new(),
             free: (0..u32::try_from(capacity).unwrap_or(NONE)).rev().collect(),
             is_dirty: vec![false; capacity],
@@ -130,8 +133,10 @@ impl Slots {
     }
 
     /// The slots of those identities that were in the last frame, and the slots of Gaussians that are gone.
-    fn found(&self, identities: &[u32]) -> (Vec<u32>, Vec<u32>) {
-        let mut slots = vec![NONE; identities.len()];
+    fn found(&mut self, identities: &[u32]) -> (Vec<u32>, Vec<u32>) {
+        let mut slots = core::mem::take(&mut self.spare);
+        slots.clear();
+        slots.resize(identities.len(), NONE);
         let (mut left, mut missing) = (Vec::new(), Vec::new());
         let (mut rest, mut rest_slots) = (self.identities.as_slice(), self.rows.as_slice());
         for (&identity, slot) in identities.iter().zip(&mut slots) {
@@ -164,7 +169,7 @@ impl Slots {
         // There are as many as are needed: the frame fits.
         let without = slots.iter_mut().filter(|slot| **slot == NONE);
         without.for_each(|slot| *slot = self.free.pop().unwrap_or(NONE));
-        self.rows = slots;
+        self.spare = core::mem::replace(&mut self.rows, slots);
         self.identities.clear();
         self.identities.extend_from_slice(identities);
     }

@@ -3,7 +3,7 @@
 //! * [`Photograph`] is a picture with the camera that took it;
 //! * [`load_photographs`] and [`load_points`] open what [`read_capture`](splatstream_render::camera::read_capture) found;
 //! * [`trainer`] makes a frame of Gaussians of photographs and points;
-//! * [`follow`] makes one sequence of frames that were trained apart;
+//! * [`follow`] makes one sequence of frames that were trained apart, which [`in_common`] tells from others;
 //! * [`simulator`] makes captures of a scene that is known exactly: pictures, cameras, points.
 //!
 //! Results are equal for any number of threads and on every machine: single IEEE operations in a stated order, `libm` for the
@@ -21,10 +21,12 @@
 pub mod simulator;
 pub mod trainer;
 
+mod likeness;
 mod load;
 mod photograph;
 mod tracker;
 
+pub use likeness::in_common;
 pub use load::{LoadError, load_photographs, load_points};
 pub use photograph::{Photograph, SizeError};
-pub use tracker::{Followed, Following, follow, in_common};
+pub use tracker::{Followed, Following, follow};
