@@ -9,8 +9,8 @@
 use crate::photograph::{Photograph, SizeError};
 use crate::trainer::{Settings, Step, TrainError, Trainer};
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::PreparedFrame;
 use splatstream_render::camera::{Camera, Scattered, Up, held_out};
-use splatstream_render::{PreparedFrame, gradient::Loss};
 
 /// Views that a frame is judged in. No slope is taken in them.
 const JUDGES: u32 = 8;
@@ -102,7 +102,6 @@ pub fn follow(
         densify: false,
         pace: settings.pace,
         hold: settings.hold,
-        loss: Loss::default(),
         background,
         antialiased: source.antialiased(),
         seed: settings.seed,

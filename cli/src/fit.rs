@@ -15,7 +15,7 @@ use crate::stream_file::LimitArgs;
 use captures::Captures;
 use clap::Args;
 use report::{Fitted, FittedFrame};
-use splatstream_files::{ply, read_scene};
+use splatstream_files::ply;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
@@ -187,8 +187,7 @@ impl Fit {
 
     /// A frame that an earlier run has left.
     fn kept(&self, path: &Path) -> Result<(GaussianFrame, FittedFrame), Failure> {
-        let frame = read_scene(path, &self.reading.limits(path))
-            .map_err(|error| Failure::other(error.to_string()))?;
+        let frame = self.reading.frame(path)?;
         let fitted = FittedFrame::kept(&frame);
         Ok((frame, fitted))
     }

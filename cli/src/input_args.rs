@@ -1,7 +1,9 @@
 //! How scene files are read: how much memory they may ask for, and which frames are taken of continuous time.
 
+use crate::failure::Failure;
 use clap::Args;
-use splatstream_files::{ReadLimits, SceneError, SceneErrorKind, SequenceOptions};
+use splatstream_files::{ReadLimits, SceneError, SceneErrorKind, SequenceOptions, read_scene};
+use splatstream_gaussians::GaussianFrame;
 use std::path::Path;
 
 /// Memory that a scene may take for each byte of its file, whatever the default: packed scenes of any format take less.
@@ -22,6 +24,11 @@ impl InputArgs {
     /// How the frames of a file of many are chosen.
     pub(crate) fn sequence(&self) -> SequenceOptions {
         SequenceOptions { samples: self.samples.unwrap_or(SequenceOptions::default().samples) }
+    }
+
+    /// The frame in a file that a command has written.
+    pub(crate) fn frame(&self, path: &Path) -> Result<GaussianFrame, Failure> {
+        read_scene(path, &self.limits(path)).map_err(|error| Failure::other(error.to_string()))
     }
 
     /// The limits for the scene at a path.

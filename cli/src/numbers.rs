@@ -62,6 +62,12 @@ pub(crate) fn parse_share(text: &str) -> Result<f64, String> {
     share.ok_or_else(|| "write a share, 0 to 1".to_owned())
 }
 
+/// The mean, if there are any.
+pub(crate) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
 /// Frames per second as ticks per second and ticks per frame: `30`, `29.97` or `30000/1001`.
 pub(crate) fn parse_frame_rate(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("'{text}' is not a frame rate; write 30, 29.97 or 30000/1001");

@@ -16,7 +16,7 @@ use report::{Origin, Tracked, TrackedFrame};
 use splatstream_capture::{Following, follow, in_common};
 use splatstream_chart::Progress as _;
 use splatstream_encoder::FrameSource;
-use splatstream_files::{ply, read_scene};
+use splatstream_files::ply;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
 use std::path::{Path, PathBuf};
@@ -131,8 +131,7 @@ impl Track {
                 false => self.make(start, &source, &settings, (&path, files.paths()), number)?,
             };
             // The next one starts from what is in the file, as it does when it is resumed.
-            let made = read_scene(&path, &self.reading.limits(&path));
-            let made = made.map_err(|error| Failure::other(error.to_string()))?;
+            let made = self.reading.frame(&path)?;
             report.add(number, path, made.len(), tracked);
             before = Some(made);
         }

@@ -1,5 +1,6 @@
 //! What `fit` says about what it has trained.
 
+use crate::numbers::mean;
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;
 use splatstream_gaussians::GaussianFrame;
@@ -132,9 +133,4 @@ impl Numbered {
 fn decibels(trained: Option<f64>, held_out: Option<f64>) -> String {
     let text = |psnr: Option<f64>| psnr.map_or("-".to_owned(), |psnr| format!("{psnr:.2} dB"));
     format!("{} in pictures it was trained with, {} in others", text(trained), text(held_out))
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
-    (count > 0).then(|| sum / f64::from(count))
 }

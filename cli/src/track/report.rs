@@ -1,6 +1,6 @@
 //! What `track` says about the sequence that it has made.
 
-use crate::numbers::frames;
+use crate::numbers::{frames, mean};
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;
 use std::path::PathBuf;
@@ -79,12 +79,8 @@ impl Tracked {
 
     pub(super) fn finish(&mut self, time: Duration) {
         let tracked = || self.frames.iter().map(|frame| &frame.tracked).filter(|frame| frame.is_tracked());
-        let count = tracked().count();
-        let mean = |of: fn(&TrackedFrame) -> Option<f64>| {
-            (count > 0).then(|| tracked().filter_map(of).sum::<f64>() / count as f64)
-        };
-        (self.psnr_before_db, self.psnr_db) =
-            (mean(|frame| frame.psnr_before_db), mean(|frame| frame.psnr_db));
+        self.psnr_before_db = mean(tracked().filter_map(|frame| frame.psnr_before_db));
+        self.psnr_db = mean(tracked().filter_map(|frame| frame.psnr_db));
         self.seconds = time.as_secs_f64();
     }
 
