@@ -161,10 +161,14 @@ impl Document {
     }
 }
 
-/// Whether an extension that a file needs changes Gaussians in a way that is not known. Materials, textures and lights do not.
+/// Beginnings of the names of extensions that change nothing about Gaussians: of materials, textures, lights and animation.
+const HARMLESS: [&str; 6] =
+    ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "EXT_lights_", "KHR_animation_"];
+
+/// Whether a file must not be read without an extension that is not known.
 fn is_unknown(name: &str) -> bool {
     let is_known = name == super::EXTENSION || super::primitive::SPZ.contains(&name);
-    name.contains("gaussian_splat") && !is_known
+    !is_known && !HARMLESS.iter().any(|harmless| name.starts_with(harmless))
 }
 
 pub(super) fn broken(what: impl Into<String>) -> SceneError {

@@ -104,7 +104,7 @@ impl<'a> Body<'a> {
         stride: usize,
         budget: &mut Budget,
     ) -> Result<Vec<Vec<T>>, SceneError> {
-        let rows = self.cursor.take_rows(element.count, stride as u64, "the element's rows")?;
+        let rows = self.cursor.take_rows(element.count, stride as u64, "the element's data")?;
         let places: Vec<_> = names.iter().filter_map(|name| place(element, name)).collect();
         let count = rows.len().checked_div(stride).unwrap_or(0);
         let room = places.iter().map(|_| budget.room(count as u64, COLUMNS));
@@ -128,7 +128,7 @@ impl<'a> Body<'a> {
             element.count.saturating_mul(element.properties.len() as u64).saturating_mul(2).saturating_sub(1);
         let left = self.cursor.remaining().len();
         if least > left as u64 {
-            return Err(SceneError::truncated(self.cursor.at(), "the element's rows", least, left));
+            return Err(SceneError::truncated(self.cursor.at(), "the element's data", least, left));
         }
         let target: Vec<Option<usize>> = element
             .properties

@@ -203,6 +203,10 @@ fn what_is_not_understood_is_named() {
             refused(|json| json["extensionsRequired"] = json!(["KHR_gaussian_splatting_compression_x"])),
             "needs the extension KHR_gaussian_splatting_compression_x",
         ),
+        (
+            refused(|json| json["extensionsRequired"] = json!(["EXT_meshopt_compression"])),
+            "needs the extension EXT_meshopt_compression",
+        ),
     ];
     for (said, expected) in said {
         assert!(said.contains(expected), "{expected} is not in: {said}");

@@ -78,7 +78,7 @@ fn a_number_of_rest_properties_between_degrees_is_refused() {
 fn a_count_beyond_the_bytes_says_how_many_are_missing() {
     let bytes = ply::write(&small_frame());
     let message = message(&bytes[..bytes.len() - 1]);
-    assert!(message.contains("the element's rows needs 312 bytes, 311 are left"), "{message}");
+    assert!(message.contains("the element's data needs 312 bytes, 311 are left"), "{message}");
 }
 
 #[test]
