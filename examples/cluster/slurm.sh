@@ -26,7 +26,9 @@ submit)
     echo "plan $plan, shards $array, $OUT after $join"
     ;;
 plan)
-    splatstream encode "$FRAMES" --write-plan -o "$SCRATCH/plan.json" --threads "$SLURM_CPUS_PER_TASK" "${options[@]}"
+    splatstream encode "$FRAMES" --write-plan -o "$SCRATCH/new-plan.json" --threads "$SLURM_CPUS_PER_TASK" "${options[@]}"
+    # The same frames and options give the same plan: shards that are younger than it stay good.
+    cmp -s "$SCRATCH/new-plan.json" "$SCRATCH/plan.json" || mv "$SCRATCH/new-plan.json" "$SCRATCH/plan.json"
     ;;
 shard)
     number=$SLURM_ARRAY_TASK_ID shard=$SCRATCH/shard-$number-of-$SHARDS.gss

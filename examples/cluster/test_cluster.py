@@ -36,13 +36,21 @@ class Files(unittest.TestCase):
             log, out = folder / "log", folder / "talk.gss"
             given = {"FRAMES": "frames", "OUT": str(out), "SHARDS": "3", "LOG": str(log)}
             given["PATH"] = f"{folder}:{os.environ['PATH']}"
-            subprocess.run(["bash", HERE / "slurm.sh", "--gop", "8"], env={**os.environ, **given}, check=True, stdout=subprocess.DEVNULL)
-            asked = log.read_text().splitlines()
+            def run():
+                """What the command was asked for."""
+                log.unlink(missing_ok=True)
+                script = ["bash", HERE / "slurm.sh", "--gop", "8"]
+                subprocess.run(script, env={**os.environ, **given}, check=True, stdout=subprocess.DEVNULL)
+                return log.read_text().splitlines()
+
+            asked, again = run(), run()
         self.assertEqual(len(asked), 5)
         self.assertIn("--write-plan", asked[0])
         for number, shard in enumerate(asked[1:4], 1):
             self.assertIn(f"--shard {number}/3", shard)
             self.assertTrue(shard.endswith("--threads 2 --gop 8"), shard)
+        # Shards of the same plan are kept.
+        self.assertEqual([words.split()[0] for words in again], ["encode", "concat"])
         self.assertTrue(asked[4].startswith("concat") and asked[4].endswith(f"-o {out}"), asked[4])
 
     def test_the_jobs_of_kubernetes_agree(self):
