@@ -35,7 +35,7 @@ use crate::photograph::{Photograph, SizeError};
 use density::Density;
 use schedule::Schedule;
 use splatstream_gaussians::random::SplitMix64;
-use splatstream_gaussians::{FrameError, GaussianFrame, sh_planes};
+use splatstream_gaussians::{FrameError, GaussianFrame};
 use splatstream_render::PreparedFrame;
 use splatstream_render::gradient::{Adam, GradientError, Gradients, Loss};
 
@@ -250,10 +250,7 @@ impl<'a> Trainer<'a> {
         if degree <= self.frame.sh_degree() {
             return Ok(());
         }
-        let antialiased = self.frame.antialiased();
-        let mut planes = std::mem::take(&mut self.frame).into_planes();
-        planes.sh.resize(sh_planes(degree), vec![0.0; planes.opacity_logit.len()]);
-        self.frame = GaussianFrame::from_planes(degree, planes)?.with_antialiased(antialiased);
+        self.frame = std::mem::take(&mut self.frame).with_sh_degree(degree)?;
         self.adam.raise_sh_degree(degree);
         // Without growth the degree rises before the first step: this is still the start.
         self.anchor = self.anchor.take().map(|_| self.frame.clone());

@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::up_guess::UpGuess;
 use clap::{Args, ValueEnum};
+use splatstream_encoder::up_of;
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_format::syntax::Camera as StreamCamera;
 use splatstream_gaussians::GaussianFrame;
@@ -88,19 +89,6 @@ impl From<UpName> for UpAxis {
     }
 }
 
-/// The direction of an axis, if it is known.
-fn direction(axis: UpAxis) -> Option<Up> {
-    match axis {
-        UpAxis::Unknown => None,
-        UpAxis::MinusY => Some(Up::MinusY),
-        UpAxis::PlusY => Some(Up::PlusY),
-        UpAxis::MinusZ => Some(Up::MinusZ),
-        UpAxis::PlusZ => Some(Up::PlusZ),
-        UpAxis::MinusX => Some(Up::MinusX),
-        UpAxis::PlusX => Some(Up::PlusX),
-    }
-}
-
 /// Where cameras come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Views {
@@ -163,8 +151,8 @@ impl CameraArgs {
 
     /// What points up, as the user, the stream, or else a guess from the first frame says.
     pub(crate) fn up(&self, frame: &GaussianFrame, description: &SceneDescription) -> Up {
-        let said = direction(self.up_axis(description));
-        said.or_else(|| direction(UpGuess::of(frame).axis)).unwrap_or_default()
+        let said = up_of(self.up_axis(description));
+        said.or_else(|| up_of(UpGuess::of(frame).axis)).unwrap_or_default()
     }
 
     /// The axis that the user, or else the stream, says points up.

@@ -114,6 +114,9 @@ impl Concat {
                 name(part),
                 name(other)
             )),
+            ConcatError::Overlap { part, other, .. } if self.inputs.get(part) == self.inputs.get(other) => {
+                Failure::other(format!("{}: is given twice\n  give every shard once", name(part)))
+            }
             ConcatError::Overlap { part, other, frames } => Failure::other(format!(
                 "{}: holds frames {}..={}, which {} holds too\n  give every shard once",
                 name(part),

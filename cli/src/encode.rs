@@ -30,7 +30,7 @@ use clap::{Args, ValueEnum};
 use decided::Decided;
 use effort::Budget;
 use failed::failed;
-use finetune::{FinetuneArgs, Fitted};
+use finetune::{FinetuneArgs, Fitted, Taken};
 pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
@@ -312,6 +312,7 @@ impl Encode {
         console.claim(Some(&self.out))?;
         refuse_inputs(&self.out, &self.inputs)?;
         check_name(&self.out)?;
+        self.shards.check_name(&self.out)?;
         let encoded = self.one(console, &self.inputs, &self.out)?;
         console.report_beside(Some(&self.out), &encoded, || encoded.text())
     }
@@ -420,6 +421,12 @@ impl Encode {
         // Frames that others are predicted from stay near the source.
         let fitted = usual.finetune.as_ref().filter(|_| !is_predicted);
         let iterations = fitted.map_or(0, |finetune| finetune.iterations);
+        let taken = Taken {
+            cameras: self.cameras.as_ref(),
+            height: self.views.height,
+            background: self.background.colour(&description),
+            frames: source.len(),
+        };
         let mut settings = Settings {
             structure,
             anchor: self.anchor.into(),
@@ -442,7 +449,7 @@ impl Encode {
             prune: self.prune.threshold(psnr)?,
             ticks: self.fps,
             importance: self.importance.map(Into::into),
-            finetune: self.finetune.settings(iterations, &cameras, &self.layers)?,
+            finetune: self.finetune.settings(iterations, &self.layers, &taken)?,
             cameras,
             fidelity: self.fidelity.map(Into::into),
             tolerance: self.tolerance,

@@ -25,7 +25,7 @@ use crate::steps::Steps;
 use crate::strips::{StripView, StripViews, mean};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
-use splatstream_render::camera::{Up, spiral};
+use splatstream_render::camera::spiral;
 
 /// Views made for the scene, and their height, where none are given; of given ones no more are taken.
 const VIEWS: u32 = 4;
@@ -308,7 +308,7 @@ fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Ve
 /// The views that shares are fitted in.
 fn cameras(frame: &GaussianFrame, settings: &Settings) -> Vec<Camera> {
     match settings.cameras.as_slice() {
-        [] => spiral(frame, Up::default(), VIEWS, HEIGHT),
+        [] => spiral(frame, settings.up(), VIEWS, HEIGHT),
         given => {
             let stride = given.len().div_ceil(VIEWS as usize).max(1);
             given.iter().step_by(stride).cloned().collect()

@@ -5,6 +5,7 @@ use crate::report::Dropped;
 use crate::source::FrameSource;
 use splatstream_gaussians::{Defects, GaussianFrame};
 use std::collections::BTreeMap;
+use xxhash_rust::xxh64::Xxh64;
 
 /// Refuses Gaussians with values that no frame may hold, or leaves them out.
 pub(crate) struct CheckedSource<'a> {
@@ -12,16 +13,19 @@ pub(crate) struct CheckedSource<'a> {
     drop_invalid: bool,
     /// By frame.
     dropped: BTreeMap<u32, Defects>,
-    /// Gaussians that each frame shall have; empty where that is not known.
-    expected: &'a [u32],
+    /// Gaussians that each frame shall have, and its digest; empty where that is not known.
+    expected: (&'a [u32], &'a [u64]),
+    /// Digests of the frames that were read, where they are wanted.
+    digests: Option<BTreeMap<u32, u64>>,
 }
 
-/// A frame that has not the Gaussians that it should have.
+/// A frame that is not the one that it should be.
 #[derive(Debug, thiserror::Error)]
-#[error("it has {found} Gaussians, and should have {planned}")]
-struct Unplanned {
-    found: u32,
-    planned: u32,
+enum Unplanned {
+    #[error("it has {found} Gaussians, and should have {planned}")]
+    Count { found: u32, planned: u32 },
+    #[error("it has other values than it should have")]
+    Values,
 }
 
 /// A frame with values that no frame may hold.
@@ -31,12 +35,33 @@ struct Invalid(Defects);
 
 impl<'a> CheckedSource<'a> {
     pub(crate) fn new(source: &'a mut dyn FrameSource, drop_invalid: bool) -> Self {
-        Self { source, drop_invalid, dropped: BTreeMap::new(), expected: &[] }
+        Self { source, drop_invalid, dropped: BTreeMap::new(), expected: (&[], &[]), digests: None }
     }
 
-    /// Refuses frames that have other numbers of Gaussians.
-    pub(crate) fn expecting(self, counts: &'a [u32]) -> Self {
-        Self { expected: counts, ..self }
+    /// Refuses frames that have other numbers of Gaussians, or other digests.
+    pub(crate) fn expecting(self, counts: &'a [u32], digests: &'a [u64]) -> Self {
+        Self { expected: (counts, digests), ..self }
+    }
+
+    /// Takes a digest of each frame that is read.
+    pub(crate) fn with_digests(self) -> Self {
+        Self { digests: Some(BTreeMap::new()), ..self }
+    }
+
+    /// The digests of the frames that were read, in their order.
+    pub(crate) fn into_digests(self) -> Vec<u64> {
+        self.digests.into_iter().flatten().map(|(_, digest)| digest).collect()
+    }
+
+    /// Whether a frame is the one that it should be.
+    fn check(&self, number: u32, frame: &GaussianFrame) -> Result<(), Unplanned> {
+        let (counts, digests) = self.expected;
+        let found = u32::try_from(frame.len()).unwrap_or(u32::MAX);
+        match (counts.get(number as usize), digests.get(number as usize)) {
+            (Some(&planned), _) if found != planned => Err(Unplanned::Count { found, planned }),
+            (_, Some(&planned)) if digest(frame) != planned => Err(Unplanned::Values),
+            _ => Ok(()),
+        }
     }
 
     /// What was left out of each frame that was read.
@@ -58,11 +83,9 @@ impl FrameSource for CheckedSource<'_> {
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
         let frame = self.source.frame(number)?;
-        let found = u32::try_from(frame.len()).unwrap_or(u32::MAX);
-        if let Some(&planned) = self.expected.get(number as usize)
-            && found != planned
-        {
-            return Err(Box::new(Unplanned { found, planned }));
+        self.check(number, &frame)?;
+        if let Some(digests) = &mut self.digests {
+            digests.entry(number).or_insert_with(|| digest(&frame));
         }
         let Some(defects) = frame.defects() else { return Ok(frame) };
         if !self.drop_invalid {
@@ -83,12 +106,29 @@ pub(crate) fn named(error: Error) -> Error {
                 Error::Invalid { frame, count: rows.len(), first }
             }
             Err(source) => match source.downcast::<Unplanned>() {
-                Ok(other) => Error::OtherFrame { frame, found: other.found, planned: other.planned },
+                Ok(other) => match *other {
+                    Unplanned::Count { found, planned } => Error::OtherFrame { frame, found, planned },
+                    Unplanned::Values => Error::ChangedFrame { frame },
+                },
                 Err(source) => Error::Source { frame, source },
             },
         },
         other => other,
     }
+}
+
+/// A number that two frames have in common only if all of their values are the same.
+fn digest(frame: &GaussianFrame) -> u64 {
+    const VALUES: usize = 1 << 10;
+    let mut hash = Xxh64::new(0);
+    hash.update(&[frame.sh_degree(), frame.antialiased().into()]);
+    let mut bytes = Vec::with_capacity(VALUES.saturating_mul(size_of::<f32>()));
+    for values in frame.planes().iter().flat_map(|plane| plane.chunks(VALUES)) {
+        bytes.clear();
+        bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        hash.update(&bytes);
+    }
+    hash.digest()
 }
 
 /// A frame in which some rows hold nothing: their opacity is 0, that is, its logit is minus infinity, which

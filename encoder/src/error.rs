@@ -124,6 +124,14 @@ pub enum Error {
         /// Those it had.
         planned: u32,
     },
+    /// A frame has other values than the one that was planned with.
+    #[error(
+        "frame {frame} is not the one that the sequence was planned with: its values differ; give the same frames, or plan again"
+    )]
+    ChangedFrame {
+        /// The frame.
+        frame: u32,
+    },
     /// A setting is not the one that was planned with.
     #[error(
         "{name} is {found}, and was {planned} when the sequence was planned; give every shard the settings of the plan"

@@ -195,14 +195,14 @@ impl Fit<'_> {
     /// What the decoder's own checks refuse.
     pub(crate) fn run(&self) -> Result<Fitted, Error> {
         let rows = coded_order(self.frame, self.order, self.coder, self.settings);
-        let ordered = self.frame.select(&rows);
+        let source = self.frame.select(&rows);
         let back = inverse(&rows);
-        let first = self.layer(&ordered, 0, None)?;
+        let first = self.layer(&source, 0, None)?;
         let Some(highest) = self.layers.checked_sub(1).filter(|&highest| highest > 0) else {
             let reports = first.report.into_iter().collect();
             return Ok(Fitted { lowest: None, highest: first.frame.select(&back), reports });
         };
-        let second = self.layer(&ordered, highest, Some(first.lists))?;
+        let second = self.layer(&source, highest, Some(first.lists))?;
         Ok(Fitted {
             lowest: Some(first.frame.select(&back)),
             highest: second.frame.select(&back),
@@ -213,17 +213,19 @@ impl Fit<'_> {
     /// Fits the values of a layer. `parents`: what the lowest layer has, where this is another.
     fn layer(
         &self,
-        ordered: &GaussianFrame,
+        source: &GaussianFrame,
         layer: u8,
         parents: Option<Vec<GaussianList>>,
     ) -> Result<Layer, Error> {
         let ladder = Ladder::new(self.layers, &self.settings.refinements);
         let receivers = Receiver::of_layer(layer, self.layers, &ladder, (self.settings, self.finetune));
         let lists = self.lists(layer, &ladder, parents, &receivers);
-        let mut latent = Latent::new(self.coder, ordered, lists)?;
+        // Pictures show what the source has, whatever degree the stream carries of it.
+        let coded = source.clone().with_sh_degree(self.coder.sequence.sh_degree)?;
+        let mut latent = Latent::new(self.coder, &coded, lists)?;
         let mut report = None;
         if !receivers.is_empty() {
-            let pictures = Pictures::new(ordered, self.finetune, self.settings, &receivers);
+            let pictures = Pictures::new(source, self.finetune, self.settings, &receivers);
             let descent = Descent::new(latent, (receivers, pictures), self.compensator, self.finetune);
             let (fitted, done) = descent.run()?;
             latent = fitted;

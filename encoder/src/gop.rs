@@ -455,7 +455,7 @@ impl<'a> SpanCoder<'a> {
         let takes_time =
             is_fitted || settings.preset != Preset::Fast && settings.profile() == Profile::Dynamic;
         let has_prefixes = self.common.sequence.refinement_count > 1 && !target.frame.is_empty();
-        (takes_time && has_prefixes).then(|| Compensator::new(&target.frame))
+        (takes_time && has_prefixes).then(|| Compensator::new(&target.frame, self.common.settings.up()))
     }
 
     /// Adds the units of a coded frame to its GOP, and what they are to the report.

@@ -30,6 +30,8 @@ pub(crate) struct Ranking {
     /// Those that were made for the first frame of the sequence.
     of_sequence: Vec<Camera>,
     preset: Preset,
+    /// What points up in the views that are made.
+    up: Up,
     /// The order of the first frame, if it was needed early.
     known_order: Option<Vec<u32>>,
 }
@@ -52,6 +54,7 @@ impl Ranking {
             are_given: !settings.cameras.is_empty(),
             of_sequence: Vec::new(),
             preset: settings.preset,
+            up: settings.up(),
             known_order: None,
         }
     }
@@ -155,7 +158,7 @@ impl Ranking {
             Preset::Fast => (6, 180),
             Preset::Balanced | Preset::Small => (10, 270),
         };
-        spiral(frame, Up::default(), count, height)
+        spiral(frame, self.up, count, height)
     }
 
     /// What orders go by: some of the cameras, in small pictures.

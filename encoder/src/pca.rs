@@ -21,12 +21,12 @@ impl Components {
         Self { mean: vec![0.0; dimension], rows: (0..dimension).map(row).collect() }
     }
 
-    /// The components of the vectors whose coordinates stand in `planes`.
+    /// The components of the vectors whose coordinates stand in `planes`. A single vector is the mean, of which nothing is left.
     #[expect(clippy::indexing_slicing, reason = "the matrix is square, and so are its eigenvectors")]
     pub(crate) fn of(planes: &[&[f32]]) -> Self {
         let dimension = planes.len();
         let count = planes.first().map_or(0, |plane| plane.len());
-        if count < 2 {
+        if count == 0 {
             return Self::identity(dimension);
         }
         let stride = count.div_ceil(SAMPLE);

@@ -57,6 +57,8 @@ pub struct Plan {
     ranking: Option<Ranking>,
     target: Option<TargetReport>,
     stands_alone: bool,
+    /// A digest of each frame as it is read; empty where all frames are coded at once.
+    frame_digests: Vec<u64>,
 }
 
 /// Looks at every frame once, finds steps for the quality or the size that is asked for, and codes the first GOP, which
@@ -68,8 +70,9 @@ pub struct Plan {
 /// # Errors
 /// Settings or frames that cannot be coded, a source that cannot be read.
 pub fn plan(source: &mut dyn FrameSource, settings: &Settings) -> Result<Plan, Error> {
-    let mut source = CheckedSource::new(source, settings.drop_invalid);
-    planned(&mut source, settings).map_err(named)
+    let mut source = CheckedSource::new(source, settings.drop_invalid).with_digests();
+    let plan = planned(&mut source, settings).map_err(named)?;
+    Ok(Plan { frame_digests: source.into_digests(), ..plan })
 }
 
 fn planned(source: &mut dyn FrameSource, asked: &Settings) -> Result<Plan, Error> {
@@ -103,7 +106,16 @@ impl Plan {
         let ranking = target::looking(source, ranking, &settings)?;
         let network = learning::network(source, &settings, &analysis)?;
         let (asked, ranking) = (asked.clone(), Some(ranking));
-        Ok(Self { asked, settings, analysis, network, ranking, target: None, stands_alone: false })
+        Ok(Self {
+            asked,
+            settings,
+            analysis,
+            network,
+            ranking,
+            target: None,
+            stands_alone: false,
+            frame_digests: Vec::new(),
+        })
     }
 
     /// The same with frames that each stand for themselves, in one layer.
@@ -161,8 +173,8 @@ impl Plan {
         if source.len() != sequence_frames {
             return Err(Error::OtherFrames { found: source.len(), planned: sequence_frames });
         }
-        let mut source =
-            CheckedSource::new(source, self.settings.drop_invalid).expecting(&self.analysis.counts);
+        let mut source = CheckedSource::new(source, self.settings.drop_invalid)
+            .expecting(&self.analysis.counts, &self.frame_digests);
         let encoded = self.encode(&mut source, (frames, Some(shard)), sink, progress, None);
         let mut report = encoded.map_err(named)?.unwrap_or_default();
         (report.target, report.stands_alone) = (self.target, self.stands_alone);

@@ -20,7 +20,7 @@ use crate::strips::StripViews;
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
-use splatstream_render::camera::{Scattered, Up};
+use splatstream_render::camera::Scattered;
 use splatstream_render::contribution::{SmallViews, Worth};
 use std::collections::BTreeMap;
 
@@ -100,7 +100,7 @@ fn least_missed(frame: &GaussianFrame, settings: &Settings, least: f64) -> (Vec<
     let rows = visible(frame, settings.keep_invisible);
     let frame = frame.select(&rows);
     let cameras = |seed: u64, count: usize, height: u32| -> Vec<Camera> {
-        Scattered::new(&frame, Up::default(), &settings.cameras, seed, height).take(count).collect()
+        Scattered::new(&frame, settings.up(), &settings.cameras, seed, height).take(count).collect()
     };
     let [weighing, judging] = SEEDS;
     let order = order(&frame, &cameras(weighing, VIEWS, HEIGHT));

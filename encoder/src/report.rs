@@ -197,6 +197,10 @@ pub struct TargetReport {
     pub encodings: u32,
     /// Times that a part of it was encoded.
     pub trials: u32,
+    /// Whether values are not fitted to pictures, although the settings say so: without, the stream is smaller.
+    pub without_finetune: bool,
+    /// Whether SH has no codebook, although the settings leave it open: it would have cost pictures too much.
+    pub without_codebook: bool,
 }
 
 /// Gaussians of a frame that were left out because of values that no frame may hold.

@@ -47,6 +47,9 @@ const GAIN: [f64; 2] = [2.6, 35.0];
 /// Finer steps are given up where pictures gain less than this share of what they should.
 const LEAST_GAIN: f64 = 0.05;
 
+/// Where fitting brings pictures of a single frame less than this, it is tried without as well, decibels.
+const DOUBTFUL_GAIN: f64 = 0.5;
+
 /// Encodings for a PSNR and for a size, at most.
 const MOST_FOR_PSNR: usize = 4;
 const MOST_FOR_SIZE: usize = 6;
@@ -172,6 +175,8 @@ struct Fitting<'a> {
     known: Vec<(f64, Steps)>,
     /// How SH is coded: as the settings say, until a codebook turns out to cost pictures too much.
     sh: ShChoice,
+    /// Whether values are fitted to pictures, where the settings say so.
+    fits_values: bool,
 }
 
 impl<'a> Fitting<'a> {
@@ -190,12 +195,12 @@ impl<'a> Fitting<'a> {
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
         let fit = Fit::new((&frame, whole.as_ref()), &ranked, &of_fit, settings);
-        Ok(Self { settings, fit, ranking, known: Vec::new(), sh: settings.sh })
+        Ok(Self { settings, fit, ranking, known: Vec::new(), sh: settings.sh, fits_values: true })
     }
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
     fn gain(&self) -> f64 {
-        let is_fitted = self.settings.temporal_layers() == 0;
+        let is_fitted = self.fits_values && self.settings.temporal_layers() == 0;
         let finetune =
             self.settings.finetune.as_ref().filter(|finetune| is_fitted && finetune.photographs.is_empty());
         finetune.map_or(0.0, |finetune| {
@@ -211,7 +216,9 @@ impl<'a> Fitting<'a> {
     /// make up for with finer steps, which takes more bits than the codebook saves.
     fn gives_up_codebook(&mut self, report: &Report, missed: f64) -> bool {
         let has_one = report.sh_codebook_entries > 0 && self.sh == ShChoice::Auto;
-        let is_dear = has_one && missed > NEAR_DECIBELS;
+        // Nor is it to blame for what fitting was to bring and did not.
+        let by_fitting = (self.gain() - gain(report)).max(0.0);
+        let is_dear = has_one && missed - by_fitting > NEAR_DECIBELS;
         if is_dear {
             self.sh = ShChoice::Coefficients;
         }
@@ -231,7 +238,13 @@ impl<'a> Fitting<'a> {
                 steps
             }
         };
-        Ok(Settings { steps, laws: self.fit.laws(), sh: self.sh, ..self.settings.clone() })
+        let finetune = self.settings.finetune.clone().filter(|_| self.fits_values);
+        Ok(Settings { steps, laws: self.fit.laws(), sh: self.sh, finetune, ..self.settings.clone() })
+    }
+
+    /// Whether values will be fitted to photographs: they leave what pictures of the source show, by which steps are found.
+    fn leaves_source(&self) -> bool {
+        self.settings.finetune.as_ref().is_some_and(|finetune| !finetune.photographs.is_empty())
     }
 
     /// What laws save with the steps for a PSNR; not where time counts.
@@ -292,23 +305,48 @@ impl<'a> Seeker<'a> {
 
     /// How it was found.
     fn told(&self, fitted: f64) -> TargetReport {
-        TargetReport { fitted: fitted as f32, encodings: self.encodings, trials: self.trials }
+        TargetReport {
+            fitted: fitted as f32,
+            encodings: self.encodings,
+            trials: self.trials,
+            without_codebook: self.fitting.sh != self.fitting.settings.sh,
+            without_finetune: self.fitting.settings.finetune.is_some() && !self.fitting.fits_values,
+        }
     }
 
-    /// What to fit for pictures of a PSNR. Of a sequence its first frames are tried: one of each type.
+    /// What to fit for pictures of a PSNR, with values fitted to pictures only where that takes fewer bits.
+    ///
+    /// Of few Gaussians there may be nothing to gain, and what fitting was expected to bring was paid for with coarser steps.
     fn quality(&mut self, wanted: f64) -> Result<Found, Error> {
+        let fitted = self.steps_for(wanted)?;
+        if !fitted.encoded.as_ref().is_some_and(|encoded| is_doubtful(&encoded.report)) {
+            return Ok(fitted);
+        }
+        let (sh, known) = (self.fitting.sh, core::mem::take(&mut self.fitting.known));
+        (self.fitting.fits_values, self.fitting.sh) = (false, self.fitting.settings.sh);
+        let plain = self.steps_for(wanted)?;
+        if price(&plain, wanted) < price(&fitted, wanted) {
+            return Ok(plain);
+        }
+        (self.fitting.fits_values, self.fitting.sh, self.fitting.known) = (true, sh, known);
+        Ok(fitted)
+    }
+
+    /// What to fit for pictures of a PSNR. Of a sequence its first frames are tried: one of each type. What will be fitted to
+    /// photographs is tried as it is before that.
+    fn steps_for(&mut self, wanted: f64) -> Result<Found, Error> {
         let mut secant = Secant::new(wanted + ABOVE, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
         let frames_of_part = match self.fitting.settings.temporal_layers() {
             0 => 1,
             layers => 1 + (1 << (layers - 1)),
         };
-        let is_sequence = self.source.len() > frames_of_part;
+        let in_part = self.source.len() > frames_of_part || self.fitting.leaves_source();
         let mut best: Option<Found> = None;
         // The PSNR that was measured first.
         let mut start = None;
         let mut next = Some(wanted - self.fitting.gain());
         while let Some(at) = next {
-            let encoded = if is_sequence { self.part(at, frames_of_part)? } else { self.kept(at)? };
+            let encoded = if in_part { self.part(at, frames_of_part)? } else { self.kept(at)? };
             // Where nothing can be seen nothing is too bad.
             let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr());
             let measured = measured.unwrap_or(wanted);
@@ -322,7 +360,7 @@ impl<'a> Seeker<'a> {
                 break;
             }
             if secant.take(at, measured) {
-                best = Some(Found { fitted: at, encoded: (!is_sequence).then_some(encoded) });
+                best = Some(Found { fitted: at, encoded: (!in_part).then_some(encoded) });
             }
             next = secant.next();
         }
@@ -402,15 +440,36 @@ impl<'a> Seeker<'a> {
         Ok(Encoded { bytes, report })
     }
 
-    /// The first frames.
+    /// The first frames, not fitted to photographs.
     fn part(&mut self, fitted: f64, frames: u32) -> Result<Encoded, Error> {
         self.trials += 1;
-        let (settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
+        let (mut settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
+        if self.fitting.leaves_source() {
+            settings.finetune = None;
+        }
         let mut bytes = Vec::new();
         let mut part = FirstFrames { source: self.source, frames };
         let report = encode_once(&mut part, &settings, ranking, &mut bytes, &mut |_, _| ())?;
         Ok(Encoded { bytes, report })
     }
+}
+
+/// What fitting values to pictures has brought, decibels: the least of all frames.
+fn gain(report: &Report) -> f64 {
+    let gains = report.finetuned.iter().map(|fitted| fitted.psnr[1] - fitted.psnr[0]);
+    gains.min_by(f64::total_cmp).unwrap_or(0.0)
+}
+
+/// Whether a single frame may be as good without fitting.
+fn is_doubtful(report: &Report) -> bool {
+    report.frames == 1 && !report.finetuned.is_empty() && gain(report) < DOUBTFUL_GAIN
+}
+
+/// The logarithm of the bytes that a stream would take at a PSNR.
+fn price(found: &Found, wanted: f64) -> f64 {
+    let Some(Encoded { report, .. }) = &found.encoded else { return f64::INFINITY };
+    let psnr = report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr()).unwrap_or(wanted);
+    libm::log(report.bytes.max(1) as f64) + GROWTH * (wanted - psnr)
 }
 
 /// A size in the unit that it is asked for in; never 0.

@@ -19,7 +19,7 @@ use splatstream_format::syntax::{FrameType, GopHeader, UnitHeader};
 use splatstream_format::unit::Stream;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Rendering;
-use splatstream_render::camera::{Up, between_held_out, held_out};
+use splatstream_render::camera::{between_held_out, held_out};
 
 /// Views of each frame that decide nothing, as many as there are that decide, and their height: with other heights PSNR is
 /// another number.
@@ -184,8 +184,8 @@ impl Views {
     pub(crate) fn of(frame: &GaussianFrame, settings: &Settings) -> Self {
         let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
         let strips = |cameras| StripViews::new(cameras, every, frame.len());
-        let of_fit = held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
-        let unseen = between_held_out(frame, Up::default(), &settings.cameras, VIEWS, HEIGHT);
+        let of_fit = held_out(frame, settings.up(), &settings.cameras, VIEWS, HEIGHT);
+        let unseen = between_held_out(frame, settings.up(), &settings.cameras, VIEWS, HEIGHT);
         Self { unseen: strips(unseen), of_fit: strips(of_fit) }
     }
 }

@@ -14,6 +14,7 @@ use splatstream_encoder::{
     encode,
 };
 use splatstream_files::builtin::BuiltinScene;
+use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, held_out, ring};
 use splatstream_render::{Image, ReferencePictures, render};
@@ -146,6 +147,57 @@ fn photographs_are_what_the_stream_comes_to_look_like() {
     let (_, report) = encoded(scene(), &Settings { finetune, ..plain() });
     let [before, after] = report.finetuned[0].psnr;
     assert!(after > before + 2.0, "{before} {after}");
+}
+
+#[test]
+fn the_background_of_the_scene_is_that_of_its_photographs() {
+    let background = [1.0, 0.8, 0.2];
+    let source = scene().remove(0);
+    let photograph = |camera: splatstream_render::Camera| Photograph {
+        picture: render(&source, &camera, background).colour,
+        camera,
+    };
+    let photographs = ring(&source, Up::default(), 16, 90).into_iter().map(photograph).collect();
+    let description = SceneDescription { background: Some(background), ..SceneDescription::default() };
+    let finetune = Some(Finetune { photographs, ..quick(2) });
+    let (_, report) = encoded(scene(), &Settings { finetune, description, ..plain() });
+    // Photographs of the source show it.
+    assert!(report.finetuned[0].psnr[0] > 35.0, "{:?}", report.finetuned);
+}
+
+#[test]
+fn steps_for_a_quality_are_those_without_photographs() {
+    let finetune = Some(Finetune { photographs: photographs(16), ..quick(20) });
+    let settings = Settings { psnr: Some(44.0), ..plain() };
+    let (_, plain) = encoded(scene(), &settings);
+    let (_, report) = encoded(scene(), &Settings { finetune, ..settings });
+    assert_eq!(report.steps, plain.steps);
+    let [before, after] = report.finetuned[0].psnr;
+    assert!(after > before + 0.5, "{before} {after}");
+}
+
+#[test]
+fn fitting_is_given_up_where_it_makes_nothing_smaller() {
+    let few = || vec![scene().remove(0).select(&(0..30).collect::<Vec<_>>())];
+    let wanted = |settings: Settings| Settings { psnr: Some(44.0), ..settings };
+    let (before, _) = encoded(few(), &wanted(plain()));
+    let (after, report) = encoded(few(), &wanted(settings(1)));
+    assert!(report.target.unwrap().without_finetune, "{:?}", report.finetuned);
+    assert!(report.finetuned.is_empty());
+    assert_eq!(before, after);
+}
+
+#[test]
+fn streams_and_frames_of_any_degree_are_fitted() {
+    for (of_frame, of_stream) in [(3, Some(1)), (2, Some(0)), (1, Some(3)), (0, None)] {
+        let settings = Settings { sh_degree: of_stream, ..settings(2) };
+        let (bytes, report) = encoded(vec![builtin(200, of_frame)], &settings);
+        assert_eq!(report.finetuned.len(), 1);
+        assert_eq!(sequence(&bytes).sh_degree, of_stream.unwrap_or(of_frame).min(of_frame));
+    }
+    // Frames of a sequence have the highest degree of all.
+    let (_, report) = encoded(vec![builtin(200, 0), builtin(200, 2), builtin(200, 1)], &settings(2));
+    assert_eq!(report.finetuned.len(), 3);
 }
 
 #[test]

@@ -5,8 +5,8 @@ mod common;
 
 use common::{decoded, encoded, strict};
 use splatstream_encoder::{
-    ConcatError, Encoder, Error, NetworkSource, PartError, Plan, PlanRecord, Preset, Settings, StreamPart,
-    Structure, concat, plan,
+    ConcatError, Encoder, Error, Finetune, NetworkSource, PartError, Plan, PlanRecord, Preset, Settings,
+    StreamPart, Structure, concat, plan,
 };
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_format::{ErrorKind, Limits};
@@ -144,6 +144,10 @@ fn a_plan_is_for_its_settings_and_its_frames_alone() {
         refused(Settings { preset: Preset::Small, ..settings() })
             .starts_with("preset is Small, and was Fast")
     );
+    let finetune = Some(Finetune { iterations: 3, ..Finetune::default() });
+    assert!(refused(Settings { finetune, ..settings() }).contains(", and was none when"));
+    let psnr = Some(45.0);
+    assert!(refused(Settings { psnr, ..settings() }).starts_with("psnr is 45 dB, and was none"));
     let plan = Plan::from_record(&record, &settings()).unwrap();
     let refused = |frames: &mut Vec<GaussianFrame>, number| {
         plan.encode_shard(frames, number, &mut Vec::new(), &mut |_, _| ()).unwrap_err()
@@ -155,6 +159,11 @@ fn a_plan_is_for_its_settings_and_its_frames_alone() {
     let mut other = frames.clone();
     other[5] = BuiltinScene { gaussians: 601, sh_degree: 1, ..BuiltinScene::default() }.frame(0);
     assert!(matches!(refused(&mut other, (2, 2)), Error::OtherFrame { frame: 5, found: 601, planned: 600 }));
+    let mut changed = frames.clone();
+    changed[5].planes_mut().dc[0][7] += 1e-6;
+    assert!(matches!(refused(&mut changed, (2, 2)), Error::ChangedFrame { frame: 5 }));
+    let of_changed = crate::plan(&mut changed, &settings()).unwrap().record().unwrap();
+    assert_ne!(of_changed.digest(), record.digest());
     assert!(matches!(refused(&mut frames.clone(), (1, 4)), Error::Shards { count: 4, most: 3 }));
     assert!(matches!(refused(&mut frames.clone(), (0, 2)), Error::Setting { name: "shard", .. }));
     assert!(matches!(refused(&mut frames.clone(), (3, 2)), Error::Setting { name: "shard", .. }));

@@ -70,7 +70,7 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
     choices.extend(fidelity(report, settings));
     choices.extend(predictors(report, settings));
     choices.extend(network(report, settings));
-    choices.extend(fitting(settings));
+    choices.extend(fitting(report, settings));
     choices.push(invisible(report, settings));
     choices.extend(pruned(report, settings));
     choices.extend(left_out(settings));
@@ -356,9 +356,12 @@ fn network(report: &Report, settings: &Settings) -> Option<Choice> {
 }
 
 /// Whether values are fitted to pictures, where that was asked for or belongs to the preset.
-fn fitting(settings: &Settings) -> Option<Choice> {
+fn fitting(report: &Report, settings: &Settings) -> Option<Choice> {
     let belongs = settings.preset == Preset::Small;
     let (choice, why) = match (&settings.finetune, settings.structure) {
+        (Some(_), _) if report.target.is_some_and(|target| target.without_finetune) => {
+            ("none".to_owned(), "pictures gain next to nothing by it: without, the stream is smaller")
+        }
         (Some(finetune), _) => {
             let choice = format!("{} iterations", finetune.iterations);
             (choice, "values of frames that stand for themselves are chosen by pictures")

@@ -33,7 +33,8 @@ pub(super) fn failed(source: &FrameFiles, out: &Path, error: &Error) -> Failure 
         )),
         Error::TooManyGaussians { frame, .. }
         | Error::TooManyPerSecond { frame, .. }
-        | Error::OtherFrame { frame, .. } => Failure::other(format!("{}: {error}", source.name(*frame))),
+        | Error::OtherFrame { frame, .. }
+        | Error::ChangedFrame { frame } => Failure::other(format!("{}: {error}", source.name(*frame))),
         Error::Output(cause) => Failure::file("write", out, cause),
         Error::Setting { .. } => Failure::Usage(error.to_string()),
         _ => Failure::other(error.to_string()),

@@ -1,14 +1,16 @@
 //! What fits frames to pictures, and what that has done.
 
+use crate::cameras::Views;
 use crate::failure::Failure;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use splatstream_capture::load_photographs;
 use splatstream_chart::numbers::bits_per_gaussian;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{
     Attribute, Finetune, FinetuneReport, Photograph, PointReport, PointWeight, Report,
 };
-use splatstream_render::{Camera, Image};
+use splatstream_render::camera::read_capture;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -30,8 +32,9 @@ pub(super) struct FinetuneArgs {
     /// gets in them depends on the machine, and so do the bytes.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     time_budget: Option<f64>,
-    /// Fit the frame to photographs and not to pictures of the source: PNG files in this directory, named as the cameras of
-    /// the file that --cameras gives.
+    /// Fit the frame to photographs and not to pictures of the source: those in this directory, named as the cameras of
+    /// the file that --cameras gives. What is transparent in them shows --background. The steps stay those with which
+    /// pictures of the source have the quality that is asked for.
     #[arg(long, value_name = "DIR", requires = "finetune", requires = "cameras")]
     images: Option<PathBuf>,
     /// Fit these attributes only, to see what each is worth.
@@ -131,15 +134,15 @@ impl FinetuneArgs {
     }
 
     /// The settings of the encoder; none where nothing is to be fitted. `usual`: iterations where none are given, or 0;
-    /// `layers`: lines that spatial layers are for, if they were given.
+    /// `layers`: lines that spatial layers are for, if they were given; `taken`: where and how photographs were.
     ///
     /// # Errors
-    /// A photograph that is not there, cannot be read or has another shape than its camera.
+    /// A photograph that is not there, cannot be read or has another shape than its camera; cameras that took none.
     pub(super) fn settings(
         &self,
         usual: u32,
-        cameras: &[Camera],
         layers: &[u32],
+        taken: &Taken<'_>,
     ) -> Result<Option<Finetune>, Failure> {
         let iterations = self.finetune.unwrap_or(usual);
         if iterations == 0 {
@@ -153,9 +156,7 @@ impl FinetuneArgs {
             }
         };
         let photographs = match &self.images {
-            Some(directory) => {
-                cameras.iter().map(|camera| photograph(directory, camera)).collect::<Result<_, _>>()?
-            }
+            Some(directory) => taken.photographs(directory)?,
             None => Vec::new(),
         };
         let time_budget = self.finetune.and(self.time_budget).map(Duration::from_secs_f64);
@@ -171,24 +172,45 @@ impl FinetuneArgs {
     }
 }
 
-/// The photograph that a camera took.
-fn photograph(directory: &Path, camera: &Camera) -> Result<Photograph, Failure> {
-    let name = Path::new(&camera.name).file_name().unwrap_or_default();
-    let path = directory.join(name).with_extension("png");
-    let bytes = std::fs::read(&path).map_err(|cause| Failure::file("read", &path, &cause))?;
-    let picture =
-        Image::from_png(&bytes).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
-    let (width, height) = (picture.width(), picture.height());
-    let camera = camera.scaled_to_height(u32::try_from(height).unwrap_or(u32::MAX));
-    if camera.width as usize != width {
-        return Err(Failure::other(format!(
-            "{}: the photograph has {width} x {height} pixels, its camera {} x {height} at that height: give the camera the shape \
-             of the photograph",
-            path.display(),
-            camera.width
-        )));
+/// How the photographs were taken that frames may be fitted to.
+pub(super) struct Taken<'a> {
+    /// The cameras that were asked for.
+    pub(super) cameras: Option<&'a Views>,
+    /// Rows to reduce them to.
+    pub(super) height: Option<u32>,
+    /// What they show where they are transparent.
+    pub(super) background: [f32; 3],
+    /// Frames that will be fitted.
+    pub(super) frames: u32,
+}
+
+impl Taken<'_> {
+    /// What the cameras took, from a directory.
+    ///
+    /// # Errors
+    /// As those of [`load_photographs`]; cameras that are made, or several frames: photographs are of one moment.
+    fn photographs(&self, directory: &Path) -> Result<Vec<Photograph>, Failure> {
+        let Some(Views::File(path)) = self.cameras else {
+            return Err(Failure::Usage(
+                "--images needs the cameras that took them: give their file as --cameras".into(),
+            ));
+        };
+        if self.frames > 1 {
+            return Err(Failure::Usage(format!(
+                "--images shows one moment, and there are {} frames: encode the frame that it shows by itself",
+                self.frames
+            )));
+        }
+        let capture =
+            read_capture(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+        let photographs = load_photographs(&capture, Some(directory), self.height, self.background)
+            .map_err(|error| Failure::other(error.to_string()))?;
+        let of_encoder = |photograph: splatstream_capture::Photograph| Photograph {
+            camera: photograph.camera().clone(),
+            picture: photograph.picture(),
+        };
+        Ok(photographs.into_iter().map(of_encoder).collect())
     }
-    Ok(Photograph { camera, picture })
 }
 
 /// What fitting one frame has done.

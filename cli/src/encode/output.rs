@@ -55,6 +55,7 @@ pub(super) fn check_name(path: &Path) -> Result<(), Failure> {
     if is_page(path) { Ok(()) } else { check_stream_name(path) }
 }
 
-fn is_page(path: &Path) -> bool {
+/// Whether a name promises a web page.
+pub(super) fn is_page(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("html"))
 }

@@ -10,11 +10,14 @@ use splatstream_encoder::{Report, Settings};
 /// the squared error of the view that misses them most.
 const ABOVE: f32 = 8.0;
 
+/// How much better they must be: with less, no steps of the rest are fine enough.
+const LEAST_ABOVE: f32 = 3.0;
+
 /// Which Gaussians are left out.
 #[derive(Args, Debug)]
 pub(super) struct PruneArgs {
     /// Leave out the Gaussians that pictures miss least: as many as can go until pictures without them fall to a PSNR of DB
-    /// decibels, 20 to 90, against pictures with them. That holds in the worst of eight views from near and far, or near
+    /// decibels, 20 to 90 and 3 above the quality at least, against pictures with them. That holds in the worst of eight views from near and far, or near
     /// --cameras, that look past the middle of the scene as well. What no view shows, as from inside of something
     /// closed, may be left out. Without a number DB is 8 more than the quality. The quality of the stream stays that against
     /// all Gaussians. Only for frames that each stand for themselves.
@@ -45,6 +48,13 @@ impl PruneArgs {
     pub(super) fn threshold(&self, psnr: Option<f32>) -> Result<Option<f32>, Failure> {
         match (self.prune, psnr) {
             (None, _) => Ok(None),
+            (Some(Threshold::Decibels(decibels)), Some(psnr)) if decibels < psnr + LEAST_ABOVE => {
+                Err(Failure::Usage(format!(
+                    "--prune {decibels} leaves no room for a quality of {psnr} dB, which counts what is left out as well: give \
+                     --prune {} or more, or a lower --psnr",
+                    psnr + LEAST_ABOVE
+                )))
+            }
             (Some(Threshold::Decibels(decibels)), _) => Ok(Some(decibels)),
             (Some(Threshold::Above(above)), Some(psnr)) => Ok(Some((psnr + above).min(90.0))),
             (Some(Threshold::Above(_)), None) => {

@@ -2,6 +2,7 @@
 
 use super::Encode;
 use super::failed::failed;
+use super::output::is_page;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
@@ -81,6 +82,17 @@ impl ShardArgs {
     /// The plan that is read, if there is one.
     pub(super) const fn plan_file(&self) -> Option<&PathBuf> {
         self.plan.as_ref()
+    }
+
+    /// Refuses a web page of a shard, which has a part of the sequence.
+    pub(super) fn check_name(&self, out: &Path) -> Result<(), Failure> {
+        match self.shard {
+            Some(_) if is_page(out) => Err(Failure::Usage(format!(
+                "{}: a shard is a part of a stream: write it as .gss, and make the page of what concat joins, with `splatstream view`",
+                out.display()
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// The frames that are encoded and where they are in the sequence; none where all of it is.

@@ -61,7 +61,7 @@ pub(crate) fn warnings(
         report.dropped.iter().take(1).map(|first| dropped(report, first, file_of)).collect();
     warnings.extend(report.isolated.iter().map(|isolated| isolated_values(isolated, file_of)));
     match Goal::of(settings) {
-        Goal::Psnr(wanted) => warnings.extend(psnr(report, wanted)),
+        Goal::Psnr(wanted) => warnings.extend(psnr(report, settings, wanted)),
         Goal::Size(size) => warnings.extend(missed_size(report, size)),
         Goal::Nothing => {}
     }
@@ -82,7 +82,11 @@ pub(super) fn unlike_frames((fewest, most): (usize, usize)) -> Option<Warning> {
     (most > fewest.saturating_mul(UNLIKE)).then(|| Warning::new("unlike-frames", message))
 }
 
-fn psnr(report: &Report, wanted: f64) -> Vec<Warning> {
+fn psnr(report: &Report, settings: &Settings, wanted: f64) -> Vec<Warning> {
+    // Values that were fitted to photographs are not to show what the source does.
+    if settings.finetune.as_ref().is_some_and(|finetune| !finetune.photographs.is_empty()) {
+        return Vec::new();
+    }
     let Some(pictures) = &report.pictures else { return Vec::new() };
     let Some(measured) = pictures.psnr() else {
         let message = "the quality could not be checked: pictures of the scene are blank from all around; \
@@ -92,12 +96,7 @@ fn psnr(report: &Report, wanted: f64) -> Vec<Warning> {
     let fitted = pictures.fitted_psnr().unwrap_or(measured);
     let below = wanted - measured.min(fitted);
     if wanted - fitted > MISSED || wanted - measured > MISSED_UNSEEN {
-        let advice = match report.isolated.is_empty() {
-            true => {
-                "give a higher --psnr, or look for Gaussians that are far larger or brighter than all others"
-            }
-            false => "repair the values that are far beyond what a scene has",
-        };
+        let advice = missed_psnr_advice(report, settings);
         let message = format!(
             "pictures have a PSNR of {:.1} dB, {below:.1} dB less than the {wanted} dB asked for; {advice}",
             wanted - below
@@ -126,6 +125,20 @@ fn psnr(report: &Report, wanted: f64) -> Vec<Warning> {
     })
     .into_iter()
     .collect()
+}
+
+/// What may be done about pictures that finer steps do not mend.
+fn missed_psnr_advice(report: &Report, settings: &Settings) -> &'static str {
+    let (of_source, coded) = report.sh_degree;
+    if !report.isolated.is_empty() {
+        "repair the values that are far beyond what a scene has"
+    } else if settings.sh_degree.is_some() && coded < of_source {
+        "pictures are compared with those of all spherical harmonics: give a higher --sh-degree"
+    } else if settings.prune.is_some() {
+        "what was left out counts: give a higher --prune"
+    } else {
+        "give a higher --psnr, or look for Gaussians that are far larger or brighter than all others"
+    }
 }
 
 fn missed_size(report: &Report, size: Size) -> Option<Warning> {
@@ -210,7 +223,8 @@ fn not_fitted(report: &Report, settings: &Settings) -> Option<Warning> {
     let frames: Vec<u32> = report.finetuned.iter().map(|fitted| fitted.frame).collect();
     let fitted = frames.chunk_by(|frame, next| frame == next).count();
     let left = coded.saturating_sub(fitted);
-    (settings.finetune.is_some() && left > 0).then(|| {
+    let is_given_up = report.target.is_some_and(|target| target.without_finetune);
+    (settings.finetune.is_some() && left > 0 && !is_given_up).then(|| {
         let message = format!(
             "{left} of {} frames are not fine-tuned: those of a GOP of which others are predicted stay near the source; --all-intra \
              has every frame fine-tuned",

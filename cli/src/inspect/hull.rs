@@ -5,10 +5,11 @@ use crate::stream_file::StreamFile;
 use rayon::prelude::*;
 use splatstream_chart::first_frame::first_frame;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo};
+use splatstream_encoder::up_of;
 use splatstream_format::Limits;
 use splatstream_gaussians::FrameError;
 use splatstream_render::ReferencePictures;
-use splatstream_render::camera::{Up, held_out};
+use splatstream_render::camera::held_out;
 
 /// Views of the first frame, and their height.
 const VIEWS: (u32, u32) = (3, 270);
@@ -41,8 +42,10 @@ pub(super) fn qualities(
     let Some(reference) = highest.map(first).transpose()?.flatten() else {
         return Ok(vec![Quality::default(); points.len()]);
     };
-    let given = of_stream(&stream.description(limits).unwrap_or_default(), VIEWS.1);
-    let cameras = held_out(&reference, Up::default(), &given, VIEWS.0, VIEWS.1);
+    let description = stream.description(limits).unwrap_or_default();
+    let given = of_stream(&description, VIEWS.1);
+    let up = up_of(description.up_axis).unwrap_or_default();
+    let cameras = held_out(&reference, up, &given, VIEWS.0, VIEWS.1);
     let right = ReferencePictures::new(&reference, cameras);
     let seen = |info: &OperatingPointInfo| {
         let frame = first(info)?;

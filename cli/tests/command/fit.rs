@@ -67,6 +67,33 @@ fn what_cannot_be_trained_is_said() {
 }
 
 #[test]
+fn a_stream_is_fitted_to_the_photographs_of_its_scene() {
+    let directory = directory();
+    let at = directory.path();
+    let capture = at.join("capture");
+    let simulate = ["simulate", "-o", text(&capture), "--views", "9", "--height", "36", "--samples", "1"];
+    succeed(&[simulate.as_slice(), &["--points", "300", "--rig", "forward"]].concat());
+    let scene = at.join("scene.ply");
+    let fit = ["fit", text(&capture), "-o", text(&scene), "--iterations", "5", "--gaussians", "300"];
+    succeed(&[fit.as_slice(), &["--sh-degree", "0"]].concat());
+    let (stream, images) = (at.join("scene.gss"), capture.join("images"));
+    let encode = ["encode", text(&scene), "-o", text(&stream), "--psnr", "36", "--preset", "fast"];
+    let to_images = ["--finetune", "10", "--images", text(&images)];
+    let cameras = ["--cameras", text(&capture)];
+    let report = json(&[&encode[..], &to_images, &cameras].concat());
+    let [before, after] =
+        ["psnr_db_before", "psnr_db_after"].map(|key| report["finetuned"][0][key].as_f64().unwrap());
+    assert!(after >= before, "{before} {after}");
+    assert_eq!(report["warnings"].as_array().unwrap().len(), 0, "{report}");
+
+    assert!(fail(2, &[&encode[..], &to_images, &["--cameras", "ring:8"]].concat()).contains("took them"));
+    let several = ["encode", text(&scene), text(&scene), "-o", text(&stream), "--all-intra"];
+    assert!(fail(2, &[&several[..], &to_images, &cameras].concat()).contains("there are 2 frames"));
+    fs::remove_file(images.join("view_001.png")).unwrap();
+    assert!(fail(1, &[&encode[..], &to_images, &cameras].concat()).contains("view_001"));
+}
+
+#[test]
 fn pictures_are_the_same_again() {
     let directory = directory();
     let [one, other] = ["one", "other"].map(|name| directory.path().join(name));

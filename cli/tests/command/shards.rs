@@ -81,10 +81,7 @@ fn what_does_not_belong_together_is_refused_by_name() {
     let said = fail(1, &["concat", a, c, "-o", out]);
     assert!(said.contains("frames 2..=3 of 6 are in none of the shards"), "{said}");
     let said = fail(1, &["concat", a, b, b, c, "-o", out]);
-    assert!(
-        said.contains("2of3.gss: holds frames 2..=3, which ") && said.contains("every shard once"),
-        "{said}"
-    );
+    assert!(said.contains("2of3.gss: is given twice") && said.contains("every shard once"), "{said}");
     let more = ["--tolerance", "0.4", "--shard", "3/3"];
     succeed(&[&["encode", text(&frames), "-o", text(&other)][..], &OPTIONS, &more].concat());
     let said = fail(1, &["concat", a, b, text(&other), "-o", out]);
@@ -135,7 +132,7 @@ fn a_plan_is_refused_with_other_options_or_other_frames() {
     let said = fail(1, &[&shard[..], &OPTIONS[..2], &["--gop", "3", "--psnr", "40"]].concat());
     assert!(said.contains("plan.json: gop is 3, and was 2 when the sequence was planned"), "{said}");
     let said = fail(1, &[&shard[..], &OPTIONS[..4], &["--psnr", "41"]].concat());
-    assert!(said.contains("psnr is Some(41.0), and was Some(40.0)"), "{said}");
+    assert!(said.contains("psnr is 41 dB, and was 40 dB"), "{said}");
     let many = ["encode", text(&frames), "--plan", plan, "--shard", "1/4", "-o", out];
     let said = fail(2, &[&many[..], &OPTIONS].concat());
     assert!(said.contains("4 shards are asked for, and the sequence has 3 GOPs"), "{said}");

@@ -12,7 +12,7 @@
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of views")]
 
 use super::latent::{Decoded, Latent};
-use super::pictures::{BACKGROUND, Pictures, View, squared_error};
+use super::pictures::{Pictures, View, squared_error};
 use super::rate::Rate;
 use super::receivers::Receiver;
 use super::{Finetune, FinetuneReport, PointReport};
@@ -263,7 +263,7 @@ impl<'a> Descent<'a> {
         let Some(sight) = self.sights.get(place) else { return Ok(()) };
         let shown = self.shown(decoded, sight)?;
         let prepared = PreparedFrame::new(&shown);
-        let drawing = prepared.draw(&view.camera, BACKGROUND);
+        let drawing = prepared.draw(&view.camera, self.pictures.background);
         let (error, slopes) = squared_error(&view.wanted, &drawing.rendering().colour);
         let before = sight.error.unwrap_or(error);
         let mean = before + (error - before) / REMEMBERED;

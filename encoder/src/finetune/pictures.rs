@@ -5,12 +5,9 @@ use super::receivers::Receiver;
 use super::{Finetune, Photograph};
 use crate::settings::Settings;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::camera::{Scattered, Up, held_out};
+use splatstream_render::camera::{Scattered, held_out};
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
 use splatstream_render::{Camera, Image, PreparedFrame, render};
-
-/// Around the scene.
-pub(super) const BACKGROUND: [f32; 3] = [0.0; 3];
 
 /// Lines of a picture: those at which quality is meant. Fuzzing wants streams, not pictures.
 pub(super) const LINES: u32 = if cfg!(fuzzing) { 12 } else { 540 };
@@ -44,6 +41,8 @@ enum Supply<'a> {
 /// Views without end for receivers of operating points, and some to judge and to report by.
 pub(super) struct Pictures<'a> {
     supply: Supply<'a>,
+    /// Around the scene.
+    pub(super) background: [f32; 3],
     taken: usize,
     turns: Vec<Turn>,
     judges: Vec<Judges>,
@@ -89,8 +88,9 @@ impl<'a> Pictures<'a> {
             taken: 0,
         };
         let turns = receivers.iter().map(turn).collect();
+        let background = settings.description.background.unwrap_or_default();
         let views = |role: Role, lines: &[u32]| match finetune.photographs.is_empty() {
-            true => drawn_for(role, lines, source, settings),
+            true => drawn_for(role, lines, source, (settings, background)),
             false => finetune
                 .of_role(role)
                 .zip(lines.iter().cycle())
@@ -113,22 +113,22 @@ impl<'a> Pictures<'a> {
                 let [own, _] = SEEDS;
                 Supply::Scattered(
                     source,
-                    Scattered::new(source, Up::default(), &settings.cameras, own, LINES),
+                    Scattered::new(source, settings.up(), &settings.cameras, own, LINES),
                 )
             }
             false => Supply::Photographs(finetune.of_role(Role::Fit).collect()),
         };
-        Self { supply, taken: 0, turns, judges, witnesses }
+        Self { supply, background, taken: 0, turns, judges, witnesses }
     }
 
     /// Mean PSNR of what a receiver has as judges see it, dB.
     pub(super) fn judge(&self, receiver: &Receiver, frame: &GaussianFrame) -> f64 {
-        mean_psnr(&self.judges, &receiver.lines, frame)
+        mean_psnr(&self.judges, &receiver.lines, frame, self.background)
     }
 
     /// The same in views of the lines of its layer by which nothing is chosen.
     pub(super) fn witness(&self, receiver: &Receiver, frame: &GaussianFrame) -> f64 {
-        mean_psnr(&self.witnesses, &[receiver.own_lines], frame)
+        mean_psnr(&self.witnesses, &[receiver.own_lines], frame, self.background)
     }
 
     /// The next view, and which receiver looks: each as often as its weight says.
@@ -146,7 +146,7 @@ impl<'a> Pictures<'a> {
         self.taken = number.wrapping_add(1);
         let view = match &mut self.supply {
             Supply::Scattered(source, cameras) => {
-                cameras.next().map(|camera| drawn(source, camera.scaled_to_height(lines)))
+                cameras.next().map(|camera| drawn(source, camera.scaled_to_height(lines), self.background))
             }
             Supply::Photographs(photographs) => {
                 Some(photographs.get(number % photographs.len().max(1))?.view(lines))
@@ -157,34 +157,40 @@ impl<'a> Pictures<'a> {
 }
 
 /// Mean PSNR of a frame in the views of some lines, dB.
-fn mean_psnr(judges: &[Judges], lines: &[u32], frame: &GaussianFrame) -> f64 {
+fn mean_psnr(judges: &[Judges], lines: &[u32], frame: &GaussianFrame, background: [f32; 3]) -> f64 {
     let views = judges.iter().find(|judges| judges.lines == lines).map_or(&[][..], |judges| &judges.views);
     let prepared = PreparedFrame::new(frame);
     let of_view = |View { camera, wanted }: &View| {
-        psnr(wanted, &prepared.draw(camera, BACKGROUND).rendering().colour).min(LOSSLESS_DB)
+        psnr(wanted, &prepared.draw(camera, background).rendering().colour).min(LOSSLESS_DB)
     };
     views.iter().map(of_view).sum::<f64>() / views.len().max(1) as f64
 }
 
 /// Views of a source from elsewhere than slopes are taken.
-fn drawn_for(role: Role, lines: &[u32], source: &GaussianFrame, settings: &Settings) -> Vec<View> {
+fn drawn_for(
+    role: Role,
+    lines: &[u32],
+    source: &GaussianFrame,
+    (settings, background): (&Settings, [f32; 3]),
+) -> Vec<View> {
     let [_, others] = SEEDS;
     let cameras = match role {
-        Role::Witness => held_out(source, Up::default(), &settings.cameras, WITNESSES, LINES),
+        Role::Witness => held_out(source, settings.up(), &settings.cameras, WITNESSES, LINES),
         Role::Fit | Role::Judge => {
-            Scattered::new(source, Up::default(), &settings.cameras, others, LINES).take(JUDGES).collect()
+            Scattered::new(source, settings.up(), &settings.cameras, others, LINES).take(JUDGES).collect()
         }
     };
     let of_lines = cameras.into_iter().zip(lines.iter().cycle());
-    of_lines.map(|(camera, &lines)| drawn(source, camera.scaled_to_height(lines))).collect()
+    of_lines.map(|(camera, &lines)| drawn(source, camera.scaled_to_height(lines), background)).collect()
 }
 
 impl Finetune {
     /// The photographs that are used for something.
     fn of_role(&self, role: Role) -> impl Iterator<Item = &Photograph> {
         let role_of = |number: usize| match number % OF_PHOTOGRAPHS {
-            0 => Role::Witness,
-            place if place == OF_PHOTOGRAPHS / 2 => Role::Judge,
+            0 => Role::Judge,
+            // The one that training holds out as a rule.
+            place if place == OF_PHOTOGRAPHS / 2 => Role::Witness,
             _ => Role::Fit,
         };
         let numbered = self.photographs.iter().enumerate();
@@ -192,8 +198,8 @@ impl Finetune {
     }
 }
 
-fn drawn(source: &GaussianFrame, camera: Camera) -> View {
-    let wanted = render(source, &camera, BACKGROUND).colour;
+fn drawn(source: &GaussianFrame, camera: Camera, background: [f32; 3]) -> View {
+    let wanted = render(source, &camera, background).colour;
     View { camera, wanted }
 }
 

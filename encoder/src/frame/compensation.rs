@@ -22,8 +22,8 @@ pub(crate) struct Compensator {
 
 impl Compensator {
     /// For prefixes of a frame that all of its Gaussians make.
-    pub(crate) fn new(frame: &GaussianFrame) -> Self {
-        Self { views: ReferencePictures::new(frame, spiral(frame, Up::default(), VIEWS, LINES)) }
+    pub(crate) fn new(frame: &GaussianFrame, up: Up) -> Self {
+        Self { views: ReferencePictures::new(frame, spiral(frame, up, VIEWS, LINES)) }
     }
 
     /// Offsets of log-scale and opacity for the Gaussians of some lists: as far as each step up brings the pictures

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::laws::Laws;
 use crate::report::TargetReport;
 use crate::sequence::{Analysis, check};
-use crate::settings::{NetworkSource, Settings};
+use crate::settings::{NetworkSource, Settings, ShChoice};
 use crate::steps::Steps;
 use serde::{Deserialize, Serialize};
 use splatstream_format::Limits;
@@ -22,6 +22,9 @@ pub struct PlanRecord {
     pub settings: BTreeMap<String, String>,
     /// Gaussians of each frame of the sequence, as it is read.
     pub gaussians: Vec<u32>,
+    /// A digest of each frame, as it is read: XXH64 of its degree of SH, 1 or 0 for antialiased, and the values of its planes as
+    /// single precision, least significant byte first.
+    pub frame_digests: Vec<u64>,
     /// Steps that were found.
     pub steps: PlannedSteps,
     /// How steps follow from what is known of a Gaussian: powers of area, opacity and anisotropy, and the area and the
@@ -77,6 +80,21 @@ pub struct PlannedTarget {
     pub encodings: u32,
     /// Times that a part of it was encoded.
     pub trials: u32,
+    /// Whether values are not fitted to pictures although the settings say so.
+    pub without_finetune: bool,
+    /// Whether SH has no codebook although the settings leave it open.
+    pub without_codebook: bool,
+}
+
+impl PlannedTarget {
+    /// Settings without what was given up.
+    fn settled(&self, settings: Settings) -> Settings {
+        Settings {
+            finetune: settings.finetune.filter(|_| !self.without_finetune),
+            sh: if self.without_codebook { ShChoice::Coefficients } else { settings.sh },
+            ..settings
+        }
+    }
 }
 
 /// A number of single precision that any format keeps to the last bit: it is written in double precision.
@@ -115,10 +133,13 @@ impl Plan {
             fitted: Single(target.fitted),
             encodings: target.encodings,
             trials: target.trials,
+            without_finetune: target.without_finetune,
+            without_codebook: target.without_codebook,
         };
         Ok(PlanRecord {
             settings: named(&self.asked),
             gaussians: analysis.counts.clone(),
+            frame_digests: self.frame_digests.clone(),
             steps: PlannedSteps::from(self.settings.steps),
             laws: [area, opacity, anisotropy, area_reference, anisotropy_reference].map(Single),
             coarser,
@@ -145,11 +166,17 @@ impl Plan {
         let coarser = record.coarser;
         let laws = Laws { area, opacity, anisotropy, area_reference, anisotropy_reference, coarser };
         let settled = Settings { steps: record.steps.into(), laws, ..settings.clone() };
+        let settled = match record.target {
+            Some(target) => target.settled(settled),
+            None => settled,
+        };
         let settled = if record.stands_alone { settled.alone() } else { settled };
         let target = |target: PlannedTarget| TargetReport {
             fitted: target.fitted.0,
             encodings: target.encodings,
             trials: target.trials,
+            without_finetune: target.without_finetune,
+            without_codebook: target.without_codebook,
         };
         Ok(Self {
             asked: settings.clone(),
@@ -159,6 +186,7 @@ impl Plan {
             ranking: None,
             target: record.target.map(target),
             stands_alone: record.stands_alone,
+            frame_digests: record.frame_digests.clone(),
         })
     }
 }
@@ -166,7 +194,8 @@ impl Plan {
 fn analysis(record: &PlanRecord, settled: &Settings) -> Result<Analysis, Error> {
     let parameters = SequenceParameters::parse_payload(&record.sequence_parameters, 0, settled.profile());
     let parameters = parameters.map_err(|_| Error::Plan("its sequence parameters are none"))?;
-    if parameters.frame_count as usize != record.gaussians.len() || record.gaussians.is_empty() {
+    let frames = parameters.frame_count as usize;
+    if [record.gaussians.len(), record.frame_digests.len()] != [frames; 2] || frames == 0 {
         return Err(Error::Plan("it has not as many frames as it says"));
     }
     if !Limits::LEVELS.contains(&record.level) {
@@ -219,7 +248,7 @@ fn described(settings: &Settings) -> Vec<(&'static str, String)> {
     let Settings { sh_degree, sh, keep_invisible, importance, cameras, fidelity, tolerance, tools, .. } =
         settings;
     // How much is coded at once changes nothing.
-    let Settings { block_log2, ticks, description, gop_memory: _, .. } = settings;
+    let Settings { block_log2, ticks, description, finetune, gop_memory: _, .. } = settings;
     let network = match network {
         Some(NetworkSource::Given(_)) => "given".to_owned(),
         other => format!("{other:?}"),
@@ -228,13 +257,19 @@ fn described(settings: &Settings) -> Vec<(&'static str, String)> {
         0 => "none".to_owned(),
         count => format!("{count}, digest {:016x}", xxh64(format!("{cameras:?}").as_bytes(), 0)),
     };
+    let finetune = finetune.as_ref().map_or("none".to_owned(), |finetune| {
+        let digest = xxh64(format!("{finetune:?}").as_bytes(), 0);
+        format!("{} iterations, digest {digest:016x}", finetune.iterations)
+    });
+    let psnr = psnr.map_or("none".to_owned(), |decibels| format!("{decibels} dB"));
     vec![
         ("encoder", env!("CARGO_PKG_VERSION").to_owned()),
         ("preset", format!("{preset:?}")),
+        ("psnr", psnr),
+        ("size", format!("{size:?}")),
+        ("finetune", finetune),
         ("steps", format!("{steps:?}")),
         ("laws", format!("{laws:?}")),
-        ("psnr", format!("{psnr:?}")),
-        ("size", format!("{size:?}")),
         ("verify", verify.to_string()),
         ("drop_invalid", drop_invalid.to_string()),
         ("gop", gop.to_string()),

@@ -312,6 +312,23 @@ impl GaussianFrame {
     }
 }
 
+impl GaussianFrame {
+    /// The same Gaussians with another degree of spherical harmonics, 0 to 3: bands above it are left out, and missing ones
+    /// are 0.
+    ///
+    /// # Errors
+    /// A degree above 3.
+    pub fn with_sh_degree(self, sh_degree: u8) -> Result<Self, FrameError> {
+        if sh_degree == self.sh_degree {
+            return Ok(self);
+        }
+        let (rows, antialiased) = (self.len(), self.antialiased);
+        let mut planes = self.into_planes();
+        planes.sh.resize(sh_planes(sh_degree), vec![0.0; rows]);
+        Ok(Self::from_planes(sh_degree, planes)?.with_antialiased(antialiased))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,6 +345,19 @@ mod tests {
         planes.log_scale[2].push(1.0);
         let error = GaussianFrame::from_planes(0, planes).unwrap_err();
         assert_eq!(error.to_string(), "scale_2 has 2 rows, x has 1");
+    }
+
+    #[test]
+    fn another_degree_leaves_bands_out_or_adds_empty_ones() {
+        let mut planes = one(2);
+        (1_u8..).zip(&mut planes.sh).for_each(|(value, plane)| plane[0] = f32::from(value));
+        let frame = GaussianFrame::from_planes(2, planes).unwrap().with_antialiased(true);
+        let lower = frame.clone().with_sh_degree(1).unwrap();
+        assert_eq!((lower.sh_degree(), lower.sh(), lower.antialiased()), (1, &frame.sh()[..9], true));
+        let higher = frame.clone().with_sh_degree(3).unwrap();
+        assert_eq!(higher.sh()[..24], *frame.sh());
+        assert_eq!(higher.sh()[24..], vec![vec![0.0]; 21]);
+        assert!(frame.with_sh_degree(4).is_err());
     }
 
     #[test]
