@@ -200,10 +200,8 @@ impl<'a> Fitting<'a> {
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
     fn gain(&self) -> f64 {
-        let is_fitted = self.fits_values && self.settings.temporal_layers() == 0;
-        let finetune =
-            self.settings.finetune.as_ref().filter(|finetune| is_fitted && finetune.photographs.is_empty());
-        finetune.map_or(0.0, |finetune| {
+        let is_fitted = self.fits_values && self.settings.temporal_layers() == 0 && !self.leaves_source();
+        self.settings.finetune.as_ref().filter(|_| is_fitted).map_or(0.0, |finetune| {
             let [most, iterations] = GAIN;
             let gain = most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations));
             gain * finetune.share_of_everything(self.settings)
@@ -217,7 +215,7 @@ impl<'a> Fitting<'a> {
     fn gives_up_codebook(&mut self, report: &Report, missed: f64) -> bool {
         let has_one = report.sh_codebook_entries > 0 && self.sh == ShChoice::Auto;
         // Nor is it to blame for what fitting was to bring and did not.
-        let by_fitting = (self.gain() - gain(report)).max(0.0);
+        let by_fitting = (self.gain() - gained(report)).max(0.0);
         let is_dear = has_one && missed - by_fitting > NEAR_DECIBELS;
         if is_dear {
             self.sh = ShChoice::Coefficients;
@@ -455,14 +453,14 @@ impl<'a> Seeker<'a> {
 }
 
 /// What fitting values to pictures has brought, decibels: the least of all frames.
-fn gain(report: &Report) -> f64 {
+fn gained(report: &Report) -> f64 {
     let gains = report.finetuned.iter().map(|fitted| fitted.psnr[1] - fitted.psnr[0]);
     gains.min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
 /// Whether a single frame may be as good without fitting.
 fn is_doubtful(report: &Report) -> bool {
-    report.frames == 1 && !report.finetuned.is_empty() && gain(report) < DOUBTFUL_GAIN
+    report.frames == 1 && !report.finetuned.is_empty() && gained(report) < DOUBTFUL_GAIN
 }
 
 /// The logarithm of the bytes that a stream would take at a PSNR.

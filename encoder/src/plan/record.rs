@@ -117,7 +117,7 @@ impl From<Single> for f64 {
 impl PlanRecord {
     /// A number that two plans have in common only if they are the same.
     pub fn digest(&self) -> u64 {
-        xxh64(format!("{self:?}").as_bytes(), 0)
+        digest_of(self)
     }
 }
 
@@ -239,6 +239,11 @@ fn named(settings: &Settings) -> BTreeMap<String, String> {
     described(settings).into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
+/// XXH64 of how values are written for debugging, which has every bit of them.
+fn digest_of(values: &impl core::fmt::Debug) -> u64 {
+    xxh64(format!("{values:?}").as_bytes(), 0)
+}
+
 /// Everything that the bytes of a stream follow from, beside its frames.
 fn described(settings: &Settings) -> Vec<(&'static str, String)> {
     let Settings { preset, steps, laws, psnr, size, verify, drop_invalid, gop, structure, anchor, .. } =
@@ -255,11 +260,10 @@ fn described(settings: &Settings) -> Vec<(&'static str, String)> {
     };
     let cameras = match cameras.len() {
         0 => "none".to_owned(),
-        count => format!("{count}, digest {:016x}", xxh64(format!("{cameras:?}").as_bytes(), 0)),
+        count => format!("{count}, digest {:016x}", digest_of(cameras)),
     };
     let finetune = finetune.as_ref().map_or("none".to_owned(), |finetune| {
-        let digest = xxh64(format!("{finetune:?}").as_bytes(), 0);
-        format!("{} iterations, digest {digest:016x}", finetune.iterations)
+        format!("{} iterations, digest {:016x}", finetune.iterations, digest_of(finetune))
     });
     let psnr = psnr.map_or("none".to_owned(), |decibels| format!("{decibels} dB"));
     vec![
