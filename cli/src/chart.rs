@@ -3,6 +3,7 @@
 mod sweep_args;
 
 use crate::cameras::{CameraArgs, Views};
+use crate::capture_files::files_at;
 use crate::compare::pictures::read_weights;
 use crate::console::Console;
 use crate::encode::warnings::warnings;
@@ -108,20 +109,34 @@ impl Chart {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "charts")?;
         make_directory(&self.out)?;
+        let inputs = self.inputs()?;
         if self.stability {
             let report = self.failures()?;
-            let written = self.write(report)?;
+            let written = self.write(report, &inputs)?;
             let page = written.page.display();
             return console
                 .report(&written, || format!("{}open {page} in a browser\n", written.summary.text()));
         }
         let report = self.charts()?;
-        let written = self.write(report)?;
+        let written = self.write(report, &inputs)?;
         console.report(&written, || {
             let (page, files) = (written.page.display(), grouped(written.files.len() as u64));
             let text = written.summary.text();
             format!("{text}open {page} in a browser; {files} CSV and SVG files are beside it\n")
         })
+    }
+
+    /// The files that it reads, as far as they are named here.
+    fn inputs(&self) -> Result<Vec<PathBuf>, Failure> {
+        let mut inputs = Vec::new();
+        for path in &self.scenes {
+            inputs.extend(FrameFiles::find(std::slice::from_ref(path), self.reading)?.inputs());
+        }
+        if let Some(Views::File(path)) = &self.cameras {
+            inputs.extend(files_at(path));
+        }
+        inputs.extend(self.peers.iter().chain(&self.st_lpips).cloned());
+        Ok(inputs)
     }
 
     fn charts(&self) -> Result<Report<splatstream_chart::summary::Summary>, Failure> {
@@ -192,15 +207,15 @@ impl Chart {
         )
     }
 
-    /// Writes the files of a report, the page last.
-    fn write<S>(&self, report: Report<S>) -> Result<Written<S>, Failure> {
+    /// Writes the files of a report, the page last; none replaces one of `inputs`.
+    fn write<S>(&self, report: Report<S>, inputs: &[PathBuf]) -> Result<Written<S>, Failure> {
         for File { name, bytes } in report.files.iter().chain(&report.pictures) {
             let path = self.out.join(name);
             path.parent().map_or(Ok(()), make_directory)?;
-            OutputFile::write(&path, bytes)?;
+            OutputFile::write_apart(&path, inputs, bytes)?;
         }
         let page = self.out.join("index.html");
-        OutputFile::write(&page, report.page.as_bytes())?;
+        OutputFile::write_apart(&page, inputs, report.page.as_bytes())?;
         let files = report.files.into_iter().map(|file| file.name).collect();
         Ok(Written { page, files, summary: report.summary })
     }

@@ -78,6 +78,20 @@ impl SuiteArgs {
         Suite::read(&Self::folder(self.suite.clone())?).map_err(refused)
     }
 
+    /// The files of a suite: records, streams, and what stands beside the folder of the vectors.
+    fn files(&self, suite: &Suite) -> Result<Vec<PathBuf>, Failure> {
+        let folder = Self::folder(self.suite.clone())?;
+        let mut files = Vec::new();
+        for beside in [Some(folder.as_path()), folder.parent()].into_iter().flatten() {
+            files.extend(["VERSION", "MANIFEST"].map(|name| beside.join(name)));
+        }
+        for folder in suite.vectors.iter().filter_map(|vector| vector.stream.parent()) {
+            let entries = std::fs::read_dir(folder).map_err(|error| Failure::file("read", folder, &error))?;
+            files.extend(entries.flatten().map(|entry| entry.path()));
+        }
+        Ok(files)
+    }
+
     /// The folder of the vectors that was named, or the one of the repository.
     fn folder(named: Option<PathBuf>) -> Result<PathBuf, Failure> {
         let named = named.or_else(Suite::locate);

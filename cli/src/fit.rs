@@ -5,12 +5,13 @@ mod report;
 mod training;
 
 use crate::cameras::BackgroundArg;
+use crate::capture_files::files_of;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
 use crate::numbers::{FrameRange, parse_share};
-use crate::output_file::{OutputFile, check_directory, make_directory, refuse_standard};
+use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs, refuse_standard};
 use crate::stream_file::LimitArgs;
 use captures::Captures;
 use clap::Args;
@@ -106,6 +107,7 @@ impl Fit {
         let opened = self.start.as_ref().map(|path| Opened::open(path, self.reading)).transpose()?;
         let limits = self.limits.limits();
         let mut starts = opened.as_ref().map(|opened| opened.frames(&limits, None)).transpose()?;
+        let inputs = starts.as_ref().map(Frames::inputs).unwrap_or_default();
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let mut report = Fitted::new(self.out.clone(), captures.is_sequence());
         let mut before: Option<GaussianFrame> = None;
@@ -121,10 +123,10 @@ impl Fit {
             let kept = out.as_deref().filter(|out| self.resume && out.is_file());
             let (frame, fitted) = match kept {
                 Some(path) => self.kept(path)?,
-                None => self.fit(&captures, number, start, before.take())?,
+                None => self.fit(&captures, number, (out.as_deref(), &inputs), start, before.take())?,
             };
             if let (Some(out), None) = (&out, kept) {
-                OutputFile::write(out, &ply::write(&frame))?;
+                OutputFile::write_apart(out, &inputs, &ply::write(&frame))?;
             }
             // The next one starts from what is in the file, as it does when it is resumed.
             before = match &out {
@@ -192,15 +194,20 @@ impl Fit {
         Ok((frame, fitted))
     }
 
+    /// Trains a frame, whose file replaces no file of the capture and none of `inputs`.
     fn fit(
         &self,
         captures: &Captures,
         number: u32,
+        (out, inputs): (Option<&Path>, &[PathBuf]),
         start: Option<GaussianFrame>,
         before: Option<GaussianFrame>,
     ) -> Result<(GaussianFrame, FittedFrame), Failure> {
         let background = self.background.colour(&SceneDescription::default());
         let capture = captures.read(number)?;
+        let files = files_of(captures.path(number), &capture, self.images.as_deref());
+        // At once, and not after minutes of work.
+        out.map_or(Ok(()), |out| refuse_inputs(out, &[inputs, &files].concat()))?;
         let training = Training::open(&capture, captures.path(number), self, background)?;
         training.run(start, before, self.time_budget.map(|seconds| Duration::from_secs(seconds.into())))
     }

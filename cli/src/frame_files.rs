@@ -88,6 +88,11 @@ impl FrameFiles {
         &self.paths
     }
 
+    /// The files that are read, which no output may replace: those of scenes that are directories one by one.
+    pub(crate) fn inputs(&self) -> Vec<PathBuf> {
+        self.paths.iter().flat_map(|path| files_of(path)).collect()
+    }
+
     /// The fewest and the most Gaussians of the frames that were read.
     pub(crate) fn counts(&self) -> (usize, usize) {
         self.counts.unwrap_or_default()
@@ -229,6 +234,14 @@ fn kind_of(path: &Path) -> Option<&'static str> {
     let extension = path.extension()?.to_str()?;
     let known = EXTENSIONS.into_iter().find(|known| extension.eq_ignore_ascii_case(known));
     known.filter(|_| path.is_file())
+}
+
+/// A file, or the files of a SOG directory.
+fn files_of(path: &Path) -> Vec<PathBuf> {
+    match std::fs::read_dir(path) {
+        Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
+        Err(_) => vec![path.to_path_buf()],
+    }
 }
 
 fn is_sog(path: &Path) -> bool {

@@ -94,6 +94,14 @@ impl Frames<'_> {
         }
     }
 
+    /// The files that are read.
+    pub(crate) fn inputs(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Stream(decoding) => vec![decoding.file.path.clone()],
+            Self::Files { files, .. } => files.inputs(),
+        }
+    }
+
     /// The next frame and its display index. A stream may lack frames, in particular at an operating point; those of which
     /// nothing is known are left out.
     pub(crate) fn next(&mut self) -> Result<Option<(u32, GaussianFrame)>, Failure> {

@@ -4,6 +4,7 @@
 //! the Python package has the same command ([`main`]) and the same options of encoding ([`EncodeOptions`]).
 
 mod cameras;
+mod capture_files;
 mod chart;
 mod compare;
 mod completions;

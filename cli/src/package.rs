@@ -131,10 +131,7 @@ impl PackageStream {
 
     /// The files of an earlier package, if they may be replaced.
     fn stale(&self) -> Result<Vec<PathBuf>, Failure> {
-        let Ok(entries) = std::fs::read_dir(&self.out) else { return Ok(Vec::new()) };
-        let mut stale: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        stale.retain(|path| is_of_package(path) && !path.is_dir());
-        stale.sort();
+        let stale = files_in(&self.out);
         if !stale.is_empty() && !self.force {
             return Err(Failure::Usage(format!(
                 "{}: there is a package in the directory; give another one, or --force to replace it",
@@ -144,6 +141,15 @@ impl PackageStream {
         stale.iter().try_for_each(|path| refuse_inputs(path, slice::from_ref(&self.input)))?;
         Ok(stale)
     }
+}
+
+/// The files of a package in a directory, by name; none where there is no package.
+pub(crate) fn files_in(directory: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| is_of_package(path) && !path.is_dir());
+    files.sort();
+    files
 }
 
 /// A package of a stream, with the table of qualities if it is wanted.

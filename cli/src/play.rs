@@ -5,7 +5,8 @@ mod report;
 
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use crate::output_file::{OutputFile, refuse_inputs};
+use crate::package::files_in;
 use crate::stream_file::LimitArgs;
 use clap::{Args, ValueEnum};
 use decoding::Decoding;
@@ -110,6 +111,8 @@ impl Play {
     /// Plays, or simulates, and reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         console.claim(self.out.as_deref())?;
+        let inputs = self.inputs();
+        self.out.as_deref().map_or(Ok(()), |out| refuse_inputs(out, &inputs))?;
         let trace = self.trace.as_deref().map(|path| self.read_trace(path)).transpose()?;
         let failed = |error| Failure::other(format!("{}: cannot play: {error}", self.location));
         let mut client = Client::open(&self.location, self.options()).map_err(failed)?;
@@ -138,9 +141,21 @@ impl Play {
         };
         let report = report.of(&self.location, self.rule.name());
         if let Some(path) = &self.out {
-            OutputFile::write_apart(path, &[], to_json(&report)?.as_bytes())?;
+            OutputFile::write_apart(path, &inputs, to_json(&report)?.as_bytes())?;
         }
         console.report_beside(self.out.as_deref(), &report, || report.text())
+    }
+
+    /// The files that it reads: a trace, and those of a package on this machine.
+    fn inputs(&self) -> Vec<PathBuf> {
+        let location = PathBuf::from(&self.location);
+        let directory = match location.parent() {
+            _ if location.is_dir() => &location,
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        let package = files_in(directory);
+        [Some(location), self.trace.clone()].into_iter().flatten().chain(package).collect()
     }
 
     fn read_trace(&self, path: &Path) -> Result<Trace, Failure> {

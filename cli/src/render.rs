@@ -1,9 +1,10 @@
 //! `splatstream render`: frames to pictures.
 
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
+use crate::capture_files::files_at;
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
-use crate::frames::Opened;
+use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
 use crate::numbers::{FrameRange, frames};
 use crate::output_file::{OutputFile, check_directory, make_directory};
@@ -61,6 +62,9 @@ pub(crate) struct Render {
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Drawn {
+    /// What no picture may replace.
+    #[serde(skip)]
+    inputs: Vec<PathBuf>,
     output: PathBuf,
     frames: u32,
     /// Frames that the stream or the files have; 0 if that is not known.
@@ -104,7 +108,7 @@ impl Render {
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));
-        let mut drawn = self.nothing();
+        let mut drawn = self.nothing(self.inputs(&frames));
         let background = self.background.colour(&description);
         let mut cameras: Vec<Camera> = Vec::new();
         let mut next = 0;
@@ -136,8 +140,9 @@ impl Render {
     }
 
     /// The report before anything is drawn.
-    fn nothing(&self) -> Drawn {
+    fn nothing(&self, inputs: Vec<PathBuf>) -> Drawn {
         Drawn {
+            inputs,
             output: self.out.clone(),
             frames: 0,
             expected: 0,
@@ -146,6 +151,16 @@ impl Render {
             errors: Vec::new(),
             guessed_up: None,
         }
+    }
+
+    /// The files that it reads, and the photographs that a file of cameras names.
+    fn inputs(&self, frames: &Frames<'_>) -> Vec<PathBuf> {
+        let cameras = match &self.camera {
+            // Where there is no directory yet, there is nothing to replace.
+            Some(Views::File(path)) if self.out.is_dir() => files_at(path),
+            _ => Vec::new(),
+        };
+        [frames.inputs(), cameras].concat()
     }
 
     /// What is taken to point up, if cameras are made and nobody says it.
@@ -179,7 +194,8 @@ impl Render {
             let file = if sequence { format!("frame_{number:04}_{view}.png") } else { format!("{view}.png") };
             let path = self.out.join(&file);
             let failed = |error| Failure::other(format!("{}: cannot write: {error}", path.display()));
-            OutputFile::write(&path, &rendering.colour.to_png().map_err(failed)?)?;
+            let png = rendering.colour.to_png().map_err(failed)?;
+            OutputFile::write_apart(&path, &drawn.inputs, &png)?;
             let (width, height) = (camera.width, camera.height);
             drawn.pictures.push(Picture { file, frame: number, view: view.clone(), width, height, seconds });
         }

@@ -3,6 +3,7 @@
 mod report;
 
 use crate::cameras::{BackgroundArg, CameraArgs, UpName, Views};
+use crate::capture_files::files_at;
 use crate::console::Console;
 use crate::decode::{earlier_frames, remove_frames};
 use crate::failure::Failure;
@@ -99,10 +100,11 @@ impl Track {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let begin = Instant::now();
         let mut files = FrameFiles::find(&self.inputs, self.reading)?;
+        let inputs = self.files_read(&files);
         check_directory(&self.out, "frames of a sequence")?;
         let mut earlier = match self.resume {
             true => Vec::new(),
-            false => earlier_frames(&self.out, files.paths(), self.force)?,
+            false => earlier_frames(&self.out, &inputs, self.force)?,
         };
         let span = self.frames.unwrap_or(FrameRange::ALL);
         if span.first >= files.len() {
@@ -128,7 +130,7 @@ impl Track {
             let path = self.out.join(format!("frame_{number:04}.ply"));
             let tracked = match self.resume && path.is_file() {
                 true => TrackedFrame::kept(),
-                false => self.make(start, &source, &settings, (&path, files.paths()), number)?,
+                false => self.make(start, &source, &settings, (&path, &inputs), number)?,
             };
             // The next one starts from what is in the file, as it does when it is resumed.
             let made = self.reading.frame(&path)?;
@@ -138,6 +140,15 @@ impl Track {
         files.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         report.finish(begin.elapsed());
         console.report(&report, || report.text())
+    }
+
+    /// The files of the frames, and of the cameras.
+    fn files_read(&self, files: &FrameFiles) -> Vec<PathBuf> {
+        let cameras = match &self.cameras {
+            Views::File(path) => files_at(path),
+            Views::Ring(_) | Views::Forward(_) => Vec::new(),
+        };
+        [files.inputs(), cameras].concat()
     }
 
     /// How frames of a GOP are followed; views are those of its first.

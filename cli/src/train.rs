@@ -4,7 +4,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::input_args::InputArgs;
-use crate::output_file::{OutputFile, refuse_standard};
+use crate::output_file::{OutputFile, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
 use crate::setting_names::QualityName;
 use clap::Args;
@@ -66,6 +66,9 @@ impl Train {
     /// Collects, trains, writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         refuse_standard(&self.out)?;
+        let inputs = self.inputs()?;
+        // At once, and not after minutes of work.
+        refuse_inputs(&self.out, &inputs)?;
         let mut found = Vec::new();
         for architecture in Architecture::BASES {
             found.push((architecture, self.samples(&architecture)?));
@@ -83,7 +86,7 @@ impl Train {
             ));
         };
         let bytes = network.to_bytes().map_err(|error| Failure::other(error.to_string()))?;
-        OutputFile::write(&self.out, &bytes)?;
+        OutputFile::write_apart(&self.out, &inputs, &bytes)?;
         let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
         let trained = Trained {
             output: self.out.clone(),
@@ -96,6 +99,15 @@ impl Train {
             errors: report.best.means().collect(),
         };
         console.report(&trained, || trained.text())
+    }
+
+    /// The files of all sequences.
+    fn inputs(&self) -> Result<Vec<PathBuf>, Failure> {
+        let mut inputs = Vec::new();
+        for path in &self.sequences {
+            inputs.extend(FrameFiles::find(std::slice::from_ref(path), self.reading)?.inputs());
+        }
+        Ok(inputs)
     }
 
     /// What all sequences give.

@@ -59,7 +59,8 @@ impl Unpackage {
             Failure::stream(if path.exists() { &path } else { &self.directory }, error.error)
         })?;
         let verified = self.verify(&stream)?;
-        OutputFile::write_apart(&self.out, &paths, &stream)?;
+        let inputs = [paths.as_slice(), &[self.directory.join(Package::MANIFEST)]].concat();
+        OutputFile::write_apart(&self.out, &inputs, &stream)?;
         let bytes = stream.len() as u64;
         let report = Report { output: &self.out, bytes, files: paths.len(), verified };
         console.report_beside(Some(&self.out), &report, || report.text())

@@ -78,16 +78,15 @@ pub(super) struct Run {
 impl Run {
     /// Runs, writes the reports; fails if the decoder did.
     pub(super) fn run(&self, console: &Console) -> Result<(), Failure> {
-        [&self.report, &self.junit, &self.markdown]
-            .into_iter()
-            .flatten()
-            .try_for_each(|path| refuse_standard(path).and_then(|()| refuse_inputs(path, &self.inputs())))?;
+        self.outputs().try_for_each(|path| refuse_standard(path))?;
         let settings = self.settings()?;
         if let Some(word) = shell_word(settings.decoder.words()) {
             console
                 .complain(&format!("warning: '{word}' is for a shell, and no shell runs; use sh -c '...'"));
         }
         let suite = self.suite.read()?;
+        let inputs = self.inputs(&suite)?;
+        self.outputs().try_for_each(|path| refuse_inputs(path, &inputs))?;
         if let Some(complaint) = suite.complaint() {
             console.complain(&format!("warning: {complaint}"));
         }
@@ -103,7 +102,7 @@ impl Run {
         let selection = self.suite.selection();
         let stale = expectations.apply(&mut results);
         let report = Report::new(&suite, &settings, &selection, results, stale);
-        self.write(&report)?;
+        self.write(&report, &inputs)?;
         console.report(&report, || summary::text(&report))?;
         self.verdict(&report)
     }
@@ -166,21 +165,27 @@ impl Run {
         self.decoder.is_none() && self.stdio.is_none()
     }
 
-    /// The files that it reads besides the suite.
-    fn inputs(&self) -> Vec<PathBuf> {
-        [&self.capabilities, &self.expectations].into_iter().flatten().cloned().collect()
+    /// The reports.
+    fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
+        [&self.report, &self.junit, &self.markdown].into_iter().flatten()
     }
 
-    fn write(&self, report: &Report) -> Result<(), Failure> {
+    /// The files that it reads: those of the suite, and what is said of the decoder.
+    fn inputs(&self, suite: &Suite) -> Result<Vec<PathBuf>, Failure> {
+        let named = [&self.capabilities, &self.expectations].into_iter().flatten().cloned();
+        Ok(self.suite.files(suite)?.into_iter().chain(named).collect())
+    }
+
+    fn write(&self, report: &Report, inputs: &[PathBuf]) -> Result<(), Failure> {
         if let Some(path) = &self.report {
-            OutputFile::write(path, (to_json(report)? + "\n").as_bytes())?;
+            OutputFile::write_apart(path, inputs, (to_json(report)? + "\n").as_bytes())?;
         }
         if let Some(path) = &self.junit {
             let xml = junit::xml(report).map_err(|error| Failure::file("write", path, &error))?;
-            OutputFile::write(path, xml.as_bytes())?;
+            OutputFile::write_apart(path, inputs, xml.as_bytes())?;
         }
         if let Some(path) = &self.markdown {
-            OutputFile::write(path, markdown::page(report).as_bytes())?;
+            OutputFile::write_apart(path, inputs, markdown::page(report).as_bytes())?;
         }
         Ok(())
     }

@@ -52,6 +52,25 @@ fn a_decoder_that_fails_is_3_and_reports_are_written() {
 }
 
 #[test]
+fn no_report_replaces_a_file_of_the_suite() {
+    let directory = directory();
+    let [from, suite] = [vectors().join("valid/geometry"), directory.path().join("valid/geometry")];
+    let folder = fs::read_dir(from).unwrap().next().unwrap().unwrap();
+    let copy = suite.join(folder.file_name());
+    fs::create_dir_all(&copy).unwrap();
+    let files = ["in.gss", "vector.json"];
+    for file in files {
+        fs::copy(folder.path().join(file), copy.join(file)).unwrap();
+    }
+    for file in files {
+        let report = copy.join(file);
+        let said = fail(2, &on_vectors("run", directory.path(), &["--report", text(&report)]));
+        assert!(said.contains("this command reads that file"), "{said}");
+        assert_eq!(fs::read(folder.path().join(file)).unwrap(), fs::read(report).unwrap());
+    }
+}
+
+#[test]
 fn a_page_of_decoders_is_made_of_reports() {
     let (vectors, directory) = (vectors(), directory());
     let (report, page) = (directory.path().join("report.json"), directory.path().join("DECODERS.md"));

@@ -1,6 +1,7 @@
 //! What commands write: whole files under the names that they were given, in the place of nothing that somebody needs.
 
 use crate::common::{directory, fail, json, run, run_with, succeed, text, write_still, write_stream};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -46,6 +47,55 @@ fn no_output_replaces_an_input() {
     fail(2, &["decode", text(&stream), "-o", text(&frames), "--force"]);
     assert_eq!(fs::read(&stream).unwrap(), before);
     assert_eq!(names(&frames), ["frame_0001.ply"]);
+}
+
+/// The bytes of every file in a directory and below it, by path.
+fn contents(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut contents = BTreeMap::new();
+    for path in fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()) {
+        match path.is_dir() {
+            true => contents.extend(self::contents(&path)),
+            false => _ = contents.insert(path.clone(), fs::read(&path).unwrap()),
+        }
+    }
+    contents
+}
+
+#[test]
+fn no_file_that_belongs_to_an_input_is_replaced() {
+    let (directory, still, stream) = files();
+    let at = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    let (package, capture, trace, start) = (at("package"), at("capture"), at("t.json"), at("st.ply"));
+    succeed(&["package", text(&stream), "-o", &package]);
+    let small = ["--views", "3", "--height", "27", "--samples", "1", "--points", "200"];
+    succeed(&[&["simulate", "-o", &capture][..], &small].concat());
+    fs::write(&trace, "t_s,mbps\n0,100\n").unwrap();
+    fs::copy(at("frames/f8.ply"), &start).unwrap();
+    fs::hard_link(format!("{package}/manifest.mpd"), at("linked.json")).unwrap();
+    fs::hard_link(format!("{package}/manifest.json"), at("linked.gss")).unwrap();
+    let before = contents(directory.path());
+    let (cameras, points) = (format!("{capture}/transforms.json"), format!("{capture}/sparse_pc.ply"));
+    let (manifest, images) = (format!("{package}/manifest.json"), format!("{capture}/images"));
+    let (frames, frame) = (at("frames"), at("frames/f8.ply"));
+    fs::hard_link(&frame, at("linked.bin")).unwrap();
+    let cases: [&[&str]; 10] = [
+        &["play", &package, "--no-wait", "-o", &manifest],
+        &["play", &manifest, "--no-wait", "-o", &manifest],
+        &["play", &package, "--no-wait", "-o", &at("linked.json")],
+        &["play", &package, "--trace", &trace, "-o", &trace],
+        &["unpackage", &package, "-o", &at("linked.gss")],
+        &["train", &frames, "--builtin", "1", "-o", &at("linked.bin")],
+        &["fit", &capture, "-o", &points],
+        &["fit", &capture, "--start", &start, "-o", &start],
+        &["fit", &capture, "--start", &frame, "-o", &frame],
+        &["render", text(&still), "--cameras", &cameras, "-o", &images],
+    ];
+    for case in cases {
+        let said = fail(2, case);
+        assert!(said.contains("this command reads that file"), "{case:?}: {said}");
+    }
+    fs::remove_file(at("linked.bin")).unwrap();
+    assert!(contents(directory.path()) == before);
 }
 
 #[cfg(unix)]
