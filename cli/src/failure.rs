@@ -1,6 +1,7 @@
 //! What went wrong, for people: file, byte, clause, cause, and what to do about it.
 
 use crate::output_file::is_standard;
+use crate::over_limit;
 use serde::Serialize;
 use splatstream_format::{Class, Error};
 use splatstream_gaussians::FrameError;
@@ -21,6 +22,8 @@ pub(crate) enum Failure {
         error: Error,
         /// Whether it is a scene instead, in a format that `encode` reads.
         is_scene: bool,
+        /// The level of the stream, if it is known.
+        level: Option<u8>,
     },
     /// Files and settings.
     Other(String),
@@ -57,7 +60,7 @@ impl Failure {
 
     /// A stream that breaks the specification.
     pub(crate) fn stream(path: &Path, error: Error) -> Self {
-        Self::Stream { path: path.to_path_buf(), error, is_scene: false }
+        Self::Stream { path: path.to_path_buf(), error, is_scene: false, level: None }
     }
 
     /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error, 130 interrupted.
@@ -81,9 +84,9 @@ impl fmt::Display for Failure {
             | Self::Decoder(message)
             | Self::Interrupted(message) => f.write_str(message),
             Self::Verdict { line, .. } => f.write_str(line),
-            Self::Stream { path, error, is_scene } => {
+            Self::Stream { path, error, is_scene, level } => {
                 let name = if is_standard(path) { "standard input".into() } else { path.to_string_lossy() };
-                let advice = if *is_scene { OF_SCENE } else { advice(error.class()) };
+                let advice = if *is_scene { OF_SCENE.to_owned() } else { advice(error, *level) };
                 write!(f, "{name}: {error}\n  {}", advice.replace("FILE", &path.to_string_lossy()))
             }
         }
@@ -93,9 +96,9 @@ impl fmt::Display for Failure {
 /// What to do with a scene that is given for a stream.
 const OF_SCENE: &str = "this is a scene, not a stream; `splatstream encode FILE -o STREAM.gss` encodes it";
 
-/// What to do about an error of a class; FILE stands for the stream.
-fn advice(class: Class) -> &'static str {
-    match class {
+/// What to do about an error of a stream of this level; FILE stands for the stream.
+fn advice(error: &Error, level: Option<u8>) -> String {
+    let by_class = match error.class() {
         Class::Malformed => {
             "the file is damaged, or it is not a stream; copy it again; `splatstream inspect FILE` shows where it breaks"
         }
@@ -106,11 +109,12 @@ fn advice(class: Class) -> &'static str {
         Class::Unsupported => {
             "the file needs a later version or another profile; look for a newer splatstream"
         }
-        Class::OverLimit => "if you trust the file, raise the limit with --max-gaussians",
+        Class::OverLimit => return over_limit::advice(error, level),
         Class::Truncated => {
             "the file is incomplete; copy it again; `splatstream decode FILE -o DIR` writes what is there"
         }
-    }
+    };
+    by_class.to_owned()
 }
 
 /// A failure, as `--json` prints it where there is no report.

@@ -24,6 +24,7 @@ mod inspect;
 mod manual;
 mod numbers;
 mod output_file;
+mod over_limit;
 mod package;
 mod play;
 mod progress;

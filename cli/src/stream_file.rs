@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 /// How much a stream may ask of this machine.
 #[derive(Args)]
 pub(crate) struct LimitArgs {
-    /// Gaussians that a frame may have; a stream that asks for more is refused (exit code 13).
+    /// Gaussians that a frame may have; a stream that asks for more is refused (exit code 13). Above the default,
+    /// the other limits are those of level 4. No stream may have more than its own level allows.
     #[arg(long, value_name = "N", default_value_t = Limits::default().max_gaussians)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     max_gaussians: u32,
@@ -24,7 +25,13 @@ pub(crate) struct LimitArgs {
 impl LimitArgs {
     /// The limits asked for.
     pub(crate) fn limits(&self) -> Limits {
-        Limits { max_gaussians: self.max_gaussians, ..Limits::default() }
+        let default = Limits::default();
+        // Whoever asks for more Gaussians than the default asks for what goes with them: their rate, and what is learned.
+        let others = match self.max_gaussians > default.max_gaussians {
+            true => Limits::of_level(*Limits::LEVELS.end()),
+            false => default,
+        };
+        Limits { max_gaussians: self.max_gaussians, ..others }
     }
 }
 
@@ -50,7 +57,12 @@ impl StreamFile {
 
     /// A failure of this stream.
     pub(crate) fn fault(&self, error: Error) -> Failure {
-        fault(&self.path, error)
+        Failure::Stream {
+            path: self.path.clone(),
+            error,
+            is_scene: is_scene(&self.path, &error),
+            level: FileHeader::parse(&self.bytes).ok().map(|(header, _)| header.level),
+        }
     }
 
     /// The first sequence parameters that are intact.
@@ -101,8 +113,25 @@ impl StreamFile {
 
 /// A failure of the stream at a path, which may be a scene instead.
 pub(crate) fn fault(path: &Path, error: Error) -> Failure {
-    let is_scene = error.kind == ErrorKind::Signature && splatstream_files::detect(path).is_ok();
-    Failure::Stream { path: path.to_path_buf(), error, is_scene }
+    Failure::Stream {
+        path: path.to_path_buf(),
+        error,
+        is_scene: is_scene(path, &error),
+        level: level_of(path),
+    }
+}
+
+/// Whether what is given for a stream is a scene in a format that `encode` reads.
+fn is_scene(path: &Path, error: &Error) -> bool {
+    error.kind == ErrorKind::Signature && splatstream_files::detect(path).is_ok()
+}
+
+/// The level of the stream in a file; none of what comes by a pipe, which has gone by.
+fn level_of(path: &Path) -> Option<u8> {
+    let mut start = [0; FileHeader::SIZE];
+    let mut file = path.is_file().then(|| File::open(path)).and_then(Result::ok)?;
+    file.read_exact(&mut start).ok()?;
+    FileHeader::parse(&start).ok().map(|(header, _)| header.level)
 }
 
 /// The bytes at a path, or of standard input, as they come.

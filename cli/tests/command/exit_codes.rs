@@ -3,7 +3,7 @@
 use crate::common::{UNIT_HEADER, directory, fail, fixture, json, payload_length, run, seal, text};
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// Bytes of file_header.
@@ -120,6 +120,13 @@ fn over_a_limit_is_13() {
     for command in [&["validate"][..], &["decode", "--dry-run"], &["compare", text(&stream)]] {
         let said = fail(13, &[command, &[text(&stream), "--max-gaussians", "10"]].concat());
         assert!(said.contains("--max-gaussians"), "{said}");
+    }
+    // What no option helps with is not said to be helped by one.
+    for vector in ["limit-codebook-values", "limit-payload-length", "limit-gaussians-4294967295"] {
+        let vectors = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/vectors/invalid/limit");
+        let stream = vectors.join(vector).join("in.gss");
+        let said = fail(13, &["validate", text(&stream), "--max-gaussians", "4294967295"]);
+        assert!(said.contains("no option raises this limit: it is that of level "), "{said}");
     }
 }
 
