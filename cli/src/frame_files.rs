@@ -13,7 +13,7 @@ use splatstream_files::{
 };
 use splatstream_gaussians::GaussianFrame;
 use std::collections::BTreeSet;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// The file that makes a directory a SOG scene.
@@ -37,6 +37,9 @@ pub(crate) struct FrameFiles {
     notes: ReadNotes,
 }
 
+/// Bytes that say which format a scene is in, if any does.
+const HEAD: u64 = 64 << 10;
+
 /// What standard input is called in messages.
 const STANDARD_INPUT: &str = "standard input";
 
@@ -46,11 +49,8 @@ impl FrameFiles {
         let mut spooled = None;
         let mut paths = match inputs {
             [only] if only.as_path() == Path::new(STANDARD) => {
-                let file = spool()?;
+                let file = spool(&mut io::stdin().lock(), reading.most())?;
                 let path = file.path().to_path_buf();
-                if is_stream(&path) {
-                    return Err(is_encoded(STANDARD_INPUT));
-                }
                 spooled = Some(file);
                 vec![path]
             }
@@ -116,12 +116,25 @@ impl FrameFiles {
     }
 }
 
-/// Standard input in a file: scenes are read more than once.
-fn spool() -> Result<Unfinished, Failure> {
+/// Standard input in a file: scenes are read more than once. What is no scene is refused by how it begins, and of what is
+/// one no more than `most` bytes are kept: it may have no end.
+fn spool(input: &mut dyn Read, most: u64) -> Result<Unfinished, Failure> {
     let directory = std::env::temp_dir();
     let failed = |error| Failure::file("keep standard input in", &directory, &error);
     let (mut file, unfinished) = Unfinished::create(&directory, false).map_err(failed)?;
-    io::copy(&mut io::stdin().lock(), &mut file).map_err(failed)?;
+    let mut count = io::copy(&mut input.take(HEAD), &mut file).map_err(failed)?;
+    if is_stream(unfinished.path()) {
+        return Err(is_encoded(STANDARD_INPUT));
+    }
+    detect(unfinished.path())
+        .map_err(|error| Failure::other(named(&error, unfinished.path(), Some(&unfinished))))?;
+    count += io::copy(&mut input.take((most + 1).saturating_sub(count)), &mut file).map_err(failed)?;
+    if count > most {
+        return Err(Failure::other(format!(
+            "{STANDARD_INPUT}: it has more than {most} bytes, which a scene may take to read\n  if you trust it, give a \
+             larger --max-input-memory, or give it as a file"
+        )));
+    }
     Ok(unfinished)
 }
 

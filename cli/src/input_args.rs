@@ -9,6 +9,9 @@ use std::path::Path;
 /// Memory that a scene may take for each byte of its file, whatever the default: packed scenes of any format take less.
 const PER_BYTE: u64 = 32;
 
+/// Memory that no scene may take, unless it is asked for.
+const MOST: u64 = 8 << 30;
+
 /// The option of all commands that read scenes.
 #[derive(Args, Debug, Clone, Copy, Default)]
 pub(crate) struct InputArgs {
@@ -29,6 +32,11 @@ impl InputArgs {
     /// The frame in a file that a command has written.
     pub(crate) fn frame(&self, path: &Path) -> Result<GaussianFrame, Failure> {
         read_scene(path, &self.limits(path)).map_err(|error| Failure::other(error.to_string()))
+    }
+
+    /// The memory that any scene may take, whatever its size.
+    pub(crate) fn most(&self) -> u64 {
+        self.max_input_memory.unwrap_or(MOST)
     }
 
     /// The limits for the scene at a path.

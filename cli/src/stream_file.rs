@@ -7,6 +7,7 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::syntax::{FileHeader, SIGNATURE, SequenceParameters, UnitType};
 use splatstream_format::unit::{Landmark, Stream};
+use splatstream_format::unit_reader::{Event, UnitReader};
 use splatstream_format::{Error, ErrorKind, Limits};
 use std::fs::File;
 use std::io::{self, Read};
@@ -39,13 +40,13 @@ impl LimitArgs {
 pub(crate) struct StreamFile {
     /// The file.
     pub(crate) path: PathBuf,
-    /// All of it.
+    /// All of it, as far as there are units.
     pub(crate) bytes: Vec<u8>,
 }
 
 impl StreamFile {
-    /// Reads a file, or standard input. Of one that does not start like a stream only the start, which says so: it may be
-    /// of any length, or have no end.
+    /// Reads a file, or standard input, as far as it is a stream: of one that does not start like one only the start, which
+    /// says so. It may be of any length, or have no end.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = match path == Path::new(STANDARD) {
             true => read_stream(io::stdin().lock()),
@@ -169,17 +170,79 @@ pub(crate) fn feed(
     }
 }
 
+/// Bytes that are read without an intact unit among them, or as many as there were before if that is more: damage is
+/// skipped, but a rest that has no unit and perhaps no end need not be held.
+const LOST: u64 = 64 << 20;
+
+/// The bytes of a stream, as far as its units go. What is wrong with those after them can be seen from the first; an
+/// error that counts them counts those that were read.
 fn read_stream(mut file: impl Read) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    file.by_ref().take(FileHeader::SIZE as u64).read_to_end(&mut bytes)?;
-    if bytes.starts_with(&SIGNATURE) {
-        file.read_to_end(&mut bytes)?;
+    let mut units = UnitReader::new(&Limits { max_units: u32::MAX, ..Limits::default() });
+    let mut intact = 0;
+    while let Some(missing) = next_missing(&mut units, &bytes, &mut intact) {
+        if file.by_ref().take(missing.max(PIECE as u64)).read_to_end(&mut bytes)? == 0 {
+            break;
+        }
     }
     Ok(bytes)
+}
+
+/// Goes over the units that are there, and says how many bytes are missing for the next; none if it is not worth reading on.
+/// `intact` is where the last intact unit ends.
+fn next_missing(units: &mut UnitReader, bytes: &[u8], intact: &mut u64) -> Option<u64> {
+    loop {
+        let at = usize::try_from(units.position()).ok()?;
+        match units.read(bytes.get(at..).unwrap_or_default(), false) {
+            Ok(Event::FileHeader(_)) => *intact = units.position(),
+            Ok(Event::Unit(unit)) => {
+                if unit.check_payload().is_ok() {
+                    *intact = units.position();
+                }
+                // Decoders look whether it is the end.
+                units.reopen();
+            }
+            Ok(Event::NeedMoreData(missing)) => {
+                let lost = units.position().saturating_sub(*intact);
+                return (lost <= LOST.max(*intact)).then_some(missing);
+            }
+            Ok(Event::End) => return None,
+            Err(_) => units.scan_for(Landmark::GopHeader),
+        }
+    }
 }
 
 /// Whether a file starts like a stream; no if it cannot be read.
 pub(crate) fn is_stream(path: &Path) -> bool {
     let mut start = [0; SIGNATURE.len()];
     File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splatstream_format::syntax::{Profile, UnitId};
+    use splatstream_format::unit::{write_file_header, write_unit};
+
+    fn stream() -> Vec<u8> {
+        let mut bytes = write_file_header(Profile::Dynamic, 1).unwrap();
+        write_unit(&mut bytes, UnitId::stream(UnitType::SceneDescription), &[7; 1000]).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn a_stream_is_read_as_far_as_it_is_one() {
+        let whole = stream();
+        assert_eq!(read_stream(whole.as_slice()).unwrap(), whole);
+        // A rest without an end is left, what it starts with is not.
+        let read = read_stream(whole.as_slice().chain(io::repeat(0))).unwrap();
+        assert!(read.starts_with(&whole) && read.len() as u64 <= LOST + (1 << 20), "{}", read.len());
+        assert!(read_stream(io::repeat(0)).unwrap().len() <= PIECE);
+        // A unit is read whole that says how long it is, damaged or not.
+        let mut long = whole.clone();
+        let payload = vec![1; usize::try_from(LOST).unwrap() + 5];
+        write_unit(&mut long, UnitId::stream(UnitType::SceneDescription), &payload).unwrap();
+        *long.last_mut().unwrap() ^= 1;
+        assert_eq!(read_stream(long.as_slice()).unwrap().len(), long.len());
+    }
 }

@@ -175,6 +175,41 @@ fn a_dash_is_a_pipe() {
     assert!(String::from_utf8_lossy(&wrong.stderr).starts_with("standard input: "), "{wrong:?}");
 }
 
+#[cfg(unix)]
+#[test]
+fn an_input_without_an_end_is_refused() {
+    let (directory, still, stream) = files();
+    let program = env!("CARGO_BIN_EXE_splatstream");
+    // Less memory than the file has bytes: it cannot be held as a whole.
+    let run =
+        |line: &str| Command::new("sh").args(["-c", &format!("ulimit -v 3000000; {line}")]).output().unwrap();
+    let (holey, out) = (directory.path().join("holey.gss"), directory.path().join("out.gss"));
+    fs::copy(&stream, &holey).unwrap();
+    fs::OpenOptions::new().write(true).open(&holey).unwrap().set_len(6 << 30).unwrap();
+    let (holey, out) = (text(&holey), text(&out));
+    for (code, line) in [
+        (10, format!("{program} validate {holey}")),
+        (10, format!("{program} extract {holey} --op s0,t0,r0 -o {out}")),
+        (10, format!("{program} validate - <{holey}")),
+    ] {
+        let ended = run(&line);
+        assert_eq!(ended.status.code(), Some(code), "{line}: {ended:?}");
+    }
+    let head = text(&still);
+    for (line, said) in [
+        (format!("{program} encode - -o {out} </dev/zero"), "no known scene format"),
+        (
+            format!("cat {head} /dev/zero | {program} encode - -o {out} --max-input-memory 4M"),
+            "it has more than 4194304 bytes",
+        ),
+    ] {
+        let ended = run(&line);
+        let stderr = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(1), "{line}: {stderr}");
+        assert!(stderr.starts_with("standard input: ") && stderr.contains(said), "{stderr}");
+    }
+}
+
 #[test]
 fn frames_of_an_earlier_run_are_not_mixed_with_new_ones() {
     let (directory, _, stream) = files();
