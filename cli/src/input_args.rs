@@ -6,8 +6,10 @@ use splatstream_files::{ReadLimits, SceneError, SceneErrorKind, SequenceOptions,
 use splatstream_gaussians::GaussianFrame;
 use std::path::Path;
 
-/// Memory that a scene may take for each byte of its file, whatever the default: packed scenes of any format take less.
-const PER_BYTE: u64 = 32;
+/// Memory that any scene may take, and that for each byte of its file: packed scenes of any format take less than a third
+/// of it. A file of a few bytes may not ask for gigabytes.
+const BASE: u64 = 64 << 20;
+const PER_BYTE: u64 = 64;
 
 /// Memory that no scene may take, unless it is asked for.
 const MOST: u64 = 8 << 30;
@@ -15,7 +17,7 @@ const MOST: u64 = 8 << 30;
 /// The option of all commands that read scenes.
 #[derive(Args, Debug, Clone, Copy, Default)]
 pub(crate) struct InputArgs {
-    /// Most memory that reading one scene may take, as in 512M or 4G [default: 1G, or 32 times the file if that is more].
+    /// Most memory that reading one scene may take, as in 512M or 4G [default: 64M and 64 times the file, at most 8G].
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     max_input_memory: Option<u64>,
     /// Frames to take of a scene in continuous time, .splatv: so many, evenly over its length [default: 50].
@@ -41,7 +43,7 @@ impl InputArgs {
 
     /// The limits for the scene at a path.
     pub(crate) fn limits(&self, path: &Path) -> ReadLimits {
-        let of_file = || size_of(path).saturating_mul(PER_BYTE).max(ReadLimits::default().max_memory);
+        let of_file = || size_of(path).saturating_mul(PER_BYTE).saturating_add(BASE).min(MOST);
         ReadLimits { max_memory: self.max_input_memory.unwrap_or_else(of_file) }
     }
 }
@@ -57,8 +59,17 @@ pub(crate) fn with_advice(error: &SceneError) -> String {
     }
 }
 
-/// Bytes of a file, or of the files in a directory; 0 if they cannot be had, which reading will say.
+/// Bytes of a file, or of the files in a directory; 0 if they cannot be had, which reading will say. A file that names
+/// others, as a .gltf and the meta.json of a SOG scene do, counts with those beside it.
 fn size_of(path: &Path) -> u64 {
+    let names_others = path
+        .extension()
+        .is_some_and(|extension| ["gltf", "json"].iter().any(|other| extension.eq_ignore_ascii_case(other)));
+    let path = match path.parent().filter(|_| names_others && path.is_file()) {
+        Some(parent) if parent.as_os_str().is_empty() => Path::new("."),
+        Some(parent) => parent,
+        None => path,
+    };
     let of_file = |path: &Path| path.metadata().map_or(0, |metadata| metadata.len());
     match std::fs::read_dir(path) {
         Ok(entries) => entries.filter_map(Result::ok).map(|entry| of_file(&entry.path())).sum(),
@@ -84,6 +95,27 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn memory_goes_with_the_bytes_of_a_scene() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = |name: &str, bytes: u64| {
+            let path = directory.path().join(name);
+            std::fs::File::create(&path).unwrap().set_len(bytes).unwrap();
+            path
+        };
+        let allowed = |path: &Path| InputArgs::default().limits(path).max_memory;
+        assert_eq!(allowed(&file("small.sog", 334)), BASE + 64 * 334);
+        assert_eq!(allowed(&file("large.ply", 1 << 34)), MOST);
+        std::fs::remove_file(directory.path().join("large.ply")).unwrap();
+        // Files that a scene is spread over count together.
+        file("scene.bin", 1 << 20);
+        let all = BASE + 64 * (334 + (1 << 20) + 100);
+        assert_eq!(allowed(&file("scene.gltf", 100)), all);
+        assert_eq!(allowed(directory.path()), all);
+        let given = InputArgs { max_input_memory: Some(5), ..InputArgs::default() };
+        assert_eq!(given.limits(directory.path()).max_memory, 5);
+    }
 
     #[test]
     fn sizes_have_units() {
