@@ -5,7 +5,7 @@ mod loss;
 mod report;
 mod target;
 
-pub(crate) use target::{earlier_frames, remove_frames};
+pub(crate) use target::earlier_frames;
 
 use crate::console::Console;
 use crate::failure::Failure;

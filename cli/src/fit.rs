@@ -7,6 +7,8 @@ mod training;
 use crate::cameras::BackgroundArg;
 use crate::capture_files::files_of;
 use crate::console::Console;
+use crate::decode::earlier_frames;
+use crate::earlier::Earlier;
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
@@ -87,8 +89,11 @@ pub(crate) struct Fit {
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
     time_budget: Option<u32>,
     /// Keep frames of a sequence that are there already, as an earlier run with the same settings left them.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "force")]
     resume: bool,
+    /// Remove frames of an earlier run from the directory of a sequence: files that have the names that frames are given.
+    #[arg(long)]
+    force: bool,
     /// Chooses the order of pictures and where new Gaussians go.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
@@ -108,6 +113,7 @@ impl Fit {
         let limits = self.limits.limits();
         let mut starts = opened.as_ref().map(|opened| opened.frames(&limits, None)).transpose()?;
         let inputs = starts.as_ref().map(Frames::inputs).unwrap_or_default();
+        let mut earlier = self.earlier(&captures, &inputs)?;
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let mut report = Fitted::new(self.out.clone(), captures.is_sequence());
         let mut before: Option<GaussianFrame> = None;
@@ -126,6 +132,7 @@ impl Fit {
                 None => self.fit(&captures, number, (out.as_deref(), &inputs), start, before.take())?,
             };
             if let (Some(out), None) = (&out, kept) {
+                earlier.remove()?;
                 OutputFile::write_apart(out, &inputs, &ply::write(&frame))?;
             }
             // The next one starts from what is in the file, as it does when it is resumed.
@@ -167,6 +174,14 @@ impl Fit {
                      stream of it"
                 )))
             }
+        }
+    }
+
+    /// Frames of an earlier run in the directory of a sequence.
+    fn earlier(&self, captures: &Captures, inputs: &[PathBuf]) -> Result<Earlier, Failure> {
+        match &self.out {
+            Some(out) if captures.is_sequence() && !self.resume => earlier_frames(out, inputs, self.force),
+            _ => Ok(Earlier::default()),
         }
     }
 

@@ -13,6 +13,7 @@ mod conformance;
 mod console;
 mod decode;
 mod demo;
+mod earlier;
 mod encode;
 mod extract;
 mod failure;

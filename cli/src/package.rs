@@ -4,6 +4,7 @@ mod live;
 mod quality;
 
 use crate::console::Console;
+use crate::earlier;
 use crate::failure::Failure;
 use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs};
 use crate::stream_file::{LimitArgs, StreamFile};
@@ -145,11 +146,7 @@ impl PackageStream {
 
 /// The files of a package in a directory, by name; none where there is no package.
 pub(crate) fn files_in(directory: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
-    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|path| is_of_package(path) && !path.is_dir());
-    files.sort();
-    files
+    earlier::files_in(directory, is_of_package)
 }
 
 /// A package of a stream, with the table of qualities if it is wanted.

@@ -3,6 +3,7 @@
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::capture_files::files_at;
 use crate::console::Console;
+use crate::earlier::{Earlier, files_in};
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
@@ -50,6 +51,10 @@ pub(crate) struct Render {
     /// Frames to draw, A..B: from A up to and without B.
     #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
     frames: Option<FrameRange>,
+    /// Remove the pictures that are in the directory, as an earlier run left them: all .png files, but no photographs that
+    /// the cameras were taken from.
+    #[arg(long)]
+    force: bool,
     /// Make up for the low-pass filter, whatever the scene says: for scenes that were trained so.
     #[arg(long)]
     antialiased: bool,
@@ -59,12 +64,19 @@ pub(crate) struct Render {
     reading: InputArgs,
 }
 
+/// How pictures are drawn, and what is in their way.
+struct Drawing {
+    cameras: Vec<Camera>,
+    background: [f32; 3],
+    /// What no picture may replace.
+    inputs: Vec<PathBuf>,
+    /// Pictures of an earlier run.
+    earlier: Earlier,
+}
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Drawn {
-    /// What no picture may replace.
-    #[serde(skip)]
-    inputs: Vec<PathBuf>,
     output: PathBuf,
     frames: u32,
     /// Frames that the stream or the files have; 0 if that is not known.
@@ -108,20 +120,19 @@ impl Render {
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));
-        let mut drawn = self.nothing(self.inputs(&frames));
-        let background = self.background.colour(&description);
-        let mut cameras: Vec<Camera> = Vec::new();
+        let mut drawn = self.nothing();
+        let mut drawing = self.drawing(&frames, &description)?;
         let mut next = 0;
         while !span.is_over(next) {
             let Some((number, frame)) = frames.next()? else { break };
-            if cameras.is_empty() {
-                cameras = named(self.cameras.cameras(self.camera.as_ref(), &frame, &description)?);
+            if drawing.cameras.is_empty() {
+                drawing.cameras = named(self.cameras.cameras(self.camera.as_ref(), &frame, &description)?);
                 drawn.guessed_up = self.guessed_up(&frame, &description);
             }
             if span.contains(number) {
                 let antialiased = frame.antialiased() || self.antialiased;
                 let frame = frame.with_antialiased(antialiased);
-                self.draw(&frame, (number, expected > 1), &cameras, background, &mut drawn)?;
+                self.draw(&frame, (number, expected > 1), &mut drawing, &mut drawn)?;
                 progress.at(drawn.frames);
             }
             next = number.saturating_add(1);
@@ -139,10 +150,21 @@ impl Render {
         frames.verdict()
     }
 
-    /// The report before anything is drawn.
-    fn nothing(&self, inputs: Vec<PathBuf>) -> Drawn {
-        Drawn {
+    /// What all pictures have in common, before there are cameras.
+    fn drawing(&self, frames: &Frames<'_>, description: &SceneDescription) -> Result<Drawing, Failure> {
+        let is_picture = |path: &Path| path.extension().is_some_and(|extension| extension == "png");
+        let (inputs, pictures) = (self.inputs(frames), files_in(&self.out, is_picture));
+        Ok(Drawing {
+            cameras: Vec::new(),
+            background: self.background.colour(description),
+            earlier: Earlier::of(&self.out, pictures, "pictures", &inputs, self.force)?,
             inputs,
+        })
+    }
+
+    /// The report before anything is drawn.
+    fn nothing(&self) -> Drawn {
+        Drawn {
             output: self.out.clone(),
             frames: 0,
             expected: 0,
@@ -181,21 +203,21 @@ impl Render {
         &self,
         frame: &GaussianFrame,
         (number, sequence): (u32, bool),
-        cameras: &[Camera],
-        background: [f32; 3],
+        drawing: &mut Drawing,
         drawn: &mut Drawn,
     ) -> Result<(), Failure> {
         make_directory(&self.out)?;
-        for camera in cameras {
+        drawing.earlier.remove()?;
+        for camera in &drawing.cameras {
             let start = Instant::now();
-            let rendering = render(frame, camera, background);
+            let rendering = render(frame, camera, drawing.background);
             let seconds = start.elapsed().as_secs_f64();
             let view = &camera.name;
             let file = if sequence { format!("frame_{number:04}_{view}.png") } else { format!("{view}.png") };
             let path = self.out.join(&file);
             let failed = |error| Failure::other(format!("{}: cannot write: {error}", path.display()));
             let png = rendering.colour.to_png().map_err(failed)?;
-            OutputFile::write_apart(&path, &drawn.inputs, &png)?;
+            OutputFile::write_apart(&path, &drawing.inputs, &png)?;
             let (width, height) = (camera.width, camera.height);
             drawn.pictures.push(Picture { file, frame: number, view: view.clone(), width, height, seconds });
         }

@@ -1,6 +1,7 @@
 //! `splatstream simulate`: captures of a scene that is known exactly.
 
 use crate::console::Console;
+use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::failure::Failure;
 use crate::numbers::frames;
 use crate::output_file::{OutputFile, check_directory, make_directory};
@@ -48,6 +49,9 @@ pub(crate) struct Simulate {
     /// Points, as structure from motion would find them.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     points: u32,
+    /// Remove captures of an earlier run from the directory: files that have the names that this command gives.
+    #[arg(long)]
+    force: bool,
     /// Chooses colours and where movements start.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
@@ -79,6 +83,7 @@ impl Simulate {
     /// Traces and writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "pictures")?;
+        Earlier::of(&self.out, earlier_files(&self.out), "captures", &[], self.force)?.remove()?;
         let start = Instant::now();
         let width = (self.height * 16).div_ceil(9);
         let rig = match self.rig {
@@ -146,6 +151,24 @@ impl Simulated {
             self.seconds,
         )
     }
+}
+
+/// The files of captures that an earlier run has left in a directory: of one frame, or of several in directories of
+/// theirs.
+fn earlier_files(out: &Path) -> Vec<PathBuf> {
+    let is_named = |path: &Path, before, digits, after| {
+        let name = path.file_name().and_then(|name| name.to_str());
+        name.is_some_and(|name| is_numbered(name, before, digits, after))
+    };
+    let entries = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files = Vec::new();
+    let frames = entries.filter(|path| is_named(path, "frame_", 4, ""));
+    for folder in frames.chain([out.to_path_buf()]) {
+        files.extend(files_in(&folder.join("images"), |path| is_named(path, "view_", 3, ".png")));
+        let others = CaptureFiles { cameras: &[], points: &[], seconds: 0.0 }.files();
+        files.extend(others.iter().map(|file| folder.join(&file.path)).filter(|path| path.is_file()));
+    }
+    files
 }
 
 fn parse_rate(text: &str) -> Result<f64, String> {

@@ -5,7 +5,8 @@ mod report;
 use crate::cameras::{BackgroundArg, CameraArgs, UpName, Views};
 use crate::capture_files::files_at;
 use crate::console::Console;
-use crate::decode::{earlier_frames, remove_frames};
+use crate::decode::earlier_frames;
+use crate::earlier::Earlier;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::input_args::InputArgs;
@@ -103,7 +104,7 @@ impl Track {
         let inputs = self.files_read(&files);
         check_directory(&self.out, "frames of a sequence")?;
         let mut earlier = match self.resume {
-            true => Vec::new(),
+            true => Earlier::default(),
             false => earlier_frames(&self.out, &inputs, self.force)?,
         };
         let span = self.frames.unwrap_or(FrameRange::ALL);
@@ -125,7 +126,7 @@ impl Track {
                 (settings, before) = (self.settings(&source)?, None);
             }
             make_directory(&self.out)?;
-            remove_frames(&mut earlier)?;
+            earlier.remove()?;
             let start = before.take().filter(|before| !before.is_empty());
             let path = self.out.join(format!("frame_{number:04}.ply"));
             let tracked = match self.resume && path.is_file() {

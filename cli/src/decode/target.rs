@@ -1,10 +1,11 @@
 //! Where decoded frames go: a file or standard output for one frame, a directory for any number.
 
 use super::clamped::Losses;
+use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::output_file::{
-    OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_inputs, refuse_terminal,
+    OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_terminal,
 };
 use clap::ValueEnum;
 use splatstream_files::{SceneError, compressed_ply, gltf, ply, sog, splat, spz};
@@ -37,7 +38,7 @@ pub(crate) struct Target {
     /// What no frame may replace.
     inputs: Vec<PathBuf>,
     /// Frames of an earlier run, removed with the first frame that is written.
-    stale: Vec<PathBuf>,
+    stale: Earlier,
     losses: Losses,
 }
 
@@ -82,7 +83,11 @@ impl Target {
             path: path.to_path_buf(),
             format: format.or(named).unwrap_or(Format::Ply),
             is_directory,
-            stale: if is_directory { earlier_frames(path, &inputs, wanted.force)? } else { Vec::new() },
+            stale: if is_directory {
+                earlier_frames(path, &inputs, wanted.force)?
+            } else {
+                Earlier::default()
+            },
             inputs,
             losses: Losses::default(),
         })
@@ -93,7 +98,7 @@ impl Target {
         if self.is_directory {
             make_directory(&self.path)?;
         }
-        remove_frames(&mut self.stale)?;
+        self.stale.remove()?;
         let path = self.path_of(number);
         let bytes = self
             .format
@@ -138,39 +143,16 @@ fn is_directory(path: &Path) -> Result<bool, Failure> {
 }
 
 /// The frames of an earlier run in a directory, if they may be removed (`force`); none of them may be among `inputs`.
-pub(crate) fn earlier_frames(path: &Path, inputs: &[PathBuf], force: bool) -> Result<Vec<PathBuf>, Failure> {
-    let Ok(entries) = std::fs::read_dir(path) else { return Ok(Vec::new()) };
-    let mut stale: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    stale.retain(|path| is_frame(path) && !path.is_dir());
-    stale.iter().try_for_each(|path| refuse_inputs(path, inputs))?;
-    if !stale.is_empty() && !force {
-        let (path, count) = (path.display(), stale.len());
-        let files = if count == 1 { "1 file" } else { &format!("{count} files") };
-        return Err(Failure::Usage(format!(
-            "{path}: the directory has {files} with names of frames, probably from an earlier run; \
-             give another directory, or --force to remove them"
-        )));
-    }
-    Ok(stale)
-}
-
-/// Removes frames of an earlier run.
-pub(crate) fn remove_frames(stale: &mut Vec<PathBuf>) -> Result<(), Failure> {
-    let mut each = stale.drain(..);
-    each.try_for_each(|path| {
-        std::fs::remove_file(&path).map_err(|error| Failure::file("remove", &path, &error))
-    })
+pub(crate) fn earlier_frames(path: &Path, inputs: &[PathBuf], force: bool) -> Result<Earlier, Failure> {
+    Earlier::of(path, files_in(path, is_frame), "frames", inputs, force)
 }
 
 /// Whether a file has a name that frames are given.
 fn is_frame(path: &Path) -> bool {
-    let format = Format::of_name(path);
-    let number = path.file_name().and_then(|name| {
-        let rest = name.to_str()?.strip_prefix("frame_")?;
-        rest.get(..rest.len().checked_sub(format?.extension().len() + 1)?)
-    });
-    format.is_some()
-        && number.is_some_and(|number| number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit()))
+    let name = path.file_name().and_then(|name| name.to_str());
+    let (Some(name), Some(format)) = (name, Format::of_name(path)) else { return false };
+    let stem = name.get(..name.len().saturating_sub(format.extension().len() + 1));
+    stem.is_some_and(|stem| is_numbered(stem, "frame_", 4, ""))
 }
 
 impl Format {

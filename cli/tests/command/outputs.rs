@@ -225,6 +225,63 @@ fn frames_of_an_earlier_run_are_not_mixed_with_new_ones() {
     assert_eq!(names(&out), ["frame_0000.ply", "frame_0001.ply", "frame_12.ply", "notes.txt"]);
 }
 
+#[test]
+fn pictures_of_an_earlier_run_are_not_mixed_with_new_ones() {
+    let (directory, still, stream) = files();
+    let out = directory.path().join("pictures");
+    let render = ["render", "-o", text(&out), "--height", "9", "--camera"];
+    succeed(&[&render[..], &["ring:2", text(&stream)]].concat());
+    fs::write(out.join("notes.txt"), "mine").unwrap();
+    let again = [&render[..], &["ring:1", text(&still)]].concat();
+    let said = fail(2, &again);
+    assert!(said.contains("has 6 files with names of pictures") && said.contains("--force"), "{said}");
+    succeed(&[&again[..], &["--force"]].concat());
+    assert_eq!(names(&out), ["notes.txt", "ring_00.png"]);
+    // Photographs stay, whatever is asked for.
+    let capture = directory.path().join("capture");
+    let simulate = ["simulate", "-o", text(&capture), "--height", "27", "--samples", "1", "--points", "50"];
+    succeed(&[&simulate[..], &["--views", "2"]].concat());
+    let (cameras, images) = (capture.join("transforms.json"), capture.join("images"));
+    fail(2, &["render", text(&still), "--camera", text(&cameras), "-o", text(&images), "--force"]);
+    assert_eq!(names(&images), ["view_000.png", "view_001.png"]);
+}
+
+#[test]
+fn captures_of_an_earlier_run_are_not_mixed_with_new_ones() {
+    let directory = directory();
+    let out = directory.path().join("walk");
+    let small = ["--height", "27", "--samples", "1", "--points", "200"];
+    let simulate = ["simulate", "-o", text(&out)];
+    let of = |more: &[&'static str]| [&simulate[..], &small, more].concat();
+    succeed(&of(&["--frames", "3", "--views", "4"]));
+    fs::write(out.join("frame_0002/notes.txt"), "mine").unwrap();
+    let said = fail(2, &of(&["--frames", "2", "--views", "3"]));
+    assert!(said.contains("has 27 files with names of captures") && said.contains("--force"), "{said}");
+    succeed(&of(&["--frames", "2", "--views", "3", "--force"]));
+    assert_eq!(names(&out), ["frame_0000", "frame_0001", "frame_0002"]);
+    assert_eq!(names(&out.join("frame_0002")), ["notes.txt"]);
+    assert_eq!(names(&out.join("frame_0000/images")), ["view_000.png", "view_001.png", "view_002.png"]);
+    // Frames that are trained of them, too.
+    let frames = directory.path().join("frames");
+    let fit = [
+        "fit",
+        text(&out),
+        "-o",
+        text(&frames),
+        "--iterations",
+        "1",
+        "--gaussians",
+        "100",
+        "--hold-out",
+        "0",
+    ];
+    succeed(&fit);
+    let one = [&fit[..], &["--frames", "0..1"]].concat();
+    assert!(fail(2, &one).contains("has 2 files with names of frames"));
+    succeed(&[&one[..], &["--force"]].concat());
+    assert_eq!(names(&frames), ["frame_0000.ply"]);
+}
+
 /// Starts a long encoding in a directory, and gives it back once its unfinished file is there.
 #[cfg(unix)]
 fn encoding(directory: &Path, still: &Path) -> std::process::Child {

@@ -208,8 +208,17 @@ fn what_is_said_about_a_scene_is_in_the_stream_and_viewers_take_it() {
     let orange =
         corner.pixels()[0].iter().zip([1.0, 0.5, 0.0]).all(|(part, asked)| (part - asked).abs() < 0.05);
     assert!(orange, "{:?}", corner.pixels()[0]);
-    let said =
-        succeed(&["render", text(&frames), "-o", text(&pictures), "--camera", "ring:1", "--height", "9"]);
+    let said = succeed(&[
+        "render",
+        text(&frames),
+        "-o",
+        text(&pictures),
+        "--camera",
+        "ring:1",
+        "--height",
+        "9",
+        "--force",
+    ]);
     assert!(said.contains("give --up"), "{said}");
     let said = fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&stream)]);
     assert!(said.contains("another name"), "{said}");
