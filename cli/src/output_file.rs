@@ -109,9 +109,7 @@ pub(crate) fn refuse_inputs(path: &Path, inputs: &[PathBuf]) -> Result<(), Failu
 
 /// Refuses a name for a stream that promises another format, or none that there is.
 pub(crate) fn check_stream_name(path: &Path) -> Result<(), Failure> {
-    let is_other = path.extension().is_some_and(|extension| !extension.eq_ignore_ascii_case("gss"));
-    // Devices and pipes have any name.
-    if !is_other || path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+    if !has_other_ending(path, "gss") {
         return Ok(());
     }
     Err(Failure::Usage(format!(
@@ -119,6 +117,23 @@ pub(crate) fn check_stream_name(path: &Path) -> Result<(), Failure> {
          `splatstream decode` writes .ply, .spz, .splat, .glb, .sog and .compressed.ply",
         path.display()
     )))
+}
+
+/// Refuses a name that promises another format than that of `what`, whose names end in `.ending`.
+pub(crate) fn check_ending(path: &Path, ending: &str, what: &str) -> Result<(), Failure> {
+    match has_other_ending(path, ending) {
+        true => Err(Failure::Usage(format!(
+            "{}: the output is {what}; give it a name that ends in .{ending}",
+            path.display()
+        ))),
+        false => Ok(()),
+    }
+}
+
+/// Whether the name of a file promises another format; devices and pipes have any name, as has a file without an ending.
+fn has_other_ending(path: &Path, ending: &str) -> bool {
+    let is_other = path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(ending));
+    is_other && !path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
 /// Refuses a name that is not a directory, or that looks like that of a file; `what` goes there.

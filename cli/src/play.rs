@@ -5,7 +5,7 @@ mod report;
 
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
-use crate::output_file::{OutputFile, refuse_inputs};
+use crate::output_file::{OutputFile, check_ending, refuse_inputs};
 use crate::package::files_in;
 use crate::stream_file::LimitArgs;
 use clap::{Args, ValueEnum};
@@ -112,7 +112,10 @@ impl Play {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         console.claim(self.out.as_deref())?;
         let inputs = self.inputs();
-        self.out.as_deref().map_or(Ok(()), |out| refuse_inputs(out, &inputs))?;
+        if let Some(out) = &self.out {
+            refuse_inputs(out, &inputs)?;
+            check_ending(out, "json", "a report in JSON")?;
+        }
         let trace = self.trace.as_deref().map(|path| self.read_trace(path)).transpose()?;
         let failed = |error| Failure::other(format!("{}: cannot play: {error}", self.location));
         let mut client = Client::open(&self.location, self.options()).map_err(failed)?;

@@ -4,7 +4,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::input_args::InputArgs;
-use crate::output_file::{OutputFile, refuse_inputs, refuse_standard};
+use crate::output_file::{OutputFile, check_ending, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
 use crate::setting_names::QualityName;
 use clap::Args;
@@ -66,6 +66,7 @@ impl Train {
     /// Collects, trains, writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         refuse_standard(&self.out)?;
+        check_ending(&self.out, "bin", "a network")?;
         let inputs = self.inputs()?;
         // At once, and not after minutes of work.
         refuse_inputs(&self.out, &inputs)?;

@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::{OutputFile, refuse_inputs};
+use crate::output_file::{OutputFile, check_ending, refuse_inputs};
 use crate::serve::until_interrupted;
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
@@ -65,6 +65,7 @@ impl View {
         console.claim(self.out.as_deref())?;
         if let Some(out) = &self.out {
             refuse_inputs(out, slice::from_ref(&self.input))?;
+            check_ending(out, "html", "a web page")?;
         }
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();

@@ -3,7 +3,7 @@
 use super::refused;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::{OutputFile, refuse_standard};
+use crate::output_file::{OutputFile, check_ending, refuse_standard};
 use clap::Args;
 use serde::Serialize;
 use splatstream_conformance::counted::counted;
@@ -36,6 +36,7 @@ impl Matrix {
     /// Reads the reports and writes the page.
     pub(super) fn run(&self, console: &Console) -> Result<(), Failure> {
         refuse_standard(&self.out)?;
+        check_ending(&self.out, "md", "a page in Markdown")?;
         let reports = self
             .reports
             .iter()

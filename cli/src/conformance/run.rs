@@ -3,7 +3,7 @@
 use super::{SuiteArgs, refused, text_of};
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
-use crate::output_file::{OutputFile, refuse_inputs, refuse_standard};
+use crate::output_file::{OutputFile, check_ending, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
 use crate::unfinished;
 use clap::Args;
@@ -78,7 +78,7 @@ pub(super) struct Run {
 impl Run {
     /// Runs, writes the reports; fails if the decoder did.
     pub(super) fn run(&self, console: &Console) -> Result<(), Failure> {
-        self.outputs().try_for_each(|path| refuse_standard(path))?;
+        self.check_outputs()?;
         let settings = self.settings()?;
         if let Some(word) = shell_word(settings.decoder.words()) {
             console
@@ -163,6 +163,19 @@ impl Run {
 
     fn is_ours(&self) -> bool {
         self.decoder.is_none() && self.stdio.is_none()
+    }
+
+    /// Reports go to files of their formats.
+    fn check_outputs(&self) -> Result<(), Failure> {
+        self.outputs().try_for_each(|path| refuse_standard(path))?;
+        let named = [
+            (&self.report, "json", "a report in JSON"),
+            (&self.junit, "xml", "a report in XML"),
+            (&self.markdown, "md", "a report in Markdown"),
+        ];
+        named.into_iter().try_for_each(|(path, ending, what)| {
+            path.as_ref().map_or(Ok(()), |path| check_ending(path, ending, what))
+        })
     }
 
     /// The reports.

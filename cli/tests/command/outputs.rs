@@ -137,6 +137,19 @@ fn names_say_what_is_written() {
         assert!(said.contains("ends in .gss"), "{said}");
         fail(2, &["extract", text(&stream), "--op", "s0,t0,r0", "-o", text(&at(name))]);
     }
+    let report = at("report.json");
+    let others: [(&[&str], &str, &str); 6] = [
+        (&["view", text(&stream), "-o"], "x.pdf", ".html"),
+        (&["conformance", "matrix", text(&report), "-o"], "x.exe", ".md"),
+        (&["conformance", "run", "--report"], "x.txt", ".json"),
+        (&["conformance", "run", "--junit"], "x.json", ".xml"),
+        (&["train", "--builtin", "1", "-o"], "x.ply", ".bin"),
+        (&["play", text(directory.path()), "-o"], "x.txt", ".json"),
+    ];
+    for (command, name, ending) in others {
+        let said = fail(2, &[command, &[text(&at(name))]].concat());
+        assert!(said.contains(&format!("give it a name that ends in {ending}")), "{said}");
+    }
     let said = fail(2, &["render", text(&stream), "-o", text(&at("x.png")), "--height", "20"]);
     assert!(said.contains("looks like the name of a file"), "{said}");
     fail(2, &["render", text(&stream), "-o", "-", "--height", "20"]);
