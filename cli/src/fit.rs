@@ -118,10 +118,7 @@ impl Fit {
         let mut report = Fitted::new(self.out.clone(), captures.is_sequence());
         let mut before: Option<GaussianFrame> = None;
         for number in (0..captures.len()).take_while(|number| !span.is_over(*number)) {
-            let start = match &mut starts {
-                Some(starts) => Some(self.start_of(starts, number)?),
-                None => None,
-            };
+            let start = starts.as_mut().map(|starts| self.start_of(starts, number)).transpose()?;
             if !span.contains(number) {
                 continue;
             }

@@ -107,14 +107,7 @@ impl Track {
             true => Earlier::default(),
             false => earlier_frames(&self.out, &inputs, self.force)?,
         };
-        let span = self.frames.unwrap_or(FrameRange::ALL);
-        if span.first >= files.len() {
-            return Err(Failure::Usage(format!(
-                "there are {}, the last is {}",
-                frames(files.len()),
-                files.len() - 1
-            )));
-        }
+        let span = self.span(files.len())?;
         let first = span.first - span.first % self.gop;
         let mut report = Tracked::new(self.out.clone());
         let mut settings = Following::default();
@@ -141,6 +134,15 @@ impl Track {
         files.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         report.finish(begin.elapsed());
         console.report(&report, || report.text())
+    }
+
+    /// The frames to make, of so many that there are.
+    fn span(&self, count: u32) -> Result<FrameRange, Failure> {
+        let span = self.frames.unwrap_or(FrameRange::ALL);
+        if span.first < count {
+            return Ok(span);
+        }
+        Err(Failure::Usage(format!("there are {}, the last is {}", frames(count), count.saturating_sub(1))))
     }
 
     /// The files of the frames, and of the cameras.
