@@ -10,6 +10,7 @@ use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
+use crate::numbers::counted;
 use crate::output_file::STANDARD;
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
@@ -18,7 +19,6 @@ use errors::{AttributeErrors, ErrorSums};
 use matching::Matching;
 use pictures::{PictureArgs, PictureErrors, Pictures};
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use splatstream_encoder::canonical::canonicalise;
 use splatstream_gaussians::GaussianFrame;
 use std::cmp::Ordering;
@@ -196,18 +196,18 @@ fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<(u32, Gaussia
 impl Report {
     fn text(&self) -> String {
         let side = |name, path: &Path, frames: u32, gaussians, errors: &[StreamFault]| {
-            let (path, frames, gaussians) =
-                (path.display(), crate::numbers::frames(frames), grouped(gaussians));
+            let (path, frames) = (path.display(), crate::numbers::frames(frames));
+            let gaussians = counted(gaussians, "Gaussian");
             let errors = faults_text(errors);
-            format!("{name} {path}: {frames}, {gaussians} Gaussians in those compared\n{errors}")
+            format!("{name} {path}: {frames}, {gaussians} in those compared\n{errors}")
         };
         let mut text = side("A", &self.a, self.frames_a, self.gaussians_a, &self.errors_a);
         text += &side("B", &self.b, self.frames_b, self.gaussians_b, &self.errors_b);
         let by_order = self.matched_by.iter().filter(|matching| **matching == Matching::Order).count() as u32;
         text += &format!(
-            "{} compared, {} pairs; {} matched by order, {} by nearest position\n\n",
+            "{} compared, {}; {} matched by order, {} by nearest position\n\n",
             crate::numbers::frames(self.frames),
-            grouped(self.pairs),
+            counted(self.pairs, "pair"),
             crate::numbers::frames(by_order),
             self.frames - by_order,
         );

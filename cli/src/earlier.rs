@@ -2,6 +2,7 @@
 //! give their files names of their own refuse them, or remove them if they are told to.
 
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::output_file::refuse_inputs;
 use std::path::{Path, PathBuf};
 
@@ -24,8 +25,7 @@ impl Earlier {
     ) -> Result<Self, Failure> {
         files.iter().try_for_each(|path| refuse_inputs(path, inputs))?;
         if !files.is_empty() && !force {
-            let (directory, count) = (directory.display(), files.len());
-            let files = if count == 1 { "1 file" } else { &format!("{count} files") };
+            let (directory, files) = (directory.display(), counted(files.len() as u64, "file"));
             return Err(Failure::Usage(format!(
                 "{directory}: the directory has {files} with names of {what}, probably from an earlier run; \
                  give another directory, or --force to remove them"

@@ -2,6 +2,7 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::numbers::frames;
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::stream_file::{LimitArgs, StreamFile};
 use crate::structure::{Frame, Structure};
@@ -109,12 +110,14 @@ impl Report {
     fn text(&self) -> String {
         let share = percent(self.bytes, self.bytes_in);
         let (bytes, all) = (grouped(self.bytes), grouped(self.bytes_in));
-        let of_stream = self.frames_in_stream.map_or_else(String::new, |count| format!(" of {count}"));
+        let shown = match self.frames_in_stream {
+            Some(count) => format!("{} of {}", self.frames, frames(count)),
+            None => frames(self.frames),
+        };
         let mut text = format!(
-            "{}: {}, {}{of_stream} frames, {bytes} of {all} bytes ({share:.1} %)\n",
+            "{}: {}, {shown}, {bytes} of {all} bytes ({share:.1} %)\n",
             self.output.display(),
             self.op,
-            self.frames
         );
         for (first, last) in &self.lost {
             text += &format!("  lost         frames {first}..={last}\n");

@@ -3,9 +3,19 @@
 use splatstream_chart::numbers::grouped;
 use std::num::ParseIntError;
 
+/// A number with its noun: 1 frame, 2,000 frames, 2 switches.
+pub(crate) fn counted(count: u64, noun: &str) -> String {
+    let ending = match count {
+        1 => "",
+        _ if noun.ends_with("ch") => "es",
+        _ => "s",
+    };
+    format!("{} {noun}{ending}", grouped(count))
+}
+
 /// A number of frames: 1 frame, 2 frames.
 pub(crate) fn frames(count: u32) -> String {
-    format!("{} frame{}", grouped(count.into()), if count == 1 { "" } else { "s" })
+    counted(count.into(), "frame")
 }
 
 /// A digest as reports write it.
@@ -85,6 +95,13 @@ pub(crate) fn parse_frame_rate(text: &str) -> Result<(u32, u32), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_is_no_plural() {
+        assert_eq!([0, 1, 2000].map(|count| counted(count, "GOP")), ["0 GOPs", "1 GOP", "2,000 GOPs"]);
+        assert_eq!([1, 2].map(|count| counted(count, "switch")), ["1 switch", "2 switches"]);
+        assert_eq!(frames(1), "1 frame");
+    }
 
     #[test]
     fn a_span_of_frames_ends_before_its_end() {

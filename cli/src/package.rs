@@ -6,11 +6,12 @@ mod quality;
 use crate::console::Console;
 use crate::earlier;
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs};
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use splatstream_chart::numbers::{grouped, percent};
+use splatstream_chart::numbers::percent;
 use splatstream_format::Limits;
 use splatstream_stream::Representation;
 use splatstream_stream::live::Settings;
@@ -233,19 +234,18 @@ impl<'a> Report<'a> {
     fn text(&self) -> String {
         let more = percent(self.bytes, self.bytes_in) - 100.0;
         let mut text = format!(
-            "{}: {} GOPs, {} bytes ({more:.1} % more than the stream)\n",
+            "{}: {}, {} ({more:.1} % more than the stream)\n",
             self.output.display(),
-            self.gops,
-            grouped(self.bytes)
+            counted(self.gops as u64, "GOP"),
+            counted(self.bytes, "byte")
         );
         for one in &self.representations {
             text += &format!(
-                "  {:<12} {} {} frames, {} subsegments, {} bytes; up to here {:.3} Mbit/s\n",
+                "  {:<12} {}, {}, {}; up to here {:.3} Mbit/s\n",
                 one.file,
-                one.frames,
-                one.frame_type,
-                one.subsegments,
-                grouped(one.bytes),
+                counted(one.frames.into(), &format!("{} frame", one.frame_type)),
+                counted(one.subsegments as u64, "subsegment"),
+                counted(one.bytes, "byte"),
                 one.bandwidth as f64 / 1e6
             );
         }

@@ -1,7 +1,7 @@
 //! What readers of scenes have changed on the way, for users.
 
 use crate::encode::warnings::Warning;
-use splatstream_chart::numbers::grouped;
+use crate::numbers::counted;
 use splatstream_files::Note;
 use std::collections::BTreeSet;
 
@@ -28,8 +28,7 @@ impl ReadNotes {
             let first = frames.first().map(|&frame| name(frame)).unwrap_or_default();
             let others = match frames.len() {
                 0 | 1 => String::new(),
-                2 => "; as in 1 frame more".to_owned(),
-                count => format!("; as in {} frames more", grouped(count as u64 - 1)),
+                count => format!("; as in {} more", counted(count as u64 - 1, "frame")),
             };
             Warning::new(note.code(), format!("{first}: {note}{others}"))
         };

@@ -7,14 +7,13 @@ use crate::earlier::{Earlier, files_in};
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
-use crate::numbers::{FrameRange, frames};
+use crate::numbers::{FrameRange, counted, frames};
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use crate::up_guess::UpGuess;
 use clap::Args;
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_gaussians::GaussianFrame;
@@ -248,9 +247,9 @@ impl Drawn {
             None => String::new(),
         };
         format!(
-            "{}: {} pictures of {}; {:.3} seconds per picture\n{hint}{}",
+            "{}: {} of {}; {:.3} seconds per picture\n{hint}{}",
             self.output.display(),
-            grouped(count),
+            counted(count, "picture"),
             match self.expected {
                 expected if expected > self.frames => format!("{} of {}", self.frames, frames(expected)),
                 _ => frames(self.frames),

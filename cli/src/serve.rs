@@ -5,6 +5,7 @@ mod network_args;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::unfinished;
 use clap::{Args, ValueEnum};
 use network_args::NetworkArgs;
@@ -193,11 +194,11 @@ impl Report<'_> {
     fn text(&self) -> String {
         let Statistics { seconds, connections, peak_connections, requests, bytes, .. } = self.statistics;
         let mut text = format!(
-            "{}: {} requests, {} bytes in {seconds:.1} s; {} connections, at most {} at a time\n",
+            "{}: {}, {} in {seconds:.1} s; {}, at most {} at a time\n",
             self.directory.display(),
-            grouped(requests),
-            grouped(bytes),
-            grouped(connections),
+            counted(requests, "request"),
+            counted(bytes, "byte"),
+            counted(connections, "connection"),
             grouped(peak_connections),
         );
         let faults = [

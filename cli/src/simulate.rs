@@ -3,13 +3,12 @@
 use crate::console::Console;
 use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::failure::Failure;
-use crate::numbers::frames;
+use crate::numbers::{counted, frames};
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use splatstream_capture::simulator::{CaptureFiles, Rig, Simulation};
-use splatstream_chart::numbers::grouped;
 use splatstream_render::Camera;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -141,13 +140,13 @@ impl Simulate {
 impl Simulated {
     fn text(&self) -> String {
         format!(
-            "{}: {}, {} pictures of {} x {}, {} points each; {:.1} seconds\n",
+            "{}: {}, {} of {} x {}, {} each; {:.1} seconds\n",
             self.output.display(),
             frames(self.frames),
-            grouped(u64::from(self.frames) * u64::from(self.views)),
+            counted(u64::from(self.frames) * u64::from(self.views), "picture"),
             self.width,
             self.height,
-            grouped(self.points as u64),
+            counted(self.points as u64, "point"),
             self.seconds,
         )
     }

@@ -2,11 +2,11 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_stream_name};
 use crate::stream_file::LimitArgs;
 use clap::Args;
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::Package;
 use splatstream_stream::unpackage::unpackage;
@@ -116,7 +116,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 impl Report<'_> {
     fn text(&self) -> String {
         let verified = if self.verified { ", as the manifest has them" } else { "" };
-        let bytes = grouped(self.bytes);
-        format!("{}: {bytes} bytes from {} files{verified}\n", self.output.display(), self.files)
+        let (bytes, files) = (counted(self.bytes, "byte"), counted(self.files as u64, "file"));
+        format!("{}: {bytes} from {files}{verified}\n", self.output.display())
     }
 }

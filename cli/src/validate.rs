@@ -2,12 +2,11 @@
 
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
-use crate::numbers::frames;
+use crate::numbers::{counted, frames};
 use crate::progress::Progress;
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_format::Class;
@@ -80,9 +79,10 @@ impl Verdict {
     }
 
     fn text(&self, path: &std::path::Path) -> String {
-        let (path, frames, gaussians) = (path.display(), frames(self.frames), grouped(self.gaussians));
+        let (path, frames) = (path.display(), frames(self.frames));
+        let gaussians = counted(self.gaussians, "Gaussian");
         match self.class {
-            None => format!("{path}: accept ({frames}, {gaussians} Gaussians, every digest agrees)"),
+            None => format!("{path}: accept ({frames}, {gaussians}, every digest agrees)"),
             Some(class) => {
                 format!("{path}: {class}, {frames} decoded\n{}", faults_text(&self.errors))
             }

@@ -3,6 +3,7 @@
 use super::flicker::{Flicker, FlickerSums};
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::failure::Failure;
+use crate::numbers::counted;
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::table::Table;
@@ -196,12 +197,12 @@ impl Figures {
 impl PictureErrors {
     /// What to say where pictures show nothing; none if all show something.
     pub(super) fn warning(&self) -> Option<String> {
-        let all = self.pictures + self.blank_pictures;
-        (self.blank_pictures > 0).then(|| {
+        let (blank, all) = (self.blank_pictures, self.pictures + self.blank_pictures);
+        let (all, verb) = (counted(all as u64, "picture"), if blank == 1 { "is" } else { "are" });
+        (blank > 0).then(|| {
             format!(
-                "warning: {} of {all} pictures are blank on both sides and count for nothing: the cameras do not see the \
-                 scene; check --cameras, or let --cameras ring:8 make some",
-                self.blank_pictures
+                "warning: {blank} of {all} {verb} blank on both sides, and left out: the cameras do not see the \
+                 scene; check --cameras, or let --cameras ring:8 make some"
             )
         })
     }
@@ -220,8 +221,8 @@ impl PictureErrors {
             Table::new(["", "PSNR dB", "covered dB", "YUV dB", "SSIM", "covered SSIM", "ST-LPIPS"]);
         rows.into_iter().for_each(|row| table.row(row));
         format!(
-            "\n{} pictures, means over all of them\n{}{}",
-            self.pictures,
+            "\n{}, means over all of them\n{}{}",
+            counted(self.pictures as u64, "picture"),
             table.text(),
             self.flicker.text()
         )

@@ -3,6 +3,7 @@
 use super::{SuiteArgs, refused, text_of};
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
 use crate::unfinished;
@@ -117,10 +118,8 @@ impl Run {
         let path = self.report.as_ref().or(self.markdown.as_ref()).or(self.junit.as_ref());
         if let Some(selected) = report.interrupted {
             let written = path.map_or_else(String::new, |path| format!("; report: {}", path.display()));
-            let done = report.cases.len();
-            return Err(Failure::Interrupted(format!(
-                "interrupted after {done} of {selected} cases{written}"
-            )));
+            let (done, selected) = (report.cases.len(), counted(selected, "case"));
+            return Err(Failure::Interrupted(format!("interrupted after {done} of {selected}{written}")));
         }
         match path {
             _ if report.is_good() => Ok(()),

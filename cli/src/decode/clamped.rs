@@ -2,7 +2,7 @@
 
 use super::target::Format;
 use crate::encode::warnings::Warning;
-use splatstream_chart::numbers::grouped;
+use crate::numbers::counted;
 use splatstream_files::spz::WriteOptions;
 use splatstream_files::{Clamped, compressed_ply, gltf, splat, spz};
 use splatstream_gaussians::GaussianFrame;
@@ -45,7 +45,7 @@ impl Losses {
             let message = format!(
                 "{} of {property} outside the range of .{name} {} replaced by the end of the range, first that of Gaussian \
                  {row} of frame {frame} with {value}; --format ply keeps all values",
-                if *count == 1 { "1 value".to_owned() } else { format!("{} values", grouped(*count)) },
+                counted(*count, "value"),
                 if *count == 1 { "was" } else { "were" },
             );
             Warning::new("clamped-values", message)

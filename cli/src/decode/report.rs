@@ -3,6 +3,7 @@
 use super::loss::Loss;
 use crate::encode::warnings::Warning;
 use crate::failure::{StreamFault, faults_text};
+use crate::numbers::counted;
 use crate::numbers::hex_digest;
 use crate::seek::Seek;
 use serde::Serialize;
@@ -152,7 +153,7 @@ fn shows(sequence: &SequenceParameters, frame: &DecodedFrame) -> String {
         text += &format!(" of spatial layer {}", frame.spatial_layer);
     }
     if frame.carried > 0 {
-        text += &format!(" and {} Gaussians carried from the I frame", grouped(frame.carried as u64));
+        text += &format!(" and {} carried from the I frame", counted(frame.carried as u64, "Gaussian"));
     }
     text
 }

@@ -2,7 +2,7 @@
 
 use super::pictures::Drawn;
 use crate::compare::errors::AttributeErrors;
-use crate::numbers::frames as counted;
+use crate::numbers::{counted, frames as frames_in_words};
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_chart::table::Table;
@@ -83,7 +83,7 @@ impl Demonstration {
         let moment = self.operating_points.iter().find_map(|point| point.drawn.as_ref());
         let moment = moment.map_or(0, |drawn| drawn.frame);
         format!(
-            "scene     {}, {} Gaussians in all, SH degree {sh_degree}: {} bytes as PLY\n\
+            "scene     {}, {} in all, SH degree {sh_degree}: {} bytes as PLY\n\
              encoded   {} bytes, {bpg:.2} bits per Gaussian, 1/{:.0} of the PLY; {seconds:.2} s, {} Gaussians per second\n\
              decoded   at every operating point; every frame has the digest that the encoder computed\n\
              drawn     frame {moment} of every point, and of the source: {place}/pictures/source.png\n\n\
@@ -93,8 +93,8 @@ impl Demonstration {
              files     {place}: demo.gss, {page}, source/, decoded/, pictures/, report.txt, report.json\n\
              try next  splatstream inspect --stats {place}/demo.gss\n\
              watch it  open {place}/{page} in a browser\n",
-            counted(*frames),
-            grouped(*gaussians),
+            frames_in_words(*frames),
+            counted(*gaussians, "Gaussian"),
             grouped(*ply_bytes),
             grouped(*bytes),
             *ply_bytes as f64 / (*bytes).max(1) as f64,

@@ -1,8 +1,8 @@
 //! What `fit` says about what it has trained.
 
+use crate::numbers::counted;
 use crate::numbers::mean;
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use splatstream_gaussians::GaussianFrame;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -118,14 +118,15 @@ impl Numbered {
             gaussians, sh_degree, iterations, seconds, psnr_db, held_out_psnr_db, kept, ..
         } = &self.fitted;
         let name = if is_sequence { format!("frame {:<6}", self.frame) } else { "scene       ".to_owned() };
-        let gaussians = grouped(*gaussians as u64);
+        let gaussians = counted(*gaussians as u64, "Gaussian");
         if *kept {
-            return format!("  {name} {gaussians} Gaussians, as it was\n");
+            return format!("  {name} {gaussians}, as it was\n");
         }
         let each = 1000.0 * seconds / f64::from((*iterations).max(1));
         format!(
-            "  {name} {gaussians} Gaussians of SH degree {sh_degree}; {}; {iterations} steps of {each:.0} ms\n",
+            "  {name} {gaussians} of SH degree {sh_degree}; {}; {} of {each:.0} ms\n",
             decibels(*psnr_db, *held_out_psnr_db),
+            counted((*iterations).into(), "step"),
         )
     }
 }

@@ -3,6 +3,7 @@
 use super::Fit;
 use super::report::{FittedFrame, View};
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::progress::Progress;
 use splatstream_capture::trainer::{Settings, Trainer, start_at_random, start_of_points};
 use splatstream_capture::{Photograph, load_photographs, load_points};
@@ -77,7 +78,8 @@ impl<'a> Training<'a> {
             losses.push(step.loss);
             steps = step.iteration;
             if step.iteration.is_multiple_of(STEPS) {
-                progress.step(format!("{} Gaussians, loss {:.4}", step.gaussians, mean(&losses)));
+                let gaussians = counted(step.gaussians as u64, "Gaussian");
+                progress.step(format!("{gaussians}, loss {:.4}", mean(&losses)));
                 losses.clear();
             }
             if budget.is_some_and(|budget| begin.elapsed() >= budget) {

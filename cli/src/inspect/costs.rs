@@ -2,6 +2,7 @@
 
 use super::Shown;
 use crate::console::Console;
+use crate::numbers::counted;
 use crate::stream_file::StreamFile;
 use splatstream_chart::costs::{Costs, OfAttribute};
 use splatstream_chart::numbers::grouped;
@@ -20,8 +21,9 @@ pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> S
 }
 
 fn text(costs: &Costs) -> String {
-    let (bytes, gaussians, bpg) = (grouped(costs.bytes), grouped(costs.gaussians), costs.bpg);
-    let mut parts = vec![format!("{bytes} bytes, {gaussians} Gaussians, {bpg:.2} bits per Gaussian\n")];
+    let (bytes, gaussians) = (counted(costs.bytes, "byte"), counted(costs.gaussians, "Gaussian"));
+    let bpg = costs.bpg;
+    let mut parts = vec![format!("{bytes}, {gaussians}, {bpg:.2} bits per Gaussian\n")];
     parts.push(attributes(costs));
     if costs.sections.iter().any(|part| part.section != Section::New.name()) {
         parts.push(sections(costs));

@@ -3,6 +3,7 @@
 use super::Shown;
 use super::hull::{Quality, qualities};
 use crate::console::Console;
+use crate::numbers::counted;
 use crate::numbers::hex_digest;
 use crate::stream_file::StreamFile;
 use serde::Serialize;
@@ -104,8 +105,8 @@ impl List {
     fn agreement(&self, infos: &[OperatingPointInfo]) -> String {
         let wrong = infos.iter().filter(|info| self.agrees(info) == Some(false));
         let wrong: Vec<String> = wrong.map(|info| info.point.to_string()).collect();
-        let text =
-            format!("\nthe operating_points unit at {:#x} lists {} points", self.at, self.entries.len());
+        let points = counted(self.entries.len() as u64, "point");
+        let text = format!("\nthe operating_points unit at {:#x} lists {points}", self.at);
         match wrong.as_slice() {
             [] => text + ": all agree with the units (clause 6.16)\n",
             wrong => format!("{text}; other figures than the units (clause 6.16): {}\n", wrong.join(" ")),

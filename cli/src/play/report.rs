@@ -1,8 +1,8 @@
 //! What a playback was like.
 
 use super::decoding::Decoded;
+use crate::numbers::counted;
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use splatstream_stream::client::{GopLog, Loss, Outcome, PlayedGop};
 use splatstream_stream::control::{Ladder, Shown};
 use splatstream_stream::manifest::Manifest;
@@ -155,17 +155,17 @@ impl Report {
         let shown = self.gops.iter().filter(|gop| gop.op.is_some()).count();
         let kind = if self.quality_measured { "measured" } else { "estimated" };
         text += &format!(
-            "{shown} of {} GOPs by the rule {}: start-up {:.3} s, {} stalls of {:.3} s, {} switches\n\
-             {} bytes in {} requests, {:.1} % not played; mean quality {:.2} dB ({kind})\n\
+            "{shown} of {} by the rule {}: start-up {:.3} s, {} of {:.3} s, {}\n\
+             {} in {}, {:.1} % not played; mean quality {:.2} dB ({kind})\n\
              experience {:.2} dB, sabre {:.3}, LoL+ {:.3}\n",
-            self.gops.len(),
+            counted(self.gops.len() as u64, "GOP"),
             self.rule,
             totals.startup_seconds,
-            totals.stalls,
+            counted(totals.stalls, "stall"),
             totals.stalled_seconds,
-            totals.switches,
-            grouped(totals.bytes),
-            totals.requests,
+            counted(totals.switches, "switch"),
+            counted(totals.bytes, "byte"),
+            counted(totals.requests, "request"),
             totals.unplayed_percent,
             totals.quality_db,
             totals.experience_db,
@@ -237,7 +237,8 @@ impl Totals {
 pub(super) fn line(gop: &PlayedGop<'_>) -> String {
     let (number, log) = (gop.number, gop.log);
     let Some(shown) = log.shown else {
-        return format!("GOP {number}: nothing of it could be had, {} requests failed", log.failures);
+        let failed = counted(log.failures, "request");
+        return format!("GOP {number}: nothing of it could be had, {failed} failed");
     };
     let behind = shown.latency_us.map_or(String::new(), |us| format!(", {:.3} s behind", seconds(us)));
     let waited = match shown.waited_us {
@@ -246,10 +247,10 @@ pub(super) fn line(gop: &PlayedGop<'_>) -> String {
         us => format!(", stalled for {:.3} s", seconds(us)),
     };
     format!(
-        "GOP {number}: {}, {} bytes in {} requests, {:.1} s buffered{behind}{waited}",
+        "GOP {number}: {}, {} in {}, {:.1} s buffered{behind}{waited}",
         shown.point,
-        grouped(shown.bytes),
-        log.requests,
+        counted(shown.bytes, "byte"),
+        counted(log.requests, "request"),
         seconds(log.buffer_us),
     )
 }

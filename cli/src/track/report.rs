@@ -1,8 +1,8 @@
 //! What `track` says about the sequence that it has made.
 
+use crate::numbers::counted;
 use crate::numbers::{frames, mean};
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -126,6 +126,6 @@ impl Numbered {
             Origin::Cut => format!("as it is: only {}", close()),
             Origin::Tracked => format!("{}; {seconds:.1} seconds", close()),
         };
-        format!("  frame {:<6} {} Gaussians, {how}\n", self.frame, grouped(self.gaussians as u64))
+        format!("  frame {:<6} {}, {how}\n", self.frame, counted(self.gaussians as u64, "Gaussian"))
     }
 }

@@ -208,4 +208,20 @@ fn one_frame_is_not_frames() {
     let still = write_still(directory.path());
     let said = succeed(&["compare", text(&still), text(&still)]);
     assert!(said.contains(": 1 frame, ") && said.contains("1 frame compared") && !said.contains("1 frames"));
+    // Nor is any other one thing many.
+    let at = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    let (stream, package, pictures) = (at("one.gss"), at("package"), at("pictures"));
+    let fast = ["--preset", "fast", "--psnr", "40", "--layers", "1080"];
+    succeed(&[&["encode", text(&still), "-o", &stream][..], &fast].concat());
+    let packaged = succeed(&["package", &stream, "-o", &package]);
+    assert!(packaged.contains(": 1 GOP, ") && packaged.contains(" 1 I frame, 1 subsegment, "), "{packaged}");
+    let played = succeed(&["play", &package, "--no-wait"]);
+    assert!(played.contains("1 of 1 GOP by") && played.contains(" in 1 request, "), "{played}");
+    let back = succeed(&["unpackage", &package, "-o", &at("back.gss")]);
+    assert!(back.contains("from 1 file, as"), "{back}");
+    let drawn = succeed(&["render", &stream, "-o", &pictures, "--camera", "ring:1", "--height", "9"]);
+    assert!(drawn.contains(": 1 picture of 1 frame;"), "{drawn}");
+    assert!(
+        succeed(&["extract", &stream, "--op", "s0,t0,r0", "-o", &at("part.gss")]).contains("1 of 1 frame, ")
+    );
 }

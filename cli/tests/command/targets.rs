@@ -150,7 +150,7 @@ fn blank_pictures_are_no_quality() {
     assert_eq!(report["blank_pictures"], 1);
     let output = run(&[&compare[..], &[text(&cameras)]].concat());
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("1 of 1 pictures are blank"), "{said}");
+    assert!(said.contains("1 of 1 picture is blank"), "{said}");
     let report = json(&[&compare[..], &["ring:1", "--height", "60"]].concat());
     assert_eq!((&report["psnr_db"], &report["blank_pictures"]), (&100.0.into(), &0.into()));
 }
