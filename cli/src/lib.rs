@@ -141,12 +141,23 @@ fn name_of(matches: &ArgMatches) -> String {
 fn in_threads(threads: Option<u16>, work: impl FnOnce() -> Result<(), Failure>) -> Result<(), Failure> {
     // 0 is one per processor. The thread that is here is none of them: it may wait for work without keeping any from it.
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0).into());
-    builder.build_global().map_err(|error| {
-        let threads =
-            threads.map_or_else(|| "a thread per processor".to_owned(), |count| format!("{count} threads"));
-        Failure::other(format!("cannot start {threads}: {error}\n  give fewer with --threads"))
-    })?;
+    builder.build_global().map_err(|error| Failure::other(cannot_start(threads, &error.to_string())))?;
     work()
+}
+
+/// What to say where so many threads cannot be started, or one per processor.
+fn cannot_start(threads: Option<u16>, error: &str) -> String {
+    match threads {
+        None => {
+            format!("cannot start a thread per processor: {error}\n  give a number of them with --threads")
+        }
+        // Fewer would be none.
+        Some(1) => format!(
+            "cannot start a thread: {error}\n  the system lets this program have none: end others, or raise the limits of \
+             processes and memory, as ulimit -u and -v show them"
+        ),
+        Some(count) => format!("cannot start {count} threads: {error}\n  give fewer with --threads"),
+    }
 }
 
 impl Command {
@@ -175,5 +186,21 @@ impl Command {
             Self::Completions(command) => command.run(console),
             Self::Manual(command) => command.run(console),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cannot_start;
+
+    #[test]
+    fn fewer_than_one_thread_is_no_advice() {
+        let [one, two, all] = [Some(1), Some(2), None].map(|threads| cannot_start(threads, "no room"));
+        assert!(one.starts_with("cannot start a thread: no room\n") && !one.contains("--threads"), "{one}");
+        assert!(two.starts_with("cannot start 2 threads: no room\n") && two.contains("fewer"), "{two}");
+        assert!(
+            all.starts_with("cannot start a thread per processor: no room\n") && all.contains("--threads"),
+            "{all}"
+        );
     }
 }
