@@ -460,6 +460,11 @@ impl Encode {
         Ok((settings, Decided { guess, budget }))
     }
 
+    /// Whether the preset and the iterations are chosen for a time that all frames take together.
+    fn chooses_effort(&self) -> bool {
+        matches!(self.finetune.budget(self.preset.is_some()), Ok(Some(_)))
+    }
+
     /// The size that was asked for.
     fn size(&self) -> Option<Size> {
         let bytes = self.target_mb.map(|megabytes| Size::Bytes((megabytes * 1e6) as u64));

@@ -76,15 +76,15 @@ enum State {
 }
 
 impl Encoder {
-    /// An encoder that has the first frame.
+    /// An encoder that has the first frame, of so many if that is known.
     fn begin(
         &self,
         options: &EncodeOptions,
         sink: Sink,
         first: GaussianFrame,
-        is_sequence: bool,
+        frames: Option<u32>,
     ) -> Result<(splatstream::Encoder<Sink>, Prepared), Failed> {
-        let prepared = options.prepare(&first, is_sequence)?;
+        let prepared = options.prepare(&first, frames)?;
         let mut encoder = splatstream::Encoder::new(sink, prepared.settings.clone());
         encoder.set_cancel(self.cancel.clone());
         let coded = self.coded.clone();
@@ -100,7 +100,7 @@ impl Encoder {
                 Ok(State::Waiting { options, sink, first: Some(frame) })
             }
             State::Waiting { options, sink, first: Some(first) } => {
-                let (mut encoder, prepared) = self.begin(&options, sink, first, true)?;
+                let (mut encoder, prepared) = self.begin(&options, sink, first, None)?;
                 encoder.push(frame)?;
                 Ok(State::Encoding { encoder: Box::new(encoder), prepared: Box::new(prepared) })
             }
@@ -116,7 +116,7 @@ impl Encoder {
         match state {
             State::Waiting { first: None, .. } => Err(EncodeError::NoFrames.into()),
             State::Waiting { options, sink, first: Some(first) } => {
-                let (encoder, prepared) = self.begin(&options, sink, first, false)?;
+                let (encoder, prepared) = self.begin(&options, sink, first, Some(1))?;
                 Ok((encoder.finish()?, prepared))
             }
             State::Encoding { encoder, prepared } => Ok((encoder.finish()?, *prepared)),
@@ -254,7 +254,7 @@ pub(crate) fn encode_sequence<'py>(
     let mut told = teller(progress.as_ref(), &coded, Some(count));
     let done = work::run(py, &cancel, &mut told, || {
         let first = frames.frame(0).map_err(|source| EncodeError::Source { frame: 0, source })?;
-        let prepared = options.prepare(&first, count > 1)?;
+        let prepared = options.prepare(&first, Some(count))?;
         let mut store = |done, _| coded.store(done, Ordering::Relaxed);
         let report = splatstream::encode(&mut frames, &prepared.settings, &mut sink, &mut store)?;
         sink.flush().map_err(EncodeError::Output)?;

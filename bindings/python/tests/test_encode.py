@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,12 +14,14 @@ import time
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import moving
 
 import splatstream_codec as gss
+from splatstream_codec import EncodeOptions
 
 
 def test_a_sequence_comes_back_within_its_steps(frames: list[gss.Gaussians]) -> None:
@@ -59,6 +62,33 @@ def test_the_command_writes_the_same_bytes(frames: list[gss.Gaussians], tmp_path
     subprocess.run([*words, *options], check=True, capture_output=True)
     encoded = gss.encode(frames[:3], preset="fast", quality="low", layers=(540, 1080), refinements=[20, 100])
     assert bytes(encoded) == out.read_bytes()
+
+
+def test_python_has_the_options_of_the_command() -> None:
+    words = [sys.executable, "-m", "splatstream_codec", "encode", "--help"]
+    text = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    of_command = {match.replace("-", "_") for match in re.findall(r"^ +(?:-\w, )?--([a-z-]+)", text, re.MULTILINE)}
+    # What only files and terminals need; a frame is read by Gaussians.load, threads are those of RAYON_NUM_THREADS.
+    of_files = {"out", "each", "shard", "plan", "write_plan", "max_input_memory", "samples"}
+    of_files |= {"json", "threads", "help", "version", "quiet"}
+    assert set(EncodeOptions.__annotations__) == of_command - of_files
+    for name in EncodeOptions.__annotations__:
+        assert re.search(rf"^    (\w+, )*{name}(, \w+)*: ", EncodeOptions.__doc__ or "", re.MULTILINE), name
+
+
+def test_values_are_fitted_to_pictures(frames: list[gss.Gaussians]) -> None:
+    options: dict[str, Any] = {"psnr": 45, "cameras": "ring:4", "all_intra": True}
+    fitted = gss.encode(frames[:2], finetune=3, finetune_only=["dc", "opacity"], optimise_for={(0, 0, 4): 2}, **options)
+    assert [frame["iterations"] for frame in fitted.report["finetuned"]] == [3, 3]
+    assert fitted.report["finetuned"][0]["points"][0]["point"] == "s0,t0,r4"
+    assert bytes(fitted) != bytes(gss.encode(frames[:2], **options))
+
+
+def test_a_time_needs_a_number_of_frames(frames: list[gss.Gaussians]) -> None:
+    result = gss.encode(frames[:2], time_budget=30)
+    assert "time budget" in {choice["tool"] for choice in result.report["chosen"]}
+    with pytest.raises(ValueError, match="give them as a list"):
+        gss.encode(iter(frames), time_budget=30)
 
 
 def test_decoded_frames_can_be_encoded_again(talk: Path) -> None:

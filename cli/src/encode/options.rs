@@ -41,12 +41,12 @@ impl std::error::Error for OptionsError {}
 /// The start of a sequence: what settings follow from.
 struct Start<'a> {
     first: &'a GaussianFrame,
-    is_sequence: bool,
+    frames: u32,
 }
 
 impl FrameSource for Start<'_> {
     fn len(&self) -> u32 {
-        if self.is_sequence { 2 } else { 1 }
+        self.frames
     }
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
@@ -74,12 +74,18 @@ impl EncodeOptions {
         }
     }
 
-    /// The settings for frames of which this is the first. A sequence gets layers and predicted frames; one frame does not.
+    /// The settings for so many frames of which this is the first; none: for a sequence whose length nobody knows yet. A
+    /// sequence gets layers and predicted frames; one frame does not.
     ///
     /// # Errors
-    /// Options that do not go together; a file of cameras or of a network that cannot be read.
-    pub fn prepare(&self, first: &GaussianFrame, is_sequence: bool) -> Result<Prepared, OptionsError> {
-        let settings = self.0.settings(&mut Start { first, is_sequence });
+    /// Options that do not go together, or that need the length; a file of cameras or of a network that cannot be read.
+    pub fn prepare(&self, first: &GaussianFrame, frames: Option<u32>) -> Result<Prepared, OptionsError> {
+        if frames.is_none() && self.0.chooses_effort() {
+            return Err(OptionsError(
+                "--time-budget shares the time among all frames, whose number must be known: give them as a list".to_owned(),
+            ));
+        }
+        let settings = self.0.settings(&mut Start { first, frames: frames.unwrap_or(2) });
         let (settings, decided) = settings.map_err(|failure| OptionsError(failure.to_string()))?;
         Ok(Prepared { settings, decided })
     }
@@ -100,7 +106,7 @@ impl Prepared {
 #[cfg(test)]
 mod tests {
     use super::EncodeOptions;
-    use splatstream_encoder::Structure;
+    use splatstream_encoder::{Preset, Structure};
     use splatstream_files::builtin::BuiltinScene;
 
     fn words(text: &str) -> impl Iterator<Item = String> {
@@ -111,10 +117,24 @@ mod tests {
     fn settings_are_those_of_the_command_line() {
         let options = EncodeOptions::parse(words("--psnr 52 --gop 8 --layers 540,1080")).unwrap();
         let first = BuiltinScene { gaussians: 50, ..BuiltinScene::default() }.frame(0);
-        let settings = options.prepare(&first, true).unwrap().settings;
+        let settings = options.prepare(&first, Some(2)).unwrap().settings;
         assert_eq!((settings.psnr, settings.gop, settings.spatial_layers), (Some(52.0), 8, 2));
         assert_eq!(settings.structure, Structure::Predicted { layers: 2 });
-        assert_eq!(options.prepare(&first, false).unwrap().settings.structure, Structure::Intra);
+        assert_eq!(options.prepare(&first, Some(1)).unwrap().settings.structure, Structure::Intra);
+        assert_eq!(
+            options.prepare(&first, None).unwrap().settings.structure,
+            Structure::Predicted { layers: 2 }
+        );
+    }
+
+    #[test]
+    fn a_time_is_shared_among_a_known_number_of_frames() {
+        let options = EncodeOptions::parse(words("--time-budget 60")).unwrap();
+        let first = BuiltinScene { gaussians: 50, ..BuiltinScene::default() }.frame(0);
+        let preset = |frames| options.prepare(&first, frames).map(|prepared| prepared.settings.preset);
+        assert_eq!(preset(Some(1_000_000)), Ok(Preset::Fast));
+        assert_ne!(preset(Some(2)), Ok(Preset::Fast));
+        assert!(preset(None).unwrap_err().to_string().contains("must be known"));
     }
 
     #[test]

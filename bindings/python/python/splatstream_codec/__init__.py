@@ -20,7 +20,7 @@ No stream panics or aborts: what is wrong is an exception with fields, see `Stre
 from ._checkpoint import from_checkpoint, from_splats
 from ._command import compare, inspect
 from ._decode import decode
-from ._encode import Encoder, EncodeResult, EncodeWarning, encode
+from ._encode import EncodeOptions, Encoder, EncodeResult, EncodeWarning, encode
 from ._errors import CommandError, EncodeError, Error, IncompleteError, SceneError, StreamError
 from ._native import VERSION as __version__
 from ._native import Decoder, Frame, Gaussians, Limits, Slots, Update
@@ -31,6 +31,7 @@ __all__ = [
     "Damage",
     "Decoder",
     "EncodeError",
+    "EncodeOptions",
     "EncodeResult",
     "EncodeWarning",
     "Encoder",

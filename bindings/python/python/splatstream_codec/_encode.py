@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Callable, Optional, TypedDict, 
 from . import _native
 from ._checkpoint import as_gaussians
 from ._native import Gaussians
+from ._types import OperatingPoint
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._checkpoint import FrameLike
+    from ._types import OperatingPointLike
 
     Output = Union[str, os.PathLike[str], BinaryIO]
     Progress = Callable[[int, Optional[int]], object]
@@ -57,7 +59,17 @@ class EncodeOptions(TypedDict, total=False):
     anchor: "nested" or "whole".
     predictor: "auto", "none", "knn", "bilateral" or "transformer".
     network: "registered", "trained" or a file of `splatstream train`.
+    choose_by: "bits" or "l1": how a predictor is chosen.
+    neighbours: Neighbours of a prediction, 1 to 16.
     without: Tools to leave out, to see what each is worth.
+    finetune: Choose values by pictures of what is decoded, in so many iterations at most; True is 200.
+    finetune_only: Attributes to fit, as ("position", "log-scale", "rotation", "opacity", "dc", "sh"); all by default.
+    finetune_lines: Lines of the pictures to fit to, in turn.
+    optimise_for: Operating points that matter and what a decibel at each is worth, as {"s0,t0,r1": 1, "s2,t0,r4": 3}.
+    images: A folder of photographs to fit a single frame to, those that `cameras` names.
+    height: Lines to reduce these photographs to.
+    time_budget: Seconds that encoding may take; the preset and the iterations follow from it. It needs a sequence.
+    gop_memory: Memory that GOPs coded at the same time may take together, as "2G" or bytes.
     """
 
     quality: Literal["low", "medium", "high", "visually-lossless"]
@@ -87,7 +99,17 @@ class EncodeOptions(TypedDict, total=False):
     anchor: Literal["nested", "whole"]
     predictor: Literal["auto", "none", "knn", "bilateral", "transformer"]
     network: str | os.PathLike[str]
+    choose_by: Literal["bits", "l1"]
+    neighbours: int
     without: Sequence[str]
+    finetune: int | Literal[True]
+    finetune_only: Sequence[str]
+    finetune_lines: Sequence[int]
+    optimise_for: Mapping[OperatingPointLike, float]
+    images: str | os.PathLike[str]
+    height: int
+    time_budget: float
+    gop_memory: int | str
 
 
 class EncodeWarning(UserWarning):
@@ -265,12 +287,18 @@ def _words(options: Mapping[str, Any]) -> list[str]:
         if value is None or value is False:
             continue
         flag = "--" + name.replace("_", "-")
-        if isinstance(value, Fraction):
+        if isinstance(value, Mapping):
+            value = ",".join(f"{_point(point)}={weight}" for point, weight in value.items())
+        elif isinstance(value, Fraction):
             value = f"{value.numerator}/{value.denominator}"
         elif not isinstance(value, (str, os.PathLike)) and isinstance(value, Iterable):
             value = ",".join(map(str, value))
         words.append(flag if value is True else f"{flag}={os.fspath(value) if isinstance(value, os.PathLike) else value}")
     return words
+
+
+def _point(point: OperatingPointLike) -> str:
+    return point if isinstance(point, str) else str(OperatingPoint(*point))
 
 
 def _result(data: bytes | None, report: str) -> EncodeResult:
