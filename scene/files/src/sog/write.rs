@@ -10,7 +10,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::META;
-use super::codebook::{codebook, nearest};
+use super::codebook::{Weighed, codebook, nearest};
 use super::palette::{Rows, palette};
 use super::planes::{ENTRIES_A_ROW, FIRST_LARGEST};
 use crate::byte_values::{byte_of_logit, to_byte};
@@ -18,6 +18,7 @@ use crate::error::SceneError;
 use crate::morton::morton_order;
 use crate::reading::row_of;
 use crate::smallest_three::to_smallest_three;
+use splatstream_gaussians::activation::sigmoid;
 use splatstream_gaussians::rotation::normalised;
 use splatstream_gaussians::{GaussianFrame, sh_coefficients};
 
@@ -41,7 +42,15 @@ pub fn write_zip(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
     let order = morton_order(frame);
     let means = means(frame, &order, &mut files)?;
     files.add("quats.webp", order.iter().map(|&row| rotation(frame, row as usize)))?;
-    let scales = codebook(frame.log_scale().concat());
+    let weights = visible(frame);
+    let weighed = |planes: &[Vec<f32>; 3]| {
+        let of_plane = |plane: &Vec<f32>| {
+            let values = plane.iter().zip(&weights);
+            values.map(|(&value, &weight)| Weighed { value, weight }).collect::<Vec<_>>()
+        };
+        codebook(planes.iter().flat_map(of_plane).collect())
+    };
+    let scales = weighed(frame.log_scale());
     files.add(
         "scales.webp",
         order.iter().map(|&row| {
@@ -49,7 +58,7 @@ pub fn write_zip(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
             [x, y, z, 255]
         }),
     )?;
-    let colours = codebook(frame.dc().concat());
+    let colours = weighed(frame.dc());
     files.add(
         "sh0.webp",
         order.iter().map(|&row| {
@@ -134,6 +143,22 @@ fn failed(name: &str, error: &dyn std::fmt::Display) -> SceneError {
     SceneError::unsupported(format!("{name} cannot be written: {error}"), "write another format")
 }
 
+/// What the square of a difference in each Gaussian counts for: its area times its opacity, which is about how much of a picture it
+/// is, as a share of the mean, and 1, so that what is small counts too.
+fn visible(frame: &GaussianFrame) -> Vec<f64> {
+    let log_area = |row: usize| {
+        let logs = row_of(frame.log_scale(), row).map(f64::from);
+        logs.iter().sum::<f64>() - logs.into_iter().fold(f64::INFINITY, f64::min)
+    };
+    // None overflows.
+    let most = (0..frame.len()).map(log_area).fold(f64::NEG_INFINITY, f64::max);
+    let opacities = frame.opacity_logit().iter().map(|&logit| sigmoid(logit.into()));
+    let areas: Vec<f64> =
+        opacities.enumerate().map(|(row, opacity)| libm::exp(log_area(row) - most) * opacity).collect();
+    let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
+    areas.iter().map(|area| if mean > 0.0 { 1.0 + area / mean } else { 1.0 }).collect()
+}
+
 /// Centres in 16 bits of sign(x) ln(1 + |x|), low bytes and high bytes apart.
 fn means(frame: &GaussianFrame, order: &[u32], files: &mut Files) -> Result<Value, SceneError> {
     let log = |value: f32| libm::log1p(f64::from(value.abs())).copysign(value.into());
@@ -187,7 +212,7 @@ fn harmonics(frame: &GaussianFrame, order: &[u32], files: &mut Files) -> Result<
     let rows = Rows { values: values.collect(), width: frame.sh().len() };
     let (entries, labels) = palette(&rows, entries_for(frame.len()));
     drop(rows);
-    let codes = codebook(entries.values.clone());
+    let codes = codebook(entries.values.iter().copied().map(Weighed::alike).collect());
     let pixels = entries.values.as_chunks::<3>().0.iter().map(|colour| {
         let [red, green, blue] = colour.map(|value| nearest(&codes, value));
         [red, green, blue, 255]
