@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Makes a result for conformance/results from the report of a run: submit.py REPORT.json NAME
+"""Makes a result for conformance/results from the report of a run: submit.py REPORT.json NAME.json
 
-Writes conformance/results/NAME.json: the report without the cases that passed or were not claimed, so that a decoder that is right
-takes a few kilobytes. The run has to be one of the whole suite. Then `.ci/reports matrix` writes the page.
+The result is the report without the cases that passed or were not claimed, so that a decoder that is right takes a few
+kilobytes. The run has to be one of the whole suite. `splatstream conformance matrix` writes the page of all results.
 """
 
 import json
@@ -10,7 +10,6 @@ import os
 import re
 import sys
 
-RESULTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "results")
 SILENT = ("pass", "not-claimed")
 
 
@@ -30,14 +29,16 @@ def kept(report):
 
 
 def main():
-    if len(sys.argv) != 3 or not re.fullmatch(r"[a-z0-9][a-z0-9.-]*", sys.argv[2]):
+    if len(sys.argv) != 3 or not re.fullmatch(r"[a-z0-9][a-z0-9.-]*\.json", os.path.basename(sys.argv[2])):
         sys.exit(__doc__)
     with open(sys.argv[1], encoding="utf-8") as f:
         report = json.load(f)
     refusal = complaint(report)
     if refusal:
         sys.exit("%s: %s; a result is a run of the whole suite" % (sys.argv[1], refusal))
-    with open(os.path.join(RESULTS, sys.argv[2] + ".json"), "w", encoding="utf-8") as f:
+    if os.path.exists(sys.argv[2]) and os.path.samefile(*sys.argv[1:]):
+        sys.exit("%s: the result would replace the report: give it another name" % sys.argv[1])
+    with open(sys.argv[2], "w", encoding="utf-8") as f:
         json.dump(kept(report), f, indent=1)
         f.write("\n")
 

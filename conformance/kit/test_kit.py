@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 import zipfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -131,6 +132,20 @@ class Submission(unittest.TestCase):
         for other in ({"interrupted": 3}, {"settings": {"selection": {"area": "a"}}}, {"suite": {"changed": "less"}}):
             self.assertTrue(submit.complaint(self.report(**other)), other)
         self.assertIsNone(submit.complaint(self.report()))
+
+    def test_a_result_is_written_where_it_is_asked_for_and_replaces_no_report(self):
+        with tempfile.TemporaryDirectory() as folder:
+            report, result = (os.path.join(folder, name) for name in ("report.json", "mydec.json"))
+            with open(report, "w", encoding="utf-8") as f:
+                json.dump(self.report(), f)
+            for wrong in (report, os.path.join(folder, "mydec"), os.path.join(folder, "My Decoder.json")):
+                with unittest.mock.patch.object(sys, "argv", ["submit.py", report, wrong]), self.assertRaises(SystemExit):
+                    submit.main()
+            with unittest.mock.patch.object(sys, "argv", ["submit.py", report, result]):
+                submit.main()
+            self.assertEqual(sorted(os.listdir(folder)), ["mydec.json", "report.json"])
+            with open(result, encoding="utf-8") as f:
+                self.assertEqual(len(json.load(f)["cases"]), 2)
 
 
 class Fluster(unittest.TestCase):

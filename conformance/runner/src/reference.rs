@@ -105,7 +105,11 @@ impl Decoded {
 
 /// What the reference decoder claims: everything.
 pub fn capabilities() -> Capabilities {
-    Capabilities { entropy: true, output: true, ..Capabilities::everything("reference") }
+    Capabilities {
+        entropy: true,
+        output: true,
+        ..Capabilities::everything(concat!("reference ", env!("CARGO_PKG_VERSION")))
+    }
 }
 
 /// Answers a request; makes the output folder if it does not exist.
