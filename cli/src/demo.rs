@@ -6,6 +6,7 @@ mod report;
 
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
+use crate::frame_name::frame_name;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::Args;
@@ -213,5 +214,5 @@ struct Source {
 }
 
 fn frame_path(directory: &Path, number: usize) -> PathBuf {
-    directory.join(format!("frame_{number:04}.ply"))
+    directory.join(format!("{}.ply", frame_name(number as u32)))
 }

@@ -19,6 +19,7 @@ mod extract;
 mod failure;
 mod fit;
 mod frame_files;
+mod frame_name;
 mod frames;
 mod input_args;
 mod inspect;

@@ -3,6 +3,7 @@
 use crate::console::Console;
 use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::failure::Failure;
+use crate::frame_name::{frame_name, is_frame_name};
 use crate::numbers::{counted, frames};
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
@@ -109,7 +110,7 @@ impl Simulate {
     }
 
     fn folder(&self, frame: u32) -> PathBuf {
-        if self.frames == 1 { self.out.clone() } else { self.out.join(format!("frame_{frame:04}")) }
+        if self.frames == 1 { self.out.clone() } else { self.out.join(frame_name(frame)) }
     }
 
     /// One frame. Cameras and points come last: a capture that was stopped has none, and is not taken for one.
@@ -155,15 +156,15 @@ impl Simulated {
 /// The files of captures that an earlier run has left in a directory: of one frame, or of several in directories of
 /// theirs.
 fn earlier_files(out: &Path) -> Vec<PathBuf> {
-    let is_named = |path: &Path, before, digits, after| {
-        let name = path.file_name().and_then(|name| name.to_str());
-        name.is_some_and(|name| is_numbered(name, before, digits, after))
+    let is_named = |path: &Path, is_known: &dyn Fn(&str) -> bool| {
+        path.file_name().and_then(|name| name.to_str()).is_some_and(is_known)
     };
+    let is_picture = |name: &str| is_numbered(name, "view_", 3, ".png");
     let entries = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut files = Vec::new();
-    let frames = entries.filter(|path| is_named(path, "frame_", 4, ""));
+    let frames = entries.filter(|path| is_named(path, &is_frame_name));
     for folder in frames.chain([out.to_path_buf()]) {
-        files.extend(files_in(&folder.join("images"), |path| is_named(path, "view_", 3, ".png")));
+        files.extend(files_in(&folder.join("images"), |path| is_named(path, &is_picture)));
         let others = CaptureFiles { cameras: &[], points: &[], seconds: 0.0 }.files();
         files.extend(others.iter().map(|file| folder.join(&file.path)).filter(|path| path.is_file()));
     }

@@ -9,6 +9,7 @@ use crate::decode::earlier_frames;
 use crate::earlier::Earlier;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
+use crate::frame_name::frame_name;
 use crate::input_args::InputArgs;
 use crate::numbers::{FrameRange, frames, parse_share};
 use crate::output_file::{OutputFile, check_directory, make_directory};
@@ -121,7 +122,7 @@ impl Track {
             make_directory(&self.out)?;
             earlier.remove()?;
             let start = before.take().filter(|before| !before.is_empty());
-            let path = self.out.join(format!("frame_{number:04}.ply"));
+            let path = self.out.join(format!("{}.ply", frame_name(number)));
             let tracked = match self.resume && path.is_file() {
                 true => TrackedFrame::kept(),
                 false => self.make(start, &source, &settings, (&path, &inputs), number)?,

@@ -1,9 +1,10 @@
 //! Where decoded frames go: a file or standard output for one frame, a directory for any number.
 
 use super::clamped::Losses;
-use crate::earlier::{Earlier, files_in, is_numbered};
+use crate::earlier::{Earlier, files_in};
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
+use crate::frame_name::{frame_name, is_frame_name};
 use crate::output_file::{
     OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_terminal,
 };
@@ -118,7 +119,7 @@ impl Target {
         if !self.is_directory {
             return self.path.clone();
         }
-        self.path.join(format!("frame_{number:04}.{}", self.format.extension()))
+        self.path.join(format!("{}.{}", frame_name(number), self.format.extension()))
     }
 }
 
@@ -152,7 +153,7 @@ fn is_frame(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str());
     let (Some(name), Some(format)) = (name, Format::of_name(path)) else { return false };
     let stem = name.get(..name.len().saturating_sub(format.extension().len() + 1));
-    stem.is_some_and(|stem| is_numbered(stem, "frame_", 4, ""))
+    stem.is_some_and(is_frame_name)
 }
 
 impl Format {

@@ -1,6 +1,7 @@
 //! The captures that a user named: one, or a sequence of them.
 
 use crate::failure::Failure;
+use crate::frame_name::frame_name;
 use splatstream_files::natural_order;
 use splatstream_render::camera::{CameraError, Capture, read_capture};
 use std::path::{Path, PathBuf};
@@ -44,7 +45,7 @@ impl Captures {
 
     /// The file of a frame.
     pub(super) fn output(&self, out: &Path, number: u32) -> PathBuf {
-        if self.is_sequence { out.join(format!("frame_{number:04}.ply")) } else { out.to_path_buf() }
+        if self.is_sequence { out.join(format!("{}.ply", frame_name(number))) } else { out.to_path_buf() }
     }
 
     pub(super) fn read(&self, number: u32) -> Result<Capture, Failure> {
