@@ -3,8 +3,9 @@
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::capture_files::files_at;
 use crate::console::Console;
-use crate::earlier::{Earlier, files_in};
+use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::failure::{Failure, StreamFault, faults_text};
+use crate::frame_name::{frame_name, is_frame_name};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
 use crate::numbers::{FrameRange, counted, frames};
@@ -50,8 +51,8 @@ pub(crate) struct Render {
     /// Frames to draw, A..B: from A up to and without B.
     #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
     frames: Option<FrameRange>,
-    /// Remove the pictures that are in the directory, as an earlier run left them: all .png files, but no photographs that
-    /// the cameras were taken from.
+    /// Remove the pictures that an earlier run has left in the directory: .png files with the names that pictures are given
+    /// (frame_0000_..., ring_00, forward_00, camera_00), or those of the cameras. Other pictures stay.
     #[arg(long)]
     force: bool,
     /// Make up for the low-pass filter, whatever the scene says: for scenes that were trained so.
@@ -69,7 +70,7 @@ struct Drawing {
     background: [f32; 3],
     /// What no picture may replace.
     inputs: Vec<PathBuf>,
-    /// Pictures of an earlier run.
+    /// Pictures of an earlier run; known when the cameras are.
     earlier: Earlier,
 }
 
@@ -120,12 +121,13 @@ impl Render {
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));
         let mut drawn = self.nothing();
-        let mut drawing = self.drawing(&frames, &description)?;
+        let mut drawing = self.drawing(&frames, &description);
         let mut next = 0;
         while !span.is_over(next) {
             let Some((number, frame)) = frames.next()? else { break };
             if drawing.cameras.is_empty() {
                 drawing.cameras = named(self.cameras.cameras(self.camera.as_ref(), &frame, &description)?);
+                drawing.earlier = self.earlier(&drawing)?;
                 drawn.guessed_up = self.guessed_up(&frame, &description);
             }
             if span.contains(number) {
@@ -150,15 +152,19 @@ impl Render {
     }
 
     /// What all pictures have in common, before there are cameras.
-    fn drawing(&self, frames: &Frames<'_>, description: &SceneDescription) -> Result<Drawing, Failure> {
-        let is_picture = |path: &Path| path.extension().is_some_and(|extension| extension == "png");
-        let (inputs, pictures) = (self.inputs(frames), files_in(&self.out, is_picture));
-        Ok(Drawing {
+    fn drawing(&self, frames: &Frames<'_>, description: &SceneDescription) -> Drawing {
+        Drawing {
             cameras: Vec::new(),
             background: self.background.colour(description),
-            earlier: Earlier::of(&self.out, pictures, "pictures", &inputs, self.force)?,
-            inputs,
-        })
+            inputs: self.inputs(frames),
+            earlier: Earlier::default(),
+        }
+    }
+
+    /// Pictures of an earlier run in the directory.
+    fn earlier(&self, drawing: &Drawing) -> Result<Earlier, Failure> {
+        let pictures = files_in(&self.out, |path| is_picture(path, &drawing.cameras));
+        Earlier::of(&self.out, pictures, "pictures", &drawing.inputs, self.force)
     }
 
     /// The report before anything is drawn.
@@ -212,7 +218,8 @@ impl Render {
             let rendering = render(frame, camera, drawing.background);
             let seconds = start.elapsed().as_secs_f64();
             let view = &camera.name;
-            let file = if sequence { format!("frame_{number:04}_{view}.png") } else { format!("{view}.png") };
+            let file =
+                if sequence { format!("{}_{view}.png", frame_name(number)) } else { format!("{view}.png") };
             let path = self.out.join(&file);
             let failed = |error| Failure::other(format!("{}: cannot write: {error}", path.display()));
             let png = rendering.colour.to_png().map_err(failed)?;
@@ -235,6 +242,16 @@ fn named(cameras: Vec<Camera>) -> Vec<Camera> {
         Camera { name, ..camera }
     };
     cameras.into_iter().enumerate().map(name).collect()
+}
+
+/// Whether a file has a name that pictures are given: of a frame of a sequence, of a camera that was made or had no name,
+/// or of one of these cameras.
+fn is_picture(path: &Path, cameras: &[Camera]) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str());
+    let Some(view) = name.and_then(|name| name.strip_suffix(".png")) else { return false };
+    let of_sequence = view.match_indices('_').any(|(end, _)| is_frame_name(&view[..end]));
+    let is_made = ["ring_", "forward_", "camera_"].iter().any(|made| is_numbered(view, made, 2, ""));
+    of_sequence || is_made || cameras.iter().any(|camera| camera.name == view)
 }
 
 impl Drawn {

@@ -244,17 +244,28 @@ fn pictures_of_an_earlier_run_are_not_mixed_with_new_ones() {
     let out = directory.path().join("pictures");
     let render = ["render", "-o", text(&out), "--height", "9", "--camera"];
     succeed(&[&render[..], &["ring:2", text(&stream)]].concat());
-    fs::write(out.join("notes.txt"), "mine").unwrap();
+    for name in ["notes.txt", "logo.png", "frame_0001.png", "ring_a.png"] {
+        fs::write(out.join(name), "mine").unwrap();
+    }
     let again = [&render[..], &["ring:1", text(&still)]].concat();
     let said = fail(2, &again);
     assert!(said.contains("has 6 files with names of pictures") && said.contains("--force"), "{said}");
     succeed(&[&again[..], &["--force"]].concat());
-    assert_eq!(names(&out), ["notes.txt", "ring_00.png"]);
-    // Photographs stay, whatever is asked for.
+    assert_eq!(names(&out), ["frame_0001.png", "logo.png", "notes.txt", "ring_00.png", "ring_a.png"]);
+    // The names of cameras in a file are those of their pictures, too.
     let capture = directory.path().join("capture");
-    let simulate = ["simulate", "-o", text(&capture), "--height", "27", "--samples", "1", "--points", "50"];
-    succeed(&[&simulate[..], &["--views", "2"]].concat());
-    let (cameras, images) = (capture.join("transforms.json"), capture.join("images"));
+    let cameras = capture.join("transforms.json");
+    let small = ["simulate", "-o", text(&capture), "--views", "2", "--height", "27"];
+    succeed(&[&small[..], &["--samples", "1", "--points", "50"]].concat());
+    let seen = directory.path().join("seen");
+    let of_file = ["render", text(&still), "-o", text(&seen), "--height", "9", "--camera", text(&cameras)];
+    succeed(&of_file);
+    fs::write(seen.join("logo.png"), "mine").unwrap();
+    assert!(fail(2, &of_file).contains("has 2 files with names of pictures"));
+    succeed(&[&of_file[..], &["--force"]].concat());
+    assert_eq!(names(&seen), ["logo.png", "view_000.png", "view_001.png"]);
+    // Photographs stay, whatever is asked for.
+    let images = capture.join("images");
     fail(2, &["render", text(&still), "--camera", text(&cameras), "-o", text(&images), "--force"]);
     assert_eq!(names(&images), ["view_000.png", "view_001.png"]);
 }
