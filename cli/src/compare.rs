@@ -149,9 +149,9 @@ impl Compare {
         pictures: &mut Pictures<'_>,
     ) -> Result<(), Failure> {
         if self.matching == Match::Order && a.len() != b.len() {
-            let (a, b) = (a.len(), b.len());
+            let [a, b] = [a, b].map(|frame| counted(frame.len() as u64, "Gaussian"));
             return Err(Failure::Usage(format!(
-                "frame {number}: --match order needs equal counts, A has {a} Gaussians and B {b}; \
+                "frame {number}: --match order needs equal counts, A has {a} and B {b}; \
                  use --match nearest"
             )));
         }

@@ -2,12 +2,12 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::numbers::{counted, frames};
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::progress::Progress;
 use crate::stream_file::{LimitArgs, fault};
 use clap::Args;
 use serde::Serialize;
-use splatstream_chart::numbers::grouped;
 use splatstream_encoder::{ConcatError, PartError, StreamPart, concat};
 use splatstream_format::Limits;
 use std::fs::File;
@@ -152,19 +152,22 @@ fn of_part(path: &Path, error: PartError) -> Failure {
 
 impl Report {
     fn text(&self) -> String {
-        let shards = if self.parts.iter().all(|part| part.shard) { "shards" } else { "streams" };
+        let part = if self.parts.iter().all(|part| part.shard) { "shard" } else { "stream" };
         let mut text = format!(
-            "{}: {} bytes, {} frames in {} GOPs, of {} {shards}\n",
+            "{}: {}, {} in {}, of {}\n",
             self.output.display(),
-            grouped(self.bytes),
-            grouped(self.frames.into()),
-            grouped(self.gops.into()),
-            self.parts.len()
+            counted(self.bytes, "byte"),
+            frames(self.frames),
+            counted(self.gops.into(), "GOP"),
+            counted(self.parts.len() as u64, part),
         );
         for Part { file, bytes, first_frame, frames, .. } in &self.parts {
             let last = (first_frame + frames).saturating_sub(1);
-            text +=
-                &format!("  {}: frames {first_frame}..={last}, {} bytes\n", file.display(), grouped(*bytes));
+            let (file, bytes) = (file.display(), counted(*bytes, "byte"));
+            text += &match frames {
+                1 => format!("  {file}: frame {first_frame}, {bytes}\n"),
+                _ => format!("  {file}: frames {first_frame}..={last}, {bytes}\n"),
+            };
         }
         text
     }

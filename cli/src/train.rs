@@ -4,6 +4,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::input_args::InputArgs;
+use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
 use crate::setting_names::QualityName;
@@ -156,13 +157,13 @@ impl Trained {
         let steps = |errors: &[f64]| errors.iter().map(|error| error / 64.0).sum::<f64>();
         let (base, error) = (steps(&self.base_errors), steps(&self.errors));
         format!(
-            "{}\n  size        {} bytes\n  SHA-256     {}\n  trained     on {} batches of 16 Gaussians, {} epochs\n  \
+            "{}\n  size        {} bytes\n  SHA-256     {}\n  trained     on {} of 16 Gaussians, {}\n  \
              error       {error:.3} steps, {:.1} % less than {} has ({base:.3})\n",
             self.output.display(),
             grouped(self.bytes as u64),
             self.sha256,
-            grouped(self.samples as u64),
-            self.epochs,
+            counted(self.samples as u64, "batch"),
+            counted(self.epochs as u64, "epoch"),
             100.0 * (1.0 - error / base.max(f64::MIN_POSITIVE)),
             self.base,
         )

@@ -22,7 +22,7 @@ pub(crate) struct CheckedSource<'a> {
 /// A frame that is not the one that it should be.
 #[derive(Debug, thiserror::Error)]
 enum Unplanned {
-    #[error("it has {found} Gaussians, and should have {planned}")]
+    #[error("its number of Gaussians is {found}, and should be {planned}")]
     Count { found: u32, planned: u32 },
     #[error("it has other values than it should have")]
     Values,

@@ -46,7 +46,7 @@ pub enum Error {
         max: u64,
     },
     /// A frame has values that no frame may hold.
-    #[error("frame {frame}: {count} invalid Gaussians, for example {first}")]
+    #[error("frame {frame}: number of invalid Gaussians: {count}; for example {first}")]
     Invalid {
         /// The frame.
         frame: u32,
@@ -58,7 +58,7 @@ pub enum Error {
     /// An attribute cannot be put on its quantisation grid.
     #[error(
         "frame {frame}: {attribute} of Gaussian {row} is {value}, too far out for a step of {step}; \
-         {count} Gaussians of the frame are, farthest of all Gaussian {farthest_row} with {farthest}"
+         number of such Gaussians in the frame: {count}, farthest of all Gaussian {farthest_row} with {farthest}"
     )]
     OutOfGrid {
         /// The frame.
@@ -94,7 +94,7 @@ pub enum Error {
     },
     /// There are not so many GOPs.
     #[error(
-        "{count} shards are asked for, and the sequence has {most} GOPs; give at most {most} shards, or shorter GOPs"
+        "{count} shards are asked for, more than the sequence has GOPs; the most that there can be: {most}; give fewer shards, or shorter GOPs"
     )]
     Shards {
         /// The number of shards.
@@ -104,7 +104,7 @@ pub enum Error {
     },
     /// The sequence has not the frames that it was planned with.
     #[error(
-        "the sequence has {found} frames, and had {planned} when it was planned; give the same frames, or plan again"
+        "the number of frames is {found}, and was {planned} when the sequence was planned; give the same frames, or plan again"
     )]
     OtherFrames {
         /// Frames there are.
@@ -114,7 +114,7 @@ pub enum Error {
     },
     /// A frame is not the one that was planned with.
     #[error(
-        "frame {frame} has {found} Gaussians, and had {planned} when the sequence was planned; give the same frames, or plan again"
+        "frame {frame}: the number of Gaussians is {found}, and was {planned} when the sequence was planned; give the same frames, or plan again"
     )]
     OtherFrame {
         /// The frame.

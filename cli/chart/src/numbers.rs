@@ -13,6 +13,16 @@ pub fn grouped(count: u64) -> String {
     text
 }
 
+/// A count with its noun: 1 frame, 2,000 frames, 2 switches.
+pub fn counted(count: u64, noun: &str) -> String {
+    let ending = match count {
+        1 => "",
+        _ if noun.ends_with("ch") => "es",
+        _ => "s",
+    };
+    format!("{} {noun}{ending}", grouped(count))
+}
+
 /// A number with so many decimals, without the sign of a zero.
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
@@ -40,6 +50,12 @@ mod tests {
     fn a_zero_has_no_sign() {
         let numbers = [-0.0, -0.0004, -0.0006, 1.5].map(|value| fixed(value, 3));
         assert_eq!(numbers, ["0.000", "0.000", "-0.001", "1.500"]);
+    }
+
+    #[test]
+    fn one_is_no_plural() {
+        assert_eq!([0, 1, 2000].map(|count| counted(count, "GOP")), ["0 GOPs", "1 GOP", "2,000 GOPs"]);
+        assert_eq!([1, 2].map(|count| counted(count, "switch")), ["1 switch", "2 switches"]);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::front::FrontRow;
 use super::peers::MissingPeer;
 use super::scene_chart::SceneChart;
 use crate::columns::{Column, PROGRAMS, Row, Value, metrics, object, objects, text};
+use crate::numbers::counted;
 use crate::variant_comparison::Standing;
 use serde::Serialize;
 use splatstream_render::metrics::Comparison;
@@ -160,11 +161,11 @@ fn sequence(chart: &SceneChart) -> String {
         }
     };
     format!(
-        "{name}: operating points of the first GOP, {frames} frames at {fps} frames per second\n{modes}\n\
+        "{name}: operating points of the first GOP, {frames} at {fps} per second\n{modes}\n\
          {name}: refinement levels of its predicted frames; carried: what is missing comes from the intra frame; \
          subset: it stays away\n{levels}\n\
          {name}: predicted frames with and without tools\n{tools}\n{ablation}",
-        frames = gop.frames,
+        frames = counted(gop.frames as u64, "frame"),
         fps = chart.fps,
         modes = text(&gop.modes),
         levels = text(&gop.levels),

@@ -1,6 +1,7 @@
 //! The options that say what is swept.
 
 use super::QUICK_HEIGHT;
+use crate::numbers::counted;
 use crate::setting_names::{PresetName, QualityName, ToolName, spelled};
 use clap::{Args, ValueEnum};
 use splatstream_chart::sweep::{Group, Sweep, Variant};
@@ -86,7 +87,7 @@ impl SweepArgs {
         efforts.extend(iterations.iter().map(|&iterations| {
             let lines = if self.quick { vec![QUICK_HEIGHT] } else { Vec::new() };
             let finetune = Some(Finetune { iterations, lines, ..Finetune::default() });
-            let name = format!("{}, {iterations} iterations", spelled(base));
+            let name = format!("{}, {}", spelled(base), counted(iterations.into(), "iteration"));
             effort(name, Group::Fitted, Settings { finetune, ..settings(base) })
         }));
         (effort(spelled(base), Group::Baseline, settings(base)), efforts)

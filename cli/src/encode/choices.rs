@@ -1,6 +1,7 @@
 //! What the encoder chose, and why.
 
 use super::prune::pruned;
+use crate::numbers::{counted, frames};
 use crate::up_guess::UpGuess;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped, percent};
@@ -209,7 +210,7 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
     let views = match (report.importance?, settings.cameras.len()) {
         (Importance::Volume, _) => String::new(),
         (_, 0) => "; views made all around the scene".to_owned(),
-        (_, count) => format!("; {count} views given"),
+        (_, count) => format!("; {} given", counted(count as u64, "view")),
     };
     Some(Choice::new("order", choice, format!("{why}{views}")))
 }
@@ -269,13 +270,13 @@ fn prediction(report: &Report, settings: &Settings) -> Option<Choice> {
     let [intra, predicted] =
         [bits_per_gaussian(bytes, gaussians), bits_per_gaussian(other_bytes, other_gaussians)];
     let all = bits_per_gaussian(bytes + other_bytes, gaussians + other_gaussians);
-    let choice = format!("{} of {} frames", grouped(others), grouped(count + others));
+    let choice = format!("{} of {}", grouped(others), counted(count + others, "frame"));
     // With twice as many frames in a GOP half of the I frames would be predicted.
     let longer = (count > 1).then(|| {
         let percent = 0.5 * percent(count, count + others) * (intra - predicted) / all;
         format!("; twice as many would save about {percent:.1} %, where they can be predicted")
     });
-    let why = format!("GOPs of up to {} frames{}", settings.gop_length(), longer.unwrap_or_default());
+    let why = format!("GOPs of up to {}{}", frames(settings.gop_length()), longer.unwrap_or_default());
     Some(Choice::new("prediction", choice, why).saving(Some((intra - all, Basis::Estimated))))
 }
 
@@ -305,7 +306,8 @@ fn fidelity(report: &Report, settings: &Settings) -> Option<Choice> {
     let frames = report.coded.iter().filter(|frame| frame.by_pictures).count();
     let why =
         format!("files are not tracked; what costs pictures less than {} dB is not sent", settings.tolerance);
-    (frames > 0).then(|| Choice::new("fidelity", format!("pictures in {frames} frames"), why))
+    (frames > 0)
+        .then(|| Choice::new("fidelity", format!("pictures in {}", counted(frames as u64, "frame")), why))
 }
 
 /// New Gaussians of all frames by predictor: none, knn, bilateral, transformer.
@@ -349,7 +351,7 @@ fn network(report: &Report, settings: &Settings) -> Option<Choice> {
         }
         (0, true) => Choice::new("network", "none", "no unit of new Gaussians takes fewer bytes with it"),
         (count, _) => {
-            let why = format!("it predicts {} new Gaussians", grouped(count));
+            let why = format!("it predicts {}", counted(count, "new Gaussian"));
             Choice::new("network", "sent with each GOP that needs it", why)
         }
     })
@@ -363,7 +365,7 @@ fn fitting(report: &Report, settings: &Settings) -> Option<Choice> {
             ("none".to_owned(), "pictures gain next to nothing by it: without, the stream is smaller")
         }
         (Some(finetune), _) => {
-            let choice = format!("{} iterations", finetune.iterations);
+            let choice = counted(finetune.iterations.into(), "iteration");
             (choice, "values of frames that stand for themselves are chosen by pictures")
         }
         (None, Structure::Predicted { .. }) if belongs => (

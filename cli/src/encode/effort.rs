@@ -2,8 +2,8 @@
 
 use super::choices::Choice;
 use super::warnings::Warning;
+use crate::numbers::{counted, frames};
 use crate::setting_names::{PresetName, spelled};
-use splatstream_chart::numbers::grouped;
 use splatstream_encoder::{Effort, Work};
 
 /// A time that was asked for, and what was chosen for it.
@@ -34,16 +34,15 @@ impl Budget {
         let Effort { preset, iterations } = self.effort;
         let fitted = match iterations {
             0 => String::new(),
-            _ => format!(", {iterations} iterations of fitting to pictures"),
+            _ => format!(", {} of fitting to pictures", counted(iterations.into(), "iteration")),
         };
         let choice = format!("{}{fitted}", spelled(PresetName::from(preset)));
         let why = format!(
-            "--time-budget {}: expected {:.2} seconds of one processor for {} Gaussians in the first of {} {}, by a model of costs",
+            "--time-budget {}: expected {:.2} seconds of one processor for {} in the first of {}, by a model of costs",
             self.seconds,
             self.expected(),
-            grouped(self.work.gaussians),
-            grouped(self.work.frames.into()),
-            if self.work.frames == 1 { "frame" } else { "frames" },
+            counted(self.work.gaussians, "Gaussian"),
+            frames(self.work.frames),
         );
         Choice::new("time budget", choice, why)
     }

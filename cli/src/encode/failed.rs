@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
-use splatstream_chart::numbers::grouped;
+use crate::numbers::counted;
 use splatstream_encoder::Error;
 use splatstream_gaussians::Defect;
 use std::path::Path;
@@ -17,8 +17,9 @@ pub(super) fn failed(source: &FrameFiles, out: &Path, error: &Error) -> Failure 
             let path = source.name(*frame);
             let more = match count - 1 {
                 0 => String::new(),
+                1 => ", and 1 more Gaussian of this frame has such values".to_owned(),
                 more => {
-                    format!(", and {} more Gaussians of this frame have such values", grouped(more as u64))
+                    format!(", and {} of this frame have such values", counted(more as u64, "more Gaussian"))
                 }
             };
             Failure::other(format!(

@@ -2,6 +2,7 @@
 
 use crate::cameras::Views;
 use crate::failure::Failure;
+use crate::numbers::counted;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use splatstream_capture::load_photographs;
@@ -275,11 +276,11 @@ impl Fitted {
         let seconds: f64 = all.iter().map(|fitted| fitted.seconds).sum();
         let line = |fitted: &Self| {
             let layer = format!(
-                "  fine-tuned         frame {}, spatial layer {}, {} iterations: {:.2} to {:.2} dB in views that it was not fitted \
+                "  fine-tuned         frame {}, spatial layer {}, {}: {:.2} to {:.2} dB in views that it was not fitted \
                  to, {:.2} to {:.2} bits per Gaussian\n",
                 fitted.frame,
                 fitted.spatial_layer,
-                fitted.iterations,
+                counted(fitted.iterations.into(), "iteration"),
                 fitted.psnr_db_before,
                 fitted.psnr_db_after,
                 fitted.values_bpg_before,
@@ -298,8 +299,8 @@ impl Fitted {
             all.iter().take_while(|fitted| all.first().is_some_and(|first| first.frame == fitted.frame));
         let mut text: String = first.map(line).collect();
         if !all.is_empty() {
-            text +=
-                &format!("  fine-tuning        {} frames and layers in {seconds:.1} seconds\n", all.len());
+            let layers = counted(all.len() as u64, "layer");
+            text += &format!("  fine-tuning        {layers} of all frames, in {seconds:.1} seconds\n");
         }
         text
     }

@@ -1,5 +1,6 @@
 //! What pictures of the finished stream are worth, and the GOPs they come from.
 
+use crate::numbers::{counted, frames};
 use serde::Serialize;
 use splatstream_encoder::{GopReport, Report, Settings, Size};
 use splatstream_format::syntax::FrameType;
@@ -111,12 +112,11 @@ impl Pictures {
         let fitted = |fitted: f64| format!(" ({fitted:.2} dB in the views that quantisers were fitted in)");
         let wanted = self.wanted_psnr_db.map(|wanted| format!(", wanted {wanted}")).unwrap_or_default()
             + &self.fitted_psnr_db.map(fitted).unwrap_or_default();
-        let frames = self.verified.len();
         let mut text = format!(
-            "  PSNR               {psnr:.2} dB{wanted}: decoded again, {frames} {}, {} views of {} lines that \
+            "  PSNR               {psnr:.2} dB{wanted}: decoded again, {}, {} of {} lines that \
              decide nothing\n",
-            if frames == 1 { "frame" } else { "frames" },
-            self.views,
+            counted(self.verified.len() as u64, "frame"),
+            counted(self.views.into(), "view"),
             self.view_height,
         );
         let ByType { intra, predicted, enhancement } = self.psnr_db_by_type;
@@ -131,8 +131,7 @@ impl Pictures {
 
     /// How many GOPs, how long; nothing of a single frame.
     fn gops_text(&self) -> String {
-        let frames: u32 = self.gops.iter().map(|gop| gop.frames).sum();
-        if frames < 2 {
+        if self.gops.iter().map(|gop| gop.frames).sum::<u32>() < 2 {
             return String::new();
         }
         let count = self.gops.len();
@@ -140,12 +139,12 @@ impl Pictures {
         let (least, most) = (lengths.clone().min().unwrap_or(0), lengths.max().unwrap_or(0));
         let cut = self.gops.iter().filter(|gop| gop.cut).count();
         let mut text = match least == most {
-            true => format!("  GOPs               {count} of {most} frames"),
-            false => format!("  GOPs               {count} of {least} to {most} frames"),
+            true => format!("  GOPs               {count} of {}", frames(most)),
+            false => format!("  GOPs               {count} of {least} to {}", frames(most)),
         };
         if cut > 0 {
             text += &format!(
-                "; {cut} of them end early, because the next frame has too little in common with the one before"
+                "; of them end early: {cut}, because the next frame has too little in common with the one before"
             );
         }
         text + "\n"

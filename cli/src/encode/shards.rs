@@ -6,10 +6,10 @@ use super::output::is_page;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
+use crate::numbers::counted;
 use crate::output_file::{OutputFile, refuse_inputs};
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use splatstream_chart::numbers::grouped;
 use splatstream_encoder::{Error, FrameSource, Plan, PlanRecord, Report, Settings, plan};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -166,11 +166,11 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
     let report = Planned { output: out, frames, gaussians, most_shards, digest, seconds };
     console.report_beside(Some(out), &report, || {
         format!(
-            "{}: {} frames, {} Gaussians; for up to {} shards: --plan {0} --shard 1/N to N/N, with the same inputs and options\n",
+            "{}: {}, {}; for up to {}: --plan {0} --shard 1/N to N/N, with the same inputs and options\n",
             out.display(),
-            grouped(frames.into()),
-            grouped(gaussians),
-            grouped(most_shards.into()),
+            counted(frames.into(), "frame"),
+            counted(gaussians, "Gaussian"),
+            counted(most_shards.into(), "shard"),
         )
     })
 }

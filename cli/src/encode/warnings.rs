@@ -1,6 +1,7 @@
 //! What a user should know of a stream that was encoded without an error.
 
 use super::pictures::Goal;
+use crate::numbers::counted;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{Dropped, FrameReport, Isolated, Report, Settings, Size, Structure, VerifiedFrame};
@@ -74,10 +75,10 @@ pub(crate) fn warnings(
 /// Frames of a sequence have about as many Gaussians; files that have not are hardly one.
 pub(super) fn unlike_frames((fewest, most): (usize, usize)) -> Option<Warning> {
     let message = format!(
-        "the files were encoded as the frames of one sequence, and have from {} to {} Gaussians: \
+        "the files were encoded as the frames of one sequence, and have from {} to {} each: \
          if they are scenes of their own, encode them with --each -o DIR",
         grouped(fewest as u64),
-        grouped(most as u64)
+        counted(most as u64, "Gaussian")
     );
     (most > fewest.saturating_mul(UNLIKE)).then(|| Warning::new("unlike-frames", message))
 }
@@ -207,8 +208,8 @@ fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
         format!("no frame is predicted: {alone}; --all-intra does the same, and faster; {TRACK}")
     } else if count > 2 * asked && 2 * count > report.frames as usize {
         format!(
-            "{count} GOPs for {} frames: most {alone}; --all-intra codes them as small, and faster; {TRACK}",
-            report.frames
+            "{count} GOPs for {}: most {alone}; --all-intra codes them as small, and faster; {TRACK}",
+            counted(report.frames.into(), "frame")
         )
     } else {
         return None;
@@ -225,10 +226,11 @@ fn not_fitted(report: &Report, settings: &Settings) -> Option<Warning> {
     let left = coded.saturating_sub(fitted);
     let is_given_up = report.target.is_some_and(|target| target.without_finetune);
     (settings.finetune.is_some() && left > 0 && !is_given_up).then(|| {
+        let are = if left == 1 { "is" } else { "are" };
         let message = format!(
-            "{left} of {} frames are not fine-tuned: those of a GOP of which others are predicted stay near the source; --all-intra \
+            "{left} of {} {are} not fine-tuned: those of a GOP of which others are predicted stay near the source; --all-intra \
              has every frame fine-tuned",
-            report.frames
+            counted(report.frames.into(), "frame")
         );
         Warning::new("not-fine-tuned", message)
     })
@@ -239,13 +241,10 @@ fn dropped(report: &Report, first: &Dropped, file_of: &dyn Fn(u32) -> String) ->
     let properties: Vec<String> =
         first.properties.iter().map(|(name, count)| format!("{name} {}", grouped((*count).into()))).collect();
     let message = format!(
-        "{} {} left out, of {}: they have values that are not finite; {} has {} ({})",
-        grouped(all),
-        if all == 1 { "Gaussian was" } else { "Gaussians were" },
-        match report.dropped.len() {
-            1 => "one frame".to_owned(),
-            frames => format!("{frames} frames"),
-        },
+        "{} {} left out, of {}: values that are not finite; {} has {} ({})",
+        counted(all, "Gaussian"),
+        if all == 1 { "was" } else { "were" },
+        counted(report.dropped.len() as u64, "frame"),
         file_of(first.frame),
         grouped(first.gaussians.into()),
         properties.join(", "),
@@ -260,9 +259,10 @@ fn isolated_values(isolated: &Isolated, file_of: &dyn Fn(u32) -> String) -> Warn
         false => format!("; the farthest is Gaussian {far_row} of {} with {far}", file_of(far_frame)),
     };
     let message = format!(
-        "{} a {attribute} far beyond what a scene has, for example Gaussian {row} of {} with {value}{farthest}; the \
+        "{} {} a {attribute} far beyond what a scene has, for example Gaussian {row} of {} with {value}{farthest}; the \
          nearest sensible value is coded instead, and nothing else is worse for it; remove or repair such Gaussians",
-        if count == 1 { "1 Gaussian has".to_owned() } else { format!("{} Gaussians have", grouped(count)) },
+        counted(count, "Gaussian"),
+        if count == 1 { "has" } else { "have" },
         file_of(frame),
     );
     Warning::new("isolated-values", message)

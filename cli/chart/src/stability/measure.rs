@@ -9,7 +9,8 @@ use super::sequences;
 use super::tools::{Attempt, Tool};
 use super::{HEIGHT, Stability, Warnings};
 use crate::Progress;
-use crate::numbers::{bits_per_gaussian, grouped};
+use crate::numbers::{bits_per_gaussian, counted};
+use splatstream_gaussians::GaussianFrame;
 
 /// A tool on the base itself: what cases are compared with.
 struct Plain {
@@ -135,15 +136,16 @@ impl Bench<'_> {
             plains.iter().map(one).collect::<Vec<_>>().join(", ")
         };
         let scene = &self.base.scene;
-        let (count, degree) = (grouped(scene.len() as u64), scene.sh_degree());
+        let gaussians = |frame: &GaussianFrame| counted(frame.len() as u64, "Gaussian");
+        let (count, degree) = (gaussians(scene), scene.sh_degree());
         let mut facts = format!(
-            "A scene of {count} Gaussians, spherical harmonics of degree {degree}: without any case {}.",
+            "A scene of {count}, spherical harmonics of degree {degree}: without any case {}.",
             of_tools(&self.scene)
         );
         if let Some(first) = self.base.frames.first() {
-            let (frames, count) = (self.base.len(), grouped(first.len() as u64));
+            let (frames, count) = (counted(self.base.len() as u64, "frame"), gaussians(first));
             facts += &format!(
-                " A sequence of {frames} frames of {count} Gaussians: without any case {}.",
+                " A sequence of {frames} of {count}: without any case {}.",
                 of_tools(&self.sequence)
             );
         }

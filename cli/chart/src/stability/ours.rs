@@ -3,7 +3,7 @@
 use super::sample::Sample;
 use super::tools::Attempt;
 use super::{Warning, Warnings};
-use crate::numbers::{grouped, percent};
+use crate::numbers::{counted, percent};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Summary, decode_stream};
@@ -77,15 +77,15 @@ pub(super) fn decoded(stream: &[u8], frames: usize) -> (Vec<Option<GaussianFrame
 fn detected(summary: &Summary) -> Option<String> {
     let first = summary.verdict()?;
     let lost: u32 = summary.lost.iter().map(|range| range.end() - range.start() + 1).sum();
-    let (errors, code) = (summary.errors.len(), first.kind.code());
-    Some(format!("decoder: {errors} errors, the first {code}; {lost} frames lost"))
+    let (errors, lost) = (counted(summary.errors.len() as u64, "error"), counted(lost.into(), "frame"));
+    Some(format!("decoder: {errors}, the first {}; {lost} lost", first.kind.code()))
 }
 
 /// What the report says was done otherwise than on the base.
 fn fallback(report: &Report, sample: &Sample, plain: Option<&Report>) -> Vec<String> {
     let mut remarks = Vec::new();
     if report.invisible > 0 {
-        remarks.push(format!("{} invisible Gaussians left out", grouped(report.invisible)));
+        remarks.push(format!("{} left out", counted(report.invisible, "invisible Gaussian")));
     }
     let Some(plain) = plain else { return remarks };
     let coarser = f64::from(report.position_step) / sample.unit() / f64::from(plain.position_step);
@@ -95,7 +95,7 @@ fn fallback(report: &Report, sample: &Sample, plain: Option<&Report>) -> Vec<Str
     let intra = |frame: &&FrameReport| frame.frame_type == FrameType::Intra;
     let [more, usual] = [report, plain].map(|report| report.coded.iter().filter(intra).count());
     if more > usual {
-        remarks.push(format!("{more} of {} frames are I frames", report.frames));
+        remarks.push(format!("I frames: {more} of {}", counted(report.frames.into(), "frame")));
     }
     let [more, usual] = [report, plain].map(new_percent);
     if more > usual + MORE_NEW {
