@@ -12,7 +12,8 @@ use splatstream_format::Limits;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::{MAX_REFINEMENTS, SequenceParameters};
 use std::collections::BTreeMap;
-use xxhash_rust::xxh64::xxh64;
+use std::fmt::{self, Debug, Write};
+use xxhash_rust::xxh64::Xxh64;
 
 /// A [plan](Plan) as plain values, to be written with serde in any format. A plan that is read from it gives the same bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -240,8 +241,21 @@ fn named(settings: &Settings) -> BTreeMap<String, String> {
 }
 
 /// XXH64 of how values are written for debugging, which has every bit of them.
-fn digest_of(values: &impl core::fmt::Debug) -> u64 {
-    xxh64(format!("{values:?}").as_bytes(), 0)
+fn digest_of(values: &impl Debug) -> u64 {
+    let mut digest = Digest(Xxh64::new(0));
+    // Nothing can fail.
+    let _written = write!(digest, "{values:?}");
+    digest.0.digest()
+}
+
+/// Takes text as it comes: that of photographs is a hundred times as long as they are.
+struct Digest(Xxh64);
+
+impl Write for Digest {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.update(text.as_bytes());
+        Ok(())
+    }
 }
 
 /// Everything that the bytes of a stream follow from, beside its frames.
