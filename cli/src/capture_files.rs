@@ -1,6 +1,6 @@
 //! The files of a capture, which no output of a command that reads it may replace.
 
-use splatstream_render::camera::{Capture, read_capture};
+use splatstream_render::camera::{Capture, read_views};
 use std::path::{Path, PathBuf};
 
 /// Where the model of a capture is, below its directory.
@@ -11,7 +11,7 @@ const MODEL: [&str; 6] =
 
 /// The files of the capture at a path, as far as it can be read.
 pub(crate) fn files_at(path: &Path) -> Vec<PathBuf> {
-    files_of(path, &read_capture(path).unwrap_or_default(), None)
+    files_of(path, &read_views(path).unwrap_or_default(), None)
 }
 
 /// The files of the capture that was read from a path; its pictures are in `images`, if not where it says. Some of them

@@ -11,7 +11,7 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{
     Attribute, Finetune, FinetuneReport, Photograph, PointReport, PointWeight, Report,
 };
-use splatstream_render::camera::read_capture;
+use splatstream_render::camera::read_views;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -203,7 +203,7 @@ impl Taken<'_> {
             )));
         }
         let capture =
-            read_capture(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+            read_views(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
         let photographs = load_photographs(&capture, Some(directory), self.height, self.background)
             .map_err(|error| Failure::other(error.to_string()))?;
         let of_encoder = |photograph: splatstream_capture::Photograph| Photograph {

@@ -90,9 +90,15 @@ const MAX_JSON: u64 = 1 << 26;
 /// # Errors
 /// A file that cannot be read, that has another form, or a camera without size, focal length or finite pose.
 pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, CameraError> {
-    // Points are read with a model only where they are asked for.
-    let capture = if path.is_dir() { colmap_or_json(path, false) } else { json_file(path) };
-    Ok(cameras_of(capture?))
+    read_views(path).map(cameras_of)
+}
+
+/// As [`read_capture`], but without the points of a model of COLMAP, which are most of it.
+///
+/// # Errors
+/// As [`read_cameras`]; more views than [`read_capture`] reads.
+pub fn read_views(path: &Path) -> Result<Capture, CameraError> {
+    if path.is_dir() { colmap_or_json(path, false) } else { json_file(path) }
 }
 
 /// What was captured: of a `cameras.json`, a `transforms.json`, or a directory that has a `transforms.json` or a model of

@@ -1,6 +1,6 @@
 //! Captures from files: COLMAP's models as text and binary, transforms.json, and files that are none.
 
-use splatstream_render::camera::{CameraError, Capture, read_cameras, read_capture};
+use splatstream_render::camera::{CameraError, Capture, read_cameras, read_capture, read_views};
 use std::fs;
 use std::path::Path;
 
@@ -115,6 +115,8 @@ fn a_model_as_text_is_read() {
 #[test]
 fn a_model_as_bytes_says_the_same_as_text() {
     let of_text = read_capture(text(CAMERAS, IMAGES, POINTS).path()).unwrap();
+    let views = read_views(text(CAMERAS, IMAGES, POINTS).path()).unwrap();
+    assert_eq!((views.views.len(), views.points.len()), (of_text.views.len(), 0));
     let of_bytes = read_capture(binary_folder(|_| {}).path()).unwrap();
     assert_eq!((of_text.views, of_text.points), (of_bytes.views, of_bytes.points));
 }
