@@ -13,6 +13,7 @@ use crate::input_args::InputArgs;
 use crate::numbers::parse_frame_rate;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
+use crate::whole_file::read_text;
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::charting::{Charting, Subject};
@@ -236,9 +237,10 @@ fn read_scene(path: &Path, frames: u32, reading: InputArgs) -> Result<Scene, Fai
 
 /// Results of other codecs.
 fn read_peers<'a>(path: &Path, open: OpenFrames<'a>) -> Result<Peers<'a>, Failure> {
-    let text = std::fs::read(path).map_err(|error| Failure::file("read", path, &error))?;
+    let text = read_text(path)?;
     let directory = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    Peers::new(&text, directory, open).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
+    Peers::new(text.as_bytes(), directory, open)
+        .map_err(|error| Failure::other(format!("{}: {error}", path.display())))
 }
 
 impl From<Error> for Failure {

@@ -25,6 +25,7 @@ use crate::setting_names::{
     AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
 };
 use crate::up_guess::UpGuess;
+use crate::whole_file::read_whole;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use decided::Decided;
@@ -187,6 +188,9 @@ pub(crate) struct Encode {
     finetune: FinetuneArgs,
 }
 
+/// The most of a network that is read, bytes: those that streams can carry are far smaller.
+const MAX_NETWORK: u64 = 16 << 20;
+
 /// Cameras that a stream can hold.
 const MAX_CAMERAS: usize = 64;
 
@@ -265,7 +269,7 @@ impl NetworkName {
             Self::Registered => NetworkSource::Registered,
             Self::Trained => NetworkSource::Fitted,
             Self::File(path) => {
-                let bytes = std::fs::read(path).map_err(|cause| Failure::file("read", path, &cause))?;
+                let bytes = read_whole(path, MAX_NETWORK)?;
                 let network = Network::parse(&bytes, 0)
                     .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
                 NetworkSource::Given(Box::new(network))
@@ -363,7 +367,8 @@ impl Encode {
             Some(NetworkName::File(path)) => Some(path),
             _ => None,
         };
-        source.paths().iter().chain(cameras).chain(network).chain(self.shards.plan_file()).cloned().collect()
+        let others = cameras.into_iter().chain(network).chain(self.shards.plan_file()).cloned();
+        source.inputs().into_iter().chain(others).collect()
     }
 
     /// Spatial layers.

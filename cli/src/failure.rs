@@ -52,6 +52,9 @@ impl Failure {
             io::ErrorKind::NotFound => "check the path",
             io::ErrorKind::PermissionDenied => "check the permissions",
             io::ErrorKind::StorageFull => "make room, or choose another disk",
+            io::ErrorKind::FileTooLarge | io::ErrorKind::InvalidData => {
+                "check whether it is the file that is meant"
+            }
             io::ErrorKind::OutOfMemory => "it needs more memory than there is: close other programs",
             _ => "check the path and the disk",
         };

@@ -83,11 +83,6 @@ impl FrameFiles {
         Self { as_is: true, ..self }
     }
 
-    /// The files, in the order of the frames.
-    pub(crate) fn paths(&self) -> &[PathBuf] {
-        &self.paths
-    }
-
     /// The files that are read, which no output may replace: those of scenes that are directories one by one.
     pub(crate) fn inputs(&self) -> Vec<PathBuf> {
         self.paths.iter().flat_map(|path| files_of(path)).collect()

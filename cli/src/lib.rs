@@ -45,6 +45,7 @@ mod unpackage;
 mod up_guess;
 mod validate;
 mod view;
+mod whole_file;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::Console;

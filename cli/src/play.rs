@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs};
 use crate::package::files_in;
 use crate::stream_file::LimitArgs;
+use crate::whole_file::read_text;
 use clap::{Args, ValueEnum};
 use decoding::Decoding;
 use report::Report;
@@ -16,7 +17,6 @@ use splatstream_stream::control::{
     Bola, BufferRule, Layered, Limits, Rule, Settings, Single, ThroughputRule,
 };
 use splatstream_stream::simulation::{Link, Requests, Trace, simulate};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Play a package: fetch ranges as the network allows, decode, and report on every GOP.
@@ -167,7 +167,7 @@ impl Play {
                 "--trace simulates a network for the package in a directory; over a real one, the server shapes".into(),
             ));
         }
-        let text = fs::read_to_string(path).map_err(|error| Failure::file("read", path, &error))?;
+        let text = read_text(path)?;
         Trace::parse(&text).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
     }
 

@@ -5,8 +5,10 @@ use crate::failure::Failure;
 use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_stream_name};
 use crate::stream_file::LimitArgs;
+use crate::whole_file::read_whole;
 use clap::Args;
 use serde::Serialize;
+use splatstream_chart::numbers::grouped;
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::Package;
 use splatstream_stream::unpackage::unpackage;
@@ -26,6 +28,9 @@ pub(crate) struct Unpackage {
     #[command(flatten)]
     limits: LimitArgs,
 }
+
+/// The most that is read of a package, bytes: its stream is put together in memory.
+const MOST: u64 = 8 << 30;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -48,8 +53,8 @@ impl Unpackage {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             match files.last_mut().filter(|_| part_of(path).is_some_and(|(_, part)| part > 0)) {
                 // Segments of a live package follow their initialisation segment.
-                Some((_, bytes)) => bytes.extend(read(path)?),
-                None => files.push((name, read(path)?)),
+                Some((_, bytes)) => bytes.extend(read_whole(path, MOST)?),
+                None => files.push((name, read_whole(path, MOST)?)),
             }
         }
         let given: Vec<_> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
@@ -77,6 +82,14 @@ impl Unpackage {
             }
         }
         paths.sort_by_key(|path| part_of(path));
+        let bytes: u64 = paths.iter().filter_map(|path| path.metadata().ok()).map(|found| found.len()).sum();
+        if bytes > MOST {
+            let (directory, bytes) = (self.directory.display(), counted(bytes, "byte"));
+            return Err(Failure::other(format!(
+                "{directory}: the files have {bytes}, at most {} are read\n  check whether it is a package",
+                grouped(MOST)
+            )));
+        }
         Ok(paths)
     }
 
@@ -86,7 +99,7 @@ impl Unpackage {
         if !path.exists() {
             return Ok(false);
         }
-        let manifest = Manifest::parse(&read(&path)?);
+        let manifest = Manifest::parse(&read_whole(&path, Manifest::MAX_BYTES as u64)?);
         let manifest = manifest.map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
         if !manifest.describes(stream) {
             return Err(Failure::other(format!(
@@ -107,10 +120,6 @@ fn part_of(path: &Path) -> Option<(String, u64)> {
     let (id, number) = name.strip_suffix(".m4s")?.split_once('-')?;
     let number = if number == "end" { u64::MAX } else { number.parse().ok().filter(|number| *number > 0)? };
     Some((id.to_owned(), number))
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|error| Failure::file("read", path, &error))
 }
 
 impl Report<'_> {

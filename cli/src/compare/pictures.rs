@@ -4,6 +4,7 @@ use super::flicker::{Flicker, FlickerSums};
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::failure::Failure;
 use crate::numbers::counted;
+use crate::whole_file::read_whole;
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::table::Table;
@@ -146,11 +147,14 @@ impl Pictures<'_> {
     }
 }
 
+/// The most of a photograph that is read, bytes.
+const MAX_PHOTO: u64 = 512 << 20;
+
 /// The photograph of a camera, which must be of its size.
 fn read_photo(directory: &Path, camera: &Camera) -> Result<Image, Failure> {
     let stem = Path::new(&camera.name).file_stem().unwrap_or(camera.name.as_ref());
     let path = directory.join(stem).with_extension("png");
-    let bytes = std::fs::read(&path).map_err(|error| Failure::file("read", &path, &error))?;
+    let bytes = read_whole(&path, MAX_PHOTO)?;
     let photo =
         Image::from_png(&bytes).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
     let (width, height) = (camera.width, camera.height);

@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::numbers::counted;
 use crate::output_file::{OutputFile, refuse_inputs};
+use crate::whole_file::read_text;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use splatstream_encoder::{Error, FrameSource, Plan, PlanRecord, Report, Settings, plan};
@@ -177,7 +178,7 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
 
 /// The plan of a file, made with these settings.
 fn read(path: &Path, settings: &Settings) -> Result<Plan, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::file("read", path, &error))?;
+    let text = read_text(path)?;
     let name = path.display();
     let none = |why: String| {
         Failure::other(format!(

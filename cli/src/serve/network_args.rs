@@ -2,10 +2,10 @@
 
 use crate::failure::Failure;
 use crate::numbers::parse_share;
+use crate::whole_file::read_text;
 use clap::Args;
 use splatstream_stream::server::Network;
 use splatstream_stream::simulation::Trace;
-use std::fs;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -35,7 +35,7 @@ impl NetworkArgs {
     /// The network, with its trace read.
     pub(super) fn network(&self) -> Result<Network, Failure> {
         let bandwidth = self.shape.as_ref().map(|path| {
-            let csv = fs::read_to_string(path).map_err(|error| Failure::file("read", path, &error))?;
+            let csv = read_text(path)?;
             Trace::parse(&csv).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
         });
         Ok(Network {

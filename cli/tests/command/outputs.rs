@@ -73,12 +73,17 @@ fn no_file_that_belongs_to_an_input_is_replaced() {
     fs::copy(at("frames/f8.ply"), &start).unwrap();
     fs::hard_link(format!("{package}/manifest.mpd"), at("linked.json")).unwrap();
     fs::hard_link(format!("{package}/manifest.json"), at("linked.gss")).unwrap();
+    let sog = directory.path().join("sog");
+    fs::create_dir(&sog).unwrap();
+    fs::write(sog.join("meta.json"), "{}").unwrap();
+    fs::write(sog.join("means_l.webp"), "no picture").unwrap();
+    fs::hard_link(sog.join("means_l.webp"), at("picture.gss")).unwrap();
     let before = contents(directory.path());
     let (cameras, points) = (format!("{capture}/transforms.json"), format!("{capture}/sparse_pc.ply"));
     let (manifest, images) = (format!("{package}/manifest.json"), format!("{capture}/images"));
     let (frames, frame) = (at("frames"), at("frames/f8.ply"));
     fs::hard_link(&frame, at("linked.bin")).unwrap();
-    let cases: [&[&str]; 10] = [
+    let cases: [&[&str]; 11] = [
         &["play", &package, "--no-wait", "-o", &manifest],
         &["play", &manifest, "--no-wait", "-o", &manifest],
         &["play", &package, "--no-wait", "-o", &at("linked.json")],
@@ -89,6 +94,7 @@ fn no_file_that_belongs_to_an_input_is_replaced() {
         &["fit", &capture, "--start", &start, "-o", &start],
         &["fit", &capture, "--start", &frame, "-o", &frame],
         &["render", text(&still), "--cameras", &cameras, "-o", &images],
+        &["encode", text(&sog), "-o", &at("picture.gss")],
     ];
     for case in cases {
         let said = fail(2, case);
@@ -208,6 +214,31 @@ fn an_input_without_an_end_is_refused() {
         let ended = run(&line);
         assert_eq!(ended.status.code(), Some(code), "{line}: {ended:?}");
     }
+    let (package, trace) = (directory.path().join("package"), directory.path().join("trace.csv"));
+    succeed(&["package", text(&stream), "-o", text(&package)]);
+    let huge = |path: &Path, bytes: u64| {
+        fs::OpenOptions::new().create(true).append(true).open(path).unwrap().set_len(bytes).unwrap();
+    };
+    huge(&trace, 1 << 32);
+    let (played, trace) = (text(&package), text(&trace));
+    let plan = format!("--plan={trace}");
+    for arguments in [
+        ["play", played, "--trace", trace],
+        ["play", played, "--trace", "/dev/zero"],
+        ["chart", text(&still), "--peers", trace],
+        ["encode", text(&still), "--shard=1/1", &plan],
+    ] {
+        let name = match arguments[0] {
+            "play" => "out.json",
+            "chart" => "report",
+            _ => "out.gss",
+        };
+        let said = fail(1, &[&arguments[..], &["-o", text(&directory.path().join(name))]].concat());
+        assert!(said.contains("more than 268435456 bytes"), "{said}");
+    }
+    huge(&package.join("s0.mp4"), 9 << 30);
+    let said = fail(1, &["unpackage", played, "-o", out]);
+    assert!(said.contains("at most 8,589,934,592 are read"), "{said}");
     let head = text(&still);
     for (line, said) in [
         (format!("{program} encode - -o {out} </dev/zero"), "no known scene format"),
