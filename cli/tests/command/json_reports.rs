@@ -96,6 +96,7 @@ fn reports_on_the_committed_stream_are_as_before() {
         ("extract_damaged", "extract damaged.gss --op s0,t0,r2 -o rest.gss"),
         ("package", "package small.gss -o package/"),
         ("unpackage", "unpackage package/ -o back.gss"),
+        ("concat", "concat small.gss small.gss -o long.gss"),
         ("simulate", "play package/ --trace trace.csv"),
         ("compare", "compare small.gss part.gss --cameras ring:2 --height 40"),
         ("render", "render small.gss -o pictures --camera ring:1 --height 20 --frames 0..1"),
