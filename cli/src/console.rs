@@ -13,14 +13,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Where results and complaints go.
 pub(crate) struct Console {
     json: bool,
+    /// Whether only warnings and errors are for people.
+    quiet: bool,
     /// Whether there is JSON on standard output already: it is one value.
     has_printed: AtomicBool,
 }
 
 impl Console {
-    /// Results as JSON, or as text for people.
-    pub(crate) fn new(json: bool) -> Self {
-        Self { json, has_printed: AtomicBool::new(false) }
+    /// Results as JSON, or as text for people, who may want none.
+    pub(crate) fn new(json: bool, quiet: bool) -> Self {
+        Self { json, quiet, has_printed: AtomicBool::new(false) }
     }
 
     /// Whether results are printed as JSON.
@@ -35,7 +37,11 @@ impl Console {
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
         self.has_printed.store(true, Ordering::Relaxed);
-        let mut output = if self.json { to_json(report)? } else { text() };
+        let mut output = match (self.json, self.quiet) {
+            (true, _) => to_json(report)?,
+            (false, true) => return Ok(()),
+            (false, false) => text(),
+        };
         if !output.is_empty() && !output.ends_with('\n') {
             output.push('\n');
         }
@@ -62,7 +68,7 @@ impl Console {
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
         if out.is_some_and(is_standard) {
-            self.complain(text().trim_end());
+            self.note(|| text().trim_end().to_owned());
             return Ok(());
         }
         self.report(report, text)
@@ -75,6 +81,9 @@ impl Console {
         text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Failure> {
         self.has_printed.store(true, Ordering::Relaxed);
+        if self.quiet && !self.json {
+            return Ok(());
+        }
         let mut out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
         let result = match self.json {
             true => {
@@ -92,6 +101,13 @@ impl Console {
             let _nobody_listens = self.report(&FailureReport::from(failure), String::new);
         }
         self.complain(&failure.to_string());
+    }
+
+    /// Says on standard error how a command goes.
+    pub(crate) fn note(&self, message: impl FnOnce() -> String) {
+        if !self.quiet {
+            self.complain(&message());
+        }
     }
 
     /// Writes to standard error. If nobody listens there, nobody can be told.

@@ -74,6 +74,10 @@ struct Cli {
     /// Print the result as JSON on standard output.
     #[arg(long, global = true, display_order = 100)]
     json: bool,
+    /// Print no report and show no progress: nothing but warnings and errors, and with --json the JSON. The exit code tells the
+    /// rest.
+    #[arg(short, long, global = true, display_order = 100)]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -111,7 +115,8 @@ pub fn main(arguments: &[OsString]) -> u8 {
         Cli::command().try_get_matches_from(arguments).unwrap_or_else(|error| refuse(&error, arguments));
     let command = name_of(&matches);
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let console = Console::new(cli.json);
+    let console = Console::new(cli.json, cli.quiet);
+    progress::set_quiet(cli.quiet);
     match in_threads(cli.threads, || cli.command.run(&console)) {
         Ok(()) => 0,
         Err(failure) => {
@@ -128,7 +133,7 @@ pub fn main(arguments: &[OsString]) -> u8 {
 fn refuse(error: &clap::Error, arguments: &[OsString]) -> ! {
     if error.use_stderr() && arguments.iter().any(|argument| argument == "--json") {
         let failure = Failure::Usage(error.to_string().trim_end().to_owned());
-        let _nobody_listens = Console::new(true).report(&FailureReport::from(&failure), String::new);
+        let _nobody_listens = Console::new(true, true).report(&FailureReport::from(&failure), String::new);
     }
     error.exit()
 }

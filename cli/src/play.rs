@@ -134,7 +134,7 @@ impl Play {
                 let mut decoding = Decoding::start(!self.no_decode, self.limits.limits())?;
                 let show = &mut |gop: &PlayedGop<'_>| {
                     if !console.is_json() {
-                        console.complain(&report::line(gop));
+                        console.note(|| report::line(gop));
                     }
                     decoding.show(gop);
                 };

@@ -2,6 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{self, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -10,6 +11,14 @@ const ONE_FRAME: &str = "{spinner} {msg}, {elapsed} gone";
 
 /// Between two lines where nobody sees a bar.
 const LINES: Duration = Duration::from_secs(30);
+
+/// Whether nobody wants to know how far a command has come.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Shows no progress from now on, or again.
+pub(crate) fn set_quiet(quiet: bool) {
+    IS_QUIET.store(quiet, Ordering::Relaxed);
+}
 
 /// How far a command has come.
 pub(crate) struct Progress {
@@ -35,7 +44,7 @@ impl Progress {
     /// A bar for `cases` cases of a conformance suite; where standard error is no terminal, a line now and then.
     pub(crate) fn cases(cases: u32) -> Self {
         let mut progress = Self::new(cases, "testing {wide_bar} {pos}/{len} cases, {eta} left");
-        progress.line = (!io::stderr().is_terminal()).then(|| Mutex::new(Some(Instant::now())));
+        progress.line = progress.lines_from(Some(Instant::now()));
         progress
     }
 
@@ -43,16 +52,18 @@ impl Progress {
     /// first name and then one now and then.
     pub(crate) fn steps(steps: u32) -> Self {
         let mut progress = Self::new(steps, "{pos}/{len} {wide_bar} {elapsed} gone, {eta} left\n{msg}");
-        progress.line = (!io::stderr().is_terminal()).then(|| Mutex::new(None));
+        progress.line = progress.lines_from(None);
         progress
     }
 
+    /// Lines in place of the bar that nobody sees, the last of them at this time.
+    fn lines_from(&self, last: Option<Instant>) -> Option<Mutex<Option<Instant>>> {
+        (self.bar.is_hidden() && !IS_QUIET.load(Ordering::Relaxed)).then(|| Mutex::new(last))
+    }
+
     fn new(length: u32, template: &str) -> Self {
-        let target = if io::stderr().is_terminal() {
-            ProgressDrawTarget::stderr()
-        } else {
-            ProgressDrawTarget::hidden()
-        };
+        let is_seen = io::stderr().is_terminal() && !IS_QUIET.load(Ordering::Relaxed);
+        let target = if is_seen { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let length = (length > 0).then_some(u64::from(length));
         let bar = ProgressBar::with_draw_target(length, target);
         if let Ok(style) = ProgressStyle::with_template(template) {

@@ -96,7 +96,7 @@ impl Serve {
         let settings = self.settings(directory)?;
         allow_open_files();
         let log = self.log;
-        let announce = |url: &str| console.complain(&format!("serving {} at {url}", directory.display()));
+        let announce = |url: &str| console.note(|| format!("serving {} at {url}", directory.display()));
         let (url, statistics) = until_interrupted(&settings, move |entry| write(log, entry), announce)?;
         let report = Report { directory, url, statistics };
         console.report(&report, || report.text())

@@ -91,7 +91,7 @@ impl View {
             .map_err(|error| Failure::other(format!("a temporary directory cannot be written: {error}")))?;
         let mut settings = Settings::new(directory.path());
         settings.address = SocketAddr::new(self.bind, self.port);
-        let announce = |url: &str| console.complain(&format!("{} is at {url}", self.input.display()));
+        let announce = |url: &str| console.note(|| format!("{} is at {url}", self.input.display()));
         let (url, _) = until_interrupted(&settings, |_| {}, announce)?;
         let report = Report::new(None, Some(url), &page, stream);
         console.report(&report, || report.text())

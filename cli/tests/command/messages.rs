@@ -6,6 +6,7 @@ use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::ply;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Output;
 
 /// Three frames in two temporal layers.
 fn sequence(directory: &Path) -> PathBuf {
@@ -224,4 +225,40 @@ fn one_frame_is_not_frames() {
     assert!(
         succeed(&["extract", &stream, "--op", "s0,t0,r0", "-o", &at("part.gss")]).contains("1 of 1 frame, ")
     );
+}
+
+#[test]
+fn quiet_leaves_warnings_errors_and_what_is_asked_for() {
+    let directory = directory();
+    let at = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    let still = write_still(directory.path());
+    let said = |arguments: &[&str]| {
+        let Output { status, stdout, stderr } = run(arguments);
+        (status.code(), stdout, String::from_utf8(stderr).unwrap())
+    };
+    let encode = ["encode", text(&still), "--preset", "fast", "--psnr", "40", "-q", "-o"];
+    assert_eq!(said(&[&encode[..], &[&at("out.gss")]].concat()), (Some(0), Vec::new(), String::new()));
+    let piped = said(&[&encode[..], &["-"]].concat());
+    assert_eq!(piped, (Some(0), fs::read(at("out.gss")).unwrap(), String::new()));
+    for quiet in ["validate", "inspect", "compare"] {
+        let again = at("out.gss");
+        let inputs = if quiet == "compare" { vec![again.as_str(); 2] } else { vec![again.as_str()] };
+        let arguments = [&["--quiet", quiet], &inputs[..]].concat();
+        assert_eq!(said(&arguments), (Some(0), Vec::new(), String::new()), "{quiet}");
+    }
+    let (code, json, words) = said(&["validate", &at("out.gss"), "-q", "--json"]);
+    assert!(code == Some(0) && words.is_empty() && serde_json::from_slice::<Value>(&json).is_ok());
+    let hasty = ["encode", text(&still), "-o", &at("hasty.gss"), "--time-budget", "0.001", "-q"];
+    let (code, stdout, warning) = said(&hasty);
+    assert_eq!((code, stdout.len(), warning.lines().count()), (Some(0), 0, 1), "{warning}");
+    assert!(warning.starts_with("warning: the fast preset"), "{warning}");
+    let (code, _, error) = said(&["validate", &at("missing.gss"), "-q"]);
+    assert!(code == Some(1) && error.contains("missing.gss: cannot read"), "{error}");
+    // Lines of progress, where there is no terminal for a bar.
+    let simulate = ["simulate", "-o", &at("capture"), "--views", "2", "--height", "27", "--samples", "1"];
+    succeed(&[&simulate[..], &["--points", "200"]].concat());
+    let (capture, scene) = (at("capture"), at("scene.ply"));
+    let fit = ["fit", &capture, "-o", &scene, "--iterations", "1", "--gaussians", "100", "--hold-out", "0"];
+    assert!(!said(&fit).2.is_empty());
+    assert_eq!(said(&[&fit[..], &["-q"]].concat()), (Some(0), Vec::new(), String::new()));
 }
