@@ -69,6 +69,7 @@ pub(crate) fn warnings(
     warnings.extend(pulses(report));
     warnings.extend(short_gops(report, settings));
     warnings.extend(not_fitted(report, settings));
+    warnings.extend(short_time(report, settings));
     warnings
 }
 
@@ -234,6 +235,19 @@ fn not_fitted(report: &Report, settings: &Settings) -> Option<Warning> {
         );
         Warning::new("not-fine-tuned", message)
     })
+}
+
+/// A time in which fitting to pictures came to nothing: too short for an iteration, or for one that gains anything.
+fn short_time(report: &Report, settings: &Settings) -> Option<Warning> {
+    let budget = settings.finetune.as_ref()?.time_budget?;
+    let is_given_up = report.target.is_some_and(|target| target.without_finetune);
+    let is_idle = report.finetuned.iter().any(|fitted| fitted.iterations == 0);
+    let message = format!(
+        "--finetune came to nothing in the {} seconds of --time-budget, which may have been over before the first iteration: give \
+         more, or leave out --time-budget",
+        budget.as_secs_f64(),
+    );
+    (is_given_up || is_idle).then(|| Warning::new("nothing-fitted", message))
 }
 
 fn dropped(report: &Report, first: &Dropped, file_of: &dyn Fn(u32) -> String) -> Warning {

@@ -85,6 +85,9 @@ fn a_time_chooses_what_is_done_and_not_the_clock() {
     let (some, bytes) = encode(&["--time-budget", "2.5"]);
     assert_eq!(chosen(&some, "time budget"), Some("balanced"));
     assert_eq!(bytes, encode(&["--preset", "balanced"]).1);
+    let (none, _) =
+        encode(&["--preset", "fast", "--psnr", "40", "--finetune", "3", "--time-budget", "0.001"]);
+    assert_eq!(codes(&none), ["nothing-fitted"]);
     let usage = |arguments: &[&str]| {
         fail(
             2,
