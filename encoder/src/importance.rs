@@ -162,7 +162,7 @@ impl Ranking {
     }
 
     /// What orders go by: some of the cameras, in small pictures.
-    fn views<'f>(&self, frame: &'f GaussianFrame) -> SmallViews<'f> {
+    fn views(&self, frame: &GaussianFrame) -> SmallViews {
         let (most, lines) = match self.preset {
             Preset::Fast => (3, 96),
             Preset::Balanced | Preset::Small => (10, 144),
@@ -177,7 +177,7 @@ impl Ranking {
     /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
     /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what
     /// goes at the same time, the contribution alone none of how alike things look.
-    fn eliminate(&self, mut views: SmallViews<'_>, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
+    fn eliminate(&self, mut views: SmallViews, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
         let count = volume.len();
         let mut kept = all(count);
         let mut gone: Vec<u32> = Vec::new();

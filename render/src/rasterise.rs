@@ -12,7 +12,6 @@ mod tile;
 
 use crate::camera::Camera;
 use crate::image::Image;
-pub(crate) use block::Block;
 pub(crate) use project::{LOW_PASS, Shapes, Splat, near, seen_slopes};
 use project::{project, touching};
 use pulp::{Simd, WithSimd};

@@ -5,12 +5,14 @@
 //! sorted by depth, and blended into the whole picture, which a core's cache holds. What each adds to a pixel is kept until
 //! all light is known, and gone through again from behind.
 
+mod columns;
 mod ellipses;
 mod trace;
 
 use super::{Share, Worth};
 use crate::camera::Camera;
-use crate::rasterise::{Shapes, near};
+use crate::rasterise::near;
+use columns::Columns;
 use ellipses::Ellipses;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -42,12 +44,10 @@ use trace::Trace;
 /// assert!(worth[0].contribution > worth[1].contribution);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct SmallViews<'a> {
-    frame: &'a GaussianFrame,
-    shapes: Shapes,
+pub struct SmallViews {
+    /// The Gaussians that are left.
+    left: Columns,
     views: Vec<SmallView>,
-    /// The Gaussians that are left, by rising row; none if all are.
-    left: Option<Vec<u32>>,
 }
 
 /// One of the small pictures.
@@ -62,10 +62,10 @@ struct SmallView {
 /// Gaussians of all views that are looked at side by side, at most: each takes some 60 bytes meanwhile.
 const AT_ONCE: usize = 1 << 23;
 
-impl<'a> SmallViews<'a> {
+impl SmallViews {
     /// Pictures of at most so many lines.
     #[must_use]
-    pub fn new(frame: &'a GaussianFrame, cameras: &[Camera], lines: u32) -> Self {
+    pub fn new(frame: &GaussianFrame, cameras: &[Camera], lines: u32) -> Self {
         let small = |camera: &Camera| {
             let (small, fine) = match camera.height > lines {
                 true => (camera.scaled_to_height(lines), lines as f32 / camera.height as f32),
@@ -74,55 +74,67 @@ impl<'a> SmallViews<'a> {
             SmallView { camera: small, fine, near: near(frame, camera) }
         };
         let views = cameras.iter().map(small).collect();
-        Self { frame, shapes: Shapes::of(frame), views, left: None }
+        Self { left: Columns::of(frame), views }
     }
 
-    /// Takes all Gaussians away but those of some rows, which rise.
+    /// Takes all Gaussians away but those of some rows of the frame, which rise. What was taken away before stays away.
     pub fn leave(&mut self, rows: &[u32]) {
-        self.left = Some(rows.to_vec());
+        self.left.leave(rows);
     }
 
     /// What each of the Gaussians that are left is to the pictures if there are no others, by rising row. Equal on every
     /// machine and for any number of threads.
     #[must_use]
     pub fn worth(&self) -> Vec<Worth> {
-        let count = self.left.as_ref().map_or(self.frame.len(), Vec::len);
+        let count = self.left.len();
         let mut sums = vec![Worth::default(); count];
         let room = AT_ONCE.checked_div(count).unwrap_or(1).max(1);
+        let side_by_side = room.min(rayon::current_num_threads()).min(self.views.len()).max(1);
+        let mut desks: Vec<Desk> = (0..side_by_side).map(|_| Desk::default()).collect();
         // In the order of the views, however many are looked at side by side.
-        for views in self.views.chunks(room.min(rayon::current_num_threads())) {
-            let look = |view| pulp::Arch::new().dispatch(Look { views: self, view, most: trace::MOST });
-            let shares: Vec<Vec<Share>> = views.par_iter().map(look).collect();
-            for shares in &shares {
+        for views in self.views.chunks(side_by_side) {
+            let look = |(view, desk): (&SmallView, &mut Desk)| {
+                pulp::Arch::new().dispatch(Look { left: &self.left, view, most: trace::MOST, desk });
+            };
+            views.par_iter().zip(&mut desks).for_each(look);
+            for desk in desks.iter().take(views.len()) {
                 let sums = sums.par_iter_mut().with_min_len(1 << 12);
-                sums.zip(shares).for_each(|(sum, share)| share.add_to(sum));
+                sums.zip(&desk.shares).for_each(|(sum, share)| share.add_to(sum));
             }
         }
         sums
     }
 }
 
+/// What looking from one camera takes, and gives: kept from view to view, since fresh memory takes time.
+#[derive(Default)]
+struct Desk {
+    ellipses: Ellipses,
+    trace: Trace,
+    shares: Vec<Share>,
+}
+
 /// Looks at all Gaussians that are left from one camera.
 struct Look<'a> {
-    views: &'a SmallViews<'a>,
+    left: &'a Columns,
     view: &'a SmallView,
     /// What is kept of pixels, at most.
     most: usize,
+    desk: &'a mut Desk,
 }
 
 impl WithSimd for Look<'_> {
-    type Output = Vec<Share>;
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let SmallViews { frame, shapes, left, .. } = self.views;
-        let SmallView { camera, fine, near } = self.view;
-        let left = left.as_deref();
-        let ellipses = Ellipses::project((frame, shapes, left), camera, *fine, *near);
-        let order = ellipses.nearest_first();
-        let mut shares = vec![Share::default(); left.map_or(frame.len(), <[u32]>::len)];
-        Trace::new(camera, self.most).blend(&ellipses, &order, &mut shares);
-        shares
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { left, view: SmallView { camera, fine, near }, most, desk } = self;
+        let Desk { ellipses, trace, shares } = desk;
+        ellipses.project(left, camera, *fine, *near);
+        shares.clear();
+        shares.resize(left.len(), Share::default());
+        trace.start(camera, most);
+        trace.blend(ellipses, shares);
     }
 }
 
@@ -134,6 +146,13 @@ mod tests {
 
     fn scene() -> GaussianFrame {
         BuiltinScene { gaussians: 4_000, ..BuiltinScene::default() }.frame(0)
+    }
+
+    /// What the first view shows of each Gaussian.
+    fn looked(views: &SmallViews, arch: pulp::Arch, most: usize) -> Vec<Share> {
+        let mut desk = Desk::default();
+        arch.dispatch(Look { left: &views.left, view: &views.views[0], most, desk: &mut desk });
+        desk.shares
     }
 
     #[test]
@@ -178,8 +197,7 @@ mod tests {
         let frame = scene();
         let cameras = ring(&frame, Up::default(), 1, 100);
         let views = SmallViews::new(&frame, &cameras, 100);
-        let [all, few] = [trace::MOST, 1000]
-            .map(|most| pulp::Arch::new().dispatch(Look { views: &views, view: &views.views[0], most }));
+        let [all, few] = [trace::MOST, 1000].map(|most| looked(&views, pulp::Arch::new(), most));
         assert_eq!(all, few);
     }
 
@@ -193,8 +211,8 @@ mod tests {
             pool.install(|| views.worth())
         });
         assert!(sums[0] == sums[1] && sums[0] == sums[2]);
-        let [plain, vectors] = [pulp::Arch::Scalar, pulp::Arch::new()]
-            .map(|arch| arch.dispatch(Look { views: &views, view: &views.views[0], most: trace::MOST }));
+        let [plain, vectors] =
+            [pulp::Arch::Scalar, pulp::Arch::new()].map(|arch| looked(&views, arch, trace::MOST));
         assert_eq!(plain, vectors);
     }
 

@@ -3,37 +3,28 @@
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; lanes and axes are constants")]
 
 use super::TILE;
-use super::project::Shapes;
 use super::tile::Lanes;
 use splatstream_gaussians::{GaussianFrame, SH_C0, sh_basis, sh_coefficients};
 use std::ops::Range;
 
-/// Some Gaussians of a frame, side by side.
-pub(crate) struct Block {
-    rows: [u32; TILE],
+/// Neighbours in a frame, side by side.
+pub(super) struct Block {
+    first: usize,
     /// How many there are: further lanes repeat the last.
     count: usize,
-    /// Whether they are neighbours in the frame.
-    is_run: bool,
 }
 
 impl Block {
-    /// Those at at most sixteen places of `rows`, or of the frame where there are none.
+    /// Those of at most sixteen rows, and at least one.
     #[inline(always)]
-    pub(crate) fn new(rows: Option<&[u32]>, places: Range<usize>) -> Self {
-        let of_lane = |lane: usize| {
-            let place = (places.start + lane).min(places.end - 1);
-            rows.map_or(place as u32, |rows| rows[place])
-        };
-        let (rows, count): ([u32; TILE], _) = (std::array::from_fn(of_lane), places.len());
-        let is_run = count == TILE && (rows[TILE - 1] - rows[0]) as usize == TILE - 1;
-        Self { rows, count, is_run }
+    pub(super) fn new(rows: Range<usize>) -> Self {
+        Self { first: rows.start, count: rows.len() }
     }
 
     /// Each with its lane.
     #[inline(always)]
-    pub(crate) fn rows(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.rows[..self.count].iter().map(|&row| row as usize).enumerate()
+    pub(super) fn rows(&self) -> impl Iterator<Item = (usize, usize)> {
+        (self.first..self.first + self.count).enumerate()
     }
 
     /// Red, green and blue of each, as they are seen from a position.
@@ -80,26 +71,14 @@ impl Block {
         offsets
     }
 
-    /// Their semi-axes, x, y and z of each.
-    #[inline(always)]
-    pub(crate) fn axes(&self, shapes: &Shapes) -> [[Lanes; 3]; 3] {
-        let mut axes = [[[0.0; TILE]; 3]; 3];
-        for (lane, &row) in self.rows.iter().enumerate() {
-            for (axis, of_row) in axes.iter_mut().zip(shapes.axes(row as usize)) {
-                axis.iter_mut().zip(of_row.to_array()).for_each(|(part, value)| part[lane] = value);
-            }
-        }
-        axes
-    }
-
     /// Their values in a plane of the frame.
     #[inline(always)]
-    pub(crate) fn of(&self, plane: &[f32]) -> Lanes {
-        let first = self.rows[0] as usize;
-        let mut lanes = [0.0; TILE];
-        match self.is_run {
-            true => lanes.copy_from_slice(&plane[first..first + TILE]),
-            false => lanes.iter_mut().zip(self.rows).for_each(|(lane, row)| *lane = plane[row as usize]),
+    fn of(&self, plane: &[f32]) -> Lanes {
+        let values = &plane[self.first..self.first + self.count];
+        let mut lanes = [values[self.count - 1]; TILE];
+        match self.count == TILE {
+            true => lanes.copy_from_slice(values),
+            false => lanes.iter_mut().zip(values).for_each(|(lane, value)| *lane = *value),
         }
         lanes
     }

@@ -121,7 +121,7 @@ impl WithSimd for ProjectChunk<'_> {
         let Self { view, rows } = self;
         let mut splats = Vec::with_capacity(rows.len());
         for start in rows.clone().step_by(TILE) {
-            let block = Block::new(None, start..rows.end.min(start + TILE));
+            let block = Block::new(start..rows.end.min(start + TILE));
             let first = splats.len();
             for (lane, row) in block.rows() {
                 if let Some((depth, splat)) = view.ellipse(row) {

@@ -2,9 +2,10 @@
 #![expect(clippy::arithmetic_side_effects, reason = "floats; counts of Gaussians in memory")]
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; lanes and axes are constants")]
 
+use super::columns::{Columns, VALUES};
 use crate::camera::Camera;
-use crate::rasterise::{Block, LOW_PASS, Lanes, Shapes, TILE, seen_slopes};
-use splatstream_gaussians::{GaussianFrame, SH_C0};
+use crate::rasterise::{LOW_PASS, Lanes, TILE, seen_slopes};
+use core::ops::Range;
 
 /// The square of the distance from its centre, in its own widths, to which a Gaussian is blended: beyond are 5 % of it.
 pub(super) const REACH: f32 = 6.0;
@@ -36,57 +37,64 @@ pub(super) struct Ellipse {
 }
 
 /// The ellipses of the Gaussians that touch a picture, by rising place.
+#[derive(Default)]
 pub(super) struct Ellipses {
     pub(super) all: Vec<Ellipse>,
+    /// Places of the ellipses, nearest first; of those at one depth, nearly, the first in the frame.
+    order: Vec<(u32, u32)>,
+    /// The same while it is sorted.
+    sorted: Vec<(u32, u32)>,
 }
 
 impl Ellipses {
-    /// Of the Gaussians that are left of a frame. `fine`: the side of a pixel of the picture that this one stands for,
-    /// pixels of this one; `near`: the least depth that is drawn.
+    /// Of the Gaussians that are left. `fine`: the side of a pixel of the picture that this one stands for, pixels of
+    /// this one; `near`: the least depth that is drawn.
     #[inline(always)]
-    pub(super) fn project(
-        (frame, shapes, left): (&GaussianFrame, &Shapes, Option<&[u32]>),
-        camera: &Camera,
-        fine: f32,
-        near: f32,
-    ) -> Self {
-        let count = left.map_or(frame.len(), <[u32]>::len);
-        let mut all = Vec::with_capacity(count);
+    pub(super) fn project(&mut self, left: &Columns, camera: &Camera, fine: f32, near: f32) {
+        let count = left.len();
+        let all = &mut self.all;
+        all.clear();
+        all.reserve(count);
         for start in (0..count).step_by(TILE) {
-            let block = Block::new(left, start..count.min(start + TILE));
-            let lanes = Projected::new(&block, (frame, shapes), camera, fine);
-            let dc = frame.dc().each_ref().map(|plane| block.of(plane));
-            for (lane, _) in block.rows().filter(|&(lane, _)| lanes.is_seen(lane, camera, near)) {
-                let colour = dc.each_ref().map(|channel| (0.5 + SH_C0 as f32 * channel[lane]).max(0.0));
+            let values = left.lanes(start / TILE);
+            let lanes = Projected::new(&values, left.is_antialiased(), camera, fine);
+            let [.., red, green, blue] = values;
+            for lane in (0..TILE.min(count - start)).filter(|&lane| lanes.is_seen(lane, camera, near)) {
+                let colour = [red[lane], green[lane], blue[lane]];
                 all.push(Ellipse { colour, place: (start + lane) as u32, ..lanes.ellipse(lane) });
             }
         }
-        Self { all }
+        self.sort();
     }
 
-    /// Places of the ellipses, nearest first; of those at one depth, nearly, the first in the frame.
-    ///
+    /// The places of the ellipses from one on, nearest first.
+    #[inline(always)]
+    pub(super) fn nearest(&self, places: Range<usize>) -> &[(u32, u32)] {
+        &self.order[places]
+    }
+
     /// Two rounds of sorting by counting, by the 22 highest bits in which depths differ.
     #[inline(always)]
-    pub(super) fn nearest_first(&self) -> Vec<u32> {
-        let depths = || self.all.iter().map(|ellipse| ellipse.depth);
+    fn sort(&mut self) {
+        let Self { all, order, sorted } = self;
+        let depths = || all.iter().map(|ellipse| ellipse.depth);
         let (least, most) = (depths().min().unwrap_or_default(), depths().max().unwrap_or_default());
         let shift = (u32::BITS - (most - least).leading_zeros()).saturating_sub(2 * DIGIT);
-        let mut order: Vec<(u32, u32)> = depths().map(|depth| (depth - least) >> shift).zip(0..).collect();
-        let mut sorted = order.clone();
+        order.clear();
+        order.extend(depths().map(|depth| (depth - least) >> shift).zip(0..));
+        sorted.resize(order.len(), (0, 0));
         for digit in 0..2 {
             let bucket = |key: u32| (key >> (digit * DIGIT)) as usize % BUCKETS;
             let mut starts = [0; BUCKETS + 1];
             order.iter().for_each(|&(key, _)| starts[bucket(key) + 1] += 1);
             (0..BUCKETS).for_each(|bucket| starts[bucket + 1] += starts[bucket]);
-            for &(key, place) in &order {
+            for &(key, place) in order.iter() {
                 let slot = &mut starts[bucket(key)];
                 sorted[*slot] = (key, place);
                 *slot += 1;
             }
-            core::mem::swap(&mut order, &mut sorted);
+            core::mem::swap(order, sorted);
         }
-        order.into_iter().map(|(_, place)| place).collect()
     }
 }
 
@@ -104,7 +112,7 @@ struct Projected {
 
 impl Projected {
     #[inline(always)]
-    fn new(block: &Block, (frame, shapes): (&GaussianFrame, &Shapes), camera: &Camera, fine: f32) -> Self {
+    fn new(values: &[&Lanes; VALUES], is_compensated: bool, camera: &Camera, fine: f32) -> Self {
         let zero = [0.0; TILE];
         let mut all = Self {
             depth: zero,
@@ -115,14 +123,12 @@ impl Projected {
             peak: zero,
             extent: [zero; 2],
         };
-        let position = frame.position().each_ref().map(|plane| block.of(plane));
-        let opacity = block.of(shapes.opacity());
-        let axes = block.axes(shapes);
+        let [px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz, opacity, ..] = *values;
+        let (position, axes) = ([px, py, pz], [[ax, ay, az], [bx, by, bz], [cx, cy, cz]]);
         let ([right, down, ahead], from) = (camera.rotation, camera.position);
         let [(least_x, most_x), (least_y, most_y)] = seen_slopes(camera);
         let (focal, principal) = (camera.focal, camera.principal);
         let fine_pass = LOW_PASS * fine * fine;
-        let is_compensated = frame.antialiased();
         // Written out number by number: the compiler makes vectors of sixteen lanes of straight lines.
         for lane in 0..TILE {
             let offset = [0, 1, 2].map(|axis: usize| position[axis][lane] - from[axis]);

@@ -6,6 +6,7 @@ use super::ellipses::{Ellipse, Ellipses, REACH};
 use crate::camera::Camera;
 use crate::contribution::Share;
 use crate::rasterise::{MAX_ALPHA, exp2};
+use core::ops::Range;
 use std::f32::consts::LOG2_E;
 
 /// Touches of pixels that are kept at most: a scene of millions of faint Gaussians has thousands in each pixel.
@@ -37,6 +38,7 @@ struct Shown {
 }
 
 /// A picture, and what it was blended from.
+#[derive(Default)]
 pub(super) struct Trace {
     size: [usize; 2],
     /// Touches that are kept at most, and those of 64 ellipses more.
@@ -45,13 +47,20 @@ pub(super) struct Trace {
     passing: Vec<f32>,
     touches: Vec<Touch>,
     shown: Vec<Shown>,
+    /// What lies behind, composited.
+    light: Vec<[f32; 4]>,
 }
 
 impl Trace {
-    pub(super) fn new(camera: &Camera, most: usize) -> Self {
-        let size = [camera.width as usize, camera.height as usize];
-        let passing = vec![1.0; size[0] * size[1]];
-        Self { size, most, passing, touches: Vec::new(), shown: Vec::new() }
+    /// Begins a picture of a camera.
+    pub(super) fn start(&mut self, camera: &Camera, most: usize) {
+        self.size = [camera.width as usize, camera.height as usize];
+        self.most = most;
+        let pixels = self.size[0] * self.size[1];
+        self.passing.clear();
+        self.passing.resize(pixels, 1.0);
+        self.light.clear();
+        self.light.resize(pixels, [0.0; 4]);
     }
 
     /// Blends all ellipses, and says what each is to the picture.
@@ -59,16 +68,16 @@ impl Trace {
     /// Where there are more touches than there is room for, the light that passes is kept instead, and what was blended
     /// before is blended again when all behind it is known.
     #[inline(always)]
-    pub(super) fn blend(mut self, ellipses: &Ellipses, order: &[u32], shares: &mut [Share]) {
-        let mut end = self.forward(ellipses, order, 0);
+    pub(super) fn blend(&mut self, ellipses: &Ellipses, shares: &mut [Share]) {
+        let all = ellipses.all.len();
+        let mut end = self.forward(ellipses, 0..all);
         // Where each part ends, and what passes it.
         let mut parts = Vec::new();
-        while end < order.len() {
+        while end < all {
             parts.push((end, self.passing.clone()));
-            end = self.forward(ellipses, order, end);
+            end = self.forward(ellipses, end..all);
         }
-        let mut light = vec![[0.0; 4]; self.passing.len()];
-        self.backward(&mut light, shares);
+        self.backward(shares);
         while let Some((end, _)) = parts.pop() {
             let start = match parts.last() {
                 None => {
@@ -80,22 +89,22 @@ impl Trace {
                     *start
                 }
             };
-            self.forward(ellipses, &order[..end], start);
-            self.backward(&mut light, shares);
+            self.forward(ellipses, start..end);
+            self.backward(shares);
         }
     }
 
-    /// Blends ellipses from a place of the order on, until there is no room; gives the place after the last.
+    /// Blends ellipses at some places of the order, until there is no room; gives the place after the last.
     #[inline(always)]
-    fn forward(&mut self, ellipses: &Ellipses, order: &[u32], start: usize) -> usize {
+    fn forward(&mut self, ellipses: &Ellipses, order: Range<usize>) -> usize {
         self.touches.clear();
         self.shown.clear();
         let mut near = [Ellipse::default(); AHEAD];
-        for (number, places) in order[start..].chunks(AHEAD).enumerate() {
+        for (number, places) in ellipses.nearest(order.clone()).chunks(AHEAD).enumerate() {
             if self.touches.len() >= self.most {
-                return start + number * AHEAD;
+                return order.start + number * AHEAD;
             }
-            for (ellipse, &place) in near.iter_mut().zip(places) {
+            for (ellipse, &(_, place)) in near.iter_mut().zip(places) {
                 *ellipse = ellipses.all[place as usize];
             }
             for ellipse in near.iter().take(places.len()) {
@@ -107,7 +116,7 @@ impl Trace {
                 }
             }
         }
-        order.len()
+        order.end
     }
 
     /// Blends an ellipse.
@@ -154,19 +163,20 @@ impl Trace {
         }
     }
 
-    /// Sums what each ellipse is to the picture, the farthest first. `light` is what lies behind, composited.
+    /// Sums what each ellipse is to the picture, the farthest first.
     ///
     /// With transmittance T in front of it, alpha a, its colour c and the light R behind, a pixel changes by
     /// T·a·c − R·a / (1 − a) without it.
     #[inline(always)]
-    fn backward(&self, light: &mut [[f32; 4]], shares: &mut [Share]) {
-        let mut end = self.touches.len();
-        for (number, Shown { place, colour, .. }) in self.shown.iter().enumerate().rev() {
-            let start = number.checked_sub(1).map_or(0, |before| self.shown[before].end);
+    fn backward(&mut self, shares: &mut [Share]) {
+        let Self { touches, shown, light, .. } = self;
+        let mut end = touches.len();
+        for (number, Shown { place, colour, .. }) in shown.iter().enumerate().rev() {
+            let start = number.checked_sub(1).map_or(0, |before| shown[before].end);
             // Four channels, of which one stays 0, fill a vector.
             let colour = [colour[0], colour[1], colour[2], 0.0];
             let (mut contribution, mut energy, mut lost) = (0.0, 0.0, [0.0; 4]);
-            for &Touch { pixel, alpha, visible } in &self.touches[start..end] {
+            for &Touch { pixel, alpha, visible } in &touches[start..end] {
                 contribution += visible;
                 energy += visible * visible;
                 let behind = &mut light[pixel as usize];
