@@ -96,7 +96,7 @@ const TURN: f32 = 5.0 / 180.0 * PI;
 /// was chosen by other views. Where the scene comes with cameras they stand near some of these, turned about the middle
 /// of what they see by 5 degrees to one side or the other.
 pub fn held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, height: u32) -> Vec<Camera> {
-    held_out_views(frame, up, given, (count, height), ("held_out", 0))
+    held_out_views(&Subject::of(frame, up), given, (count, height), ("held_out", 0))
 }
 
 /// As many other cameras as [`held_out`] gives, as high, from other sides: to judge what was chosen by them.
@@ -107,19 +107,30 @@ pub fn between_held_out(
     count: u32,
     height: u32,
 ) -> Vec<Camera> {
-    held_out_views(frame, up, given, (count, height), ("between_held_out", 1))
+    held_out_views(&Subject::of(frame, up), given, (count, height), ("between_held_out", 1))
+}
+
+/// What [`held_out`] and [`between_held_out`] give, with one look at the frame.
+pub fn held_out_twice(
+    frame: &GaussianFrame,
+    up: Up,
+    given: &[Camera],
+    count: u32,
+    height: u32,
+) -> [Vec<Camera>; 2] {
+    let subject = Subject::of(frame, up);
+    [("held_out", 0), ("between_held_out", 1)]
+        .map(|set| held_out_views(&subject, given, (count, height), set))
 }
 
 /// Cameras that rise while they go around the scene. Those of set 1 stand half the way from those of set 0 to the next, and near
 /// others of the given cameras.
 fn held_out_views(
-    frame: &GaussianFrame,
-    up: Up,
+    subject: &Subject,
     given: &[Camera],
     (count, height): (u32, u32),
     (name, set): (&str, u32),
 ) -> Vec<Camera> {
-    let subject = Subject::of(frame, up);
     let golden = PI * (3.0 - 5.0_f32.sqrt());
     let made = |number: u32| {
         let share = (number as f32 + 0.5) / count as f32;
@@ -233,6 +244,19 @@ const BOXES: [[usize; 2]; 3] = [[3, 97], [20, 80], [35, 65]];
 /// are less than 2.5 times as large.
 const SURROUNDINGS: f32 = 4.0;
 
+/// What stands at some places, which rise, when values are sorted: the values between two places are looked at together.
+#[expect(clippy::indexing_slicing, reason = "places are below the number of values")]
+fn ranked(values: &mut [f32], places: &[usize]) -> Vec<f32> {
+    let middle = places.len() / 2;
+    let Some(&place) = places.get(middle) else { return Vec::new() };
+    let (below, &mut value, above) = values.select_nth_unstable_by(place, f32::total_cmp);
+    let mut found = ranked(below, &places[..middle]);
+    found.push(value);
+    let farther: Vec<usize> = places[middle + 1..].iter().map(|&other| other - place - 1).collect();
+    found.extend(ranked(above, &farther));
+    found
+}
+
 /// What a camera looks at.
 #[derive(Debug, Clone)]
 struct Subject {
@@ -257,11 +281,14 @@ impl Subject {
         let mut axes =
             frame.position().each_ref().map(|plane| rows.iter().map(|&row| plane[row]).collect::<Vec<f32>>());
         let of_axis = |values: &mut Vec<f32>| {
-            let mut at = |percent: usize| {
-                let place = values.len() * percent / 100;
-                if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(place, f32::total_cmp).1 }
-            };
-            BOXES.map(|percents| percents.map(&mut at))
+            let count = values.len();
+            let place = |percent: usize| count * percent / 100;
+            let mut places: Vec<usize> = BOXES.as_flattened().iter().map(|&percent| place(percent)).collect();
+            places.sort_unstable();
+            places.dedup();
+            let found = if values.is_empty() { Vec::new() } else { ranked(values, &places) };
+            let value = |percent: usize| places.iter().zip(&found).find(|known| *known.0 == place(percent));
+            BOXES.map(|percents| percents.map(|percent| value(percent).map_or(0.0, |known| *known.1)))
         };
         let mut of_axes = [[[0.0; 2]; BOXES.len()]; 3];
         of_axes.par_iter_mut().zip(&mut axes).for_each(|(boxes, values)| *boxes = of_axis(values));
