@@ -10,6 +10,7 @@ use crate::pca::Components;
 use crate::savings::{Saving, Tool};
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_decoder::steps::step;
 use splatstream_format::payload::{Codebook, Transform};
@@ -56,15 +57,14 @@ pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) ->
         transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
     let scale = 1.0 / (step * UNIT as f32);
     let count = planes.first().map_or(0, |plane| plane.len());
+    let arch = Arch::new();
     let tile = |&start: &usize| -> Vec<Vec<f32>> {
         let end = count.min(start + TILE);
         let row = |weights: &[i16]| {
             let mut sums = vec![0.0_f32; end - start];
             for ((&weight, plane), &mean) in weights.iter().zip(planes).zip(&means) {
-                let weight = f32::from(weight) * scale;
-                for (sum, &value) in sums.iter_mut().zip(&plane[start..end]) {
-                    *sum += weight * (value - mean);
-                }
+                let (weight, values) = (f32::from(weight) * scale, &plane[start..end]);
+                arch.dispatch(AddWeighted { weight, values, mean, sums: &mut sums });
             }
             sums
         };
@@ -78,6 +78,26 @@ pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) ->
         each.for_each(|(index, plane)| tiles.iter().for_each(|tile| plane.extend_from_slice(&tile[index])));
     }
     components
+}
+
+/// Adds what values have beyond a mean, times a weight, to sums: with the vectors of the machine, on every one the same.
+pub(crate) struct AddWeighted<'a> {
+    pub(crate) weight: f32,
+    pub(crate) values: &'a [f32],
+    pub(crate) mean: f32,
+    pub(crate) sums: &'a mut [f32],
+}
+
+impl WithSimd for AddWeighted<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { weight, values, mean, sums } = self;
+        for (sum, &value) in sums.iter_mut().zip(values) {
+            *sum += weight * (value - mean);
+        }
+    }
 }
 
 /// Drops the last components that round to 0 for every Gaussian, with these steps; at least one stays.

@@ -5,7 +5,7 @@
 )]
 
 use crate::allocation::{Attribute, Fit};
-use crate::colour;
+use crate::colour::{self, AddWeighted};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
 use crate::frame::unit::Grains;
@@ -15,6 +15,7 @@ use crate::pca::Components;
 use crate::settings::Settings;
 use crate::shape::{Shape, nearest_multiple};
 use crate::steps::Steps;
+use pulp::Arch;
 use rayon::prelude::*;
 use splatstream_decoder::companding::Companding;
 use splatstream_decoder::position::refine;
@@ -178,15 +179,14 @@ impl<'a> Trial<'a> {
             component.iter().zip(&self.coded).map(value).collect()
         };
         let components: Vec<Vec<f32>> = self.components(which).par_iter().map(real).collect();
+        let arch = Arch::new();
         let plane = |index: usize| {
             let mut plane = vec![basis.mean[index] as f32; self.coded.len()];
             // Some Gaussians after the others, so that their values are near for all components.
             for (part, values) in plane.chunks_mut(NEAR).enumerate() {
                 for (row, component) in basis.rows.iter().zip(&components) {
-                    let weight = row[index] as f32 * finest;
-                    for (value, component) in values.iter_mut().zip(&component[part * NEAR..]) {
-                        *value += weight * component;
-                    }
+                    let (weight, own) = (row[index] as f32 * finest, &component[part * NEAR..]);
+                    arch.dispatch(AddWeighted { weight, values: own, mean: 0.0, sums: values });
                 }
             }
             plane
