@@ -205,11 +205,12 @@ impl Fit {
         })
     }
 
-    /// The steps with which renderings have a PSNR of about `decibels`.
+    /// The steps with which renderings have a PSNR of about `decibels`, and the PSNR that they were seen to have; none if
+    /// nothing can be seen.
     ///
     /// # Errors
     /// Planes that make no frame.
-    pub(crate) fn at(&self, decibels: f32) -> Result<Steps, Error> {
+    pub(crate) fn at(&self, decibels: f32) -> Result<(Steps, Option<f64>), Error> {
         let mut steps = Steps::about(decibels);
         for _ in 0..ROUNDS {
             let errors = self.estimated(&steps)?;
@@ -228,15 +229,16 @@ impl Fit {
     /// All steps finer or coarser by one factor, so that renderings have a PSNR of about `decibels`.
     ///
     /// Values that lie on a grid already leap where steps pass its own: what is found is looked at before it is taken.
-    fn levelled(&self, steps: Steps, decibels: f64) -> Result<Steps, Error> {
+    fn levelled(&self, steps: Steps, decibels: f64) -> Result<(Steps, Option<f64>), Error> {
         let mut secant = Secant::new(decibels, NEAR, 1.0, CORRECTIONS);
-        let mut best = steps;
+        let mut best = (steps, None);
         let mut next = Some(decibels);
         while let Some(at) = next {
             let scaled = finer(steps, at - decibels);
+            let psnr = self.psnr(&scaled)?;
             // Where nothing can be seen nothing is too bad.
-            if secant.take(at, self.psnr(&scaled)?.unwrap_or(decibels)) {
-                best = scaled;
+            if secant.take(at, psnr.unwrap_or(decibels)) {
+                best = (scaled, psnr);
             }
             next = secant.next();
         }

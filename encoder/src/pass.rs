@@ -8,6 +8,7 @@ use crate::report::Report;
 use crate::settings::Settings;
 use crate::source::FrameSource;
 use crate::spans::Span;
+use crate::verification::Tried;
 use crate::writer::Coded;
 use splatstream_format::syntax::FrameType;
 use std::io::Write;
@@ -20,18 +21,18 @@ const DOUBTFUL: f64 = 0.6;
 const LARGER: f64 = 1.005;
 
 /// Encodes with the steps of the settings: frames stand for themselves where the first GOP is no smaller otherwise. Who gives
-/// the steps and no goal has the layers of the settings in any case.
+/// the steps and no goal has the layers of the settings in any case. `tried`: what fitting has seen with these steps.
 ///
 /// # Errors
 /// As [`encode`](fn@crate::encode).
 pub(crate) fn encode_smaller(
     source: &mut dyn FrameSource,
     settings: &Settings,
-    ranking: Ranking,
+    (ranking, tried): (Ranking, Option<Tried>),
     sink: &mut dyn Write,
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
-    let plan = Plan::new(source, settings, settings.clone(), ranking)?;
+    let plan = Plan::new(source, settings, settings.clone(), ranking)?.with_tried(tried);
     let all = 0..source.len();
     let mut alone = None;
     let mut judge = |source: &mut dyn FrameSource, coded: &Coded, report: &Report| {

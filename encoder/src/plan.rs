@@ -18,12 +18,12 @@ use crate::shard::Shard;
 use crate::source::FrameSource;
 use crate::spans::{Coding, Common, Judge, Span, Spans, at_once};
 use crate::target;
-use crate::verification::Verifier;
+use crate::verification::{Tried, Verifier};
 use crate::writer::{Coded, Head, Record, UnitWriter};
 use core::ops::Range;
 use splatstream_format::Limits;
 use splatstream_format::payload::Network;
-use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::syntax::{Profile, SequenceParameters};
 use std::io::Write;
 
 /// What holds for all frames of a sequence: steps, ranges, layers, the network.
@@ -56,6 +56,8 @@ pub struct Plan {
     /// Knows the order of the first frame, where that was needed; none where the plan comes from a record.
     ranking: Option<Ranking>,
     target: Option<TargetReport>,
+    /// What fitting has seen of the first frame with these steps; none where it has not drawn just these.
+    tried: Option<Tried>,
     stands_alone: bool,
     /// A digest of each frame as it is read; empty where all frames are coded at once.
     frame_digests: Vec<u64>,
@@ -113,9 +115,15 @@ impl Plan {
             network,
             ranking,
             target: None,
+            tried: None,
             stands_alone: false,
             frame_digests: Vec::new(),
         })
+    }
+
+    /// The same with what fitting has seen of the first frame.
+    pub(crate) fn with_tried(self, tried: Option<Tried>) -> Self {
+        Self { tried, ..self }
     }
 
     /// The same with frames that each stand for themselves, in one layer.
@@ -219,7 +227,9 @@ impl Plan {
         }
         writer.finish()?;
         (report.bytes, report.gops, report.frames) = (record.offset, record.gops, frame_count);
-        report.pictures = record.verifier.map(|verifier| verifier.compare(source, settings)).transpose()?;
+        let tried = self.tried.as_ref().filter(|_| is_as_tried(&report, settings));
+        let compare = |verifier: Verifier| verifier.compare(source, settings, tried);
+        report.pictures = record.verifier.map(compare).transpose()?;
         Ok(Some(report))
     }
 
@@ -253,4 +263,11 @@ impl Plan {
             network: self.network.as_ref(),
         }
     }
+}
+
+/// Whether a decoder has of a stream what [fitting](crate::allocation) made of its only frame to draw it: fitting knows no
+/// codebook, no predictor, and no values that are not the nearest to those of the source.
+fn is_as_tried(report: &Report, settings: &Settings) -> bool {
+    let is_plain = settings.profile() == Profile::Intra && settings.finetune.is_none();
+    is_plain && report.frames == 1 && report.sh_codebook_entries == 0
 }

@@ -157,6 +157,7 @@ pub struct VerifiedFrame {
     /// Mean of the PSNR of its views, decibels; none if nothing can be seen in any of them.
     pub psnr: Option<f64>,
     /// The same of as many other views: those that decide how fine all steps together are. None where no PSNR is asked for.
+    /// Where a decoder has of a single frame what was drawn when steps were fitted, it is what was measured then.
     pub fitted_psnr: Option<f64>,
 }
 

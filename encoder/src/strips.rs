@@ -64,6 +64,7 @@ pub(crate) fn mean(decibels: impl Iterator<Item = Result<Option<f64>, Error>>) -
 }
 
 /// Strips of views in which frames are compared that are not in memory at the same time.
+#[derive(Clone)]
 pub(crate) struct StripViews {
     cameras: Vec<Camera>,
     every: u32,

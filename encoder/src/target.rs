@@ -19,7 +19,8 @@ use crate::sequence;
 use crate::settings::{Preset, Settings, ShChoice, Size};
 use crate::source::FrameSource;
 use crate::steps::Steps;
-use crate::verification::Views;
+use crate::strips::StripViews;
+use crate::verification::{Tried, Views};
 use crate::window::FirstFrames;
 use splatstream_format::syntax::FrameType;
 use splatstream_gaussians::GaussianFrame;
@@ -104,7 +105,7 @@ pub(crate) fn fit(
 /// # Errors
 /// A frame that cannot be read.
 pub(crate) fn first_ranking(source: &mut dyn FrameSource, settings: &Settings) -> Result<Ranking, Error> {
-    let (_, frame) = first_frame(source, settings)?;
+    let frame = first_frame(source, settings)?;
     let mut ranking = Ranking::new(settings);
     ranking.rank_first(&frame);
     Ok(ranking)
@@ -120,19 +121,15 @@ pub(crate) fn looking(
     settings: &Settings,
 ) -> Result<Ranking, Error> {
     if ranking.is_blind() {
-        ranking.look_at(&first_frame(source, settings)?.1);
+        ranking.look_at(&first_frame(source, settings)?);
     }
     Ok(ranking)
 }
 
-/// The first frame as it is read, and as it is coded.
-fn first_frame(
-    source: &mut dyn FrameSource,
-    settings: &Settings,
-) -> Result<(GaussianFrame, GaussianFrame), Error> {
+/// The first frame as it is coded.
+fn first_frame(source: &mut dyn FrameSource, settings: &Settings) -> Result<GaussianFrame, Error> {
     let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
-    let frame = coded_form(first.clone(), settings);
-    Ok((first, frame))
+    Ok(coded_form(first, settings))
 }
 
 /// A first frame as it is coded.
@@ -171,8 +168,10 @@ struct Fitting<'a> {
     fit: Fit,
     /// Knows the order of the first frame.
     ranking: Ranking,
-    /// Steps by the PSNR that they were fitted for.
-    known: Vec<(f64, Steps)>,
+    /// Steps by the PSNR that they were fitted for, with the one that they were seen to have.
+    known: Vec<(f64, Steps, Option<f64>)>,
+    /// Views of the first frame that decide nothing, where these are the same when the stream is looked at.
+    unseen: Option<StripViews>,
     /// How SH is coded: as the settings say, until a codebook turns out to cost pictures too much.
     sh: ShChoice,
     /// Whether values are fitted to pictures, where the settings say so.
@@ -181,9 +180,11 @@ struct Fitting<'a> {
 
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
-        let (first, frame) = first_frame(source, settings)?;
-        let Views { of_fit, .. } = Views::of(&first, settings);
-        drop(first);
+        let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
+        let Views { of_fit, unseen } = Views::of(&first, settings);
+        let frame = coded_form(first, settings);
+        // What is left out of the source is in its pictures.
+        let unseen = settings.prune.is_none().then_some(unseen);
         // What is left out counts as an error.
         let whole = match settings.prune {
             Some(_) => {
@@ -195,7 +196,7 @@ impl<'a> Fitting<'a> {
         let mut ranking = Ranking::new(settings);
         let ranked = ranking.rank_first(&frame);
         let fit = Fit::new((&frame, whole.as_ref()), &ranked, &of_fit, settings);
-        Ok(Self { settings, fit, ranking, known: Vec::new(), sh: settings.sh, fits_values: true })
+        Ok(Self { settings, fit, ranking, known: Vec::new(), unseen, sh: settings.sh, fits_values: true })
     }
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
@@ -226,18 +227,24 @@ impl<'a> Fitting<'a> {
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
     /// ones.
     fn at(&mut self, decibels: f64) -> Result<Settings, Error> {
-        let apart = |known: &&(f64, Steps)| (known.0 - decibels).abs();
+        let apart = |known: &&(f64, Steps, Option<f64>)| (known.0 - decibels).abs();
         let nearest = self.known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
-            Some((from, steps)) => finer(*steps, decibels - from),
+            Some((from, steps, _)) => finer(*steps, decibels - from),
             None => {
-                let steps = self.fit.at(decibels as f32)?;
-                self.known.push((decibels, steps));
+                let (steps, psnr) = self.fit.at(decibels as f32)?;
+                self.known.push((decibels, steps, psnr));
                 steps
             }
         };
         let finetune = self.settings.finetune.clone().filter(|_| self.fits_values);
         Ok(Settings { steps, laws: self.fit.laws(), sh: self.sh, finetune, ..self.settings.clone() })
+    }
+
+    /// What fitting has seen of the frame with the steps for a PSNR, if it has drawn it with just these.
+    fn tried(&self, decibels: f64) -> Option<Tried> {
+        let &(_, _, psnr) = self.known.iter().find(|known| known.0 == decibels)?;
+        Some(Tried { unseen: self.unseen.clone()?, psnr: psnr? })
     }
 
     /// Whether values will be fitted to photographs: they leave what pictures of the source show, by which steps are found.
@@ -428,7 +435,8 @@ impl<'a> Seeker<'a> {
     fn whole(&mut self, fitted: f64, sink: &mut dyn Write) -> Result<Report, Error> {
         self.encodings += 1;
         let (settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
-        encode_smaller(self.source, &settings, ranking, sink, self.progress)
+        let tried = self.fitting.tried(fitted);
+        encode_smaller(self.source, &settings, (ranking, tried), sink, self.progress)
     }
 
     /// The same in memory.

@@ -186,6 +186,7 @@ impl Plan {
             settings: settled,
             ranking: None,
             target: record.target.map(target),
+            tried: None,
             stands_alone: record.stands_alone,
             frame_digests: record.frame_digests.clone(),
         })
