@@ -124,7 +124,7 @@ impl Scene {
             verify: is_fitted,
             structure,
             spatial_layers,
-            ..Settings::default()
+            ..Settings::of(preset)
         })
     }
 }
