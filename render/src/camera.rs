@@ -4,7 +4,7 @@ mod files;
 mod generated;
 
 pub use files::{CameraError, Capture, CapturedPoint, CapturedView, read_cameras, read_capture, read_views};
-pub use generated::{Scattered, Up, between_held_out, forward, held_out, held_out_twice, ring, spiral};
+pub use generated::{Scattered, Up, forward, held_out, held_out_twice, ring, spiral};
 
 use glam::{Mat3, Quat, Vec3};
 

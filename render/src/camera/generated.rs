@@ -99,18 +99,7 @@ pub fn held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, hei
     held_out_views(&Subject::of(frame, up), given, (count, height), ("held_out", 0))
 }
 
-/// As many other cameras as [`held_out`] gives, as high, from other sides: to judge what was chosen by them.
-pub fn between_held_out(
-    frame: &GaussianFrame,
-    up: Up,
-    given: &[Camera],
-    count: u32,
-    height: u32,
-) -> Vec<Camera> {
-    held_out_views(&Subject::of(frame, up), given, (count, height), ("between_held_out", 1))
-}
-
-/// What [`held_out`] and [`between_held_out`] give, with one look at the frame.
+/// What [`held_out`] gives, and as many other cameras, as high, from other sides: to judge what was chosen by the first.
 pub fn held_out_twice(
     frame: &GaussianFrame,
     up: Up,

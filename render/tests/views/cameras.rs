@@ -4,7 +4,7 @@ use crate::gaussian::{BALL, Gaussian, frame};
 use glam::Vec3;
 use proptest::prelude::*;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::camera::{Up, between_held_out, forward, held_out, read_cameras, ring, spiral};
+use splatstream_render::camera::{Up, forward, held_out, held_out_twice, read_cameras, ring, spiral};
 use splatstream_render::{Camera, render};
 
 const UPS: [Up; 6] = [Up::MinusY, Up::PlusY, Up::MinusZ, Up::PlusZ, Up::MinusX, Up::PlusX];
@@ -97,6 +97,13 @@ fn cameras_of_a_ring_stand_above_and_upright() {
             assert!(Vec3::from(camera.rotation[2]).dot(axis) < 0.0, "not from above");
         }
     }
+}
+
+/// The second of two sets, the first of which is [`held_out`].
+fn between_held_out(frame: &GaussianFrame, up: Up, given: &[Camera], count: u32, height: u32) -> Vec<Camera> {
+    let [first, second] = held_out_twice(frame, up, given, count, height);
+    assert_eq!(first, held_out(frame, up, given, count, height));
+    second
 }
 
 #[test]
