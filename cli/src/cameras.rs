@@ -1,5 +1,6 @@
 //! From where scenes are looked at: a camera file, or cameras made for the scene.
 
+use crate::capture_files::files_at;
 use crate::failure::Failure;
 use crate::up_guess::UpGuess;
 use clap::{Args, ValueEnum};
@@ -115,6 +116,16 @@ impl FromStr for Views {
             Some(("ring", count)) => made(count).map(Self::Ring),
             Some(("forward", count)) => made(count).map(Self::Forward),
             _ => Ok(Self::File(PathBuf::from(text))),
+        }
+    }
+}
+
+impl Views {
+    /// The files that they are read from, with the pictures that these name; none where they are made.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        match self {
+            Self::File(path) => files_at(path),
+            Self::Ring(_) | Self::Forward(_) => Vec::new(),
         }
     }
 }

@@ -359,16 +359,13 @@ impl Encode {
 
     /// Every file that is read: frames, cameras, a network.
     fn read_files(&self, source: &FrameFiles) -> Vec<PathBuf> {
-        let cameras = match &self.cameras {
-            Some(Views::File(path)) => Some(path),
-            _ => None,
-        };
+        let cameras = self.cameras.iter().flat_map(Views::files);
         let network = match &self.network {
             Some(NetworkName::File(path)) => Some(path),
             _ => None,
         };
-        let others = cameras.into_iter().chain(network).chain(self.shards.plan_file()).cloned();
-        source.inputs().into_iter().chain(others).collect()
+        let others = network.into_iter().chain(self.shards.plan_file()).cloned();
+        source.inputs().into_iter().chain(cameras).chain(others).collect()
     }
 
     /// Spatial layers.

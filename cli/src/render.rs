@@ -1,7 +1,6 @@
 //! `splatstream render`: frames to pictures.
 
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
-use crate::capture_files::files_at;
 use crate::console::Console;
 use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::failure::{Failure, StreamFault, faults_text};
@@ -182,12 +181,9 @@ impl Render {
 
     /// The files that it reads, and the photographs that a file of cameras names.
     fn inputs(&self, frames: &Frames<'_>) -> Vec<PathBuf> {
-        let cameras = match &self.camera {
-            // Where there is no directory yet, there is nothing to replace.
-            Some(Views::File(path)) if self.out.is_dir() => files_at(path),
-            _ => Vec::new(),
-        };
-        [frames.inputs(), cameras].concat()
+        // Where there is no directory yet, there is nothing to replace.
+        let cameras = self.camera.iter().filter(|_| self.out.is_dir()).flat_map(Views::files);
+        frames.inputs().into_iter().chain(cameras).collect()
     }
 
     /// What is taken to point up, if cameras are made and nobody says it.

@@ -3,7 +3,6 @@
 mod report;
 
 use crate::cameras::{BackgroundArg, CameraArgs, UpName, Views};
-use crate::capture_files::files_at;
 use crate::console::Console;
 use crate::decode::earlier_frames;
 use crate::earlier::Earlier;
@@ -148,11 +147,7 @@ impl Track {
 
     /// The files of the frames, and of the cameras.
     fn files_read(&self, files: &FrameFiles) -> Vec<PathBuf> {
-        let cameras = match &self.cameras {
-            Views::File(path) => files_at(path),
-            Views::Ring(_) | Views::Forward(_) => Vec::new(),
-        };
-        [files.inputs(), cameras].concat()
+        [files.inputs(), self.cameras.files()].concat()
     }
 
     /// How frames of a GOP are followed; views are those of its first.

@@ -298,6 +298,9 @@ fn pictures_of_an_earlier_run_are_not_mixed_with_new_ones() {
     // Photographs stay, whatever is asked for.
     let images = capture.join("images");
     fail(2, &["render", text(&still), "--camera", text(&cameras), "-o", text(&images), "--force"]);
+    // So do cameras that are given by their directory.
+    let plan = ["encode", text(&still), "--cameras", text(&capture), "--write-plan", "-o", text(&cameras)];
+    assert!(fail(2, &plan).contains("transforms.json"));
     assert_eq!(names(&images), ["view_000.png", "view_001.png"]);
 }
 
