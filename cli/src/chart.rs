@@ -3,12 +3,11 @@
 mod sweep_args;
 
 use crate::cameras::{CameraArgs, Views};
-use crate::capture_files::files_at;
 use crate::compare::pictures::read_weights;
 use crate::console::Console;
 use crate::encode::warnings::warnings;
 use crate::failure::Failure;
-use crate::frame_files::FrameFiles;
+use crate::frame_files::{FrameFiles, inputs_of};
 use crate::input_args::InputArgs;
 use crate::numbers::parse_frame_rate;
 use crate::output_file::{OutputFile, check_directory, make_directory};
@@ -129,13 +128,8 @@ impl Chart {
 
     /// The files that it reads, as far as they are named here.
     fn inputs(&self) -> Result<Vec<PathBuf>, Failure> {
-        let mut inputs = Vec::new();
-        for path in &self.scenes {
-            inputs.extend(FrameFiles::find(std::slice::from_ref(path), self.reading)?.inputs());
-        }
-        if let Some(Views::File(path)) = &self.cameras {
-            inputs.extend(files_at(path));
-        }
+        let mut inputs = inputs_of(&self.scenes)?;
+        inputs.extend(self.cameras.iter().flat_map(Views::files));
         inputs.extend(self.peers.iter().chain(&self.st_lpips).cloned());
         Ok(inputs)
     }

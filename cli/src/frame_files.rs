@@ -54,7 +54,7 @@ impl FrameFiles {
                 spooled = Some(file);
                 vec![path]
             }
-            [directory] if directory.is_dir() && !is_sog(directory) => frames_in(directory)?,
+            [directory] if is_folder(directory) => frames_in(directory)?,
             files => {
                 files.iter().try_for_each(|path| check_file(path))?;
                 if let (2.., Some(path)) = (files.len(), files.iter().find(|path| is_sequence(path))) {
@@ -109,6 +109,25 @@ impl FrameFiles {
             None => format!("frame {frame}"),
         }
     }
+}
+
+/// The files of scenes and sequences that a user named, which no output may replace: those of directories one by one. None
+/// is opened, and standard input is not read.
+///
+/// # Errors
+/// A directory that cannot be read or has no frames.
+pub(crate) fn inputs_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut inputs = Vec::new();
+    for path in named.iter().filter(|path| path.as_path() != Path::new(STANDARD)) {
+        let frames = if is_folder(path) { frames_in(path)? } else { vec![path.clone()] };
+        inputs.extend(frames.iter().flat_map(|path| files_of(path)));
+    }
+    Ok(inputs)
+}
+
+/// Whether a path is that of a directory of frames.
+fn is_folder(path: &Path) -> bool {
+    path.is_dir() && !is_sog(path)
 }
 
 /// Standard input in a file: scenes are read more than once. What is no scene is refused by how it begins, and of what is
@@ -254,4 +273,22 @@ fn files_of(path: &Path) -> Vec<PathBuf> {
 
 fn is_sog(path: &Path) -> bool {
     path.join(SOG_META).is_file()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_named_without_being_opened() {
+        let directory = tempfile::tempdir().unwrap();
+        let folder = directory.path().join("frames");
+        let sog = folder.join("a.sog");
+        std::fs::create_dir_all(&sog).unwrap();
+        let [archive, meta] = [directory.path().join("broken.zip"), sog.join(SOG_META)];
+        [&archive, &meta].into_iter().for_each(|path| std::fs::write(path, "no scene").unwrap());
+        let named = [Path::new(STANDARD), &archive, &folder, &sog].map(Path::to_path_buf);
+        assert_eq!(inputs_of(&named).unwrap(), [archive, meta.clone(), meta]);
+        assert!(inputs_of(&[directory.path().join("frames/a.sog/none"), folder]).is_ok());
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::frame_files::FrameFiles;
+use crate::frame_files::{FrameFiles, inputs_of};
 use crate::input_args::InputArgs;
 use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs, refuse_standard};
@@ -68,7 +68,7 @@ impl Train {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         refuse_standard(&self.out)?;
         check_ending(&self.out, "bin", "a network")?;
-        let inputs = self.inputs()?;
+        let inputs = inputs_of(&self.sequences)?;
         // At once, and not after minutes of work.
         refuse_inputs(&self.out, &inputs)?;
         let mut found = Vec::new();
@@ -101,15 +101,6 @@ impl Train {
             errors: report.best.means().collect(),
         };
         console.report(&trained, || trained.text())
-    }
-
-    /// The files of all sequences.
-    fn inputs(&self) -> Result<Vec<PathBuf>, Failure> {
-        let mut inputs = Vec::new();
-        for path in &self.sequences {
-            inputs.extend(FrameFiles::find(std::slice::from_ref(path), self.reading)?.inputs());
-        }
-        Ok(inputs)
     }
 
     /// What all sequences give.

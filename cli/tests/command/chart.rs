@@ -1,6 +1,8 @@
 //! `splatstream chart` leaves a page that needs nothing else, and the numbers behind it.
 
-use crate::common::{directory, json, run, succeed, text, write_frames};
+use crate::common::{directory, json, run, run_with, succeed, text, write_frames};
+use splatstream_files::builtin::BuiltinScene;
+use splatstream_files::ply;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -57,6 +59,16 @@ fn a_quick_chart_is_one_page_without_anything_from_outside() {
     assert!(scene["psnr_db"].as_f64().unwrap() > 25.0, "{scene}");
     assert_eq!(scene["variants"][0]["variant"], "without contexts");
     assert!(scene["variants"][0]["bd_rate_percent"].as_f64().unwrap() > 0.0, "{scene}");
+}
+
+#[test]
+fn a_scene_comes_from_standard_input() {
+    let directory = directory();
+    let out = directory.path().join("report");
+    let scene = BuiltinScene { gaussians: 60, sh_degree: 0, ..BuiltinScene::default() }.frame(0);
+    let output = run_with(&["chart", "-", "--quick", "--json", "-o", text(&out)], &ply::write(&scene));
+    assert!(output.status.success(), "{output:?}");
+    assert!(out.join("index.html").is_file());
 }
 
 #[test]
