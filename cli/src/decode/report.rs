@@ -3,8 +3,7 @@
 use super::loss::Loss;
 use crate::encode::warnings::Warning;
 use crate::failure::{StreamFault, faults_text};
-use crate::numbers::counted;
-use crate::numbers::hex_digest;
+use crate::numbers::{counted, hex_digest};
 use crate::seek::Seek;
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;

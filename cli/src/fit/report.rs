@@ -1,7 +1,6 @@
 //! What `fit` says about what it has trained.
 
-use crate::numbers::counted;
-use crate::numbers::mean;
+use crate::numbers::{counted, mean};
 use serde::Serialize;
 use splatstream_gaussians::GaussianFrame;
 use std::path::PathBuf;

@@ -3,8 +3,7 @@
 use super::Shown;
 use super::hull::{Quality, qualities};
 use crate::console::Console;
-use crate::numbers::counted;
-use crate::numbers::hex_digest;
+use crate::numbers::{counted, hex_digest};
 use crate::stream_file::StreamFile;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};

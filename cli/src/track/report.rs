@@ -1,7 +1,6 @@
 //! What `track` says about the sequence that it has made.
 
-use crate::numbers::counted;
-use crate::numbers::{frames, mean};
+use crate::numbers::{counted, frames, mean};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Duration;

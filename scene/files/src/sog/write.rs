@@ -44,11 +44,8 @@ pub fn write_zip(frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
     files.add("quats.webp", order.iter().map(|&row| rotation(frame, row as usize)))?;
     let weights = visible(frame);
     let weighed = |planes: &[Vec<f32>; 3]| {
-        let of_plane = |plane: &Vec<f32>| {
-            let values = plane.iter().zip(&weights);
-            values.map(|(&value, &weight)| Weighed { value, weight }).collect::<Vec<_>>()
-        };
-        codebook(planes.iter().flat_map(of_plane).collect())
+        let values = planes.iter().flat_map(|plane| plane.iter().zip(&weights));
+        codebook(values.map(|(&value, &weight)| Weighed { value, weight }).collect())
     };
     let scales = weighed(frame.log_scale());
     files.add(
