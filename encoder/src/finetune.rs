@@ -7,6 +7,7 @@
 
 mod descent;
 mod latent;
+mod loss;
 mod pictures;
 mod rate;
 mod receivers;
@@ -22,6 +23,7 @@ use crate::settings::Settings;
 use core::time::Duration;
 use descent::Descent;
 use latent::{Latent, List};
+pub use loss::FinetuneLoss;
 use pictures::Pictures;
 pub use receivers::PointWeight;
 use receivers::Receiver;
@@ -40,13 +42,15 @@ pub struct Finetune {
     pub iterations: u32,
     /// Time for each I frame. What comes out depends on the speed of the machine then; none: on nothing but the iterations.
     pub time_budget: Option<Duration>,
+    /// What is made small.
+    pub loss: FinetuneLoss,
     /// What pictures should show; none: what those of the source do.
     pub photographs: Vec<Photograph>,
     /// Lines of the pictures that each spatial layer is for, from the lowest up; where there are too few, 540, 720, 1080 and
     /// 2160, or of two layers 540 and 1080.
     pub lines: Vec<u32>,
-    /// Lines of the pictures that slopes are taken of, in turn, whatever layer they are of; none: those of the layer. Quality is
-    /// reported at the lines of the layer in any case.
+    /// Lines of the pictures that slopes are taken of, in turn, whatever layer they are of; none: those of the layer. What is named
+    /// twice counts twice. Quality is reported at the lines of the layer in any case.
     pub resolutions: Vec<u32>,
     /// The operating points that matter, of which receivers see pictures; values that none of these points shows stay the nearest.
     /// None: all Gaussians of each spatial layer.
@@ -56,11 +60,12 @@ pub struct Finetune {
 }
 
 impl Default for Finetune {
-    /// 200 iterations, against pictures of the source.
+    /// 200 iterations, by squared error, against pictures of the source.
     fn default() -> Self {
         Self {
             iterations: 200,
             time_budget: None,
+            loss: FinetuneLoss::default(),
             photographs: Vec::new(),
             lines: Vec::new(),
             resolutions: Vec::new(),
@@ -88,6 +93,11 @@ impl Finetune {
             self.lines.iter().chain(&self.resolutions).find(|lines| !LINES_ALLOWED.contains(lines))
         {
             return setting("finetune lines", lines.to_string(), "1 to 8640");
+        }
+        if let FinetuneLoss::L1Ssim { similarity } = self.loss
+            && !(0.0..=1.0).contains(&similarity)
+        {
+            return setting("finetune similarity", similarity.to_string(), "0 to 1");
         }
         self.check_points(settings)?;
         if (1..LEAST_PHOTOGRAPHS).contains(&self.photographs.len()) {

@@ -7,8 +7,8 @@ use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped, percent};
 use splatstream_decoder::predictor::Predictor;
 use splatstream_encoder::{
-    Basis, FrameReport, Importance, Laws, PredictorChoice, Predictors, Preset, Report, Settings, ShChoice,
-    Steps, Structure, Tool, Tools,
+    Basis, FinetuneLoss, FrameReport, Importance, Laws, PredictorChoice, Predictors, Preset, Report,
+    Settings, ShChoice, Steps, Structure, Tool, Tools,
 };
 use splatstream_format::syntax::FrameType;
 
@@ -365,7 +365,11 @@ fn fitting(report: &Report, settings: &Settings) -> Option<Choice> {
             ("none".to_owned(), "pictures gain next to nothing by it: without, the stream is smaller")
         }
         (Some(finetune), _) => {
-            let choice = counted(finetune.iterations.into(), "iteration");
+            let loss = match finetune.loss {
+                FinetuneLoss::SquaredError => "squared error",
+                FinetuneLoss::L1Ssim { .. } => "L1 and SSIM",
+            };
+            let choice = format!("{}, {loss}", counted(finetune.iterations.into(), "iteration"));
             (choice, "values of frames that stand for themselves are chosen by pictures")
         }
         (None, Structure::Predicted { .. }) if belongs => (

@@ -9,7 +9,7 @@ use splatstream_capture::load_photographs;
 use splatstream_chart::numbers::bits_per_gaussian;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{
-    Attribute, Finetune, FinetuneReport, Photograph, PointReport, PointWeight, Report,
+    Attribute, Finetune, FinetuneLoss, FinetuneReport, Photograph, PointReport, PointWeight, Report,
 };
 use splatstream_render::camera::read_views;
 use std::path::{Path, PathBuf};
@@ -46,10 +46,32 @@ pub(super) struct FinetuneArgs {
     /// each spatial layer.
     #[arg(long, value_name = "POINT=WEIGHT,...", requires = "finetune")]
     optimise_for: Option<PointWeights>,
-    /// Lines of the pictures to fit to, in turn, as in 540,720,1080; default is those that each spatial layer is for.
+    /// Lines of the pictures to fit to, in turn, as in 540,720,1080; what is named twice counts twice. Default is those that each
+    /// spatial layer is for.
     #[arg(long, value_name = "LINES,...", value_delimiter = ',', requires = "finetune")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=8640))]
     finetune_lines: Vec<u32>,
+    /// What fitting makes small. Whichever it is, --psnr asks for a PSNR.
+    #[arg(long, value_enum, value_name = "LOSS", default_value = "squared", requires = "finetune")]
+    finetune_loss: LossName,
+}
+
+/// What fitting makes small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LossName {
+    /// Squared error: the highest PSNR.
+    Squared,
+    /// Four fifths L1 and a fifth SSIM, the loss that 3D Gaussian splatting trains with.
+    L1Ssim,
+}
+
+impl From<LossName> for FinetuneLoss {
+    fn from(name: LossName) -> Self {
+        match name {
+            LossName::Squared => Self::SquaredError,
+            LossName::L1Ssim => Self::l1_ssim(),
+        }
+    }
 }
 
 /// Operating points and their weights, as a user writes them.
@@ -164,6 +186,7 @@ impl FinetuneArgs {
         Ok(Some(Finetune {
             iterations,
             time_budget,
+            loss: self.finetune_loss.into(),
             photographs,
             lines: layers.to_vec(),
             resolutions: self.finetune_lines.clone(),

@@ -4,15 +4,18 @@
 //! what is missing there for those of the values before they were rounded: so each goes on until it is rounded to the
 //! other side, and no further. Values are counted in their own steps, which makes one rate right for all attributes.
 //!
-//! What is summed over the operating points that count, each as its receivers see it and by its weight, are logarithms of squared
-//! errors: decibels. Of errors themselves those of prefixes, a hundred times as large, would be all that matters.
+//! What is summed over the operating points that count, each as its receivers see it and by its weight, are logarithms of
+//! losses, in decibels where these are squared errors. Of losses themselves those of prefixes, a hundred times as large, would be
+//! all that matters.
 //!
-//! A bit is worth what it would bring elsewhere: steps that are halved cost a bit for nearly each value and divide the error
-//! of the whole frame by four, so that at the margin a bit brings 2 ln 2 of its logarithm by the bits of an octave.
+//! A bit is worth what it would bring elsewhere: steps that are halved cost a bit for nearly each value and divide the squared
+//! error of the whole frame by four, so that at the margin a bit brings 2 ln 2 of its logarithm by the bits of an octave. Of a loss
+//! of L1 and SSIM it is between ln 2 and 2 ln 2, by the share that each has of it.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of views")]
 
 use super::latent::{Decoded, Latent};
-use super::pictures::{Pictures, View, squared_error};
+use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
+use super::pictures::{Pictures, Verdict, View};
 use super::rate::Rate;
 use super::receivers::Receiver;
 use super::{Finetune, FinetuneReport, PointReport};
@@ -40,16 +43,16 @@ const PRICE: f64 = 1.0;
 /// Iterations from one choice of models, and one look of the judges, to the next.
 const EVERY: u32 = 20;
 
-/// Slopes are divided by the error of about so many of the last views of the same receiver.
+/// Slopes are divided by the loss of about so many of the last views of the same receiver.
 const REMEMBERED: f64 = 20.0;
 
 /// Looks of the judges, one after the other, at nothing better after which it ends: each halves the rate.
 const PATIENCE: u32 = 5;
 
-/// A squared error of a picture below which it shows what it should.
+/// A loss of a picture below which it shows what it should.
 const NOTHING: f64 = 1e-9;
 
-/// What halving all steps brings, dB.
+/// What halving all steps brings, dB of squared error.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
 
 /// A fit under way.
@@ -70,8 +73,8 @@ struct Sight {
     receiver: Receiver,
     /// What it adds to log-scales and opacities.
     compensation: (i8, i8),
-    /// The squared error of a view, about; none before the first.
-    error: Option<f64>,
+    /// The loss of a view, about; none before the first.
+    loss: Option<f64>,
 }
 
 /// What judges liked most.
@@ -91,6 +94,8 @@ struct Best {
 #[derive(Clone, Copy)]
 struct Look {
     psnr: f64,
+    /// What is made small, as decibels below 1.
+    quality: f64,
     bits: f64,
 }
 
@@ -102,7 +107,7 @@ impl<'a> Descent<'a> {
         finetune: &'a Finetune,
     ) -> Self {
         let adam = Adam::new(&latent.offsets);
-        let sight = |receiver| Sight { receiver, compensation: (0, 0), error: None };
+        let sight = |receiver| Sight { receiver, compensation: (0, 0), loss: None };
         let sights = receivers.into_iter().map(sight).collect();
         Self {
             latent,
@@ -212,15 +217,23 @@ impl<'a> Descent<'a> {
     /// bits it saves.
     fn look(&mut self, decoded: &Decoded, rate: &Rate) -> Result<bool, Error> {
         self.compensate(decoded)?;
-        let mut psnr = 0.0;
+        let (mut psnr, mut quality, mut halvings) = (0.0, 0.0, 0.0);
         for sight in &self.sights {
-            let judged = self.pictures.judge(&sight.receiver, self.shown(decoded, sight)?.as_ref());
-            psnr += sight.receiver.weight * judged;
+            let verdict = self.pictures.judge(&sight.receiver, self.shown(decoded, sight)?.as_ref())?;
+            let Verdict { psnr: own_psnr, quality: own_quality, halvings: own_halvings } = verdict;
+            let weight = sight.receiver.weight;
+            psnr += weight * own_psnr;
+            quality += weight * own_quality;
+            halvings += weight * own_halvings;
         }
-        let now = Look { psnr, bits: rate.bits };
+        let an_octave = match self.finetune.loss {
+            FinetuneLoss::SquaredError => DECIBELS_AN_OCTAVE,
+            FinetuneLoss::L1Ssim { .. } => DECIBELS_AN_OCTAVE * halvings / HALVINGS_OF_SQUARES,
+        };
+        let now = Look { psnr, quality, bits: rate.bits };
         let before = self.best.as_ref().map_or(now, |best| best.before);
-        let worth = now.psnr - DECIBELS_AN_OCTAVE * (now.bits - before.bits) / rate.bits_an_octave.max(1.0);
-        let is_better = |best: &Best| worth > best.worth && now.psnr >= before.psnr;
+        let worth = now.quality - an_octave * (now.bits - before.bits) / rate.bits_an_octave.max(1.0);
+        let is_better = |best: &Best| worth > best.worth && now.quality >= before.quality;
         match &mut self.best {
             Some(best) if !is_better(best) => {
                 best.waited += 1;
@@ -238,44 +251,45 @@ impl<'a> Descent<'a> {
     /// One iteration.
     fn step(&mut self, decoded: &Decoded, rate: &Rate, done: u32) -> Result<(), Error> {
         let mut gradients = Gradients::zero(&decoded.frame);
-        let mut views = 0.0;
+        let mut halvings = 0.0;
         for (place, view) in (0..VIEWS).map_while(|_| self.pictures.next()).collect::<Vec<_>>() {
-            self.look_from(decoded, place, &view, &mut gradients)?;
-            views += 1.0;
+            halvings += self.look_from(decoded, place, &view, &mut gradients)?;
         }
         self.latent.to_steps(&decoded.frame, &mut gradients);
         // Slopes are sums over the views.
-        let price = PRICE * views * 2.0 * LN_2 / rate.bits_an_octave.max(1.0);
+        let price = PRICE * halvings * LN_2 / rate.bits_an_octave.max(1.0);
         rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
         let slower = (0.5 + 0.5 * libm::cos(PI * self.share(done))) as f32;
         self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate * slower))?;
         Ok(())
     }
 
-    /// Adds the slopes of the logarithm of what a receiver misses in a view, by each value of this layer that it sees.
+    /// Adds the slopes of the logarithm of what a receiver misses in a view, by each value of this layer that it sees; gives how
+    /// often that is halved where all differences are.
     fn look_from(
         &mut self,
         decoded: &Decoded,
         place: usize,
         view: &View,
         sum: &mut Gradients,
-    ) -> Result<(), Error> {
-        let Some(sight) = self.sights.get(place) else { return Ok(()) };
+    ) -> Result<f64, Error> {
+        let Some(sight) = self.sights.get(place) else { return Ok(0.0) };
         let shown = self.shown(decoded, sight)?;
         let prepared = PreparedFrame::new(&shown);
         let drawing = prepared.draw(&view.camera, self.pictures.background);
-        let (error, slopes) = squared_error(&view.wanted, &drawing.rendering().colour);
-        let before = sight.error.unwrap_or(error);
-        let mean = before + (error - before) / REMEMBERED;
+        let (Missed { loss, halvings }, slopes) =
+            self.finetune.loss.of(&view.wanted, &drawing.rendering().colour)?;
+        let before = sight.loss.unwrap_or(loss);
+        let mean = before + (loss - before) / REMEMBERED;
         let mut own = Gradients::zero(&shown);
         drawing.backward(&slopes, &mut own)?;
         // Where nothing is missing there is nowhere to go.
         let scale = if mean > NOTHING { 1.0 / mean } else { 0.0 };
         add(&own, scale as f32, &self.latent.seen(&sight.receiver), sum);
         if let Some(sight) = self.sights.get_mut(place) {
-            sight.error = Some(mean);
+            sight.loss = Some(mean);
         }
-        Ok(())
+        Ok(halvings)
     }
 }
 

@@ -1,8 +1,10 @@
 //! The pictures that values are fitted to, and how far those of the decoded frame are from them.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of pictures")]
 
+use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
 use super::receivers::Receiver;
 use super::{Finetune, Photograph};
+use crate::error::Error;
 use crate::settings::Settings;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Scattered, held_out};
@@ -45,9 +47,24 @@ pub(super) struct Pictures<'a> {
     pub(super) background: [f32; 3],
     taken: usize,
     turns: Vec<Turn>,
+    loss: FinetuneLoss,
     judges: Vec<Judges>,
     witnesses: Vec<Judges>,
 }
+
+/// What judges say of what a receiver has: means over their views.
+#[derive(Default)]
+pub(super) struct Verdict {
+    /// dB.
+    pub(super) psnr: f64,
+    /// What is made small, as decibels below 1: the PSNR where that is the squared error.
+    pub(super) quality: f64,
+    /// How often what is made small is halved where all differences are.
+    pub(super) halvings: f64,
+}
+
+/// A loss of a picture, a mean over its pixels, below which it shows what it should.
+const LEAST: f64 = 1e-9;
 
 /// When a receiver is the next to look.
 struct Turn {
@@ -118,12 +135,32 @@ impl<'a> Pictures<'a> {
             }
             false => Supply::Photographs(finetune.of_role(Role::Fit).collect()),
         };
-        Self { supply, background, taken: 0, turns, judges, witnesses }
+        Self { supply, background, taken: 0, turns, loss: finetune.loss, judges, witnesses }
     }
 
-    /// Mean PSNR of what a receiver has as judges see it, dB.
-    pub(super) fn judge(&self, receiver: &Receiver, frame: &GaussianFrame) -> f64 {
-        mean_psnr(&self.judges, &receiver.lines, frame, self.background)
+    /// What judges say of what a receiver has.
+    ///
+    /// # Errors
+    /// None: their pictures are of the sizes that they should have.
+    pub(super) fn judge(&self, receiver: &Receiver, frame: &GaussianFrame) -> Result<Verdict, Error> {
+        let FinetuneLoss::L1Ssim { .. } = self.loss else {
+            let psnr = mean_psnr(&self.judges, &receiver.lines, frame, self.background);
+            return Ok(Verdict { psnr, quality: psnr, halvings: HALVINGS_OF_SQUARES });
+        };
+        let views = views_of(&self.judges, &receiver.lines);
+        let prepared = PreparedFrame::new(frame);
+        let mut verdict = Verdict::default();
+        for View { camera, wanted } in views {
+            let drawing = prepared.draw(camera, self.background);
+            let picture = &drawing.rendering().colour;
+            let (Missed { loss, halvings }, _) = self.loss.of(wanted, picture)?;
+            verdict.psnr += psnr(wanted, picture).min(LOSSLESS_DB);
+            verdict.quality -= 10.0 * libm::log10(loss.max(LEAST));
+            verdict.halvings += halvings;
+        }
+        let count = views.len().max(1) as f64;
+        let Verdict { psnr, quality, halvings } = verdict;
+        Ok(Verdict { psnr: psnr / count, quality: quality / count, halvings: halvings / count })
     }
 
     /// The same in views of the lines of its layer by which nothing is chosen.
@@ -156,9 +193,14 @@ impl<'a> Pictures<'a> {
     }
 }
 
+/// The views of some lines.
+fn views_of<'a>(judges: &'a [Judges], lines: &[u32]) -> &'a [View] {
+    judges.iter().find(|judges| judges.lines == lines).map_or(&[], |judges| &judges.views)
+}
+
 /// Mean PSNR of a frame in the views of some lines, dB.
 fn mean_psnr(judges: &[Judges], lines: &[u32], frame: &GaussianFrame, background: [f32; 3]) -> f64 {
-    let views = judges.iter().find(|judges| judges.lines == lines).map_or(&[][..], |judges| &judges.views);
+    let views = views_of(judges, lines);
     let prepared = PreparedFrame::new(frame);
     let of_view = |View { camera, wanted }: &View| {
         psnr(wanted, &prepared.draw(camera, background).rendering().colour).min(LOSSLESS_DB)
@@ -210,36 +252,5 @@ impl Photograph {
         let camera = self.camera.scaled_to_height(lines);
         let wanted = self.picture.averaged(camera.width as usize, camera.height as usize);
         View { camera, wanted }
-    }
-}
-
-/// The sum of squared differences of two pictures as a screen shows them, and its slope by each value of the second. What is
-/// beyond a screen's range has the slope that leads back to what is wanted.
-pub(super) fn squared_error(wanted: &Image, picture: &Image) -> (f64, Image) {
-    let mut sum = 0.0;
-    let pixel = |(wanted, shown): (&[f32; 3], &[f32; 3])| {
-        let mut slopes = [0.0; 3];
-        for ((slope, wanted), &shown) in slopes.iter_mut().zip(wanted).zip(shown) {
-            let difference = shown.clamp(0.0, 1.0) - wanted.clamp(0.0, 1.0);
-            sum += f64::from(difference * difference);
-            *slope = 2.0 * difference;
-        }
-        slopes
-    };
-    let slopes = wanted.pixels().iter().zip(picture.pixels()).map(pixel).collect();
-    (sum, Image::new(picture.width(), slopes))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn errors_are_those_that_a_screen_shows() {
-        let wanted = Image::new(2, vec![[0.5, 0.0, 1.0], [1.0; 3]]);
-        let picture = Image::new(2, vec![[0.75, 0.0, 3.0], [1.0, 1.0, 0.5]]);
-        let (sum, slopes) = squared_error(&wanted, &picture);
-        assert_eq!(sum, 0.0625 + 0.25);
-        assert_eq!(slopes.pixels(), [[0.5, 0.0, 0.0], [0.0, 0.0, -1.0]]);
     }
 }

@@ -1,0 +1,130 @@
+//! What a picture misses of what it should show, and how that changes with each of its values.
+
+use crate::error::Error;
+use splatstream_render::Image;
+use splatstream_render::gradient::{Judged, Loss};
+
+/// What fitting to pictures makes small.
+///
+/// Pictures count as a screen shows them: what is beyond its range is no error, but has the slope that leads back to what is
+/// wanted. Whatever is made small, the quality that is asked for and reported is a PSNR.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum FinetuneLoss {
+    /// The squared error, summed over a picture: what PSNR is made of.
+    #[default]
+    SquaredError,
+    /// The loss of the paper, (1 − β)·L1 + β·(1 − SSIM), a mean over a picture, so that pictures of any number of lines count
+    /// equally.
+    L1Ssim {
+        /// β, the weight of structural similarity, 0 to 1. That of 3D Gaussian splatting is 0.2; the paper gives none.
+        similarity: f32,
+    },
+}
+
+impl FinetuneLoss {
+    /// L1 and SSIM with the weights of 3D Gaussian splatting.
+    #[must_use]
+    pub fn l1_ssim() -> Self {
+        Self::L1Ssim { similarity: Loss::default().similarity }
+    }
+}
+
+/// What a picture misses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Missed {
+    /// How much.
+    pub(super) loss: f64,
+    /// How many times it is halved where all differences are: a squared error and, nearly, what SSIM misses twice, L1 once.
+    pub(super) halvings: f64,
+}
+
+/// Times that a squared error is halved where differences are.
+pub(super) const HALVINGS_OF_SQUARES: f64 = 2.0;
+
+impl FinetuneLoss {
+    /// What a picture misses, and its slope by each value.
+    ///
+    /// # Errors
+    /// Pictures of different sizes.
+    pub(super) fn of(self, wanted: &Image, picture: &Image) -> Result<(Missed, Image), Error> {
+        match self {
+            Self::SquaredError => {
+                let (loss, slopes) = squared_error(wanted, picture);
+                Ok((Missed { loss, halvings: HALVINGS_OF_SQUARES }, slopes))
+            }
+            Self::L1Ssim { similarity } => {
+                let loss = Loss { similarity };
+                let Judged { value, l1, slopes, .. } = loss.between(&shown(wanted), &shown(picture))?;
+                let of_l1 = (1.0 - f64::from(similarity)) * l1;
+                let halvings = if value > 0.0 { 2.0 - (of_l1 / value).clamp(0.0, 1.0) } else { 1.0 };
+                Ok((Missed { loss: value, halvings }, slopes))
+            }
+        }
+    }
+}
+
+/// A picture as a screen shows it.
+fn shown(picture: &Image) -> Image {
+    let pixels = picture.pixels().iter().map(|pixel| pixel.map(|value| value.clamp(0.0, 1.0)));
+    Image::new(picture.width(), pixels.collect())
+}
+
+/// The sum of squared differences of two pictures as a screen shows them, and its slope by each value of the second. What is
+/// beyond a screen's range has the slope that leads back to what is wanted.
+fn squared_error(wanted: &Image, picture: &Image) -> (f64, Image) {
+    let mut sum = 0.0;
+    let pixel = |(wanted, shown): (&[f32; 3], &[f32; 3])| {
+        let mut slopes = [0.0; 3];
+        for ((slope, wanted), &shown) in slopes.iter_mut().zip(wanted).zip(shown) {
+            let difference = shown.clamp(0.0, 1.0) - wanted.clamp(0.0, 1.0);
+            sum += f64::from(difference * difference);
+            *slope = 2.0 * difference;
+        }
+        slopes
+    };
+    let slopes = wanted.pixels().iter().zip(picture.pixels()).map(pixel).collect();
+    (sum, Image::new(picture.width(), slopes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_those_that_a_screen_shows() {
+        let wanted = Image::new(2, vec![[0.5, 0.0, 1.0], [1.0; 3]]);
+        let picture = Image::new(2, vec![[0.75, 0.0, 3.0], [1.0, 1.0, 0.5]]);
+        let (sum, slopes) = squared_error(&wanted, &picture);
+        assert_eq!(sum, 0.0625 + 0.25);
+        assert_eq!(slopes.pixels(), [[0.5, 0.0, 0.0], [0.0, 0.0, -1.0]]);
+        let beyond = Image::new(2, vec![[0.5, -1.0, 2.0], [3.0; 3]]);
+        let (missed, _) = FinetuneLoss::l1_ssim().of(&wanted, &beyond).unwrap();
+        assert!(missed.loss.abs() < 1e-6, "{missed:?}");
+    }
+
+    #[test]
+    fn halved_differences_halve_a_loss_as_often_as_it_says() {
+        let of = |row: usize, column: usize| (row * 7 + column * 13) % 17;
+        let picture = |size: f32| {
+            let pixel = |at: usize| {
+                let (row, column) = (at / 32, at % 32);
+                let noise = if (row * 5 + column * 11) % 3 == 0 { size } else { -size };
+                [0.3 + of(row, column) as f32 / 40.0 + noise; 3]
+            };
+            Image::new(32, (0..1024).map(pixel).collect())
+        };
+        let wanted = picture(0.0);
+        for loss in [
+            FinetuneLoss::SquaredError,
+            FinetuneLoss::L1Ssim { similarity: 0.0 },
+            FinetuneLoss::l1_ssim(),
+            FinetuneLoss::L1Ssim { similarity: 1.0 },
+        ] {
+            let [(coarse, _), (fine, _)] =
+                [0.010, 0.005].map(|size| loss.of(&wanted, &picture(size)).unwrap());
+            let halvings = (coarse.loss / fine.loss).log2();
+            let told = f64::midpoint(coarse.halvings, fine.halvings);
+            assert!((halvings - told).abs() < 0.05, "{loss:?}: {halvings} {told}");
+        }
+    }
+}
