@@ -31,7 +31,7 @@ use clap::{Args, ValueEnum};
 use decided::Decided;
 use effort::Budget;
 use failed::failed;
-use finetune::{FinetuneArgs, Fitted, Taken};
+use finetune::{FinetuneArgs, Fitted, Taken, told_of_fitting};
 pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
@@ -327,12 +327,15 @@ impl Encode {
         let read = self.read_files(&source);
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
-        let (settings, decided) = self.settings(&mut source)?;
+        let (mut settings, decided) = self.settings(&mut source)?;
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
+        let progress = Progress::frames("encoding", source.len());
+        if let Some(finetune) = &mut settings.finetune {
+            finetune.watch = told_of_fitting(&progress);
+        }
         let shard = self.shards.open(&mut source, &settings)?;
-        let progress =
-            Progress::frames("encoding", shard.as_ref().map_or(source.len(), |shard| shard.frames));
+        shard.iter().for_each(|shard| progress.of(shard.frames));
         let mut at = |done, _| progress.at(done);
         let report = match &shard {
             None => encode(&mut source, &settings, &mut file, &mut at),

@@ -78,6 +78,17 @@ impl Progress {
         self
     }
 
+    /// That there are so many frames.
+    pub(crate) fn of(&self, frames: u32) {
+        self.bar.set_length(frames.into());
+    }
+
+    /// Tells what is being done, from any thread.
+    pub(crate) fn teller(&self) -> impl Fn(String) + Send + Sync + 'static {
+        let bar = self.bar.clone();
+        move |what| bar.set_message(what)
+    }
+
     /// `done` frames are done.
     pub(crate) fn at(&self, done: u32) {
         self.bar.set_position(done.into());

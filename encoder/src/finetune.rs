@@ -11,6 +11,7 @@ mod loss;
 mod pictures;
 mod rate;
 mod receivers;
+mod watch;
 
 use crate::allocation::Attribute;
 use crate::error::Error;
@@ -32,6 +33,7 @@ use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, Image};
+pub use watch::{FinetuneProgress, FinetuneWatch};
 
 /// How values of I frames are fitted to pictures.
 ///
@@ -57,6 +59,8 @@ pub struct Finetune {
     pub optimise_for: Vec<PointWeight>,
     /// Attributes that keep the nearest values, to see what fitting the others is worth.
     pub held: Vec<Attribute>,
+    /// Who is told how far it has come.
+    pub watch: FinetuneWatch,
 }
 
 impl Default for Finetune {
@@ -71,6 +75,7 @@ impl Default for Finetune {
             resolutions: Vec::new(),
             optimise_for: Vec::new(),
             held: Vec::new(),
+            watch: FinetuneWatch::default(),
         }
     }
 }
@@ -237,9 +242,9 @@ impl Fit<'_> {
         if !receivers.is_empty() {
             let pictures = Pictures::new(source, self.finetune, self.settings, &receivers);
             let descent = Descent::new(latent, (receivers, pictures), self.compensator, self.finetune);
-            let (fitted, done) = descent.run()?;
+            let (fitted, done) = descent.run(layer)?;
             latent = fitted;
-            report = Some(FinetuneReport { spatial_layer: layer, ..done });
+            report = Some(done);
         }
         Ok(Layer { frame: latent.frame()?, lists: latent.lists()?, report })
     }

@@ -72,7 +72,10 @@ pub use allocation::Attribute;
 pub use budget::{Effort, Work};
 pub use concat::{ConcatError, Concatenated, PartError, StreamPart, concat};
 pub use error::Error;
-pub use finetune::{Finetune, FinetuneLoss, FinetuneReport, Photograph, PointReport, PointWeight};
+pub use finetune::{
+    Finetune, FinetuneLoss, FinetuneProgress, FinetuneReport, FinetuneWatch, Photograph, PointReport,
+    PointWeight,
+};
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;

@@ -10,8 +10,8 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_encoder::{
-    Attribute, Error, Finetune, FinetuneLoss, Photograph, PointReport, PointWeight, Preset, Report, Settings,
-    Structure, encode,
+    Attribute, Error, Finetune, FinetuneLoss, FinetuneProgress, FinetuneWatch, Photograph, PointReport,
+    PointWeight, Preset, Report, Settings, Structure, encode,
 };
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_format::payload::SceneDescription;
@@ -19,6 +19,7 @@ use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, held_out, ring};
 use splatstream_render::metrics::ssim;
 use splatstream_render::{Image, ReferencePictures, render};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 const ALL: [Attribute; 6] = [
@@ -125,6 +126,20 @@ fn l1_and_ssim_give_the_same_bytes_for_any_number_of_threads() {
         pool.install(|| encoded(scene(), &by_l1_ssim(6)).0)
     };
     assert_eq!(of(1), of(3));
+}
+
+#[test]
+fn each_iteration_is_told_and_nothing_depends_on_who_listens() {
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let list = Arc::clone(&told);
+    let watch = FinetuneWatch::new(move |progress: FinetuneProgress| list.lock().unwrap().push(progress));
+    let finetune = Some(Finetune { watch, lines: vec![60, 108], ..quick(3) });
+    let layered = |finetune| Settings { finetune, spatial_layers: 2, ..plain() };
+    let (bytes, _) = encoded(scene(), &layered(finetune));
+    assert_eq!(bytes, encoded(scene(), &layered(Some(Finetune { lines: vec![60, 108], ..quick(3) }))).0);
+    let of_layer =
+        |spatial_layer| (1..=3).map(move |done| FinetuneProgress { spatial_layer, done, iterations: 3 });
+    assert_eq!(*told.lock().unwrap(), [0, 1].into_iter().flat_map(of_layer).collect::<Vec<_>>());
 }
 
 #[test]

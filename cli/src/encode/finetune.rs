@@ -3,13 +3,15 @@
 use crate::cameras::Views;
 use crate::failure::Failure;
 use crate::numbers::counted;
+use crate::progress::Progress;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use splatstream_capture::load_photographs;
 use splatstream_chart::numbers::bits_per_gaussian;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_encoder::{
-    Attribute, Finetune, FinetuneLoss, FinetuneReport, Photograph, PointReport, PointWeight, Report,
+    Attribute, Finetune, FinetuneLoss, FinetuneProgress, FinetuneReport, FinetuneWatch, Photograph,
+    PointReport, PointWeight, Report,
 };
 use splatstream_render::camera::read_views;
 use std::path::{Path, PathBuf};
@@ -192,6 +194,7 @@ impl FinetuneArgs {
             resolutions: self.finetune_lines.clone(),
             optimise_for: self.optimise_for.clone().map_or_else(Vec::new, |points| points.0),
             held,
+            ..Finetune::default()
         }))
     }
 }
@@ -235,6 +238,21 @@ impl Taken<'_> {
         };
         Ok(photographs.into_iter().map(of_encoder).collect())
     }
+}
+
+/// Says beside a bar how far fitting a frame has come.
+pub(super) fn told_of_fitting(progress: &Progress) -> FinetuneWatch {
+    let tell = progress.teller();
+    FinetuneWatch::new(move |FinetuneProgress { spatial_layer, done, iterations }| {
+        let of_layer = match spatial_layer {
+            0 => String::new(),
+            layer => format!(" of spatial layer {layer}"),
+        };
+        tell(match done < iterations {
+            true => format!("encoding, fine-tuning{of_layer}: {done} of {iterations} iterations"),
+            false => "encoding".to_owned(),
+        });
+    })
 }
 
 /// What fitting one frame has done.

@@ -18,7 +18,7 @@ use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
 use super::pictures::{Pictures, Verdict, View};
 use super::rate::Rate;
 use super::receivers::Receiver;
-use super::{Finetune, FinetuneReport, PointReport};
+use super::{Finetune, FinetuneProgress, FinetuneReport, PointReport};
 use crate::allocation::Attribute;
 use crate::error::Error;
 use crate::frame::compensation::{Compensator, compensated};
@@ -122,8 +122,8 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Goes on as long as it may; gives the values that judges like most, and what has been done.
-    pub(super) fn run(mut self) -> Result<(Latent<'a>, FinetuneReport), Error> {
+    /// Goes on as long as it may, with values of `spatial_layer`; gives the values that judges like most, and what has been done.
+    pub(super) fn run(mut self, spatial_layer: u8) -> Result<(Latent<'a>, FinetuneReport), Error> {
         let mut rate = Rate::new(&self.latent)?;
         let before = self.latent.decoded()?;
         self.compensate(&before)?;
@@ -143,10 +143,13 @@ impl<'a> Descent<'a> {
             }
             self.step(&decoded, &rate, done)?;
             done += 1;
+            let iterations = self.finetune.iterations;
+            self.finetune.watch.tell(FinetuneProgress { spatial_layer, done, iterations });
         }
         let last = self.latent.decoded()?;
         self.look(&last, &Rate::new(&self.latent)?)?;
         let mut report = FinetuneReport {
+            spatial_layer,
             iterations: done,
             seconds: self.start.elapsed().as_secs_f64(),
             ..FinetuneReport::default()

@@ -1,0 +1,47 @@
+//! How far fitting has come.
+
+use core::fmt;
+use std::sync::Arc;
+
+/// How far fitting a layer of a frame has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FinetuneProgress {
+    /// The spatial layer.
+    pub spatial_layer: u8,
+    /// Iterations that are done.
+    pub done: u32,
+    /// Iterations at most; it may end before.
+    pub iterations: u32,
+}
+
+/// Someone who is told after each iteration, from whatever thread it is done in; by default nobody.
+///
+/// Nothing that is encoded depends on it, so that any two are equal, and look the same.
+#[derive(Clone, Default)]
+pub struct FinetuneWatch(Option<Arc<dyn Fn(FinetuneProgress) + Send + Sync>>);
+
+impl FinetuneWatch {
+    /// Has `told` called.
+    #[must_use]
+    pub fn new(told: impl Fn(FinetuneProgress) + Send + Sync + 'static) -> Self {
+        Self(Some(Arc::new(told)))
+    }
+
+    pub(super) fn tell(&self, progress: FinetuneProgress) {
+        if let Some(told) = &self.0 {
+            told(progress);
+        }
+    }
+}
+
+impl PartialEq for FinetuneWatch {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl fmt::Debug for FinetuneWatch {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("FinetuneWatch")
+    }
+}
