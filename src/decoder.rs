@@ -36,6 +36,8 @@ pub struct Decoder {
     cancel: Cancel,
     /// Whether two frames are decoded at a time.
     is_ahead: bool,
+    /// Offset of the GOP header that decoding starts with; none at the start of the stream.
+    start: Option<u64>,
     /// Frames before this one are decoded and not given out.
     from: u32,
     warnings: Vec<Warning>,
@@ -94,7 +96,13 @@ impl Decoder {
         let (limits, point, cancel) = (Limits::default(), OperatingPoint::ALL, Cancel::default());
         let stream = stream(&limits, point, &cancel, false);
         let (warnings, state) = (Vec::new(), State::Decoding);
-        Self { source, stream, limits, point, cancel, is_ahead: false, from: 0, warnings, state }
+        Self { source, stream, limits, point, cancel, is_ahead: false, start: None, from: 0, warnings, state }
+    }
+
+    /// Starts again, with all that has been asked for so far.
+    fn restart(&mut self) {
+        self.stream = stream(&self.limits, self.point, &self.cancel, self.is_ahead);
+        self.start.iter().for_each(|&gop| self.stream.go_to(gop));
     }
 
     /// The same with other limits. To be called before anything has been decoded.
@@ -109,8 +117,8 @@ impl Decoder {
     /// ```
     #[must_use]
     pub fn with_limits(mut self, limits: Limits) -> Self {
-        self.stream = stream(&limits, self.point, &self.cancel, self.is_ahead);
         self.limits = limits;
+        self.restart();
         self
     }
 
@@ -128,7 +136,7 @@ impl Decoder {
     #[must_use]
     pub fn with_operating_point(mut self, point: OperatingPoint) -> Self {
         self.point = point;
-        self.stream = stream(&self.limits, point, &self.cancel, self.is_ahead);
+        self.restart();
         self
     }
 
@@ -150,7 +158,7 @@ impl Decoder {
     #[must_use]
     pub fn ahead(mut self) -> Self {
         self.is_ahead = true;
-        self.stream = stream(&self.limits, self.point, &self.cancel, true);
+        self.restart();
         self
     }
 
@@ -158,7 +166,8 @@ impl Decoder {
     /// not looked at, but for the units up to the first sequence parameters. To be called before anything has been decoded.
     #[must_use]
     pub fn starting_at(mut self, gop: u64) -> Self {
-        self.stream.go_to(gop);
+        self.start = Some(gop);
+        self.restart();
         self
     }
 
@@ -343,9 +352,10 @@ impl Decoder {
         self.from = frame;
         self.warnings.clear();
         self.state = State::Decoding;
-        match gop_of(&mut self.source, frame, &self.limits.of_format()) {
-            Some(gop) => self.stream.go_to(gop.offset),
-            None => self.stream = stream(&self.limits, self.point, &self.cancel, self.is_ahead),
+        self.start = gop_of(&mut self.source, frame, &self.limits.of_format()).map(|gop| gop.offset);
+        match self.start {
+            Some(gop) => self.stream.go_to(gop),
+            None => self.restart(),
         }
         Ok(())
     }

@@ -6,5 +6,6 @@ mod ahead;
 mod arrival;
 mod bounds;
 mod operating_points;
+mod orders;
 mod slots;
 mod vectors;

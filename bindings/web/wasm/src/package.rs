@@ -303,15 +303,15 @@ impl Package {
         let mut current = self.player.state().current();
         while let Some(gop) = self.player.show() {
             let is_lost = gop.point.is_none();
-            if let Some(point) = gop.point {
+            if let Some(chosen) = gop.point {
                 let start = gop.head.len();
                 let received = Received::whole([gop.head, gop.units].concat());
-                let (spatial, refinement) = (point.spatial, point.refinement);
-                let temporal = point.temporal.unwrap_or(0);
-                let mut opened = decoder(&received).starting_at(start as u64);
-                opened.set_operating_point(OperatingPoint { spatial, temporal, refinement });
+                let (spatial, refinement) = (chosen.spatial, chosen.refinement);
+                let temporal = chosen.temporal.unwrap_or(0);
+                let point = OperatingPoint { spatial, temporal, refinement };
+                let opened = decoder(&received).starting_at(start as u64).with_operating_point(point);
                 self.gop.decoder = opened;
-                (self.gop.is_open, self.gop.is_still) = (true, point.temporal.is_none());
+                (self.gop.is_open, self.gop.is_still) = (true, chosen.temporal.is_none());
                 (self.gop.is_done, self.gop.temporal) = (false, temporal);
             }
             if self.gop.follows {
