@@ -7,5 +7,6 @@ mod arrival;
 mod bounds;
 mod operating_points;
 mod orders;
+mod readme;
 mod slots;
 mod vectors;
