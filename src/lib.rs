@@ -34,7 +34,7 @@
 //! * [`Frame`] has the Gaussians as planes of f32 or of integers, and [what was lost](Frame::warnings).
 //! * [`Slots`] keeps each Gaussian at its place from frame to frame, and says what has changed: what a renderer uploads.
 //! * [`Limits`] bound memory, work and output before anything is allocated; [`Cancel`] ends the work on a frame. The
-//!   defaults are safe for a server that decodes what strangers send.
+//!   defaults are safe for a server that decodes what strangers send; a player takes [`Limits::without_totals`].
 //! * [`Encoder`] takes frames as they come and writes a stream, GOP by GOP.
 //!
 //! No input panics or aborts. A damaged stream gives the frames that are left, with warnings; damage costs at most the GOP

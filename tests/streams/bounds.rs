@@ -31,6 +31,18 @@ fn each_limit_ends_decoding_where_it_is_reached() {
     }
     let enough = Limits { max_gaussians: 400, max_total_gaussians: 4800, max_output: 4800 * 14 * 4, ..all };
     assert_eq!(verdict(enough).unwrap(), 12);
+    let endless = Limits { max_total_gaussians: 1, max_output: 1, max_work: 1, ..all }.without_totals();
+    assert_eq!(verdict(endless).unwrap(), 12);
+}
+
+#[test]
+fn totals_count_from_where_a_seek_went() {
+    let limits = Limits { max_total_gaussians: 4800, ..Limits::default() };
+    let mut decoder = Decoder::from_bytes(vectors::talk()).with_limits(limits);
+    for _ in 0..5 {
+        decoder.seek(splatstream::Position::Frame(0)).unwrap();
+        assert_eq!(decoder.by_ref().map(Result::unwrap).count(), 12);
+    }
 }
 
 #[test]

@@ -175,7 +175,8 @@ extern "C" {
 uint32_t splatstream_abi_version(void);
 
 // The limits of a new decoder, which are for a server that decodes what strangers send: 2 GiB of memory, 4 Mi Gaussians
-// in a frame, and an hour or so of work for a core. A program that changes some starts with these.
+// in a frame, 2^28 in all, 32 GiB of output, and some minutes of work for a core. A program that changes some starts with
+// these. A player of streams of any length sets the three totals to UINT64_MAX.
 struct SplatstreamLimits splatstream_limits_default(void);
 
 // For splatstream_decoder_set_cancel.

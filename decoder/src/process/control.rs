@@ -9,7 +9,7 @@ use crate::operating_point::OperatingPoint;
 use splatstream_format::syntax::UnitType;
 
 impl Decoder {
-    /// Forgets all but the sequence: the next unit is a gop_header anywhere in the stream, as for
+    /// Forgets all but the sequence, what was spent of the budget included: the next unit is a gop_header anywhere in the stream, as for
     /// [`Decoder::starting_inside`].
     pub fn restart(&mut self) {
         let sequence = self.sequence.take();
@@ -22,7 +22,6 @@ impl Decoder {
             tally,
             wanted_point: self.wanted_point,
             interrupt: self.interrupt.clone(),
-            spent: self.spent,
             next_identity: self.next_identity,
             ..Self::with(self.profile, self.options)
         };
