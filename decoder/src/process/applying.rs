@@ -47,11 +47,13 @@ impl FrameInProgress {
         let r = usize::from(refinement);
         let empty = || Arc::new(GaussianList::empty(usize::from(context.sequence.sh_dimension())));
         let Some(reference) = context.reference else {
-            let parents = self.lists.lists.get(r).cloned().unwrap_or_else(empty);
+            let below = self.lists.lists.get(r).cloned().unwrap_or_else(empty);
+            let parents = below.unchanged_in(self.lists.spares.list(&below), context.interrupt);
+            context.interrupt.check()?;
             let lower: Vec<&QuantizedFrame> =
                 self.lists.lists.iter().take(r).map(|list| &list.planes).collect();
             let situation = Situation { around: [&lower, &[]], temporal: None };
-            return apply(unit, parents.as_ref().clone(), &situation).map(Outcome::from);
+            return apply(unit, parents, &situation).map(Outcome::from);
         };
         let before = reference.lists.get(r).cloned().unwrap_or_else(empty);
         if self.field.is_empty() && is_idle(unit.header, &before) {

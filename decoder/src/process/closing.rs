@@ -13,6 +13,9 @@ use crate::list::GaussianList;
 use splatstream_format::{Error, ErrorKind};
 use std::sync::Arc;
 
+/// Identities that are given between two looks at the interrupt.
+const IDENTITIES: usize = 1 << 16;
+
 /// A frame that has ended.
 pub(super) struct Closed {
     pub(super) decoded: DecodedFrame,
@@ -79,7 +82,7 @@ impl FrameInProgress {
         }
         decoded.planes = self.lists.planes(sh_planes, context.interrupt);
         if context.options.identities {
-            decoded.identities = self.lists.shown_identities(decoded.planes.len());
+            decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt);
         }
         let next_identity = self.next_identity();
         let Lists { lists, digests, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
@@ -100,7 +103,7 @@ impl FrameInProgress {
         let mut fault = None;
         decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()), context.interrupt);
         if context.options.identities {
-            decoded.identities = self.lists.shown_identities(decoded.planes.len());
+            decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt);
             state.identities = self.lists.identities.clone();
         }
         if let Some(reference) = reference {
@@ -163,12 +166,19 @@ impl Lists {
         QuantizedFrame::joined(&parts, sh_planes, interrupt)
     }
 
-    /// The identities of the exact Gaussians, of which there are so many.
-    fn shown_identities(&mut self, count: usize) -> Vec<u32> {
-        match self.identities.is_empty() {
-            true => self.identify(count).collect(),
-            false => self.identities.iter().flat_map(|identities| identities.iter().copied()).collect(),
+    /// The identities of the exact Gaussians, of which there are so many. Where an interrupt is requested, some are missing.
+    fn shown_identities(&mut self, count: usize, interrupt: &Interrupt) -> Vec<u32> {
+        let mut shown = Vec::with_capacity(count);
+        if self.identities.is_empty() {
+            let mut identities = self.identify(count);
+            while shown.len() < count && !interrupt.is_requested() {
+                shown.extend(identities.by_ref().take(IDENTITIES));
+            }
         }
+        for identities in self.identities.iter().take_while(|_| !interrupt.is_requested()) {
+            shown.extend_from_slice(identities);
+        }
+        shown
     }
 
     /// What the last unit says of a frame that ends with it.
