@@ -36,12 +36,12 @@ pub struct Limits {
     /// Bytes of a unit, of which a frame has one for each refinement and layer. Default 64 MiB: 4 million Gaussians of degree 2
     /// at 50 dB take 32 MB in five units.
     pub max_unit: u32,
-    /// Bytes of all frames together as planes of f32. Default 32 GiB: 54 frames of 4 Mi Gaussians of degree 2, each of 608 MiB, or
+    /// Bytes of all frames together as planes of f32. Default 32 GiB: 53 frames of 4 Mi Gaussians of degree 2, each of 608 MiB, or
     /// 3,700 of 100,000 of degree 1.
     pub max_output: u64,
     /// Work on all frames together: values that are decoded, moved, hashed or predicted. Default 2^34. One core did 2 * 10^8 a
-    /// second (4 million static Gaussians of degree 2, 1.7 * 10^8 values, in 0.86 s; predicted frames likewise), which makes a
-    /// minute and a half; the worst streams known take 30 nanoseconds a value, which makes nine minutes.
+    /// second (4 million static Gaussians of degree 2, 1.7 * 10^8 values, in 0.86 s), which makes a minute and a half. Fuzzing
+    /// allows a stream 30 nanoseconds a value besides what its bytes take, which would make nine minutes.
     pub max_work: u64,
 }
 

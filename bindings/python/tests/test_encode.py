@@ -78,7 +78,7 @@ def test_python_has_the_options_of_the_command() -> None:
 
 def test_values_are_fitted_to_pictures(frames: list[gss.Gaussians]) -> None:
     options: dict[str, Any] = {"psnr": 45, "cameras": "ring:4", "all_intra": True}
-    fitted = gss.encode(frames[:2], finetune=3, finetune_only=["dc", "opacity"], optimise_for={(0, 0, 4): 2}, **options)
+    fitted = gss.encode(frames[:2], finetune=3, finetune_only=["dc", "opacity"], finetune_loss="l1-ssim", optimise_for={(0, 0, 4): 2}, **options)
     assert [frame["iterations"] for frame in fitted.report["finetuned"]] == [3, 3]
     assert fitted.report["finetuned"][0]["points"][0]["point"] == "s0,t0,r4"
     assert bytes(fitted) != bytes(gss.encode(frames[:2], **options))

@@ -65,6 +65,7 @@ class EncodeOptions(TypedDict, total=False):
     finetune: Choose values by pictures of what is decoded, in so many iterations at most; True is 200.
     finetune_only: Attributes to fit, as ("position", "log-scale", "rotation", "opacity", "dc", "sh"); all by default.
     finetune_lines: Lines of the pictures to fit to, in turn.
+    finetune_loss: What pictures are fitted by: "squared" (the default) or "l1-ssim", the loss that scenes are trained with.
     optimise_for: Operating points that matter and what a decibel at each is worth, as {"s0,t0,r1": 1, "s2,t0,r4": 3}.
     images: A folder of photographs to fit a single frame to, those that `cameras` names.
     height: Lines to reduce these photographs to.
@@ -105,6 +106,7 @@ class EncodeOptions(TypedDict, total=False):
     finetune: int | Literal[True]
     finetune_only: Sequence[str]
     finetune_lines: Sequence[int]
+    finetune_loss: Literal["squared", "l1-ssim"]
     optimise_for: Mapping[OperatingPointLike, float]
     images: str | os.PathLike[str]
     height: int
