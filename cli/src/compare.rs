@@ -87,14 +87,16 @@ impl Compare {
         if [&self.a, &self.b].iter().all(|path| path.as_path() == Path::new(STANDARD)) {
             return Err(Failure::Usage("only one of A and B can be standard input".to_owned()));
         }
-        let limits = self.limits.limits();
+        let options = self.limits.options_to_draw();
         let (opened_a, opened_b) =
             (Opened::open(&self.a, self.reading)?, Opened::open(&self.b, self.reading)?);
-        let (mut frames_a, mut frames_b) = (opened_a.frames(&limits, None)?, opened_b.frames(&limits, None)?);
+        let (mut frames_a, mut frames_b) =
+            (opened_a.frames(&options, None)?, opened_b.frames(&options, None)?);
         let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();
-        let description = opened_a.description(&limits).or_else(|| opened_b.description(&limits));
+        let description =
+            opened_a.description(&options.limits).or_else(|| opened_b.description(&options.limits));
         let mut pictures = self.pictures.start(description.unwrap_or_default())?;
         let mut a = next(&mut frames_a, &mut report.frames_a)?;
         let mut b = next(&mut frames_b, &mut report.frames_b)?;

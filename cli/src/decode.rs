@@ -124,12 +124,11 @@ impl Decode {
 
     fn options(&self) -> Options {
         Options {
-            limits: self.limits.limits(),
             verify: !self.no_verify,
             operating_point: self.op.unwrap_or(OperatingPoint::ALL),
             stop_at_first_error: self.strict,
             subset: self.subset,
-            ..Options::default()
+            ..self.limits.options()
         }
     }
 

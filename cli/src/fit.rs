@@ -110,8 +110,8 @@ impl Fit {
         let captures = Captures::find(&self.input)?;
         self.check(&captures)?;
         let opened = self.start.as_ref().map(|path| Opened::open(path, self.reading)).transpose()?;
-        let limits = self.limits.limits();
-        let mut starts = opened.as_ref().map(|opened| opened.frames(&limits, None)).transpose()?;
+        let options = self.limits.options_to_draw();
+        let mut starts = opened.as_ref().map(|opened| opened.frames(&options, None)).transpose()?;
         let inputs = starts.as_ref().map(Frames::inputs).unwrap_or_default();
         let mut earlier = self.earlier(&captures, &inputs)?;
         let span = self.frames.unwrap_or(FrameRange::ALL);

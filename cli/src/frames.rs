@@ -60,15 +60,15 @@ impl Opened {
     /// Its frames, from the first; of a stream those of an operating point, which files do not have.
     pub(crate) fn frames(
         &self,
-        limits: &Limits,
+        options: &Options,
         point: Option<OperatingPoint>,
     ) -> Result<Frames<'_>, Failure> {
         match self {
             Self::Stream(file) => {
                 let operating_point = point.unwrap_or(OperatingPoint::ALL);
-                file.check_point(operating_point, limits)?;
-                let options = Options { limits: *limits, operating_point, ..Options::default() };
-                let expected = file.sequence(limits).map_or(0, |sequence| sequence.frame_count);
+                let options = Options { operating_point, ..*options };
+                file.check_point(operating_point, &options.limits)?;
+                let expected = file.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
                 let frames =
                     stream::Frames::open(&file.bytes, &options).map_err(|error| file.fault(error))?;
                 Ok(Frames::Stream(Box::new(Decoding { file, frames, expected })))

@@ -69,11 +69,12 @@ impl Inspect {
         if self.dot && !self.view.deps {
             return Err(Failure::Usage("--dot is a form of --deps: give both".to_owned()));
         }
-        let limits = self.limits.limits();
+        let options = self.limits.options_to_draw();
+        let limits = options.limits;
         let stream = || StreamFile::read(&self.input);
         let error = match &self.view {
             View { units: true, .. } => units::show(&self.input, &limits, console),
-            View { ops: true, .. } => points::show(&stream()?, &limits, console),
+            View { ops: true, .. } => points::show(&stream()?, &options, console),
             View { deps: true, .. } => deps::show(&stream()?, self.dot, &limits, console),
             View { stats: true, .. } => costs::show(&stream()?, &limits, console),
             View { hex: Some(unit), .. } => hex::show(&stream()?, *unit, &limits, console),

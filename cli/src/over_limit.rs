@@ -5,6 +5,9 @@ use splatstream_format::{Error, ErrorKind, Limits};
 /// The option that raises limits.
 const OPTION: &str = "--max-gaussians";
 
+/// The option that says how much memory decoding may take.
+const MEMORY: &str = "--max-memory";
+
 /// The advice for an error of this class in a stream of a level, if that is known.
 pub(crate) fn advice(error: &Error, level: Option<u8>) -> String {
     let ErrorKind::OverLimit { limit, asked, allowed } = error.kind else { return String::new() };
@@ -16,6 +19,13 @@ pub(crate) fn advice(error: &Error, level: Option<u8>) -> String {
         "max_gaussians" => (u64::from(of_level.max_gaussians), asked),
         "max_gaussian_rate" => (of_level.max_gaussian_rate, of_level.max_gaussians.into()),
         "max_learned" => (of_level.max_learned.into(), of_level.max_gaussians.into()),
+        "memory in bytes" => {
+            return format!(
+                "decoding it may take more memory than this machine has free: close other programs, decode a lower operating \
+                 point, or allow it with {MEMORY} {}",
+                megabytes(asked)
+            );
+        }
         "memory of this machine" => {
             return "decoding it takes more memory than there is: close other programs, or take a machine with more"
                 .to_owned();
@@ -32,6 +42,11 @@ pub(crate) fn advice(error: &Error, level: Option<u8>) -> String {
         None => "one of the specification".to_owned(),
     };
     format!("no option raises this limit: it is {whose}; report it to the author of the encoder")
+}
+
+/// A size as the option reads it, rounded up.
+fn megabytes(bytes: u64) -> String {
+    format!("{}M", bytes.div_ceil(1 << 20))
 }
 
 #[cfg(test)]
@@ -51,6 +66,7 @@ mod tests {
         // Up to the level, and no further.
         assert!(!helps(&of("max_gaussians", (1 << 18) + 1, 1 << 18, Some(1))));
         assert!(!helps(&of("max_gaussians", u32::MAX.into(), 4 << 20, Some(4))));
+        assert!(of("memory in bytes", (7 << 30) + 1, 1 << 30, Some(4)).ends_with("--max-memory 7169M"));
         // The limits that go with it.
         for (limit, asked, allowed) in
             [("max_gaussian_rate", 1 << 29, 1 << 28), ("max_learned", 3 << 20, 2 << 20)]

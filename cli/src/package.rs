@@ -12,7 +12,7 @@ use crate::stream_file::{LimitArgs, StreamFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use splatstream_chart::numbers::percent;
-use splatstream_format::Limits;
+use splatstream_decoder::process;
 use splatstream_stream::Representation;
 use splatstream_stream::live::Settings;
 use splatstream_stream::manifest::{Manifest, RepresentationInfo};
@@ -109,7 +109,7 @@ impl PackageStream {
             return live::run((&self.input, &self.out), &settings, &self.limits.limits(), console);
         }
         let stream = StreamFile::read(&self.input)?;
-        let package = package(&stream, &options, &self.limits.limits(), self.quality)?;
+        let package = package(&stream, &options, &self.limits.options_to_draw(), self.quality)?;
         self.clear(stale)?;
         let sizes = write(&package, &self.out, slice::from_ref(&self.input))?;
         let report = Report::new(&self.out, &package.manifest, sizes);
@@ -154,12 +154,13 @@ pub(crate) fn files_in(directory: &Path) -> Vec<PathBuf> {
 pub(crate) fn package<'a>(
     stream: &'a StreamFile,
     options: &Options,
-    limits: &Limits,
+    decoding: &process::Options,
     quality: bool,
 ) -> Result<Package<'a>, Failure> {
-    let mut package = Package::of(&stream.bytes, options, limits).map_err(|error| stream.fault(error))?;
+    let mut package =
+        Package::of(&stream.bytes, options, &decoding.limits).map_err(|error| stream.fault(error))?;
     if quality {
-        package.manifest.quality = Some(quality::measure(stream, &package.manifest, limits)?);
+        package.manifest.quality = Some(quality::measure(stream, &package.manifest, decoding)?);
     }
     Ok(package)
 }

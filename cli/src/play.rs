@@ -131,7 +131,7 @@ impl Play {
                 Report::of_simulation(client.manifest(), &ladder, &outcome)
             }
             None => {
-                let mut decoding = Decoding::start(!self.no_decode, self.limits.limits())?;
+                let mut decoding = Decoding::start(!self.no_decode, self.limits.options())?;
                 let show = &mut |gop: &PlayedGop<'_>| {
                     if !console.is_json() {
                         console.note(|| report::line(gop));

@@ -113,9 +113,9 @@ impl Render {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "pictures")?;
         let opened = Opened::open(&self.input, self.reading)?;
-        let limits = self.limits.limits();
-        let description = opened.description(&limits).unwrap_or_default();
-        let mut frames = opened.frames(&limits, self.op)?;
+        let options = self.limits.options_to_draw();
+        let description = opened.description(&options.limits).unwrap_or_default();
+        let mut frames = opened.frames(&options, self.op)?;
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));

@@ -1,9 +1,13 @@
 //! A stream on disk, and how much a command agrees to decode of it.
 
 use crate::failure::Failure;
+use crate::input_args::parse_size;
+use crate::machine;
 use crate::output_file::STANDARD;
 use clap::Args;
+use splatstream_decoder::budget::Budget;
 use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::process::Options;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::syntax::{FileHeader, SIGNATURE, SequenceParameters, UnitType};
 use splatstream_format::unit::{Landmark, Stream};
@@ -21,6 +25,12 @@ pub(crate) struct LimitArgs {
     #[arg(long, value_name = "N", default_value_t = Limits::default().max_gaussians)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     max_gaussians: u32,
+
+    /// Most memory that decoding may take, as in 512M or 4G; a stream that asks for more is refused (exit code 13)
+    /// [default: three quarters of what this machine has free, and a quarter of that where frames are drawn or
+    /// compared].
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    max_memory: Option<u64>,
 }
 
 impl LimitArgs {
@@ -33,6 +43,22 @@ impl LimitArgs {
             false => default,
         };
         Limits { max_gaussians: self.max_gaussians, ..others }
+    }
+
+    /// How to decode: all of a stream, within the limits and the memory asked for, or that there is.
+    pub(crate) fn options(&self) -> Options {
+        self.within(machine::memory())
+    }
+
+    /// The same where frames are drawn or compared, which takes up to three times what decoding them takes, and some are
+    /// decoded side by side.
+    pub(crate) fn options_to_draw(&self) -> Options {
+        self.within(machine::memory() / 4)
+    }
+
+    fn within(&self, memory: u64) -> Options {
+        let budget = Budget { memory: self.max_memory.unwrap_or(memory), ..Budget::UNLIMITED };
+        Options { limits: self.limits(), budget, ..Options::default() }
     }
 }
 

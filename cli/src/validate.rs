@@ -7,7 +7,6 @@ use crate::progress::Progress;
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
 use serde::Serialize;
-use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Summary, decode_stream};
 use splatstream_format::Class;
 use std::ops::ControlFlow;
@@ -44,11 +43,10 @@ impl Validate {
     /// Decodes all of the stream, also after errors; the exit code is the verdict, the first of them.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let stream = StreamFile::read(&self.input)?;
-        let limits = self.limits.limits();
-        let frames = stream.sequence(&limits).map_or(0, |sequence| sequence.frame_count);
+        let options = self.limits.options();
+        let frames = stream.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
         let progress = Progress::frames("checking", frames);
         let mut gaussians = 0;
-        let options = Options { limits, ..Options::default() };
         let summary = decode_stream(&stream.bytes, &options, |_, frame| {
             gaussians += frame.planes.len() as u64;
             progress.at(frame.index.saturating_add(1));

@@ -4,20 +4,19 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_format::Limits;
 use splatstream_gaussians::{FrameError, GaussianFrame};
 use std::ops::ControlFlow;
 
-/// The first frame at an operating point of which something is shown; none if there is none.
+/// The first frame at an operating point, not that of `options`, of which something is shown; none if there is none.
 ///
 /// # Errors
 /// Planes that make no frame: the decoder is at fault.
 pub fn first_frame(
     stream: &[u8],
     operating_point: OperatingPoint,
-    limits: &Limits,
+    options: &Options,
 ) -> Result<Option<GaussianFrame>, FrameError> {
-    let options = Options { limits: *limits, operating_point, ..Options::default() };
+    let options = Options { operating_point, ..*options };
     let mut first = None;
     let _faults = decode_stream(stream, &options, |sequence, frame| {
         if frame.is_lost {

@@ -5,7 +5,7 @@ use super::picture_comparison::{BACKGROUND, Judge};
 use crate::Error;
 use crate::first_frame::first_frame;
 use crate::report::File;
-use splatstream_format::Limits;
+use splatstream_decoder::process::Options;
 use splatstream_render::{Image, render};
 
 /// What differences are multiplied with: an eighth of the range is the end of the scale.
@@ -60,7 +60,7 @@ pub(crate) fn pictures(
     let source = keep(&reference.colour, "source.png")?;
     let mut levels = Vec::new();
     for point in &run.points {
-        let Some(frame) = first_frame(&run.stream, point.info.point, &Limits::default())? else { continue };
+        let Some(frame) = first_frame(&run.stream, point.info.point, &Options::default())? else { continue };
         let image = render(&frame, camera, BACKGROUND).colour;
         let percent = point.info.percent;
         let view = point.frames.first().and_then(|frame| frame.views.get(place));

@@ -5,8 +5,8 @@ use crate::stream_file::StreamFile;
 use rayon::prelude::*;
 use splatstream_chart::first_frame::first_frame;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo};
+use splatstream_decoder::process::Options;
 use splatstream_encoder::up_of;
-use splatstream_format::Limits;
 use splatstream_gaussians::FrameError;
 use splatstream_render::ReferencePictures;
 use splatstream_render::camera::held_out;
@@ -31,18 +31,18 @@ pub(super) struct Quality {
 pub(super) fn qualities(
     stream: &StreamFile,
     points: &[OperatingPointInfo],
-    limits: &Limits,
+    options: &Options,
 ) -> Result<Vec<Quality>, FrameError> {
     let bytes = stream.bytes.as_slice();
     let highest = points.iter().max_by_key(|info| {
         let OperatingPoint { spatial, temporal, refinement } = info.point;
         (spatial, refinement, temporal)
     });
-    let first = |info: &OperatingPointInfo| first_frame(bytes, info.point, limits);
+    let first = |info: &OperatingPointInfo| first_frame(bytes, info.point, options);
     let Some(reference) = highest.map(first).transpose()?.flatten() else {
         return Ok(vec![Quality::default(); points.len()]);
     };
-    let description = stream.description(limits).unwrap_or_default();
+    let description = stream.description(&options.limits).unwrap_or_default();
     let given = of_stream(&description, VIEWS.1);
     let up = up_of(description.up_axis).unwrap_or_default();
     let cameras = held_out(&reference, up, &given, VIEWS.0, VIEWS.1);

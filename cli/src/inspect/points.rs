@@ -58,20 +58,21 @@ struct List {
 }
 
 /// Lists the operating points, smallest first.
-pub(super) fn show(stream: &StreamFile, limits: &Limits, console: &Console) -> Shown {
+pub(super) fn show(stream: &StreamFile, options: &Options, console: &Console) -> Shown {
+    let limits = &options.limits;
     let found =
         operating_points(&stream.bytes, limits).and_then(|infos| Ok((infos, list(&stream.bytes, limits)?)));
     let (infos, list) = match found {
         Ok(found) => found,
         Err(error) => return Ok(Some(error)),
     };
-    let qualities = qualities(stream, &infos, limits)?;
+    let qualities = qualities(stream, &infos, options)?;
     let point = |(info, quality)| Point::new(info, list.as_ref(), quality);
     let mut points: Vec<Point> = infos.iter().zip(qualities).map(point).collect();
     let mut error = None;
     if console.is_json() {
         for (point, info) in points.iter_mut().zip(&infos) {
-            error = error.or(point.decode(&stream.bytes, info.point, limits));
+            error = error.or(point.decode(&stream.bytes, info.point, options));
         }
     }
     console
@@ -143,8 +144,8 @@ impl Point {
     }
 
     /// Decodes at the point, for the digests; gives the first error.
-    fn decode(&mut self, bytes: &[u8], operating_point: OperatingPoint, limits: &Limits) -> Option<Error> {
-        let options = Options { limits: *limits, operating_point, ..Options::default() };
+    fn decode(&mut self, bytes: &[u8], operating_point: OperatingPoint, options: &Options) -> Option<Error> {
+        let options = Options { operating_point, ..*options };
         let summary = decode_stream(bytes, &options, |_, frame| {
             self.digests.push(FrameDigest {
                 frame: frame.index,

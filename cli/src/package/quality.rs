@@ -32,8 +32,9 @@ const MOST_DB: f64 = 50.0;
 pub(super) fn measure(
     stream: &StreamFile,
     manifest: &Manifest,
-    limits: &Limits,
+    options: &Options,
 ) -> Result<Vec<QualityInfo>, Failure> {
+    let limits = &options.limits;
     let division = Division::of(&stream.bytes, limits).map_err(|error| stream.fault(error))?;
     let progress = Progress::frames("measuring", manifest.stream.frames.try_into().unwrap_or(u32::MAX));
     let points = points(manifest);
@@ -42,7 +43,7 @@ pub(super) fn measure(
     let (mut cameras, mut table) = (Vec::new(), Vec::new());
     for (number, (info, gop)) in (0..).zip(manifest.gops.iter().zip(&division.gops)) {
         let wanted = samples(info);
-        let decode = |point| decode(&stream.bytes, gop.start, &wanted, point, limits);
+        let decode = |point| decode(&stream.bytes, gop.start, &wanted, point, options);
         let whole = decode(OperatingPoint::ALL)?;
         if let Some(first) = whole.iter().flatten().next().filter(|_| cameras.is_empty()) {
             cameras = views(stream, first, limits)?;
@@ -102,9 +103,9 @@ fn decode(
     gop: u64,
     samples: &[Sample],
     operating_point: OperatingPoint,
-    limits: &Limits,
+    options: &Options,
 ) -> Result<Vec<Option<GaussianFrame>>, Failure> {
-    let options = Options { limits: *limits, operating_point, ..Options::default() };
+    let options = Options { operating_point, ..*options };
     let (mut shown, mut failed) = (vec![None; samples.len()], None);
     let _summary = decode_stream_inside(bytes, gop, &options, |sequence, frame| {
         let index = frame.index;

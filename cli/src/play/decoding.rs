@@ -5,7 +5,6 @@ use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Step, StreamDecoder};
-use splatstream_format::Limits;
 use splatstream_stream::client::PlayedGop;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -48,12 +47,12 @@ struct Running {
 
 impl Decoding {
     /// A decoder, if one is wanted.
-    pub(super) fn start(wanted: bool, limits: Limits) -> Result<Self, Failure> {
+    pub(super) fn start(wanted: bool, options: Options) -> Result<Self, Failure> {
         if !wanted {
             return Ok(Self { running: None });
         }
         let (jobs, waiting) = sync_channel::<Job>(WAITING);
-        let work = move || waiting.iter().map(|job| (job.number, decode(&job, &limits))).collect();
+        let work = move || waiting.iter().map(|job| (job.number, decode(&job, &options))).collect();
         let thread = std::thread::Builder::new().name("decoder".into()).spawn(work);
         let thread = thread.map_err(|error| Failure::other(format!("cannot start a decoder: {error}")))?;
         Ok(Self { running: Some(Running { jobs, thread }) })
@@ -82,8 +81,8 @@ impl Decoding {
     }
 }
 
-fn decode(job: &Job, limits: &Limits) -> Decoded {
-    let options = Options { limits: *limits, operating_point: job.point, ..Options::default() };
+fn decode(job: &Job, options: &Options) -> Decoded {
+    let options = Options { operating_point: job.point, ..*options };
     let mut decoded = Decoded::default();
     let start = Instant::now();
     let mut decoder = StreamDecoder::inside(job.head as u64, &options);

@@ -5,9 +5,9 @@ use crate::failure::Failure;
 use crate::package::{package, write};
 use crate::progress::Progress;
 use crate::stream_file::StreamFile;
+use splatstream_decoder::process;
 use splatstream_encoder::encode;
 use splatstream_files::builtin::BuiltinScene;
-use splatstream_format::Limits;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_stream::package::Options;
 use std::path::Path;
@@ -29,7 +29,7 @@ pub(super) fn make(directory: &Path) -> Result<(), Failure> {
     encode(&mut frames, &demo::settings(SCENE.frames), &mut bytes, &mut |done, _| progress.at(done))
         .map_err(|error| Failure::other(error.to_string()))?;
     let stream = StreamFile { path: directory.join("built-in.gss"), bytes };
-    let package = package(&stream, &Options::default(), &Limits::default(), true)?;
+    let package = package(&stream, &Options::default(), &process::Options::default(), true)?;
     write(&package, directory, &[])?;
     Ok(())
 }

@@ -121,6 +121,11 @@ fn over_a_limit_is_13() {
         let said = fail(13, &[command, &[text(&stream), "--max-gaussians", "10"]].concat());
         assert!(said.contains("--max-gaussians"), "{said}");
     }
+    // What decoding may take is bounded by what the machine has, or as the user says.
+    for command in [&["validate"][..], &["decode", "--dry-run"], &["compare", text(&stream)]] {
+        let said = fail(13, &[command, &[text(&stream), "--max-memory", "1M"]].concat());
+        assert!(said.contains("or allow it with --max-memory "), "{said}");
+    }
     // What no option helps with is not said to be helped by one.
     for vector in ["limit-codebook-values", "limit-payload-length", "limit-gaussians-4294967295"] {
         let vectors = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/vectors/invalid/limit");
