@@ -40,7 +40,7 @@ pub enum SceneFormat {
     Splat,
     /// Versions 1 to 4: [`spz`].
     Spz,
-    /// A directory or a ZIP archive of images: [`sog`].
+    /// A directory of images, or a ZIP archive of them or of their directory: [`sog`].
     Sog,
     /// `.glb` and `.gltf` with Gaussians: [`gltf`].
     Gltf,
@@ -161,9 +161,8 @@ fn format_of(head: &[u8], path: &Path, whole: impl Read + Seek) -> Result<SceneF
         return Ok(if is_tar(&start) { SceneFormat::Archive } else { SceneFormat::Spz });
     }
     if is_zip(head) {
-        let has_meta =
-            ZipArchive::new(whole).is_ok_and(|archive| archive.index_for_name(sog::META).is_some());
-        let is_sog = has_meta || has_extension("sog");
+        let has_scene = ZipArchive::new(whole).is_ok_and(|archive| sog::folder_in(&archive).is_some());
+        let is_sog = has_scene || has_extension("sog");
         return Ok(if is_sog { SceneFormat::Sog } else { SceneFormat::Archive });
     }
     if is_tar(head) {

@@ -19,7 +19,7 @@ mod palette;
 mod planes;
 mod write;
 
-use std::io::Cursor;
+use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
 use zip::ZipArchive;
@@ -27,7 +27,7 @@ use zip::ZipArchive;
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
-use crate::sequence::read_member;
+use crate::sequence::{is_frame, is_hidden, read_member};
 use splatstream_gaussians::GaussianFrame;
 
 pub use write::write_zip;
@@ -58,7 +58,25 @@ pub(crate) fn read_dir_as_is(directory: &Path, budget: &mut Budget) -> Result<Ga
     planes::read(fetch, budget).map_err(|error| error.in_file(directory))
 }
 
-/// Reads a SOG scene bundled as a ZIP archive. Opacity 0 and 255 become finite logits.
+/// Where a ZIP archive has the files of a SOG scene, as what their names begin with: nothing, or the one folder with a
+/// `meta.json` of an archive without frames in other formats. None if the archive holds no scene, or several.
+pub(crate) fn folder_in<R: Read + Seek>(archive: &ZipArchive<R>) -> Option<String> {
+    if archive.index_for_name(META).is_some() {
+        return Some(String::new());
+    }
+    let mut folder = None;
+    for name in archive.file_names().filter_map(Result::ok).filter(|name| !is_hidden(name)) {
+        match name.strip_suffix(META).filter(|folder| folder.ends_with('/')) {
+            Some(_) if folder.is_some() => return None,
+            Some(found) => folder = Some(found.to_owned()),
+            None if is_frame(&name) => return None,
+            None => {}
+        }
+    }
+    folder
+}
+
+/// Reads a SOG scene bundled as a ZIP archive, by itself or in one folder. Opacity 0 and 255 become finite logits.
 ///
 /// # Errors
 /// Those of [`read_dir`]; the message names the member at fault.
@@ -71,8 +89,10 @@ pub(crate) fn read_zip_as_is(bytes: &[u8], budget: &mut Budget) -> Result<Gaussi
     let refuse = |what: String| SceneError::inconsistent(what, "this is no SOG archive, or it is damaged");
     let mut archive =
         ZipArchive::new(Cursor::new(bytes)).map_err(|error| refuse(format!("cannot list it: {error}")))?;
+    let folder = folder_in(&archive).unwrap_or_default();
     let fetch = |name: &str, budget: &mut Budget| {
-        let member = archive.by_name(name).map_err(|error| refuse(format!("{name}: {error}")))?;
+        let name = format!("{folder}{name}");
+        let member = archive.by_name(&name).map_err(|error| refuse(format!("{name}: {error}")))?;
         read_member(member, budget)
     };
     planes::read(fetch, budget)

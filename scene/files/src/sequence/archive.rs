@@ -75,15 +75,24 @@ fn frames<'a>(
     }
 }
 
+/// Whether the name of a member is that of a frame.
+pub(crate) fn is_frame(name: &str) -> bool {
+    kind(name).is_some()
+}
+
+/// Whether a member is what systems put beside files.
+pub(crate) fn is_hidden(name: &str) -> bool {
+    let file = Path::new(name).file_name();
+    file.is_some_and(|file| file.as_encoded_bytes().starts_with(b".")) || name.starts_with("__MACOSX/")
+}
+
 /// The format that the name of a member promises; none for folders and for what systems put beside files.
 fn kind(name: &str) -> Option<&'static str> {
-    let path = Path::new(name);
-    let is_hidden = path.file_name()?.to_str()?.starts_with('.') || name.starts_with("__MACOSX/");
-    let extension = path.extension()?.to_str()?;
+    let extension = Path::new(name).extension()?.to_str()?;
     // The buffers of a .gltf would be other members.
     let known =
         EXTENSIONS.into_iter().find(|known| extension.eq_ignore_ascii_case(known) && *known != "gltf");
-    known.filter(|_| !is_hidden && !name.ends_with('/'))
+    known.filter(|_| !is_hidden(name) && !name.ends_with('/'))
 }
 
 /// The bytes of a member of a ZIP archive, as many as it says.
