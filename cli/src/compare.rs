@@ -34,7 +34,7 @@ use std::path::{Path, PathBuf};
     splatstream compare garden.ply garden.gss --match nearest --json\n  \
     splatstream compare garden.ply garden.gss --cameras ring:8 --height 1080")]
 pub(crate) struct Compare {
-    /// A stream, a scene, or a directory of frames; - is a stream on standard input.
+    /// A stream, a scene, or a directory of frames; - is a stream or a scene on standard input, but no .splat or .ksplat.
     a: PathBuf,
     /// Another.
     b: PathBuf,

@@ -15,6 +15,7 @@ use splatstream_gaussians::GaussianFrame;
 use std::collections::BTreeSet;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The file that makes a directory a SOG scene.
 const SOG_META: &str = "meta.json";
@@ -30,7 +31,7 @@ pub(crate) struct FrameFiles {
     /// Whether values that no frame may hold are left to whoever asks for the frames.
     as_is: bool,
     /// What came by standard input, until it is read.
-    spooled: Option<Unfinished>,
+    spooled: Option<Arc<Unfinished>>,
     /// The fewest and the most Gaussians of the frames read so far.
     counts: Option<(usize, usize)>,
     /// What readers have noted.
@@ -46,13 +47,10 @@ const STANDARD_INPUT: &str = "standard input";
 impl FrameFiles {
     /// The frames that the arguments of a command name: files, or one directory of frames, or one file of many.
     pub(crate) fn find(inputs: &[PathBuf], reading: InputArgs) -> Result<Self, Failure> {
-        let mut spooled = None;
         let mut paths = match inputs {
             [only] if only.as_path() == Path::new(STANDARD) => {
-                let file = spool(&mut io::stdin().lock(), reading.most())?;
-                let path = file.path().to_path_buf();
-                spooled = Some(file);
-                vec![path]
+                let spooled = spool(&mut io::stdin().lock(), reading.most())?;
+                return Self::of_spooled(Arc::new(spooled), reading);
             }
             [directory] if is_folder(directory) => frames_in(directory)?,
             files => {
@@ -67,10 +65,24 @@ impl FrameFiles {
             }
         };
         paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
+        Self::of(paths, None, reading)
+    }
+
+    /// The frames that came by standard input: see [`spool`].
+    pub(crate) fn of_spooled(spooled: Arc<Unfinished>, reading: InputArgs) -> Result<Self, Failure> {
+        Self::of(vec![spooled.path().to_path_buf()], Some(spooled), reading)
+    }
+
+    /// The frames of files in their order.
+    fn of(
+        paths: Vec<PathBuf>,
+        spooled: Option<Arc<Unfinished>>,
+        reading: InputArgs,
+    ) -> Result<Self, Failure> {
         let sequence = match paths.as_slice() {
             [only] if is_sequence(only) => {
                 let opened = Sequence::open(only, &reading.limits(only), &reading.sequence());
-                Some(opened.map_err(|error| Failure::other(named(&error, only, spooled.as_ref())))?)
+                Some(opened.map_err(|error| Failure::other(named(&error, only, spooled.is_some())))?)
             }
             _ => None,
         };
@@ -132,7 +144,7 @@ fn is_folder(path: &Path) -> bool {
 
 /// Standard input in a file: scenes are read more than once. What is no scene is refused by how it begins, and of what is
 /// one no more than `most` bytes are kept: it may have no end.
-fn spool(input: &mut dyn Read, most: u64) -> Result<Unfinished, Failure> {
+pub(crate) fn spool(input: &mut dyn Read, most: u64) -> Result<Unfinished, Failure> {
     let directory = std::env::temp_dir();
     let failed = |error| Failure::file("keep standard input in", &directory, &error);
     let (mut file, unfinished) = Unfinished::create(&directory, false).map_err(failed)?;
@@ -140,8 +152,7 @@ fn spool(input: &mut dyn Read, most: u64) -> Result<Unfinished, Failure> {
     if is_stream(unfinished.path()) {
         return Err(is_encoded(STANDARD_INPUT));
     }
-    detect(unfinished.path())
-        .map_err(|error| Failure::other(named(&error, unfinished.path(), Some(&unfinished))))?;
+    detect(unfinished.path()).map_err(|error| Failure::other(named(&error, unfinished.path(), true)))?;
     count += io::copy(&mut input.take((most + 1).saturating_sub(count)), &mut file).map_err(failed)?;
     if count > most {
         return Err(Failure::other(format!(
@@ -192,15 +203,15 @@ impl FrameFiles {
             Some(sequence) => sequence.frame(number),
             None => read_scene_as_is(path, &self.reading.limits(path)),
         };
-        read.map_err(|error| named(&error, path, self.spooled.as_ref()))
+        read.map_err(|error| named(&error, path, self.spooled.is_some()))
     }
 }
 
 /// An error of reading, with advice; what came by standard input is called that.
-fn named(error: &SceneError, path: &Path, spooled: Option<&Unfinished>) -> String {
-    match spooled {
-        Some(_) => with_advice(error).replace(&*path.to_string_lossy(), STANDARD_INPUT),
-        None => with_advice(error),
+fn named(error: &SceneError, path: &Path, is_spooled: bool) -> String {
+    match is_spooled {
+        true => with_advice(error).replace(&*path.to_string_lossy(), STANDARD_INPUT),
+        false => with_advice(error),
     }
 }
 

@@ -2,19 +2,23 @@
 
 use crate::encode::warnings::Warning;
 use crate::failure::{Failure, StreamFault};
-use crate::frame_files::FrameFiles;
+use crate::frame_files::{FrameFiles, spool};
 use crate::input_args::InputArgs;
 use crate::output_file::STANDARD;
 use crate::stream_file::{StreamFile, is_stream};
+use crate::unfinished::Unfinished;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream;
 use splatstream_encoder::FrameSource;
 use splatstream_format::payload::SceneDescription;
+use splatstream_format::syntax::SIGNATURE;
 use splatstream_format::{Error, Limits};
 use splatstream_gaussians::GaussianFrame;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Frames that a user named: a stream, or files.
 pub(crate) enum Opened {
@@ -22,6 +26,8 @@ pub(crate) enum Opened {
     Stream(StreamFile),
     /// A scene file, a file of many frames or a directory of frames, and how it is read.
     Scene(PathBuf, InputArgs),
+    /// A scene file or a file of many frames that came by standard input.
+    Spooled(Arc<Unfinished>, InputArgs),
 }
 
 /// The frames, in order.
@@ -42,18 +48,29 @@ pub(crate) struct Decoding<'a> {
 impl Opened {
     /// What a user named; its content decides what it is.
     pub(crate) fn open(path: &Path, reading: InputArgs) -> Result<Self, Failure> {
-        // Scenes come as files and directories; what comes by a pipe is a stream, or an error that says so.
-        if path == Path::new(STANDARD) || is_stream(path) {
-            return StreamFile::read(path).map(Self::Stream);
+        match path == Path::new(STANDARD) {
+            true => Self::of_standard_input(reading),
+            false if is_stream(path) => StreamFile::read(path).map(Self::Stream),
+            false => Ok(Self::Scene(path.to_path_buf(), reading)),
         }
-        Ok(Self::Scene(path.to_path_buf(), reading))
+    }
+
+    /// What comes by standard input: a stream, or else a scene, which is kept in a file.
+    fn of_standard_input(reading: InputArgs) -> Result<Self, Failure> {
+        let start = StreamFile::read(Path::new(STANDARD))?;
+        if start.bytes.starts_with(&SIGNATURE) {
+            return Ok(Self::Stream(start));
+        }
+        let mut whole = start.bytes.chain(io::stdin().lock());
+        let spooled = spool(&mut whole, reading.most())?;
+        Ok(Self::Spooled(Arc::new(spooled), reading))
     }
 
     /// What a stream says about its scene.
     pub(crate) fn description(&self, limits: &Limits) -> Option<SceneDescription> {
         match self {
             Self::Stream(file) => file.description(limits),
-            Self::Scene(..) => None,
+            Self::Scene(..) | Self::Spooled(..) => None,
         }
     }
 
@@ -77,12 +94,19 @@ impl Opened {
                 "{}: only a stream has operating points; leave --op out",
                 path.display()
             ))),
-            Self::Scene(path, reading) => {
-                let files = Box::new(FrameFiles::find(std::slice::from_ref(path), *reading)?);
-                Ok(Frames::Files { files, next: 0 })
+            Self::Spooled(..) if point.is_some() => Err(Failure::Usage(
+                "standard input: only a stream has operating points; leave --op out".to_owned(),
+            )),
+            Self::Scene(path, reading) => of_files(FrameFiles::find(std::slice::from_ref(path), *reading)?),
+            Self::Spooled(spooled, reading) => {
+                of_files(FrameFiles::of_spooled(Arc::clone(spooled), *reading)?)
             }
         }
     }
+}
+
+fn of_files(files: FrameFiles) -> Result<Frames<'static>, Failure> {
+    Ok(Frames::Files { files: Box::new(files), next: 0 })
 }
 
 impl Frames<'_> {

@@ -30,7 +30,7 @@ use std::time::Instant;
     splatstream render talk.gss --camera ring:4 -o pictures/ --op s0,t0,r0 --frames 0..1"
 )]
 pub(crate) struct Render {
-    /// A stream, a scene file, or a directory of frames; - is a stream on standard input.
+    /// A stream, a scene file, or a directory of frames; - is a stream or a scene on standard input, but no .splat or .ksplat.
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// A cameras.json or transforms.json, or a directory with a model of COLMAP; ring:N and forward:N make N cameras for the first frame. Default: the cameras

@@ -1,6 +1,8 @@
 //! What people and scripts are told: the messages of documented cases, and the JSON beside them.
 
-use crate::common::{directory, fail, json, run, scene, succeed, text, write_frames, write_still};
+use crate::common::{
+    directory, fail, fixture, json, run, run_with, scene, succeed, text, write_frames, write_still,
+};
 use serde_json::Value;
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::ply;
@@ -40,6 +42,26 @@ fn a_scene_for_a_stream_and_a_stream_for_a_scene() {
     let validate = fail(10, &["validate", text(&still)]);
     let encode = fail(1, &["encode", text(&stream), "-o", text(&directory.path().join("again.gss"))]);
     insta::assert_snapshot!(plain(&[validate, encode].concat(), directory.path()));
+}
+
+#[test]
+fn a_scene_may_come_by_standard_input_wherever_frames_are_read() {
+    let directory = directory();
+    let still = write_still(directory.path());
+    let bytes = fs::read(&still).unwrap();
+    let compared = run_with(&["compare", "-", text(&still), "--json"], &bytes);
+    assert!(compared.status.success(), "{compared:?}");
+    let report: Value = serde_json::from_slice(&compared.stdout).unwrap();
+    assert_eq!((&report["gaussians_a"], &report["pairs"]), (&600.into(), &600.into()));
+    assert_eq!(report["attributes"]["position"]["max"], 0.0);
+    let streamed = run_with(&["compare", "-", text(&fixture())], &fs::read(fixture()).unwrap());
+    assert!(streamed.status.success(), "{streamed:?}");
+    let pictures = directory.path().join("pictures");
+    let render = ["render", "-", "-o", text(&pictures), "--camera", "ring:1", "--height", "16"];
+    assert!(run_with(&render, &bytes).status.success());
+    let refused = run_with(&[&render[..], &["--op", "s0,t0,r0"]].concat(), &bytes);
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(said.contains("standard input: only a stream has operating points"), "{said}");
 }
 
 #[test]
