@@ -20,8 +20,8 @@ pub(crate) enum Failure {
         path: PathBuf,
         /// Its first error.
         error: Error,
-        /// Whether it is a scene instead, in a format that `encode` reads.
-        is_scene: bool,
+        /// What it is if not a stream.
+        instead: Instead,
         /// The level of the stream, if it is known.
         level: Option<u8>,
     },
@@ -38,6 +38,17 @@ pub(crate) enum Failure {
         /// A line of JSON.
         line: String,
     },
+}
+
+/// What a file is that is given for a stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Instead {
+    /// It is a stream, or nothing is known about it.
+    Nothing,
+    /// A scene in a format that `encode` reads.
+    Scene,
+    /// A file without bytes.
+    Empty,
 }
 
 impl Failure {
@@ -63,7 +74,7 @@ impl Failure {
 
     /// A stream that breaks the specification.
     pub(crate) fn stream(path: &Path, error: Error) -> Self {
-        Self::Stream { path: path.to_path_buf(), error, is_scene: false, level: None }
+        Self::Stream { path: path.to_path_buf(), error, instead: Instead::Nothing, level: None }
     }
 
     /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error, 130 interrupted.
@@ -87,9 +98,13 @@ impl fmt::Display for Failure {
             | Self::Decoder(message)
             | Self::Interrupted(message) => f.write_str(message),
             Self::Verdict { line, .. } => f.write_str(line),
-            Self::Stream { path, error, is_scene, level } => {
+            Self::Stream { path, error, instead, level } => {
                 let name = if is_standard(path) { "standard input".into() } else { path.to_string_lossy() };
-                let advice = if *is_scene { OF_SCENE.to_owned() } else { advice(error, *level) };
+                let advice = match instead {
+                    Instead::Nothing => advice(error, *level),
+                    Instead::Scene => OF_SCENE.to_owned(),
+                    Instead::Empty => return write!(f, "{name}: it is empty\n  {OF_NOTHING}"),
+                };
                 write!(f, "{name}: {error}\n  {}", advice.replace("FILE", &path.to_string_lossy()))
             }
         }
@@ -98,6 +113,9 @@ impl fmt::Display for Failure {
 
 /// What to do with a scene that is given for a stream.
 const OF_SCENE: &str = "this is a scene, not a stream; `splatstream encode FILE -o STREAM.gss` encodes it";
+
+/// What to do with a file that has no bytes.
+const OF_NOTHING: &str = "check what wrote it, or copy it again";
 
 /// What to do about an error of a stream of this level; FILE stands for the stream.
 fn advice(error: &Error, level: Option<u8>) -> String {

@@ -1,6 +1,6 @@
 //! A stream on disk, and how much a command agrees to decode of it.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Instead};
 use crate::input_args::parse_size;
 use crate::machine;
 use crate::output_file::STANDARD;
@@ -87,7 +87,7 @@ impl StreamFile {
         Failure::Stream {
             path: self.path.clone(),
             error,
-            is_scene: is_scene(&self.path, &error),
+            instead: if self.bytes.is_empty() { Instead::Empty } else { instead(&self.path, &error) },
             level: FileHeader::parse(&self.bytes).ok().map(|(header, _)| header.level),
         }
     }
@@ -140,17 +140,17 @@ impl StreamFile {
 
 /// A failure of the stream at a path, which may be a scene instead.
 pub(crate) fn fault(path: &Path, error: Error) -> Failure {
-    Failure::Stream {
-        path: path.to_path_buf(),
-        error,
-        is_scene: is_scene(path, &error),
-        level: level_of(path),
-    }
+    Failure::Stream { path: path.to_path_buf(), error, instead: instead(path, &error), level: level_of(path) }
 }
 
-/// Whether what is given for a stream is a scene in a format that `encode` reads.
-fn is_scene(path: &Path, error: &Error) -> bool {
-    error.kind == ErrorKind::Signature && splatstream_files::detect(path).is_ok()
+/// What is given for a stream, if it does not begin like one.
+fn instead(path: &Path, error: &Error) -> Instead {
+    let is_empty = || path.metadata().is_ok_and(|found| found.is_file() && found.len() == 0);
+    match error.kind {
+        ErrorKind::Signature if splatstream_files::detect(path).is_ok() => Instead::Scene,
+        _ if error.at == 0 && is_empty() => Instead::Empty,
+        _ => Instead::Nothing,
+    }
 }
 
 /// The level of the stream in a file; none of what comes by a pipe, which has gone by.

@@ -16,6 +16,9 @@ pub(crate) fn read_whole(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
 /// The text of a file.
 pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
     let text = whole(path, MOST_TEXT).and_then(|bytes| {
+        if bytes.is_empty() {
+            return Err(io::Error::new(ErrorKind::InvalidData, "it is empty"));
+        }
         String::from_utf8(bytes).map_err(|_| io::Error::new(ErrorKind::InvalidData, "it is not UTF-8 text"))
     });
     text.map_err(|error| Failure::file("read", path, &error))
@@ -46,6 +49,8 @@ mod tests {
         let said = read_whole(&path, 3).unwrap_err().to_string();
         assert!(said.contains("it has more than 3 bytes"), "{said}");
         assert_eq!(read_text(&path).unwrap(), "four");
+        std::fs::write(&path, []).unwrap();
+        assert!(read_text(&path).unwrap_err().to_string().contains("it is empty"));
         std::fs::write(&path, [0xff]).unwrap();
         assert!(read_text(&path).unwrap_err().to_string().contains("not UTF-8"));
     }

@@ -168,6 +168,7 @@ pub(crate) fn scene_error(py: Python<'_>, error: SceneError) -> PyErr {
     let message = error.to_string();
     let (kind, offset) = match error.kind {
         SceneErrorKind::Io(cause) => return os_error(cause, error.path.as_deref()),
+        SceneErrorKind::Empty => ("truncated", Some(0)),
         SceneErrorKind::Truncated { at, .. } => ("truncated", Some(at)),
         SceneErrorKind::Malformed { at, .. } => ("malformed", Some(at)),
         SceneErrorKind::Unsupported { .. } => ("unsupported", None),

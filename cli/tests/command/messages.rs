@@ -45,6 +45,38 @@ fn a_scene_for_a_stream_and_a_stream_for_a_scene() {
 }
 
 #[test]
+fn an_empty_input_is_called_empty() {
+    let directory = directory();
+    let at = |name: &str| directory.path().join(name);
+    let names = ["e.gss", "e.ply", "e.splat", "e.zip", "e.json", "e.csv"];
+    names.iter().for_each(|name| fs::write(at(name), []).unwrap());
+    let (stream, out) = (fixture(), at("out.gss"));
+    let [gss, ply, splat, zip, json, csv] = names.map(at);
+    let said = [
+        fail(14, &["validate", text(&gss)]),
+        fail(14, &["inspect", text(&gss)]),
+        fail(14, &["decode", text(&gss), "-o", text(&at("out"))]),
+        fail(14, &["extract", text(&gss), "--op", "s0,t0,r0", "-o", text(&out)]),
+        fail(14, &["package", text(&gss), "-o", text(&at("package"))]),
+        fail(14, &["concat", text(&gss), text(&stream), "-o", text(&out)]),
+        fail(1, &["encode", text(&ply), "-o", text(&out)]),
+        fail(1, &["encode", text(&splat), "-o", text(&out)]),
+        fail(1, &["encode", text(&zip), "-o", text(&out)]),
+        fail(1, &["compare", text(&stream), text(&ply)]),
+        fail(1, &["render", text(&stream), "--camera", text(&json), "-o", text(&at("pictures"))]),
+        fail(1, &["play", text(&directory.path().join("package")), "--trace", text(&csv)]),
+    ];
+    for said in said {
+        assert!(said.contains("it is empty"), "{said}");
+    }
+    let out = text(&out);
+    for arguments in [&["encode", "-", "-o", out][..], &["compare", "-", text(&stream)]] {
+        let said = String::from_utf8(run_with(arguments, &[]).stderr).unwrap();
+        assert!(said.starts_with("standard input: it is empty"), "{said}");
+    }
+}
+
+#[test]
 fn a_scene_may_come_by_standard_input_wherever_frames_are_read() {
     let directory = directory();
     let still = write_still(directory.path());

@@ -17,6 +17,9 @@ pub enum CameraError {
     /// The file could not be read.
     #[error("cannot read: {0}; check the path")]
     Io(#[from] std::io::Error),
+    /// A file without bytes.
+    #[error("it is empty; check what wrote it, or copy it again")]
+    Empty,
     /// Neither of the two forms.
     #[error(
         "neither a cameras.json (a list of id, width, height, position, rotation, fx, fy) nor a transforms.json \
@@ -128,6 +131,9 @@ fn json_file(path: &Path) -> Result<Capture, CameraError> {
     if bytes.len() as u64 > MAX_JSON {
         let error = format!("the file has more than {MAX_JSON} bytes");
         return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, error).into());
+    }
+    if bytes.is_empty() {
+        return Err(CameraError::Empty);
     }
     of_json(&bytes, path.parent().unwrap_or(Path::new("")))
 }

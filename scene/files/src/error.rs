@@ -21,6 +21,9 @@ pub enum SceneErrorKind {
     /// The file system refused.
     #[error("cannot read: {0}")]
     Io(#[from] io::Error),
+    /// There are no bytes: the file was never written, or something went wrong where it was copied.
+    #[error("it is empty; check what wrote it, or copy it again")]
+    Empty,
     /// The bytes end early.
     #[error(
         "byte {at}: {what} needs {needed} bytes, {available} are left; the file is cut short, copy it again"

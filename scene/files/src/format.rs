@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use flate2::read::GzDecoder;
 use zip::ZipArchive;
 
-use crate::error::SceneError;
+use crate::error::{SceneError, SceneErrorKind};
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
 use crate::scene::Scene;
@@ -58,7 +58,7 @@ pub enum SceneFormat {
 /// cannot (`.splat`, `.ksplat`).
 ///
 /// # Errors
-/// A path that cannot be read, or content of no known format.
+/// A path that cannot be read, an empty file, or content of no known format.
 pub fn detect(path: &Path) -> Result<SceneFormat, SceneError> {
     if sog_directory(path).is_some() {
         return Ok(SceneFormat::Sog);
@@ -67,6 +67,9 @@ pub fn detect(path: &Path) -> Result<SceneFormat, SceneError> {
         let mut file = File::open(path)?;
         let mut head = Vec::new();
         file.by_ref().take(HEAD).read_to_end(&mut head)?;
+        if head.is_empty() {
+            return Err(SceneErrorKind::Empty.into());
+        }
         format_of(&head, path, file)
     };
     find().map_err(|error| error.in_file(path))
@@ -123,6 +126,9 @@ pub(crate) fn read_whole(
     directory: Option<&Path>,
     budget: &mut Budget,
 ) -> Result<GaussianFrame, SceneError> {
+    if bytes.is_empty() {
+        return Err(SceneErrorKind::Empty.into());
+    }
     match format_of(bytes, name, std::io::Cursor::new(bytes))? {
         SceneFormat::Ply => ply::read_as_is(bytes, budget),
         SceneFormat::CompressedPly => compressed_ply::read_as_is(bytes, budget),

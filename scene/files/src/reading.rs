@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use crate::error::SceneError;
+use crate::error::{SceneError, SceneErrorKind};
 use crate::limits::Budget;
 use splatstream_gaussians::{GaussianFrame, Planes};
 
-/// The whole of a file, which counts as long as the budget lives.
+/// The whole of a file, of which no format is empty but by accident; it counts as long as the budget lives.
 pub(crate) fn read_file(path: &Path, budget: &mut Budget) -> Result<Vec<u8>, SceneError> {
     const WHAT: &str = "the file";
     let mut read = || -> Result<Vec<u8>, SceneError> {
@@ -18,7 +18,10 @@ pub(crate) fn read_file(path: &Path, budget: &mut Budget) -> Result<Vec<u8>, Sce
         // A pipe has no size, and a file may grow while it is read.
         file.take(size.saturating_add(budget.left()).saturating_add(1)).read_to_end(&mut bytes)?;
         budget.take((bytes.len() as u64).saturating_sub(size), WHAT)?;
-        Ok(bytes)
+        match bytes.is_empty() {
+            true => Err(SceneErrorKind::Empty.into()),
+            false => Ok(bytes),
+        }
     };
     read().map_err(|error| error.in_file(path))
 }

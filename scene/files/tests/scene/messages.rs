@@ -39,6 +39,23 @@ fn values_that_no_frame_may_hold_are_named_by_row_and_property() {
 }
 
 #[test]
+fn an_empty_file_is_called_empty() {
+    let directory = tempfile::tempdir().unwrap();
+    for name in
+        ["a.ply", "a.spz", "a.sog", "a.splat", "a.ksplat", "a.gltf", "a.zip", "a.tar", "a.splat4d", "a"]
+    {
+        let path = directory.path().join(name);
+        fs::write(&path, []).unwrap();
+        let message = read_scene(&path, &LIMITS).unwrap_err().to_string();
+        assert_eq!(
+            message,
+            format!("{}: it is empty; check what wrote it, or copy it again", path.display())
+        );
+        assert!(matches!(detect(&path).unwrap_err().kind, SceneErrorKind::Empty), "{name}");
+    }
+}
+
+#[test]
 fn an_unused_property_may_hold_anything() {
     assert!(ply::read(&ply_with(1, 3, f32::NAN), &LIMITS).is_ok());
 }

@@ -122,6 +122,9 @@ fn what_is_wrong_with_an_archive_is_named() {
     let damaged = zip_of(&[("a.ply".to_owned(), b"ply\nx".to_vec())]);
     let error = open(&damaged, SceneFormat::Archive, 1).unwrap().frame(0).unwrap_err().to_string();
     assert!(error.starts_with("talk/a.ply: byte 4: no PLY header line"), "{error}");
+    let empty = zip_of(&[("a.splat".to_owned(), Vec::new())]);
+    let error = open(&empty, SceneFormat::Archive, 1).unwrap().frame(0).unwrap_err().to_string();
+    assert!(error.starts_with("talk/a.splat: it is empty"), "{error}");
     // A member that says more than there is.
     let mut cut = tar_of(&[("a.ply".to_owned(), ply::write(&small_frame()))]);
     cut.truncate(1000);
