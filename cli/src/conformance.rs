@@ -94,14 +94,12 @@ impl SuiteArgs {
 
     /// The folder of the vectors that was named, or the one of the repository.
     fn folder(named: Option<PathBuf>) -> Result<PathBuf, Failure> {
-        let named = named.or_else(Suite::locate);
-        let named = named.unwrap_or_else(|| Path::new("conformance/vectors").into());
+        let named = named.or_else(Suite::locate).ok_or_else(nowhere)?;
         let folder = std::path::absolute(&named).map_err(|error| Failure::file("find", &named, &error))?;
         if !folder.is_dir() {
             let path = named.display();
             let what = if folder.exists() { "this is a file" } else { "there is no such directory" };
-            let advice = "give the folder of the vectors with --suite DIR; they are in conformance/vectors of the repository";
-            return Err(Failure::other(format!("{path}: {what}\n  {advice}")));
+            return Err(Failure::other(format!("{path}: {what}\n  {SUITE}")));
         }
         Ok(folder)
     }
@@ -121,6 +119,20 @@ impl SuiteArgs {
     fn cases<'a>(&self, suite: &'a Suite) -> Result<Vec<Case<'a>>, Failure> {
         self.selection().of(Case::all(suite)).map_err(refused)
     }
+}
+
+/// Where vectors come from.
+const SUITE: &str = concat!(
+    "give their folder with --suite DIR: conformance/vectors of a checkout of ",
+    env!("CARGO_PKG_REPOSITORY"),
+    ", or what splatstream-conformance-*.tar.xz of a release unpacks to"
+);
+
+/// No vectors were named, and none are near.
+fn nowhere() -> Failure {
+    Failure::other(format!(
+        "no vectors: there is no conformance/vectors in the current folder, in that of this program or above them\n  {SUITE}"
+    ))
 }
 
 fn parse_kind(text: &str) -> Result<Kind, String> {

@@ -8,7 +8,7 @@ use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::ply;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::process::{Command, Output};
 
 /// Three frames in two temporal layers.
 fn sequence(directory: &Path) -> PathBuf {
@@ -94,6 +94,22 @@ fn a_scene_may_come_by_standard_input_wherever_frames_are_read() {
     let refused = run_with(&[&render[..], &["--op", "s0,t0,r0"]].concat(), &bytes);
     let said = String::from_utf8(refused.stderr).unwrap();
     assert!(said.contains("standard input: only a stream has operating points"), "{said}");
+}
+
+#[test]
+fn a_program_away_from_the_vectors_says_where_they_are() {
+    let directory = directory();
+    let program = directory.path().join("splatstream");
+    fs::copy(env!("CARGO_BIN_EXE_splatstream"), &program).unwrap();
+    let away = |arguments: &[&str]| {
+        Command::new(&program).args(arguments).current_dir(directory.path()).output().unwrap()
+    };
+    let output = away(&["conformance", "list"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("--suite DIR") && said.contains("splatstream-conformance-*.tar.xz"), "{said}");
+    let suite = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance");
+    assert!(away(&["conformance", "list", "--suite", text(&suite)]).status.success());
 }
 
 #[test]
