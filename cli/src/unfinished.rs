@@ -1,4 +1,8 @@
-//! Files that are being written, and what happens to them when somebody ends the program: they go away.
+//! Files that are being written, and what happens to them when somebody ends the program: they go away. Where the system
+//! can, they have no name until they are whole, so that nothing is left of them however it ends.
+
+#[cfg(target_os = "linux")]
+mod nameless;
 
 use crate::failure::Failure;
 use std::fs::File;
@@ -21,6 +25,9 @@ struct State {
 /// A file that goes away unless it is given a name.
 pub(crate) struct Unfinished {
     path: PathBuf,
+    /// The file, if it has no name to be removed by.
+    #[cfg(target_os = "linux")]
+    nameless: Option<nameless::Nameless>,
 }
 
 impl Unfinished {
@@ -30,12 +37,26 @@ impl Unfinished {
         let mut state = lock();
         // Where signals cannot be listened to, a file that is left over is the smaller evil.
         let _deaf = listen(&mut state);
-        let (file, path) = builder(is_result).tempfile_in(directory)?.keep().map_err(|error| error.error)?;
-        state.files.push(path.clone());
-        Ok((file, Self { path }))
+        #[cfg(target_os = "linux")]
+        if let Some((file, nameless)) = nameless::Nameless::create(directory, mode(is_result)) {
+            return Ok((file, Self { path: nameless.path(), nameless: Some(nameless) }));
+        }
+        Self::named(directory, is_result, &mut state)
     }
 
-    /// Where it is.
+    /// One with a name that is not its final one.
+    fn named(directory: &Path, is_result: bool, state: &mut State) -> io::Result<(File, Self)> {
+        let (file, path) = builder(is_result).tempfile_in(directory)?.keep().map_err(|error| error.error)?;
+        state.files.push(path.clone());
+        let unfinished = Self {
+            path,
+            #[cfg(target_os = "linux")]
+            nameless: None,
+        };
+        Ok((file, unfinished))
+    }
+
+    /// Where this program finds it.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -44,17 +65,28 @@ impl Unfinished {
     pub(crate) fn rename(self, name: &Path) -> io::Result<()> {
         // Dropping waits for the lock.
         let state = lock();
-        let result = std::fs::rename(&self.path, name);
+        let result = self.give_name(name);
         drop(state);
         result
+    }
+
+    fn give_name(&self, name: &Path) -> io::Result<()> {
+        #[cfg(target_os = "linux")]
+        if let Some(nameless) = &self.nameless {
+            return nameless.link(name, &builder(true));
+        }
+        std::fs::rename(&self.path, name)
     }
 }
 
 impl Drop for Unfinished {
     fn drop(&mut self) {
         let mut state = lock();
-        let _gone_already = std::fs::remove_file(&self.path);
-        state.files.retain(|path| *path != self.path);
+        // One without a name is not among them.
+        if state.files.contains(&self.path) {
+            let _gone_already = std::fs::remove_file(&self.path);
+            state.files.retain(|path| *path != self.path);
+        }
     }
 }
 
@@ -94,8 +126,51 @@ fn builder(is_result: bool) -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".splatstream-");
     #[cfg(unix)]
-    if is_result {
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    }
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode(is_result)));
     builder
+}
+
+/// Who may do what with a file, as far as the user of the program lets them.
+#[cfg(unix)]
+fn mode(is_result: bool) -> u32 {
+    if is_result { 0o666 } else { 0o600 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// What is in a directory.
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = fs::read_dir(directory).unwrap().map(Result::unwrap);
+        let mut names: Vec<_> = entries.map(|entry| entry.file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    type Make = fn(&Path) -> io::Result<(File, Unfinished)>;
+
+    #[test]
+    fn a_file_is_there_when_it_is_finished_and_gone_when_it_is_not() {
+        let makes: [Make; 2] = [
+            |directory| Unfinished::create(directory, true),
+            |directory| Unfinished::named(directory, true, &mut lock()),
+        ];
+        for make in makes {
+            let directory = tempfile::tempdir().unwrap();
+            let (path, name) = (directory.path(), directory.path().join("result"));
+            drop(make(path).unwrap());
+            assert!(names(path).is_empty());
+            // The second takes the place of the first.
+            for content in ["first", "second"] {
+                let (mut file, unfinished) = make(path).unwrap();
+                file.write_all(content.as_bytes()).unwrap();
+                assert_eq!(fs::read_to_string(unfinished.path()).unwrap(), content);
+                unfinished.rename(&name).unwrap();
+                assert_eq!(fs::read_to_string(&name).unwrap(), content);
+                assert_eq!(names(path), ["result"]);
+            }
+        }
+    }
 }

@@ -340,6 +340,18 @@ fn captures_of_an_earlier_run_are_not_mixed_with_new_ones() {
     assert_eq!(names(&frames), ["frame_0000.ply"]);
 }
 
+/// Whether a process has a file open in a directory, with or without a name.
+#[cfg(target_os = "linux")]
+fn is_writing(process: u32, directory: &Path) -> bool {
+    let open = fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
+    open.filter_map(|entry| fs::read_link(entry.path()).ok()).any(|file| file.starts_with(directory))
+}
+
+#[cfg(all(unix, not(target_os = "linux")))]
+fn is_writing(_process: u32, directory: &Path) -> bool {
+    names(directory).iter().any(|name| name.starts_with(".splatstream-"))
+}
+
 /// Starts a long encoding in a directory, and gives it back once its unfinished file is there.
 #[cfg(unix)]
 fn encoding(directory: &Path, still: &Path) -> std::process::Child {
@@ -350,7 +362,7 @@ fn encoding(directory: &Path, still: &Path) -> std::process::Child {
         .spawn()
         .unwrap();
     let start = Instant::now();
-    while !names(directory).iter().any(|name| name.starts_with(".splatstream-")) {
+    while !is_writing(child.id(), directory) {
         assert!(start.elapsed() < Duration::from_secs(20), "it never began to write");
         std::thread::sleep(Duration::from_millis(2));
     }
@@ -373,6 +385,20 @@ fn signals_leave_nothing_behind() {
         assert_eq!(names(&out), ["out.gss"]);
         assert_eq!(fs::read(out.join("out.gss")).unwrap(), b"old");
     }
+}
+
+/// What a program cannot notice leaves nothing behind either: the file has no name until it is whole.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_program_that_is_killed_leaves_nothing_behind() {
+    let (directory, still, _) = files();
+    let out = directory.path().join("killed");
+    fs::create_dir(&out).unwrap();
+    let child = encoding(&out, &still);
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-KILL", &id]).status().unwrap().success());
+    assert_eq!(child.wait_with_output().unwrap().status.code(), None);
+    assert!(names(&out).is_empty(), "{:?}", names(&out));
 }
 
 #[cfg(target_os = "linux")]
