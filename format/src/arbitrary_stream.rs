@@ -109,6 +109,9 @@ impl<'a> Arbitrary<'a> for ArbitraryStream {
 
 impl ArbitraryStream {
     /// A stream of a profile.
+    ///
+    /// # Errors
+    /// There are too few bytes.
     pub fn of_profile(profile: Profile, u: &mut Unstructured<'_>) -> Result<Self> {
         let mut sequence = sequence_parameters(u, profile)?;
         // Few values happen to be sorted.
@@ -125,6 +128,9 @@ impl ArbitraryStream {
     }
 
     /// The bytes of the stream.
+    ///
+    /// # Errors
+    /// Parts that the text allows and that do not fit together: a defect of this module.
     pub fn to_bytes(&self) -> crate::Result<Vec<u8>> {
         let bytes = write_file_header(self.profile, self.level)?;
         let mut out = Output { bytes, frame_count: 0, unit_count: 0 };
@@ -217,6 +223,9 @@ impl ArbitraryFrame {
 }
 
 /// Any parameters that are accepted in a profile.
+///
+/// # Errors
+/// There are too few bytes.
 pub fn sequence_parameters(u: &mut Unstructured<'_>, profile: Profile) -> Result<SequenceParameters> {
     let refinement_count = u.int_in_range(1..=crate::syntax::MAX_REFINEMENTS)?;
     let layers = if profile == Profile::Intra { 1 } else { MAX_LAYERS };
@@ -278,6 +287,9 @@ fn companding(u: &mut Unstructured<'_>, position_bits: u8) -> Result<(u8, u8)> {
 }
 
 /// Any transform of a kind that is accepted. A sequence of degree 0 has none of kind sh.
+///
+/// # Errors
+/// There are too few bytes.
 pub fn transform(
     u: &mut Unstructured<'_>,
     transform_id: u8,
@@ -294,6 +306,9 @@ pub fn transform(
 }
 
 /// Any small codebook that is accepted.
+///
+/// # Errors
+/// There are too few bytes.
 pub fn codebook(u: &mut Unstructured<'_>, codebook_id: u8, component_count: u8) -> Result<Codebook> {
     let (entry_count_minus1, value_bytes) = (u.int_in_range(0..=7)?, u.int_in_range(1..=2)?);
     let header = CodebookHeader { codebook_id, component_count, entry_count_minus1, value_bytes };
@@ -306,6 +321,9 @@ pub fn codebook(u: &mut Unstructured<'_>, codebook_id: u8, component_count: u8) 
 }
 
 /// Any scene description with few cameras.
+///
+/// # Errors
+/// There are too few bytes.
 pub fn scene_description(u: &mut Unstructured<'_>) -> Result<SceneDescription> {
     let number = |u: &mut Unstructured<'_>| offset(u).map(f32::from_bits);
     let numbers = |u: &mut Unstructured<'_>| Ok([number(u)?, number(u)?, number(u)?]);

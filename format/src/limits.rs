@@ -73,6 +73,9 @@ impl Limits {
     }
 
     /// Refuses `asked` above `allowed`; `at` and `limit` go into the error.
+    ///
+    /// # Errors
+    /// Over limit: `asked` is above `allowed`.
     pub fn check(at: u64, limit: &'static str, asked: u64, allowed: u64) -> Result<()> {
         if asked > allowed {
             return Err(Error::new(at, "A.2", ErrorKind::OverLimit { limit, asked, allowed }));

@@ -163,6 +163,9 @@ macro_rules! record_io {
         impl $Record {
             /// Reads and checks the record at the start of `bytes`, which stand at offset `at` of the
             /// stream; gives the bytes after it.
+            ///
+            /// # Errors
+            /// Malformed: bytes are missing. Those of [`Self::validate`].
             pub fn parse(bytes: &[u8], at: u64) -> $crate::Result<(Self, &[u8])> {
                 let (record, rest): (Self, _) = $crate::syntax::decode(&Self::TABLE, bytes, at)?;
                 record.validate(at)?;
@@ -170,6 +173,9 @@ macro_rules! record_io {
             }
 
             /// Reads and checks a payload that is this record and nothing more.
+            ///
+            /// # Errors
+            /// Those of [`Self::parse`]; malformed if bytes are left over.
             pub fn parse_payload(payload: &[u8], at: u64) -> $crate::Result<Self> {
                 let (record, rest) = Self::parse(payload, at)?;
                 Self::TABLE.ends(rest, at)?;
@@ -178,6 +184,9 @@ macro_rules! record_io {
 
             /// The bytes of the record; refused where [`Self::parse`] would refuse them. Offsets of errors
             /// count from the start of the record.
+            ///
+            /// # Errors
+            /// Those of [`Self::validate`].
             pub fn to_bytes(&self) -> $crate::Result<Vec<u8>> {
                 self.validate(0)?;
                 Ok($crate::syntax::encode(self))
@@ -193,6 +202,9 @@ macro_rules! record_io_in_profile {
         impl $Record {
             /// Reads and checks the record at the start of `bytes`, which stand at offset `at` of a stream of a
             /// profile; gives the bytes after it.
+            ///
+            /// # Errors
+            /// Malformed: bytes are missing. Those of [`Self::validate`].
             pub fn parse(
                 bytes: &[u8],
                 at: u64,
@@ -204,6 +216,9 @@ macro_rules! record_io_in_profile {
             }
 
             /// Reads and checks a payload that is this record and nothing more.
+            ///
+            /// # Errors
+            /// Those of [`Self::parse`]; malformed if bytes are left over.
             pub fn parse_payload(
                 payload: &[u8],
                 at: u64,
@@ -216,6 +231,9 @@ macro_rules! record_io_in_profile {
 
             /// The bytes of the record; refused where [`Self::parse_payload`] would refuse them in every profile.
             /// Offsets of errors count from the start of the record.
+            ///
+            /// # Errors
+            /// Those of [`Self::validate`] in the profile Dynamic.
             pub fn to_bytes(&self) -> $crate::Result<Vec<u8>> {
                 self.validate(0, $crate::syntax::Profile::Dynamic)?;
                 Ok($crate::syntax::encode(self))
@@ -256,6 +274,9 @@ impl Table {
     }
 
     /// 6.1: nothing is left of a payload at offset `at` that is this record alone; `rest` is what comes after it.
+    ///
+    /// # Errors
+    /// Malformed: `rest` is not empty.
     pub fn ends(&self, rest: &[u8], at: u64) -> Result<()> {
         if rest.is_empty() {
             return Ok(());

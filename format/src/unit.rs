@@ -32,12 +32,18 @@ pub struct Unit<'a> {
 
 impl Unit<'_> {
     /// 6.3: the elements of the header, in a stream of a profile.
+    ///
+    /// # Errors
+    /// Those of [`UnitHeader::validate_elements`] and of [`UnitHeader::validate_profile`].
     pub fn check_header(&self, profile: Profile) -> Result<()> {
         self.header.validate_elements(self.at)?;
         self.header.validate_profile(self.at, profile)
     }
 
     /// 6.3: the payload is the one that was written. The payload of a unit of unknown type may be anything.
+    ///
+    /// # Errors
+    /// Malformed: its checksum is wrong.
     pub fn check_payload(&self) -> Result<()> {
         self.header.check_payload(self.at, self.payload)
     }
@@ -106,6 +112,9 @@ impl Landmark {
 
 impl<'a> Stream<'a> {
     /// Reads and checks the file header of the stream that `bytes` is.
+    ///
+    /// # Errors
+    /// Those of [`FileHeader::parse`].
     pub fn open(bytes: &'a [u8], limits: &Limits) -> Result<Self> {
         let (header, _) = FileHeader::parse(bytes)?;
         Ok(Self { header, bytes, limits: *limits })
@@ -180,12 +189,18 @@ impl<'a> Iterator for Units<'a> {
 }
 
 /// The first bytes of a stream.
+///
+/// # Errors
+/// Unsupported: a level that is not defined.
 pub fn write_file_header(profile: Profile, level: u8) -> Result<Vec<u8>> {
     FileHeader::new(profile, level)?.to_bytes()
 }
 
 /// Appends a unit with its checksums. Nothing is appended where a reader would refuse the header; offsets of
 /// errors count from the start of the unit.
+///
+/// # Errors
+/// Those of [`UnitHeader::new`].
 pub fn write_unit(out: &mut Vec<u8>, id: UnitId, payload: &[u8]) -> Result<()> {
     let header = UnitHeader::new(id, payload)?.to_bytes()?;
     out.extend(header);

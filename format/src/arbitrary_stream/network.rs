@@ -6,6 +6,9 @@ use crate::syntax::NetworkHeader;
 use arbitrary::{Error, Result, Unstructured};
 
 /// Any small network, or one that is registered.
+///
+/// # Errors
+/// There are too few bytes.
 pub fn weights(u: &mut Unstructured<'_>) -> Result<Weights> {
     let index: usize = u.int_in_range(0..=3)?;
     match REGISTRY.get(index) {

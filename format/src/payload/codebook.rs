@@ -15,6 +15,10 @@ pub struct Codebook {
 
 impl Codebook {
     /// Reads and checks a payload that stands at offset `at`.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over. Invalid: the header, by clause 6.8. Over limit: more values
+    /// than `limits` allow.
     pub fn parse(payload: &[u8], at: u64, limits: &Limits) -> Result<Self> {
         let (header, rest) = CodebookHeader::parse(payload, at)?;
         header.within(at, limits)?;
@@ -23,6 +27,9 @@ impl Codebook {
 
     /// Reads `rest`, the bytes after a header that has been accepted. `at` is the offset of the payload, that
     /// is of the header.
+    ///
+    /// # Errors
+    /// Malformed: there are not as many bytes as the entries that the header says.
     pub fn parse_rest(header: CodebookHeader, rest: &[u8], at: u64) -> Result<Self> {
         // Taken before anything is allocated: the bytes are there.
         let bytes = length(header.value_count()).saturating_mul(header.value_bytes.into());
@@ -36,6 +43,9 @@ impl Codebook {
 
     /// The bytes of the payload; refused where [`Self::parse`] would refuse them, and where an entry does not
     /// fit in `value_bytes`. Offsets of errors count from the start of the payload.
+    ///
+    /// # Errors
+    /// Invalid: the header, the number of entries, or an entry that `value_bytes` cannot hold.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.header.validate(0)?;
         if self.entries.len() != length(self.header.value_count()) {

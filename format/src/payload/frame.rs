@@ -31,6 +31,11 @@ pub struct Cells<'a> {
 
 impl<'a> FramePayload<'a> {
     /// Reads and checks a payload that stands at offset `at`. What is in the section is not looked at.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over, or a number is not in its shortest form. Unsupported: a
+    /// frame type or flags that are reserved. Invalid: a value that clause 6.6 forbids. Over limit: more
+    /// Gaussians, in a frame or a second, or more cells than `limits` allow.
     pub fn parse(payload: &'a [u8], at: u64, sequence: &SequenceParameters, limits: &Limits) -> Result<Self> {
         Self::read(&mut Reader::new(payload, at), sequence, limits)
     }
@@ -93,6 +98,10 @@ pub struct CellsBytes {
 /// The bytes of a payload; refused where [`FramePayload::parse`] would refuse them at every level. `frame_flags` of
 /// the header is replaced by what follows from the other arguments. Offsets of errors count from the start of the
 /// payload.
+///
+/// # Errors
+/// Those of [`FramePayload::parse`] at level 4, without its limit of the rate; invalid with a part of a
+/// section of 2^32 bytes or more.
 pub fn write_frame(
     header: &FrameHeader,
     carried_digest: Option<u64>,

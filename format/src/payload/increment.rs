@@ -17,6 +17,11 @@ pub struct Increment<'a> {
 
 impl<'a> Increment<'a> {
     /// Reads and checks a payload that stands at offset `at`. What is in the sections is not looked at.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over, or a number is not in its shortest form. Unsupported: flags
+    /// that are reserved in the profile. Invalid: a value that clause 6.14 forbids. Over limit: more
+    /// Gaussians than `limits` allow, or than the payload can hold.
     pub fn parse(
         payload: &'a [u8],
         at: u64,
@@ -57,6 +62,10 @@ impl<'a> Increment<'a> {
 
 /// The bytes of a payload; refused where [`Increment::parse`] would refuse them in every profile and at every level.
 /// `sections` are those with a count above 0, in stream order. Offsets of errors count from the start of the payload.
+///
+/// # Errors
+/// Those of [`Increment::parse`] in the profile Dynamic at level 4; invalid with a part of a section of 2^32
+/// bytes or more.
 pub fn write_increment(
     header: &IncrementHeader,
     sequence: &SequenceParameters,

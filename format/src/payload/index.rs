@@ -13,6 +13,10 @@ pub struct Index {
 
 impl Index {
     /// Reads and checks a payload that stands at offset `at`.
+    ///
+    /// # Errors
+    /// Malformed: there are not as many bytes as entries. Unsupported: reserved bits of an entry. Invalid:
+    /// frames or offsets that do not rise.
     pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
         let (header, rest) = IndexHeader::parse(payload, at)?;
         // Taken before room is made: the bytes are there.
@@ -32,6 +36,9 @@ impl Index {
     }
 
     /// The bytes of the payload; refused where [`Self::parse`] would refuse them.
+    ///
+    /// # Errors
+    /// Those of [`Self::parse`]; invalid with 2^32 entries or more.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let entry_count = u32::try_from(self.entries.len()).map_err(|_| {
             let rule = "there are fewer than 2^32 entries";

@@ -13,6 +13,10 @@ pub struct OperatingPoints {
 
 impl OperatingPoints {
     /// Reads and checks a payload that stands at offset `at`.
+    ///
+    /// # Errors
+    /// Malformed: there are not as many bytes as entries. Unsupported: reserved bits. Invalid: a layer or
+    /// refinement that no sequence has, or entries that do not rise.
     pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
         let table = &OperatingPointsHeader::TABLE;
         let (header, rest) = OperatingPointsHeader::parse(payload, at)?;
@@ -33,6 +37,9 @@ impl OperatingPoints {
     }
 
     /// The bytes of the payload; refused where [`Self::parse`] would refuse them.
+    ///
+    /// # Errors
+    /// Those of [`Self::parse`]; invalid with 2^16 entries or more.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let point_count = u16::try_from(self.entries.len()).map_err(|_| {
             let rule = "there are fewer than 2^16 operating points";

@@ -163,6 +163,10 @@ impl Elements<'_, '_, '_> {
 
 impl SceneDescription {
     /// Reads and checks a payload that stands at offset `at`.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over, or a number is not in its shortest form. Unsupported:
+    /// reserved values and flags. Invalid: a value that clause 6.9 forbids.
     pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
         let (header, rest) = SceneDescriptionHeader::parse(payload, at)?;
         Self::read(&header, &mut after_fixed_part(&SceneDescriptionHeader::TABLE, rest, at))
@@ -204,6 +208,9 @@ impl SceneDescription {
 
     /// The bytes of the payload; refused where [`Self::parse`] would refuse them. Offsets of errors count from the
     /// start of the payload.
+    ///
+    /// # Errors
+    /// Those of [`Self::parse`].
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let flags = [
             (self.metres_per_unit.is_some(), SceneDescriptionHeader::METRES),

@@ -22,6 +22,10 @@ pub struct Transform {
 
 impl Transform {
     /// Reads and checks a payload that stands at offset `at`.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over. Unsupported: a reserved kind. Invalid: a value that clause
+    /// 6.7 forbids in a stream of this sequence.
     pub fn parse(payload: &[u8], at: u64, sequence: &SequenceParameters) -> Result<Self> {
         let (header, rest) = TransformHeader::parse(payload, at, sequence)?;
         Self::parse_rest(header, rest, at)
@@ -29,6 +33,10 @@ impl Transform {
 
     /// Reads and checks `rest`, the bytes after a header that has been accepted. `at` is the offset of the
     /// payload, that is of the header.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over. Invalid: a number of the mean or the basis that clause 6.7
+    /// forbids.
     pub fn parse_rest(header: TransformHeader, rest: &[u8], at: u64) -> Result<Self> {
         // At most 45 and 45 * 45.
         let (means, weights) = Self::lengths(&header);
@@ -45,6 +53,9 @@ impl Transform {
 
     /// The bytes of the payload; refused where [`Self::parse`] would refuse them. Offsets of errors count from
     /// the start of the payload.
+    ///
+    /// # Errors
+    /// Unsupported or invalid as for [`Self::parse`].
     pub fn to_bytes(&self, sequence: &SequenceParameters) -> Result<Vec<u8>> {
         self.header.validate(0, sequence)?;
         self.validate_values(0)?;

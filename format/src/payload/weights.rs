@@ -105,6 +105,10 @@ impl Network {
     }
 
     /// Reads and checks a network that stands at offset `at` and ends with `bytes`.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over. Unsupported: reserved flags. Invalid: a value that clause
+    /// 6.17.1 forbids.
     pub fn parse(bytes: &[u8], at: u64) -> Result<Self> {
         let (header, rest) = NetworkHeader::parse(bytes, at)?;
         let lengths = Part::ALL.map(|part| part.lengths(&header));
@@ -129,6 +133,9 @@ impl Network {
     }
 
     /// The bytes of the network.
+    ///
+    /// # Errors
+    /// Unsupported or invalid: the header, as for [`Self::parse`].
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.header.validate(0)?;
         let mut bytes = encode(&self.header);
@@ -158,6 +165,10 @@ pub enum Weights {
 
 impl Weights {
     /// Reads and checks a payload that stands at offset `at`.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over. Unsupported: a reserved source. Those of [`Network::parse`]
+    /// for a network that is carried.
     pub fn parse(payload: &[u8], at: u64) -> Result<Self> {
         let (header, rest) = WeightsHeader::parse(payload, at)?;
         Self::parse_rest(header, rest, at)
@@ -165,6 +176,9 @@ impl Weights {
 
     /// Reads `rest`, the bytes after a header that has been accepted. `at` is the offset of the payload, that
     /// is of the header.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing or left over. Those of [`Network::parse`] for a network that is carried.
     pub fn parse_rest(header: WeightsHeader, rest: &[u8], at: u64) -> Result<Self> {
         if header == WeightsHeader::CARRIED {
             return Network::parse(rest, after(at, WeightsHeader::SIZE)).map(Box::new).map(Self::Carried);
@@ -176,6 +190,9 @@ impl Weights {
     }
 
     /// The bytes of the payload.
+    ///
+    /// # Errors
+    /// Those of [`Network::to_bytes`] for a network that is carried.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let (header, model) = match self {
             Self::Carried(network) => (WeightsHeader::CARRIED, network.to_bytes()?),

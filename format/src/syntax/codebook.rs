@@ -34,6 +34,9 @@ impl CodebookHeader {
     }
 
     /// 6.8.
+    ///
+    /// # Errors
+    /// Invalid: an identifier, a number of components or a number of bytes outside its range.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.range("codebook_id", self.codebook_id, 0, MAX_ID)?;
@@ -42,6 +45,9 @@ impl CodebookHeader {
     }
 
     /// A.2: the codebook is not larger than agreed.
+    ///
+    /// # Errors
+    /// Over limit: more values than that.
     pub fn within(&self, at: u64, limits: &Limits) -> Result<()> {
         let at = Self::TABLE.check(at).offset("entry_count_minus1", 0);
         Limits::check(at, "max_codebook_values", self.value_count().into(), limits.max_codebook_values.into())

@@ -19,11 +19,17 @@ record_io!(EndOfStream);
 
 impl EndOfStream {
     /// 6.11, as far as it needs no other unit: any numbers.
+    ///
+    /// # Errors
+    /// None: it is there so that all records are checked alike.
     pub fn validate(&self, _at: u64) -> Result<()> {
         Ok(())
     }
 
     /// 6.11: the numbers are those of the stream, which is `expected`.
+    ///
+    /// # Errors
+    /// Invalid: a number is another.
     pub fn validate_against(&self, at: u64, expected: &Self) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.equal("frame_count", self.frame_count.into(), expected.frame_count.into())?;

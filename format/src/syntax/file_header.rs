@@ -76,6 +76,9 @@ impl FileHeader {
     }
 
     /// The header of a stream of this version.
+    ///
+    /// # Errors
+    /// Unsupported: a level that is not defined.
     pub fn new(profile: Profile, level: u8) -> Result<Self> {
         let (version_major, version_minor) = VERSION;
         let header = Self {
@@ -92,6 +95,9 @@ impl FileHeader {
     }
 
     /// Reads and checks the header of a stream that starts with `bytes`; gives the bytes after it.
+    ///
+    /// # Errors
+    /// Truncated: the header is not complete. Those of [`Self::validate`].
     pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8])> {
         // First of all, and on as many bytes as there are: another file format is not a truncated stream.
         Self::TABLE.check(0).well_formed(
@@ -106,12 +112,18 @@ impl FileHeader {
     }
 
     /// The bytes of the header; refused where [`Self::parse`] would refuse them.
+    ///
+    /// # Errors
+    /// Those of [`Self::validate`].
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.validate(0)?;
         Ok(encode(self))
     }
 
     /// 6.2: signature, checksum, version, profile, level, in this order.
+    ///
+    /// # Errors
+    /// Malformed: the signature or the checksum is wrong. Unsupported: another version, profile or level.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.well_formed(self.signature == SIGNATURE, "signature", ErrorKind::Signature)?;

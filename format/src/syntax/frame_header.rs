@@ -113,12 +113,19 @@ impl FrameHeader {
     }
 
     /// 6.6: the type is the one that the structure of the GOP gives the frame.
+    ///
+    /// # Errors
+    /// Invalid: it is another.
     pub fn validate_role(&self, at: u64, role: &FrameRole) -> Result<()> {
         let (found, expected) = (self.frame_type.into(), role.frame_type.code().into());
         Self::TABLE.check(at).equal("frame_type", found, expected)
     }
 
     /// 6.6.
+    ///
+    /// # Errors
+    /// Unsupported: a frame type or flags that are reserved. Invalid: a transform outside its range, or flags
+    /// of an I frame.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.known(self.kind().is_some(), "frame_type", self.frame_type)?;
@@ -135,6 +142,9 @@ impl FrameHeader {
     }
 
     /// A.2: the frame is not larger than agreed, nor are there more Gaussians in a second.
+    ///
+    /// # Errors
+    /// Over limit: it is, or there are.
     pub fn within(&self, at: u64, sequence: &SequenceParameters, limits: &Limits) -> Result<()> {
         let at = Self::TABLE.check(at).offset("gaussian_count", 0);
         Limits::check(at, "max_gaussians", self.gaussian_count.into(), limits.max_gaussians.into())?;

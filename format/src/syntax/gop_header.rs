@@ -81,6 +81,10 @@ impl GopHeader {
     }
 
     /// 6.5.
+    ///
+    /// # Errors
+    /// Unsupported: reserved bits, or a structure that is reserved in the profile. Invalid: a number of
+    /// frames or layers outside its range.
     pub fn validate(&self, at: u64, profile: Profile) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.range("gop_frame_count", self.gop_frame_count, 1, u32::MAX)?;
@@ -96,12 +100,18 @@ impl GopHeader {
     }
 
     /// 6.5: the sequence has the layers of the structure.
+    ///
+    /// # Errors
+    /// Invalid: it does not.
     pub fn validate_layers(&self, at: u64, temporal_layer_count: u8) -> Result<()> {
         let deepest = temporal_layer_count.saturating_sub(1);
         Self::TABLE.check(at).range("temporal_depth", self.temporal_depth, 0, deepest)
     }
 
     /// 6.5: the last frame of a GOP that starts at display index `frame` has a display index too.
+    ///
+    /// # Errors
+    /// Invalid: it has none.
     pub fn validate_from(&self, at: u64, frame: u32) -> Result<()> {
         let left = DISPLAY_INDICES.saturating_sub(frame.into());
         Self::TABLE.check(at).range("gop_frame_count", self.gop_frame_count, 1, left)

@@ -156,6 +156,9 @@ impl IncrementHeader {
     };
 
     /// Reads and checks the header of a payload that stands at offset `at`; gives the bytes after it.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing, or a number is not in its shortest form. Those of [`Self::validate`].
     pub fn parse<'a>(
         payload: &'a [u8],
         at: u64,
@@ -274,6 +277,9 @@ impl IncrementHeader {
 
     /// The bytes of the header; refused where [`Self::parse`] would refuse them in every profile, and where a flag
     /// is missing that a value needs.
+    ///
+    /// # Errors
+    /// Those of [`Self::validate`] in the profile Dynamic; invalid without a flag that a value needs.
     pub fn to_bytes(&self, sequence: &SequenceParameters) -> Result<Vec<u8>> {
         self.validate(0, sequence, Profile::Dynamic)?;
         let complete = self.needed_flags() & !self.increment_flags == 0;
@@ -380,6 +386,10 @@ impl IncrementHeader {
     }
 
     /// 6.14, as far as it needs nothing but the sequence.
+    ///
+    /// # Errors
+    /// Unsupported: flags or values that are reserved in the profile. Invalid: flags that do not go together,
+    /// or a value outside its range.
     pub fn validate(&self, at: u64, sequence: &SequenceParameters, profile: Profile) -> Result<()> {
         self.validate_flags(at, profile)?;
         for ((flag, count), (element, ..)) in self.counts().into_iter().zip(self.elements()) {
@@ -408,6 +418,9 @@ impl IncrementHeader {
     }
 
     /// A.2: no more Gaussians than a frame may have, and no more new ones than the payload can hold.
+    ///
+    /// # Errors
+    /// Over limit: there are more.
     pub fn within(&self, at: u64, payload_length: usize, limits: &Limits) -> Result<()> {
         let most = u64::from(limits.max_gaussians);
         let new_at = self.at(at, "new_count");
@@ -418,6 +431,9 @@ impl IncrementHeader {
     }
 
     /// 6.14 and 7.14: the flags fit the frame, the counts fit the parents there are, and the list has the size that the frame prescribes.
+    ///
+    /// # Errors
+    /// Invalid: they do not, or it has another.
     pub fn validate_counts(&self, at: u64, sizes: &ListSizes) -> Result<()> {
         let equal = |element, value: u32, expected: u32| {
             self.spot(at, element, 0).equal(value.into(), expected.into())

@@ -29,6 +29,9 @@ record_io!(IndexEntry);
 
 impl IndexHeader {
     /// 6.10: any number of entries.
+    ///
+    /// # Errors
+    /// None: it is there so that all records are checked alike.
     pub fn validate(&self, _at: u64) -> Result<()> {
         Ok(())
     }
@@ -36,11 +39,17 @@ impl IndexHeader {
 
 impl IndexEntry {
     /// 6.10.
+    ///
+    /// # Errors
+    /// Unsupported: reserved bits are set.
     pub fn validate(&self, at: u64) -> Result<()> {
         Self::TABLE.check(at).reserved_bits("reserved_zero", 0, self.reserved_zero)
     }
 
     /// 6.10: frame and offset are greater than those of the entry before.
+    ///
+    /// # Errors
+    /// Invalid: one of them is not.
     pub fn validate_after(&self, at: u64, before: &Self) -> Result<()> {
         let check = Self::TABLE.check(at);
         let least = |before: u64| before.saturating_add(1);

@@ -38,6 +38,9 @@ record_io!(OperatingPointEntry);
 
 impl OperatingPointsHeader {
     /// 6.16.
+    ///
+    /// # Errors
+    /// Unsupported: reserved bits are set.
     pub fn validate(&self, at: u64) -> Result<()> {
         Self::TABLE.check(at).reserved_bits("reserved_zero", 0, self.reserved_zero)
     }
@@ -45,6 +48,9 @@ impl OperatingPointsHeader {
 
 impl OperatingPointEntry {
     /// 6.16.
+    ///
+    /// # Errors
+    /// Unsupported: reserved bits are set. Invalid: a layer or refinement that no sequence has.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.range("spatial_layer", self.spatial_layer, 0, MAX_LAYERS.saturating_sub(1))?;

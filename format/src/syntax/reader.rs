@@ -129,6 +129,9 @@ impl<'a, 't> Reader<'a, 't> {
 
 /// Reads the number at the start of `bytes`, which stand at offset `at`; gives the bytes after it. The element
 /// and the clause of its table go into the error.
+///
+/// # Errors
+/// Malformed: the bytes end within the number, it is not in its shortest form, or it does not fit 32 bits.
 pub fn leb128<'a>(
     bytes: &'a [u8],
     at: u64,

@@ -50,6 +50,9 @@ impl SceneDescriptionHeader {
     const FLAGS: u8 = (1 << 5) - 1;
 
     /// 6.9.
+    ///
+    /// # Errors
+    /// Unsupported: reserved values or flags.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.known(self.up_axis <= 6, "up_axis", self.up_axis)?;
@@ -84,6 +87,9 @@ pub(crate) fn in_range(value: f32) -> bool {
 
 impl Camera {
     /// Reads and checks the record at the start of `bytes`, which stand at offset `at`; gives the bytes after it.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing. Invalid: a number that clause 6.9 forbids.
     pub fn parse(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
         let (record, rest): (CameraRecord, _) = super::decode(&CameraRecord::TABLE, bytes, at)?;
         let camera = Self {
@@ -96,6 +102,9 @@ impl Camera {
     }
 
     /// The bytes of the record; refused where [`Self::parse`] would refuse them.
+    ///
+    /// # Errors
+    /// Invalid: a number that clause 6.9 forbids.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.validate(0)?;
         let record = CameraRecord {

@@ -139,6 +139,10 @@ impl SequenceParameters {
     };
 
     /// 6.4.
+    ///
+    /// # Errors
+    /// Unsupported: flags that are reserved in the profile. Invalid: a value outside its range, or values
+    /// that do not fit each other.
     pub fn validate(&self, at: u64, profile: Profile) -> Result<()> {
         let check = Self::TABLE.check(at);
         let layers = if profile == Profile::Intra { 1 } else { MAX_LAYERS };

@@ -68,6 +68,9 @@ impl TransformHeader {
     }
 
     /// Reads and checks the fixed part of a payload that stands at offset `at`; gives the bytes after it.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing. Those of [`Self::validate`].
     pub fn parse<'a>(payload: &'a [u8], at: u64, sequence: &SequenceParameters) -> Result<(Self, &'a [u8])> {
         let (header, rest): (Self, _) = decode(&Self::TABLE, payload, at)?;
         header.validate(at, sequence)?;
@@ -75,6 +78,10 @@ impl TransformHeader {
     }
 
     /// 6.7.
+    ///
+    /// # Errors
+    /// Unsupported: a reserved kind. Invalid: an identifier, a dimension or a rank that a stream of this
+    /// sequence cannot have.
     pub fn validate(&self, at: u64, sequence: &SequenceParameters) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.range("transform_id", self.transform_id, 0, MAX_ID)?;

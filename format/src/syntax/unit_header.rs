@@ -211,6 +211,11 @@ impl UnitId {
 
 impl UnitHeader {
     /// The header of a unit with this payload.
+    ///
+    /// # Errors
+    /// Unsupported: a reserved type that stands for a known one, or that is critical. Invalid: layers, a
+    /// refinement or a frame that the type cannot have. Malformed: type 0. Over limit: a payload of 2^32
+    /// bytes or more.
     pub fn new(id: UnitId, payload: &[u8]) -> Result<Self> {
         let header = Self {
             unit_type: id.unit_type.code(),
@@ -236,6 +241,9 @@ impl UnitHeader {
     }
 
     /// This header before another payload: length and checksums are new, all else stays.
+    ///
+    /// # Errors
+    /// Over limit: a payload of 2^32 bytes or more.
     pub fn with_payload(&self, payload: &[u8]) -> Result<Self> {
         let payload_crc = crc32fast::hash(payload);
         let header = Self { payload_length: payload_length(payload)?, payload_crc, ..*self };
@@ -243,6 +251,9 @@ impl UnitHeader {
     }
 
     /// Reads and checks the header at the start of `bytes`; gives the bytes after it.
+    ///
+    /// # Errors
+    /// Those of [`Self::delimit`] and of [`Self::validate_elements`].
     pub fn parse(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
         let (header, rest) = Self::delimit(bytes, at)?;
         header.validate_elements(at)?;
@@ -250,6 +261,9 @@ impl UnitHeader {
     }
 
     /// The same without a check of the elements: the header is intact, so that the end of its unit is known.
+    ///
+    /// # Errors
+    /// Truncated: the header is not complete. Malformed: its checksum is wrong.
     pub fn delimit(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
         let (header, rest): (Self, _) =
             decode(&Self::TABLE, bytes, at).map_err(crate::unit::cut_is_truncated)?;
@@ -258,6 +272,9 @@ impl UnitHeader {
     }
 
     /// The bytes of the header; refused where [`Self::parse`] would refuse them.
+    ///
+    /// # Errors
+    /// Those of [`Self::validate`].
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.validate(0)?;
         Ok(encode(self))
@@ -291,6 +308,9 @@ impl UnitHeader {
     }
 
     /// 6.3.
+    ///
+    /// # Errors
+    /// Malformed: the checksum is wrong. Those of [`Self::validate_elements`].
     pub fn validate(&self, at: u64) -> Result<()> {
         self.validate_check(at)?;
         self.validate_elements(at)
@@ -303,6 +323,10 @@ impl UnitHeader {
     }
 
     /// 6.3: the elements of an intact header.
+    ///
+    /// # Errors
+    /// Malformed: type 0. Unsupported: reserved bits, or an unknown type that is critical. Invalid: layers, a
+    /// refinement or a frame that the type cannot have.
     pub fn validate_elements(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.well_formed(self.unit_type != 0, "unit_type", ErrorKind::Number { element: "unit_type" })?;
@@ -321,12 +345,18 @@ impl UnitHeader {
     }
 
     /// 6.3: the unit is one of the profile.
+    ///
+    /// # Errors
+    /// Unsupported: it is not.
     pub fn validate_profile(&self, at: u64, profile: Profile) -> Result<()> {
         let known = profile == Profile::Dynamic || self.unit_type() != UnitType::Weights;
         Self::TABLE.check(at).known(known, "unit_type", self.unit_type)
     }
 
     /// 6.3: the layers are layers of the sequence.
+    ///
+    /// # Errors
+    /// Invalid: they are not.
     pub fn validate_layers(&self, at: u64, sequence: &SequenceParameters) -> Result<()> {
         let check = Self::TABLE.check(at);
         let last = |count: u8| count.saturating_sub(1);

@@ -26,6 +26,9 @@ impl WeightsHeader {
     pub const REGISTERED: Self = Self { model_source: 1 };
 
     /// 6.17.
+    ///
+    /// # Errors
+    /// Unsupported: a reserved source.
     pub fn validate(&self, at: u64) -> Result<()> {
         Self::TABLE.check(at).known(self.model_source <= 1, "model_source", self.model_source)
     }
@@ -61,6 +64,9 @@ table! {
 
 impl NetworkHeader {
     /// Reads and checks the fixed part of a network that stands at offset `at`; gives the bytes after it.
+    ///
+    /// # Errors
+    /// Malformed: bytes are missing. Those of [`Self::validate`].
     pub fn parse(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
         let (header, rest): (Self, _) = decode(&Self::TABLE, bytes, at)?;
         header.validate(at)?;
@@ -114,6 +120,9 @@ impl NetworkHeader {
     }
 
     /// 6.17.1.
+    ///
+    /// # Errors
+    /// Unsupported: reserved flags. Invalid: a value outside its range, or a network without outputs.
     pub fn validate(&self, at: u64) -> Result<()> {
         let check = Self::TABLE.check(at);
         check.reserved_bits(
