@@ -210,8 +210,52 @@ fn join<'p, T: Copy + Send + Sync + 'p>(
     });
 }
 
+/// Values that are moved at once where all of them are kept.
+const KEPT: usize = 32;
+
 /// Keeps the values whose flag is set; values without a flag stay.
-pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
-    let mut flags = keep.iter();
-    values.retain(|_| flags.next().copied().unwrap_or(true));
+///
+/// Most are kept: groups of which all are move as a whole.
+pub(crate) fn retain<T: Copy>(values: &mut Vec<T>, keep: &[bool]) {
+    let (mut end, count) = (0_usize, values.len());
+    let mut start = 0_usize;
+    for flags in keep.get(..count).unwrap_or(keep).chunks(KEPT) {
+        let next = start.saturating_add(flags.len());
+        if flags == [true; KEPT] {
+            values.copy_within(start..next, end);
+            end = end.saturating_add(flags.len());
+        } else {
+            for (from, _) in (start..next).zip(flags).filter(|(_, keep)| **keep) {
+                let value = values.get(from).copied();
+                values.get_mut(end).zip(value).into_iter().for_each(|(slot, value)| *slot = value);
+                end = end.saturating_add(1);
+            }
+        }
+        start = next;
+    }
+    values.copy_within(start.., end);
+    values.truncate(end.saturating_add(count.saturating_sub(start)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn values_without_a_flag_and_those_with_a_set_one_stay(
+            count in 0_u32..300,
+            mut keep in proptest::collection::vec(any::<bool>(), 0..300),
+            all in 0_usize..300,
+        ) {
+            keep.iter_mut().skip(all).for_each(|keep| *keep = true);
+            let mut values: Vec<u32> = (0..count).collect();
+            let mut expected = values.clone();
+            let mut flags = keep.iter();
+            expected.retain(|_| flags.next().copied().unwrap_or(true));
+            retain(&mut values, &keep);
+            prop_assert_eq!(values, expected);
+        }
+    }
 }
