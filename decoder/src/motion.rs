@@ -10,6 +10,9 @@ use crate::cell::{Cell, UNIT_MAX, isqrt};
 use crate::vector::{Task, vectorized};
 use splatstream_format::entropy::machine::Machine;
 
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+mod simd128;
+
 /// Gaussians moved at a time by the instructions of the machine.
 const LANES: usize = 16;
 /// Gaussians for which it is not worth it.
@@ -24,6 +27,9 @@ pub(crate) struct Motion {
     translation: [i32; 3],
     /// What the rotation adds to an offset from the centre, times 2^27: a matrix, row by row.
     turn: [[i32; 3]; 3],
+    /// log2 of the side of the cell.
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+    cell_log2: u8,
     /// The quaternion, times 2^14: vector and real part.
     vector: [i32; 3],
     real: i32,
@@ -62,6 +68,8 @@ impl Motion {
             centre: cell.coordinates.map(|at| i64::from(at).wrapping_shl(size).wrapping_add(half) as i32),
             translation: cell.translation.map(|shift| shift.wrapping_mul(8)),
             turn,
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+            cell_log2,
             vector: cell.rotation,
             real: real as i32,
         }
@@ -105,6 +113,10 @@ impl Motion {
                 [*a, *b, *c] = self.rotation([*a, *b, *c], bounds);
             }
             return;
+        }
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+        if self.rotates() && self.cell_log2 <= simd128::MAX_CELL_LOG2 {
+            return simd128::displace(self, ([xs, ys, zs], [r0, r1, r2]), bounds);
         }
         vectorized(Displace { motion: self, planes: ([xs, ys, zs], [r0, r1, r2]), bounds });
     }
@@ -250,6 +262,13 @@ mod tests {
         join(fine.map(i64::from), shift, |fine, shift| (fine + shift).clamp(0, LAST.into()))
     }
 
+    /// A position of the second cell along each axis: offsets reach from one side, rounded, to the other.
+    #[expect(clippy::arithmetic_side_effects, reason = "an overflow is a failed test")]
+    fn inside(cell_log2: u8, fine: [i32; 3]) -> [i32; 3] {
+        let side = 1 << (cell_log2 + 6);
+        fine.map(|part| part % side + side - 32)
+    }
+
     /// The largest fine position of 20 bits.
     const LAST: i32 = ((1 << 20) - 1) << 6;
 
@@ -274,6 +293,36 @@ mod tests {
             let cell = Cell { coordinates, translation, rotation, stale: false };
             let moved = Motion::of(&cell, 15).position(fine, Bounds { position: LAST, one: 1 << 20 });
             prop_assert_eq!(moved.map(i64::from), by_products(&cell, 15, fine));
+        }
+
+        #[test]
+        fn planes_move_as_each_gaussian_does(
+            cell_log2 in 3_u8..=20,
+            translation in [-1_048_576..=1_048_576, -1_048_576..=1_048_576, -1_048_576..=1_048_576],
+            rotation in [-8192..=8192, -8192..=8192, -8192..=8192],
+            gaussians in proptest::collection::vec(
+                ([0..1 << 26, 0..1 << 26, 0..1 << 26], [-2_097_088..=2_097_088, -2_097_088..=2_097_088, -2_097_088..=2_097_088]),
+                1..40,
+            ),
+            (shift, one) in (0..21, 0..=1 << 21),
+        ) {
+            let gaussians: Vec<([i32; 3], [i32; 3])> = gaussians
+                .into_iter()
+                .map(|(position, rotation)| (inside(cell_log2, position), rotation.map(|part| part >> shift)))
+                .collect();
+            let cell = Cell { coordinates: [1; 3], translation, rotation, stale: false };
+            let (motion, bounds) = (Motion::of(&cell, cell_log2), Bounds { position: LAST, one });
+            let plane = |axis: usize| -> Vec<i32> { gaussians.iter().map(|(position, _)| position[axis]).collect() };
+            let turned = |axis: usize| -> Vec<i32> { gaussians.iter().map(|(_, rotation)| rotation[axis]).collect() };
+            let (mut positions, mut rotations) = ([0, 1, 2].map(plane), [0, 1, 2].map(turned));
+            let planes = (positions.each_mut().map(Vec::as_mut_slice), rotations.each_mut().map(Vec::as_mut_slice));
+            motion.displace(planes, bounds);
+            for (at, &(position, rotation)) in gaussians.iter().enumerate() {
+                let moved = [0, 1, 2].map(|axis| positions[axis][at]);
+                prop_assert_eq!(moved, motion.position(position, bounds));
+                let turned = [0, 1, 2].map(|axis| rotations[axis][at]);
+                prop_assert_eq!(turned, motion.rotation(rotation, bounds));
+            }
         }
 
         #[test]

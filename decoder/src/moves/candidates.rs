@@ -9,8 +9,13 @@ use splatstream_format::entropy::machine::Machine;
 /// Stands for the row of a move that no parent is known to.
 pub(super) const NEVER: u32 = u32::MAX;
 
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+mod simd128;
+
 /// Places on either side of a place, and itself.
 const CANDIDATES: usize = 2 * MOVE_WINDOW + 1;
+/// The same, and what fills the last vector.
+const FILLED: usize = CANDIDATES.next_multiple_of(4);
 
 /// Bits of the index of a candidate, below the squared distance: this is below 2^44, as coordinates are below 2^21.
 const INDEX_BITS: u32 = 6;
@@ -32,12 +37,29 @@ pub(super) struct Neighbours {
     pub(super) count: usize,
 }
 
+/// The candidates around a parent that moves.
+struct Around<'c> {
+    /// Its position and its row.
+    own: [u32; 3],
+    row: u32,
+    /// Those of the candidates, of which the first [`CANDIDATES`] count, and from which row on their motions are known.
+    position: [&'c [u32; FILLED]; 3],
+    known_from: &'c [u32; FILLED],
+}
+
+/// The keys of the nearest candidates, in order; all ones where there are fewer.
+struct Nearest {
+    keys: [u64; MOVE_NEIGHBOURS],
+    /// Whether more of them are equally far than can be taken.
+    is_tied: bool,
+}
+
 impl Candidates {
     /// The parents of a space; `modes` are those of the last list.
     pub(super) fn new(space: &MoveSpace, modes: &[i32]) -> Self {
         let order = &space.order;
         let last = u32::try_from(space.lists.len().wrapping_sub(1)).unwrap_or(u32::MAX);
-        let padded = order.len().saturating_add(2 * MOVE_WINDOW);
+        let padded = order.len().saturating_add(2 * MOVE_WINDOW).saturating_add(FILLED - CANDIDATES);
         let mut position = [(); 3].map(|()| vec![0; padded]);
         let mut known_from = vec![NEVER; padded];
         let mut place_of = vec![0; space.lists.last().map_or(0, Vec::len)];
@@ -62,37 +84,62 @@ impl Candidates {
     #[inline(always)]
     fn nearest(&self, row: u32, order: &[Place]) -> Neighbours {
         let index = at(&self.place_of, row as usize) as usize;
-        let window = |plane| window(plane, index);
-        let [Some(xs), Some(ys), Some(zs)] = self.position.each_ref().map(|plane| window(plane)) else {
+        let [Some(xs), Some(ys), Some(zs)] = self.position.each_ref().map(|plane| window(plane, index))
+        else {
             return Neighbours::default();
         };
-        let Some(known_from) = window(&self.known_from) else { return Neighbours::default() };
+        let Some(known_from) = window(&self.known_from, index) else { return Neighbours::default() };
         let own = self.position.each_ref().map(|plane| at(plane, index.wrapping_add(MOVE_WINDOW)));
-        let mut keys = [u64::MAX; CANDIDATES];
-        let points = xs.iter().zip(ys).zip(zs).zip(known_from);
-        for ((key, number), (((&x, &y), &z), &known_from)) in keys.iter_mut().zip(0..).zip(points) {
-            let found = distance(own, [x, y, z]) << INDEX_BITS | number;
-            *key = if known_from <= row { found } else { u64::MAX };
-        }
-        let nearest = smallest(&keys);
+        let around = Around { own, row, position: [xs, ys, zs], known_from };
         let first = index.wrapping_sub(MOVE_WINDOW);
         let place = |key: u64| {
             let number = (key & ((1 << INDEX_BITS) - 1)) as usize;
             order.get(first.wrapping_add(number)).map_or((0, 0), |place| (place.list, place.row))
         };
-        let count = nearest.iter().filter(|&&key| key != u64::MAX).count();
-        let reach = nearest.last().map_or(0, |&key| key >> INDEX_BITS);
-        let within = keys.iter().filter(|&&key| key >> INDEX_BITS <= reach).count();
-        if count == MOVE_NEIGHBOURS && within > MOVE_NEIGHBOURS {
-            return among_equals(&keys, place);
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+        let nearest = simd128::nearest(&around);
+        #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable"))))]
+        let nearest = around.nearest();
+        if nearest.is_tied {
+            let [.., farthest] = nearest.keys;
+            return among_equals(&around.keys(), farthest, place);
         }
-        Neighbours { found: nearest.map(place), count }
+        let count = nearest.keys.iter().filter(|&&key| key != u64::MAX).count();
+        Neighbours { found: nearest.keys.map(place), count }
     }
 }
 
-/// The candidates of a place in a plane.
+impl Around<'_> {
+    /// The key of each candidate: its squared distance, and below it its number.
+    #[inline(always)]
+    fn keys(&self) -> [u64; CANDIDATES] {
+        let mut keys = [u64::MAX; CANDIDATES];
+        let [xs, ys, zs] = self.position;
+        let points = xs.iter().zip(ys).zip(zs).zip(self.known_from);
+        for ((key, number), (((&x, &y), &z), &known_from)) in keys.iter_mut().zip(0..).zip(points) {
+            let found = distance(self.own, [x, y, z]) << INDEX_BITS | number;
+            *key = if known_from <= self.row { found } else { u64::MAX };
+        }
+        keys
+    }
+
+    #[inline(always)]
+    #[cfg_attr(
+        all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")),
+        expect(dead_code, reason = "the vectors of the machine take its place")
+    )]
+    fn nearest(&self) -> Nearest {
+        let keys = self.keys();
+        let nearest = smallest(&keys);
+        let farthest = nearest.last().copied().unwrap_or(u64::MAX);
+        let within = keys.iter().filter(|&&key| key >> INDEX_BITS <= farthest >> INDEX_BITS).count();
+        Nearest { keys: nearest, is_tied: farthest != u64::MAX && within > MOVE_NEIGHBOURS }
+    }
+}
+
+/// The candidates of a place in a plane, and what fills the last vector.
 #[inline(always)]
-fn window(plane: &[u32], index: usize) -> Option<&[u32; CANDIDATES]> {
+fn window(plane: &[u32], index: usize) -> Option<&[u32; FILLED]> {
     plane.get(index..)?.first_chunk()
 }
 
@@ -109,11 +156,11 @@ fn smallest(keys: &[u64; CANDIDATES]) -> [u64; MOVE_NEIGHBOURS] {
     smallest
 }
 
-/// The nearest where more are equally far than can be taken: those of lower lists and rows.
+/// The nearest where more are as far as the farthest key than can be taken: those of lower lists and rows.
 #[cold]
-fn among_equals(keys: &[u64; CANDIDATES], place: impl Fn(u64) -> (u32, u32)) -> Neighbours {
-    let known = keys.iter().filter(|&&key| key != u64::MAX);
-    let mut all: Vec<(u64, (u32, u32))> = known.map(|&key| (key >> INDEX_BITS, place(key))).collect();
+fn among_equals(keys: &[u64; CANDIDATES], farthest: u64, place: impl Fn(u64) -> (u32, u32)) -> Neighbours {
+    let within = keys.iter().filter(|&&key| key >> INDEX_BITS <= farthest >> INDEX_BITS);
+    let mut all: Vec<(u64, (u32, u32))> = within.map(|&key| (key >> INDEX_BITS, place(key))).collect();
     all.sort_unstable();
     let mut nearest = Neighbours::default();
     for (slot, (_, place)) in nearest.found.iter_mut().zip(all) {
