@@ -58,7 +58,9 @@ pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>, interrupt: &Inter
     if interrupt.is_requested() {
         return points;
     }
-    let mut counts = vec![[0_u32; VALUES]; DIGITS];
+    let all = points.iter().fold(0, |all, (code, _)| all | code);
+    let bits = u64::BITS.wrapping_sub(all.leading_zeros());
+    let mut counts = vec![[0_u32; VALUES]; DIGITS.min(bits.div_ceil(DIGIT) as usize)];
     for (code, _) in &points {
         for (position, counts) in (0_u32..).zip(&mut counts) {
             if let Some(count) = counts.get_mut(digit(*code, position)) {

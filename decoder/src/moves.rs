@@ -170,8 +170,8 @@ impl MoveSpace {
     /// motions are not known yet.
     pub fn push(&mut self, reference: &GaussianList, displaced: &GaussianList) {
         let list = u32::try_from(self.lists.len()).unwrap_or(u32::MAX);
+        // Everything is filled in, so that nothing has to be cleared.
         let mut parents = self.spare_lists.pop().unwrap_or_default();
-        parents.clear();
         parents.resize(displaced.len(), Parent::default());
         let Self { order, spare_order, ratio, interrupt, .. } = self;
         let requested = &*interrupt;
@@ -219,8 +219,8 @@ impl MoveSpace {
     pub fn moves(&self, modes: &[i32], wanted: impl Fn(usize) -> bool + Sync) -> Moves<'_> {
         let rows: Vec<u32> =
             (0_u32..).zip(modes).filter(|(_, mode)| *mode & HAS_MOVE != 0).map(|(row, _)| row).collect();
-        let motion = self.lists.last().into_iter().flatten().map(|parent| parent.motion).collect();
-        let mut moves = Moves { space: self, rows, neighbours: Vec::new(), motion };
+        let apart = vec![[0; 3]; self.lists.last().map_or(0, Vec::len)];
+        let mut moves = Moves { space: self, rows, neighbours: Vec::new(), apart };
         if (0..moves.rows.len()).any(&wanted) {
             moves.neighbours = self.neighbours(modes, &moves.rows, &wanted);
         }
@@ -275,8 +275,8 @@ pub struct Moves<'s> {
     rows: Vec<u32>,
     /// Those of each move; none if no predictor looks at them.
     neighbours: Vec<Neighbours>,
-    /// The motion of each parent as far as it is known: of those that do not move, that of their cells.
-    motion: Vec<[i32; 3]>,
+    /// How each parent moves apart from its cell, as far as that is known: those that do not move go with it.
+    apart: Vec<[i32; 3]>,
 }
 
 impl Moves<'_> {
@@ -293,18 +293,11 @@ impl Moves<'_> {
             MovePredictor::Cells => displacement,
             MovePredictor::Previous => trend,
             MovePredictor::Neighbours => {
-                let apart = |motion, other: &Parent| join(motion, other.displacement, i32::wrapping_sub);
-                join(displacement, self.mean(number, apart), i32::wrapping_add)
+                join(displacement, self.mean(number, |apart, _| apart), i32::wrapping_add)
             }
             MovePredictor::Both => {
-                let apart = |motion, other: &Parent| {
-                    join(
-                        join(motion, other.displacement, i32::wrapping_sub),
-                        half_trend(other),
-                        i32::wrapping_sub,
-                    )
-                };
-                let by_neighbours = join(displacement, self.mean(number, apart), i32::wrapping_add);
+                let rest = |apart, other: &Parent| join(apart, half_trend(other), i32::wrapping_sub);
+                let by_neighbours = join(displacement, self.mean(number, rest), i32::wrapping_add);
                 join(by_neighbours, half_trend(&parent), i32::wrapping_add)
             }
         };
@@ -313,10 +306,10 @@ impl Moves<'_> {
 
     /// Takes the fine position that the parent of a move has in the end.
     pub fn set(&mut self, number: usize, position_fine: [i32; 3]) {
-        let start = self.parent(number).start;
+        let Parent { start, displacement, .. } = self.parent(number);
         let row = self.rows.get(number).map_or(usize::MAX, |&row| row as usize);
-        if let Some(motion) = self.motion.get_mut(row) {
-            *motion = join(position_fine, start, i32::wrapping_sub);
+        if let Some(apart) = self.apart.get_mut(row) {
+            *apart = join(join(position_fine, start, i32::wrapping_sub), displacement, i32::wrapping_sub);
         }
     }
 
@@ -325,7 +318,8 @@ impl Moves<'_> {
         self.space.lists.last().map(|parents| at(parents, row)).unwrap_or_default()
     }
 
-    /// The mean of what `of` makes of the neighbours' motions: to nearest, halves up. 0 without neighbours.
+    /// The mean of what `of` makes of how neighbours move apart from their cells: to nearest, halves up. 0 without
+    /// neighbours.
     ///
     /// Motions are below 2^26, and trends below 2^29, so that a term is below 2^30.
     fn mean(&self, number: usize, of: impl Fn([i32; 3], &Parent) -> [i32; 3]) -> [i32; 3] {
@@ -334,9 +328,12 @@ impl Moves<'_> {
         let mut sum = [0_i64; 3];
         for &(list, row) in neighbours.found.iter().take(neighbours.count) {
             let Some(parents) = self.space.lists.get(list as usize) else { continue };
-            let other = at(parents, row as usize);
-            let motion = if list == own { at(&self.motion, row as usize) } else { other.motion };
-            let term = of(motion, &other);
+            let Some(other) = parents.get(row as usize) else { continue };
+            let apart = match list == own {
+                true => at(&self.apart, row as usize),
+                false => join(other.motion, other.displacement, i32::wrapping_sub),
+            };
+            let term = of(apart, other);
             sum.iter_mut().zip(term).for_each(|(sum, term)| *sum = sum.wrapping_add(term.into()));
         }
         // floor((2 sum + count) / (2 count)).
@@ -368,11 +365,14 @@ fn gather(
     displaced: &GaussianList,
     ratio: SpanRatio,
 ) {
-    fill(parents, &reference.position_fine, first, |parent, start| parent.start = start);
-    fill(parents, &displaced.position_fine, first, |parent, moved| {
-        parent.displacement = join(moved, parent.start, i32::wrapping_sub);
-        parent.motion = parent.displacement;
-    });
+    let [x, y, z] = from_row(&reference.position_fine, first);
+    let [a, b, c] = from_row(&displaced.position_fine, first);
+    let starts = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]);
+    let moved = a.iter().zip(b).zip(c).map(|((&a, &b), &c)| [a, b, c]);
+    for ((parent, start), moved) in parents.iter_mut().zip(starts).zip(moved) {
+        let displacement = join(moved, start, i32::wrapping_sub);
+        *parent = Parent { start, displacement, trend: [0; 3], motion: displacement };
+    }
     fill(parents, &reference.change.motion, first, |parent, motion| {
         parent.trend = motion.map(|motion| ratio.scaled(motion));
     });
@@ -381,10 +381,15 @@ fn gather(
 /// Gives each of the parents from row `first` on its values of three planes; nothing where the planes end.
 #[inline(always)]
 fn fill(parents: &mut [Parent], planes: &[Vec<i32>; 3], first: usize, each: impl Fn(&mut Parent, [i32; 3])) {
-    let [x, y, z] = planes.each_ref().map(|plane| plane.get(first..).unwrap_or_default());
+    let [x, y, z] = from_row(planes, first);
     for (parent, ((&x, &y), &z)) in parents.iter_mut().zip(x.iter().zip(y).zip(z)) {
         each(parent, [x, y, z]);
     }
+}
+
+/// The values of three planes from a row on.
+fn from_row(planes: &[Vec<i32>; 3], first: usize) -> [&[i32]; 3] {
+    planes.each_ref().map(|plane| plane.get(first..).unwrap_or_default())
 }
 
 #[inline(always)]
