@@ -139,16 +139,28 @@ impl Slots {
         slots.resize(identities.len(), NONE);
         let (mut left, mut missing) = (Vec::new(), Vec::new());
         let (mut rest, mut rest_slots) = (self.identities.as_slice(), self.rows.as_slice());
-        for (&identity, slot) in identities.iter().zip(&mut slots) {
-            match rest.iter().take(AHEAD).position(|&other| other == identity) {
-                Some(skipped) => {
-                    let (passed, passed_slots) = (rest.iter().take(skipped), rest_slots.iter().take(skipped));
-                    left.extend(passed.copied().zip(passed_slots.copied()));
-                    *slot = rest_slots.get(skipped).copied().unwrap_or(NONE);
-                    rest = rest.get(skipped + 1..).unwrap_or_default();
-                    rest_slots = rest_slots.get(skipped + 1..).unwrap_or_default();
+        for (identities, slots) in identities.chunks(GROUP).zip(slots.chunks_mut(GROUP)) {
+            // Most come as they did in the last frame.
+            let (same, after) = rest.split_at_checked(identities.len()).unwrap_or_default();
+            if same == identities {
+                let (same_slots, after_slots) = rest_slots.split_at_checked(same.len()).unwrap_or_default();
+                slots.copy_from_slice(same_slots);
+                (rest, rest_slots) = (after, after_slots);
+                continue;
+            }
+            for (&identity, slot) in identities.iter().zip(slots) {
+                match rest.iter().take(AHEAD).position(|&other| other == identity) {
+                    Some(skipped) => {
+                        let (passed, next) = rest.split_at_checked(skipped).unwrap_or_default();
+                        let (passed_slots, next_slots) =
+                            rest_slots.split_at_checked(skipped).unwrap_or_default();
+                        left.extend(passed.iter().copied().zip(passed_slots.iter().copied()));
+                        *slot = next_slots.first().copied().unwrap_or(NONE);
+                        rest = next.get(1..).unwrap_or_default();
+                        rest_slots = next_slots.get(1..).unwrap_or_default();
+                    }
+                    None => missing.push((identity, slot)),
                 }
-                None => missing.push((identity, slot)),
             }
         }
         left.extend(rest.iter().copied().zip(rest_slots.iter().copied()));
