@@ -237,9 +237,7 @@ impl Decoder {
             let step = self.stream.next_step(bytes, is_end);
             // What has been taken need not be kept while the next bytes are awaited.
             self.source.go_to(self.stream.position());
-            if self.cancel.is_requested() {
-                return Err(Error::Cancelled);
-            }
+            self.check_cancelled()?;
             match step.map_err(Error::Stream)? {
                 Step::Frame(frame) => {
                     if let Some(frame) = self.told(*frame)? {
@@ -254,7 +252,9 @@ impl Decoder {
                 Step::NeedMoreData(more) => {
                     // Shared bytes are all there: the decoder has gone to another place.
                     if !self.source.is_shared() && !self.source.fill(more)? {
-                        let Some(waited) = self.stream.stop_waiting() else { return Ok(None) };
+                        let waited = self.stream.stop_waiting();
+                        self.check_cancelled()?;
+                        let Some(waited) = waited else { return Ok(None) };
                         if let Some(frame) = self.told(waited)? {
                             return Ok(Some(frame));
                         }
@@ -265,6 +265,17 @@ impl Decoder {
                     return self.finish();
                 }
             }
+        }
+    }
+
+    /// Refuses what the decoder gives once it was told to end: parts of it are missing.
+    ///
+    /// # Errors
+    /// It was cancelled.
+    fn check_cancelled(&self) -> Result<()> {
+        match self.cancel.is_requested() {
+            true => Err(Error::Cancelled),
+            false => Ok(()),
         }
     }
 
@@ -298,7 +309,7 @@ impl Decoder {
     /// A frame as it is given out; none if nothing is known of it, or if another one is sought.
     ///
     /// # Errors
-    /// Planes that do not fit together.
+    /// Planes or identities that do not fit together.
     fn frame(&mut self, decoded: DecodedFrame) -> Result<Option<Frame>> {
         let Some(&sequence) = self.stream.sequence().filter(|_| decoded.index >= self.from) else {
             return Ok(None);

@@ -20,7 +20,7 @@ pub enum Error {
     Incomplete(Vec<Warning>),
     /// A file cannot be opened or read.
     Io(std::io::Error),
-    /// The planes of a frame do not fit together, in words: a defect of this library, which its authors want to hear of.
+    /// The planes of a frame, or the identities of its Gaussians, do not fit together, in words: a defect of this library, which its authors want to hear of.
     Broken(String),
     /// [`Cancel`](crate::Cancel) was requested. A [seek](crate::Decoder::seek) starts again.
     Cancelled,

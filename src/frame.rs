@@ -46,6 +46,10 @@ impl Frame {
         warnings: Vec<Warning>,
     ) -> Result<Self> {
         decoded.planes.check(sequence.sh_degree).map_err(|error| Error::Broken(error.to_string()))?;
+        let (identities, gaussians) = (decoded.identities.len(), decoded.planes.len());
+        if identities != gaussians {
+            return Err(Error::Broken(format!("{gaussians} Gaussians have {identities} identities")));
+        }
         Ok(Self {
             index: decoded.index,
             kind: decoded.frame_type,
@@ -168,4 +172,28 @@ pub(crate) fn time_of(index: u32, sequence: &SequenceParameters) -> Duration {
 /// The output of 7.10 of planes that [`Frame::new`] has checked.
 fn computed(integers: QuantizedFrame, sequence: &SequenceParameters) -> GaussianFrame {
     to_gaussians(integers, sequence).expect("a frame has planes that fit together")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splatstream_decoder::operating_point::OperatingPoint;
+    use splatstream_decoder::process::Options;
+    use splatstream_decoder::stream::Frames;
+
+    #[test]
+    fn a_frame_whose_parts_do_not_fit_is_broken() {
+        let options = Options { identities: true, ..Options::default() };
+        let mut frames = Frames::open(include_bytes!("../examples/talk.gss"), &options).unwrap();
+        let decoded = frames.next_frame().unwrap();
+        let sequence = *frames.sequence().unwrap();
+        let frame = |decoded| Frame::new(decoded, OperatingPoint::ALL, sequence, Vec::new());
+        assert!(frame(decoded.clone()).is_ok());
+        let mut without_identity = decoded.clone();
+        without_identity.identities.pop();
+        assert!(matches!(frame(without_identity), Err(Error::Broken(what)) if what.contains("identities")));
+        let mut without_value = decoded;
+        without_value.planes.opacity.pop();
+        assert!(matches!(frame(without_value), Err(Error::Broken(_))));
+    }
 }
