@@ -12,6 +12,7 @@ use splatstream_format::{Error, Result};
 /// How decoding a stream went.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[must_use]
+#[non_exhaustive]
 pub struct Summary {
     /// Frames handed out.
     pub frames: u32,

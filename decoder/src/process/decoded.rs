@@ -8,6 +8,7 @@ use splatstream_format::syntax::FrameType;
 
 /// One frame, as far as its units were decoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DecodedFrame {
     /// Display index.
     pub index: u32,

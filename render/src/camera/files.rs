@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a file gives no cameras.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CameraError {
     /// The file could not be read.
     #[error("cannot read: {0}; check the path")]

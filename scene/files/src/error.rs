@@ -17,6 +17,7 @@ pub struct SceneError {
 /// What is wrong with a scene. Byte offsets count from the start of the file, or, where the message says
 /// so, of its decompressed content.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneErrorKind {
     /// The file system refused.
     #[error("cannot read: {0}")]
