@@ -22,6 +22,8 @@ const FEW: usize = 512;
 
 /// Points whose codes one task computes.
 const RUN: usize = 4096;
+/// Points between two looks at the interrupt.
+const PART: usize = 1 << 16;
 
 /// The Morton codes of points, given by their planes x, y, z of one length. Coordinates are below 2^21.
 pub(crate) fn codes([xs, ys, zs]: [&[u32]; 3]) -> Vec<u64> {
@@ -61,7 +63,7 @@ pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>, interrupt: &Inter
     let all = points.iter().fold(0, |all, (code, _)| all | code);
     let bits = u64::BITS.wrapping_sub(all.leading_zeros());
     let mut counts = vec![[0_u32; VALUES]; DIGITS.min(bits.div_ceil(DIGIT) as usize)];
-    for (code, _) in &points {
+    for (code, _) in parts(&points, interrupt).flatten() {
         for (position, counts) in (0_u32..).zip(&mut counts) {
             if let Some(count) = counts.get_mut(digit(*code, position)) {
                 *count = count.wrapping_add(1);
@@ -84,7 +86,7 @@ pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>, interrupt: &Inter
             next = next.wrapping_add(*count);
             *count = first;
         }
-        for point in &points {
+        for point in parts(&points, interrupt).flatten() {
             let Some(place) = counts.get_mut(digit(point.0, position)) else { continue };
             if let Some(slot) = sorted.get_mut(*place as usize) {
                 *slot = *point;
@@ -94,6 +96,11 @@ pub(crate) fn order(codes: impl ExactSizeIterator<Item = u64>, interrupt: &Inter
         core::mem::swap(&mut points, &mut sorted);
     }
     points
+}
+
+/// The points, as long as no interrupt is requested.
+fn parts<'p>(points: &'p [(u64, u32)], interrupt: &'p Interrupt) -> impl Iterator<Item = &'p [(u64, u32)]> {
+    points.chunks(PART).take_while(|_| !interrupt.is_requested())
 }
 
 #[inline(always)]

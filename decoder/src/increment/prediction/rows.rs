@@ -13,6 +13,8 @@ const BEFORE_SH: usize = 10;
 
 /// Rows that are gathered together: a plane is read for all of them before the next.
 const RUN: usize = 256;
+/// Neighbours between two looks at the interrupt: they lie anywhere in memory.
+const PART: usize = 1 << 16;
 
 /// The Gaussians of a set that are neighbours, in the order of the set.
 #[derive(Debug)]
@@ -27,7 +29,8 @@ impl Rows {
     /// Gathers the neighbours out of a set; where an interrupt is requested, the rows mean nothing.
     pub(super) fn new_unless(interrupt: &Interrupt, set: &QuantizedFrame, neighbours: &[Neighbour]) -> Self {
         let mut used = vec![false; set.len()];
-        for neighbour in neighbours {
+        let parts = || neighbours.chunks(PART).take_while(|_| !interrupt.is_requested());
+        for neighbour in parts().flatten() {
             if let Some(used) = used.get_mut(neighbour.index as usize) {
                 *used = true;
             }
@@ -44,7 +47,10 @@ impl Rows {
         if interrupt.is_requested() {
             return Self { width, values: Vec::new(), indices: Vec::new() };
         }
-        let indices = neighbours.iter().map(|neighbour| at(&row_of, neighbour.index)).collect();
+        let mut indices = Vec::with_capacity(neighbours.len());
+        for part in parts() {
+            indices.extend(part.iter().map(|neighbour| at(&row_of, neighbour.index)));
+        }
         let mut values = vec![0; used_indices.len().wrapping_mul(width)];
         let runs = values.par_chunks_mut(width.wrapping_mul(RUN)).zip(used_indices.par_chunks(RUN));
         runs.filter(|_| !interrupt.is_requested()).for_each(|(values, indices)| {
