@@ -29,7 +29,7 @@ vectors() {
         return
     fi
     CARGO_ENCODED_RUSTFLAGS=-Ctarget-feature=+simd128 CARGO_TARGET_WASM32_WASIP1_RUNNER="node --no-warnings $PWD/tests/wasi.mjs" \
-        cargo test --quiet -p splatstream-format -p splatstream-decoder --lib --target $target -- machine motion moves
+        cargo test --quiet -p splatstream-format -p splatstream-decoder --lib --target $target -- entropy::machine motion:: moves::
 }
 
 # The modules for engines without instructions of 128 bits.
