@@ -1,5 +1,7 @@
 //! Loops compiled for the vectors of the machine. What they compute is the same everywhere.
 
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+use core::arch::wasm32::{f64x2_convert_low_i32x4, i32x4_shuffle, v128};
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use pulp::{Simd, WithSimd};
 use splatstream_format::entropy::machine::Machine;
@@ -40,4 +42,11 @@ pub(crate) fn vectorized(task: impl Task) {
     task.run(splatstream_format::entropy::machine::Simd128);
     #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable"))))]
     task.run(splatstream_format::entropy::machine::Portable);
+}
+
+/// The first and the last two of four integers, as f64.
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]
+#[inline(always)]
+pub(crate) fn halves(values: v128) -> [v128; 2] {
+    [f64x2_convert_low_i32x4(values), f64x2_convert_low_i32x4(i32x4_shuffle::<2, 3, 2, 3>(values, values))]
 }

@@ -7,9 +7,10 @@
 
 use super::{Bounds, Motion, Planes};
 use crate::cell::UNIT_MAX;
+use crate::vector::halves;
 use core::arch::wasm32::{
-    f64x2_add, f64x2_convert_low_i32x4, f64x2_lt, f64x2_mul, f64x2_pmax, f64x2_splat, f64x2_sqrt, f64x2_sub,
-    i32x4_add, i32x4_max, i32x4_min, i32x4_shuffle, i32x4_splat, i32x4_sub, v128, v128_and, v128_xor,
+    f64x2_add, f64x2_lt, f64x2_mul, f64x2_pmax, f64x2_splat, f64x2_sqrt, f64x2_sub, i32x4_add, i32x4_max,
+    i32x4_min, i32x4_shuffle, i32x4_splat, i32x4_sub, v128, v128_and, v128_xor,
 };
 use pulp::cast;
 
@@ -60,12 +61,6 @@ fn loaded(values: &[i32]) -> v128 {
         all
     };
     cast(values.first_chunk::<FOUR>().copied().unwrap_or_else(few))
-}
-
-/// The first and the last two of four integers.
-#[inline(always)]
-fn halves(values: v128) -> [v128; 2] {
-    [f64x2_convert_low_i32x4(values), f64x2_convert_low_i32x4(i32x4_shuffle::<2, 3, 2, 3>(values, values))]
 }
 
 /// Four integers that were rounded by adding [`TO_INTEGER`].

@@ -4,11 +4,11 @@
 //! 2^50, is exact as an f64.
 
 use super::{Around, CANDIDATES, Nearest};
+use crate::vector::halves;
 use core::arch::wasm32::{
-    f64x2, f64x2_add, f64x2_convert_low_i32x4, f64x2_le, f64x2_mul, f64x2_pmax, f64x2_pmin, f64x2_splat,
-    i32x4_shuffle, i32x4_splat, i32x4_sub, i64x2_add, i64x2_extend_high_i32x4, i64x2_extend_low_i32x4,
-    i64x2_extract_lane, i64x2_shuffle, i64x2_splat, i64x2_sub, u32x4, u32x4_le, u32x4_splat, v128, v128_and,
-    v128_bitselect,
+    f64x2, f64x2_add, f64x2_le, f64x2_mul, f64x2_pmax, f64x2_pmin, f64x2_splat, i32x4_splat, i32x4_sub,
+    i64x2_add, i64x2_extend_high_i32x4, i64x2_extend_low_i32x4, i64x2_extract_lane, i64x2_shuffle,
+    i64x2_splat, i64x2_sub, u32x4, u32x4_le, u32x4_splat, v128, v128_and, v128_bitselect,
 };
 use pulp::cast;
 
@@ -75,12 +75,6 @@ fn keys(around: &Around<'_>) -> [[v128; 2]; CANDIDATES.div_ceil(4)] {
 #[inline(always)]
 fn left() -> impl Iterator<Item = usize> {
     (0..=CANDIDATES).rev().step_by(4)
-}
-
-/// The first and the last two of four integers.
-#[inline(always)]
-fn halves(values: v128) -> [v128; 2] {
-    [f64x2_convert_low_i32x4(values), f64x2_convert_low_i32x4(i32x4_shuffle::<2, 3, 2, 3>(values, values))]
 }
 
 /// How many keys are of no greater distance than a key.
