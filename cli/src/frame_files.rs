@@ -42,7 +42,7 @@ pub(crate) struct FrameFiles {
 const HEAD: u64 = 64 << 10;
 
 /// What standard input is called in messages.
-const STANDARD_INPUT: &str = "standard input";
+pub(crate) const STANDARD_INPUT: &str = "standard input";
 
 impl FrameFiles {
     /// The frames that the arguments of a command name: files, or one directory of frames, or one file of many.

@@ -2,7 +2,7 @@
 
 use crate::encode::warnings::Warning;
 use crate::failure::{Failure, StreamFault};
-use crate::frame_files::{FrameFiles, spool};
+use crate::frame_files::{FrameFiles, STANDARD_INPUT, spool};
 use crate::input_args::InputArgs;
 use crate::output_file::STANDARD;
 use crate::stream_file::{StreamFile, is_stream};
@@ -90,26 +90,29 @@ impl Opened {
                     stream::Frames::open(&file.bytes, &options).map_err(|error| file.fault(error))?;
                 Ok(Frames::Stream(Box::new(Decoding { file, frames, expected })))
             }
-            Self::Scene(path, _) if point.is_some() => Err(Failure::Usage(format!(
-                "{}: only a stream has operating points; leave --op out",
-                path.display()
-            ))),
-            Self::Spooled(..) if point.is_some() => Err(Failure::Usage(
-                "standard input: only a stream has operating points; leave --op out".to_owned(),
-            )),
-            Self::Scene(path, reading) => of_files(FrameFiles::find(std::slice::from_ref(path), *reading)?),
+            Self::Scene(path, _) if point.is_some() => Err(without_points(&path.to_string_lossy())),
+            Self::Spooled(..) if point.is_some() => Err(without_points(STANDARD_INPUT)),
+            Self::Scene(path, reading) => {
+                FrameFiles::find(std::slice::from_ref(path), *reading).map(Frames::of_files)
+            }
             Self::Spooled(spooled, reading) => {
-                of_files(FrameFiles::of_spooled(Arc::clone(spooled), *reading)?)
+                FrameFiles::of_spooled(Arc::clone(spooled), *reading).map(Frames::of_files)
             }
         }
     }
 }
 
-fn of_files(files: FrameFiles) -> Result<Frames<'static>, Failure> {
-    Ok(Frames::Files { files: Box::new(files), next: 0 })
+/// Files are asked for those of an operating point.
+fn without_points(name: &str) -> Failure {
+    Failure::Usage(format!("{name}: only a stream has operating points; leave --op out"))
 }
 
 impl Frames<'_> {
+    /// Those of files, from the first.
+    fn of_files(files: FrameFiles) -> Self {
+        Self::Files { files: Box::new(files), next: 0 }
+    }
+
     /// How many there should be; 0 if that is not known.
     pub(crate) fn expected(&self) -> u32 {
         match self {
