@@ -5,7 +5,8 @@
 //! all digests compared, of all threads together.
 //!
 //! `... --example bounds -- --interrupt [LEVEL]... [CASE]...` interrupts the decoder of each at many places, and prints for
-//! how long it goes on, on one thread.
+//! how long it goes on, on one thread. `... -- --interrupt-file FILE LEVEL` prints the milliseconds for a stream of one's own, the
+//! shortest first.
 
 use rustix::time::{ClockId, clock_gettime};
 use splatstream_decoder::process::Options;
