@@ -6,7 +6,7 @@
 use crate::error::Error;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
-use splatstream_render::{Camera, PreparedFrame, Rendering, Strips};
+use splatstream_render::{Camera, PreparedFrame, Rendering, Strips, draw_strips, touching_strips};
 
 /// Around the scene.
 const BACKGROUND: [f32; 3] = [0.0; 3];
@@ -42,9 +42,9 @@ pub(crate) struct StripView {
 }
 
 impl StripView {
-    /// Of a frame that is prepared.
-    fn new(frame: &GaussianFrame, prepared: &PreparedFrame<'_>, camera: &Camera, strips: Strips) -> Self {
-        let rows = prepared.touching(camera, strips);
+    /// Of a frame.
+    fn new(frame: &GaussianFrame, camera: &Camera, strips: Strips) -> Self {
+        let rows = touching_strips(frame, camera, strips);
         let frame = frame.select(&rows);
         let picture = PreparedFrame::new(&frame).strips(camera, BACKGROUND, strips);
         Self { camera: camera.clone(), strips, picture, frame, rows }
@@ -78,10 +78,9 @@ impl StripViews {
 
     /// The strips of a frame, to compare others of the same Gaussians with: of the views at some places.
     pub(crate) fn of(&self, frame: &GaussianFrame, places: impl Iterator<Item = usize>) -> Vec<StripView> {
-        let prepared = PreparedFrame::new(frame);
         let view = |place: usize| {
             let strips = strips(place as u32, self.every);
-            Some(StripView::new(frame, &prepared, self.cameras.get(place)?, strips))
+            Some(StripView::new(frame, self.cameras.get(place)?, strips))
         };
         places.filter_map(view).collect()
     }
@@ -100,9 +99,8 @@ impl StripViews {
 
     /// The strips of a frame, view by view.
     pub(crate) fn draw(&self, frame: &GaussianFrame) -> impl Iterator<Item = Rendering> {
-        let prepared = PreparedFrame::new(frame);
         let views = self.cameras.iter().zip(0..);
-        views.map(move |(camera, number)| prepared.strips(camera, BACKGROUND, strips(number, self.every)))
+        views.map(|(camera, number)| draw_strips(frame, camera, BACKGROUND, strips(number, self.every)))
     }
 
     /// Their mean PSNR where those of another frame have been drawn, dB; none if nothing can be seen in any.

@@ -73,7 +73,7 @@ impl Block {
 
     /// Their values in a plane of the frame.
     #[inline(always)]
-    fn of(&self, plane: &[f32]) -> Lanes {
+    pub(super) fn of(&self, plane: &[f32]) -> Lanes {
         let values = &plane[self.first..self.first + self.count];
         let mut lanes = [values[self.count - 1]; TILE];
         match self.count == TILE {

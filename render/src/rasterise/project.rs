@@ -76,16 +76,29 @@ impl Shapes {
     pub(crate) fn axes(&self, row: usize) -> [Vec3; 3] {
         self.axes[row]
     }
+
+    /// The shape of a Gaussian.
+    #[inline(always)]
+    fn one(&self, row: usize) -> Shape {
+        Shape { axes: self.axes[row], longest: self.longest[row], opacity: self.opacity[row] }
+    }
 }
 
-/// The ellipses of the Gaussians that touch the picture, nearest first.
-pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Vec<Splat> {
-    let view = View::new(frame, shapes, sight);
+/// What is the same of a Gaussian in all views.
+struct Shape {
+    axes: [Vec3; 3],
+    longest: f32,
+    opacity: f32,
+}
+
+/// The ellipses of the Gaussians that touch the picture, nearest first; `near` is the least depth that is drawn.
+pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>, near: f32) -> Vec<Splat> {
+    let view = View::new(frame, sight, near);
     let count = frame.len();
     let starts: Vec<usize> = (0..count).step_by(CHUNK).collect();
     let chunk = |&start: &usize| {
         let rows = start..count.min(start + CHUNK);
-        pulp::Arch::new().dispatch(ProjectChunk { view: &view, rows })
+        pulp::Arch::new().dispatch(ProjectChunk { view: &view, shapes, rows })
     };
     let chunks: Vec<Vec<(f32, Splat)>> = starts.par_iter().map(chunk).collect();
     // Positive floats order as their bits; equal depths keep the order of the frame.
@@ -100,16 +113,10 @@ pub(crate) fn project(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>)
     keys.par_iter().map(splat).collect()
 }
 
-/// The Gaussians of a whole frame that touch the picture, by rising row.
-pub(crate) fn touching(frame: &GaussianFrame, shapes: &Shapes, sight: &Sight<'_>) -> Vec<u32> {
-    let view = View::new(frame, shapes, sight);
-    let rows = (0..frame.len()).into_par_iter().with_min_len(CHUNK);
-    rows.filter(|&row| view.ellipse(row).is_some()).map(|row| row as u32).collect()
-}
-
 /// Projects some Gaussians.
 struct ProjectChunk<'a> {
     view: &'a View<'a>,
+    shapes: &'a Shapes,
     rows: Range<usize>,
 }
 
@@ -118,13 +125,13 @@ impl WithSimd for ProjectChunk<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let Self { view, rows } = self;
+        let Self { view, shapes, rows } = self;
         let mut splats = Vec::with_capacity(rows.len());
         for start in rows.clone().step_by(TILE) {
             let block = Block::new(start..rows.end.min(start + TILE));
             let first = splats.len();
             for (lane, row) in block.rows() {
-                if let Some((depth, splat)) = view.ellipse(row) {
+                if let Some((depth, splat)) = view.ellipse(row, &shapes.one(row)) {
                     // Until the colours of the block are there, the lane that it is at.
                     splats.push((depth, Splat { colour: [lane as f32; 3], ..splat }));
                 }
@@ -145,7 +152,6 @@ impl WithSimd for ProjectChunk<'_> {
 /// A frame and a camera, as projection needs them.
 struct View<'a> {
     frame: &'a GaussianFrame,
-    shapes: &'a Shapes,
     to_camera: Mat3,
     rows: [Vec3; 3],
     position: Vec3,
@@ -159,17 +165,16 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    fn new(frame: &'a GaussianFrame, shapes: &'a Shapes, sight: &Sight<'_>) -> Self {
+    fn new(frame: &'a GaussianFrame, sight: &Sight<'_>, near: f32) -> Self {
         let camera = sight.camera;
         let to_camera = Mat3::from_cols_array_2d(&camera.rotation).transpose();
         let size = [camera.width as f32, camera.height as f32];
         Self {
             frame,
-            shapes,
             to_camera,
             rows: camera.rotation.map(Vec3::from),
             position: camera.position.into(),
-            near: near(frame, camera),
+            near,
             focal: camera.focal,
             principal: camera.principal,
             size,
@@ -180,17 +185,17 @@ impl<'a> View<'a> {
 
     /// The depth of a Gaussian, and its ellipse without colour; none if it cannot be seen.
     #[inline(always)]
-    fn ellipse(&self, row: usize) -> Option<(f32, Splat)> {
+    fn ellipse(&self, row: usize, shape: &Shape) -> Option<(f32, Splat)> {
         let offset = Vec3::from(self.frame.position().each_ref().map(|plane| plane[row])) - self.position;
         let at = self.to_camera * offset;
-        if at.z.is_nan() || at.z < self.near || self.is_outside(at, self.shapes.longest[row]) {
+        if at.z.is_nan() || at.z < self.near || self.is_outside(at, shape.longest) {
             return None;
         }
-        let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(row, at);
+        let Covariance { xx, xy, yy, determinant: sharp } = self.covariance(shape, at);
         let (wide, tall) = (xx + LOW_PASS, yy + LOW_PASS);
         let determinant = sharp + LOW_PASS * (xx + tall);
         let kept = if self.frame.antialiased() { (sharp / determinant).sqrt() } else { 1.0 };
-        let opacity = self.shapes.opacity[row] * kept;
+        let opacity = shape.opacity * kept;
         let peak = libm::log2f(opacity);
         // Squared Mahalanobis distance at which alpha is 1/255.
         let reach = 2.0 / LOG2_E * (peak + LOG2_255);
@@ -254,7 +259,7 @@ impl<'a> View<'a> {
 
     /// Covariance of the projection, without low-pass.
     #[inline(always)]
-    fn covariance(&self, row: usize, at: Vec3) -> Covariance {
+    fn covariance(&self, shape: &Shape, at: Vec3) -> Covariance {
         let near = 1.0 / at.z;
         let [x, y] = [0, 1].map(|axis| {
             let (least, most) = self.slopes[axis];
@@ -262,9 +267,8 @@ impl<'a> View<'a> {
         });
         let across = (self.rows[0] - self.rows[2] * x) * (self.focal[0] * near);
         let down = (self.rows[1] - self.rows[2] * y) * (self.focal[1] * near);
-        let axes = self.shapes.axes[row];
-        let u = Vec3::from(axes.map(|axis| across.dot(axis)));
-        let v = Vec3::from(axes.map(|axis| down.dot(axis)));
+        let u = Vec3::from(shape.axes.map(|axis| across.dot(axis)));
+        let v = Vec3::from(shape.axes.map(|axis| down.dot(axis)));
         // Lagrange's identity: never negative, where |u|²·|v|² - (u·v)² may lose every digit.
         let determinant = u.cross(v).length_squared();
         Covariance { xx: u.length_squared(), xy: u.dot(v), yy: v.length_squared(), determinant }
