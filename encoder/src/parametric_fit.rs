@@ -7,11 +7,16 @@
     reason = "codes of tokens rise, scale and shape are small numbers of the syntax"
 )]
 
+use pulp::{Arch, Simd, WithSimd};
 use splatstream_format::entropy::parametric::Parametric;
 use splatstream_format::entropy::token::{Alphabet, join, unzigzag};
 
+/// Tokens have eight bits, and an edge more.
+const MOST_EDGES: usize = 257;
+
 /// A token that occurs.
 struct Counted {
+    number: usize,
     /// Codes of its values: from the first to before the second.
     codes: [u64; 2],
     count: f64,
@@ -21,9 +26,8 @@ struct Counted {
 struct Sample {
     tokens: Vec<Counted>,
     alphabet: Alphabet,
+    direct_log2: u8,
     last: u8,
-    /// The first code after those of the last token.
-    end: u64,
 }
 
 /// The best distribution for `counts` of tokens, of which there is at least one.
@@ -32,12 +36,13 @@ pub(crate) fn fitted(counts: &[u64], alphabet: Alphabet, direct_log2: u8) -> Opt
     let occurring = counts.iter().enumerate().filter(|&(_, &count)| count > 0);
     let tokens: Vec<Counted> = occurring
         .map(|(token, &count)| Counted {
+            number: token,
             codes: [first_code(token), first_code(token + 1)],
             count: count as f64,
         })
         .collect();
     let last = u8::try_from(counts.iter().rposition(|&count| count > 0)?).ok()?;
-    let sample = Sample { tokens, alphabet, last, end: first_code(usize::from(last) + 1) };
+    let sample = Sample { tokens, alphabet, direct_log2, last };
     Some(sample.best())
 }
 
@@ -117,34 +122,11 @@ impl Sample {
 
     /// Changes scale and zero level by steps that save bits, until none does.
     fn descended(&self, from: Parametric) -> (f64, Parametric) {
-        let natural = self.descended_at(Parametric { zero_level: 0, ..from });
+        let edges = Edges::new(self, from.centre);
+        let natural = descended_at(&edges, Parametric { zero_level: 0, ..from });
         let observed = Parametric { zero_level: self.observed_level(from.centre), ..from };
-        let given = self.descended_at(observed);
+        let given = descended_at(&edges, observed);
         if given.0 < natural.0 { given } else { natural }
-    }
-
-    /// As [`Self::descended`], a zero level of 0 staying 0.
-    fn descended_at(&self, from: Parametric) -> (f64, Parametric) {
-        let mut best = (self.bits(&from), from);
-        loop {
-            let before = best.0;
-            for (scale, level) in [(2, 0), (-2, 0), (1, 0), (-1, 0), (0, 1), (0, -1)] {
-                let here = best.1;
-                let zero_level = match here.zero_level {
-                    0 => 0,
-                    old => old.saturating_add_signed(level).clamp(1, 15),
-                };
-                let scale = here.scale.saturating_add_signed(scale).min(Parametric::MAX_SCALE);
-                let next = Parametric { scale, zero_level, ..here };
-                let bits = if next == here { best.0 } else { self.bits(&next) };
-                if bits < best.0 {
-                    best = (bits, next);
-                }
-            }
-            if best.0 >= before {
-                return best;
-            }
-        }
     }
 
     /// The zero level of the share that the centre has.
@@ -157,28 +139,142 @@ impl Sample {
         let share = self.tokens.iter().find(at).map_or(0.0, |token| token.count) / total;
         (8.0 + libm::log2((share + 1e-3) / (1.0 - share + 1e-3))).round().clamp(1.0, 15.0) as u8
     }
+}
 
-    /// Bits of all symbols, without raw bits.
+/// As [`Sample::descended`], a zero level of 0 staying 0.
+fn descended_at(edges: &Edges, from: Parametric) -> (f64, Parametric) {
+    let mut best = (edges.bits(&from), from);
+    loop {
+        let before = best.0;
+        for (scale, level) in [(2, 0), (-2, 0), (1, 0), (-1, 0), (0, 1), (0, -1)] {
+            let here = best.1;
+            let zero_level = match here.zero_level {
+                0 => 0,
+                old => old.saturating_add_signed(level).clamp(1, 15),
+            };
+            let scale = here.scale.saturating_add_signed(scale).min(Parametric::MAX_SCALE);
+            let next = Parametric { scale, zero_level, ..here };
+            let bits = if next == here { best.0 } else { edges.bits(&next) };
+            if bits < best.0 {
+                best = (bits, next);
+            }
+        }
+        if best.0 >= before {
+            return best;
+        }
+    }
+}
+
+/// Where tokens begin and end, as distances from a centre: what is the same for all distributions around it. Vectors of the
+/// machine go through them.
+#[derive(Debug)]
+struct Edges {
+    /// Of each token up to the last.
+    counts: Vec<f64>,
+    /// By edge, one more than tokens: the mass below it is `base + of_above·tail(above) + of_below·tail(below)`.
+    base: Vec<f64>,
+    above: Vec<[f64; 2]>,
+    below: Vec<[f64; 2]>,
+}
+
+impl Edges {
+    fn new(sample: &Sample, centre: i32) -> Self {
+        let first_code = |token: usize| join(u8::try_from(token).unwrap_or(u8::MAX), sample.direct_log2).0;
+        let tokens = usize::from(sample.last) + 1;
+        let mut counts = vec![0.0; tokens];
+        for token in &sample.tokens {
+            counts.iter_mut().skip(token.number).take(1).for_each(|count| *count = token.count);
+        }
+        let mut edges = Self { counts, base: Vec::new(), above: Vec::new(), below: Vec::new() };
+        for code in (0..=tokens).map(first_code) {
+            let [above, below] = sides(code, f64::from(centre), sample.alphabet);
+            edges.base.push(above[0] - below[0]);
+            edges.above.push([above[1], above[2]]);
+            edges.below.push([-below[1], below[2]]);
+        }
+        edges
+    }
+
+    /// Bits of all symbols under a distribution around the centre, without raw bits.
     fn bits(&self, parameters: &Parametric) -> f64 {
-        let real = Real::new(parameters, self.alphabet);
-        let shared = 4095.0 - f64::from(self.last);
-        let scale = shared / real.mass_below(self.end).max(1e-9);
-        let mut below = (0, 0.0);
-        let bits = |token: &Counted| {
-            let [first, end] = token.codes;
-            let start = if below.0 == first { below.1 } else { real.mass_below(first) };
-            below = (end, real.mass_below(end));
-            token.count * (12.0 - fast_log2(1.0 + scale * (below.1 - start).max(0.0)))
-        };
-        self.tokens.iter().map(bits).sum()
+        Arch::new().dispatch(Bits { edges: self, real: Real::new(parameters) })
+    }
+}
+
+/// The mass of the values before a code as the difference of two sides, each `base + sign·tail(distance)`; distances are in
+/// sixteenths.
+fn sides(code: u64, centre: f64, alphabet: Alphabet) -> [[f64; 3]; 2] {
+    let side = |value: f64| match value - centre {
+        beyond if beyond > 0.0 => [2.0, -1.0, 16.0 * (beyond - 1.0)],
+        beyond => [0.0, 1.0, -16.0 * beyond],
+    };
+    match (alphabet, code) {
+        (Alphabet::Attribute, _) => {
+            let half = (code >> 1) as f64;
+            [side(half + (code & 1) as f64), side(-half)]
+        }
+        (_, 0) => [[0.0; 3]; 2],
+        (_, code) => [[1.0, -1.0, 16.0 * (code as f64 - 1.0)], [0.0; 3]],
+    }
+}
+
+/// Values that go through the vectors of a machine side by side.
+const LANES: usize = 8;
+
+/// Counts the bits of all symbols.
+struct Bits<'a> {
+    edges: &'a Edges,
+    real: Real,
+}
+
+impl WithSimd for Bits<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        match self.real.squarings {
+            0 => self.with_squarings::<0>(),
+            2 => self.with_squarings::<2>(),
+            4 => self.with_squarings::<4>(),
+            _ => self.with_squarings::<6>(),
+        }
+    }
+}
+
+impl Bits<'_> {
+    #[inline(always)]
+    fn with_squarings<const SQUARINGS: u8>(self) -> f64 {
+        let Self { edges: Edges { counts, base, above, below }, real } = self;
+        let mut masses = [0.0; MOST_EDGES];
+        let edges = base.iter().zip(above).zip(below);
+        for (mass, ((base, above), below)) in masses.iter_mut().zip(edges) {
+            let [one, other] = [above, below].map(|side| side[0] * real.survival::<SQUARINGS>(side[1]));
+            *mass = base + real.weight * (one + other);
+        }
+        let tokens = counts.len();
+        let shared = 4096.0 - tokens as f64;
+        let whole = masses.get(tokens).copied().unwrap_or(0.0);
+        let scale = shared / whole.max(1e-9);
+        let mut sums = [0.0; LANES];
+        let ends = masses.get(1..).unwrap_or_default();
+        for (counts, (starts, ends)) in counts.chunks(LANES).zip(masses.chunks(LANES).zip(ends.chunks(LANES)))
+        {
+            for (sum, (count, (start, end))) in
+                sums.iter_mut().zip(counts.iter().zip(starts.iter().zip(ends)))
+            {
+                *sum += count * (12.0 - fast_log2(1.0 + scale * (end - start).max(0.0)));
+            }
+        }
+        sums.iter().sum()
     }
 }
 
 /// The binary logarithm of a positive number to 1e-4: enough to rank distributions, and many times as fast as to the last
 /// digit.
+#[inline(always)]
 fn fast_log2(value: f64) -> f64 {
     let bits = value.to_bits();
-    let exponent = (bits >> 52) as f64 - 1023.0;
+    let exponent = f64::from((bits >> 52) as i32) - 1023.0;
     let mantissa = f64::from_bits(bits & ((1 << 52) - 1) | (1023 << 52));
     // The series of the inverse hyperbolic tangent about the square root of two.
     let ratio = (mantissa - core::f64::consts::SQRT_2) / (mantissa + core::f64::consts::SQRT_2);
@@ -189,48 +285,27 @@ fn fast_log2(value: f64) -> f64 {
 
 /// The distribution in real numbers; the mass of one side without the centre is `weight`.
 struct Real {
-    alphabet: Alphabet,
-    centre: f64,
     width: f64,
     squarings: u8,
     weight: f64,
 }
 
 impl Real {
-    fn new(parameters: &Parametric, alphabet: Alphabet) -> Self {
-        let &Parametric { shape, zero_level, scale, centre, .. } = parameters;
+    fn new(parameters: &Parametric) -> Self {
+        let &Parametric { shape, zero_level, scale, .. } = parameters;
         let squarings = 2 * shape;
         let width = f64::from(2 | (scale & 1)) * libm::exp2(f64::from((scale >> 1) + squarings));
-        let mut real = Self { alphabet, centre: f64::from(centre), width, squarings, weight: 1.0 };
-        real.weight = match zero_level {
-            0 => real.survival(8.0),
+        let weight = match zero_level {
+            0 => (0..squarings).fold(width / (width + 8.0), |part, _| part * part),
             level => 1.0 / (1.0 + libm::exp2(f64::from(level) - 8.0)),
         };
-        real
+        Self { width, squarings, weight }
     }
 
-    fn survival(&self, distance: f64) -> f64 {
-        (0..self.squarings).fold(self.width / (self.width + distance), |part, _| part * part)
-    }
-
-    fn tail(&self, distance: f64) -> f64 {
-        self.weight * self.survival(16.0 * (distance - 1.0))
-    }
-
-    fn signed_mass_below(&self, value: f64) -> f64 {
-        let beyond = value - self.centre;
-        if beyond > 0.0 { 2.0 - self.tail(beyond) } else { self.tail(1.0 - beyond) }
-    }
-
-    fn mass_below(&self, code: u64) -> f64 {
-        if self.alphabet == Alphabet::Attribute {
-            let half = (code >> 1) as f64;
-            self.signed_mass_below(half + (code & 1) as f64) - self.signed_mass_below(-half)
-        } else if code == 0 {
-            0.0
-        } else {
-            1.0 - self.tail(code as f64)
-        }
+    /// The part beyond a distance in sixteenths, of what lies beyond 0.
+    #[inline(always)]
+    fn survival<const SQUARINGS: u8>(&self, distance: f64) -> f64 {
+        (0..SQUARINGS).fold(self.width / (self.width + distance), |part, _| part * part)
     }
 }
 
