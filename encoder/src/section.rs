@@ -14,7 +14,7 @@ use splatstream_format::entropy::token::Alphabet;
 use splatstream_format::payload::SectionBytes;
 
 /// Values of a plane above which tables of its own always pay.
-const MANY: usize = 1 << 15;
+pub(crate) const MANY: usize = 1 << 15;
 
 /// How sections are coded.
 #[derive(Debug, Clone, Copy)]

@@ -7,7 +7,7 @@ use super::unit::{Draft, UnitCoder};
 use crate::entropy_cost::Histogram;
 use crate::error::Error;
 use crate::savings::{Saving, Tool};
-use crate::section::SectionPlan;
+use crate::section::{MANY, SectionPlan};
 use crate::settings::Tools;
 use rayon::prelude::*;
 use splatstream_format::entropy::in_force::ModelsInForce;
@@ -74,6 +74,10 @@ pub(super) fn of_reuse(
     models: &ModelsInForce,
     bytes: usize,
 ) -> Result<usize, Error> {
+    // Such a unit has tables of its own in any case.
+    if new.len() > MANY && draft.header.parent_count == 0 {
+        return Ok(0);
+    }
     let plan = SectionPlan { tools: Tools { table_reuse: false, ..coder.plan.tools }, ..coder.plan };
     let alone = UnitCoder { plan, ..*coder }.code(draft, new, &mut models.clone())?;
     Ok(alone.len().saturating_sub(bytes))
