@@ -200,10 +200,11 @@ impl Reach {
             (middle - low).max(high - middle)
         });
         let farthest = farthest.fold(0.0, f64::max) / step;
+        let points = self.points(step, half);
         let mut best: Option<(f64, f64, Candidate)> = None;
         for grid in candidates(half) {
             let missed = (libm::log2(farthest / grid.reach())).max(0.0);
-            let cost = self.cost(&grid, step, half);
+            let cost = cost_of(&points, &grid);
             if best.is_none_or(|(least, cheapest, _)| (missed, cost) < (least, cheapest)) {
                 best = Some((missed, cost, grid));
             }
@@ -211,7 +212,7 @@ impl Reach {
         let everywhere = |bits: u8| Candidate { bits, linear_log2: bits - 1, segment_log2: bits - 1 };
         match (linear, best) {
             (Some(bits), Some((missed, cost, grid))) => {
-                let by_line = self.cost(&Candidate { linear_log2: 63, ..everywhere(bits) }, step, half);
+                let by_line = cost_of(&points, &Candidate { linear_log2: 63, ..everywhere(bits) });
                 let pays = missed <= 0.0 && cost + WORTHWHILE < by_line;
                 if pays { Choice::Companded(grid.narrowed(farthest)) } else { Choice::Linear(bits) }
             }
@@ -220,29 +221,38 @@ impl Reach {
         }
     }
 
-    /// Bits per Gaussian of positions, but for what is the same for all grids, with the step at which errors in
-    /// pictures are those of another grid.
+    /// How far the Gaussians of the sample are from the middle of the core on each axis, steps, and what errors there count.
     ///
     /// An error of position shows as the angle at which it is seen, from somewhere in the core or near it, and counts
     /// as the square of that and of the opacity.
-    fn cost(&self, grid: &Candidate, step: f64, half: f64) -> f64 {
-        let (linear, segment) = (libm::exp2(grid.linear_log2.into()), libm::exp2(grid.segment_log2.into()));
-        let (mut error, mut octaves, mut weights) = (0.0, 0.0, 0.0);
-        for (position, opacity) in &self.sample {
+    fn points(&self, step: f64, half: f64) -> Vec<([f64; 3], f64)> {
+        let point = |(position, opacity): &([f32; 3], f32)| {
             let apart = [0, 1, 2].map(|axis: usize| {
                 (f64::from(position[axis]) - f64::from(self.core.middle[axis])).abs() / step
             });
             let distance = apart[0].max(apart[1]).max(apart[2]).max(half);
-            let weight = f64::from(*opacity) / (distance * distance);
-            weights += weight;
-            for apart in apart {
-                let coarser = coarser(apart, linear, segment);
-                octaves += f64::from(coarser);
-                error += weight * power_of_two(2 * coarser) / 3.0;
-            }
-        }
-        1.5 * libm::log2((error / weights).max(1.0)) - octaves / self.sample.len().max(1) as f64
+            (apart, f64::from(*opacity) / (distance * distance))
+        };
+        self.sample.iter().map(point).collect()
     }
+}
+
+/// Bits per Gaussian of positions, but for what is the same for all grids, with the step at which errors in pictures are
+/// those of another grid.
+fn cost_of(points: &[([f64; 3], f64)], grid: &Candidate) -> f64 {
+    let linear = libm::exp2(grid.linear_log2.into());
+    // Powers of two: a product is the quotient.
+    let of_segment = libm::exp2(-f64::from(grid.segment_log2));
+    let (mut error, mut octaves, mut weights) = (0.0, 0, 0.0);
+    for &(apart, weight) in points {
+        weights += weight;
+        for apart in apart {
+            let coarser = coarser(apart, linear, of_segment);
+            octaves += i64::from(coarser);
+            error += weight * power_of_two(2 * coarser);
+        }
+    }
+    1.5 * libm::log2((error / (3.0 * weights)).max(1.0)) - octaves as f64 / points.len().max(1) as f64
 }
 
 /// What positions are coded on.
@@ -294,8 +304,8 @@ fn candidates(half: f64) -> impl Iterator<Item = Candidate> {
 }
 
 /// log2 of the step at a distance from the middle.
-fn coarser(apart: f64, linear: f64, segment: f64) -> i32 {
-    if apart <= linear { 0 } else { exponent((apart - linear) / segment + 2.0) }
+fn coarser(apart: f64, linear: f64, of_segment: f64) -> i32 {
+    if apart <= linear { 0 } else { exponent((apart - linear) * of_segment + 2.0) }
 }
 
 /// The value at a place of sorted values; 0 if there is none.
