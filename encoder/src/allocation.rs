@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::importance::Ranked;
 use crate::laws::Laws;
 use crate::pca::Components;
-use crate::quantised::Trial;
+use crate::quantised::{Grids, Trial};
 use crate::refinements::parts;
 use crate::savings::{Saving, Tool};
 use crate::secant::Secant;
@@ -36,14 +36,23 @@ const EVERY: u32 = 8;
 const ALONE: usize = 2;
 /// Frames of fewer Gaussians are measured so for the fast preset too.
 const FEW: usize = 1 << 12;
-/// Gaussians whose symbols are counted and whose errors are estimated.
+/// Gaussians whose symbols are counted and whose errors are estimated; for the fast preset.
 const SAMPLE: usize = 1 << 14;
+const SAMPLE_FAST: usize = 1 << 12;
 /// How often shares are estimated: the first steps are those of an average scene.
 const ROUNDS: usize = 2;
-/// How often pictures are measured, at most, and how near is near enough, dB: a stream that misses more costs another
-/// encoding.
+/// How often all of them together are made finer or coarser as estimates say.
+const LEVELS: usize = 2;
+/// How often pictures are measured, at most, and how near is near enough, dB: a stream that misses by more than half a decibel
+/// costs another encoding.
 const CORRECTIONS: usize = 6;
 const NEAR: f64 = 0.2;
+/// The same for the fast preset.
+const NEAR_FAST: f64 = 0.4;
+/// What pictures gain where steps are fitted for a decibel more, of most scenes.
+const SLOPE: f64 = 0.85;
+/// Shares of errors are the same for qualities that are no farther apart than this, dB.
+const ALIKE: f64 = 8.0;
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// Steps change by no more than this factor at once: the model is local.
@@ -102,10 +111,23 @@ pub(crate) fn finer(mut steps: Steps, decibels: f64) -> Steps {
     steps
 }
 
+/// All steps finer or coarser as pictures need for so many decibels, if they have `now`; as they are where that is no number.
+fn towards(decibels: f32, now: f64, steps: Steps) -> Steps {
+    if now.is_finite() { finer(steps, f64::from(decibels) - now) } else { steps }
+}
+
+/// The PSNR of a mean squared error, decibels.
+fn psnr_of(error: f64) -> f64 {
+    -10.0 * libm::log10(error)
+}
+
 /// What is measured of a frame to fit steps to a quality.
 pub(crate) struct Fit {
     pub(crate) scene: Scene,
     pub(crate) settings: Settings,
+    /// Of the frame.
+    pub(crate) sh_degree: u8,
+    pub(crate) antialiased: bool,
     /// The refinement of each Gaussian.
     pub(crate) refinement: Vec<u8>,
     /// Principal components of dc and of sh.
@@ -117,6 +139,8 @@ pub(crate) struct Fit {
     /// Some of the Gaussians, and which these are.
     sample: (GaussianFrame, Vec<u32>),
     sensitivity: Sensitivity,
+    /// See [`Ranked::level`].
+    level: f64,
 }
 
 impl Fit {
@@ -141,16 +165,20 @@ impl Fit {
         }
         let slices =
             |planes: &[Vec<f32>]| Components::of(&planes.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        let stride = frame.len().div_ceil(SAMPLE).max(1);
+        let most = if settings.preset == Preset::Fast { SAMPLE_FAST } else { SAMPLE };
+        let stride = frame.len().div_ceil(most).max(1);
         let rows: Vec<u32> = (0..frame.len() as u32).step_by(stride).collect();
         let shown = rows.iter().map(|&row| ranked.shown[row as usize]).collect();
         let sample = frame.select(&rows);
         Self {
             bases: [slices(frame.dc()), slices(frame.sh())],
             scene,
+            sh_degree: frame.sh_degree(),
+            antialiased: frame.antialiased(),
             settings: Settings { laws, ..settings.clone() },
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),
+            level: ranked.level,
             views: match whole {
                 Some(whole) => views.beside(frame, whole),
                 None => views.of(frame, 0..views.len()),
@@ -172,7 +200,8 @@ impl Fit {
             return Ok(None);
         }
         let cost = |laws: Laws| -> Result<(f64, f64), Error> {
-            let trial = Trial::with(self, laws, sample, Some(rows), steps);
+            let grids = Grids::with(self, laws, steps);
+            let trial = Trial::new(&grids, sample, rows);
             let bits: f64 = ATTRIBUTES.into_iter().map(|attribute| trial.bits(attribute)).sum();
             let errors = self.sensitivity.errors(sample, &trial.decoded(&ATTRIBUTES)?);
             Ok((bits - trial.position_bits_left_out(), errors.iter().sum()))
@@ -189,12 +218,12 @@ impl Fit {
     /// Bits per Gaussian that each attribute takes more where its steps are halved.
     fn bits_an_octave(&self, steps: &Steps) -> [f64; 6] {
         let (sample, rows) = &self.sample;
-        let trial = |octaves: f64| {
+        let grids = [-0.25, 0.25].map(|octaves: f64| {
             let mut steps = *steps;
             ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, libm::exp2(octaves)));
-            Trial::new(self, sample, Some(rows), &steps)
-        };
-        let [finer, coarser] = [trial(-0.25), trial(0.25)];
+            Grids::new(self, &steps)
+        });
+        let [finer, coarser] = grids.each_ref().map(|grids| Trial::new(grids, sample, rows));
         ATTRIBUTES.map(|attribute| match attribute {
             // Every bit of a sorted position costs one bit an axis.
             Attribute::Position => 3.0,
@@ -216,12 +245,18 @@ impl Fit {
             let errors = self.estimated(&steps)?;
             steps = self.allocated(&steps, errors);
         }
-        if !self.alone.is_empty() {
-            // Shares are those of steps near the ones that are looked for.
-            let now = self.psnr(&steps)?.unwrap_or(decibels.into());
-            steps = finer(steps, f64::from(decibels) - now);
+        // What a decibel more takes is not the same everywhere.
+        for _ in 0..LEVELS {
+            steps = towards(decibels, self.expected(&self.estimated(&steps)?), steps);
+        }
+        for _ in 0..if self.alone.is_empty() { 0 } else { ROUNDS } {
             let errors = self.measured(&steps)?;
-            steps = self.allocated(&steps, errors);
+            let now = psnr_of(errors.iter().sum());
+            steps = towards(decibels, now, self.allocated(&steps, errors));
+            // Shares are to be those of steps near the ones that are looked for.
+            if (f64::from(decibels) - now).abs() <= ALIKE || !now.is_finite() {
+                break;
+            }
         }
         self.levelled(steps, decibels.into())
     }
@@ -230,7 +265,8 @@ impl Fit {
     ///
     /// Values that lie on a grid already leap where steps pass its own: what is found is looked at before it is taken.
     fn levelled(&self, steps: Steps, decibels: f64) -> Result<(Steps, Option<f64>), Error> {
-        let mut secant = Secant::new(decibels, NEAR, 1.0, CORRECTIONS);
+        let near = if self.settings.preset == Preset::Fast { NEAR_FAST } else { NEAR };
+        let mut secant = Secant::new(decibels, near, SLOPE, CORRECTIONS);
         let mut best = (steps, None);
         let mut next = Some(decibels);
         while let Some(at) = next {
@@ -247,24 +283,32 @@ impl Fit {
 
     /// PSNR of pictures with all attributes on their grids, dB.
     fn psnr(&self, steps: &Steps) -> Result<Option<f64>, Error> {
+        let grids = Grids::new(self, steps);
         mean(self.views.iter().map(|view| {
-            let trial = Trial::new(self, &view.frame, Some(&view.rows), steps);
+            let trial = Trial::new(&grids, &view.frame, &view.rows);
             Ok(view.psnr(&trial.decoded(&ATTRIBUTES)?))
         }))
     }
 
-    /// The squared error of pictures with each attribute alone on its grid, estimated, in any unit.
+    /// The PSNR that estimated errors let expect, decibels; of a scene without any it is no number.
+    fn expected(&self, errors: &[f64; 6]) -> f64 {
+        let of_all = self.refinement.len() as f64 / self.sample.1.len() as f64;
+        self.level + psnr_of(errors.iter().sum::<f64>() * of_all)
+    }
+
+    /// The squared error of pictures with each attribute alone on its grid, estimated.
     fn estimated(&self, steps: &Steps) -> Result<[f64; 6], Error> {
         let (sample, rows) = &self.sample;
-        let decoded = Trial::new(self, sample, Some(rows), steps).decoded(&ATTRIBUTES)?;
+        let grids = Grids::new(self, steps);
+        let decoded = Trial::new(&grids, sample, rows).decoded(&ATTRIBUTES)?;
         Ok(self.sensitivity.errors(sample, &decoded))
     }
 
     /// The same as strips of a few views show it.
     fn measured(&self, steps: &Steps) -> Result<[f64; 6], Error> {
+        let grids = Grids::new(self, steps);
         let views = self.alone.iter();
-        let trials: Vec<Trial<'_>> =
-            views.map(|view| Trial::new(self, &view.frame, Some(&view.rows), steps)).collect();
+        let trials: Vec<Trial<'_>> = views.map(|view| Trial::new(&grids, &view.frame, &view.rows)).collect();
         let mut errors = [0.0; 6];
         for (error, attribute) in errors.iter_mut().zip(ATTRIBUTES) {
             if attribute == Attribute::Sh && self.sample.0.sh_degree() == 0 {

@@ -15,7 +15,23 @@ pub(crate) struct Ranked {
     pub(crate) order: Vec<u32>,
     /// By Gaussian; empty where no views were needed.
     pub(crate) shown: Vec<Worth>,
+    /// The PSNR of pictures is about so much, decibels, where errors that are estimated from what is shown sum up to 1.
+    pub(crate) level: f64,
 }
+
+/// Whether it is known what hides a Gaussian; see [`Ranked::level`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hiding {
+    /// What others hide counts as shown.
+    Ignored,
+    /// What others hide does not show.
+    Known,
+}
+
+/// By how much pictures of real scenes near 50 dB are better than sums of estimated errors let expect, decibels: what is
+/// hidden makes no errors, and those of Gaussians that overlap add up.
+const BETTER_UNHIDDEN: f64 = 10.2;
+const BETTER_HIDDEN: f64 = -4.0;
 
 /// Orders the frames of a sequence, most important Gaussian first.
 #[derive(Clone)]
@@ -94,9 +110,9 @@ impl Ranking {
         let mut ranked = self.ranked(frame);
         if ranked.shown.is_empty() {
             self.cameras(frame);
-            ranked.shown = match self.preset {
-                Preset::Fast => unhidden(frame, &self.cameras),
-                Preset::Balanced | Preset::Small => self.views(frame).worth(),
+            (ranked.shown, ranked.level) = match self.preset {
+                Preset::Fast => (unhidden(frame, &self.cameras), self.level(Hiding::Ignored)),
+                Preset::Balanced | Preset::Small => (self.views(frame).worth(), self.level(Hiding::Known)),
             };
         }
         self.known_order = Some(ranked.order.clone());
@@ -114,7 +130,7 @@ impl Ranking {
     fn ranked(&mut self, frame: &GaussianFrame) -> Ranked {
         let volume = importance::opacity_volume(frame);
         if self.importance == Importance::Volume {
-            return Ranked { order: importance::order(&volume), shown: Vec::new() };
+            return Ranked { order: importance::order(&volume), ..Ranked::default() };
         }
         self.cameras(frame);
         let by = |shown: &[Worth], score: fn(&Worth) -> f64| {
@@ -123,7 +139,8 @@ impl Ranking {
         };
         if self.importance == Importance::Footprint {
             let shown = unhidden(frame, &self.cameras);
-            return Ranked { order: by(&shown, |worth| worth.energy), shown };
+            let order = by(&shown, |worth| worth.energy);
+            return Ranked { order, shown, level: self.level(Hiding::Ignored) };
         }
         let views = self.views(frame);
         let shown = views.worth();
@@ -131,7 +148,25 @@ impl Ranking {
             Importance::Removal => self.eliminate(views, &volume, &shown),
             _ => by(&shown, |worth| worth.contribution),
         };
-        Ranked { order, shown }
+        Ranked { order, shown, level: self.level(Hiding::Known) }
+    }
+
+    /// See [`Ranked::level`]; of the cameras in use.
+    fn level(&self, hiding: Hiding) -> f64 {
+        let all = |cameras: &[Camera]| -> f64 {
+            cameras.iter().map(|camera| f64::from(camera.width) * f64::from(camera.height)).sum()
+        };
+        let (better, pixels) = match hiding {
+            // What is shown is a mean of the cameras.
+            Hiding::Ignored => (BETTER_UNHIDDEN, all(&self.cameras) / self.cameras.len().max(1) as f64),
+            Hiding::Known => {
+                let (cameras, lines) = self.small();
+                let small = |camera: &Camera| camera.scaled_to_height(lines.min(camera.height));
+                (BETTER_HIDDEN, all(&cameras.iter().map(small).collect::<Vec<_>>()))
+            }
+        };
+        // Errors are squares of three channels.
+        better + 10.0 * libm::log10(3.0 * pixels.max(1.0))
     }
 
     /// A GOP begins with a frame. Its views are those of the sequence, so that orders do not change from GOP to GOP, unless
@@ -163,13 +198,18 @@ impl Ranking {
 
     /// What orders go by: some of the cameras, in small pictures.
     fn views(&self, frame: &GaussianFrame) -> SmallViews {
+        let (cameras, lines) = self.small();
+        SmallViews::new(frame, &cameras, lines)
+    }
+
+    /// These cameras, and the lines of the pictures.
+    fn small(&self) -> (Vec<Camera>, u32) {
         let (most, lines) = match self.preset {
             Preset::Fast => (3, 96),
             Preset::Balanced | Preset::Small => (10, 144),
         };
         let stride = self.cameras.len().div_ceil(most).max(1);
-        let cameras: Vec<Camera> = self.cameras.iter().step_by(stride).cloned().collect();
-        SmallViews::new(frame, &cameras, lines)
+        (self.cameras.iter().step_by(stride).cloned().collect(), lines)
     }
 
     /// From the last to the first: what pictures miss least goes, the rest is weighed again without it.

@@ -27,11 +27,41 @@ use splatstream_gaussians::{GaussianFrame, Planes};
 /// Gaussians whose colours are made together.
 const NEAR: usize = 1 << 11;
 
-/// A frame with some steps.
+/// What some steps make of a scene: the same for all of its views and samples.
+pub(crate) struct Grids<'a> {
+    bases: &'a [Components; 2],
+    /// The refinement of each Gaussian of the scene.
+    refinement: &'a [u8],
+    sequence: SequenceParameters,
+    grains: Grains,
+    /// By refinement.
+    rules: Vec<StepRule>,
+}
+
+impl<'a> Grids<'a> {
+    /// Of steps, with the laws of a fit.
+    pub(crate) fn new(fit: &'a Fit, steps: &Steps) -> Self {
+        Self::with(fit, fit.laws(), steps)
+    }
+
+    /// The same with other laws.
+    pub(crate) fn with(fit: &'a Fit, laws: Laws, steps: &Steps) -> Self {
+        let settings = Settings { steps: *steps, laws, spatial_layers: 1, ..fit.settings.clone() };
+        let flags = SequenceParameters::flags(true, fit.antialiased, false);
+        let sequence = fit.scene.parameters(&settings, 1, fit.sh_degree, flags);
+        let grains = Grains::new(&settings, &sequence);
+        let rules = (0..sequence.refinement_count)
+            .map(|refinement| StepRule::new(&sequence, grains.of(refinement).attribute_step))
+            .collect();
+        Self { bases: &fit.bases, refinement: &fit.refinement, sequence, grains, rules }
+    }
+}
+
+/// A frame on some grids.
 pub(crate) struct Trial<'a> {
     frame: &'a GaussianFrame,
     bases: &'a [Components; 2],
-    sequence: SequenceParameters,
+    sequence: &'a SequenceParameters,
     geometry: Geometry,
     /// How each Gaussian is coded.
     coded: Vec<Coded>,
@@ -46,29 +76,12 @@ struct Coded {
 }
 
 impl<'a> Trial<'a> {
-    /// `rows`: which Gaussians of the fit these are; none: all.
-    pub(crate) fn new(fit: &'a Fit, frame: &'a GaussianFrame, rows: Option<&[u32]>, steps: &Steps) -> Self {
-        Self::with(fit, fit.laws(), frame, rows, steps)
-    }
-
-    /// The same with other laws.
-    pub(crate) fn with(
-        fit: &'a Fit,
-        laws: Laws,
-        frame: &'a GaussianFrame,
-        rows: Option<&[u32]>,
-        steps: &Steps,
-    ) -> Self {
-        let settings = Settings { steps: *steps, laws, spatial_layers: 1, ..fit.settings.clone() };
-        let flags = SequenceParameters::flags(true, frame.antialiased(), false);
-        let sequence = fit.scene.parameters(&settings, 1, frame.sh_degree(), flags);
-        let grains = Grains::new(&settings, &sequence);
-        let geometry = geometry(frame, &sequence);
-        let rules: Vec<StepRule> = (0..sequence.refinement_count)
-            .map(|refinement| StepRule::new(&sequence, grains.of(refinement).attribute_step))
-            .collect();
+    /// `rows`: which Gaussians of the scene these are.
+    pub(crate) fn new(grids: &'a Grids<'_>, frame: &'a GaussianFrame, rows: &[u32]) -> Self {
+        let Grids { bases, refinement, sequence, grains, rules } = grids;
+        let geometry = geometry(frame, sequence);
         let code = |row: usize| {
-            let refinement = fit.refinement[rows.map_or(row, |rows| rows[row] as usize)];
+            let refinement = refinement[rows[row] as usize];
             let rule = &rules[usize::from(refinement)];
             let wanted = geometry.log_scale.each_ref().map(|plane| plane[row]);
             let shape = Shape::new(wanted, geometry.opacity[row], rule, true);
@@ -76,7 +89,7 @@ impl<'a> Trial<'a> {
             Coded { shape, position_shift: grains.of(refinement).position_shift, exponents }
         };
         let coded = (0..frame.len()).into_par_iter().map(code).collect();
-        Self { frame, bases: &fit.bases, sequence, geometry, coded }
+        Self { frame, bases, sequence, geometry, coded }
     }
 
     /// The frame with some attributes as a decoder would have them.
@@ -114,7 +127,7 @@ impl<'a> Trial<'a> {
     }
 
     fn positions(&self, planes: &mut Planes) {
-        let companding = Companding::new(&self.sequence);
+        let companding = Companding::new(self.sequence);
         let (offset, step) = (self.sequence.position_offset(), self.sequence.position_step());
         for (axis, plane) in planes.position.iter_mut().enumerate() {
             let value = |(coded, &code): (&Coded, &u32)| {

@@ -27,9 +27,10 @@ use splatstream_render::camera::held_out_twice;
 const VIEWS: u32 = 4;
 const HEIGHT: u32 = 540;
 
-/// Of so many strips of a view one is drawn; for the fast preset.
-const EVERY: u32 = 6;
-const EVERY_FAST: u32 = 12;
+/// Of so many strips of a view one is drawn: of those that decide how fine steps are, and of those that decide nothing; and
+/// for the fast preset.
+const EVERY: [u32; 2] = [6, 12];
+const EVERY_FAST: [u32; 2] = [16, 24];
 
 /// Keeps units while they are written, and the frames that they decode to.
 pub(crate) struct Verifier {
@@ -205,9 +206,12 @@ pub(crate) struct Views {
 impl Views {
     /// Of the views that a scene comes with, or all around it; each set lies between the other.
     pub(crate) fn of(frame: &GaussianFrame, settings: &Settings) -> Self {
-        let every = if settings.preset == Preset::Fast { EVERY_FAST } else { EVERY };
-        let strips = |cameras| StripViews::new(cameras, every, frame.len());
-        let [of_fit, unseen] = held_out_twice(frame, settings.up(), &settings.cameras, VIEWS, HEIGHT);
-        Self { unseen: strips(unseen), of_fit: strips(of_fit) }
+        let [of_fit, of_report] = match settings.preset {
+            Preset::Fast => EVERY_FAST,
+            Preset::Balanced | Preset::Small => EVERY,
+        };
+        let strips = |cameras, every| StripViews::new(cameras, every, frame.len());
+        let [cameras, other] = held_out_twice(frame, settings.up(), &settings.cameras, VIEWS, HEIGHT);
+        Self { unseen: strips(other, of_report), of_fit: strips(cameras, of_fit) }
     }
 }
