@@ -48,11 +48,10 @@ const LEVELS: usize = 2;
 const CORRECTIONS: usize = 6;
 const NEAR: f64 = 0.2;
 /// The same for the fast preset.
-const NEAR_FAST: f64 = 0.4;
-/// What pictures gain where steps are fitted for a decibel more, of most scenes.
-const SLOPE: f64 = 0.85;
-/// Shares of errors are the same for qualities that are no farther apart than this, dB.
-const ALIKE: f64 = 8.0;
+const NEAR_FAST: f64 = 0.3;
+/// What pictures gain where steps are fitted for a decibel more: of most scenes, and where the first guess is near.
+const SLOPE: f64 = 1.0;
+const SLOPE_FAST: f64 = 0.85;
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// Steps change by no more than this factor at once: the model is local.
@@ -245,18 +244,16 @@ impl Fit {
             let errors = self.estimated(&steps)?;
             steps = self.allocated(&steps, errors);
         }
-        // What a decibel more takes is not the same everywhere.
-        for _ in 0..LEVELS {
-            steps = towards(decibels, self.expected(&self.estimated(&steps)?), steps);
-        }
-        for _ in 0..if self.alone.is_empty() { 0 } else { ROUNDS } {
-            let errors = self.measured(&steps)?;
-            let now = psnr_of(errors.iter().sum());
-            steps = towards(decibels, now, self.allocated(&steps, errors));
-            // Shares are to be those of steps near the ones that are looked for.
-            if (f64::from(decibels) - now).abs() <= ALIKE || !now.is_finite() {
-                break;
+        if self.alone.is_empty() {
+            // What a decibel more takes is not the same everywhere.
+            for _ in 0..LEVELS {
+                steps = towards(decibels, self.expected(&self.estimated(&steps)?), steps);
             }
+        } else {
+            // Shares are those of steps near the ones that are looked for.
+            steps = towards(decibels, self.psnr(&steps)?.unwrap_or(decibels.into()), steps);
+            let errors = self.measured(&steps)?;
+            steps = self.allocated(&steps, errors);
         }
         self.levelled(steps, decibels.into())
     }
@@ -265,8 +262,9 @@ impl Fit {
     ///
     /// Values that lie on a grid already leap where steps pass its own: what is found is looked at before it is taken.
     fn levelled(&self, steps: Steps, decibels: f64) -> Result<(Steps, Option<f64>), Error> {
-        let near = if self.settings.preset == Preset::Fast { NEAR_FAST } else { NEAR };
-        let mut secant = Secant::new(decibels, near, SLOPE, CORRECTIONS);
+        let is_fast = self.settings.preset == Preset::Fast;
+        let (near, slope) = if is_fast { (NEAR_FAST, SLOPE_FAST) } else { (NEAR, SLOPE) };
+        let mut secant = Secant::new(decibels, near, slope, CORRECTIONS);
         let mut best = (steps, None);
         let mut next = Some(decibels);
         while let Some(at) = next {
