@@ -330,7 +330,9 @@ impl<'a> Seeker<'a> {
         let (sh, known) = (self.fitting.sh, core::mem::take(&mut self.fitting.known));
         (self.fitting.fits_values, self.fitting.sh) = (false, self.fitting.settings.sh);
         let plain = self.steps_for(wanted)?;
-        if price(&plain, wanted) < price(&fitted, wanted) {
+        // Where nothing was gained the values are those of the source, and a lower price is chance.
+        let is_idle = fitted.encoded.as_ref().is_some_and(|encoded| gained(&encoded.report) <= 0.0);
+        if is_idle || price(&plain, wanted) < price(&fitted, wanted) {
             return Ok(plain);
         }
         (self.fitting.fits_values, self.fitting.sh, self.fitting.known) = (true, sh, known);
