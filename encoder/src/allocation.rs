@@ -47,11 +47,11 @@ const LEVELS: usize = 2;
 /// costs another encoding.
 const CORRECTIONS: usize = 6;
 const NEAR: f64 = 0.2;
-/// The same for the fast preset.
-const NEAR_FAST: f64 = 0.3;
-/// What pictures gain where steps are fitted for a decibel more: of most scenes, and where the first guess is near.
+/// The same where nothing is measured before.
+const NEAR_GUESSED: f64 = 0.3;
+/// What pictures gain where steps are fitted for a decibel more: of most scenes, and where estimates alone are near.
 const SLOPE: f64 = 1.0;
-const SLOPE_FAST: f64 = 0.85;
+const SLOPE_GUESSED: f64 = 0.85;
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// Steps change by no more than this factor at once: the model is local.
@@ -262,8 +262,8 @@ impl Fit {
     ///
     /// Values that lie on a grid already leap where steps pass its own: what is found is looked at before it is taken.
     fn levelled(&self, steps: Steps, decibels: f64) -> Result<(Steps, Option<f64>), Error> {
-        let is_fast = self.settings.preset == Preset::Fast;
-        let (near, slope) = if is_fast { (NEAR_FAST, SLOPE_FAST) } else { (NEAR, SLOPE) };
+        let is_guessed = self.alone.is_empty();
+        let (near, slope) = if is_guessed { (NEAR_GUESSED, SLOPE_GUESSED) } else { (NEAR, SLOPE) };
         let mut secant = Secant::new(decibels, near, slope, CORRECTIONS);
         let mut best = (steps, None);
         let mut next = Some(decibels);
