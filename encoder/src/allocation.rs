@@ -346,7 +346,7 @@ fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Ve
     let first = usize::from(cameras.len() > 1);
     let apart = cameras.len().div_ceil(ALONE).max(1);
     let places = (first..cameras.len()).step_by(apart).take(ALONE);
-    StripViews::new(cameras, EVERY, frame.len()).of(frame, places)
+    StripViews::new(cameras, EVERY, frame).of(frame, places)
 }
 
 /// The views that shares are fitted in.

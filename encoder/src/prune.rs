@@ -104,7 +104,7 @@ fn least_missed(frame: &GaussianFrame, settings: &Settings, least: f64) -> (Vec<
     };
     let [weighing, judging] = SEEDS;
     let order = order(&frame, &cameras(weighing, VIEWS, HEIGHT));
-    let views = StripViews::new(cameras(judging, JUDGES, HEIGHT), EVERY, frame.len());
+    let views = StripViews::new(cameras(judging, JUDGES, HEIGHT), EVERY, &frame);
     let whole: Vec<_> = views.draw(&frame).collect();
     let psnr = |gone: usize| {
         let mut kept = order[gone..].to_vec();

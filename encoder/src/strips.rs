@@ -11,18 +11,32 @@ use splatstream_render::{Camera, PreparedFrame, Rendering, Strips, draw_strips, 
 /// Around the scene.
 const BACKGROUND: [f32; 3] = [0.0; 3];
 
-/// Frames of fewer Gaussians than the first have more strips, for the errors of a few Gaussians are in few places; those
-/// of more than the second have fewer.
+/// Frames of fewer Gaussians than the first have more strips, for the errors of a few small Gaussians are in few places;
+/// those of more than the second have fewer.
 const FEW: usize = 1 << 15;
 const MANY: usize = 1 << 19;
 
-/// A strip in so many, of a frame of so many Gaussians, where it is one in `every` of usual frames.
+/// Strips that touch this part of what whole pictures show are enough, of however few Gaussians: these are large.
+const NEARLY_ALL: f64 = 0.99;
+
+/// A strip in so many, of a frame in some views, where it is one in `every` of usual frames.
 #[expect(clippy::arithmetic_side_effects, reason = "small constants, and Gaussians in memory")]
-fn strip_of(every: u32, gaussians: usize) -> u32 {
-    match gaussians < FEW {
-        true => (every as usize * gaussians / FEW).max(1) as u32,
-        false => every * gaussians.div_ceil(MANY) as u32,
+fn strip_of(every: u32, cameras: &[Camera], frame: &GaussianFrame) -> u32 {
+    let gaussians = frame.len();
+    if gaussians >= FEW {
+        return every * gaussians.div_ceil(MANY) as u32;
     }
+    let touched = |every: u32| -> usize {
+        let views = cameras.iter().zip(0..);
+        views.map(|(camera, number)| touching_strips(frame, camera, strips(number, every)).len()).sum()
+    };
+    let fewest = (every as usize * gaussians / FEW).max(1) as u32;
+    let enough = NEARLY_ALL * touched(1) as f64;
+    let halves = core::iter::successors(Some(every), |&every| Some(every / 2));
+    halves
+        .take_while(|&every| every > fewest)
+        .find(|&every| touched(every) as f64 >= enough)
+        .unwrap_or(fewest)
 }
 
 /// Which strips are taken of a view: at another height in each.
@@ -71,9 +85,9 @@ pub(crate) struct StripViews {
 }
 
 impl StripViews {
-    /// One strip in `every` of each view, for frames of so many Gaussians.
-    pub(crate) fn new(cameras: Vec<Camera>, every: u32, gaussians: usize) -> Self {
-        Self { cameras, every: strip_of(every, gaussians) }
+    /// One strip in `every` of each view, for frames like one.
+    pub(crate) fn new(cameras: Vec<Camera>, every: u32, frame: &GaussianFrame) -> Self {
+        Self { every: strip_of(every, &cameras, frame), cameras }
     }
 
     /// The strips of a frame, to compare others of the same Gaussians with: of the views at some places.

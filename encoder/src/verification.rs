@@ -210,7 +210,7 @@ impl Views {
             Preset::Fast => EVERY_FAST,
             Preset::Balanced | Preset::Small => EVERY,
         };
-        let strips = |cameras, every| StripViews::new(cameras, every, frame.len());
+        let strips = |cameras, every| StripViews::new(cameras, every, frame);
         let [cameras, other] = held_out_twice(frame, settings.up(), &settings.cameras, VIEWS, HEIGHT);
         Self { unseen: strips(other, of_report), of_fit: strips(cameras, of_fit) }
     }
