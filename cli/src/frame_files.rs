@@ -9,7 +9,7 @@ use crate::stream_file::is_stream;
 use crate::unfinished::Unfinished;
 use splatstream_encoder::FrameSource;
 use splatstream_files::{
-    EXTENSIONS, Scene, SceneError, SceneFormat, Sequence, detect, natural_order, read_scene_as_is,
+    EXTENSIONS, HEAD, Scene, SceneError, SceneFormat, Sequence, detect, natural_order, read_scene_as_is,
 };
 use splatstream_gaussians::GaussianFrame;
 use std::collections::BTreeSet;
@@ -37,9 +37,6 @@ pub(crate) struct FrameFiles {
     /// What readers have noted.
     notes: ReadNotes,
 }
-
-/// Bytes that say which format a scene is in, if any does.
-const HEAD: u64 = 64 << 10;
 
 /// What standard input is called in messages.
 pub(crate) const STANDARD_INPUT: &str = "standard input";
@@ -148,7 +145,7 @@ pub(crate) fn spool(input: &mut dyn Read, most: u64) -> Result<Unfinished, Failu
     let directory = std::env::temp_dir();
     let failed = |error| Failure::file("keep standard input in", &directory, &error);
     let (mut file, unfinished) = Unfinished::create(&directory, false).map_err(failed)?;
-    let mut count = io::copy(&mut input.take(HEAD), &mut file).map_err(failed)?;
+    let mut count = io::copy(&mut input.take(HEAD + 1), &mut file).map_err(failed)?;
     if is_stream(unfinished.path()) {
         return Err(is_encoded(STANDARD_INPUT));
     }

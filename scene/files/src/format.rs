@@ -15,8 +15,8 @@ use crate::sequence::{SPLAT4D, SPLATV, Sequence, SequenceOptions};
 use crate::{compressed_ply, gltf, ksplat, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
-/// A PLY header must fit in this many bytes for [`detect`] to tell packed vertices from plain ones.
-const HEAD: u64 = 64 << 10;
+/// Bytes of a file by which [`detect`] tells its format: the longest header of a PLY file that is read.
+pub const HEAD: u64 = ply::MOST_HEADER as u64;
 
 /// Where a tar archive has its name, and that.
 const TAR: (usize, &[u8]) = (257, b"ustar");
@@ -66,7 +66,8 @@ pub fn detect(path: &Path) -> Result<SceneFormat, SceneError> {
     let find = || {
         let mut file = File::open(path)?;
         let mut head = Vec::new();
-        file.by_ref().take(HEAD).read_to_end(&mut head)?;
+        // One byte more: whether the header goes on.
+        file.by_ref().take(HEAD + 1).read_to_end(&mut head)?;
         if head.is_empty() {
             return Err(SceneErrorKind::Empty.into());
         }

@@ -53,7 +53,7 @@ mod smallest_three;
 
 pub use clamped::Clamped;
 pub use error::{SceneError, SceneErrorKind};
-pub use format::{EXTENSIONS, SceneFormat, detect, read_scene, read_scene_as_is};
+pub use format::{EXTENSIONS, HEAD, SceneFormat, detect, read_scene, read_scene_as_is};
 pub use limits::ReadLimits;
 pub use note::Note;
 pub use scene::Scene;

@@ -10,7 +10,7 @@ mod header;
 mod points;
 mod table;
 
-pub(crate) use header::{Element, Header, is_ply, parse as parse_header};
+pub(crate) use header::{Element, Header, MOST_HEADER, is_ply, parse as parse_header};
 pub use points::{PointCloud, read_points};
 pub(crate) use table::Body;
 

@@ -15,6 +15,9 @@ use crate::limits::Budget;
 /// Bytes of memory that a line of a header takes beside its name, at most.
 const LINE: u64 = 192;
 
+/// Bytes of a header, at most: comments of programs that keep their settings in them take some thousands.
+pub(crate) const MOST_HEADER: usize = 1 << 20;
+
 const NOT_PLY: &str = "check that this is a PLY file and that the transfer did not change its line ends";
 
 /// What precedes the values.
@@ -106,8 +109,12 @@ pub(crate) fn is_ply(bytes: &[u8]) -> bool {
 /// Reads the header at the start of `bytes`.
 ///
 /// # Errors
-/// The byte offset of the first line that is not understood.
+/// The byte offset of the first line that is not understood, or that of the end where none is the last.
 pub(crate) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<Header, SceneError> {
+    let (bytes, is_cut) = match bytes.get(..MOST_HEADER) {
+        Some(first) if first.len() < bytes.len() => (first, true),
+        _ => (bytes, false),
+    };
     let refuse = |rest: &[u8], what: String| {
         SceneError::malformed(bytes.len().saturating_sub(rest.len()), what, NOT_PLY)
     };
@@ -119,7 +126,10 @@ pub(crate) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<Header, SceneEr
     loop {
         budget.take(LINE, "a PLY header")?;
         let (after, line) =
-            line(rest).map_err(|_| refuse(rest, format!("no PLY header line: \"{}\"", excerpt(rest))))?;
+            line(rest).map_err(|_| match rest.is_empty() || is_cut && !rest.contains(&b'\n') {
+                true => endless(bytes.len(), is_cut),
+                false => refuse(rest, format!("no PLY header line: \"{}\"", excerpt(rest))),
+            })?;
         match line {
             Line::Format(found) => encoding = Some(found),
             Line::Remark => {}
@@ -143,6 +153,22 @@ pub(crate) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<Header, SceneEr
             }
         }
         rest = after;
+    }
+}
+
+/// The error of a header whose last line is not among its first bytes, which are those of the file unless they are cut.
+fn endless(length: usize, is_cut: bool) -> SceneError {
+    match is_cut {
+        true => SceneError::malformed(
+            length,
+            format!("the PLY header goes on after {MOST_HEADER} bytes, the most that is read"),
+            "take comments or properties out of it",
+        ),
+        false => SceneError::malformed(
+            length,
+            "the file ends before the line \"end_header\" of its PLY header",
+            "the file is cut short, copy it again",
+        ),
     }
 }
 
@@ -251,5 +277,21 @@ mod tests {
             error.to_string().starts_with("byte 21: no PLY header line: \"element vertex many\""),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_header_without_end_is_told_from_one_that_is_too_long() {
+        let read = |text: &str| parse(text.as_bytes(), &mut budget());
+        let start = "ply\nformat ascii 1.0\n";
+        let said = read(&format!("{start}element vertex 3\n")).unwrap_err().to_string();
+        assert!(said.starts_with("byte 38: the file ends before the line \"end_header\""), "{said}");
+        let of_length = |length: usize| {
+            let comment = length - start.len() - "comment \nend_header\n".len();
+            format!("{start}comment {}\nend_header\n1 2 3", "x".repeat(comment))
+        };
+        assert_eq!(read(&of_length(MOST_HEADER)).unwrap().length, MOST_HEADER);
+        let said = read(&of_length(MOST_HEADER + 1)).unwrap_err().to_string();
+        assert!(said.starts_with("byte 1048576: the PLY header goes on after 1048576 bytes"), "{said}");
+        assert!(said.ends_with("take comments or properties out of it"), "{said}");
     }
 }

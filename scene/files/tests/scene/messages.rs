@@ -3,8 +3,8 @@
 use std::fs;
 
 use splatstream_files::{
-    Note, ReadLimits, Scene, SceneErrorKind, SceneFormat, detect, ply, read_scene, read_scene_as_is, sog,
-    splat,
+    HEAD, Note, ReadLimits, Scene, SceneErrorKind, SceneFormat, detect, ply, read_scene, read_scene_as_is,
+    sog, splat,
 };
 use splatstream_gaussians::activation::sigmoid;
 
@@ -72,6 +72,25 @@ fn infinite_opacities_are_opacities_of_0_and_1() {
         assert!(logit.is_finite() && nearest.abs_diff(opacity) <= 1, "{logit}");
         assert_eq!(notes, [Note::ExactOpacity { count: 1 }]);
     }
+}
+
+#[test]
+fn long_headers_of_files_are_read_up_to_a_limit() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.ply");
+    let with_comment = |length: usize| {
+        let text = format!("format binary_little_endian 1.0\ncomment {}\n", "x".repeat(length));
+        let plain = ply::write(&small_frame());
+        let rest = plain.splitn(3, |&byte| byte == b'\n').last().unwrap();
+        fs::write(&path, [b"ply\n", text.as_bytes(), rest].concat()).unwrap();
+        read_scene(&path, &LIMITS)
+    };
+    assert_eq!(with_comment(200_000).unwrap().len(), small_frame().len());
+    let said = with_comment(HEAD as usize).unwrap_err().to_string();
+    assert!(said.contains(": byte 1048576: the PLY header goes on after 1048576 bytes"), "{said}");
+    fs::write(&path, "ply\nformat ascii 1.0\n").unwrap();
+    let said = read_scene(&path, &LIMITS).unwrap_err().to_string();
+    assert!(said.contains(": byte 21: the file ends before the line \"end_header\""), "{said}");
 }
 
 #[test]
