@@ -102,19 +102,22 @@ impl Carried {
 
     /// Makes the motions that the lists from `first` on have yet to make, as long as no interrupt is requested.
     fn compute_from(&mut self, first: usize, interrupt: &Interrupt) {
-        (first..self.len()).take_while(|_| !interrupt.is_requested()).for_each(|h| self.compute(h));
+        (first..self.len())
+            .take_while(|_| !interrupt.is_requested())
+            .for_each(|h| self.compute(h, interrupt));
     }
 
-    /// Makes the motions that list h has yet to make.
-    fn compute(&mut self, h: usize) {
+    /// Makes the motions that list h has yet to make; where an interrupt is requested, the list means nothing.
+    fn compute(&mut self, h: usize, interrupt: &Interrupt) {
         let Some(carried) = self.lists.get_mut(h) else { return };
         let waiting = self.motions.get(carried.done..).unwrap_or_default();
         if waiting.is_empty() {
             return;
         }
-        let mut list = carried.list.as_ref().clone();
-        for motion in waiting {
-            let keep = list.carry(&motion.field, motion.drops_stale);
+        let memory = GaussianList::empty(carried.list.planes.sh.len());
+        let mut list = carried.list.unchanged_in(memory, interrupt);
+        for motion in waiting.iter().take_while(|_| !interrupt.is_requested()) {
+            let keep = list.carry(&motion.field, motion.drops_stale, interrupt);
             if !keep.is_empty() && !carried.identities.is_empty() {
                 crate::frame::retain(Arc::make_mut(&mut carried.identities), &keep);
             }

@@ -2,12 +2,12 @@
 
 use crate::attribute::in_range;
 use crate::components::{Components, Pair, TILE};
+use crate::cores;
 use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::steps::Exponents;
 use crate::vector::{Task, vectorized};
 use core::ops::RangeInclusive;
-use rayon::prelude::*;
 use splatstream_format::entropy::machine::{Machine, WIDE};
 use splatstream_format::entropy::reader::{signed, vector};
 use splatstream_format::payload::{Codebook, Transform};
@@ -140,6 +140,7 @@ pub fn add_inverse(
     for plane in out {
         runs.iter_mut().zip(plane.chunks_mut(RUN)).for_each(|(run, chunk)| run.push(chunk));
     }
+    let values = count.saturating_mul(transform.header.dimension.into());
     let transform_run = |(index, mut out): (usize, Vec<&mut [i32]>)| {
         interrupt.check()?;
         let start = index.wrapping_mul(RUN);
@@ -151,8 +152,7 @@ pub fn add_inverse(
         }
         transformed(transform, &components, &mut out, |predicted, _, change| predicted.wrapping_add(change))
     };
-    let results: Vec<Result<()>> = runs.into_par_iter().enumerate().map(transform_run).collect();
-    results.into_iter().collect()
+    cores::map(values, runs.into_iter().enumerate().collect(), transform_run).into_iter().collect()
 }
 
 /// Writes what `join` makes of the value in `out`, the mean and the transformed components.

@@ -5,10 +5,10 @@
 //!
 //! What is added here counts points or is an index of one, so that no sum is above the number of points.
 
+use crate::cores;
 use crate::interrupt::Interrupt;
 use crate::position::morton;
 use crate::vector::{Task, vectorized};
-use rayon::prelude::*;
 use splatstream_format::entropy::machine::Machine;
 
 /// Bits of a digit.
@@ -25,13 +25,14 @@ const RUN: usize = 4096;
 /// Points between two looks at the interrupt.
 const PART: usize = 1 << 16;
 
-/// The Morton codes of points, given by their planes x, y, z of one length. Coordinates are below 2^21.
-pub(crate) fn codes([xs, ys, zs]: [&[u32]; 3]) -> Vec<u64> {
+/// The Morton codes of points, given by their planes x, y, z of one length. Coordinates are below 2^21. Where an interrupt is
+/// requested, they mean nothing.
+pub(crate) fn codes([xs, ys, zs]: [&[u32]; 3], interrupt: &Interrupt) -> Vec<u64> {
     let mut codes = vec![0; xs.len()];
-    codes
-        .par_chunks_mut(RUN)
-        .zip(xs.par_chunks(RUN).zip(ys.par_chunks(RUN)).zip(zs.par_chunks(RUN)))
-        .for_each(|(codes, ((xs, ys), zs))| vectorized(Codes { points: [xs, ys, zs], codes }));
+    let runs = codes.chunks_mut(RUN).zip(xs.chunks(RUN).zip(ys.chunks(RUN)).zip(zs.chunks(RUN)));
+    cores::for_each(interrupt, xs.len().saturating_mul(3), runs, |(codes, ((xs, ys), zs))| {
+        vectorized(Codes { points: [xs, ys, zs], codes });
+    });
     codes
 }
 

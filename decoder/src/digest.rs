@@ -1,8 +1,8 @@
 //! Clause 7.9: the digests of lists of Gaussians.
 
+use crate::cores;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
-use rayon::prelude::*;
 use std::borrow::Cow;
 use xxhash_rust::xxh64::xxh64;
 
@@ -28,11 +28,11 @@ pub(crate) fn list_digest_unless(
     let others =
         frame.signed_planes().map(|plane| Plane::Signed(plane.get(range.clone()).unwrap_or_default()));
     let planes: Vec<(u64, Plane<'_>)> = (0_u64..).zip(positions.chain(others)).collect();
-    let digest = |(seed, plane): &(u64, Plane<'_>)| match interrupt.is_requested() {
+    let digest = |(seed, plane): (u64, Plane<'_>)| match interrupt.is_requested() {
         true => 0,
-        false => plane.digest(*seed),
+        false => plane.digest(seed),
     };
-    ListDigest(planes.par_iter().map(digest).collect())
+    ListDigest(cores::map(range.len().saturating_mul(planes.len()), planes, digest))
 }
 
 enum Plane<'a> {

@@ -6,16 +6,19 @@
 
 use crate::block::{UnitParameters, decode_block};
 use crate::buffers::{Buffers, Workspace};
+use crate::cores;
 use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, blocks_of};
-use rayon::prelude::*;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::SectionModels;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::entropy::reader::PlaneDecoder;
 use splatstream_format::payload::{CodedSection, Increment};
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
+
+/// Values that take as long as the table of a plane.
+const VALUES_OF_TABLE: usize = 64;
 
 /// A unit whose blocks can be decoded straight into planes.
 #[derive(Debug, Clone, Copy)]
@@ -51,10 +54,12 @@ pub(crate) fn decode(
 ) -> (QuantizedFrame, Vec<Result<usize>>) {
     let sections: Vec<Option<(&CodedSection<'_>, &SectionModels)>> =
         units.iter().map(|unit| unit.prepared.sections().next()).collect();
-    let decoders: Vec<Vec<PlaneDecoder>> = sections
-        .par_iter()
-        .map(|section| section.iter().flat_map(|(_, models)| &models.models).map(PlaneDecoder::new).collect())
-        .collect();
+    // What a table is made of counts like values.
+    let tables = units.iter().map(|unit| unit.prepared.tables()).fold(0, usize::saturating_add);
+    let decoders: Vec<Vec<PlaneDecoder>> =
+        cores::map(tables.saturating_mul(VALUES_OF_TABLE), sections.iter().collect(), |section| {
+            section.iter().flat_map(|(_, models)| &models.models).map(PlaneDecoder::new).collect()
+        });
     let blocks: Vec<(usize, &[u8], u64, usize)> = sections
         .iter()
         .enumerate()
@@ -67,6 +72,7 @@ pub(crate) fn decode(
     let total = lengths.iter().copied().fold(0, usize::saturating_add);
     let mut planes =
         QuantizedFrame::zeroed_unless(workspace.interrupt, total, usize::from(sequence.sh_dimension()));
+    let values = planes.values();
     let task = |((unit, bytes, at, _), out)| {
         let (coded, models) = sections.get(unit).copied().flatten()?;
         let parameters = parameters(units.get(unit)?, coded, models, sequence);
@@ -75,7 +81,7 @@ pub(crate) fn decode(
     let tasks: Vec<Task<'_, '_, '_>> =
         blocks.into_iter().zip(planes.slices(&lengths)).filter_map(task).collect();
     let decoded: Vec<(usize, Result<usize>)> =
-        tasks.into_par_iter().map(|task| workspace.run(|buffers| run(buffers, task))).collect();
+        cores::map(values, tasks, |task| workspace.run(|buffers| run(buffers, task)));
     let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (unit, block) in decoded {
         let Some(slot) = results.get_mut(unit) else { continue };

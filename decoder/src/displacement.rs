@@ -3,10 +3,10 @@
 //! A fine position is in 64ths of a grid step, a fine rotation in 64ths of rotation_step.
 
 use crate::cell::Cell;
+use crate::cores;
 use crate::interrupt::Interrupt;
 use crate::motion::{Bounds, Motion, Planes};
 use crate::position::morton;
-use rayon::prelude::*;
 
 /// Gaussians displaced by one task.
 const RUN: usize = 4096;
@@ -75,14 +75,14 @@ impl CellField {
         rotation: &mut [Vec<i32>; 3],
     ) -> Vec<bool> {
         let [x, y, z] = position;
-        let [a, b, c] = rotation;
         let mut stale = vec![false; x.len()];
-        stale
-            .par_chunks_mut(RUN)
-            .zip(x.par_chunks_mut(RUN).zip(y.par_chunks_mut(RUN)).zip(z.par_chunks_mut(RUN)))
-            .zip(a.par_chunks_mut(RUN).zip(b.par_chunks_mut(RUN)).zip(c.par_chunks_mut(RUN)))
-            .filter(|_| !interrupt.is_requested())
-            .for_each(|((stale, ((x, y), z)), ((a, b), c))| self.displace_run(stale, [x, y, z], [a, b, c]));
+        let values = x.len().saturating_mul(6);
+        let [x, y, z] = [x, y, z].map(|plane| plane.chunks_mut(RUN));
+        let [a, b, c] = rotation.each_mut().map(|plane| plane.chunks_mut(RUN));
+        let runs = stale.chunks_mut(RUN).zip(x.zip(y).zip(z)).zip(a.zip(b).zip(c));
+        cores::for_each(interrupt, values, runs, |((stale, ((x, y), z)), ((a, b), c))| {
+            self.displace_run(stale, [x, y, z], [a, b, c]);
+        });
         stale
     }
 

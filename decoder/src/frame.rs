@@ -1,7 +1,7 @@
 //! Clause 7.9: the canonical integer planes of a frame.
 
+use crate::cores;
 use crate::interrupt::Interrupt;
-use rayon::prelude::*;
 use splatstream_gaussians::{FrameError, MAX_SH_DEGREE, sh_planes};
 
 /// A reconstructed frame: integers on the grids of the sequence, Gaussians in coded order.
@@ -58,6 +58,7 @@ impl QuantizedFrame {
 
     /// The same; where an interrupt is requested, planes are empty.
     pub(crate) fn zeroed_unless(interrupt: &Interrupt, count: usize, sh_planes: usize) -> Self {
+        let values = count.saturating_mul(sh_planes);
         let count = || if interrupt.is_requested() { 0 } else { count };
         let planes = || [(); 3].map(|()| vec![0; count()]);
         Self {
@@ -66,7 +67,7 @@ impl QuantizedFrame {
             opacity: vec![0; count()],
             rotation: planes(),
             dc: planes(),
-            sh: (0..sh_planes).into_par_iter().map(|_| vec![0; count()]).collect(),
+            sh: cores::map(values, vec![(); sh_planes], |()| vec![0; count()]),
         }
     }
 
@@ -121,6 +122,11 @@ impl QuantizedFrame {
         self.opacity.len()
     }
 
+    /// Values of all planes.
+    pub(crate) fn values(&self) -> usize {
+        self.len().saturating_mul(self.sh.len().saturating_add(13))
+    }
+
     /// True if the frame has no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.opacity.is_empty()
@@ -135,8 +141,14 @@ impl QuantizedFrame {
     /// A copy of the Gaussians in a range.
     #[must_use]
     pub fn part(&self, range: core::ops::Range<usize>) -> Self {
-        let unsigned = |plane: &Vec<u32>| plane.get(range.clone()).unwrap_or_default().to_vec();
-        let signed = |plane: &Vec<i32>| plane.get(range.clone()).unwrap_or_default().to_vec();
+        self.part_unless(Interrupt::NEVER, range)
+    }
+
+    /// The same; where an interrupt is requested, planes are empty.
+    pub(crate) fn part_unless(&self, interrupt: &Interrupt, range: core::ops::Range<usize>) -> Self {
+        let range = || if interrupt.is_requested() { 0..0 } else { range.clone() };
+        let unsigned = |plane: &Vec<u32>| plane.get(range()).unwrap_or_default().to_vec();
+        let signed = |plane: &Vec<i32>| plane.get(range()).unwrap_or_default().to_vec();
         Self {
             position: self.position.each_ref().map(unsigned),
             log_scale: self.log_scale.each_ref().map(signed),
@@ -149,9 +161,14 @@ impl QuantizedFrame {
 
     /// Keeps the Gaussians whose flag is set.
     pub fn retain(&mut self, keep: &[bool]) {
-        self.position.par_iter_mut().for_each(|plane| retain(plane, keep));
-        let planes: Vec<&mut Vec<i32>> = self.signed_planes_mut().collect();
-        planes.into_par_iter().for_each(|plane| retain(plane, keep));
+        self.retain_unless(Interrupt::NEVER, keep);
+    }
+
+    /// The same; where an interrupt is requested, planes are left as they are.
+    pub(crate) fn retain_unless(&mut self, interrupt: &Interrupt, keep: &[bool]) {
+        let values = self.values();
+        cores::for_each(interrupt, values, self.position.iter_mut(), |plane| retain(plane, keep));
+        cores::for_each(interrupt, values, self.signed_planes_mut(), |plane| retain(plane, keep));
     }
 
     /// Appends the Gaussians of another frame with as many SH planes.
@@ -164,19 +181,21 @@ impl QuantizedFrame {
         for (plane, more) in self.position.iter_mut().zip(&other.position) {
             plane.extend_from_slice(more);
         }
-        let planes: Vec<_> = self.signed_planes_mut().zip(other.signed_planes()).collect();
-        let planes = planes.into_par_iter().filter(|_| !interrupt.is_requested());
-        planes.for_each(|(plane, more)| plane.extend_from_slice(more));
+        let planes = self.signed_planes_mut().zip(other.signed_planes());
+        cores::for_each(interrupt, other.values(), planes, |(plane, more)| plane.extend_from_slice(more));
     }
 
     /// The Gaussians of several frames, which have `sh_planes` SH planes, one after the other. Where an interrupt is
     /// requested, they mean nothing.
     pub(crate) fn joined(parts: &[&Self], sh_planes: usize, interrupt: &Interrupt) -> Self {
         let mut all = Self::zeroed(0, sh_planes);
-        let positions = parts.iter().map(|part| part.position.iter().collect()).collect();
-        join(all.position.iter_mut(), positions, interrupt);
-        let others = parts.iter().map(|part| part.signed_planes().collect()).collect();
-        join(all.signed_planes_mut(), others, interrupt);
+        let values = parts.iter().map(|part| part.values()).fold(0, usize::saturating_add);
+        let positions: Vec<_> = parts.iter().map(|part| part.position.iter().collect()).collect();
+        let joined = all.position.iter_mut().enumerate();
+        cores::for_each(interrupt, values, joined, |(index, plane)| join(plane, &positions, index));
+        let others: Vec<_> = parts.iter().map(|part| part.signed_planes().collect()).collect();
+        let joined = all.signed_planes_mut().enumerate();
+        cores::for_each(interrupt, values, joined, |(index, plane)| join(plane, &others, index));
         all
     }
 
@@ -196,18 +215,11 @@ impl QuantizedFrame {
     }
 }
 
-/// Fills empty planes, each with those at its index of all parts.
-fn join<'p, T: Copy + Send + Sync + 'p>(
-    planes: impl Iterator<Item = &'p mut Vec<T>>,
-    parts: Vec<Vec<&Vec<T>>>,
-    interrupt: &Interrupt,
-) {
-    let planes: Vec<&mut Vec<T>> = planes.collect();
-    planes.into_par_iter().enumerate().filter(|_| !interrupt.is_requested()).for_each(|(index, plane)| {
-        let own = || parts.iter().filter_map(|part| part.get(index));
-        plane.reserve_exact(own().map(|part| part.len()).fold(0, usize::saturating_add));
-        own().for_each(|part| plane.extend_from_slice(part));
-    });
+/// Fills an empty plane with those at its index of all parts.
+fn join<T: Copy>(plane: &mut Vec<T>, parts: &[Vec<&Vec<T>>], index: usize) {
+    let own = || parts.iter().filter_map(|part| part.get(index));
+    plane.reserve_exact(own().map(|part| part.len()).fold(0, usize::saturating_add));
+    own().for_each(|part| plane.extend_from_slice(part));
 }
 
 /// Values that are moved at once where all of them are kept.

@@ -52,6 +52,7 @@ pub mod colour;
 pub mod companding;
 mod components;
 pub mod context;
+mod cores;
 mod curve;
 pub mod digest;
 mod direct;

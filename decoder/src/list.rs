@@ -3,11 +3,11 @@
 //! List h holds the Gaussians that the units of refinement h brought. Inside the prediction loop positions and rotations
 //! have six more bits than the canonical planes; [`GaussianList::settle`] derives the canonical planes from them.
 
+use crate::cores;
 use crate::digest::{ListDigest, list_digest};
 use crate::displacement::CellField;
 use crate::frame::{QuantizedFrame, retain};
 use crate::interrupt::Interrupt;
-use rayon::prelude::*;
 
 /// Fraction bits of positions and rotations inside the prediction loop.
 pub const FRACTION_BITS: u32 = 6;
@@ -52,18 +52,19 @@ impl Change {
     /// From one state of some Gaussians to another.
     pub fn between(before: &GaussianList, after: &GaussianList) -> Self {
         let mut change = Self::default();
-        change.set(before, after);
+        change.set_unless(Interrupt::NEVER, before, after);
         change
     }
 
-    /// Becomes the change from one state of some Gaussians to another; memory that it has is used again.
-    fn set(&mut self, before: &GaussianList, after: &GaussianList) {
+    /// Becomes the change from one state of some Gaussians to another; memory that it has is used again. Where an interrupt
+    /// is requested, it means nothing.
+    fn set_unless(&mut self, interrupt: &Interrupt, before: &GaussianList, after: &GaussianList) {
         let [x, y, z] = &before.position_fine;
         let [to_x, to_y, to_z] = &after.position_fine;
         let from = [x, y, z, &before.planes.opacity];
         let to = [to_x, to_y, to_z, &after.planes.opacity];
-        let planes: Vec<_> = self.planes_mut().zip(from.into_iter().zip(to)).collect();
-        planes.into_par_iter().for_each(|(plane, (from, to))| {
+        let planes = self.planes_mut().zip(from.into_iter().zip(to));
+        cores::for_each(interrupt, after.planes.values(), planes, |(plane, (from, to))| {
             plane.clear();
             plane.extend(to.iter().zip(from).map(|(to, from)| to.wrapping_sub(*from)));
         });
@@ -89,10 +90,19 @@ impl GaussianList {
 
     /// Gaussians whose positions and rotations have no fraction yet.
     pub fn of_planes(planes: QuantizedFrame, anchor: bool) -> Self {
+        Self::of_planes_unless(Interrupt::NEVER, planes, anchor)
+    }
+
+    /// The same; where an interrupt is requested, planes are empty.
+    pub(crate) fn of_planes_unless(interrupt: &Interrupt, planes: QuantizedFrame, anchor: bool) -> Self {
+        let wanted = || if interrupt.is_requested() { 0 } else { usize::MAX };
         let fine = |value: i32| value.wrapping_mul(FINE);
-        let position_fine =
-            planes.position.each_ref().map(|plane| plane.iter().map(|&q| fine(q.cast_signed())).collect());
-        let rotation_fine = planes.rotation.each_ref().map(|plane| plane.iter().map(|&r| fine(r)).collect());
+        let position_fine = planes
+            .position
+            .each_ref()
+            .map(|plane| plane.iter().take(wanted()).map(|&q| fine(q.cast_signed())).collect());
+        let rotation_fine =
+            planes.rotation.each_ref().map(|plane| plane.iter().take(wanted()).map(|&r| fine(r)).collect());
         let anchor = vec![anchor; planes.len()];
         Self { planes, position_fine, rotation_fine, anchor, change: Change::default() }
     }
@@ -110,9 +120,7 @@ impl GaussianList {
         let from = self.planes.signed_planes().chain(&self.position_fine).chain(&self.rotation_fine);
         let to = spare.planes.signed_planes_mut();
         let to = to.chain(&mut spare.position_fine).chain(&mut spare.rotation_fine);
-        let copies: Vec<(&mut Vec<i32>, &Vec<i32>)> = to.zip(from).collect();
-        let copies = copies.into_par_iter().filter(|_| !interrupt.is_requested());
-        copies.for_each(|(to, from)| to.clone_from(from));
+        cores::for_each(interrupt, self.planes.values(), to.zip(from), |(to, from)| to.clone_from(from));
         for (to, from) in spare.planes.position.iter_mut().zip(&self.planes.position) {
             to.clone_from(from);
         }
@@ -121,10 +129,11 @@ impl GaussianList {
         spare
     }
 
-    /// Takes note of what the Gaussians have become since a state of them.
-    pub(crate) fn follow_change(&mut self, since: &Self) {
+    /// Takes note of what the Gaussians have become since a state of them. Where an interrupt is requested, the note means
+    /// nothing.
+    pub(crate) fn follow_change(&mut self, since: &Self, interrupt: &Interrupt) {
         let mut change = core::mem::take(&mut self.change);
-        change.set(since, self);
+        change.set_unless(interrupt, since, self);
         self.change = change;
     }
 
@@ -140,26 +149,32 @@ impl GaussianList {
 
     /// Derives the canonical positions and rotations from the fine ones.
     pub fn settle(&mut self) {
+        self.settle_unless(Interrupt::NEVER);
+    }
+
+    /// The same; where an interrupt is requested, the canonical planes mean nothing.
+    pub(crate) fn settle_unless(&mut self, interrupt: &Interrupt) {
+        let values = self.planes.values();
         let Self { planes, position_fine, rotation_fine, .. } = self;
-        let positions = planes.position.par_iter_mut().zip(position_fine.par_iter());
-        positions.for_each(|(plane, fine)| {
-            for (slot, &value) in plane.iter_mut().zip(fine) {
+        let positions = planes.position.iter_mut().zip(position_fine);
+        cores::for_each(interrupt, values, positions, |(plane, fine)| {
+            for (slot, &mut value) in plane.iter_mut().zip(fine) {
                 *slot = canonical(value).cast_unsigned();
             }
         });
-        let rotations = planes.rotation.par_iter_mut().zip(rotation_fine.par_iter());
-        rotations.for_each(|(plane, fine)| {
-            for (slot, &value) in plane.iter_mut().zip(fine) {
+        let rotations = planes.rotation.iter_mut().zip(rotation_fine);
+        cores::for_each(interrupt, values, rotations, |(plane, fine)| {
+            for (slot, &mut value) in plane.iter_mut().zip(fine) {
                 *slot = canonical(value);
             }
         });
     }
 
     /// The same for some Gaussians, given by their rows.
-    pub(crate) fn settle_rows(&mut self, rows: &[&[u32]]) {
+    pub(crate) fn settle_rows(&mut self, rows: &[&[u32]], interrupt: &Interrupt) {
         let count = rows.iter().map(|rows| rows.len()).fold(0, usize::saturating_add);
         if count.saturating_mul(FEW_ROWS) > self.len() {
-            return self.settle();
+            return self.settle_unless(interrupt);
         }
         let rows = || rows.iter().flat_map(|rows| rows.iter()).map(|&row| row as usize);
         let Self { planes, position_fine, rotation_fine, .. } = self;
@@ -190,22 +205,25 @@ impl GaussianList {
             return Vec::new();
         }
         let stale = field.displace_unless(interrupt, &mut self.position_fine, &mut self.rotation_fine);
-        if !interrupt.is_requested() {
-            self.settle();
-        }
+        self.settle_unless(interrupt);
         stale
     }
 
     /// Keeps the Gaussians whose flag is set; an empty list keeps all.
     pub fn retain(&mut self, keep: &[bool]) {
+        self.retain_unless(Interrupt::NEVER, keep);
+    }
+
+    /// The same; where an interrupt is requested, planes are left as they are.
+    pub(crate) fn retain_unless(&mut self, interrupt: &Interrupt, keep: &[bool]) {
         if keep.iter().all(|&keep| keep) {
             return;
         }
         let Self { planes, position_fine, rotation_fine, anchor, change } = self;
-        planes.retain(keep);
-        position_fine.iter_mut().chain(rotation_fine).for_each(|plane| retain(plane, keep));
+        planes.retain_unless(interrupt, keep);
+        let others = position_fine.iter_mut().chain(rotation_fine).chain(change.planes_mut());
+        others.take_while(|_| !interrupt.is_requested()).for_each(|plane| retain(plane, keep));
         retain(anchor, keep);
-        change.planes_mut().for_each(|plane| retain(plane, keep));
     }
 
     /// Appends new Gaussians.
@@ -217,7 +235,8 @@ impl GaussianList {
     pub(crate) fn append_unless(&mut self, interrupt: &Interrupt, other: &Self) {
         self.planes.append_unless(interrupt, &other.planes);
         let ours = self.position_fine.iter_mut().chain(&mut self.rotation_fine);
-        for (plane, more) in ours.zip(other.position_fine.iter().chain(&other.rotation_fine)) {
+        let theirs = other.position_fine.iter().chain(&other.rotation_fine);
+        for (plane, more) in ours.zip(theirs).take_while(|_| !interrupt.is_requested()) {
             plane.extend_from_slice(more);
         }
         self.anchor.extend_from_slice(&other.anchor);
@@ -228,18 +247,19 @@ impl GaussianList {
     /// `drops_stale` is set, that is if the frame has units that replace them.
     #[must_use]
     pub fn carried(mut self, field: &CellField, drops_stale: bool) -> Self {
-        self.carry(field, drops_stale);
+        self.carry(field, drops_stale, Interrupt::NEVER);
         self
     }
 
-    /// Carries the list in place; gives which Gaussians stay, nothing if all do.
-    pub(crate) fn carry(&mut self, field: &CellField, drops_stale: bool) -> Vec<bool> {
-        let stale = self.displace(field);
+    /// Carries the list in place; gives which Gaussians stay, nothing if all do. Where an interrupt is requested, the list
+    /// means nothing.
+    pub(crate) fn carry(&mut self, field: &CellField, drops_stale: bool, interrupt: &Interrupt) -> Vec<bool> {
+        let mut keep = self.displace_unless(interrupt, field);
         if !drops_stale {
             return Vec::new();
         }
-        let keep: Vec<bool> = stale.par_iter().map(|&stale| !stale).collect();
-        self.retain(&keep);
+        keep.iter_mut().for_each(|stale| *stale = !*stale);
+        self.retain_unless(interrupt, &keep);
         keep
     }
 

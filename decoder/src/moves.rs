@@ -5,12 +5,12 @@
 //! whose motion is known when the parent's turn comes. Who counts follows from the modes alone, so that neighbours are
 //! found in parallel (`candidates`); the motions follow one after the other, in the order of the parents.
 
+use crate::cores;
 use crate::curve;
 use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
 use crate::vector::vectorized;
 use candidates::{Candidates, NEVER, Neighbours, Search};
-use rayon::prelude::*;
 use splatstream_format::{Error, ErrorKind, Result};
 
 mod candidates;
@@ -22,6 +22,8 @@ pub const MOVE_NEIGHBOURS: usize = 4;
 
 /// Parents, places or moves that one task takes.
 const RUN: usize = 2048;
+/// Parents that get memory between two looks at the interrupt.
+const PART: usize = 1 << 16;
 
 /// Bits of a mode that say whether a parent moves, and whether it goes.
 const HAS_MOVE: i32 = 1;
@@ -170,14 +172,18 @@ impl MoveSpace {
     /// motions are not known yet.
     pub fn push(&mut self, reference: &GaussianList, displaced: &GaussianList) {
         let list = u32::try_from(self.lists.len()).unwrap_or(u32::MAX);
-        // Everything is filled in, so that nothing has to be cleared.
-        let mut parents = self.spare_lists.pop().unwrap_or_default();
-        parents.resize(displaced.len(), Parent::default());
-        let Self { order, spare_order, ratio, interrupt, .. } = self;
+        let Self { order, spare_order, spare_lists, ratio, interrupt, .. } = self;
         let requested = &*interrupt;
+        // Everything is filled in, so that nothing has to be cleared.
+        let mut parents = spare_lists.pop().unwrap_or_default();
+        let values = displaced.len().saturating_mul(12);
+        while parents.len() < displaced.len() && !requested.is_requested() {
+            parents.resize(displaced.len().min(parents.len().saturating_add(PART)), Parent::default());
+        }
+        parents.truncate(displaced.len());
         let sort = || {
             let positions = displaced.planes.position.each_ref().map(Vec::as_slice);
-            let sorted = curve::order(curve::codes(positions).into_iter(), requested);
+            let sorted = curve::order(curve::codes(positions, requested).into_iter(), requested);
             if requested.is_requested() {
                 return;
             }
@@ -186,12 +192,12 @@ impl MoveSpace {
             core::mem::swap(order, spare_order);
         };
         let fill_in = || {
-            let runs = parents.par_chunks_mut(RUN).enumerate();
-            runs.filter(|_| !requested.is_requested()).for_each(|(run, parents)| {
+            let runs = parents.chunks_mut(RUN).enumerate();
+            cores::for_each(requested, values, runs, |(run, parents)| {
                 gather(parents, run.wrapping_mul(RUN), reference, displaced, *ratio);
             });
         };
-        rayon::join(sort, fill_in);
+        cores::join(values, sort, fill_in);
         self.lists.push(parents);
     }
 
@@ -236,8 +242,9 @@ impl MoveSpace {
     ) -> Vec<Neighbours> {
         let candidates = Candidates::new(self, modes);
         let mut neighbours = vec![Neighbours::default(); rows.len()];
-        let runs = neighbours.par_chunks_mut(RUN).zip(rows.par_chunks(RUN)).enumerate();
-        runs.filter(|_| !self.interrupt.is_requested()).for_each(|(run, (neighbours, rows))| {
+        let runs = neighbours.chunks_mut(RUN).zip(rows.chunks(RUN)).enumerate();
+        let values = rows.len().saturating_mul(MOVE_WINDOW);
+        cores::for_each(&self.interrupt, values, runs, |(run, (neighbours, rows))| {
             let first = run.wrapping_mul(RUN);
             vectorized(Search {
                 candidates: &candidates,

@@ -5,6 +5,7 @@
 //! side of the index at which the seeking point would stand are candidates. The nearest candidates, ties to the lower
 //! index, are the neighbours. Sorting takes a time that grows with n, a search 2 * `WINDOW` distances.
 
+use crate::cores;
 use crate::curve;
 use crate::interrupt::Interrupt;
 use crate::position::morton;
@@ -52,11 +53,15 @@ impl NeighbourSearch {
     /// The same; where an interrupt is requested, what is found means nothing.
     pub(crate) fn new_unless(interrupt: &Interrupt, points: [&[u32]; 3]) -> Self {
         let [xs, ys, zs] = points;
-        let codes = curve::codes(points);
+        let codes = curve::codes(points, interrupt);
         let coordinate = |plane: &[u32], index: u32| plane.get(index as usize).copied().unwrap_or(0);
         let point =
             |(code, index)| Point { code, index, at: [xs, ys, zs].map(|plane| coordinate(plane, index)) };
-        Self { points: curve::order(codes.into_iter(), interrupt).into_par_iter().map(point).collect() }
+        let order = curve::order(codes.into_iter(), interrupt);
+        if !cores::are_many(order.len()) {
+            return Self { points: order.into_iter().map(point).collect() };
+        }
+        Self { points: order.into_par_iter().map(point).collect() }
     }
 
     /// Points searched.
@@ -119,16 +124,16 @@ impl NeighbourSearch {
         if all.is_empty() {
             return all;
         }
-        all.par_chunks_mut(RUN.wrapping_mul(wanted))
-            .zip(xs.par_chunks(RUN).zip(ys.par_chunks(RUN)).zip(zs.par_chunks(RUN)))
-            .filter(|_| !interrupt.is_requested())
-            .for_each(|(run, ((xs, ys), zs))| {
-                let mut found = Vec::with_capacity(WINDOW.wrapping_mul(2));
-                for (slots, ((&x, &y), &z)) in run.chunks_mut(wanted).zip(xs.iter().zip(ys).zip(zs)) {
-                    self.nearest([x, y, z], wanted, &mut found);
-                    slots.iter_mut().zip(&found).for_each(|(slot, &neighbour)| *slot = neighbour);
-                }
-            });
+        let values = all.len();
+        let runs = all.chunks_mut(RUN.wrapping_mul(wanted));
+        let runs = runs.zip(xs.chunks(RUN).zip(ys.chunks(RUN)).zip(zs.chunks(RUN)));
+        cores::for_each(interrupt, values, runs, |(run, ((xs, ys), zs))| {
+            let mut found = Vec::with_capacity(WINDOW.wrapping_mul(2));
+            for (slots, ((&x, &y), &z)) in run.chunks_mut(wanted).zip(xs.iter().zip(ys).zip(zs)) {
+                self.nearest([x, y, z], wanted, &mut found);
+                slots.iter_mut().zip(&found).for_each(|(slot, &neighbour)| *slot = neighbour);
+            }
+        });
         all
     }
 

@@ -9,6 +9,7 @@ use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use super::values::{SectionValues, UnitValues};
 use crate::attribute::{ATTRIBUTE_RANGE, in_range};
 use crate::cell::{Cell, rotation_unit};
+use crate::cores;
 use crate::displacement::CellField;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
@@ -18,7 +19,6 @@ use crate::position::{collect, positions};
 use crate::predictor::Predictor;
 use crate::stage::Stage;
 use core::ops::RangeInclusive;
-use rayon::prelude::*;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
@@ -145,38 +145,47 @@ fn cell(code: u64, stale: i32, motion: [i64; 6], at: u64) -> Result<Cell> {
 /// # Errors
 /// Invalid by clauses 7.4 to 7.7.
 pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) -> Result<Applied> {
-    let mut list = parents;
+    let (mut list, mut set) = (parents, QuantizedFrame::default());
+    let (added, keep) = apply_to(&mut list, &mut set, unit, situation)?;
+    Ok(Applied { list, added, keep })
+}
+
+/// Applies a unit to a list, with room for the reference set; gives the new Gaussians, and which parents stay.
+fn apply_to(
+    list: &mut GaussianList,
+    set: &mut QuantizedFrame,
+    unit: &Unit<'_>,
+    situation: &Situation<'_>,
+) -> Result<(QuantizedFrame, Vec<bool>)> {
+    let interrupt = unit.coding.interrupt;
     let codes = unit.values.plane(Section::Predictors, 0);
     let is_predicted = codes.iter().any(|&code| code != Predictor::None.code());
-    let before = (situation.temporal.is_some() && is_predicted)
-        .then(|| reference_set_unless(unit.coding.interrupt, situation, &list.planes));
-    if let Some(temporal) = situation.temporal.as_ref().filter(|_| unit.header.extrapolates_opacity) {
-        extrapolate(&mut list, temporal);
+    if situation.temporal.is_some() && is_predicted {
+        *set = reference_set_unless(interrupt, situation, &list.planes);
     }
-    unit.coding.interrupt.check()?;
-    let keep = change_parents(unit, &mut list, situation.temporal.as_ref())?;
-    unit.coding.interrupt.check()?;
+    if let Some(temporal) = situation.temporal.as_ref().filter(|_| unit.header.extrapolates_opacity) {
+        extrapolate(list, temporal);
+    }
+    interrupt.check()?;
+    let keep = change_parents(unit, list, situation.temporal.as_ref())?;
+    interrupt.check()?;
     let predictors = predictors(unit)?;
     if let Some(temporal) = &situation.temporal {
-        list.follow_change(temporal.reference);
+        list.follow_change(temporal.reference, interrupt);
     }
-    unit.coding.interrupt.check()?;
-    list.retain(&keep);
-    unit.coding.interrupt.check()?;
-    let set = match before {
-        Some(set) => set,
-        None if is_predicted => reference_set_unless(unit.coding.interrupt, situation, &list.planes),
-        None => QuantizedFrame::default(),
-    };
-    unit.coding.interrupt.check()?;
+    list.retain_unless(interrupt, &keep);
+    if situation.temporal.is_none() && is_predicted {
+        *set = reference_set_unless(interrupt, situation, &list.planes);
+    }
+    interrupt.check()?;
     if !set.is_empty() {
         check_learned(unit, &predictors)?;
     }
     let position = new_positions(unit)?;
-    let added = new_gaussians(unit, situation.temporal.is_none(), position, &predictors, &set)?;
-    unit.coding.interrupt.check()?;
-    list.append_unless(unit.coding.interrupt, &added);
-    Ok(Applied { list, added: added.planes, keep })
+    let added = new_gaussians(unit, situation.temporal.is_none(), position, &predictors, set)?;
+    interrupt.check()?;
+    list.append_unless(interrupt, &added);
+    Ok((added.planes, keep))
 }
 
 /// Clause 7.7: everything that new Gaussians may be predicted from, in order.
@@ -232,7 +241,7 @@ fn change_parents(
         attributes.write_to(list, &updated, unit.coding.interrupt);
     }
     unit.coding.interrupt.check()?;
-    list.settle_rows(&[&moved, &updated]);
+    list.settle_rows(&[&moved, &updated], unit.coding.interrupt);
     Ok(modes.iter().map(|&mode| mode != REMOVED).collect())
 }
 
@@ -416,11 +425,10 @@ fn new_gaussians(
     };
     let Attributes { log_scale, opacity, rotation_fine, dc, sh, parents: _ } = attributes;
     let rotation = [(); 3].map(|()| vec![0; count]);
-    let mut list =
-        GaussianList::of_planes(QuantizedFrame { position, log_scale, opacity, rotation, dc, sh }, anchor);
+    let planes = QuantizedFrame { position, log_scale, opacity, rotation, dc, sh };
+    let mut list = GaussianList::of_planes_unless(unit.coding.interrupt, planes, anchor);
     list.rotation_fine = rotation_fine;
-    unit.coding.interrupt.check()?;
-    list.settle();
+    list.settle_unless(unit.coding.interrupt);
     Ok(list)
 }
 
@@ -437,7 +445,7 @@ fn unpredicted(count: usize, sh_planes: usize, values: &[Vec<i32>], unit: &Unit<
         Ok(attributes)
     };
     let starts: Vec<usize> = (0..count).step_by(RUN).collect();
-    let runs: Vec<Result<Attributes>> = starts.into_par_iter().map(run).collect();
+    let runs: Vec<Result<Attributes>> = cores::map(count.saturating_mul(values.len()), starts, run);
     let mut all = Attributes::unpredicted(0, &unit.coding.colour, sh_planes);
     for attributes in runs {
         let attributes = attributes?;

@@ -2,13 +2,13 @@
 
 use crate::attribute::{ATTRIBUTE_RANGE, in_range, unsorted};
 use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
+use crate::cores;
 use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::list::{FINE, FRACTION_BITS, GaussianList};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule, step};
 use core::ops::RangeInclusive;
-use rayon::prelude::*;
 use splatstream_format::Result;
 use splatstream_format::payload::Transform;
 
@@ -142,7 +142,7 @@ impl Attributes {
             opacity: shapes.opacity.clone(),
             rotation_fine: list.rotation_fine.each_ref().map(pick),
             dc: planes.dc.each_ref().map(pick),
-            sh: planes.sh.par_iter().map(pick).collect(),
+            sh: cores::map(rows.len().saturating_mul(planes.sh.len()), planes.sh.iter().collect(), pick),
             parents: Some(shapes),
         }
     }
@@ -161,8 +161,8 @@ impl Attributes {
         let to = to.chain(&mut planes.dc).chain(&mut planes.sh);
         let from = self.log_scale.iter().chain([&self.opacity]).chain(&self.rotation_fine);
         let from = from.chain(&self.dc).chain(&self.sh);
-        let planes: Vec<(&mut Vec<i32>, &Vec<i32>)> = to.zip(from).collect();
-        planes.into_par_iter().filter(|_| !interrupt.is_requested()).for_each(write);
+        let values = rows.len().saturating_mul(self.sh.len().saturating_add(10));
+        cores::for_each(interrupt, values, to.zip(from), write);
     }
 
     /// Adds the residuals of all attributes.

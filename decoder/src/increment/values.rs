@@ -4,9 +4,9 @@ use crate::attribute;
 use crate::block::{CodedPlanes, decode_coded};
 use crate::buffers::Workspace;
 use crate::coded_block::CodedBlock;
+use crate::cores;
 use crate::interrupt::Interrupt;
 use crate::steps::StepRule;
-use rayon::prelude::*;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
 use splatstream_format::entropy::layout::{Layout, Section, ShCoding};
@@ -143,13 +143,11 @@ impl<'r, 'a> PreparedSections<'r, 'a> {
     ) -> Result<Vec<CodedBlock>> {
         let decoders: Vec<PlaneDecoder> = models.models.iter().map(PlaneDecoder::new).collect();
         let planes = CodedPlanes { lanes_log2: coded.lanes_log2, layout: &models.layout, steps: self.steps };
-        let decoded: Vec<Result<CodedBlock>> = blocks_of(coded, sequence)
-            .into_par_iter()
-            .map(|(bytes, at, count)| {
-                workspace.run(|buffers| decode_coded(bytes, at, count, &planes, &decoders, buffers))
-            })
-            .collect();
-        decoded.into_iter().collect()
+        let values = (coded.count as usize).saturating_mul(decoders.len());
+        let decode = |(bytes, at, count)| {
+            workspace.run(|buffers| decode_coded(bytes, at, count, &planes, &decoders, buffers))
+        };
+        cores::map(values, blocks_of(coded, sequence), decode).into_iter().collect()
     }
 }
 
@@ -194,6 +192,7 @@ fn joined(
         }
     }
     for (plane, model) in values.planes.iter_mut().zip(&models.models) {
+        interrupt.check()?;
         attribute::unbias(plane, model.bias);
     }
     match has_deltas {

@@ -1,9 +1,9 @@
 //! The neighbours of moved parents: the nearest of those next to them along the Morton curve.
 
 use super::{MOVE_NEIGHBOURS, MOVE_WINDOW, MoveSpace, Place, RUN, at};
+use crate::cores;
 use crate::position::collect;
 use crate::vector::{Task, vectorized};
-use rayon::prelude::*;
 use splatstream_format::entropy::machine::Machine;
 
 /// Stands for the row of a move that no parent is known to.
@@ -67,16 +67,22 @@ impl Candidates {
             place_of.get_mut(place.row as usize).into_iter().for_each(|slot| *slot = index);
         }
         let [xs, ys, zs] = position.each_mut().map(|plane| plane.get_mut(MOVE_WINDOW..).unwrap_or_default());
-        let positions = xs.par_chunks_mut(RUN).zip(ys.par_chunks_mut(RUN)).zip(zs.par_chunks_mut(RUN));
-        positions.zip(order.par_chunks(RUN)).for_each(|(((xs, ys), zs), places)| {
+        let (interrupt, values) = (&space.interrupt, order.len().saturating_mul(3));
+        let positions = xs.chunks_mut(RUN).zip(ys.chunks_mut(RUN)).zip(zs.chunks_mut(RUN));
+        cores::for_each(interrupt, values, positions.zip(order.chunks(RUN)), |(((xs, ys), zs), places)| {
             vectorized(Positions { places, planes: [xs, ys, zs] });
         });
         let known = known_from.get_mut(MOVE_WINDOW..).unwrap_or_default();
-        known.par_chunks_mut(RUN).zip(order.par_chunks(RUN)).for_each(|(known, places)| {
-            for (known, place) in known.iter_mut().zip(places) {
-                *known = space.known_from(place, last, modes);
-            }
-        });
+        cores::for_each(
+            interrupt,
+            values,
+            known.chunks_mut(RUN).zip(order.chunks(RUN)),
+            |(known, places)| {
+                for (known, place) in known.iter_mut().zip(places) {
+                    *known = space.known_from(place, last, modes);
+                }
+            },
+        );
         Self { position, known_from, place_of }
     }
 

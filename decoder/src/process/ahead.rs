@@ -7,12 +7,13 @@
 use super::frame::FrameInProgress;
 use super::report::Found;
 use super::{DecodedFrame, Decoder, FrameEnd};
+use crate::cores;
 use crate::gop::Gop;
 use crate::operating_point::OperatingPoint;
 use splatstream_format::Error;
 
-/// Modules for web pages have one thread, and no code for more.
-const HAS_THREADS: bool = cfg!(not(target_family = "wasm"));
+/// Values of a Gaussian, at least.
+const VALUES: usize = 13;
 
 /// A frame that has ended and is to be handed out.
 pub(super) struct Ready {
@@ -29,7 +30,8 @@ impl Decoder {
         let (Some(frame), Some(gop)) = (&self.frame, &self.gop) else { return false };
         let is_free = gop.header.is_predicted() && !is_kept(gop, frame.role.temporal_layer);
         let is_wanted = self.options.ahead && !self.options.stop_at_first_error && self.frames_left > 0;
-        let is_worth_it = HAS_THREADS && rayon::current_num_threads() > 1;
+        let values = (frame.header.gaussian_count as usize).saturating_mul(VALUES);
+        let is_worth_it = cores::are_many(values) && rayon::current_num_threads() > 1;
         is_wanted && is_worth_it && is_free && self.waiting.is_none() && frame.error.is_none()
     }
 
@@ -48,7 +50,7 @@ impl Decoder {
 
     /// Decodes the pending units of the frame in progress, and of the one that waits, which ends; reports their errors.
     pub(super) fn settle(&mut self) {
-        if HAS_THREADS && self.waiting.is_some() {
+        if cores::HAS_THREADS && self.waiting.is_some() {
             return self.settle_both();
         }
         let Some(mut frame) = self.frame.take() else { return };
@@ -78,8 +80,8 @@ impl Decoder {
         if let Some(frame) = self.close(FrameEnd::Complete) {
             self.ready.push_back(Ready { frame, point: self.frame_point, found: Some(self.report.found()) });
         }
-        if next.is_some() {
-            self.frame = next;
+        if let Some(next) = next {
+            self.frame = Some(next);
         }
         next_errors.into_iter().for_each(|error| self.add(error));
     }

@@ -10,6 +10,7 @@ use super::applying::{self, Outcome};
 use super::decoded::Shift;
 use super::frame::{Context, DividedUnit, FrameInProgress, Refused};
 use super::spares::Spares;
+use crate::cores;
 use crate::digest::{ListDigest, list_digest_unless, lists_digest};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
@@ -21,7 +22,6 @@ use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
 use crate::list::GaussianList;
 use crate::steps::StepRule;
-use rayon::prelude::*;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::syntax::IncrementHeader;
 use splatstream_format::{Error, ErrorKind, Result};
@@ -117,6 +117,8 @@ impl Lists {
             return;
         }
         let mut start = 0_usize;
+        // The planes of one list are its own: nothing is copied.
+        let is_whole = self.heads.len() == 1;
         let heads = core::mem::take(&mut self.heads).into_iter().enumerate();
         for (r, head) in heads.take_while(|_| !interrupt.is_requested()) {
             let end = start.saturating_add(head.size);
@@ -124,7 +126,11 @@ impl Lists {
                 self.follow_identities(r, Arc::default(), &[], head.size);
             }
             self.heads.push(head);
-            self.lists.push(Arc::new(GaussianList::of_planes(self.planes.part(start..end), true)));
+            let planes = match is_whole {
+                true => core::mem::take(&mut self.planes),
+                false => self.planes.part_unless(interrupt, start..end),
+            };
+            self.lists.push(Arc::new(GaussianList::of_planes_unless(interrupt, planes, true)));
             start = end;
         }
         self.planes = QuantizedFrame::default();
@@ -292,18 +298,19 @@ impl FrameInProgress {
         context: &Context<'_>,
         errors: &mut Vec<Error>,
     ) {
-        let values: Vec<Result<UnitValues>> = group
-            .par_iter()
-            .map(|(_, prepared)| known(prepared)?.sections.decode(context.sequence, context.workspace()))
-            .collect();
+        let of_unit = |(_, prepared): &(_, Result<Prepared<'_, '_>>)| {
+            prepared.as_ref().map_or(0, |p| p.sections.values())
+        };
+        let count = group.iter().map(of_unit).fold(0, u64::saturating_add);
+        let count = usize::try_from(count).unwrap_or(usize::MAX);
+        let values: Vec<Result<UnitValues>> = cores::map(count, group.iter().collect(), |(_, prepared)| {
+            known(prepared)?.sections.decode(context.sequence, context.workspace())
+        });
         for ((unit, prepared), values) in group.iter().zip(values) {
-            if unit.refinement >= self.decoded.limit {
-                continue;
-            }
-            let prepared = known(prepared);
-            let taken = prepared.and_then(|prepared| self.unit(prepared, &values?, context));
-            if let Err(error) = taken {
-                self.refuse(unit, error, errors);
+            if unit.refinement < self.decoded.limit {
+                let values = values.as_ref().map_err(|error| *error);
+                let taken = known(prepared).and_then(|prepared| self.unit(prepared, values?, context));
+                taken.unwrap_or_else(|error| self.refuse(unit, error, errors));
             }
         }
     }

@@ -1,0 +1,84 @@
+//! Work on all cores, where there is enough of it.
+//!
+//! Who calls a decoder is mostly none of the threads that share its work. To hand something to these and to wait for it
+//! takes longer than all that a small frame needs, so that what is little is done where it comes up.
+
+use crate::interrupt::Interrupt;
+use rayon::prelude::*;
+
+/// Modules for web pages have one thread, and no code for more.
+pub(crate) const HAS_THREADS: bool = cfg!(not(target_family = "wasm"));
+
+/// Values of Gaussians that are done with before a thread has woken up.
+const FEW: usize = 1 << 14;
+
+/// Whether work on so many values is worth other threads.
+pub(crate) fn are_many(values: usize) -> bool {
+    HAS_THREADS && values > FEW
+}
+
+/// What `of` makes of each item, in order. All items together have so many values.
+pub(crate) fn map<T: Send, R: Send>(
+    values: usize,
+    items: Vec<T>,
+    of: impl Fn(T) -> R + Sync + Send,
+) -> Vec<R> {
+    match are_many(values) && items.len() > 1 {
+        true => items.into_par_iter().map(of).collect(),
+        false => items.into_iter().map(of).collect(),
+    }
+}
+
+/// Works on each item, as long as no interrupt is requested. All items together have so many values.
+pub(crate) fn for_each<T: Send>(
+    interrupt: &Interrupt,
+    values: usize,
+    items: impl Iterator<Item = T>,
+    work: impl Fn(T) + Sync + Send,
+) {
+    match are_many(values) {
+        true => {
+            let items: Vec<T> = items.collect();
+            items.into_par_iter().filter(|_| !interrupt.is_requested()).for_each(work);
+        }
+        false => items.take_while(|_| !interrupt.is_requested()).for_each(work),
+    }
+}
+
+/// Two pieces of work on so many values.
+pub(crate) fn join(values: usize, first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
+    match are_many(values) {
+        true => drop(rayon::join(first, second)),
+        false => {
+            first();
+            second();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::sync::atomic::{AtomicUsize, Ordering};
+
+    #[test]
+    fn few_and_many_values_give_the_same_in_order() {
+        let squares = |values| map(values, (0..999_u64).collect(), |item| item.pow(2));
+        assert_eq!(squares(FEW), squares(FEW + 1));
+        assert_eq!(squares(FEW).last(), Some(&998_u64.pow(2)));
+    }
+
+    #[test]
+    fn nothing_is_begun_once_an_interrupt_is_requested() {
+        for values in [FEW, FEW + 1] {
+            let (interrupt, done) = (Interrupt::new(), AtomicUsize::new(0));
+            let work = |_| {
+                done.fetch_add(1, Ordering::Relaxed);
+            };
+            for_each(&interrupt, values, 0..99, work);
+            interrupt.request();
+            for_each(&interrupt, values, 0..99, work);
+            assert_eq!(done.into_inner(), 99);
+        }
+    }
+}
