@@ -452,11 +452,12 @@ impl Decoder {
 
     /// Ends the frame in progress, whose units have been decoded.
     fn close(&mut self, end: FrameEnd) -> Option<DecodedFrame> {
-        let mut frame = self.frame.take().filter(|frame| !frame.has_ended)?;
         if self.interrupt.is_requested() {
+            // The frame is freed with the decoder.
             self.has_stopped = true;
             return None;
         }
+        let mut frame = self.frame.take().filter(|frame| !frame.has_ended)?;
         if let (FrameEnd::Unit(at), true) = (end, frame.is_intra() && !frame.seen) {
             let rule = "an I frame has an increment";
             let error = Error::new(at, "7.1.5", ErrorKind::Constraint { rule });
@@ -490,7 +491,11 @@ impl Decoder {
         if end == FrameEnd::Complete {
             self.frame = Some(frame);
         }
-        (!self.has_stopped).then_some(closed.decoded)
+        if self.has_stopped {
+            self.interrupt.leave(closed.decoded);
+            return None;
+        }
+        Some(closed.decoded)
     }
 
     /// Reports the error of a unit that is no increment, and takes what it costs; gives the frame that it ends, if it does.

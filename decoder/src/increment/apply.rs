@@ -146,8 +146,13 @@ fn cell(code: u64, stale: i32, motion: [i64; 6], at: u64) -> Result<Cell> {
 /// Invalid by clauses 7.4 to 7.7.
 pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) -> Result<Applied> {
     let (mut list, mut set) = (parents, QuantizedFrame::default());
-    let (added, keep) = apply_to(&mut list, &mut set, unit, situation)?;
-    Ok(Applied { list, added, keep })
+    match apply_to(&mut list, &mut set, unit, situation) {
+        Ok((added, keep)) => Ok(Applied { list, added, keep }),
+        Err(error) => {
+            unit.coding.interrupt.leave((list, set));
+            Err(error)
+        }
+    }
 }
 
 /// Applies a unit to a list, with room for the reference set; gives the new Gaussians, and which parents stay.
@@ -418,8 +423,13 @@ fn new_gaussians(
     let attributes = match prediction {
         Some(prediction) => {
             let mut attributes = Attributes::unpredicted(count, &unit.coding.colour, sh_planes);
-            prediction.reconstruct(&mut attributes, AttributeValues(values), &unit.coding, unit.at)?;
-            attributes
+            match prediction.reconstruct(&mut attributes, AttributeValues(values), &unit.coding, unit.at) {
+                Ok(()) => attributes,
+                Err(error) => {
+                    by.interrupt.leave(attributes);
+                    return Err(error);
+                }
+            }
         }
         None => unpredicted(count, sh_planes, values, unit)?,
     };

@@ -99,6 +99,7 @@ impl<'s> Prediction<'s> {
         let search = NeighbourSearch::new_unless(by.interrupt, set.position.each_ref().map(Vec::as_slice));
         let neighbours = search.nearest_unless(by.interrupt, position.each_ref().map(Vec::as_slice), count);
         if by.interrupt.is_requested() {
+            by.interrupt.leave((search, neighbours));
             return None;
         }
         let features = vec![0; neighbours.len()];
@@ -134,14 +135,16 @@ impl<'s> Prediction<'s> {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        for stage in Stage::ALL {
+        let done = Stage::ALL.into_iter().try_for_each(|stage| {
             self.interrupt.check()?;
             self.predict(stage, attributes);
             self.interrupt.check()?;
             attributes.add_stage(stage, values, coding, at)?;
             self.learn(stage, attributes);
-        }
-        Ok(())
+            Ok(())
+        });
+        self.interrupt.leave((self.neighbours, self.features, self.rows));
+        done
     }
 
     /// Overwrites one attribute of the predicted Gaussians with its prediction.

@@ -81,7 +81,7 @@ impl Decoder {
             self.ready.push_back(Ready { frame, point: self.frame_point, found: Some(self.report.found()) });
         }
         if let Some(next) = next {
-            self.frame = Some(next);
+            self.interrupt.leave(self.frame.replace(next));
         }
         next_errors.into_iter().for_each(|error| self.add(error));
     }
@@ -96,8 +96,11 @@ impl Decoder {
 
     /// The next frame that has ended.
     pub fn next_ready(&mut self) -> Option<DecodedFrame> {
-        let Ready { frame, point, found } =
-            self.ready.pop_front().filter(|_| !self.interrupt.is_requested())?;
+        if self.interrupt.is_requested() {
+            // They are freed with the decoder.
+            return None;
+        }
+        let Ready { frame, point, found } = self.ready.pop_front()?;
         self.frame_point = point;
         self.report.tell(found);
         Some(frame)

@@ -40,7 +40,7 @@ impl Decoder {
 
     /// Lets another thread end decoding: once it has been requested, no frame is given any more.
     pub fn set_interrupt(&mut self, interrupt: Interrupt) {
-        self.interrupt = interrupt;
+        self.interrupt = interrupt.of_decoder();
     }
 
     /// Changes the operating point where it may change.

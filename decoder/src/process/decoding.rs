@@ -312,6 +312,7 @@ impl FrameInProgress {
                 let taken = known(prepared).and_then(|prepared| self.unit(prepared, values?, context));
                 taken.unwrap_or_else(|error| self.refuse(unit, error, errors));
             }
+            context.interrupt.leave(values);
         }
     }
 
