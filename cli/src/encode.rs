@@ -423,7 +423,7 @@ impl Encode {
             Some(_) => None,
             None => Some(self.psnr.unwrap_or_else(|| Quality::from(self.quality).decibels())),
         };
-        // Frames that others are predicted from stay near the source.
+        // With predicted frames values are fitted where that is asked for, not by a preset.
         let fitted = usual.finetune.as_ref().filter(|_| !is_predicted);
         let iterations = fitted.map_or(0, |finetune| finetune.iterations);
         let taken = Taken {

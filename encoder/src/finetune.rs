@@ -35,7 +35,7 @@ use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, Image};
 pub use watch::{FinetuneProgress, FinetuneWatch};
 
-/// How values of I frames are fitted to pictures.
+/// How values of I frames are fitted to pictures. Frames that are predicted from them follow the fitted values.
 ///
 /// The same settings give the same bytes on every machine, unless there is a time budget.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +55,7 @@ pub struct Finetune {
     /// twice counts twice. Quality is reported at the lines of the layer in any case.
     pub resolutions: Vec<u32>,
     /// The operating points that matter, of which receivers see pictures; values that none of these points shows stay the nearest.
-    /// None: all Gaussians of each spatial layer.
+    /// None: all Gaussians of each spatial layer, or of the highest one where frames are predicted.
     pub optimise_for: Vec<PointWeight>,
     /// Attributes that keep the nearest values, to see what fitting the others is worth.
     pub held: Vec<Attribute>,
@@ -172,6 +172,8 @@ pub(crate) struct Fitted {
     pub(crate) lowest: Option<GaussianFrame>,
     /// Of the highest layer.
     pub(crate) highest: GaussianFrame,
+    /// Whether the values of the highest layer are others than those of the source.
+    pub(crate) is_changed: bool,
     /// What has been done, from the lowest layer up.
     pub(crate) reports: Vec<FinetuneReport>,
 }
@@ -196,6 +198,7 @@ struct Layer {
     /// In the order of the lists.
     frame: GaussianFrame,
     lists: Vec<GaussianList>,
+    is_changed: bool,
     /// None where no operating point shows it.
     report: Option<FinetuneReport>,
 }
@@ -215,12 +218,14 @@ impl Fit<'_> {
         let first = self.layer(&source, 0, None)?;
         let Some(highest) = self.layers.checked_sub(1).filter(|&highest| highest > 0) else {
             let reports = first.report.into_iter().collect();
-            return Ok(Fitted { lowest: None, highest: first.frame.select(&back), reports });
+            let is_changed = first.is_changed;
+            return Ok(Fitted { lowest: None, highest: first.frame.select(&back), is_changed, reports });
         };
         let second = self.layer(&source, highest, Some(first.lists))?;
         Ok(Fitted {
             lowest: Some(first.frame.select(&back)),
             highest: second.frame.select(&back),
+            is_changed: second.is_changed,
             reports: first.report.into_iter().chain(second.report).collect(),
         })
     }
@@ -246,7 +251,8 @@ impl Fit<'_> {
             latent = fitted;
             report = Some(done);
         }
-        Ok(Layer { frame: latent.frame()?, lists: latent.lists()?, report })
+        let is_changed = latent.offsets.planes().iter().flatten().any(|&offset| offset != 0.0);
+        Ok(Layer { frame: latent.frame()?, lists: latent.lists()?, is_changed, report })
     }
 
     /// The lists of a layer.

@@ -7,6 +7,7 @@
 mod axis_matching;
 pub(crate) mod cells;
 pub(crate) mod compensation;
+pub(crate) mod deviation;
 pub(crate) mod intra;
 pub(crate) mod ladder;
 pub(crate) mod learning;
@@ -28,15 +29,19 @@ pub(crate) use axis_matching::{Namings, Pose};
 pub(crate) use update_decision::pixel;
 pub(crate) use visible_difference::{Seen, Shown};
 
-use crate::matching::Cloud;
+use crate::error::Error;
+use crate::matching::{Cloud, Matching};
 use crate::savings::Saving;
+use deviation::Deviation;
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::CellsBytes;
-use splatstream_format::syntax::IncrementHeader;
+use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
 use splatstream_gaussians::GaussianFrame;
+use unit::UnitCoder;
 
 /// A frame to be coded.
+#[derive(Clone)]
 pub(crate) struct Target {
     /// Canonical, without what is never seen.
     pub(crate) frame: GaussianFrame,
@@ -79,6 +84,34 @@ pub(crate) struct Reference {
     rows: Vec<Vec<u32>>,
     /// Rows of the file.
     row_count: u32,
+    /// What its Gaussians differ by from their source because values were fitted; none: nothing but what rounding makes of them.
+    deviation: Option<Deviation>,
+}
+
+impl Reference {
+    /// Has what is predicted from an I frame follow its fitted values, and not those of its source.
+    ///
+    /// # Errors
+    /// Lists whose planes make no frame.
+    pub(crate) fn differs_from(
+        &mut self,
+        target: &Target,
+        sequence: &SequenceParameters,
+    ) -> Result<(), Error> {
+        self.deviation = Some(Deviation::of_intra((&self.lists, &self.rows), target, sequence)?);
+        Ok(())
+    }
+
+    /// What a frame shall become that is predicted from this one; none: what its source has.
+    pub(crate) fn fitted(
+        &self,
+        target: &Target,
+        matching: &Matching,
+        coder: &UnitCoder<'_>,
+    ) -> Option<Target> {
+        let deviation = self.deviation.as_ref()?;
+        Some(deviation.added_to(target, (self, matching), coder))
+    }
 }
 
 /// A unit ready to be written.

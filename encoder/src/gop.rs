@@ -323,8 +323,7 @@ impl<'a> SpanCoder<'a> {
         let known = gop.tools.take_components();
         let coder = self.coder(gop, None);
         let is_predicted = gop.header.is_predicted();
-        // What other frames refer to stays near the source, as they do.
-        let is_fitted = !is_predicted && self.recorder.is_none() && !target.frame.is_empty();
+        let is_fitted = self.recorder.is_none() && !target.frame.is_empty();
         let finetune = self.common.settings.finetune.as_ref().filter(|_| is_fitted);
         let compensator = self.compensator(&target, finetune.is_some());
         let fit = |finetune| Fit {
@@ -348,7 +347,7 @@ impl<'a> SpanCoder<'a> {
         if !is_predicted {
             target.forget();
         }
-        let coded = code_intra(
+        let mut coded = code_intra(
             &coder,
             IntraTarget {
                 chooser: Chooser { predictors, ..self.chooser() },
@@ -365,6 +364,9 @@ impl<'a> SpanCoder<'a> {
         )?;
         if self.report.coded.is_empty() {
             self.report.savings.extend(coded.savings.iter().chain(&worth_of_reuse(&coded)));
+        }
+        if is_predicted && fitted.as_ref().is_some_and(|fitted| fitted.is_changed) {
+            coded.reference.differs_from(&target, &self.common.sequence)?;
         }
         let reports = fitted.into_iter().flat_map(|fitted| fitted.reports);
         self.report.finetuned.extend(reports.map(|report| FinetuneReport { frame: number, ..report }));
@@ -398,6 +400,9 @@ impl<'a> SpanCoder<'a> {
         let measure = self.measure();
         let Some(matching) = self.matching(reference, target, &measure) else { return Ok(Verdict::Unlike) };
         let mut goal = self.goal(gop, &matching, target);
+        let source = target;
+        let fitted = reference.fitted(target, &matching, &self.coder(gop, None));
+        let target = fitted.as_ref().unwrap_or(source);
         let mut survivors = self.survivors(gop, target);
         let book = self.residual_book(gop, &survivors, reference, &matching, role.temporal_layer);
         survivors.book = book.as_ref();
@@ -438,7 +443,7 @@ impl<'a> SpanCoder<'a> {
             }
             None => {
                 if let Some(steadiness) = &mut gop.steadiness {
-                    steadiness.follow(target, &coded, &self.common.sequence)?;
+                    steadiness.follow(source, &coded, &self.common.sequence)?;
                 }
             }
         }

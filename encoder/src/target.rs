@@ -201,7 +201,7 @@ impl<'a> Fitting<'a> {
 
     /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
     fn gain(&self) -> f64 {
-        let is_fitted = self.fits_values && self.settings.temporal_layers() == 0 && !self.leaves_source();
+        let is_fitted = self.fits_values && !self.leaves_source();
         self.settings.finetune.as_ref().filter(|_| is_fitted).map_or(0.0, |finetune| {
             let [most, iterations] = GAIN;
             let gain = most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations));

@@ -253,17 +253,58 @@ fn streams_and_frames_of_any_degree_are_fitted() {
     assert_eq!(report.finetuned.len(), 3);
 }
 
+/// Some frames in which things move, and settings that predict all but the first.
+fn moving(count: u32) -> Vec<GaussianFrame> {
+    let scene = BuiltinScene { gaussians: 1_500, frames: count, sh_degree: 1, ..BuiltinScene::default() };
+    (0..count).map(|number| scene.frame(number)).collect()
+}
+
+fn predicted(settings: Settings) -> Settings {
+    Settings { structure: Structure::Predicted { layers: 1 }, spatial_layers: 1, ..settings }
+}
+
+/// PSNR of each frame that is decoded, in five views of 108 lines that nothing was fitted to.
+fn psnr_of_frames(bytes: &[u8], source: &[GaussianFrame]) -> Vec<f64> {
+    let cameras = ring(&source[0], Up::default(), 5, 108);
+    let frames = decoded(bytes, &strict()).0.into_iter().zip(source);
+    let psnr = |(frame, source): (splatstream_decoder::process::DecodedFrame, &GaussianFrame)| {
+        let frame = to_gaussians(frame.into_shown(), &sequence(bytes)).unwrap();
+        ReferencePictures::new(source, cameras.clone()).psnr(&frame).sum::<f64>() / 5.0
+    };
+    frames.map(psnr).collect()
+}
+
 #[test]
-fn frames_that_others_refer_to_stay_near_the_source() {
-    let scene = BuiltinScene { gaussians: 300, frames: 3, sh_degree: 0, ..BuiltinScene::default() };
-    let frames = || (0..3).map(|number| scene.frame(number)).collect::<Vec<_>>();
-    let predicted =
-        |settings: Settings| Settings { structure: Structure::Predicted { layers: 1 }, ..settings };
-    let (bytes, report) = encoded(frames(), &predicted(settings(2)));
-    assert!(report.finetuned.is_empty());
-    assert_eq!(bytes, encoded(frames(), &predicted(plain())).0);
-    let (_, intra) = encoded(frames(), &settings(2));
-    assert_eq!(intra.finetuned.iter().map(|report| report.frame).collect::<Vec<_>>(), [0, 1, 2]);
+fn predicted_frames_follow_the_values_that_an_i_frame_was_fitted_to() {
+    let (before, plain) = encoded(moving(4), &predicted(plain()));
+    let (after, tuned) = encoded(moving(4), &predicted(settings(40)));
+    assert_eq!(tuned.finetuned.iter().map(|report| report.frame).collect::<Vec<_>>(), [0]);
+    let kinds = |report: &Report| report.coded.iter().map(|frame| frame.frame_type).collect::<Vec<_>>();
+    assert_eq!(kinds(&plain), kinds(&tuned));
+    assert!(after.len() as f64 <= 1.03 * before.len() as f64, "{} {}", before.len(), after.len());
+    let [without, with] = [&before, &after].map(|bytes| psnr_of_frames(bytes, &moving(4)));
+    assert!(with.iter().zip(&without).all(|(with, without)| with > without), "{without:?} {with:?}");
+    let (_, intra) = encoded(moving(2), &settings(2));
+    assert_eq!(intra.finetuned.iter().map(|report| report.frame).collect::<Vec<_>>(), [0, 1]);
+}
+
+#[test]
+fn what_stands_still_takes_no_bits_after_fitting() {
+    let still = || vec![builtin(1_500, 1); 3];
+    let sizes = |report: &Report| report.coded.iter().map(|frame| frame.bytes).collect::<Vec<_>>();
+    // With prefixes that are compensated in any case.
+    let balanced = |settings| predicted(Settings { preset: Preset::Balanced, ..settings });
+    let [plain, tuned] = [plain(), settings(20)].map(|settings| encoded(still(), &balanced(settings)).1);
+    assert_eq!(sizes(&plain)[1..], sizes(&tuned)[1..], "{:?} {:?}", sizes(&plain), sizes(&tuned));
+}
+
+#[test]
+fn predicted_frames_are_the_same_for_any_number_of_threads_after_fitting() {
+    let of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| encoded(moving(3), &predicted(settings(4))).0)
+    };
+    assert_eq!(of(1), of(3));
 }
 
 #[test]

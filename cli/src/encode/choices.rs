@@ -364,17 +364,23 @@ fn fitting(report: &Report, settings: &Settings) -> Option<Choice> {
         (Some(_), _) if report.target.is_some_and(|target| target.without_finetune) => {
             ("none".to_owned(), "pictures gain next to nothing by it: without, the stream is smaller")
         }
-        (Some(finetune), _) => {
+        (Some(finetune), structure) => {
             let loss = match finetune.loss {
                 FinetuneLoss::SquaredError => "squared error",
                 FinetuneLoss::L1Ssim { .. } => "L1 and SSIM",
             };
             let choice = format!("{}, {loss}", counted(finetune.iterations.into(), "iteration"));
-            (choice, "values of frames that stand for themselves are chosen by pictures")
+            let why = match structure {
+                Structure::Intra => "values of frames are chosen by pictures",
+                Structure::Predicted { .. } => {
+                    "values of I frames are chosen by pictures, and frames that are predicted from them follow"
+                }
+            };
+            (choice, why)
         }
         (None, Structure::Predicted { .. }) if belongs => (
             "none".to_owned(),
-            "frames of GOPs with predicted frames stay near the source; --all-intra has them fitted",
+            "--finetune has I frames fitted, and frames that are predicted from them follow",
         ),
         (None, _) if belongs => ("none".to_owned(), "--finetune 0"),
         (None, _) => return None,

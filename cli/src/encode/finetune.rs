@@ -25,8 +25,8 @@ const ITERATIONS: &str = "200";
 #[derive(Args, Debug)]
 pub(super) struct FinetuneArgs {
     /// Choose the values of frames by pictures of what is decoded, in so many iterations at most, 200 if none are given:
-    /// fewer bits for the same PSNR, and minutes for each frame. The small preset takes 20; 0 takes none. Frames of
-    /// sequences are fitted where each stands for itself, as with --all-intra.
+    /// fewer bits for the same PSNR, and minutes for each frame. The small preset takes 20; 0 takes none. Of
+    /// sequences with predicted frames I frames are fitted, only if this is given, and the others follow their values.
     #[arg(long, value_name = "ITERATIONS", num_args = 0..=1, default_missing_value = ITERATIONS)]
     finetune: Option<u32>,
     /// Seconds that encoding may take: the preset and the iterations are chosen for them, by counts and a model of costs
@@ -45,7 +45,7 @@ pub(super) struct FinetuneArgs {
     finetune_only: Vec<AttributeName>,
     /// Operating points that matter, and what a decibel at each is worth, as in s0,t0,r1=1,s2,t0,r4=3; a point without a weight
     /// has weight 1. Frames are fitted to what receivers at these points see, and not at others. Default is all Gaussians of
-    /// each spatial layer.
+    /// each spatial layer, or of the highest one where frames are predicted.
     #[arg(long, value_name = "POINT=WEIGHT,...", requires = "finetune")]
     optimise_for: Option<PointWeights>,
     /// Lines of the pictures to fit to, in turn, as in 540,720,1080; what is named twice counts twice. Default is those that each

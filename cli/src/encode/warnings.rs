@@ -68,7 +68,6 @@ pub(crate) fn warnings(
     }
     warnings.extend(pulses(report));
     warnings.extend(short_gops(report, settings));
-    warnings.extend(not_fitted(report, settings));
     warnings.extend(short_time(report, settings));
     warnings
 }
@@ -216,25 +215,6 @@ fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
         return None;
     };
     Some(Warning::new("short-gops", message))
-}
-
-/// Frames that fitting to pictures has left as they are.
-fn not_fitted(report: &Report, settings: &Settings) -> Option<Warning> {
-    let coded = report.coded.iter().filter(|frame| frame.gaussians > 0).count();
-    // Of frames with layers each layer is listed, one after the other.
-    let frames: Vec<u32> = report.finetuned.iter().map(|fitted| fitted.frame).collect();
-    let fitted = frames.chunk_by(|frame, next| frame == next).count();
-    let left = coded.saturating_sub(fitted);
-    let is_given_up = report.target.is_some_and(|target| target.without_finetune);
-    (settings.finetune.is_some() && left > 0 && !is_given_up).then(|| {
-        let are = if left == 1 { "is" } else { "are" };
-        let message = format!(
-            "{left} of {} {are} not fine-tuned: those of a GOP of which others are predicted stay near the source; --all-intra \
-             has every frame fine-tuned",
-            counted(report.frames.into(), "frame")
-        );
-        Warning::new("not-fine-tuned", message)
-    })
 }
 
 /// A time in which fitting to pictures came to nothing: too short for an iteration, or for one that gains anything.

@@ -75,7 +75,8 @@ impl Receiver {
 }
 
 impl Finetune {
-    /// The operating points that count: those that are given, or all lists of each layer.
+    /// The operating points that count: those that are given, or all lists of each layer, of the highest alone where frames are
+    /// predicted.
     fn points(&self, layers: u8, settings: &Settings) -> Vec<PointWeight> {
         if !self.optimise_for.is_empty() {
             return self.optimise_for.clone();
@@ -83,7 +84,9 @@ impl Finetune {
         let refinement = top_refinement(settings);
         let of_layer =
             |spatial| PointWeight { point: OperatingPoint { spatial, temporal: 0, refinement }, weight: 1.0 };
-        (0..layers).map(of_layer).collect()
+        // Frames that are predicted follow what the highest layer has, and lower ones cost it bits.
+        let lowest = if settings.temporal_layers() > 0 { layers.saturating_sub(1) } else { 0 };
+        (lowest..layers).map(of_layer).collect()
     }
 
     /// The share of the weights of points that show all Gaussians: at the others finer steps do not bring what they should.

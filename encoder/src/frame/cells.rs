@@ -1,5 +1,6 @@
 //! Cells of predicted frames: from the motion of Gaussians to the section of a frame header.
 
+use super::deviation::Deviation;
 use super::new_list::deltas;
 use super::predicted::PredictedTarget;
 use super::{Reference, Target};
@@ -66,6 +67,20 @@ impl ReferenceCloud {
             row_count: reference.row_count,
             from: lists.iter().flat_map(from).collect(),
         }
+    }
+
+    /// The same with the values of its source, as far as it differs from that because values were fitted to pictures.
+    pub(crate) fn of_source(reference: &Reference, sequence: &SequenceParameters) -> Self {
+        let mut cloud = Self::new(reference, sequence);
+        if let Some(Deviation { position, values }) = &reference.deviation {
+            let own = cloud.position.iter_mut().chain(&mut cloud.log_scale).chain(&mut cloud.dc);
+            let own = own.chain([&mut cloud.opacity]);
+            let off = position.iter().chain(values.log_scale()).chain(values.dc()).map(Vec::as_slice);
+            for (own, off) in own.zip(off.chain([values.opacity_logit()])) {
+                own.iter_mut().zip(off).for_each(|(value, off)| *value -= off);
+            }
+        }
+        cloud
     }
 
     fn cloud<'a>(&'a self, position: &'a [Vec<f32>; 3]) -> Cloud<'a> {

@@ -92,6 +92,7 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: IntraTarget<'_>) -> Resu
         lists,
         span_log2: 0,
         models: models.first,
+        deviation: None,
     };
     Ok(CodedFrame { cells: None, carried_digest: None, units, reference, savings })
 }

@@ -131,11 +131,13 @@ impl<'a> Predicted<'a> {
         let added = (0..).zip(of_list).map(|(list, added)| (added, self.grain(list))).collect();
         let new = NewList::all(&self.from.coder, &wanted, added, done.models.before(0));
         let mut space = self.space();
-        let mut rows = Vec::new();
+        let (mut rows, mut parents) = (Vec::new(), Vec::new());
         for (list, new) in new.into_iter().enumerate() {
             let new_rows = new.added.iter().map(|&index| self.row(indices[index as usize]));
             let continued = self.continued(list).map(|(_, partner)| partner.map_or(NO_ROW, |i| self.row(i)));
             rows.push(continued.chain(new_rows).collect());
+            parents.extend(self.continued(list).map(|(from, _)| Some(from as u32)));
+            parents.extend(new.added.iter().map(|_| None));
             self.unit(list, &wanted, new, &mut space, &mut done)?;
         }
         let carry = |list: &GaussianList| list.clone().carried(&self.field, true);
@@ -145,7 +147,9 @@ impl<'a> Predicted<'a> {
         let Done { models, units, lists, .. } = done;
         let row_count = self.from.target.row_count;
         let span_log2 = self.from.span_log2;
-        let reference = Reference { lists, span_log2, carried, models: models.first, rows, row_count };
+        let deviation = self.from.reference.deviation.as_ref().map(|deviation| deviation.followed(&parents));
+        let models = models.first;
+        let reference = Reference { lists, span_log2, carried, models, rows, row_count, deviation };
         Ok(CodedFrame { cells: self.cells, carried_digest, units, reference, savings: Vec::new() })
     }
 

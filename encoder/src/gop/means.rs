@@ -37,7 +37,7 @@ impl SpanCoder<'_> {
         target: &Target,
         measure: &Measure,
     ) -> Option<Matching> {
-        let cloud = ReferenceCloud::new(reference, &self.common.sequence);
+        let cloud = ReferenceCloud::of_source(reference, &self.common.sequence);
         let mut matching = cloud.matching(target, measure, self.common.sequence.position_bits);
         // Who goes by pictures has a use for partners that differ a lot.
         let useful = self.by_pictures() && shares_much(&matching);
