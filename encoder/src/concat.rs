@@ -100,6 +100,7 @@ pub enum ConcatError {
 
 /// What was joined.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Concatenated {
     /// Bytes of the stream.
     pub bytes: u64,

@@ -137,6 +137,7 @@ pub struct Photograph {
 
 /// What fitting an I frame has done.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct FinetuneReport {
     /// Display index of the frame.
     pub frame: u32,
@@ -157,6 +158,7 @@ pub struct FinetuneReport {
 
 /// What fitting has done at an operating point.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct PointReport {
     /// The operating point.
     pub point: OperatingPoint,

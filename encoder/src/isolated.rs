@@ -6,6 +6,7 @@ use std::cmp::Ordering;
 
 /// Values of one attribute that were too far out and are coded as the nearest that are not.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Isolated {
     /// The attribute.
     pub attribute: &'static str,

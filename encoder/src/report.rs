@@ -13,6 +13,7 @@ use splatstream_gaussians::Defect;
 
 /// What was written, what was chosen, and why.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Bytes of the stream.
     pub bytes: u64,
@@ -129,6 +130,7 @@ fn worth_of_axes(are_sorted: bool, [sorted, unsorted]: [f64; 2]) -> Saving {
 
 /// A GOP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct GopReport {
     /// Display index of its first frame.
     pub first: u32,
@@ -138,6 +140,7 @@ pub struct GopReport {
 
 /// Pictures of the finished stream beside those of the source, in views that decide nothing.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct PictureReport {
     /// The frames that were looked at.
     pub frames: Vec<VerifiedFrame>,
@@ -149,6 +152,7 @@ pub struct PictureReport {
 
 /// A frame that was looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct VerifiedFrame {
     /// Display index.
     pub number: u32,
@@ -191,6 +195,7 @@ impl PictureReport {
 
 /// How a size or a quality that was asked for was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct TargetReport {
     /// The PSNR that the steps were fitted for at last, decibels.
     pub fitted: f32,
@@ -206,6 +211,7 @@ pub struct TargetReport {
 
 /// Gaussians of a frame that were left out because of values that no frame may hold.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Dropped {
     /// The frame.
     pub frame: u32,
@@ -219,6 +225,7 @@ pub struct Dropped {
 
 /// Gaussians of a frame that were left out because pictures hardly miss them.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Pruned {
     /// The frame.
     pub frame: u32,
@@ -233,6 +240,7 @@ pub struct Pruned {
 
 /// What a frame is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// How it is coded.
     pub frame_type: FrameType,

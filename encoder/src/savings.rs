@@ -35,6 +35,7 @@ pub enum Basis {
 
 /// What a choice saves.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Saving {
     /// What was chosen.
     pub tool: Tool,

@@ -82,6 +82,7 @@ impl Default for Schedule<'_> {
 
 /// What has been learnt after an epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Epochs that are done.
     pub epoch: usize,
@@ -95,6 +96,7 @@ pub struct Progress {
 
 /// What training has done to the validation.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct TrainingReport {
     /// With outputs 0, that is of the base.
     pub base: Loss,

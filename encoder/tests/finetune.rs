@@ -132,13 +132,14 @@ fn l1_and_ssim_give_the_same_bytes_for_any_number_of_threads() {
 fn each_iteration_is_told_and_nothing_depends_on_who_listens() {
     let told = Arc::new(Mutex::new(Vec::new()));
     let list = Arc::clone(&told);
-    let watch = FinetuneWatch::new(move |progress: FinetuneProgress| list.lock().unwrap().push(progress));
+    let watch = FinetuneWatch::new(move |progress: FinetuneProgress| {
+        list.lock().unwrap().push((progress.spatial_layer, progress.done, progress.iterations));
+    });
     let finetune = Some(Finetune { watch, lines: vec![60, 108], ..quick(3) });
     let layered = |finetune| Settings { finetune, spatial_layers: 2, ..plain() };
     let (bytes, _) = encoded(scene(), &layered(finetune));
     assert_eq!(bytes, encoded(scene(), &layered(Some(Finetune { lines: vec![60, 108], ..quick(3) }))).0);
-    let of_layer =
-        |spatial_layer| (1..=3).map(move |done| FinetuneProgress { spatial_layer, done, iterations: 3 });
+    let of_layer = |spatial_layer| (1..=3).map(move |done| (spatial_layer, done, 3));
     assert_eq!(*told.lock().unwrap(), [0, 1].into_iter().flat_map(of_layer).collect::<Vec<_>>());
 }
 

@@ -243,7 +243,7 @@ impl Taken<'_> {
 /// Says beside a bar how far fitting a frame has come.
 pub(super) fn told_of_fitting(progress: &Progress) -> FinetuneWatch {
     let tell = progress.teller();
-    FinetuneWatch::new(move |FinetuneProgress { spatial_layer, done, iterations }| {
+    FinetuneWatch::new(move |FinetuneProgress { spatial_layer, done, iterations, .. }| {
         let of_layer = match spatial_layer {
             0 => String::new(),
             layer => format!(" of spatial layer {layer}"),
@@ -283,7 +283,7 @@ struct FittedPoint {
 
 impl From<&PointReport> for FittedPoint {
     fn from(report: &PointReport) -> Self {
-        let PointReport { point, weight, psnr: [psnr_db_before, psnr_db_after] } = *report;
+        let PointReport { point, weight, psnr: [psnr_db_before, psnr_db_after], .. } = *report;
         Self { point: point.to_string(), weight, psnr_db_before, psnr_db_after }
     }
 }

@@ -247,7 +247,7 @@ fn dropped(report: &Report, first: &Dropped, file_of: &dyn Fn(u32) -> String) ->
 }
 
 fn isolated_values(isolated: &Isolated, file_of: &dyn Fn(u32) -> String) -> Warning {
-    let Isolated { attribute, count, frame, row, value, farthest: (far_frame, far_row, far) } = *isolated;
+    let Isolated { attribute, count, frame, row, value, farthest: (far_frame, far_row, far), .. } = *isolated;
     let farthest = match (far_frame, far_row) == (frame, row) {
         true => String::new(),
         false => format!("; the farthest is Gaussian {far_row} of {} with {far}", file_of(far_frame)),

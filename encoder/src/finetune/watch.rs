@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 /// How far fitting a layer of a frame has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct FinetuneProgress {
     /// The spatial layer.
     pub spatial_layer: u8,
