@@ -97,7 +97,7 @@ impl Deviation {
         let rows = reference.lists.iter().zip(0_u8..);
         let rows = rows.flat_map(|(list, number)| (0..list.len()).map(move |row| (list, number, row)));
         let values = &self.values;
-        let PlanesMut { log_scale, mut rotation, opacity_logit, dc, sh, .. } = sum.frame.planes_mut();
+        let PlanesMut { mut log_scale, mut rotation, opacity_logit, dc, sh, .. } = sum.frame.planes_mut();
         let mut colours: Vec<&mut [f32]> = dc.into_iter().chain(sh).collect();
         let own_colours: Vec<&[f32]> = values.dc().iter().chain(values.sh()).map(Vec::as_slice).collect();
         for ((list, number, row), (from, partner)) in rows.zip(matching.target_of.iter().enumerate()) {
@@ -108,10 +108,10 @@ impl Deviation {
                 rotation: rotation.each_ref().map(|plane| plane[index]),
             };
             let pose = namings.nearest(pose, of_source, sizes((list, row), number, coder));
-            for axis in 0..3 {
-                log_scale[axis][index] = pose.log_scale[axis] + values.log_scale()[axis][from];
-                sum.position[axis][index] += self.position[axis][from];
-            }
+            let scales = log_scale.iter_mut().zip(pose.log_scale).zip(values.log_scale());
+            scales.for_each(|((plane, value), own)| plane[index] = value + own[from]);
+            let places = sum.position.iter_mut().zip(&self.position);
+            places.for_each(|(plane, own)| plane[index] += own[from]);
             let turned = [0, 1, 2, 3].map(|part: usize| pose.rotation[part] + values.rotation()[part][from]);
             rotation.iter_mut().zip(unit(turned)).for_each(|(plane, part)| plane[index] = part);
             opacity_logit[index] += values.opacity_logit()[from];
