@@ -1,6 +1,7 @@
 //! Clause 7.6.5: colour components to colour, by an integer transform.
 
 use crate::attribute::in_range;
+pub use crate::components::COMPONENT_RANGE;
 use crate::components::{Components, Pair, TILE};
 use crate::cores;
 use crate::interrupt::Interrupt;
@@ -12,9 +13,6 @@ use splatstream_format::entropy::machine::{Machine, WIDE};
 use splatstream_format::entropy::reader::{signed, vector};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::{Error, ErrorKind, Result};
-
-/// The values of a component.
-pub const COMPONENT_RANGE: RangeInclusive<i32> = -8191..=8191;
 
 /// The values of colour in output steps.
 pub(crate) const COLOUR_RANGE: RangeInclusive<i32> = -(1 << 30)..=1 << 30;

@@ -4,11 +4,14 @@
 //! pairs with the plane after it, since machines multiply two pairs of 16 bits and add the products in one instruction.
 
 use crate::attribute::in_range;
-use crate::colour::COMPONENT_RANGE;
 use crate::steps::Exponents;
 use crate::vector::{Task, vectorized};
+use core::ops::RangeInclusive;
 use splatstream_format::entropy::machine::Machine;
 use splatstream_format::{Error, Result};
+
+/// The values of a component.
+pub const COMPONENT_RANGE: RangeInclusive<i32> = -8191..=8191;
 
 /// Gaussians that are transformed at a time: their sums stay in registers.
 pub(crate) const TILE: usize = 32;

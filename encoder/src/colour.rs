@@ -7,7 +7,7 @@
 use crate::entropy_cost::entropy_of;
 use crate::grid::nearest_integer;
 use crate::pca::Components;
-use crate::savings::{Saving, Tool};
+use crate::savings::{BIT, Saving, Tool};
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
 use pulp::{Arch, Simd, WithSimd};
@@ -110,10 +110,6 @@ pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<f32>>,
     transform.basis.truncate(used * usize::from(transform.header.dimension));
     transform.header.rank = used as u8;
 }
-
-/// What a bit is worth, squared steps: halving the step of a uniform quantiser takes a bit more and divides its error of a
-/// twelfth of a square by four.
-pub(crate) const BIT: f64 = 2.0 * core::f64::consts::LN_2 / 12.0;
 
 /// How SH of a GOP is coded, and the figures that the choice rests on.
 #[derive(Debug, Clone)]

@@ -1,6 +1,8 @@
 //! What a choice saves against the other one, as far as that can be told without encoding everything again.
 
-use crate::colour::BIT;
+/// What a bit is worth, squared steps: halving the step of a uniform quantiser takes a bit more and divides its error of a
+/// twelfth of a square by four.
+pub(crate) const BIT: f64 = 2.0 * core::f64::consts::LN_2 / 12.0;
 
 /// A tool, or a choice, whose worth is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

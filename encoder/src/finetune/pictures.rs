@@ -2,7 +2,7 @@
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of pictures")]
 
 use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
-use super::receivers::Receiver;
+use super::receivers::{LINES, Receiver};
 use super::{Finetune, Photograph};
 use crate::error::Error;
 use crate::settings::Settings;
@@ -10,9 +10,6 @@ use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Scattered, held_out};
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
 use splatstream_render::{Camera, Image, PreparedFrame, render};
-
-/// Lines of a picture: those at which quality is meant. Fuzzing wants streams, not pictures.
-pub(super) const LINES: u32 = if cfg!(fuzzing) { 12 } else { 540 };
 
 /// Views by which it is judged what is kept, of none of which a slope is taken.
 const JUDGES: usize = 6;

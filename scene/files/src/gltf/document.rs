@@ -142,6 +142,13 @@ pub(super) struct Buffer {
     pub(super) byte_length: u64,
 }
 
+impl Primitive {
+    /// Whether it holds Gaussians.
+    pub(super) fn is_gaussians(&self) -> bool {
+        self.extensions.gaussians.is_some() || self.extensions.spz_draft.is_some()
+    }
+}
+
 impl Document {
     pub(super) fn parse(json: &[u8], budget: &mut Budget) -> Result<Self, SceneError> {
         budget.take((json.len() as u64).saturating_mul(PARSED), "the JSON of the file")?;

@@ -24,11 +24,6 @@ pub(super) const SPZ: [&str; 3] = [
 /// Colours in linear light; all others are shown as they are.
 const LINEAR: &str = "lin_rec709_display";
 
-/// Whether a primitive holds Gaussians.
-pub(super) fn is_gaussians(primitive: &Primitive) -> bool {
-    primitive.extensions.gaussians.is_some() || primitive.extensions.spz_draft.is_some()
-}
-
 /// The Gaussians of a primitive, in the axes of frames, not yet placed.
 pub(super) fn read(
     document: &Document,

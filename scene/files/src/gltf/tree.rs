@@ -3,7 +3,6 @@
 use super::document::{Document, Node, Primitive, broken};
 use super::note_others;
 use super::placement::Placement;
-use super::primitive::is_gaussians;
 use crate::error::SceneError;
 use crate::limits::Budget;
 use glam::{DMat4, DQuat, DVec3};
@@ -82,7 +81,7 @@ fn take_mesh<'a>(
     budget.take((found.primitives.len() as u64).saturating_mul(bytes), WHAT)?;
     let mut others = 0_u64;
     for (at, primitive) in found.primitives.iter().enumerate() {
-        if !is_gaussians(primitive) {
+        if !primitive.is_gaussians() {
             others = others.saturating_add(1);
             continue;
         }
