@@ -4,6 +4,7 @@ use super::material::step;
 use super::objects::{Hit, Objects};
 use glam::DVec3;
 use splatstream_files::builtin::noise::rough;
+use splatstream_files::srgb;
 
 /// Towards the sun, not of length 1: above, left and in front.
 const SUN: DVec3 = DVec3::new(-0.55, -0.75, -0.36);
@@ -105,10 +106,5 @@ pub(super) fn to_picture(radiance: DVec3) -> [f32; 3] {
 
 /// The same as levels.
 pub(super) fn levels(radiance: DVec3) -> [u8; 3] {
-    radiance.to_array().map(|linear| {
-        let linear = linear.clamp(0.0, 1.0);
-        let shown =
-            if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 };
-        (255.0 * shown + 0.5) as u8
-    })
+    radiance.to_array().map(|linear| (255.0 * srgb::encode(linear.clamp(0.0, 1.0)) + 0.5) as u8)
 }

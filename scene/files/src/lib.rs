@@ -3,6 +3,7 @@
 //! * [`read_scene`] reads any supported file or directory; [`ply`], [`compressed_ply`], [`splat`], [`spz`], [`sog`],
 //!   [`gltf`] and [`ksplat`] read one format each, and all but the last write; [`Clamped`] is what a format cannot keep of a
 //!   frame, [`Note`] what a frame cannot hold of a file.
+//! * [`srgb`] gives colours in linear light those of frames, which are encoded as sRGB.
 //! * [`Sequence`] reads files of many frames, one at a time: archives, `.splatv` and `.splat4d`.
 //! * [`builtin`] makes scenes from a seed, so that everything can be tried and tested without any input file.
 //!
@@ -34,6 +35,7 @@ pub mod ply;
 pub mod sog;
 pub mod splat;
 pub mod spz;
+pub mod srgb;
 
 mod axes;
 mod byte_values;
@@ -50,6 +52,8 @@ mod reading;
 mod scene;
 mod sequence;
 mod smallest_three;
+#[expect(clippy::arithmetic_side_effects, reason = "vectors of floats, which do not overflow")]
+mod sphere;
 
 pub use clamped::Clamped;
 pub use error::{SceneError, SceneErrorKind};

@@ -35,7 +35,7 @@ pub enum Note {
         /// Of how many Gaussians.
         count: u64,
     },
-    /// Colours are in linear light, and were taken as they are.
+    /// Colours are in linear light, and were encoded as sRGB.
     LinearColours,
 }
 
@@ -85,8 +85,8 @@ impl fmt::Display for Note {
                 number(*count, "opacity", "opacities")
             ),
             Self::LinearColours => f.write_str(
-                "colours are in linear light (lin_rec709_display) and were kept as they are; they look too dark where \
-                 they are shown as sRGB",
+                "colours are in linear light and were encoded as sRGB, each by itself; pictures differ where translucent \
+                 Gaussians cover each other, since sRGB is blended otherwise",
             ),
         }
     }

@@ -11,7 +11,7 @@ use crate::error::SceneError;
 use crate::limits::Budget;
 use crate::note::Note;
 use crate::reading::frame_of;
-use crate::spz;
+use crate::{spz, srgb};
 use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, sh_coefficients};
 
 /// The extensions for compressed Gaussians that are read: the newest first.
@@ -21,8 +21,11 @@ pub(super) const SPZ: [&str; 3] = [
     "KHR_spz_gaussian_splats_compression",
 ];
 
-/// Colours in linear light; all others are shown as they are.
-const LINEAR: &str = "lin_rec709_display";
+/// What colours are encoded as sRGB, as in frames, and what they are called in drafts of the extension.
+const SRGB: [&str; 3] = ["srgb_rec709_display", "BT.709-sRGB", "BT.709-srgb"];
+
+/// Colours in linear light, and the same in drafts.
+const LINEAR: [&str; 2] = ["lin_rec709_display", "BT.709-linear"];
 
 /// The Gaussians of a primitive, in the axes of frames, not yet placed.
 pub(super) fn read(
@@ -31,15 +34,25 @@ pub(super) fn read(
     part: &Part<'_>,
     budget: &mut Budget,
 ) -> Result<GaussianFrame, SceneError> {
-    check(part, budget)?;
-    match compressed(part.primitive) {
+    check(part)?;
+    let frame = match compressed(part.primitive) {
         Some(Compressed { buffer_view: Some(view) }) => {
             let (bytes, _) = buffers.view(document, view)?;
             spz::read_as_is(bytes, budget)
         }
         Some(_) => Err(broken(format!("{} is compressed and has no bufferView", name(part)))),
         None => attributes(document, buffers, part, budget),
+    }?;
+    if !colour_space(part).is_some_and(|space| LINEAR.contains(&space)) {
+        return Ok(frame);
     }
+    budget.note(Note::LinearColours);
+    Ok(srgb::from_linear(frame))
+}
+
+/// What the colours of a primitive are, where it says so; they are sRGB otherwise.
+fn colour_space<'a>(part: &Part<'a>) -> Option<&'a str> {
+    part.primitive.extensions.gaussians.as_ref()?.color_space.as_deref()
 }
 
 /// What a primitive is called in messages.
@@ -47,7 +60,7 @@ fn name(part: &Part<'_>) -> String {
     format!("primitive {} of mesh {}", part.index, part.mesh)
 }
 
-fn check(part: &Part<'_>, budget: &mut Budget) -> Result<(), SceneError> {
+fn check(part: &Part<'_>) -> Result<(), SceneError> {
     let Some(gaussians) = &part.primitive.extensions.gaussians else { return Ok(()) };
     if let Some(kernel) = gaussians.kernel.as_deref().filter(|&kernel| kernel != "ellipse") {
         let what = format!("{}: Gaussians of the kernel \"{}\"", name(part), kernel.escape_default());
@@ -63,8 +76,13 @@ fn check(part: &Part<'_>, budget: &mut Budget) -> Result<(), SceneError> {
         let what = format!("{}: Gaussians by the extension {}", name(part), unknown.escape_default());
         return Err(SceneError::unsupported(what, "export them without it, or compressed as SPZ"));
     }
-    if gaussians.color_space.as_deref() == Some(LINEAR) {
-        budget.note(Note::LinearColours);
+    let is_known = |space: &str| SRGB.contains(&space) || LINEAR.contains(&space);
+    if let Some(unknown) = colour_space(part).filter(|&space| !is_known(space)) {
+        let what = format!("{}: colours of the space \"{}\"", name(part), unknown.escape_default());
+        return Err(SceneError::unsupported(
+            what,
+            "export them as srgb_rec709_display or lin_rec709_display",
+        ));
     }
     Ok(())
 }

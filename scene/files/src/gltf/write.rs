@@ -9,6 +9,7 @@ use crate::byte_values::{byte_of_logit, is_beyond_scales, scale_of_log, to_byte}
 use crate::clamped::Clamped;
 use crate::error::SceneError;
 use crate::reading::row_of;
+use crate::srgb;
 use serde_json::{Map, Value, json};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_gaussians::activation::{colour_of_dc, sigmoid};
@@ -110,12 +111,7 @@ impl Parts {
 
     /// Adds what viewers show that do not know Gaussians: their colours, which glTF wants in linear light, and opacities.
     fn add_colours(&mut self, frame: &GaussianFrame) {
-        let linear = |dc: f32| {
-            let colour = colour_of_dc(dc).clamp(0.0, 1.0);
-            let linear =
-                if colour <= 0.04045 { colour / 12.92 } else { libm::pow((colour + 0.055) / 1.055, 2.4) };
-            to_byte(linear * 255.0)
-        };
+        let linear = |dc: f32| to_byte(srgb::decode(colour_of_dc(dc).clamp(0.0, 1.0)) * 255.0);
         let colours = frame.opacity_logit().iter().enumerate().flat_map(|(row, &logit)| {
             let [red, green, blue] = row_of(frame.dc(), row).map(linear);
             [red, green, blue, byte_of_logit(logit)]

@@ -3,7 +3,7 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
-use splatstream_files::{Note, ReadLimits, gltf, read_scene, read_scene_as_is, spz};
+use splatstream_files::{Note, ReadLimits, gltf, read_scene, read_scene_as_is, spz, srgb};
 use splatstream_gaussians::GaussianFrame;
 use std::fs;
 
@@ -196,6 +196,13 @@ fn what_is_not_understood_is_named() {
             }),
             "the kernel \"box\"",
         ),
+        (
+            refused(|json| {
+                json["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["colorSpace"] =
+                    "lin_rec2020_display".into();
+            }),
+            "colours of the space \"lin_rec2020_display\"",
+        ),
         (refused(|json| json["accessors"][0]["count"] = 4.into()), "needs 48 bytes, its buffer view has 36"),
         (refused(|json| json["accessors"][0]["type"] = "VEC2".into()), "is a VEC2, VEC3 is needed"),
         (refused(|json| json["bufferViews"][0]["byteOffset"] = 1e12.into()), "glTF: "),
@@ -210,6 +217,30 @@ fn what_is_not_understood_is_named() {
     ];
     for (said, expected) in said {
         assert!(said.contains(expected), "{expected} is not in: {said}");
+    }
+}
+
+#[test]
+fn colours_in_linear_light_are_encoded_and_noted() {
+    let (mut document, binary) = split(&gltf::write(&small_frame()).unwrap());
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("scene.glb");
+    let mut read_as = |space: &str| {
+        document["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["colorSpace"] =
+            space.into();
+        fs::write(&path, glb(&document, &binary)).unwrap();
+        read_scene_as_is(&path, &LIMITS).unwrap()
+    };
+    for space in ["srgb_rec709_display", "BT.709-sRGB"] {
+        let scene = read_as(space);
+        assert_eq!((scene.frame, scene.notes), (frame(), vec![]), "{space}");
+    }
+    for space in ["lin_rec709_display", "BT.709-linear"] {
+        let scene = read_as(space);
+        assert_eq!(scene.notes, [Note::LinearColours], "{space}");
+        assert_eq!(scene.frame, srgb::from_linear(frame()));
+        assert_ne!(scene.frame.dc(), frame().dc());
+        assert_eq!(scene.frame.position(), frame().position());
     }
 }
 
