@@ -55,8 +55,9 @@ const CARRIED: u64 = 32;
 const UNIT_PLANES: u64 = 5;
 /// What buffers of blocks, tables and models may take: it does not grow with the frame.
 const FIXED: u64 = 32 << 20;
-/// Asking whether the memory is there is worth it above this.
-const PROBED: u64 = 16 << 20;
+/// Asking whether the memory is there is worth it above this: what Gaussians of small frames take besides is soon there, and
+/// asking costs as much as decoding them.
+const PROBED: u64 = FIXED + (16 << 20);
 
 /// What the budget knows of a sequence.
 #[derive(Debug, Clone, Copy)]
