@@ -4,6 +4,9 @@ use crate::cores;
 use crate::interrupt::Interrupt;
 use splatstream_gaussians::{FrameError, MAX_SH_DEGREE, sh_planes};
 
+/// Planes of a frame beside those of SH.
+pub(crate) const PLANES: usize = 13;
+
 /// A reconstructed frame: integers on the grids of the sequence, Gaussians in coded order.
 ///
 /// All planes have the same length.
@@ -124,7 +127,7 @@ impl QuantizedFrame {
 
     /// Values of all planes.
     pub(crate) fn values(&self) -> usize {
-        self.len().saturating_mul(self.sh.len().saturating_add(13))
+        self.len().saturating_mul(self.sh.len().saturating_add(PLANES))
     }
 
     /// True if the frame has no Gaussian.

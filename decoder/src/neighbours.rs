@@ -9,7 +9,6 @@ use crate::cores;
 use crate::curve;
 use crate::interrupt::Interrupt;
 use crate::position::morton;
-use rayon::prelude::*;
 
 /// Candidates on either side of a point on the curve, at most.
 pub const WINDOW: usize = 16;
@@ -58,10 +57,7 @@ impl NeighbourSearch {
         let point =
             |(code, index)| Point { code, index, at: [xs, ys, zs].map(|plane| coordinate(plane, index)) };
         let order = curve::order(codes.into_iter(), interrupt);
-        if !cores::are_many(order.len()) {
-            return Self { points: order.into_iter().map(point).collect() };
-        }
-        Self { points: order.into_par_iter().map(point).collect() }
+        Self { points: cores::map(order.len(), order, point) }
     }
 
     /// Points searched.

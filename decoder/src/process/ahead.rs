@@ -8,12 +8,10 @@ use super::frame::FrameInProgress;
 use super::report::Found;
 use super::{DecodedFrame, Decoder, FrameEnd};
 use crate::cores;
+use crate::frame::PLANES;
 use crate::gop::Gop;
 use crate::operating_point::OperatingPoint;
 use splatstream_format::Error;
-
-/// Values of a Gaussian, at least.
-const VALUES: usize = 13;
 
 /// A frame that has ended and is to be handed out.
 pub(super) struct Ready {
@@ -30,7 +28,7 @@ impl Decoder {
         let (Some(frame), Some(gop)) = (&self.frame, &self.gop) else { return false };
         let is_free = gop.header.is_predicted() && !is_kept(gop, frame.role.temporal_layer);
         let is_wanted = self.options.ahead && !self.options.stop_at_first_error && self.frames_left > 0;
-        let values = (frame.header.gaussian_count as usize).saturating_mul(VALUES);
+        let values = (frame.header.gaussian_count as usize).saturating_mul(PLANES);
         let is_worth_it = cores::are_many(values) && rayon::current_num_threads() > 1;
         is_wanted && is_worth_it && is_free && self.waiting.is_none() && frame.error.is_none()
     }
