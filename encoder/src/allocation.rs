@@ -124,9 +124,6 @@ fn psnr_of(error: f64) -> f64 {
 pub(crate) struct Fit {
     pub(crate) scene: Scene,
     pub(crate) settings: Settings,
-    /// Of the frame.
-    pub(crate) sh_degree: u8,
-    pub(crate) antialiased: bool,
     /// The refinement of each Gaussian.
     pub(crate) refinement: Vec<u8>,
     /// Principal components of dc and of sh.
@@ -136,7 +133,7 @@ pub(crate) struct Fit {
     /// The source as those views show it in which attributes are measured alone.
     alone: Vec<StripView>,
     /// Some of the Gaussians, and which these are.
-    sample: (GaussianFrame, Vec<u32>),
+    pub(crate) sample: (GaussianFrame, Vec<u32>),
     sensitivity: Sensitivity,
     /// See [`Ranked::level`].
     level: f64,
@@ -172,8 +169,6 @@ impl Fit {
         Self {
             bases: [slices(frame.dc()), slices(frame.sh())],
             scene,
-            sh_degree: frame.sh_degree(),
-            antialiased: frame.antialiased(),
             settings: Settings { laws, ..settings.clone() },
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),

@@ -47,8 +47,10 @@ impl<'a> Grids<'a> {
     /// The same with other laws.
     pub(crate) fn with(fit: &'a Fit, laws: Laws, steps: &Steps) -> Self {
         let settings = Settings { steps: *steps, laws, spatial_layers: 1, ..fit.settings.clone() };
-        let flags = SequenceParameters::flags(true, fit.antialiased, false);
-        let sequence = fit.scene.parameters(&settings, 1, fit.sh_degree, flags);
+        // Which Gaussians these are is no matter here.
+        let (frame, _) = &fit.sample;
+        let flags = SequenceParameters::flags(true, frame.antialiased(), false);
+        let sequence = fit.scene.parameters(&settings, 1, frame.sh_degree(), flags);
         let grains = Grains::new(&settings, &sequence);
         let rules = (0..sequence.refinement_count)
             .map(|refinement| StepRule::new(&sequence, grains.of(refinement).attribute_step))
