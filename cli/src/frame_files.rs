@@ -145,7 +145,7 @@ pub(crate) fn spool(input: &mut dyn Read, most: u64) -> Result<Unfinished, Failu
     let directory = std::env::temp_dir();
     let failed = |error| Failure::file("keep standard input in", &directory, &error);
     let (mut file, unfinished) = Unfinished::create(&directory, false).map_err(failed)?;
-    let mut count = io::copy(&mut input.take(HEAD + 1), &mut file).map_err(failed)?;
+    let mut count = io::copy(&mut input.take(HEAD), &mut file).map_err(failed)?;
     if is_stream(unfinished.path()) {
         return Err(is_encoded(STANDARD_INPUT));
     }

@@ -15,8 +15,9 @@ use crate::sequence::{SPLAT4D, SPLATV, Sequence, SequenceOptions};
 use crate::{compressed_ply, gltf, ksplat, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
-/// Bytes of a file by which [`detect`] tells its format: the longest header of a PLY file that is read.
-pub const HEAD: u64 = ply::MOST_HEADER as u64;
+/// Bytes of a file by which [`detect`] tells its format: the longest header of a PLY file that is read, and one more, which says
+/// whether a header goes on.
+pub const HEAD: u64 = ply::MOST_HEADER as u64 + 1;
 
 /// Where a tar archive has its name, and that.
 const TAR: (usize, &[u8]) = (257, b"ustar");
@@ -66,8 +67,7 @@ pub fn detect(path: &Path) -> Result<SceneFormat, SceneError> {
     let find = || {
         let mut file = File::open(path)?;
         let mut head = Vec::new();
-        // One byte more: whether the header goes on.
-        file.by_ref().take(HEAD + 1).read_to_end(&mut head)?;
+        file.by_ref().take(HEAD).read_to_end(&mut head)?;
         if head.is_empty() {
             return Err(SceneErrorKind::Empty.into());
         }
