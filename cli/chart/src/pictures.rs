@@ -6,6 +6,7 @@ use crate::Error;
 use crate::first_frame::first_frame;
 use crate::report::File;
 use splatstream_decoder::process::Options;
+use splatstream_files::srgb;
 use splatstream_render::{Image, render};
 
 /// What differences are multiplied with: an eighth of the range is the end of the scale.
@@ -108,10 +109,7 @@ pub(crate) fn heat(value: f32) -> [f32; 3] {
         -1.268_438 * l + 2.609_757_4 * m - 0.341_319_38 * s,
         -0.004_196_086_3 * l - 0.703_418_6 * m + 1.707_614_7 * s,
     ]
-    .map(|linear| {
-        let linear = linear.clamp(0.0, 1.0);
-        if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 }
-    })
+    .map(|linear| srgb::encode(linear.clamp(0.0, 1.0).into()) as f32)
 }
 
 /// Keeps a picture and makes a small one of it.
