@@ -45,14 +45,15 @@ pub(crate) fn for_each<T: Send>(
     }
 }
 
-/// Two pieces of work on so many values.
-pub(crate) fn join(values: usize, first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
+/// What two pieces of work on so many values give.
+pub(crate) fn join<A: Send, B: Send>(
+    values: usize,
+    first: impl FnOnce() -> A + Send,
+    second: impl FnOnce() -> B + Send,
+) -> (A, B) {
     match are_many(values) {
-        true => drop(rayon::join(first, second)),
-        false => {
-            first();
-            second();
-        }
+        true => rayon::join(first, second),
+        false => (first(), second()),
     }
 }
 

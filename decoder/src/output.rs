@@ -5,8 +5,8 @@
 #![expect(clippy::float_arithmetic, reason = "clause 7.10: attributes leave the integer domain here")]
 
 use crate::companding::Companding;
+use crate::cores;
 use crate::frame::QuantizedFrame;
-use rayon::prelude::*;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::{FrameError, GaussianFrame, Planes};
 
@@ -22,6 +22,7 @@ pub fn to_gaussians(
     frame: QuantizedFrame,
     sequence: &SequenceParameters,
 ) -> Result<GaussianFrame, FrameError> {
+    let values = frame.values();
     let QuantizedFrame { position, log_scale, opacity, rotation, dc, sh } = frame;
     let dc_step = sequence.dc_step() * COLOUR_FRACTION;
     let sh_step = sequence.sh_step() * COLOUR_FRACTION;
@@ -33,9 +34,8 @@ pub fn to_gaussians(
     let harmonics = sh.into_iter().map(|plane| (plane, None, sh_step));
     let integers: Vec<(Vec<i32>, Option<f32>, f32)> =
         shapes.into_iter().chain(rotations).chain(opacities).chain(colours).chain(harmonics).collect();
-    let convert =
-        || integers.into_par_iter().map(|(plane, offset, step)| affine(plane, offset, step)).collect();
-    let (position, planes): (_, Vec<Vec<f32>>) = rayon::join(|| scene_positions(position, sequence), convert);
+    let convert = || cores::map(values, integers, |(plane, offset, step)| affine(plane, offset, step));
+    let (position, planes) = cores::join(values, || scene_positions(position, sequence), convert);
     let mut planes = planes.into_iter();
     let mut next = || planes.next().unwrap_or_default();
     let log_scale = [next(), next(), next()];

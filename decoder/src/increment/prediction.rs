@@ -5,6 +5,7 @@
 
 use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use crate::colour::Colour;
+use crate::cores;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
 use crate::list::{FINE, canonical};
@@ -15,7 +16,6 @@ use crate::transformer::LaneNetwork;
 use core::ops::Range;
 use learned::{Learned, Target};
 use projection::Projection;
-use rayon::prelude::*;
 use rows::Rows;
 use splatstream_format::Result;
 use splatstream_format::payload::Network;
@@ -40,7 +40,7 @@ pub struct Predicting<'a> {
     pub interrupt: &'a Interrupt,
 }
 
-/// Items, at least, that are worth another thread.
+/// Items that one thread does together.
 const RUN: usize = 64;
 
 /// A new Gaussian that is predicted.
@@ -193,8 +193,9 @@ impl<'s> Prediction<'s> {
             let position = self.position.each_ref().map(|plane| plane.get(index).copied().unwrap_or(0));
             Target { row: item.row, position, neighbours, indices, weights, affinities }
         };
-        let items = self.items.par_iter().enumerate();
-        items.filter(|(_, item)| item.predictor == Predictor::Transformer).map(target).collect()
+        let items = self.items.iter().enumerate();
+        let items: Vec<_> = items.filter(|(_, item)| item.predictor == Predictor::Transformer).collect();
+        cores::map(items.len().saturating_mul(self.count), items, target)
     }
 
     /// The indices of an item's neighbours.
@@ -233,19 +234,23 @@ impl<'s> Prediction<'s> {
     fn means(&self, stage: Stage, out: &mut [Vec<i32>], unit: i32) {
         let colour = matches!(stage, Stage::Dc | Stage::Sh);
         let columns = self.rows.columns(stage);
-        let mut means = vec![0; self.items.len().wrapping_mul(out.len())];
-        let each = means.par_chunks_exact_mut(out.len().max(1)).zip(&self.items).enumerate();
-        each.with_min_len(RUN).for_each(|(index, (means, item))| {
+        let width = out.len();
+        let mut means = vec![0; self.items.len().wrapping_mul(width)];
+        let of_item = |(means, (index, item)): (&mut [i32], (usize, &Item))| {
             let is_learned = colour && item.predictor == Predictor::Transformer;
-            if !is_learned && !self.interrupt.is_requested() {
+            if !is_learned {
                 let rows = self.rows.of(self.range(index)).filter_map(|row| row.get(columns.clone()));
                 let weighted = WeightedMean::new(&self.weights(index, item.predictor));
                 weighted.of_rows(rows, means);
             }
+        };
+        let values = means.len().saturating_mul(self.count);
+        let starts = (0..).step_by(RUN);
+        let runs = means.chunks_mut(width.max(1).wrapping_mul(RUN)).zip(self.items.chunks(RUN)).zip(starts);
+        cores::for_each(self.interrupt, values, runs, |((means, items), start)| {
+            means.chunks_mut(width.max(1)).zip((start..).zip(items)).for_each(of_item);
         });
-        let width = out.len();
-        let planes = out.par_iter_mut().enumerate().filter(|_| !self.interrupt.is_requested());
-        planes.for_each(|(number, plane)| {
+        cores::for_each(self.interrupt, means.len(), out.iter_mut().enumerate(), |(number, plane)| {
             let column = means.iter().skip(number).step_by(width);
             for (item, mean) in self.items.iter().zip(column) {
                 let is_learned = colour && item.predictor == Predictor::Transformer;

@@ -3,6 +3,7 @@
 use super::projection::{COLOURS_MAX, Colour, Components, Projection};
 use super::rows::Rows;
 use super::{Attributes, RUN, at, set_row};
+use crate::cores;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
 use crate::list::canonical;
@@ -10,8 +11,7 @@ use crate::neighbours::Neighbour;
 use crate::predictor::{NEIGHBOURS_MAX, WeightedMean};
 use crate::stage::Stage;
 use crate::transformer::batch::Seen;
-use crate::transformer::{Batch, LANES, LaneNetwork, OUTPUTS_MAX};
-use rayon::prelude::*;
+use crate::transformer::{Batch, INPUTS_MAX, LANES, LaneNetwork, OUTPUTS_MAX};
 
 /// The network of a GOP, what it works in, and the set it predicts from.
 #[derive(Debug)]
@@ -42,6 +42,11 @@ pub struct Target<'n> {
     pub(super) affinities: [i64; NEIGHBOURS_MAX],
 }
 
+/// Values that the network works on for targets, in each of its layers.
+fn values_of(targets: &[Target<'_>]) -> usize {
+    targets.len().saturating_mul(INPUTS_MAX)
+}
+
 impl Learned<'_> {
     /// Overwrites the colours of the targets in `attributes` with those that the network predicts. Their
     /// log-scales, opacities and rotations have been reconstructed.
@@ -51,7 +56,8 @@ impl Learned<'_> {
             true => Vec::new(),
             false => self.colours(run, attributes, &components),
         };
-        let predicted: Vec<Vec<Colour>> = targets.par_chunks(LANES).map(of_run).collect();
+        let predicted: Vec<Vec<Colour>> =
+            cores::map(values_of(targets), targets.chunks(LANES).collect(), of_run);
         for (target, colour) in targets.iter().zip(predicted.into_iter().flatten()) {
             let (dc, sh) = colour.split_at(3);
             set_row(&mut attributes.dc, target.row, dc.iter().copied());
@@ -63,7 +69,7 @@ impl Learned<'_> {
     pub fn batches(&self, targets: &[Target<'_>], attributes: &Attributes) -> Vec<Batch> {
         let components = self.components(targets);
         let batch = |run: &[Target<'_>]| self.batch(run, &self.bases(run), attributes, &components);
-        targets.par_chunks(LANES).map(batch).collect()
+        cores::map(values_of(targets), targets.chunks(LANES).collect(), batch)
     }
 
     /// What the outputs should be for each target, in step/64: the components of its colour in the planes `dc` and
@@ -78,7 +84,7 @@ impl Learned<'_> {
             let pairs = own.iter().zip(base).take(self.network.header().outputs());
             pairs.map(|(own, base)| round12(own.wrapping_sub(base)) as i32).collect()
         };
-        targets.par_iter().map(of_target).collect()
+        cores::map(values_of(targets), targets.iter().collect(), of_target)
     }
 
     /// The components of every row that is a neighbour of a target; of the others 0.
@@ -91,12 +97,14 @@ impl Learned<'_> {
         }
         let start = self.rows.columns(Stage::Dc).start;
         let mut components = vec![[0; OUTPUTS_MAX]; self.rows.len()];
-        let each = components.par_iter_mut().zip(self.rows.all()).zip(used).with_min_len(RUN);
-        each.filter(|(_, used)| *used && !self.interrupt.is_requested()).for_each(
-            |((components, row), _)| {
+        let values = components.len().saturating_mul(OUTPUTS_MAX);
+        let rows: Vec<(&[i32], bool)> = self.rows.all().zip(used).collect();
+        let runs = components.chunks_mut(RUN).zip(rows.chunks(RUN));
+        cores::for_each(self.interrupt, values, runs, |(components, rows)| {
+            for (components, (row, _)) in components.iter_mut().zip(rows).filter(|(_, (_, used))| *used) {
                 *components = self.projection.components(row.get(start..).unwrap_or_default());
-            },
-        );
+            }
+        });
         components
     }
 

@@ -1,12 +1,12 @@
 //! The neighbours of new Gaussians, gathered: each with all its attributes side by side.
 
 use super::at;
+use crate::cores;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
 use crate::neighbours::Neighbour;
 use crate::stage::Stage;
 use core::ops::Range;
-use rayon::prelude::*;
 
 /// Columns of a row before those of sh.
 const BEFORE_SH: usize = 10;
@@ -51,9 +51,10 @@ impl Rows {
         for part in parts() {
             indices.extend(part.iter().map(|neighbour| at(&row_of, neighbour.index)));
         }
-        let mut values = vec![0; used_indices.len().wrapping_mul(width)];
-        let runs = values.par_chunks_mut(width.wrapping_mul(RUN)).zip(used_indices.par_chunks(RUN));
-        runs.filter(|_| !interrupt.is_requested()).for_each(|(values, indices)| {
+        let count = used_indices.len().wrapping_mul(width);
+        let mut values = vec![0; count];
+        let runs = values.chunks_mut(width.wrapping_mul(RUN)).zip(used_indices.chunks(RUN));
+        cores::for_each(interrupt, count, runs, |(values, indices)| {
             for (column, plane) in set.signed_planes().enumerate() {
                 let slots = values.iter_mut().skip(column).step_by(width);
                 slots.zip(indices).for_each(|(slot, &index)| *slot = at(plane, index));
@@ -84,8 +85,8 @@ impl Rows {
     }
 
     /// All rows, in order.
-    pub(super) fn all(&self) -> impl IndexedParallelIterator<Item = &[i32]> {
-        self.values.par_chunks_exact(self.width)
+    pub(super) fn all(&self) -> impl Iterator<Item = &[i32]> {
+        self.values.chunks_exact(self.width)
     }
 
     /// The columns of an attribute.
