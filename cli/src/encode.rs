@@ -10,6 +10,7 @@ mod options;
 mod output;
 mod pictures;
 mod prune;
+mod refinements;
 mod shards;
 pub(crate) mod warnings;
 
@@ -36,6 +37,7 @@ pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
 use prune::PruneArgs;
+use refinements::Refinements;
 use serde::Serialize;
 use shards::{ShardArgs, ShardReport};
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
@@ -127,9 +129,10 @@ pub(crate) struct Encode {
     /// that train has made; default is trained for --predictor transformer, and none otherwise.
     #[arg(long, value_name = "registered|trained|FILE")]
     network: Option<NetworkName>,
-    /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100.
-    #[arg(long, value_name = "PERCENTS", value_delimiter = ',', default_value = "10,20,30,50,100")]
-    refinements: Vec<u8>,
+    /// Share of the Gaussians up to each refinement, percent: 1 to 10 rising numbers, the last 100; or auto:N, which chooses N
+    /// of them so that pictures are best for receivers that take any part of the bytes.
+    #[arg(long, value_name = "PERCENTS|auto:N", default_value = "10,20,30,50,100")]
+    refinements: Refinements,
     /// Highest degree of spherical harmonics kept; default is what the scene needs.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: Option<u8>,
@@ -204,16 +207,6 @@ enum ImportanceName {
     Footprint,
     /// Opacity times volume; needs no views.
     Volume,
-}
-
-fn check_refinements(percents: &[u8]) -> Result<(), Failure> {
-    let is_rising = percents.is_sorted_by(|a, b| a < b) && percents.first() != Some(&0);
-    if is_rising && percents.len() <= 10 && percents.last() == Some(&100) {
-        return Ok(());
-    }
-    Err(Failure::Usage(
-        "--refinements takes 1 to 10 rising percentages, the last 100, as 10,20,50,100".to_owned(),
-    ))
 }
 
 fn parse_psnr(text: &str) -> Result<f32, String> {
@@ -328,6 +321,8 @@ impl Encode {
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
         let (mut settings, decided) = self.settings(&mut source)?;
+        let put = self.refinements.put(&mut source, &mut settings);
+        put.map_err(|error| failed(&source, out, &error))?;
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
@@ -399,11 +394,11 @@ impl Encode {
         Ok((description, cameras, guess))
     }
 
-    /// The settings, and what was decided where the options leave it open.
+    /// The settings but for the refinements, and what was decided where the options leave it open.
     fn settings(&self, source: &mut dyn FrameSource) -> Result<(Settings, Decided), Failure> {
         let is_predicted = source.len() > 1 && !self.all_intra;
         let layers = self.layer_count(is_predicted)?;
-        check_refinements(&self.refinements)?;
+        self.refinements.check()?;
         let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
         let (description, cameras, guess) = self.scene(&first)?;
         let work = Work {
@@ -447,7 +442,6 @@ impl Encode {
             drop_invalid: self.drop_invalid,
             gop: self.gop,
             gop_memory: self.gop_memory,
-            refinements: self.refinements.clone(),
             sh_degree: self.sh_degree,
             sh: self.sh.into(),
             keep_invisible: self.keep_invisible,

@@ -16,6 +16,7 @@
 
 mod allocation;
 mod blocks;
+mod boundaries;
 mod budget;
 pub mod canonical;
 mod checked;
@@ -69,6 +70,7 @@ mod window;
 mod writer;
 
 pub use allocation::Attribute;
+pub use boundaries::refinements_by_slope;
 pub use budget::{Effort, Work};
 pub use concat::{ConcatError, Concatenated, PartError, StreamPart, concat};
 pub use error::Error;

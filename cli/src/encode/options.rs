@@ -85,8 +85,11 @@ impl EncodeOptions {
                 "--time-budget shares the time among all frames, whose number must be known: give them as a list".to_owned(),
             ));
         }
-        let settings = self.0.settings(&mut Start { first, frames: frames.unwrap_or(2) });
-        let (settings, decided) = settings.map_err(|failure| OptionsError(failure.to_string()))?;
+        let mut start = Start { first, frames: frames.unwrap_or(2) };
+        let settings = self.0.settings(&mut start);
+        let (mut settings, decided) = settings.map_err(|failure| OptionsError(failure.to_string()))?;
+        let put = self.0.refinements.put(&mut start, &mut settings);
+        put.map_err(|error| OptionsError(error.to_string()))?;
         Ok(Prepared { settings, decided })
     }
 }
@@ -135,6 +138,21 @@ mod tests {
         assert_eq!(preset(Some(1_000_000)), Ok(Preset::Fast));
         assert_ne!(preset(Some(2)), Ok(Preset::Fast));
         assert!(preset(None).unwrap_err().to_string().contains("must be known"));
+    }
+
+    #[test]
+    fn refinements_are_given_or_chosen() {
+        let first = BuiltinScene { gaussians: 50, ..BuiltinScene::default() }.frame(0);
+        let refinements = |text: &str| {
+            let options = EncodeOptions::parse(words(text)).map_err(|error| error.to_string())?;
+            let prepared = options.prepare(&first, Some(1)).map_err(|error| error.to_string())?;
+            Ok::<_, String>(prepared.settings.refinements)
+        };
+        assert_eq!(refinements("--refinements 20,100"), Ok(vec![20, 100]));
+        assert!(refinements("--refinements auto:4").is_ok_and(|percents| percents.len() == 4));
+        for wrong in ["auto:0", "auto:11", "auto:", "20,x,100", "20,50", "50,20,100"] {
+            assert!(refinements(&format!("--refinements {wrong}")).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -153,7 +153,9 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
     let mut source = FrameFiles::find(&command.inputs, command.reading)?.unchecked();
     let read = command.read_files(&source);
     refuse_inputs(out, &read)?;
-    let (settings, _) = command.settings(&mut source)?;
+    let (mut settings, _) = command.settings(&mut source)?;
+    let put = command.refinements.put(&mut source, &mut settings);
+    put.map_err(|error| failed(&source, out, &error))?;
     let file = OutputFile::create(out, &read)?;
     let plan = plan(&mut source, &settings).map_err(|error| failed(&source, out, &error))?;
     let (most_shards, frames) = (plan.shards(), source.len());

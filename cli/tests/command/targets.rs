@@ -99,6 +99,22 @@ fn a_time_chooses_what_is_done_and_not_the_clock() {
 }
 
 #[test]
+fn refinements_end_where_pictures_gain_if_that_is_asked_for() {
+    let directory = directory();
+    let (still, stream) = (write_still(directory.path()), directory.path().join("still.gss"));
+    let encode = |refinements: &str| {
+        let options = ["--psnr", "40", "--refinements", refinements];
+        let report = json(&[&["encode", text(&still), "-o", text(&stream)][..], &options].concat());
+        (report, fs::read(&stream).unwrap())
+    };
+    let (report, bytes) = encode("auto:3");
+    let percents = chosen(&report, "refinements").and_then(|choice| choice.strip_prefix("3 of up to "));
+    let percents = percents.expect("three").trim_end_matches(" %").replace(' ', "");
+    assert!(percents.ends_with(",100"), "{percents}");
+    assert!(bytes == encode(&percents).1, "{percents}");
+}
+
+#[test]
 fn the_small_preset_is_fitted_to_pictures_unless_told_otherwise() {
     let directory = directory();
     let (still, stream) = (write_still(directory.path()), directory.path().join("still.gss"));
