@@ -17,8 +17,9 @@ pub(crate) mod warnings;
 use crate::cameras::{BackgroundArg, CameraArgs, Views, to_stream};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::frame_files::FrameFiles;
+use crate::frame_files::{FrameFiles, unread};
 use crate::input_args::{InputArgs, parse_size};
+use crate::machine;
 use crate::numbers::{hex_digest, parse_frame_rate};
 use crate::output_file::refuse_inputs;
 use crate::progress::Progress;
@@ -164,6 +165,11 @@ pub(crate) struct Encode {
     /// the stream is the same.
     #[arg(long, value_name = "SIZE", value_parser = parse_size, default_value = "2G")]
     gop_memory: u64,
+    /// Most memory that encoding may take with what it reads, as in 512M or 4G: frames that take more are refused before (exit
+    /// code 13), and with little, fewer GOPs are coded at once; the stream is the same [default: three quarters of what this
+    /// machine has free].
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    max_memory: Option<u64>,
     #[command(flatten)]
     reading: InputArgs,
     #[command(flatten)]
@@ -316,27 +322,29 @@ impl Encode {
 
     /// Encodes one scene or sequence; warnings are said.
     fn one(&self, console: &Console, inputs: &[PathBuf], out: &Path) -> Result<Encoded, Failure> {
-        let mut source = FrameFiles::find(inputs, self.reading)?.unchecked();
+        let memory = self.memory();
+        let mut source = FrameFiles::find(inputs, self.reading.within(memory))?.unchecked();
         let read = self.read_files(&source);
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
         let (mut settings, decided) = self.settings(&mut source)?;
+        settings.max_memory = source.left_for(&settings, memory);
         let put = self.refinements.put(&mut source, &mut settings);
-        put.map_err(|error| failed(&source, out, &error))?;
+        put.map_err(|error| failed(&source, (out, memory), &error))?;
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
         if let Some(finetune) = &mut settings.finetune {
             finetune.watch = told_of_fitting(&progress);
         }
-        let shard = self.shards.open(&mut source, &settings)?;
+        let shard = self.shards.open(&mut source, &settings, memory)?;
         shard.iter().for_each(|shard| progress.of(shard.frames));
         let mut at = |done, _| progress.at(done);
         let report = match &shard {
             None => encode(&mut source, &settings, &mut file, &mut at),
             Some(shard) => shard.encode(&mut source, &mut file, &mut at),
         };
-        let report = report.map_err(|error| failed(&source, out, &error))?;
+        let report = report.map_err(|error| failed(&source, (out, memory), &error))?;
         drop(progress);
         let page_bytes = file.finish()?;
         let name_of = |frame| source.name(frame);
@@ -353,6 +361,11 @@ impl Encode {
         encoded.warnings.extend(source.warnings());
         encoded.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         Ok(encoded)
+    }
+
+    /// Memory that everything together may take, bytes.
+    fn memory(&self) -> u64 {
+        self.max_memory.unwrap_or_else(machine::memory)
     }
 
     /// Every file that is read: frames, cameras, a network.
@@ -399,7 +412,7 @@ impl Encode {
         let is_predicted = source.len() > 1 && !self.all_intra;
         let layers = self.layer_count(is_predicted)?;
         self.refinements.check()?;
-        let first = source.frame(0).map_err(|error| Failure::other(error.to_string()))?;
+        let first = source.frame(0).map_err(|error| unread(error.as_ref()))?;
         let (description, cameras, guess) = self.scene(&first)?;
         let work = Work {
             gaussians: first.len() as u64,
@@ -442,6 +455,7 @@ impl Encode {
             drop_invalid: self.drop_invalid,
             gop: self.gop,
             gop_memory: self.gop_memory,
+            max_memory: self.memory(),
             sh_degree: self.sh_degree,
             sh: self.sh.into(),
             keep_invisible: self.keep_invisible,

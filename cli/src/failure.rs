@@ -27,6 +27,8 @@ pub(crate) enum Failure {
     },
     /// Files and settings.
     Other(String),
+    /// It takes more memory than it may.
+    Memory(String),
     /// A decoder under test failed; where to read more.
     Decoder(String),
     /// The user ended a run; how far it had come.
@@ -77,11 +79,13 @@ impl Failure {
         Self::Stream { path: path.to_path_buf(), error, instead: Instead::Nothing, level: None }
     }
 
-    /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error, 130 interrupted.
+    /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error, 13 too much memory, 130
+    /// interrupted.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
             Self::Other(_) => 1,
+            Self::Memory(_) => Class::OverLimit.exit_code(),
             Self::Decoder(_) => 3,
             Self::Interrupted(_) => 130,
             Self::Verdict { exit_code, .. } => *exit_code,
@@ -95,6 +99,7 @@ impl fmt::Display for Failure {
         match self {
             Self::Usage(message)
             | Self::Other(message)
+            | Self::Memory(message)
             | Self::Decoder(message)
             | Self::Interrupted(message) => f.write_str(message),
             Self::Verdict { line, .. } => f.write_str(line),
@@ -167,6 +172,7 @@ impl From<&Failure> for FailureReport {
             Failure::Usage(_) => "usage",
             Failure::Stream { .. } | Failure::Verdict { .. } => "stream",
             Failure::Other(_) => "other",
+            Failure::Memory(_) => "memory",
             Failure::Decoder(_) => "decoder",
             Failure::Interrupted(_) => "interrupted",
         };

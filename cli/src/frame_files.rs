@@ -2,17 +2,20 @@
 
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
-use crate::input_args::{InputArgs, with_advice};
+use crate::input_args::{InputArgs, size_of, with_advice};
 use crate::output_file::STANDARD;
+use crate::over_limit::of_encoding;
 use crate::read_notes::ReadNotes;
 use crate::stream_file::is_stream;
 use crate::unfinished::Unfinished;
-use splatstream_encoder::FrameSource;
+use splatstream_encoder::{FrameSource, Settings};
 use splatstream_files::{
-    EXTENSIONS, HEAD, Scene, SceneError, SceneFormat, Sequence, detect, natural_order, read_scene_as_is,
+    EXTENSIONS, HEAD, Scene, SceneError, SceneErrorKind, SceneFormat, Sequence, detect, natural_order,
+    read_scene_as_is,
 };
 use splatstream_gaussians::GaussianFrame;
 use std::collections::BTreeSet;
+use std::fmt;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,6 +31,8 @@ pub(crate) struct FrameFiles {
     reading: InputArgs,
     /// The frame read last: of a single frame, the encoder's second pass needs no second reading.
     last: Option<(u32, GaussianFrame)>,
+    /// Whether there is memory for it.
+    keeps_last: bool,
     /// Whether values that no frame may hold are left to whoever asks for the frames.
     as_is: bool,
     /// What came by standard input, until it is read.
@@ -36,6 +41,38 @@ pub(crate) struct FrameFiles {
     counts: Option<(usize, usize)>,
     /// What readers have noted.
     notes: ReadNotes,
+}
+
+/// A frame that cannot be read, in words.
+#[derive(Debug)]
+struct Unread {
+    message: String,
+    is_over_memory: bool,
+}
+
+impl fmt::Display for Unread {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Unread {}
+
+impl From<Unread> for Failure {
+    fn from(Unread { message, is_over_memory }: Unread) -> Self {
+        match is_over_memory {
+            true => Self::Memory(message),
+            false => Self::Other(message),
+        }
+    }
+}
+
+/// The failure of a frame that a source does not give.
+pub(crate) fn unread(error: &(dyn std::error::Error + Send + Sync + 'static)) -> Failure {
+    match error.downcast_ref::<Unread>() {
+        Some(Unread { message, is_over_memory: true }) => Failure::Memory(message.clone()),
+        _ => Failure::other(error.to_string()),
+    }
 }
 
 /// What standard input is called in messages.
@@ -79,17 +116,37 @@ impl FrameFiles {
         let sequence = match paths.as_slice() {
             [only] if is_sequence(only) => {
                 let opened = Sequence::open(only, &reading.limits(only), &reading.sequence());
-                Some(opened.map_err(|error| Failure::other(named(&error, only, spooled.is_some())))?)
+                Some(opened.map_err(|error| unreadable(&error, only, spooled.is_some(), &reading))?)
             }
             _ => None,
         };
-        let notes = ReadNotes::default();
-        Ok(Self { paths, sequence, reading, last: None, as_is: false, spooled, counts: None, notes })
+        let (last, keeps_last, as_is, counts, notes) = (None, true, false, None, ReadNotes::default());
+        Ok(Self { paths, sequence, reading, last, keeps_last, as_is, spooled, counts, notes })
     }
 
     /// Values are not checked.
     pub(crate) fn unchecked(self) -> Self {
         Self { as_is: true, ..self }
+    }
+
+    /// What encoding with these settings may take of some memory: what is left beside the frame that is kept and the files that
+    /// are read again. No frame is kept where that alone makes it enough.
+    pub(crate) fn left_for(&mut self, settings: &Settings, memory: u64) -> u64 {
+        let Some((_, frame)) = &self.last else { return memory };
+        let frames = self.len();
+        let taken = settings.memory(frame.len() as u64, frame.sh_degree(), frames);
+        let kept: u64 = frame.planes().iter().map(|plane| size_of_val(plane.as_slice()) as u64).sum();
+        let file = self.paths.iter().map(|path| size_of(path)).max().unwrap_or(0);
+        // While a frame is read the encoder holds a part of what it takes: what reading takes may be more than the rest.
+        let reading = kept.saturating_add(file).saturating_sub(taken / 3);
+        // A single frame that is kept is not read again.
+        let beside = if frames > 1 { kept.saturating_add(reading) } else { kept };
+        let is_enough = |beside: u64| taken.saturating_add(beside) <= memory;
+        if !is_enough(beside) && is_enough(reading) {
+            (self.last, self.keeps_last) = (None, false);
+            return memory.saturating_sub(reading);
+        }
+        memory.saturating_sub(beside)
     }
 
     /// The files that are read, which no output may replace: those of scenes that are directories one by one.
@@ -179,6 +236,8 @@ impl FrameSource for FrameFiles {
         {
             return Ok(frame.clone());
         }
+        // Not beside the next.
+        self.last = None;
         let Scene { frame, notes } = self.read(number)?;
         if !self.as_is {
             frame.validate().map_err(|defect| format!("{}: {defect}", self.name(number)))?;
@@ -186,22 +245,36 @@ impl FrameSource for FrameFiles {
         self.notes.add(number, notes);
         let (fewest, most) = self.counts.unwrap_or((frame.len(), frame.len()));
         self.counts = Some((fewest.min(frame.len()), most.max(frame.len())));
-        self.last = Some((number, frame.clone()));
+        self.last = self.keeps_last.then(|| (number, frame.clone()));
         Ok(frame)
     }
 }
 
 impl FrameFiles {
     /// Reads a frame as it is.
-    fn read(&mut self, number: u32) -> Result<Scene, String> {
+    fn read(&mut self, number: u32) -> Result<Scene, Unread> {
         let place = if self.sequence.is_some() { 0 } else { number as usize };
-        let path = self.paths.get(place).ok_or_else(|| format!("there is no frame {number}"))?;
+        let none = || Unread { message: format!("there is no frame {number}"), is_over_memory: false };
+        let path = self.paths.get(place).ok_or_else(none)?;
         let read = match &mut self.sequence {
             Some(sequence) => sequence.frame(number),
             None => read_scene_as_is(path, &self.reading.limits(path)),
         };
-        read.map_err(|error| named(&error, path, self.spooled.is_some()))
+        read.map_err(|error| unreadable(&error, path, self.spooled.is_some(), &self.reading))
     }
+}
+
+/// A frame that cannot be read.
+fn unreadable(error: &SceneError, path: &Path, is_spooled: bool, reading: &InputArgs) -> Unread {
+    if !reading.is_over_memory(error) {
+        return Unread { message: named(error, path, is_spooled), is_over_memory: false };
+    }
+    let advice = match error.kind {
+        SceneErrorKind::OverLimit { asked, .. } => of_encoding(asked),
+        _ => "close other programs, or raise what limits this one, as ulimit -v shows it".to_owned(),
+    };
+    let name = if is_spooled { STANDARD_INPUT.to_owned() } else { path.display().to_string() };
+    Unread { message: format!("{name}: {}\n  {advice}", error.kind), is_over_memory: true }
 }
 
 /// An error of reading, with advice; what came by standard input is called that.

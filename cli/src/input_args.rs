@@ -23,12 +23,29 @@ pub(crate) struct InputArgs {
     /// Frames to take of a scene in continuous time, .splatv: so many, evenly over its length [default: 50].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     samples: Option<u32>,
+    /// Memory that the command has for everything, bytes; none: reading is bounded by itself.
+    #[arg(skip)]
+    memory: Option<u64>,
 }
 
 impl InputArgs {
     /// How the frames of a file of many are chosen.
     pub(crate) fn sequence(&self) -> SequenceOptions {
         SequenceOptions { samples: self.samples.unwrap_or(SequenceOptions::default().samples) }
+    }
+
+    /// The same where everything together has so much memory.
+    pub(crate) fn within(self, memory: u64) -> Self {
+        Self { memory: Some(memory), ..self }
+    }
+
+    /// Whether a scene is refused because of the memory that there is for everything, or is left of the machine.
+    pub(crate) fn is_over_memory(&self, error: &SceneError) -> bool {
+        match error.kind {
+            SceneErrorKind::OverLimit { allowed, .. } => Some(allowed) == self.memory,
+            SceneErrorKind::OutOfMemory { .. } => self.memory.is_some(),
+            _ => false,
+        }
     }
 
     /// The frame in a file that a command has written.
@@ -44,7 +61,8 @@ impl InputArgs {
     /// The limits for the scene at a path.
     pub(crate) fn limits(&self, path: &Path) -> ReadLimits {
         let of_file = || size_of(path).saturating_mul(PER_BYTE).saturating_add(BASE).min(MOST);
-        ReadLimits { max_memory: self.max_input_memory.unwrap_or_else(of_file) }
+        let of_reading = self.max_input_memory.unwrap_or_else(of_file);
+        ReadLimits { max_memory: of_reading.min(self.memory.unwrap_or(u64::MAX)) }
     }
 }
 
@@ -61,7 +79,7 @@ pub(crate) fn with_advice(error: &SceneError) -> String {
 
 /// Bytes of a file, or of the files in a directory; 0 if they cannot be had, which reading will say. A file that names
 /// others, as a .gltf and the meta.json of a SOG scene do, counts with those beside it.
-fn size_of(path: &Path) -> u64 {
+pub(crate) fn size_of(path: &Path) -> u64 {
     let names_others = path
         .extension()
         .is_some_and(|extension| ["gltf", "json"].iter().any(|other| extension.eq_ignore_ascii_case(other)));

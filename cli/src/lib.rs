@@ -86,7 +86,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Demo(demo::Demo),
-    Encode(encode::Encode),
+    Encode(Box<encode::Encode>),
     Decode(decode::Decode),
     Inspect(inspect::Inspect),
     Validate(validate::Validate),

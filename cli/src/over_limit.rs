@@ -5,7 +5,7 @@ use splatstream_format::{Error, ErrorKind, Limits};
 /// The option that raises limits.
 const OPTION: &str = "--max-gaussians";
 
-/// The option that says how much memory decoding may take.
+/// The option that says how much memory decoding or encoding may take.
 const MEMORY: &str = "--max-memory";
 
 /// The advice for an error of this class in a stream of a level, if that is known.
@@ -42,6 +42,15 @@ pub(crate) fn advice(error: &Error, level: Option<u8>) -> String {
         None => "one of the specification".to_owned(),
     };
     format!("no option raises this limit: it is {whose}; report it to the author of the encoder")
+}
+
+/// The advice where encoding takes so many bytes and may not.
+pub(crate) fn of_encoding(asked: u64) -> String {
+    format!(
+        "close other programs, or allow it with {MEMORY} {} where there is as much; a faster --preset and no --finetune take less, and \
+         of a sequence --all-intra, a smaller --gop, and a --shard instead of a --target-mb",
+        megabytes(asked)
+    )
 }
 
 /// A size as the option reads it, rounded up.

@@ -50,7 +50,7 @@ pub fn refinements_by_slope(
     if count == 1 {
         return Ok(vec![100]);
     }
-    let mut checked = CheckedSource::new(source, settings.drop_invalid);
+    let mut checked = CheckedSource::new(source, settings);
     let frame = checked.frame(0).map_err(|source| named(Error::Source { frame: 0, source }))?;
     let rows = visible(&frame, settings.keep_invisible);
     let frame = frame.into_selected(&rows);

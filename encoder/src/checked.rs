@@ -1,16 +1,21 @@
 //! Frames as the encoder takes them: every value is finite, every rotation has a direction.
 
 use crate::error::Error;
+use crate::memory::Footprint;
 use crate::report::Dropped;
+use crate::settings::Settings;
 use crate::source::FrameSource;
 use splatstream_gaussians::{Defects, GaussianFrame};
 use std::collections::BTreeMap;
 use xxhash_rust::xxh64::Xxh64;
 
-/// Refuses Gaussians with values that no frame may hold, or leaves them out.
+/// Refuses Gaussians with values that no frame may hold, or leaves them out; and frames that take more memory to encode than
+/// there may be.
 pub(crate) struct CheckedSource<'a> {
     source: &'a mut dyn FrameSource,
-    drop_invalid: bool,
+    settings: &'a Settings,
+    /// Most memory that encoding may take, bytes.
+    max_memory: u64,
     /// By frame.
     dropped: BTreeMap<u32, Defects>,
     /// Gaussians that each frame shall have, and its digest; empty where that is not known.
@@ -34,8 +39,14 @@ enum Unplanned {
 struct Invalid(Defects);
 
 impl<'a> CheckedSource<'a> {
-    pub(crate) fn new(source: &'a mut dyn FrameSource, drop_invalid: bool) -> Self {
-        Self { source, drop_invalid, dropped: BTreeMap::new(), expected: (&[], &[]), digests: None }
+    pub(crate) fn new(source: &'a mut dyn FrameSource, settings: &'a Settings) -> Self {
+        let max_memory = settings.max_memory;
+        Self { source, settings, max_memory, dropped: BTreeMap::new(), expected: (&[], &[]), digests: None }
+    }
+
+    /// The same where some of the memory is taken already.
+    pub(crate) fn beside(self, taken: u64) -> Self {
+        Self { max_memory: self.max_memory.saturating_sub(taken), ..self }
     }
 
     /// Refuses frames that have other numbers of Gaussians, or other digests.
@@ -83,12 +94,13 @@ impl FrameSource for CheckedSource<'_> {
 
     fn frame(&mut self, number: u32) -> Result<GaussianFrame, Box<dyn std::error::Error + Send + Sync>> {
         let frame = self.source.frame(number)?;
+        Footprint::of(&frame, self.source.len(), self.settings).check(number, self.max_memory)?;
         self.check(number, &frame)?;
         if let Some(digests) = &mut self.digests {
             digests.entry(number).or_insert_with(|| digest(&frame));
         }
         let Some(defects) = frame.defects() else { return Ok(frame) };
-        if !self.drop_invalid {
+        if !self.settings.drop_invalid {
             return Err(Box::new(Invalid(defects)));
         }
         let frame = without(frame, &defects.rows);
@@ -110,7 +122,10 @@ pub(crate) fn named(error: Error) -> Error {
                     Unplanned::Count { found, planned } => Error::OtherFrame { frame, found, planned },
                     Unplanned::Values => Error::ChangedFrame { frame },
                 },
-                Err(source) => Error::Source { frame, source },
+                Err(source) => match source.downcast::<Error>() {
+                    Ok(error) => *error,
+                    Err(source) => Error::Source { frame, source },
+                },
             },
         },
         other => other,

@@ -45,6 +45,20 @@ pub enum Error {
         /// The most that one second holds.
         max: u64,
     },
+    /// A frame takes more memory to encode than the settings allow.
+    #[error(
+        "frame {frame}: encoding {gaussians} Gaussians takes up to {asked} bytes of memory, at most {allowed} are allowed (max_memory)"
+    )]
+    OverMemory {
+        /// The frame.
+        frame: u32,
+        /// Its Gaussians.
+        gaussians: u64,
+        /// Bytes that encoding takes at most, one GOP at a time.
+        asked: u64,
+        /// Bytes that it may take: [`Settings::max_memory`](crate::Settings::max_memory), less frames that wait.
+        allowed: u64,
+    },
     /// A frame has values that no frame may hold.
     #[error("frame {frame}: number of invalid Gaussians: {count}; for example {first}")]
     Invalid {

@@ -89,16 +89,17 @@ pub(crate) struct Reference {
 }
 
 impl Reference {
-    /// Has what is predicted from an I frame follow its fitted values, and not those of its source.
+    /// Has what is predicted from an I frame follow its fitted values, and not those of its source. `members`: the place of each
+    /// Gaussian in the target, list by list.
     ///
     /// # Errors
     /// Lists whose planes make no frame.
     pub(crate) fn differs_from(
         &mut self,
-        target: &Target,
+        (target, members): (&Target, &[Vec<u32>]),
         sequence: &SequenceParameters,
     ) -> Result<(), Error> {
-        self.deviation = Some(Deviation::of_intra((&self.lists, &self.rows), target, sequence)?);
+        self.deviation = Some(Deviation::of_intra((&self.lists, members), target, sequence)?);
         Ok(())
     }
 

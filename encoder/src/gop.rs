@@ -347,7 +347,7 @@ impl<'a> SpanCoder<'a> {
         if !is_predicted {
             target.forget();
         }
-        let mut coded = code_intra(
+        let (mut coded, members) = code_intra(
             &coder,
             IntraTarget {
                 chooser: Chooser { predictors, ..self.chooser() },
@@ -366,7 +366,7 @@ impl<'a> SpanCoder<'a> {
             self.report.savings.extend(coded.savings.iter().chain(&worth_of_reuse(&coded)));
         }
         if is_predicted && fitted.as_ref().is_some_and(|fitted| fitted.is_changed) {
-            coded.reference.differs_from(&target, &self.common.sequence)?;
+            coded.reference.differs_from((&target, &members), &self.common.sequence)?;
         }
         let reports = fitted.into_iter().flat_map(|fitted| fitted.reports);
         self.report.finetuned.extend(reports.map(|report| FinetuneReport { frame: number, ..report }));

@@ -34,6 +34,7 @@ mod importance;
 mod isolated;
 mod laws;
 mod matching;
+mod memory;
 mod models;
 mod motion;
 mod parametric_fit;

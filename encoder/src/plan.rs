@@ -72,7 +72,7 @@ pub struct Plan {
 /// # Errors
 /// Settings or frames that cannot be coded, a source that cannot be read.
 pub fn plan(source: &mut dyn FrameSource, settings: &Settings) -> Result<Plan, Error> {
-    let mut source = CheckedSource::new(source, settings.drop_invalid).with_digests();
+    let mut source = CheckedSource::new(source, settings).with_digests();
     let plan = planned(&mut source, settings).map_err(named)?;
     Ok(Plan { frame_digests: source.into_digests(), ..plan })
 }
@@ -181,8 +181,8 @@ impl Plan {
         if source.len() != sequence_frames {
             return Err(Error::OtherFrames { found: source.len(), planned: sequence_frames });
         }
-        let mut source = CheckedSource::new(source, self.settings.drop_invalid)
-            .expecting(&self.analysis.counts, &self.frame_digests);
+        let mut source =
+            CheckedSource::new(source, &self.settings).expecting(&self.analysis.counts, &self.frame_digests);
         let encoded = self.encode(&mut source, (frames, Some(shard)), sink, progress, None);
         let mut report = encoded.map_err(named)?.unwrap_or_default();
         (report.target, report.stands_alone) = (self.target, self.stands_alone);
@@ -210,7 +210,7 @@ impl Plan {
         record.verifier = is_verified.then(|| Verifier::new(frames.clone()));
         let mut writer = UnitWriter::new(sink, &mut record);
         let spans = self.spans(frames);
-        let at_once = at_once(settings, &self.analysis, &spans);
+        let at_once = at_once(settings, &self.analysis, &spans, settings.max_memory);
         let description = self.analysis.description(settings);
         let head =
             Head { level: self.analysis.level, description: Some(&description), shard: shard.as_ref() };

@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::frame::learning;
 use crate::importance::Ranking;
 use crate::isolated::Isolated;
+use crate::memory::{Footprint, bytes_of};
 use crate::prune::refuse_pruning;
 use crate::report::Report;
 use crate::room::{Announced, announce};
@@ -122,6 +123,7 @@ impl<W: Write> Encoder<W> {
             Some(stream) => stream.hold(frame, number)?,
             None => frame,
         };
+        self.check_memory(&frame, number)?;
         self.window.frames.push_back(frame);
         let complete = u64::from(self.gop_length()).saturating_mul(self.gops_at_once.into());
         // With one frame more, the sequence is known to have more than one GOP.
@@ -143,8 +145,10 @@ impl<W: Write> Encoder<W> {
         }
         if self.stream.is_none() {
             let mut told = |done, _| tell(&mut self.told, done);
-            let report = crate::encode(&mut self.window, &self.settings, &mut self.sink, &mut told)
-                .map_err(cancelled)?;
+            let max_memory = self.settings.max_memory.saturating_sub(self.window.bytes());
+            let settings = Settings { max_memory, ..self.settings };
+            let report =
+                crate::encode(&mut self.window, &settings, &mut self.sink, &mut told).map_err(cancelled)?;
             self.sink.flush()?;
             return Ok(report);
         }
@@ -156,6 +160,13 @@ impl<W: Write> Encoder<W> {
         Ok(report)
     }
 
+    /// Refuses a frame that cannot be coded beside those that wait with it.
+    fn check_memory(&self, frame: &GaussianFrame, number: u32) -> Result<(), Error> {
+        let waiting = self.window.bytes().saturating_add(bytes_of(frame));
+        let allowed = self.settings.max_memory.saturating_sub(waiting);
+        Footprint::of(frame, number.saturating_add(1), &self.settings).check(number, allowed)
+    }
+
     /// Frames of a GOP, at most.
     fn gop_length(&self) -> u32 {
         self.stream.as_ref().map_or_else(|| self.settings.gop_length(), |stream| stream.settings.gop_length())
@@ -165,8 +176,9 @@ impl<W: Write> Encoder<W> {
     /// to it.
     fn start(&mut self) -> Result<(), Error> {
         let frames = self.gop_length().saturating_add(1);
+        let waiting = self.window.bytes();
         let mut first = FirstFrames { source: &mut self.window, frames };
-        let mut source = CheckedSource::new(&mut first, self.settings.drop_invalid);
+        let mut source = CheckedSource::new(&mut first, &self.settings).beside(waiting);
         let mut stream = Stream::start(&mut source, &self.settings, &mut self.sink)
             .map_err(|error| cancelled(named(error)))?;
         for (number, frame) in (0..).zip(&mut self.window.frames).skip(frames as usize) {
@@ -191,9 +203,11 @@ impl<W: Write> Encoder<W> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
         let before = self.window.first;
         let frames = before..end;
-        let mut source = CheckedSource::new(&mut self.window, stream.settings.drop_invalid);
+        let waiting = self.window.bytes();
+        let mut source = CheckedSource::new(&mut self.window, &self.settings).beside(waiting);
+        let room = self.settings.max_memory.saturating_sub(waiting);
         let mut told = |done: u32| tell(&mut self.told, before.saturating_add(done));
-        let coded = stream.code(&mut source, frames, &mut self.sink, &mut told);
+        let coded = stream.code(&mut source, (frames, room), &mut self.sink, &mut told);
         coded.map_err(|error| cancelled(named(error)))?;
         stream.report.leave_out(source.into_dropped());
         self.window.drop_before(end);
@@ -229,11 +243,11 @@ impl Stream {
         Ok(frame)
     }
 
-    /// Codes frames that begin and end with a GOP.
+    /// Codes frames that begin and end with a GOP, in so much memory.
     fn code(
         &mut self,
         source: &mut dyn FrameSource,
-        frames: Range<u32>,
+        (frames, room): (Range<u32>, u64),
         sink: &mut dyn Write,
         progress: &mut dyn FnMut(u32),
     ) -> Result<(), Error> {
@@ -241,7 +255,7 @@ impl Stream {
         let ranking =
             if self.record.gops.is_empty() { self.ranking.clone() } else { self.ranking.for_later() };
         let spans = Spans::new(frames, settings.gop_length());
-        let at_once = at_once(settings, &self.analysis, &spans);
+        let at_once = at_once(settings, &self.analysis, &spans, room);
         let common = Common {
             settings,
             sequence: self.analysis.parameters,

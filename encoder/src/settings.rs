@@ -306,6 +306,11 @@ pub struct Settings {
     /// Memory that GOPs coded at the same time may take together, bytes, as far as it can be estimated; one GOP at a
     /// time takes what it takes. The stream is the same whatever stands here.
     pub gop_memory: u64,
+    /// Most memory that encoding may take at the same time, bytes, beside what a source of frames keeps for itself: frames that
+    /// take [more](Settings::memory) are [refused](crate::Error::OverMemory) before any of it is taken. With little, fewer GOPs
+    /// are coded at once. Default: no bound, for a caller's own frames; who encodes what strangers send gives one. The stream is
+    /// the same whatever stands here.
+    pub max_memory: u64,
     /// Ticks in a second, and from one frame to the next.
     pub ticks: (u32, u32),
     /// What the stream says about its scene. The bounds are those of the Gaussians, whatever stands here.
@@ -413,6 +418,7 @@ impl Default for Settings {
             tools: Tools::default(),
             block_log2: 14,
             gop_memory: 2 << 30,
+            max_memory: u64::MAX,
             ticks: (30, 1),
             description: SceneDescription::default(),
         }

@@ -15,6 +15,7 @@ mod job;
 use crate::error::Error;
 use crate::gop::SpanCoder;
 use crate::importance::Ranking;
+use crate::memory::Footprint;
 use crate::report::Report;
 use crate::sequence::Analysis;
 use crate::settings::Settings;
@@ -26,10 +27,6 @@ use splatstream_format::Limits;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::SequenceParameters;
 use std::collections::VecDeque;
-
-/// Memory that coding a GOP takes beside its frames, bytes for each Gaussian of its largest frame: an
-/// estimate, which has not been compared with measured memory.
-const BESIDE_FRAMES: u64 = 700;
 
 /// What all spans of a sequence are coded with.
 #[derive(Clone, Copy)]
@@ -89,15 +86,19 @@ impl Iterator for Spans {
     }
 }
 
-/// How many GOPs are coded at once: as many as there are threads, but no more than the settings have memory for.
-pub(crate) fn at_once(settings: &Settings, analysis: &Analysis, spans: &Spans) -> usize {
-    let gaussians = analysis.largest as u64;
-    let planes = u64::from(analysis.parameters.sh_dimension()).saturating_add(14);
-    let frames = u64::from(spans.length.min(spans.frames.end.saturating_sub(spans.frames.start)));
-    let of_span = gaussians
-        .saturating_mul(frames.saturating_mul(planes).saturating_mul(4).saturating_add(BESIDE_FRAMES));
-    let fitting = settings.gop_memory.checked_div(of_span).unwrap_or(u64::MAX);
-    let fitting = usize::try_from(fitting).unwrap_or(usize::MAX).max(1);
+/// How many GOPs are coded at once: as many as there are threads, but no more than the settings have memory for. `room`: what
+/// there is for all that encoding takes.
+pub(crate) fn at_once(settings: &Settings, analysis: &Analysis, spans: &Spans, room: u64) -> usize {
+    let gaussians = analysis.counts.iter().copied().max().map_or(0, u64::from);
+    let frames = spans.frames.end.saturating_sub(spans.frames.start);
+    let footprint = Footprint::new(gaussians, analysis.source_sh_degree, frames, settings);
+    let of_another = footprint.of_another_gop().max(1);
+    let together = settings.gop_memory.checked_div(of_another).unwrap_or(0);
+    // One is coded in any case, from frames that are read when they are needed. Those of several are in memory.
+    let beside_one =
+        room.saturating_sub(footprint.bytes()).saturating_sub(footprint.frames_of_gop_in_memory());
+    let in_room = beside_one.checked_div(of_another).unwrap_or(0).saturating_add(1);
+    let fitting = usize::try_from(together.min(in_room)).unwrap_or(usize::MAX).max(1);
     fitting.min(rayon::current_num_threads()).min(spans.left() as usize)
 }
 
@@ -130,23 +131,45 @@ impl Coding<'_, '_> {
         at_once: usize,
         judge: Option<Judge<'_>>,
     ) -> Result<bool, Error> {
-        match (at_once, judge) {
-            (0 | 1, None) => self.one_by_one(spans, ranking),
-            (_, judge) => self.several(spans, ranking, at_once.max(1), judge),
+        match at_once {
+            0 | 1 => self.one_by_one(spans, ranking, judge),
+            _ => self.several(spans, ranking, at_once, judge),
         }
     }
 
-    /// Frames are read when they are needed, and what is coded of them is written at once.
-    fn one_by_one(&mut self, spans: Spans, ranking: Ranking) -> Result<bool, Error> {
-        self.begin()?;
+    /// Frames are read when they are needed, and what is coded of them is written at once, but for the span that is judged.
+    fn one_by_one(
+        &mut self,
+        spans: Spans,
+        ranking: Ranking,
+        mut judge: Option<Judge<'_>>,
+    ) -> Result<bool, Error> {
         let start = spans.frames.start;
         let mut rankings = rankings(ranking);
         for span in spans {
+            if judge.is_none() {
+                self.begin()?;
+            }
             let done = span.first.saturating_sub(start);
             let progress = &mut |frames: u32| (self.progress)(done.saturating_add(frames));
             let ranking = rankings();
-            let coder = SpanCoder::new(self.source, self.common, ranking, self.writer, progress);
-            self.report.append(coder.code(span)?);
+            let report = match judge.take() {
+                None => {
+                    SpanCoder::new(self.source, self.common, ranking, self.writer, progress).code(span)?
+                }
+                Some(judge) => {
+                    let mut coded = Coded::default();
+                    let coder = SpanCoder::new(self.source, self.common, ranking, &mut coded, progress);
+                    let report = coder.code(span)?;
+                    if !judge(self.source, &coded, &report)? {
+                        return Ok(false);
+                    }
+                    self.begin()?;
+                    coded.write_to(self.writer)?;
+                    report
+                }
+            };
+            self.report.append(report);
         }
         Ok(true)
     }

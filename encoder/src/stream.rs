@@ -25,7 +25,7 @@ pub fn encode(
     sink: &mut dyn Write,
     progress: Progress<'_>,
 ) -> Result<Report, Error> {
-    let mut source = CheckedSource::new(source, settings.drop_invalid);
+    let mut source = CheckedSource::new(source, settings);
     let mut report = match settings.prune {
         None => encode_checked(&mut source, settings, sink, progress)?,
         Some(least) => {

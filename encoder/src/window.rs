@@ -1,6 +1,7 @@
 //! Parts of sequences: frames that are in memory, and the first frames of a source.
 
 use crate::error::Error;
+use crate::memory::bytes_of;
 use crate::source::FrameSource;
 use splatstream_decoder::interrupt::Interrupt;
 use splatstream_gaussians::GaussianFrame;
@@ -32,6 +33,11 @@ impl FrameSource for Window {
 }
 
 impl Window {
+    /// What the frames take.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.frames.iter().map(bytes_of).fold(0, u64::saturating_add)
+    }
+
     /// Forgets the frames before one.
     pub(crate) fn drop_before(&mut self, number: u32) {
         self.frames.drain(..(number.saturating_sub(self.first) as usize).min(self.frames.len()));

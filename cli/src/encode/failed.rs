@@ -1,17 +1,18 @@
 //! Errors of the encoder in the words of the command line.
 
 use crate::failure::Failure;
-use crate::frame_files::FrameFiles;
+use crate::frame_files::{FrameFiles, unread};
 use crate::numbers::counted;
+use crate::over_limit::of_encoding;
 use splatstream_encoder::Error;
 use splatstream_gaussians::Defect;
 use std::path::Path;
 
-/// The encoder counts frames; a user has files.
-pub(super) fn failed(source: &FrameFiles, out: &Path, error: &Error) -> Failure {
+/// The encoder counts frames; a user has files. `memory`: what there is for reading and encoding together.
+pub(super) fn failed(source: &FrameFiles, (out, memory): (&Path, u64), error: &Error) -> Failure {
     match error {
         // Errors of reading name the file.
-        Error::Source { source, .. } => Failure::other(source.to_string()),
+        Error::Source { source, .. } => unread(source.as_ref()),
         Error::Invalid { frame, count, first } => {
             let Defect { row, property, value, kind } = first;
             let path = source.name(*frame);
@@ -26,6 +27,12 @@ pub(super) fn failed(source: &FrameFiles, out: &Path, error: &Error) -> Failure 
                 "{path}: frame {frame}, Gaussian {row}: {property} is {value}: {kind}{more}\n  \
                  repair the file, or leave such Gaussians out with --drop-invalid"
             ))
+        }
+        Error::OverMemory { frame, asked, allowed, .. } => {
+            // What is allowed is what readers leave.
+            let beside = memory.saturating_sub(*allowed);
+            let advice = of_encoding(asked.saturating_add(beside));
+            Failure::Memory(format!("{}: {error}\n  {advice}", source.name(*frame)))
         }
         Error::OutOfGrid { frame, farthest_row, .. } => Failure::other(format!(
             "{}: {error}\n  repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from \

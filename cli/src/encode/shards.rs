@@ -101,11 +101,14 @@ impl ShardArgs {
         &self,
         source: &mut FrameFiles,
         settings: &Settings,
+        memory: u64,
     ) -> Result<Option<Shard>, Failure> {
         let Some(number) = self.shard else { return Ok(None) };
         let plan = match &self.plan {
             Some(path) => read(path, settings)?,
-            None => plan(source, settings).map_err(|error| failed(source, Path::new("-"), &error))?,
+            None => {
+                plan(source, settings).map_err(|error| failed(source, (Path::new("-"), memory), &error))?
+            }
         };
         let frames = plan.frames_of_shard(number).map_err(|error| too_many(&error))?;
         let report = ShardReport {
@@ -150,16 +153,18 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
             "{out}: --write-plan writes JSON; give a name that ends in .json"
         )));
     }
-    let mut source = FrameFiles::find(&command.inputs, command.reading)?.unchecked();
+    let memory = command.memory();
+    let mut source = FrameFiles::find(&command.inputs, command.reading.within(memory))?.unchecked();
     let read = command.read_files(&source);
     refuse_inputs(out, &read)?;
     let (mut settings, _) = command.settings(&mut source)?;
+    settings.max_memory = source.left_for(&settings, memory);
     let put = command.refinements.put(&mut source, &mut settings);
-    put.map_err(|error| failed(&source, out, &error))?;
+    put.map_err(|error| failed(&source, (out, memory), &error))?;
     let file = OutputFile::create(out, &read)?;
-    let plan = plan(&mut source, &settings).map_err(|error| failed(&source, out, &error))?;
+    let plan = plan(&mut source, &settings).map_err(|error| failed(&source, (out, memory), &error))?;
     let (most_shards, frames) = (plan.shards(), source.len());
-    let plan = plan.record().map_err(|error| failed(&source, out, &error))?;
+    let plan = plan.record().map_err(|error| failed(&source, (out, memory), &error))?;
     let (digest, gaussians) =
         (format!("{:016x}", plan.digest()), plan.gaussians.iter().map(|&n| u64::from(n)).sum());
     let plan = PlanFile { format: FORMAT.to_owned(), frames, most_shards, plan };

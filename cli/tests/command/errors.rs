@@ -109,6 +109,8 @@ const CASES: &[&str] = &[
     // Limits.
     "validate good.gss --max-gaussians 10",
     "encode good.ply -o out.gss --max-input-memory 1K",
+    "encode good.ply -o out.gss --max-memory 10K",
+    "encode good.ply -o out.gss --max-memory 4M",
     // Values that no stream can have.
     "encode nan.ply -o out.gss",
     "encode loud.ply -o out.gss",

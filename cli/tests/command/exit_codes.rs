@@ -1,6 +1,9 @@
 //! Every exit code, and what the user is told with it.
 
-use crate::common::{UNIT_HEADER, directory, fail, fixture, json, payload_length, run, seal, text};
+use crate::common::{
+    UNIT_HEADER, directory, fail, fixture, json, payload_length, run, seal, succeed, text, write_frames,
+    write_still,
+};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -125,6 +128,25 @@ fn over_a_limit_is_13() {
     for command in [&["validate"][..], &["decode", "--dry-run"], &["compare", text(&stream)]] {
         let said = fail(13, &[command, &[text(&stream), "--max-memory", "1M"]].concat());
         assert!(said.contains("or allow it with --max-memory "), "{said}");
+    }
+    // So is encoding, with the scene that is read, before anything is written.
+    let directory = directory();
+    let (still, out) = (write_still(directory.path()), directory.path().join("out.gss"));
+    let sequence = write_frames(directory.path());
+    for (input, memory) in [(&still, "10K"), (&still, "4M"), (&sequence, "4M")] {
+        let encode = ["encode", text(input), "-o", text(&out), "--preset", "fast"];
+        let said = fail(13, &[&encode[..], &["--max-memory", memory]].concat());
+        assert!(said.contains("or allow it with --max-memory "), "{said}");
+        let needed = said.split("--max-memory ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 2, "something is left of {said}");
+        if memory == "4M" {
+            // What is said to be enough is, and the stream is that without a bound.
+            succeed(&[&encode[..], &["--max-memory", needed]].concat());
+            let bounded = fs::read(&out).unwrap();
+            succeed(&encode);
+            assert_eq!(bounded, fs::read(&out).unwrap());
+            fs::remove_file(&out).unwrap();
+        }
     }
     // What no option helps with is not said to be helped by one.
     for vector in ["limit-codebook-values", "limit-payload-length", "limit-gaussians-4294967295"] {

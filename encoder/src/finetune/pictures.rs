@@ -20,6 +20,13 @@ const WITNESSES: u32 = 5;
 /// Of so many photographs one is for judges, and one to report by.
 const OF_PHOTOGRAPHS: usize = 8;
 
+/// Bytes of a pixel of what views should show, and of those of an iteration, which are drawn and whose slopes are taken.
+const OF_WANTED: u64 = 12;
+const OF_DRAWN: u64 = 160;
+
+/// Width of the views that are made, heights.
+const USUAL_WIDTH: f64 = 16.0 / 9.0;
+
 /// Seeds of the views that slopes are taken of, and of those of judges.
 const SEEDS: [u64; 2] = [1, 2];
 
@@ -224,6 +231,21 @@ fn drawn_for(
 }
 
 impl Finetune {
+    /// What pictures take that are there at the same time, bytes.
+    pub(crate) fn bytes_of_pictures(&self, settings: &Settings) -> u64 {
+        let width = |camera: &Camera| f64::from(camera.width) / f64::from(camera.height.max(1));
+        let cameras = settings.cameras.iter().chain(self.photographs.iter().map(|one| &one.camera));
+        let widest = cameras.map(width).fold(USUAL_WIDTH, f64::max);
+        let pixels = |lines: u32| (widest * f64::from(lines) * f64::from(lines)) as u64;
+        let kept = match self.photographs.len() {
+            0 => JUDGES + WITNESSES as usize,
+            photographs => 2 * photographs.div_ceil(OF_PHOTOGRAPHS),
+        };
+        let of_pixel = (kept as u64).saturating_mul(OF_WANTED).saturating_add(OF_DRAWN);
+        let all = self.lines_of_pictures(settings).into_iter().map(pixels).fold(0, u64::saturating_add);
+        all.saturating_mul(of_pixel)
+    }
+
     /// The photographs that are used for something.
     fn of_role(&self, role: Role) -> impl Iterator<Item = &Photograph> {
         let role_of = |number: usize| match number % OF_PHOTOGRAPHS {

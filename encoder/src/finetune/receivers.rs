@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::frame::ladder::Ladder;
 use crate::settings::Settings;
 use splatstream_decoder::operating_point::OperatingPoint;
+use std::collections::BTreeSet;
 
 /// Lines of a picture: those at which quality is meant. Fuzzing wants streams, not pictures.
 pub(super) const LINES: u32 = if cfg!(fuzzing) { 12 } else { 540 };
@@ -89,6 +90,14 @@ impl Finetune {
         // Frames that are predicted follow what the highest layer has, and lower ones cost it bits.
         let lowest = if settings.temporal_layers() > 0 { layers.saturating_sub(1) } else { 0 };
         (lowest..layers).map(of_layer).collect()
+    }
+
+    /// The lines of all pictures that are there at the same time: those of the lowest layer by themselves, of which others have more.
+    pub(super) fn lines_of_pictures(&self, settings: &Settings) -> BTreeSet<u32> {
+        let layers = settings.spatial_layer_count();
+        let points = self.points(layers, settings);
+        let own = points.iter().map(|given| self.own_lines(given.point.spatial, layers));
+        own.chain(self.resolutions.iter().copied()).collect()
     }
 
     /// The share of the weights of points that show all Gaussians: at the others finer steps do not bring what they should.

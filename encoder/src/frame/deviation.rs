@@ -31,18 +31,16 @@ pub(crate) struct Deviation {
 }
 
 impl Deviation {
-    /// Of the lists of an I frame. `rows`: where each Gaussian stands in its file, list by list.
+    /// Of the lists of an I frame. `members`: the place of each Gaussian in the target, list by list.
     ///
     /// # Errors
     /// Lists whose planes make no frame.
     pub(crate) fn of_intra(
-        (lists, rows): (&[GaussianList], &[Vec<u32>]),
+        (lists, members): (&[GaussianList], &[Vec<u32>]),
         target: &Target,
         sequence: &SequenceParameters,
     ) -> Result<Self, Error> {
-        // Rows of a target rise.
-        let index = |row: &u32| target.rows.binary_search(row).unwrap_or(0) as u32;
-        let indices: Vec<u32> = rows.iter().flatten().map(index).collect();
+        let indices = members.concat();
         let source = target.frame.select(&indices);
         let mut values = shown(lists, sequence)?;
         let is_round: Vec<bool> = {

@@ -60,11 +60,14 @@ struct Intra<'a> {
     savings: Vec<Saving>,
 }
 
-/// Codes an I frame.
+/// Codes an I frame; gives it, and the Gaussians of each list by their places in the target.
 ///
 /// # Errors
 /// What the decoder's own checks refuse.
-pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: IntraTarget<'_>) -> Result<CodedFrame, Error> {
+pub(crate) fn code_intra(
+    coder: &UnitCoder<'_>,
+    target: IntraTarget<'_>,
+) -> Result<(CodedFrame, Vec<Vec<u32>>), Error> {
     let sequence = coder.sequence;
     let refinements = usize::from(sequence.refinement_count);
     let sh_planes = usize::from(sequence.sh_dimension());
@@ -94,7 +97,7 @@ pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: IntraTarget<'_>) -> Resu
         models: models.first,
         deviation: None,
     };
-    Ok(CodedFrame { cells: None, carried_digest: None, units, reference, savings })
+    Ok((CodedFrame { cells: None, carried_digest: None, units, reference, savings }, members))
 }
 
 impl Intra<'_> {

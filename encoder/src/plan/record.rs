@@ -268,7 +268,7 @@ fn described(settings: &Settings) -> Vec<(&'static str, String)> {
     let Settings { sh_degree, sh, keep_invisible, importance, cameras, fidelity, tolerance, tools, .. } =
         settings;
     // How much is coded at once changes nothing.
-    let Settings { block_log2, ticks, description, finetune, gop_memory: _, .. } = settings;
+    let Settings { block_log2, ticks, description, finetune, gop_memory: _, max_memory: _, .. } = settings;
     let network = match network {
         Some(NetworkSource::Given(_)) => "given".to_owned(),
         other => format!("{other:?}"),

@@ -71,6 +71,8 @@ class EncodeOptions(TypedDict, total=False):
     height: Lines to reduce these photographs to.
     time_budget: Seconds that encoding may take; the preset and the iterations follow from it. It needs a sequence.
     gop_memory: Memory that GOPs coded at the same time may take together, as "2G" or bytes.
+    max_memory: Most memory that encoding may take, as "4G" or bytes; by default three quarters of what the machine has free. Frames
+        that take more are refused.
     """
 
     quality: Literal["low", "medium", "high", "visually-lossless"]
@@ -112,6 +114,7 @@ class EncodeOptions(TypedDict, total=False):
     height: int
     time_budget: float
     gop_memory: int | str
+    max_memory: int | str
 
 
 class EncodeWarning(UserWarning):
