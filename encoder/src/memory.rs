@@ -77,9 +77,10 @@ impl Share {
 /// away, and codebooks.
 const INTRA_FAST: Share = Share { copies: 27, bytes: 80 };
 const INTRA: Share = Share { copies: 33, bytes: 240 };
-/// Gaussians that are in the strips of the views in which steps are fitted; where there are many, there are fewer strips.
-const IN_STRIPS_FAST: Share = Share { copies: 13, bytes: 10 };
-const IN_STRIPS: Share = Share { copies: 25, bytes: 20 };
+/// Gaussians that are in the strips of the views in which steps are fitted, were they seven times as large as usual; where there are
+/// many, there are fewer strips.
+const IN_STRIPS_FAST: Share = Share { copies: 20, bytes: 10 };
+const IN_STRIPS: Share = Share { copies: 33, bytes: 20 };
 const MANY: u64 = 1 << 19;
 /// Coding predicted frames: references, what pairs them with the frame, and what becomes of each Gaussian in two ways.
 const PREDICTED_FAST: Share = Share { copies: 87, bytes: 240 };

@@ -40,6 +40,14 @@ fn scene(gaussians: u32, sh_degree: u8, frames: u32, tracking: Tracking) -> Vec<
     (0..frames).map(|number| scene.frame(number)).collect()
 }
 
+/// The same with Gaussians seven times as large.
+fn enlarged(mut frames: Vec<GaussianFrame>) -> Vec<GaussianFrame> {
+    for plane in frames.iter_mut().flat_map(|frame| frame.planes_mut().log_scale) {
+        plane.iter_mut().for_each(|log_scale| *log_scale += 2.0);
+    }
+    frames
+}
+
 /// What is said, and what is taken beside the frames; in megabytes.
 fn said_and_taken(name: &str, frames: Vec<GaussianFrame>, settings: &Settings) -> [f64; 2] {
     let largest = frames.iter().map(GaussianFrame::len).max().unwrap() as u64;
@@ -94,6 +102,7 @@ fn no_more_memory_is_taken_than_is_said() {
         ("fast, degree 3", still(40_000, 3), fast.clone()),
         ("balanced", still(40_000, 0), balanced.clone()),
         ("balanced, degree 2", still(33_000, 2), balanced.clone()),
+        ("large Gaussians", enlarged(still(33_000, 3)), balanced.clone()),
         ("steps that are given", still(33_000, 3), plain),
         ("pruned", still(33_000, 0), pruned),
         ("fitted", still(33_000, 0), fitted(&balanced)),
