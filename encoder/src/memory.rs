@@ -80,7 +80,7 @@ const INTRA: Share = Share { copies: 33, bytes: 240 };
 /// Gaussians that are in the strips of the views in which steps are fitted, were they seven times as large as usual; where there are
 /// many, there are fewer strips.
 const IN_STRIPS_FAST: Share = Share { copies: 20, bytes: 10 };
-const IN_STRIPS: Share = Share { copies: 33, bytes: 20 };
+const IN_STRIPS: Share = Share { copies: 40, bytes: 20 };
 const MANY: u64 = 1 << 19;
 /// Coding predicted frames: references, what pairs them with the frame, and what becomes of each Gaussian in two ways.
 const PREDICTED_FAST: Share = Share { copies: 87, bytes: 240 };

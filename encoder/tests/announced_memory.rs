@@ -5,13 +5,20 @@ use peak_alloc::PeakAlloc;
 use splatstream_encoder::{Encoder, Error, Finetune, FrameSource, Preset, Settings, Size, Structure, encode};
 use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_gaussians::GaussianFrame;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// One test at a time.
 static ALONE: Mutex<()> = Mutex::new(());
+
+/// One test at a time, once the program has what it takes a single time: threads and tables.
+fn alone() -> MutexGuard<'static, ()> {
+    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut frames = scene(100, 0, 1, Tracking::Tracked);
+    encode(&mut frames, &of(Preset::Balanced), &mut std::io::sink(), &mut |_, _| ()).unwrap();
+    alone
+}
 
 /// Frames that are in memory already, and what is taken at most when one of them is asked for.
 struct There {
@@ -79,7 +86,7 @@ fn said_and_taken(name: &str, frames: Vec<GaussianFrame>, settings: &Settings) -
 
 #[test]
 fn no_more_memory_is_taken_than_is_said() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let [fast, balanced] = [Preset::Fast, Preset::Balanced].map(of);
     let fitted = |settings: &Settings| {
         let finetune = Some(Finetune { iterations: 2, ..Finetune::default() });
@@ -122,7 +129,7 @@ fn no_more_memory_is_taken_than_is_said() {
 /// Where there are many Gaussians no more is asked for than twice what is taken.
 #[test]
 fn of_many_gaussians_not_much_more_is_said_than_is_taken() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     for (gaussians, degree, preset) in
         [(300_000, 0, Preset::Fast), (150_000, 3, Preset::Fast), (60_000, 3, Preset::Balanced)]
     {
@@ -135,7 +142,7 @@ fn of_many_gaussians_not_much_more_is_said_than_is_taken() {
 /// With more memory more GOPs are coded at once, within it and with the same bytes.
 #[test]
 fn gops_at_once_stay_within_the_memory() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let structure = Structure::Predicted { layers: 2 };
     let settings = Settings { psnr: None, verify: false, gop: 2, structure, ..of(Preset::Fast) };
     let settings = Settings { gop_memory: u64::MAX, ..settings };
@@ -160,7 +167,7 @@ fn gops_at_once_stay_within_the_memory() {
 /// Frames that wait count where they are pushed.
 #[test]
 fn frames_that_wait_count() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let settings = Settings {
         gop: 3,
         structure: Structure::Predicted { layers: 1 },
