@@ -41,7 +41,8 @@ class EncodeOptions(TypedDict, total=False):
     layers: Spatial layers by the height in lines that each is meant for, as (540, 720, 1080).
     temporal_layers: 1 to 4: 1 is I P P P, 2 is I B P B P, more are dyadic.
     all_intra: Code every frame by itself.
-    refinements: Share of the Gaussians up to each refinement, percent, as (10, 20, 30, 50, 100).
+    refinements: Share of the Gaussians up to each refinement, percent, as (10, 20, 30, 50, 100); or "auto:5": so many, where
+        pictures gain most.
     sh_degree: Highest degree of spherical harmonics kept.
     sh: "auto", "coefficients" or "vq".
     fps: Frames per second, as 30, 29.97 or Fraction(30000, 1001).
@@ -84,7 +85,7 @@ class EncodeOptions(TypedDict, total=False):
     layers: Sequence[int]
     temporal_layers: int
     all_intra: bool
-    refinements: Sequence[int]
+    refinements: Sequence[int] | str
     sh_degree: int
     sh: Literal["auto", "coefficients", "vq"]
     fps: float | Fraction
