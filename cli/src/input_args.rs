@@ -41,8 +41,11 @@ impl InputArgs {
 
     /// Whether a scene is refused because of the memory that there is for everything, or is left of the machine.
     pub(crate) fn is_over_memory(&self, error: &SceneError) -> bool {
-        match error.kind {
-            SceneErrorKind::OverLimit { allowed, .. } => Some(allowed) == self.memory,
+        match &error.kind {
+            SceneErrorKind::OverLimit { allowed, .. } => Some(*allowed) == self.memory,
+            SceneErrorKind::Io(cause) if cause.kind() == std::io::ErrorKind::OutOfMemory => {
+                self.memory.is_some()
+            }
             SceneErrorKind::OutOfMemory { .. } => self.memory.is_some(),
             _ => false,
         }

@@ -49,6 +49,11 @@ fn left(group: &Path, [limit, used, files]: [&str; 3]) -> Option<u64> {
     Some(number(limit)?.saturating_sub(number(used)?.saturating_sub(copies)))
 }
 
+/// What the thread for signals takes of the address space, which is not started yet: its stack, and what the allocator sets aside
+/// for it. In both is little.
+#[cfg(target_os = "linux")]
+const OF_THREAD: u64 = 66 << 20;
+
 /// What the address space may still grow by; none if it has no limit.
 #[cfg(target_os = "linux")]
 fn of_address_space() -> Option<u64> {
@@ -57,7 +62,8 @@ fn of_address_space() -> Option<u64> {
     // What the allocator sets aside for each thread is taken with the first that it asks for, and counts before what is left.
     rayon::broadcast(|_| drop(std::hint::black_box(Box::new(0_u8))));
     let pages: u64 = std::fs::read_to_string("/proc/self/statm").ok()?.split(' ').next()?.parse().ok()?;
-    Some(limit.saturating_sub(pages.saturating_mul(rustix::param::page_size() as u64)))
+    let taken = pages.saturating_mul(rustix::param::page_size() as u64);
+    Some(limit.saturating_sub(taken).saturating_sub(OF_THREAD))
 }
 
 #[cfg(not(target_os = "linux"))]

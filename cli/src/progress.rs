@@ -69,7 +69,10 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
+        // It takes a thread.
+        if is_seen {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
         Self { bar, line: None }
     }
 
