@@ -8,12 +8,12 @@
 //! Bytes are taken to be proportional to Gaussians. The prefixes are drawn from the source, over the views that orders go by, and
 //! the error that the quantisers will make is added: prefixes that differ by less than that differ for nobody.
 
-use crate::canonical::visible;
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;
 use crate::importance::Ranking;
-use crate::settings::Settings;
+use crate::settings::{Quality, Settings};
 use crate::source::FrameSource;
+use crate::target::first_frame;
 use splatstream_format::syntax::{MAX_REFINEMENTS, prefix_length};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::ReferencePictures;
@@ -23,9 +23,6 @@ const CANDIDATES: [u8; 18] = [1, 2, 3, 4, 5, 7, 9, 12, 15, 20, 25, 30, 40, 50, 6
 
 /// Lines of the pictures.
 const LINES: u32 = 144;
-
-/// The PSNR of the whole frame where the settings do not ask for one, dB: that of *high* quality.
-const USUAL_PSNR: f64 = 50.0;
 
 /// Percentages of the Gaussians up to each of `count` refinements, rising, the last 100, so that pictures of the first frame are
 /// as good as they can be for receivers that take any part of its bytes. What the settings say about refinements is not read.
@@ -51,11 +48,10 @@ pub fn refinements_by_slope(
         return Ok(vec![100]);
     }
     let mut checked = CheckedSource::new(source, settings);
-    let frame = checked.frame(0).map_err(|source| named(Error::Source { frame: 0, source }))?;
-    let rows = visible(&frame, settings.keep_invisible);
-    let frame = frame.into_selected(&rows);
-    let whole = settings.psnr.map_or(USUAL_PSNR, f64::from);
-    Ok(best_boundaries(&psnr_of_prefixes(&frame, settings, whole), count))
+    let frame = first_frame(&mut checked, settings).map_err(named)?;
+    // Where a size is asked for, the PSNR is that of a usual stream.
+    let whole = settings.psnr.unwrap_or(Quality::High.decibels());
+    Ok(best_boundaries(&psnr_of_prefixes(&frame, settings, whole.into()), count))
 }
 
 /// The PSNR, dB, of nothing at all and of the prefix that ends at each candidate, where the error of a whole frame is so many dB.

@@ -9,6 +9,8 @@
 
 use crate::error::Error;
 use crate::settings::{Preset, Settings};
+use crate::strips::{FEW, MANY};
+use crate::verification::EVERY;
 use splatstream_gaussians::{GaussianFrame, sh_planes};
 
 /// What does not go with Gaussians, bytes: models, tables, what threads have.
@@ -19,9 +21,6 @@ const FIXED: u64 = 4 << 20;
 const OF_PICTURE: u64 = 960 * 540 * 16;
 const PICTURES_OF_ONE: u64 = 9;
 const PICTURES: u64 = 16;
-/// Of fewer Gaussians whole pictures are looked at, of more no more than each sixth strip of them.
-const FEW: u64 = 1 << 15;
-const EVERY: u64 = 6;
 
 /// Frames that are kept to judge the stream by, at most: one of each type in the middle, the first and the last.
 const JUDGED: u64 = 5;
@@ -81,7 +80,6 @@ const INTRA: Share = Share { copies: 33, bytes: 240 };
 /// many, there are fewer strips.
 const IN_STRIPS_FAST: Share = Share { copies: 20, bytes: 10 };
 const IN_STRIPS: Share = Share { copies: 40, bytes: 20 };
-const MANY: u64 = 1 << 19;
 /// Coding predicted frames: references, what pairs them with the frame, and what becomes of each Gaussian in two ways.
 const PREDICTED_FAST: Share = Share { copies: 87, bytes: 240 };
 const PREDICTED: Share = Share { copies: 108, bytes: 430 };
@@ -180,7 +178,7 @@ impl<'a> Footprint<'a> {
             (true, Preset::Fast) => IN_STRIPS_FAST,
             (true, Preset::Balanced | Preset::Small) => IN_STRIPS,
         };
-        let fewer = self.gaussians.div_ceil(MANY).max(1);
+        let fewer = self.gaussians.div_ceil(MANY as u64).max(1);
         share.of(values(self.sh_degree)).div_ceil(fewer)
     }
 
@@ -199,7 +197,8 @@ impl<'a> Footprint<'a> {
         let fitted =
             self.settings.finetune.as_ref().map_or(0, |finetune| finetune.bytes_of_pictures(self.settings));
         let pictures = if self.frames > 1 { PICTURES } else { PICTURES_OF_ONE };
-        let every = if self.gaussians < FEW { 1 } else { EVERY };
-        pictures.saturating_mul(OF_PICTURE.div_ceil(every)).saturating_add(fitted)
+        // Of fewer Gaussians whole pictures are looked at, of more no more than so many strips of them.
+        let [every, _] = if self.gaussians < FEW as u64 { [1; 2] } else { EVERY };
+        pictures.saturating_mul(OF_PICTURE.div_ceil(every.into())).saturating_add(fitted)
     }
 }

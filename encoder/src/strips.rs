@@ -13,8 +13,8 @@ const BACKGROUND: [f32; 3] = [0.0; 3];
 
 /// Frames of fewer Gaussians than the first have more strips, for the errors of a few small Gaussians are in few places;
 /// those of more than the second have fewer.
-const FEW: usize = 1 << 15;
-const MANY: usize = 1 << 19;
+pub(crate) const FEW: usize = 1 << 15;
+pub(crate) const MANY: usize = 1 << 19;
 
 /// Strips that touch this part of what whole pictures show are enough, of however few Gaussians: these are large.
 const NEARLY_ALL: f64 = 0.99;

@@ -127,7 +127,7 @@ pub(crate) fn looking(
 }
 
 /// The first frame as it is coded.
-fn first_frame(source: &mut dyn FrameSource, settings: &Settings) -> Result<GaussianFrame, Error> {
+pub(crate) fn first_frame(source: &mut dyn FrameSource, settings: &Settings) -> Result<GaussianFrame, Error> {
     let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
     Ok(coded_form(first, settings))
 }

@@ -29,7 +29,7 @@ const HEIGHT: u32 = 540;
 
 /// Of so many strips of a view one is drawn: of those that decide how fine steps are, and of those that decide nothing; and
 /// for the fast preset.
-const EVERY: [u32; 2] = [6, 12];
+pub(crate) const EVERY: [u32; 2] = [6, 12];
 const EVERY_FAST: [u32; 2] = [12, 24];
 
 /// Keeps units while they are written, and the frames that they decode to.
