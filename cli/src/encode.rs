@@ -6,6 +6,7 @@ mod each;
 mod effort;
 mod failed;
 mod finetune;
+mod network_name;
 mod options;
 mod output;
 mod pictures;
@@ -27,13 +28,13 @@ use crate::setting_names::{
     AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
 };
 use crate::up_guess::UpGuess;
-use crate::whole_file::read_whole;
 use choices::{Choice, choices};
 use clap::{Args, ValueEnum};
 use decided::Decided;
 use effort::Budget;
 use failed::failed;
 use finetune::{FinetuneArgs, Fitted, Taken, told_of_fitting};
+use network_name::NetworkName;
 pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
 use pictures::{Goal, Pictures};
@@ -43,14 +44,12 @@ use serde::Serialize;
 use shards::{ShardArgs, ShardReport};
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{
-    FrameSource, Importance, NetworkSource, Quality, Report, Settings, Size, Structure, Work, encode,
+    FrameSource, Importance, Quality, Report, Settings, Size, Structure, Work, encode,
 };
-use splatstream_format::payload::{Network, SceneDescription};
+use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
-use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 use std::time::Instant;
 use warnings::{Warning, unlike_frames, warnings};
 
@@ -197,9 +196,6 @@ pub(crate) struct Encode {
     finetune: FinetuneArgs,
 }
 
-/// The most of a network that is read, bytes: those that streams can carry are far smaller.
-const MAX_NETWORK: u64 = 16 << 20;
-
 /// Cameras that a stream can hold.
 const MAX_CAMERAS: usize = 64;
 
@@ -240,41 +236,6 @@ fn parse_title(text: &str) -> Result<String, String> {
 fn parse_metres(text: &str) -> Result<f32, String> {
     let metres = text.parse().ok().filter(|metres| (f32::MIN_POSITIVE..=1e12).contains(metres));
     metres.ok_or_else(|| format!("'{text}' is not a number of metres above 0"))
-}
-
-/// Where the network of the transformer comes from.
-#[derive(Clone)]
-enum NetworkName {
-    Registered,
-    Trained,
-    File(PathBuf),
-}
-
-impl FromStr for NetworkName {
-    type Err = Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(match text {
-            "registered" => Self::Registered,
-            "trained" => Self::Trained,
-            path => Self::File(path.into()),
-        })
-    }
-}
-
-impl NetworkName {
-    fn source(&self) -> Result<NetworkSource, Failure> {
-        Ok(match self {
-            Self::Registered => NetworkSource::Registered,
-            Self::Trained => NetworkSource::Fitted,
-            Self::File(path) => {
-                let bytes = read_whole(path, MAX_NETWORK)?;
-                let network = Network::parse(&bytes, 0)
-                    .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
-                NetworkSource::Given(Box::new(network))
-            }
-        })
-    }
 }
 
 /// What `--json` prints.
@@ -327,10 +288,7 @@ impl Encode {
         let read = self.read_files(&source);
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
-        let (mut settings, decided) = self.settings(&mut source)?;
-        settings.max_memory = source.left_for(&settings, memory);
-        let put = self.refinements.put(&mut source, &mut settings);
-        put.map_err(|error| failed(&source, (out, memory), &error))?;
+        let (mut settings, decided) = self.settings_for(&mut source, (out, memory))?;
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
@@ -471,6 +429,19 @@ impl Encode {
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
         Ok((settings, Decided { guess, budget }))
+    }
+
+    /// All settings for files, which take some of the memory themselves.
+    fn settings_for(
+        &self,
+        source: &mut FrameFiles,
+        (out, memory): (&Path, u64),
+    ) -> Result<(Settings, Decided), Failure> {
+        let (mut settings, decided) = self.settings(source)?;
+        settings.max_memory = source.left_for(&settings, memory);
+        let put = self.refinements.put(source, &mut settings);
+        put.map_err(|error| failed(source, (out, memory), &error))?;
+        Ok((settings, decided))
     }
 
     /// Whether the preset and the iterations are chosen for a time that all frames take together.

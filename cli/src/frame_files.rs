@@ -58,21 +58,16 @@ impl fmt::Display for Unread {
 
 impl std::error::Error for Unread {}
 
-impl From<Unread> for Failure {
-    fn from(Unread { message, is_over_memory }: Unread) -> Self {
-        match is_over_memory {
-            true => Self::Memory(message),
-            false => Self::Other(message),
-        }
+impl From<&Unread> for Failure {
+    fn from(unread: &Unread) -> Self {
+        let message = unread.message.clone();
+        if unread.is_over_memory { Self::Memory(message) } else { Self::Other(message) }
     }
 }
 
 /// The failure of a frame that a source does not give.
 pub(crate) fn unread(error: &(dyn std::error::Error + Send + Sync + 'static)) -> Failure {
-    match error.downcast_ref::<Unread>() {
-        Some(Unread { message, is_over_memory: true }) => Failure::Memory(message.clone()),
-        _ => Failure::other(error.to_string()),
-    }
+    error.downcast_ref::<Unread>().map_or_else(|| Failure::other(error.to_string()), Failure::from)
 }
 
 /// What standard input is called in messages.
@@ -113,13 +108,16 @@ impl FrameFiles {
         spooled: Option<Arc<Unfinished>>,
         reading: InputArgs,
     ) -> Result<Self, Failure> {
-        let sequence = match paths.as_slice() {
-            [only] if is_sequence(only) => {
-                let opened = Sequence::open(only, &reading.limits(only), &reading.sequence());
-                Some(opened.map_err(|error| unreadable(&error, only, spooled.is_some(), &reading))?)
-            }
-            _ => None,
-        };
+        let sequence =
+            match paths.as_slice() {
+                [only] if is_sequence(only) => {
+                    let opened = Sequence::open(only, &reading.limits(only), &reading.sequence());
+                    Some(opened.map_err(|error| {
+                        Failure::from(&unreadable(&error, only, spooled.is_some(), &reading))
+                    })?)
+                }
+                _ => None,
+            };
         let (last, keeps_last, as_is, counts, notes) = (None, true, false, None, ReadNotes::default());
         Ok(Self { paths, sequence, reading, last, keeps_last, as_is, spooled, counts, notes })
     }

@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use splatstream_encoder::{FrameSource, Settings, refinements_by_slope};
+use splatstream_format::syntax::MAX_REFINEMENTS;
 use std::str::FromStr;
 
 /// Before the number of refinements whose shares are to be chosen.
@@ -24,7 +25,7 @@ impl FromStr for Refinements {
 
     fn from_str(text: &str) -> Result<Self, String> {
         if let Some(count) = text.strip_prefix(CHOSEN) {
-            let count = count.parse().ok().filter(|count| (1..=10).contains(count));
+            let count = count.parse().ok().filter(|count| (1..=MAX_REFINEMENTS).contains(count));
             return count.map(Self::Chosen).ok_or_else(|| format!("'{text}' is not auto:1 to auto:10"));
         }
         let percent = |word: &str| word.parse().map_err(|_| format!("'{word}' is not a percentage"));
@@ -37,7 +38,7 @@ impl Refinements {
     pub(super) fn check(&self) -> Result<(), Failure> {
         let Self::Given(percents) = self else { return Ok(()) };
         let is_rising = percents.is_sorted_by(|a, b| a < b) && percents.first() != Some(&0);
-        if is_rising && percents.len() <= 10 && percents.last() == Some(&100) {
+        if is_rising && percents.len() <= MAX_REFINEMENTS.into() && percents.last() == Some(&100) {
             return Ok(());
         }
         Err(Failure::Usage(ALLOWED.to_owned()))

@@ -157,10 +157,7 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
     let mut source = FrameFiles::find(&command.inputs, command.reading.within(memory))?.unchecked();
     let read = command.read_files(&source);
     refuse_inputs(out, &read)?;
-    let (mut settings, _) = command.settings(&mut source)?;
-    settings.max_memory = source.left_for(&settings, memory);
-    let put = command.refinements.put(&mut source, &mut settings);
-    put.map_err(|error| failed(&source, (out, memory), &error))?;
+    let (settings, _) = command.settings_for(&mut source, (out, memory))?;
     let file = OutputFile::create(out, &read)?;
     let plan = plan(&mut source, &settings).map_err(|error| failed(&source, (out, memory), &error))?;
     let (most_shards, frames) = (plan.shards(), source.len());
