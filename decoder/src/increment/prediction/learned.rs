@@ -98,11 +98,12 @@ impl Learned<'_> {
         let start = self.rows.columns(Stage::Dc).start;
         let mut components = vec![[0; OUTPUTS_MAX]; self.rows.len()];
         let values = components.len().saturating_mul(OUTPUTS_MAX);
-        let rows: Vec<(&[i32], bool)> = self.rows.all().zip(used).collect();
-        let runs = components.chunks_mut(RUN).zip(rows.chunks(RUN));
-        cores::for_each(self.interrupt, values, runs, |(components, rows)| {
-            for (components, (row, _)) in components.iter_mut().zip(rows).filter(|(_, (_, used))| *used) {
-                *components = self.projection.components(row.get(start..).unwrap_or_default());
+        let firsts = (0_u32..).step_by(RUN);
+        let runs = components.chunks_mut(RUN).zip(used.chunks(RUN)).zip(firsts);
+        cores::for_each(self.interrupt, values, runs, |((components, used), first)| {
+            let rows = components.iter_mut().zip(first..).zip(used);
+            for ((components, row), _) in rows.filter(|(_, used)| **used) {
+                *components = self.projection.components(self.rows.row(row).get(start..).unwrap_or_default());
             }
         });
         components

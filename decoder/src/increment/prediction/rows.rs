@@ -84,11 +84,6 @@ impl Rows {
         self.values.get(start..start.wrapping_add(self.width)).unwrap_or_default()
     }
 
-    /// All rows, in order.
-    pub(super) fn all(&self) -> impl Iterator<Item = &[i32]> {
-        self.values.chunks_exact(self.width)
-    }
-
     /// The columns of an attribute.
     pub(super) fn columns(&self, stage: Stage) -> Range<usize> {
         match stage {
