@@ -10,7 +10,9 @@
     reason = "rows are those of the frame that all planes are of; parts and axes are constants"
 )]
 
+use crate::attribute::{ATTRIBUTES, Attribute};
 use crate::error::Error;
+use crate::frame::grain::Grains;
 use crate::importance::Ranked;
 use crate::laws::Laws;
 use crate::pca::Components;
@@ -23,6 +25,7 @@ use crate::sequence::Scene;
 use crate::settings::{Preset, Settings};
 use crate::steps::Steps;
 use crate::strips::{StripView, StripViews, mean};
+use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::camera::spiral;
@@ -54,55 +57,6 @@ const SLOPE: f64 = 1.0;
 const SLOPE_GUESSED: f64 = 0.85;
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
-/// Steps change by no more than this factor at once: the model is local.
-const LARGEST_CHANGE: f64 = 8.0;
-
-/// What has a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Attribute {
-    /// Centres.
-    Position,
-    /// Natural logs of semi-axes.
-    LogScale,
-    /// Quaternions.
-    Rotation,
-    /// Opacity logits.
-    Opacity,
-    /// The constant part of the colour.
-    Dc,
-    /// Spherical harmonics of degree 1 and up.
-    Sh,
-}
-
-/// All of them, in the order of their discriminants.
-pub(crate) const ATTRIBUTES: [Attribute; 6] = [
-    Attribute::Position,
-    Attribute::LogScale,
-    Attribute::Rotation,
-    Attribute::Opacity,
-    Attribute::Dc,
-    Attribute::Sh,
-];
-
-impl Attribute {
-    /// Makes a step coarser by `factor`, within what is sensible.
-    fn scale(self, steps: &mut Steps, factor: f64) {
-        let factor = factor.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
-        let scaled =
-            |step: f32, most: f32| ((f64::from(step) * factor) as f32).clamp(2.0_f32.powi(-20), most);
-        match self {
-            Self::Position => {
-                steps.position_bits = (steps.position_bits - libm::log2(factor) as f32).clamp(1.0, 20.0);
-            }
-            Self::LogScale => steps.log_scale = scaled(steps.log_scale, 2.0),
-            Self::Rotation => steps.rotation = scaled(steps.rotation, 0.5),
-            Self::Opacity => steps.opacity = scaled(steps.opacity, 4.0),
-            Self::Dc => steps.dc = scaled(steps.dc, 4.0),
-            Self::Sh => steps.sh = scaled(steps.sh, 4.0),
-        }
-    }
-}
-
 /// All steps finer by one factor: as if pictures gained so many decibels.
 pub(crate) fn finer(mut steps: Steps, decibels: f64) -> Steps {
     let factor = libm::exp2(-decibels / DECIBELS_AN_OCTAVE);
@@ -187,6 +141,17 @@ impl Fit {
         self.settings.laws
     }
 
+    /// What steps make of the scene with some laws.
+    fn grids(&self, laws: Laws, steps: &Steps) -> Grids<'_> {
+        let settings = Settings { steps: *steps, laws, spatial_layers: 1, ..self.settings.clone() };
+        // Which Gaussians these are is no matter here.
+        let (frame, _) = &self.sample;
+        let flags = SequenceParameters::flags(true, frame.antialiased(), false);
+        let sequence = self.scene.parameters(&settings, 1, frame.sh_degree(), flags);
+        let grains = Grains::new(&laws, steps, &sequence);
+        Grids::new(sequence, grains, &self.bases, &self.refinement)
+    }
+
     /// What laws save against the same steps for all Gaussians, estimated; none where there are none.
     pub(crate) fn worth_of_laws(&self, steps: &Steps) -> Result<Option<Saving>, Error> {
         let (sample, rows) = &self.sample;
@@ -194,7 +159,7 @@ impl Fit {
             return Ok(None);
         }
         let cost = |laws: Laws| -> Result<(f64, f64), Error> {
-            let grids = Grids::with(self, laws, steps);
+            let grids = self.grids(laws, steps);
             let trial = Trial::new(&grids, sample, rows);
             let bits: f64 = ATTRIBUTES.into_iter().map(|attribute| trial.bits(attribute)).sum();
             let errors = self.sensitivity.errors(sample, &trial.decoded(&ATTRIBUTES)?);
@@ -215,7 +180,7 @@ impl Fit {
         let grids = [-0.25, 0.25].map(|octaves: f64| {
             let mut steps = *steps;
             ATTRIBUTES.into_iter().for_each(|attribute| attribute.scale(&mut steps, libm::exp2(octaves)));
-            Grids::new(self, &steps)
+            self.grids(self.laws(), &steps)
         });
         let [finer, coarser] = grids.each_ref().map(|grids| Trial::new(grids, sample, rows));
         ATTRIBUTES.map(|attribute| match attribute {
@@ -276,7 +241,7 @@ impl Fit {
 
     /// PSNR of pictures with all attributes on their grids, dB.
     fn psnr(&self, steps: &Steps) -> Result<Option<f64>, Error> {
-        let grids = Grids::new(self, steps);
+        let grids = self.grids(self.laws(), steps);
         mean(self.views.iter().map(|view| {
             let trial = Trial::new(&grids, &view.frame, &view.rows);
             Ok(view.psnr(&trial.decoded(&ATTRIBUTES)?))
@@ -292,14 +257,14 @@ impl Fit {
     /// The squared error of pictures with each attribute alone on its grid, estimated.
     fn estimated(&self, steps: &Steps) -> Result<[f64; 6], Error> {
         let (sample, rows) = &self.sample;
-        let grids = Grids::new(self, steps);
+        let grids = self.grids(self.laws(), steps);
         let decoded = Trial::new(&grids, sample, rows).decoded(&ATTRIBUTES)?;
         Ok(self.sensitivity.errors(sample, &decoded))
     }
 
     /// The same as strips of a few views show it.
     fn measured(&self, steps: &Steps) -> Result<[f64; 6], Error> {
-        let grids = Grids::new(self, steps);
+        let grids = self.grids(self.laws(), steps);
         let views = self.alone.iter();
         let trials: Vec<Trial<'_>> = views.map(|view| Trial::new(&grids, &view.frame, &view.rows)).collect();
         let mut errors = [0.0; 6];

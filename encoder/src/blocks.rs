@@ -7,13 +7,14 @@
 #![expect(clippy::indexing_slicing, reason = "blocks are cut from planes of equal lengths")]
 
 use crate::error::Error;
-use crate::models;
 use rayon::prelude::*;
 use splatstream_decoder::coded_block::CodedBlock;
+use splatstream_decoder::context;
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Layout, PlaneInfo};
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::entropy::model::PlaneModel;
+use splatstream_format::entropy::token::{Alphabet, zigzag};
 use splatstream_format::entropy::writer::{BlockWriter, PlaneEncoder};
 
 /// The blocks of a section.
@@ -102,13 +103,32 @@ impl<'v> Blocks<'v> {
             for (plane, ((&info, model), encoder)) in
                 self.planes().iter().zip(models).zip(&encoders).enumerate()
             {
-                let contexts = models::contexts(model, info, plane, &block);
-                writer.plane(encoder, &contexts, models::unsigned_values(info, plane, &block).into_iter())?;
+                let contexts = contexts(model, info, plane, &block);
+                writer.plane(encoder, &contexts, unsigned_values(info, plane, &block).into_iter())?;
             }
             Ok(writer.finish())
         };
         (0..self.len()).into_par_iter().map(code).collect()
     }
+}
+
+/// The unsigned values of a plane of one block, as they are split in tokens.
+pub(crate) fn unsigned_values(info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u64> {
+    let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+    match info.alphabet {
+        Alphabet::Position => block.deltas.clone(),
+        Alphabet::Index => coded.iter().map(|&index| u64::from(index.unsigned_abs())).collect(),
+        Alphabet::Attribute => coded.iter().map(|&value| u64::from(zigzag(value))).collect(),
+    }
+}
+
+/// The contexts of a plane of one block under a model.
+pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u8> {
+    if info.is_position() {
+        return context::delta_contexts(&model.axes, &block.deltas, block.segments());
+    }
+    let values = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+    context::plane_contexts(&model.axes, plane, info, block, values)
 }
 
 /// The first plane that is not of the position alphabet.

@@ -10,10 +10,10 @@
 
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;
+use crate::first_frame::first_frame;
 use crate::importance::Ranking;
 use crate::settings::{Quality, Settings};
 use crate::source::FrameSource;
-use crate::target::first_frame;
 use splatstream_format::syntax::{MAX_REFINEMENTS, prefix_length};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::ReferencePictures;

@@ -4,7 +4,7 @@
 //! timed: a cost model says what presets and iterations take. Its constants were fitted once to measurements (rationale, 1.26); its
 //! seconds are processor time of that machine, of all threads together.
 
-use crate::finetune::Finetune;
+use crate::finetune::request::Finetune;
 use crate::settings::{Preset, Settings};
 
 /// What the time to encode follows from.

@@ -11,9 +11,10 @@ mod loss;
 mod pictures;
 mod rate;
 mod receivers;
+pub(crate) mod report;
+pub(crate) mod request;
 mod watch;
 
-use crate::allocation::Attribute;
 use crate::error::Error;
 use crate::frame::compensation::Compensator;
 use crate::frame::ladder::Ladder;
@@ -21,64 +22,17 @@ use crate::frame::residuals::Wanted;
 use crate::frame::unit::UnitCoder;
 use crate::refinements::parts;
 use crate::settings::Settings;
-use core::time::Duration;
 use descent::Descent;
 use latent::{Latent, List};
 pub use loss::FinetuneLoss;
 use pictures::Pictures;
-pub use receivers::PointWeight;
 use receivers::Receiver;
+pub use report::{FinetuneReport, PointReport};
+pub use request::{Finetune, Photograph, PointWeight};
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
-use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::{Camera, Image};
 pub use watch::{FinetuneProgress, FinetuneWatch};
-
-/// How values of I frames are fitted to pictures. Frames that are predicted from them follow the fitted values.
-///
-/// The same settings give the same bytes on every machine, unless there is a time budget.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Finetune {
-    /// Steps of descent at most, each over two views; fewer are taken where nothing gets better. 1 or more.
-    pub iterations: u32,
-    /// Time for each I frame. What comes out depends on the speed of the machine then; none: on nothing but the iterations.
-    pub time_budget: Option<Duration>,
-    /// What is made small.
-    pub loss: FinetuneLoss,
-    /// What pictures should show; none: what those of the source do.
-    pub photographs: Vec<Photograph>,
-    /// Lines of the pictures that each spatial layer is for, from the lowest up; where there are too few, 540, 720, 1080 and
-    /// 2160, or of two layers 540 and 1080.
-    pub lines: Vec<u32>,
-    /// Lines of the pictures that slopes are taken of, in turn, whatever layer they are of; none: those of the layer. What is named
-    /// twice counts twice. Quality is reported at the lines of the layer in any case.
-    pub resolutions: Vec<u32>,
-    /// The operating points that matter, of which receivers see pictures; values that none of these points shows stay the nearest.
-    /// None: all Gaussians of each spatial layer, or of the highest one where frames are predicted.
-    pub optimise_for: Vec<PointWeight>,
-    /// Attributes that keep the nearest values, to see what fitting the others is worth.
-    pub held: Vec<Attribute>,
-    /// Who is told how far it has come.
-    pub watch: FinetuneWatch,
-}
-
-impl Default for Finetune {
-    /// 200 iterations, by squared error, against pictures of the source.
-    fn default() -> Self {
-        Self {
-            iterations: 200,
-            time_budget: None,
-            loss: FinetuneLoss::default(),
-            photographs: Vec::new(),
-            lines: Vec::new(),
-            resolutions: Vec::new(),
-            optimise_for: Vec::new(),
-            held: Vec::new(),
-            watch: FinetuneWatch::default(),
-        }
-    }
-}
 
 impl Finetune {
     /// Whether it can be done.
@@ -125,48 +79,6 @@ const LINES_ALLOWED: core::ops::RangeInclusive<u32> = 1..=8640;
 
 /// Photographs at least, if there are any.
 const LEAST_PHOTOGRAPHS: usize = 8;
-
-/// A photograph of the scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Photograph {
-    /// Where it was taken; of as many pixels as the picture.
-    pub camera: Camera,
-    /// What it shows.
-    pub picture: Image,
-}
-
-/// What fitting an I frame has done.
-#[derive(Debug, Clone, PartialEq, Default)]
-#[non_exhaustive]
-pub struct FinetuneReport {
-    /// Display index of the frame.
-    pub frame: u32,
-    /// The spatial layer.
-    pub spatial_layer: u8,
-    /// Steps of descent that were taken.
-    pub iterations: u32,
-    /// How long it took.
-    pub seconds: f64,
-    /// PSNR before and after, decibels, in views that no slope was taken of, but by which it was chosen what is kept: the mean of
-    /// the operating points by their weights.
-    pub psnr: [f64; 2],
-    /// Bits of all values but positions before and after, as their models estimate them.
-    pub bits: [f64; 2],
-    /// What receivers of each operating point that was optimised for see.
-    pub points: Vec<PointReport>,
-}
-
-/// What fitting has done at an operating point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct PointReport {
-    /// The operating point.
-    pub point: OperatingPoint,
-    /// What a decibel there was worth beside one at others.
-    pub weight: f64,
-    /// Mean PSNR before and after, decibels, in views of the lines of its layer by which nothing was chosen.
-    pub psnr: [f64; 2],
-}
 
 /// The values that pictures want, Gaussian by Gaussian as they come.
 pub(crate) struct Fitted {

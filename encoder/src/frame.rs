@@ -4,10 +4,12 @@
 //! their [new Gaussians](new_list) into lists, choose what these are [predicted](predictors) from, and hand each
 //! [unit](unit) over to be coded.
 
-mod axis_matching;
+pub(crate) mod axis_matching;
 pub(crate) mod cells;
 pub(crate) mod compensation;
 pub(crate) mod deviation;
+mod difference;
+pub(crate) mod grain;
 pub(crate) mod intra;
 pub(crate) mod ladder;
 pub(crate) mod learning;
@@ -20,56 +22,22 @@ pub(crate) mod recorder;
 pub(crate) mod residuals;
 pub(crate) mod steadiness;
 pub(crate) mod survivors;
+pub(crate) mod target;
 pub(crate) mod unit;
 mod update_decision;
 pub(crate) mod visible_difference;
 mod worth;
 
-pub(crate) use axis_matching::{Namings, Pose};
-pub(crate) use update_decision::pixel;
-pub(crate) use visible_difference::{Seen, Shown};
-
 use crate::error::Error;
-use crate::matching::{Cloud, Matching};
+use crate::matching::Matching;
 use crate::savings::Saving;
 use deviation::Deviation;
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::CellsBytes;
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
-use splatstream_gaussians::GaussianFrame;
+use target::Target;
 use unit::UnitCoder;
-
-/// A frame to be coded.
-#[derive(Clone)]
-pub(crate) struct Target {
-    /// Canonical, without what is never seen.
-    pub(crate) frame: GaussianFrame,
-    /// Positions in grid steps.
-    pub(crate) position: [Vec<f32>; 3],
-    /// Row of each Gaussian in its file, and rows of the file.
-    pub(crate) rows: Vec<u32>,
-    pub(crate) row_count: u32,
-}
-
-impl Target {
-    /// Lets the values go, and keeps which Gaussians they were of.
-    pub(crate) fn forget(&mut self) {
-        self.frame = GaussianFrame::default();
-        self.position = Default::default();
-    }
-
-    pub(crate) fn cloud(&self) -> Cloud<'_> {
-        Cloud {
-            position: self.position.each_ref().map(Vec::as_slice),
-            log_scale: self.frame.log_scale().each_ref().map(Vec::as_slice),
-            opacity: self.frame.opacity_logit(),
-            dc: self.frame.dc().each_ref().map(Vec::as_slice),
-            row: &self.rows,
-            row_count: self.row_count,
-        }
-    }
-}
 
 /// A coded frame that others refer to.
 pub(crate) struct Reference {
@@ -111,7 +79,7 @@ impl Reference {
         coder: &UnitCoder<'_>,
     ) -> Option<Target> {
         let deviation = self.deviation.as_ref()?;
-        Some(deviation.added_to(target, (self, matching), coder))
+        Some(deviation.added_to(target, (&self.lists, matching), coder))
     }
 }
 

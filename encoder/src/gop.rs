@@ -10,7 +10,9 @@ mod worth;
 
 use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
-use crate::finetune::{FinetuneReport, Fit};
+use crate::finetune::Fit;
+use crate::finetune::report::FinetuneReport;
+use crate::frame::CodedFrame;
 use crate::frame::cells::CellPlan;
 use crate::frame::compensation::Compensator;
 use crate::frame::intra::{IntraTarget, code_intra};
@@ -19,7 +21,7 @@ use crate::frame::predictors::Chooser;
 use crate::frame::recorder::{Recorder, weights};
 use crate::frame::residuals::Wanted;
 use crate::frame::steadiness::Steadiness;
-use crate::frame::{CodedFrame, Target};
+use crate::frame::target::Target;
 use crate::gop_tools::GopTools;
 use crate::grid::PositionGrid;
 use crate::importance::Ranking;
@@ -29,7 +31,7 @@ use crate::motion::follow::follow;
 use crate::report::{FrameReport, Report};
 use crate::settings::{Predictors, Preset};
 use crate::source::FrameSource;
-use crate::spans::{Common, Span};
+use crate::spans::span::{Common, Span};
 use crate::writer::GopSink;
 use group::Gop;
 use splatstream_format::payload::write_frame;
@@ -422,7 +424,11 @@ impl<'a> SpanCoder<'a> {
             compensation: &gop.compensation,
         };
         let cells = Some(&cells).filter(|_| self.common.settings.tools.cell_motion);
-        let coded = Predicted::new(from, cells, matching)?.code(goal.as_mut())?;
+        let mut predicted = Predicted::new(from, cells, matching)?;
+        if let Some(goal) = &mut goal {
+            predicted.set_judge(goal)?;
+        }
+        let coded = predicted.code()?;
         if !self.is_within_limits(&coded) {
             return Ok(Verdict::Unlike);
         }

@@ -1,6 +1,6 @@
 //! Which Gaussians come first.
 
-use crate::frame::pixel;
+use crate::frame::visible_difference::pixel;
 use crate::settings::{Importance, Preset, Settings};
 use rayon::prelude::*;
 use splatstream_format::syntax::prefix_length;

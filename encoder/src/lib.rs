@@ -15,6 +15,7 @@
 #![deny(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
 mod allocation;
+mod attribute;
 mod blocks;
 mod boundaries;
 mod budget;
@@ -26,6 +27,7 @@ mod concat;
 mod entropy_cost;
 mod error;
 mod finetune;
+mod first_frame;
 mod frame;
 mod gop;
 mod gop_tools;
@@ -70,7 +72,7 @@ mod vq;
 mod window;
 mod writer;
 
-pub use allocation::Attribute;
+pub use attribute::Attribute;
 pub use boundaries::refinements_by_slope;
 pub use budget::{Effort, Work};
 pub use concat::{ConcatError, Concatenated, PartError, StreamPart, concat};
@@ -82,7 +84,7 @@ pub use finetune::{
 pub use frame::learning::{nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;
-pub use plan::{Plan, PlanRecord, PlannedSteps, PlannedTarget, Single, plan};
+pub use plan::{Plan, PlanRecord, PlannedSteps, PlannedTarget, Single};
 pub use progress::Progress;
 pub use push::Encoder;
 pub use report::{
@@ -96,5 +98,5 @@ pub use settings::{
 pub use shard::Shard;
 pub use source::FrameSource;
 pub use steps::Steps;
-pub use stream::encode;
+pub use stream::{encode, plan};
 pub use upright::up_of;

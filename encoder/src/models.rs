@@ -5,7 +5,7 @@
     reason = "contexts, tables and tokens are numbers below the lengths that the model was made with"
 )]
 
-use crate::blocks::Blocks;
+use crate::blocks::{Blocks, contexts, unsigned_values};
 use crate::clusters::{Clustering, cluster};
 use crate::entropy_cost::Histogram;
 use crate::parametric_fit::fitted;
@@ -28,25 +28,6 @@ const COUNTED: usize = 1 << 16;
 /// Thresholds of the first and of the second axis.
 const FIRST_THRESHOLDS: usize = 15;
 const SECOND_THRESHOLDS: usize = 3;
-
-/// The unsigned values of a plane of one block, as they are split in tokens.
-pub(crate) fn unsigned_values(info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u64> {
-    let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-    match info.alphabet {
-        Alphabet::Position => block.deltas.clone(),
-        Alphabet::Index => coded.iter().map(|&index| u64::from(index.unsigned_abs())).collect(),
-        Alphabet::Attribute => coded.iter().map(|&value| u64::from(zigzag(value))).collect(),
-    }
-}
-
-/// The contexts of a plane of one block under a model.
-pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u8> {
-    if info.is_position() {
-        return context::delta_contexts(&model.axes, &block.deltas, block.segments());
-    }
-    let values = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-    context::plane_contexts(&model.axes, plane, info, block, values)
-}
 
 /// The sources worth trying for a plane, the most promising first.
 fn candidates(info: PlaneInfo, preset: Preset, tools: Tools) -> Vec<Source> {

@@ -7,6 +7,7 @@
 
 mod cell_selection;
 pub(crate) mod follow;
+mod pairs;
 mod registration;
 mod rigid;
 pub(crate) mod stale_cells;

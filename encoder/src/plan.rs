@@ -6,25 +6,31 @@ pub use record::{PlanRecord, PlannedSteps, PlannedTarget, Single};
 
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;
+use crate::first_frame::{first_ranking, looking};
 use crate::frame::learning;
 use crate::gop::SpanCoder;
 use crate::importance::Ranking;
-use crate::pass::is_better_alone;
-use crate::prune::refuse_pruning;
 use crate::report::{Report, TargetReport};
-use crate::sequence::{Analysis, analyse, check};
+use crate::sequence::{Analysis, analyse};
 use crate::settings::Settings;
 use crate::shard::Shard;
 use crate::source::FrameSource;
-use crate::spans::{Coding, Common, Judge, Span, Spans, at_once};
-use crate::target;
+use crate::spans::span::{Common, Span};
+use crate::spans::{Coding, Judge, Spans, at_once};
 use crate::verification::{Tried, Verifier};
 use crate::writer::{Coded, Head, Record, UnitWriter};
 use core::ops::Range;
 use splatstream_format::Limits;
 use splatstream_format::payload::Network;
-use splatstream_format::syntax::{Profile, SequenceParameters};
+use splatstream_format::syntax::{FrameType, Profile, SequenceParameters};
 use std::io::Write;
+
+/// Where the first GOP takes more than this part of what its I frames let expect of I frames alone, these are tried.
+const DOUBTFUL: f64 = 0.6;
+
+/// Frames that each stand for themselves, without layers, are preferred to a stream that takes more than this times as
+/// many bytes.
+const LARGER: f64 = 1.005;
 
 /// What holds for all frames of a sequence: steps, ranges, layers, the network.
 ///
@@ -63,39 +69,6 @@ pub struct Plan {
     frame_digests: Vec<u64>,
 }
 
-/// Looks at every frame once, finds steps for the quality or the size that is asked for, and codes the first GOP, which
-/// shows whether frames are predicted at all.
-///
-/// For a [size](Settings::size) the whole sequence is encoded, several times: with a plan, only the last of these
-/// encodings is shared among machines.
-///
-/// # Errors
-/// Settings or frames that cannot be coded, a source that cannot be read.
-pub fn plan(source: &mut dyn FrameSource, settings: &Settings) -> Result<Plan, Error> {
-    let mut source = CheckedSource::new(source, settings).with_digests();
-    let plan = planned(&mut source, settings).map_err(named)?;
-    Ok(Plan { frame_digests: source.into_digests(), ..plan })
-}
-
-fn planned(source: &mut dyn FrameSource, asked: &Settings) -> Result<Plan, Error> {
-    check(asked)?;
-    refuse_pruning(asked)?;
-    if !asked.has_target() || source.is_empty() {
-        return Plan::new(source, asked, asked.clone(), Ranking::new(asked));
-    }
-    let (settings, ranking, found) = target::fit(source, asked)?;
-    let mut plan = Plan::new(source, asked, settings, ranking)?;
-    let Some(first) = plan.spans(0..source.len()).next() else { return Ok(plan) };
-    if plan.settings.may_predict() {
-        let (coded, report) = plan.code(source, first)?;
-        if let Some(alone) = is_better_alone(&plan, source, &coded, &report)? {
-            plan = alone;
-        }
-    }
-    plan.target = Some(found);
-    Ok(plan)
-}
-
 impl Plan {
     /// With steps that are settled.
     pub(crate) fn new(
@@ -105,7 +78,7 @@ impl Plan {
         ranking: Ranking,
     ) -> Result<Self, Error> {
         let analysis = analyse(source, &settings)?;
-        let ranking = target::looking(source, ranking, &settings)?;
+        let ranking = looking(source, ranking, &settings)?;
         let network = learning::network(source, &settings, &analysis)?;
         let (asked, ranking) = (asked.clone(), Some(ranking));
         Ok(Self {
@@ -121,6 +94,16 @@ impl Plan {
         })
     }
 
+    /// The same with how its steps were found.
+    pub(crate) fn with_target(self, target: TargetReport) -> Self {
+        Self { target: Some(target), ..self }
+    }
+
+    /// The same with a digest of each frame as it was read.
+    pub(crate) fn with_frame_digests(self, frame_digests: Vec<u64>) -> Self {
+        Self { frame_digests, ..self }
+    }
+
     /// The same with what fitting has seen of the first frame.
     pub(crate) fn with_tried(self, tried: Option<Tried>) -> Self {
         Self { tried, ..self }
@@ -131,6 +114,25 @@ impl Plan {
         let (settings, ranking) = (self.settings.clone().alone(), self.ranking(source, true)?);
         let plan = Self::new(source, &self.asked, settings, ranking)?;
         Ok(Self { target: self.target, stands_alone: true, ..plan })
+    }
+
+    /// The plan with frames that stand for themselves, if the first GOP is smaller with it. `coded` and `report`: the first
+    /// GOP with this one.
+    ///
+    /// # Errors
+    /// As [`encode`](fn@crate::encode).
+    pub(crate) fn better_alone(
+        &self,
+        source: &mut dyn FrameSource,
+        coded: &Coded,
+        report: &Report,
+    ) -> Result<Option<Self>, Error> {
+        if !is_doubtful(report) {
+            return Ok(None);
+        }
+        let alone = self.alone(source)?;
+        let (smaller, _) = alone.code(source, Span { first: 0, end: report.coded.len() as u32 })?;
+        Ok((coded.bytes() as f64 > LARGER * smaller.bytes() as f64).then_some(alone))
     }
 
     /// Shards that the sequence can be cut into, at most: the GOPs that it has if no frame forces another one.
@@ -246,8 +248,8 @@ impl Plan {
         match &self.ranking {
             Some(ranking) if is_first => Ok(ranking.clone()),
             Some(ranking) => Ok(ranking.for_later()),
-            None if is_first && self.asked.has_target() => target::first_ranking(source, &self.asked),
-            None => target::looking(source, Ranking::new(&self.settings), &self.settings),
+            None if is_first && self.asked.has_target() => first_ranking(source, &self.asked),
+            None => looking(source, Ranking::new(&self.settings), &self.settings),
         }
     }
 
@@ -263,6 +265,16 @@ impl Plan {
             network: self.network.as_ref(),
         }
     }
+}
+
+/// Whether frames that each stand for themselves might take fewer bytes than a GOP did.
+fn is_doubtful(report: &Report) -> bool {
+    let of = |counts: fn(FrameType) -> bool| {
+        let frames = report.coded.iter().filter(|frame| counts(frame.frame_type));
+        frames.fold((0.0, 0.0), |sum, frame| (sum.0 + frame.bytes as f64, sum.1 + f64::from(frame.gaussians)))
+    };
+    let (all, intra) = (of(|_| true), of(|kind| kind == FrameType::Intra));
+    report.coded.len() > 1 && all.0 * intra.1 > DOUBTFUL * intra.0 * all.1
 }
 
 /// Whether a decoder has of a stream what [fitting](crate::allocation) made of its only frame to draw it: fitting knows no

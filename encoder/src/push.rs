@@ -2,6 +2,7 @@
 
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;
+use crate::first_frame::looking;
 use crate::frame::learning;
 use crate::importance::Ranking;
 use crate::isolated::Isolated;
@@ -12,7 +13,8 @@ use crate::room::{Announced, announce};
 use crate::sequence::{Analysis, Survey};
 use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
-use crate::spans::{Coding, Common, Spans, at_once};
+use crate::spans::span::Common;
+use crate::spans::{Coding, Spans, at_once};
 use crate::target;
 use crate::window::{FirstFrames, Window};
 use crate::writer::{Head, Record, UnitWriter};
@@ -231,7 +233,7 @@ impl Stream {
         let description = analysis.description(&settings);
         let head = Head { level: analysis.level, description: Some(&description), shard: None };
         UnitWriter::new(sink, &mut record).start(&head)?;
-        let ranking = target::looking(source, ranking, &settings)?;
+        let ranking = looking(source, ranking, &settings)?;
         let network = learning::network(source, &settings, &analysis)?;
         Ok(Self { analysis, announced, settings, ranking, network, record, report })
     }

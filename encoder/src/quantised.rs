@@ -4,17 +4,14 @@
     reason = "rows are those of the frame that all planes are of; parts and axes are constants"
 )]
 
-use crate::allocation::{Attribute, Fit};
+use crate::attribute::Attribute;
 use crate::colour::{self, AddWeighted};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
-use crate::frame::unit::Grains;
+use crate::frame::grain::Grains;
 use crate::grid::{Geometry, geometry, nearest_integer};
-use crate::laws::Laws;
 use crate::pca::Components;
-use crate::settings::Settings;
 use crate::shape::{Shape, nearest_multiple};
-use crate::steps::Steps;
 use pulp::Arch;
 use rayon::prelude::*;
 use splatstream_decoder::companding::Companding;
@@ -39,23 +36,18 @@ pub(crate) struct Grids<'a> {
 }
 
 impl<'a> Grids<'a> {
-    /// Of steps, with the laws of a fit.
-    pub(crate) fn new(fit: &'a Fit, steps: &Steps) -> Self {
-        Self::with(fit, fit.laws(), steps)
-    }
-
-    /// The same with other laws.
-    pub(crate) fn with(fit: &'a Fit, laws: Laws, steps: &Steps) -> Self {
-        let settings = Settings { steps: *steps, laws, spatial_layers: 1, ..fit.settings.clone() };
-        // Which Gaussians these are is no matter here.
-        let (frame, _) = &fit.sample;
-        let flags = SequenceParameters::flags(true, frame.antialiased(), false);
-        let sequence = fit.scene.parameters(&settings, 1, frame.sh_degree(), flags);
-        let grains = Grains::new(&settings, &sequence);
+    /// Of the parameters of a stream of the scene, and how finely its refinements are coded. `refinement`: that of each Gaussian
+    /// of the scene.
+    pub(crate) fn new(
+        sequence: SequenceParameters,
+        grains: Grains,
+        bases: &'a [Components; 2],
+        refinement: &'a [u8],
+    ) -> Self {
         let rules = (0..sequence.refinement_count)
             .map(|refinement| StepRule::new(&sequence, grains.of(refinement).attribute_step))
             .collect();
-        Self { bases: &fit.bases, refinement: &fit.refinement, sequence, grains, rules }
+        Self { bases, refinement, sequence, grains, rules }
     }
 }
 

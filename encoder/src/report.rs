@@ -1,6 +1,6 @@
 //! What was written, what was chosen, and why.
 
-use crate::finetune::FinetuneReport;
+use crate::finetune::report::FinetuneReport;
 use crate::isolated::Isolated;
 use crate::laws::Laws;
 use crate::savings::{Saving, Tool};

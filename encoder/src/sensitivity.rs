@@ -3,8 +3,9 @@
 //! What pictures lose without a Gaussian and the energy of its weight are known of each. Of both follow the errors that
 //! small changes of its attributes make, as for [predicted frames](crate::frame::visible_difference).
 
-use crate::allocation::ATTRIBUTES;
-use crate::frame::{Pose, Seen, Shown};
+use crate::attribute::ATTRIBUTES;
+use crate::frame::axis_matching::Pose;
+use crate::frame::visible_difference::{Seen, Shown, pixel};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::contribution::Worth;
@@ -24,7 +25,7 @@ impl Sensitivity {
         let seen = |(row, worth): (usize, Worth)| Seen {
             loss: worth.loss as f32,
             energy: worth.energy as f32,
-            pixel: crate::frame::pixel(frame, row, cameras),
+            pixel: pixel(frame, row, cameras),
         };
         Self { seen: shown.into_iter().enumerate().map(seen).collect() }
     }

@@ -1,6 +1,6 @@
 //! What a user asks for: quality, effort, layers.
 
-use crate::finetune::Finetune;
+use crate::finetune::request::Finetune;
 use crate::frame::ladder::Ladder;
 use crate::laws::Laws;
 use crate::steps::Steps;

@@ -11,6 +11,7 @@
 //! grow with the length of the sequence.
 
 mod job;
+pub(crate) mod span;
 
 use crate::error::Error;
 use crate::gop::SpanCoder;
@@ -23,28 +24,8 @@ use crate::source::FrameSource;
 use crate::writer::{Coded, Head, UnitWriter};
 use core::ops::Range;
 use job::Job;
-use splatstream_format::Limits;
-use splatstream_format::payload::Network;
-use splatstream_format::syntax::SequenceParameters;
+use span::{Common, Span};
 use std::collections::VecDeque;
-
-/// What all spans of a sequence are coded with.
-#[derive(Clone, Copy)]
-pub(crate) struct Common<'a> {
-    pub(crate) settings: &'a Settings,
-    pub(crate) sequence: SequenceParameters,
-    /// Those of the level of the stream.
-    pub(crate) limits: Limits,
-    /// The network that the GOPs may use.
-    pub(crate) network: Option<&'a Network>,
-}
-
-/// Frames that are coded by themselves: display indices of the first, and of the one after the last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Span {
-    pub(crate) first: u32,
-    pub(crate) end: u32,
-}
 
 /// The spans of some frames of a sequence.
 #[derive(Debug, Clone)]

@@ -1,13 +1,15 @@
-//! The way of a sequence to a stream: what was asked for, reached in one pass over the frames or in several.
+//! The way of a sequence to a stream, or to the plan of one: what was asked for, reached in one pass over the frames or in
+//! several.
 
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;
 use crate::importance::Ranking;
 use crate::pass::encode_once;
+use crate::plan::Plan;
 use crate::progress::Progress;
-use crate::prune::PrunedSource;
+use crate::prune::{PrunedSource, refuse_pruning};
 use crate::report::Report;
-use crate::sequence;
+use crate::sequence::check;
 use crate::settings::Settings;
 use crate::source::FrameSource;
 use crate::target;
@@ -30,7 +32,7 @@ pub fn encode(
         None => encode_checked(&mut source, settings, sink, progress)?,
         Some(least) => {
             // Before anything is weighed for what no stream can carry.
-            sequence::check(settings)?;
+            check(settings)?;
             let mut pruned = PrunedSource::new(&mut source, settings, least);
             let mut report = encode_checked(&mut pruned, settings, sink, progress)?;
             report.leave_pruned_out(pruned.into_pruned());
@@ -52,4 +54,36 @@ fn encode_checked(
         false => encode_once(source, settings, Ranking::new(settings), sink, progress),
     };
     encoded.map_err(named)
+}
+
+/// Looks at every frame once, finds steps for the quality or the size that is asked for, and codes the first GOP, which
+/// shows whether frames are predicted at all.
+///
+/// For a [size](Settings::size) the whole sequence is encoded, several times: with a plan, only the last of these
+/// encodings is shared among machines.
+///
+/// # Errors
+/// Settings or frames that cannot be coded, a source that cannot be read.
+pub fn plan(source: &mut dyn FrameSource, settings: &Settings) -> Result<Plan, Error> {
+    let mut source = CheckedSource::new(source, settings).with_digests();
+    let plan = planned(&mut source, settings).map_err(named)?;
+    Ok(plan.with_frame_digests(source.into_digests()))
+}
+
+fn planned(source: &mut dyn FrameSource, asked: &Settings) -> Result<Plan, Error> {
+    check(asked)?;
+    refuse_pruning(asked)?;
+    if !asked.has_target() || source.is_empty() {
+        return Plan::new(source, asked, asked.clone(), Ranking::new(asked));
+    }
+    let (settings, ranking, found) = target::fit(source, asked)?;
+    let mut plan = Plan::new(source, asked, settings, ranking)?;
+    let Some(first) = plan.spans(0..source.len()).next() else { return Ok(plan) };
+    if asked.may_predict() {
+        let (coded, report) = plan.code(source, first)?;
+        if let Some(alone) = plan.better_alone(source, &coded, &report)? {
+            plan = alone;
+        }
+    }
+    Ok(plan.with_target(found))
 }

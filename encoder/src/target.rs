@@ -6,10 +6,9 @@
 #![expect(clippy::arithmetic_side_effects, reason = "counts of encodings and frames; layers are at most 4")]
 
 use crate::allocation::{Fit, finer};
-use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
+use crate::first_frame::coded_form;
 use crate::importance::Ranking;
-use crate::isolated;
 use crate::pass::{encode_once, encode_smaller};
 use crate::progress::Progress;
 use crate::report::{Report, TargetReport};
@@ -23,7 +22,6 @@ use crate::strips::StripViews;
 use crate::verification::{Tried, Views};
 use crate::window::FirstFrames;
 use splatstream_format::syntax::FrameType;
-use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
 
 /// A PSNR is near enough within so many decibels of what is this much higher than the one that is asked for: a little too
@@ -98,45 +96,6 @@ pub(crate) fn fit(
     // The one that the plan is made for.
     seeker.encodings += u32::from(found.encoded.is_none());
     Ok((seeker.fitting.at(found.fitted)?, seeker.fitting.ranking.clone(), seeker.told(found.fitted)))
-}
-
-/// The ranking of the first frame that steps are fitted with, which knows its order.
-///
-/// # Errors
-/// A frame that cannot be read.
-pub(crate) fn first_ranking(source: &mut dyn FrameSource, settings: &Settings) -> Result<Ranking, Error> {
-    let frame = first_frame(source, settings)?;
-    let mut ranking = Ranking::new(settings);
-    ranking.rank_first(&frame);
-    Ok(ranking)
-}
-
-/// The ranking with the views of the sequence, if they are to be made.
-///
-/// # Errors
-/// A frame that cannot be read.
-pub(crate) fn looking(
-    source: &mut dyn FrameSource,
-    mut ranking: Ranking,
-    settings: &Settings,
-) -> Result<Ranking, Error> {
-    if ranking.is_blind() {
-        ranking.look_at(&first_frame(source, settings)?);
-    }
-    Ok(ranking)
-}
-
-/// The first frame as it is coded.
-pub(crate) fn first_frame(source: &mut dyn FrameSource, settings: &Settings) -> Result<GaussianFrame, Error> {
-    let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
-    Ok(coded_form(first, settings))
-}
-
-/// A first frame as it is coded.
-fn coded_form(frame: GaussianFrame, settings: &Settings) -> GaussianFrame {
-    let shown = visible(&frame, settings.keep_invisible);
-    let frame = canonicalise(frame.into_selected(&shown), true);
-    isolated::colours(frame, &shown, 0).0
 }
 
 /// Settings that reach what is asked for on the frames of `source`, the order of the first frame, and how they were found.

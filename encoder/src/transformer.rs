@@ -12,7 +12,7 @@
 //! |---|---|
 //! | `parameters` | where the parameters of a network stand, and those to start from |
 //! | `model`, `attention` | the pass forwards |
-//! | `backward` | the slopes of the parameters |
+//! | `gradient`, `backward` | the slopes of the parameters |
 //! | `descent` | steps against the slopes |
 //! | `loss` | how far outputs are from those wanted |
 //! | `lane`, `matrix` | arithmetic on 16 Gaussians |
@@ -21,6 +21,7 @@ mod architecture;
 mod attention;
 mod backward;
 mod descent;
+mod gradient;
 mod lane;
 mod loss;
 mod matrix;

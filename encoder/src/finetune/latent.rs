@@ -10,8 +10,9 @@
 
 use super::receivers::Receiver;
 use crate::error::Error;
+use crate::frame::grain::Grain;
 use crate::frame::residuals::Wanted;
-use crate::frame::unit::{Grain, UnitCoder};
+use crate::frame::unit::UnitCoder;
 use core::ops::Range;
 use rayon::prelude::*;
 use splatstream_decoder::companding::Companding;

@@ -3,7 +3,7 @@
 
 use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
 use super::receivers::{LINES, Receiver};
-use super::{Finetune, Photograph};
+use super::request::{Finetune, Photograph};
 use crate::error::Error;
 use crate::settings::Settings;
 use splatstream_gaussians::GaussianFrame;

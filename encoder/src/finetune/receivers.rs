@@ -4,7 +4,7 @@
 //! later lists are missing it raises log-scales and opacities by the compensation of the last one. Values are fitted to pictures
 //! of exactly that, so that a value counts at every point that shows it.
 
-use super::Finetune;
+use super::request::{Finetune, PointWeight};
 use crate::error::Error;
 use crate::frame::ladder::Ladder;
 use crate::settings::Settings;
@@ -13,15 +13,6 @@ use std::collections::BTreeSet;
 
 /// Lines of a picture: those at which quality is meant. Fuzzing wants streams, not pictures.
 pub(super) const LINES: u32 = if cfg!(fuzzing) { 12 } else { 540 };
-
-/// An operating point, and what a decibel there is worth beside one at the others.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PointWeight {
-    /// One of the stream. Its temporal layer makes no difference to an I frame.
-    pub point: OperatingPoint,
-    /// Above 0; only the ratios of weights matter.
-    pub weight: f64,
-}
 
 /// A receiver whose pictures count where the values of a spatial layer are fitted.
 pub(super) struct Receiver {

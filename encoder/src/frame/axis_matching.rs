@@ -1,10 +1,13 @@
 //! The way to write a target Gaussian that is nearest to how its reference is written.
 
-use super::survivors::LEFT;
 use crate::canonical::{permutation, product};
 
 /// The orders of three axes.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 0, 2], [2, 1, 0]];
+
+/// The largest difference, in steps, that is left of an attribute. Rounding would leave half a step; a residual of one step
+/// takes about two bits more than none.
+pub(crate) const LEFT: f32 = 0.55;
 
 /// What a difference that has to be sent counts, in squared steps: more than all that are left can.
 const SENT: f32 = 16.0;

@@ -1,9 +1,10 @@
 //! Cells of predicted frames: from the motion of Gaussians to the section of a frame header.
 
+use super::Reference;
 use super::deviation::Deviation;
 use super::new_list::deltas;
-use super::predicted::PredictedTarget;
-use super::{Reference, Target};
+use super::target::Target;
+use super::unit::UnitCoder;
 use crate::error::Error;
 use crate::matching::{Cloud, Matching, Measure};
 use crate::motion::follow::follow;
@@ -153,23 +154,23 @@ pub(crate) struct CellPlan<'a> {
 /// # Errors
 /// A value that no token codes.
 pub(crate) fn code_cells(
-    from: &PredictedTarget<'_>,
+    coder: &UnitCoder<'_>,
+    (reference, target): (&Reference, &Target),
     matching: &Matching,
     plan: &CellPlan<'_>,
     models: &mut ModelsInForce,
 ) -> Result<(CellField, Option<CellsBytes>), Error> {
-    let sequence = from.coder.sequence;
-    let cloud = ReferenceCloud::new(from.reference, sequence);
-    let mut motion = cloud.motion(from.target, matching, plan, sequence.position_bits);
+    let sequence = coder.sequence;
+    let cloud = ReferenceCloud::new(reference, sequence);
+    let mut motion = cloud.motion(target, matching, plan, sequence.position_bits);
     // What differs more from cell to cell, no token codes.
     motion.cells.retain(|cell| cell.translation.iter().all(|part| part.abs() <= MAX_TRANSLATION));
     motion.cells.truncate(plan.max_cells as usize);
     if motion.cells.is_empty() {
         return Ok((CellField::default(), None));
     }
-    let values = cell_values(&motion, from.coder.block());
+    let values = cell_values(&motion, coder.block());
     let field = field(&values, motion.cell_log2, sequence, 0)?;
-    let coder = &from.coder;
     let drafted = coder.section_draft(Section::Cells, &values, coder.steps([0; 5]), models);
     let section = drafted.code(Section::Cells, &values, &coder.plan, models)?;
     let (cell_count, cell_log2) = (motion.cells.len() as u32, motion.cell_log2);

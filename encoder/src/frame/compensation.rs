@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
@@ -88,4 +89,13 @@ pub(crate) fn compensated(
     planes.log_scale.iter_mut().flatten().for_each(|value| *value += i32::from(scale));
     planes.opacity.iter_mut().for_each(|value| *value += i32::from(opacity));
     Ok(to_gaussians(planes, sequence)?)
+}
+
+/// All Gaussians of some lists, as they are output.
+///
+/// # Errors
+/// Lists whose planes make no frame.
+pub(crate) fn shown(lists: &[GaussianList], sequence: &SequenceParameters) -> Result<GaussianFrame, Error> {
+    let lists: Vec<&QuantizedFrame> = lists.iter().map(|list| &list.planes).collect();
+    compensated(&lists, (0, 0), sequence)
 }

@@ -10,10 +10,10 @@
 )]
 #![expect(clippy::arithmetic_side_effects, reason = "differences of floats; counts of Gaussians in memory")]
 
-use super::axis_matching::Pose;
-use super::rate_distortion::shown;
+use super::axis_matching::{Namings, Pose};
+use super::compensation::shown;
+use super::target::Target;
 use super::unit::UnitCoder;
-use super::{Reference, Target};
 use crate::error::Error;
 use crate::matching::Matching;
 use splatstream_decoder::list::GaussianList;
@@ -82,17 +82,17 @@ impl Deviation {
         Self { position: self.position.each_ref().map(|plane| of(plane)), values }
     }
 
-    /// What a frame shall become where its Gaussians continue those of a reference: what its source has, and what each differed
+    /// What a frame shall become where its Gaussians continue those of a reference, of which these are the lists: what its source has, and what each differed
     /// by. It is written as the reference is.
     pub(crate) fn added_to(
         &self,
         target: &Target,
-        (reference, matching): (&Reference, &Matching),
+        (lists, matching): (&[GaussianList], &Matching),
         coder: &UnitCoder<'_>,
     ) -> Target {
         let mut sum = target.clone();
-        let namings = super::Namings::new();
-        let rows = reference.lists.iter().zip(0_u8..);
+        let namings = Namings::new();
+        let rows = lists.iter().zip(0_u8..);
         let rows = rows.flat_map(|(list, number)| (0..list.len()).map(move |row| (list, number, row)));
         let values = &self.values;
         let PlanesMut { mut log_scale, mut rotation, opacity_logit, dc, sh, .. } = sum.frame.planes_mut();

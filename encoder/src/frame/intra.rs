@@ -4,11 +4,12 @@
 #![expect(clippy::indexing_slicing, reason = "lists are counted by refinement_count, rows by the frame")]
 
 use super::compensation::Compensator;
+use super::grain::Grain;
 use super::ladder::Ladder;
 use super::new_list::NewList;
 use super::predictors::{Chooser, used};
 use super::residuals::Wanted;
-use super::unit::{Draft, Grain, UnitCoder};
+use super::unit::{Draft, UnitCoder};
 use super::{CodedFrame, CodedUnit, Reference, worth};
 use crate::error::Error;
 use crate::savings::Saving;
@@ -119,7 +120,7 @@ impl Intra<'_> {
         let shifts: Vec<u8> = added.iter().map(|(_, grain)| grain.position_shift).collect();
         let new = NewList::all(self.coder, lowest, added, self.models.before(0));
         if self.target.tells_savings && layer == 0 {
-            self.savings = worth::of_lists(self.coder, &self.target, &new, &shifts);
+            self.savings = worth::of_lists(self.coder, (lowest, order), &new, &shifts);
         }
         if !self.target.chooser.predicts() && !self.ladder.refines_from(layer) {
             self.target.wanted = self.target.wanted.select(&[]);
@@ -163,7 +164,7 @@ impl Intra<'_> {
         draft.header.refinement_digest = lists_digest(digests);
         self.lists[list] = applied.list;
         self.compensate(&mut draft, layer, refinement)?;
-        let payload = self.coder.code(&draft, &new, &mut models)?;
+        let payload = self.coder.code(&draft, &new.coded, &mut models)?;
         let reuse_saves = match self.target.tells_savings {
             true => {
                 let before = self.models.before(refinement);

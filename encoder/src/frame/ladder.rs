@@ -8,7 +8,7 @@
 //! Log-scales have their final steps from the start. Measured on real scenes, coarse ones spoil the picture of the lowest
 //! layer as much as a coarser quantiser of everything would, and the steps of all other attributes follow from them.
 
-use super::unit::Grain;
+use super::grain::Grain;
 use splatstream_format::syntax::MAX_ATTRIBUTE_STEP;
 
 /// Half octaves by which steps are coarser until they are refined: log_scale, opacity, rotation, dc, sh. Three are a

@@ -2,13 +2,14 @@
 
 use super::recorder::Recorder;
 use crate::error::Error;
+use crate::first_frame::looking;
 use crate::gop::SpanCoder;
 use crate::importance::Ranking;
 use crate::sequence::{Analysis, analyse};
 use crate::settings::{NetworkSource, Settings};
 use crate::source::FrameSource;
-use crate::spans::{Common, Spans};
-use crate::target::looking;
+use crate::spans::Spans;
+use crate::spans::span::Common;
 use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, TrainingReport, train};
 use crate::writer::Coded;
 use core::ops::ControlFlow;

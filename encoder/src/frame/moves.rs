@@ -8,7 +8,7 @@
     reason = "positions on the grid have at most 26 bits, steps are powers of two"
 )]
 
-use super::survivors::{MOST, REMOVED};
+use super::survivors::{Aim, MOST, REMOVED};
 use splatstream_decoder::list::{FINE, GaussianList, canonical};
 use splatstream_decoder::moves::{MovePredictor, MoveSpace, Moves};
 use splatstream_format::syntax::NO_PREDICTOR;
@@ -33,17 +33,6 @@ const DOUBLING_BITS: f32 = 1.6;
 
 /// Bits by which a block names its predictor.
 const NAMED_BITS: f32 = 1.5;
-
-/// Where a parent shall be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Aim {
-    /// Grid steps.
-    pub(crate) place: [f32; 3],
-    /// How far from there it may be left, steps of its moves.
-    pub(crate) left: f32,
-    /// Whether it is worth a move at all.
-    pub(crate) moves: bool,
-}
 
 /// The moves of a unit.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -2,8 +2,9 @@
 //!
 //! They need nothing of other units: those of all units of a frame are put in order, coded and given models at once.
 
+use super::grain::Grain;
 use super::residuals::Wanted;
-use super::unit::{Grain, UnitCoder};
+use super::unit::UnitCoder;
 use crate::section::{SectionDraft, biases};
 use rayon::prelude::*;
 use splatstream_decoder::increment::values::SectionValues;

@@ -6,14 +6,15 @@
 )]
 
 use super::cells::{CellPlan, code_cells};
-use super::moves::{self, Aim, MovePlan};
+use super::grain::Grain;
+use super::moves::{self, MovePlan};
 use super::new_list::{NewList, unpredicted};
 use super::predictors::{Chooser, used};
-use super::rate_distortion::Goal;
 use super::residuals::Wanted;
-use super::survivors::{Fate, Parents, REMOVED, Survivors};
-use super::unit::{Draft, Grain, UnitCoder};
-use super::{CodedFrame, CodedUnit, Reference, Target};
+use super::survivors::{Aim, Fate, Parents, REMOVED, Survivors};
+use super::target::Target;
+use super::unit::{Draft, UnitCoder};
+use super::{CodedFrame, CodedUnit, Reference};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
 use crate::matching::Matching;
@@ -100,7 +101,9 @@ impl<'a> Predicted<'a> {
     ) -> Result<Self, Error> {
         let mut models = ModelsOfFrame::starting_with(from.reference.models.clone());
         let (field, cells) = match cells {
-            Some(plan) => code_cells(&from, &matching, plan, &mut models.first)?,
+            Some(plan) => {
+                code_cells(&from.coder, (from.reference, from.target), &matching, plan, &mut models.first)?
+            }
             None => (CellField::default(), None),
         };
         let mut displaced: Vec<GaussianList> =
@@ -122,10 +125,7 @@ impl<'a> Predicted<'a> {
     ///
     /// # Errors
     /// What the decoder's own checks refuse.
-    pub(crate) fn code(mut self, goal: Option<&mut Goal>) -> Result<CodedFrame, Error> {
-        if let Some(goal) = goal {
-            self.set_judge(goal)?;
-        }
+    pub(crate) fn code(mut self) -> Result<CodedFrame, Error> {
         let Fresh { indices, wanted, of_list } = self.fresh();
         let mut done = Done { models: core::mem::take(&mut self.models), ..Done::default() };
         let added = (0..).zip(of_list).map(|(list, added)| (added, self.grain(list))).collect();
@@ -183,7 +183,7 @@ impl<'a> Predicted<'a> {
         if let Some(&(log_scale, opacity)) = compensation.get(list) {
             (draft.header.compensation_log_scale, draft.header.compensation_opacity) = (log_scale, opacity);
         }
-        let payload = coder.code(&draft, &new, &mut models)?;
+        let payload = coder.code(&draft, &new.coded, &mut models)?;
         done.models.follow(refinement, models);
         done.units.push(CodedUnit {
             spatial_layer: coder.sequence.spatial_layer_count - 1,

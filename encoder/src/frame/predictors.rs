@@ -90,13 +90,13 @@ impl Chooser<'_> {
         let candidates = self.candidates(coder, draft, &set, &all.select(&new.added))?;
         // What is estimated knows nothing of contexts, which find much of what neighbours have in common.
         let is_compared = self.is_frugal() && !candidates.is_empty();
-        let plain = if is_compared { coder.new_bytes(draft, new, models)? } else { 0 };
+        let plain = if is_compared { coder.new_bytes(draft, &new.coded, models)? } else { 0 };
         let searched = set.len() / (8 * SEARCHED_FOR_A_BIT);
         let mut least = if is_compared { plain.saturating_sub(searched) } else { usize::MAX };
         let mut saved = 0;
         let only = candidates.len() == 1 && !self.is_frugal();
         for candidate in candidates {
-            let bytes = if only { 0 } else { coder.new_bytes(&candidate, new, models)? };
+            let bytes = if only { 0 } else { coder.new_bytes(&candidate, &new.coded, models)? };
             if bytes < least {
                 (least, saved) = (bytes, plain.saturating_sub(bytes));
                 *draft = candidate;

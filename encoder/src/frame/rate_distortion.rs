@@ -1,12 +1,9 @@
 //! What a bit may cost in pictures, so that a frame is as good as it must be and no better.
 
-use super::compensation::compensated;
+use super::compensation::shown;
 use super::predicted::Predicted;
 use super::update_decision::Judge;
 use crate::error::Error;
-use splatstream_decoder::frame::QuantizedFrame;
-use splatstream_decoder::list::GaussianList;
-use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{ReferencePictures, metrics};
 
@@ -26,15 +23,6 @@ const STRIDE: i32 = 4;
 /// PSNR of each picture of a frame, dB, at most [`metrics::LOSSLESS_DB`].
 pub(crate) fn finite_psnr(pictures: &ReferencePictures, frame: &GaussianFrame) -> impl Iterator<Item = f64> {
     pictures.psnr(frame).map(|decibels| decibels.min(metrics::LOSSLESS_DB))
-}
-
-/// All Gaussians of some lists, as they are output.
-///
-/// # Errors
-/// Lists whose planes make no frame.
-pub(crate) fn shown(lists: &[GaussianList], sequence: &SequenceParameters) -> Result<GaussianFrame, Error> {
-    let lists: Vec<&QuantizedFrame> = lists.iter().map(|list| &list.planes).collect();
-    compensated(&lists, (0, 0), sequence)
 }
 
 /// How good pictures must be.
@@ -74,7 +62,8 @@ impl Predicted<'_> {
         let decibels = finite_psnr(&goal.pictures, &everything);
         goal.least = decibels.map(|psnr| psnr - goal.tolerance).collect();
         let carried = shown(&self.displaced, self.from.coder.sequence)?;
-        self.from.survivors.judge = Some(Judge::new(&self.from.target.frame, &carried, goal));
+        self.from.survivors.judge =
+            Some(Judge::new(&self.from.target.frame, &carried, (&goal.pictures, &goal.least)));
         goal.level = self.level(goal)?;
         self.price_at(goal, goal.level);
         Ok(())

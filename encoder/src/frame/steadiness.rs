@@ -4,7 +4,8 @@
 //! they show depends on the scene. So the pictures of each predicted frame are compared with its source, as those of the I
 //! frame were, and the price of the next frame follows: nothing is coded twice.
 
-use super::rate_distortion::{finite_psnr, shown};
+use super::compensation::shown;
+use super::rate_distortion::finite_psnr;
 use super::survivors::BitPrice;
 use super::{CodedFrame, Target};
 use crate::error::Error;

@@ -4,12 +4,11 @@
     reason = "rows are those of the parents and of the target; attributes and axes are constants"
 )]
 
-use super::Target;
-use super::axis_matching::{Namings, Pose};
-use super::moves::Aim;
+use super::axis_matching::{LEFT, Namings, Pose};
+use super::difference::{Apart, COLOUR, Kept, OPACITY, ROTATION};
+use super::target::Target;
 use super::update_decision::Judge;
 use crate::grid::nearest_integer;
-use crate::vq;
 use rayon::prelude::*;
 use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_decoder::list::{FINE, GaussianList};
@@ -18,9 +17,7 @@ use splatstream_decoder::steps::{StepRule, step};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::SequenceParameters;
 
-/// The largest difference, in steps, that is left of an attribute, and of a position. Rounding would leave half a step; a
-/// residual of one step takes about two bits more than none.
-pub(crate) const LEFT: f32 = 0.55;
+/// The largest difference, in steps, that is left of a position; of an attribute that is [`LEFT`].
 const LEFT_OF_MOVES: f32 = 0.7;
 
 /// What is sent whatever it takes: differences of more steps than this show.
@@ -59,6 +56,17 @@ fn kept(difference: f32) -> i32 {
     if difference.abs() <= LEFT { 0 } else { nearest_integer(difference) }
 }
 
+/// Where a parent shall be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Aim {
+    /// Grid steps.
+    pub(crate) place: [f32; 3],
+    /// How far from there it may be left, steps of its moves.
+    pub(crate) left: f32,
+    /// Whether it is worth a move at all.
+    pub(crate) moves: bool,
+}
+
 /// What becomes of a parent.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Fate {
@@ -70,63 +78,6 @@ pub(crate) struct Fate {
 
 /// The mode of a parent that is removed.
 pub(crate) const REMOVED: i32 = 4;
-
-/// Where the opacity, the rotation and dc are among the attributes, after the log-scales.
-const OPACITY: usize = 3;
-const ROTATION: usize = 4;
-const COLOUR: usize = 7;
-
-/// How far a Gaussian is from its partner, in steps of the sequence.
-pub(crate) struct Apart {
-    pub(crate) position: [f32; 3],
-    /// Log-scales, opacity, rotation, components of dc and of sh.
-    pub(crate) attributes: Vec<f32>,
-    /// Where the components of sh begin.
-    colours: usize,
-    /// The steps that each is coded with, nearly: those of a Gaussian of this size and opacity.
-    pub(crate) steps: [f32; 5],
-    /// The step of moves.
-    pub(crate) move_step: f32,
-    /// The partner, written like the Gaussian, and the Gaussian.
-    pub(crate) pose: Pose,
-    pub(crate) reference: Pose,
-    /// The opacity of the partner.
-    pub(crate) logit: f32,
-}
-
-impl Apart {
-    /// Components of sh.
-    pub(crate) fn sh(&self) -> &[f32] {
-        &self.attributes[self.colours..]
-    }
-
-    /// Components of sh, in the steps that they are coded with.
-    fn coded_sh(&self) -> Vec<f32> {
-        self.sh().iter().map(|value| value / self.steps[4]).collect()
-    }
-
-    /// The step of an attribute.
-    pub(crate) fn step_of(&self, attribute: usize) -> f32 {
-        let stage = match attribute {
-            0..OPACITY => 0,
-            OPACITY => 1,
-            ROTATION..COLOUR => 2,
-            _ if attribute < self.colours => 3,
-            _ => 4,
-        };
-        self.steps[stage]
-    }
-}
-
-/// What is sent of the differences.
-pub(crate) struct Kept {
-    /// Whether the position is worth a move.
-    pub(crate) moves: bool,
-    /// What the attributes shall change by, steps of the sequence.
-    pub(crate) attributes: Vec<f32>,
-    /// The entry of the codebook of SH residuals, if there is one.
-    pub(crate) entry: Option<i32>,
-}
 
 /// The parents of a unit, and how finely it codes them.
 #[derive(Clone, Copy)]
@@ -188,8 +139,8 @@ impl Survivors<'_> {
         let index = index as usize;
         let apart = self.apart(parents, row, index);
         let Kept { moves, attributes, entry } = match &self.judge {
-            None => self.all_kept(&apart),
-            Some(judge) => judge.kept(self, &apart, index),
+            None => apart.all_kept(self.book),
+            Some(judge) => judge.kept(self.sequence, self.book, &apart, index),
         };
         let place = self.target.position.each_ref().map(|plane| plane[index]);
         let update = self.update(parents, row, &attributes, entry);
@@ -205,20 +156,6 @@ impl Survivors<'_> {
             aim: Some(Aim { place, left: LEFT_OF_MOVES, moves }),
             updated: if is_worth_it { update.residuals } else { Vec::new() },
         }
-    }
-
-    /// All differences.
-    pub(crate) fn all_kept(&self, apart: &Apart) -> Kept {
-        Kept {
-            moves: true,
-            attributes: apart.attributes.clone(),
-            entry: self.book.map(|book| vq::nearest_entry(book, &apart.coded_sh())),
-        }
-    }
-
-    /// The entry of a codebook that is nearest to the components of sh.
-    pub(crate) fn nearest_entry(book: &Codebook, apart: &Apart) -> i32 {
-        vq::nearest_entry(book, &apart.coded_sh())
     }
 
     /// Whether a Gaussian is so far from its partner that no residual brings it there.

@@ -1,9 +1,8 @@
 //! Codes one increment: values chosen elsewhere are applied as a decoder applies them, then entropy coded.
 
-use super::new_list::NewList;
+use super::grain::{Grain, Grains};
 use crate::error::Error;
 use crate::section::{SectionDraft, SectionPlan, biases};
-use crate::settings::Settings;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::increment::residual::AttributeCoding;
 use splatstream_decoder::increment::values::{SectionValues, UnitValues};
@@ -15,9 +14,7 @@ use splatstream_decoder::steps::StepRule;
 use splatstream_format::Limits;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{Network, SectionBytes, write_increment};
-use splatstream_format::syntax::{
-    IncrementHeader, MAX_REFINEMENTS, NO_PREDICTOR, SequenceParameters, ShHeader,
-};
+use splatstream_format::syntax::{IncrementHeader, NO_PREDICTOR, SequenceParameters, ShHeader};
 
 /// What the units of a frame have in common.
 #[derive(Clone, Copy)]
@@ -34,38 +31,6 @@ pub(crate) struct UnitCoder<'a> {
     pub(crate) network: Option<&'a Network>,
     /// New Gaussians of a unit that it may predict.
     pub(crate) max_learned: u32,
-}
-
-/// How finely a unit codes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Grain {
-    /// Low bits of positions that are left out.
-    pub(crate) position_shift: u8,
-    /// Exponents of the steps of log_scale, opacity, rotation, dc, sh.
-    pub(crate) attribute_step: [u8; 5],
-}
-
-/// How finely the refinements of a sequence are coded.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Grains([Grain; MAX_REFINEMENTS as usize]);
-
-impl Grains {
-    /// As the settings of a sequence ask for.
-    pub(crate) fn new(settings: &Settings, sequence: &SequenceParameters) -> Self {
-        let mut grains = Self::default();
-        for (refinement, grain) in (0..).zip(&mut grains.0) {
-            *grain = Grain {
-                position_shift: settings.laws.position_shift(sequence, refinement),
-                attribute_step: settings.laws.attribute_step(&settings.steps, sequence, refinement),
-            };
-        }
-        grains
-    }
-
-    /// Of a refinement.
-    pub(crate) fn of(&self, refinement: u8) -> Grain {
-        self.0.get(usize::from(refinement)).copied().unwrap_or_default()
-    }
 }
 
 /// A unit before it is coded.
@@ -156,8 +121,8 @@ impl UnitCoder<'_> {
         Ok(apply(&unit, parents, situation)?)
     }
 
-    /// The payload of a unit, whose digest is known; `models` become those in force after it. `new`: its new Gaussians
-    /// without prediction.
+    /// The payload of a unit, whose digest is known; `models` become those in force after it. `unpredicted`: models of
+    /// its new Gaussians without prediction.
     ///
     /// # Errors
     /// A value that no token codes, a header that a decoder would refuse.
@@ -168,7 +133,7 @@ impl UnitCoder<'_> {
     pub(crate) fn code(
         &self,
         draft: &Draft,
-        new: &NewList,
+        unpredicted: &SectionDraft,
         models: &mut ModelsInForce,
     ) -> Result<Vec<u8>, Error> {
         let header = trimmed(draft.header);
@@ -176,7 +141,7 @@ impl UnitCoder<'_> {
         let values = draft.values.section(Section::New);
         let new = match (draft.is_predicted(), header.new_count) {
             (_, 0) => return Ok(write_increment(&header, self.sequence, &sections)?),
-            (false, _) => &new.coded,
+            (false, _) => unpredicted,
             (true, _) => {
                 let steps = self.steps(header.attribute_step);
                 &self.section_draft(Section::New, values, steps, models)
@@ -200,7 +165,7 @@ impl UnitCoder<'_> {
     pub(crate) fn new_bytes(
         &self,
         draft: &Draft,
-        new: &NewList,
+        unpredicted: &SectionDraft,
         models: &ModelsInForce,
     ) -> Result<usize, Error> {
         let mut models = models.clone();
@@ -210,7 +175,7 @@ impl UnitCoder<'_> {
             sections.push(self.own_section(Section::New, draft, &mut models)?);
         } else {
             let values = draft.values.section(Section::New);
-            sections.push(new.coded.code(Section::New, values, &self.plan, &mut models)?);
+            sections.push(unpredicted.code(Section::New, values, &self.plan, &mut models)?);
         }
         Ok(length(&sections))
     }

@@ -5,13 +5,13 @@
 //! bits. The [price](super::rate_distortion) is as high as the pictures of the frame allow.
 #![expect(clippy::arithmetic_side_effects, reason = "lengths of what is in memory; steps are clamped")]
 
-use super::rate_distortion::Goal;
-use super::survivors::{Apart, Kept, Survivors};
-use super::visible_difference::{Seen, Shown};
+use super::difference::{Apart, Kept};
+use super::visible_difference::{Seen, Shown, pixel};
 use crate::grid::nearest_integer;
 use splatstream_format::payload::Codebook;
+use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::Camera;
+use splatstream_render::ReferencePictures;
 use splatstream_render::contribution::worth;
 
 /// Bits of a difference of one step, and what each doubling adds; what a zero takes among others that are none.
@@ -57,14 +57,18 @@ struct Term {
 
 impl Judge {
     /// For a source frame and what the cells bring into it. The errors of each view count as shares of the error that
-    /// it may have: so many decibels are worth as much in any view.
-    pub(crate) fn new(frame: &GaussianFrame, displaced: &GaussianFrame, goal: &Goal) -> Self {
-        let cameras = goal.pictures.cameras().cloned().collect::<Vec<_>>();
+    /// it may have: so many decibels are worth as much in any view. `least`: the PSNR that each of the pictures must have, dB.
+    pub(crate) fn new(
+        frame: &GaussianFrame,
+        displaced: &GaussianFrame,
+        (pictures, least): (&ReferencePictures, &[f64]),
+    ) -> Self {
+        let cameras = pictures.cameras().cloned().collect::<Vec<_>>();
         let mut seen: Vec<Seen> = (0..frame.len())
             .map(|row| Seen { loss: 0.0, energy: 0.0, pixel: pixel(frame, row, &cameras) })
             .collect();
         let mut carried = vec![0.0; displaced.len()];
-        for (camera, least) in cameras.iter().zip(&goal.least) {
+        for (camera, least) in cameras.iter().zip(least) {
             let values = 3.0 * f64::from(camera.width) * f64::from(camera.height);
             let allowed = values * libm::pow(10.0, -0.1 * least);
             for (loss, worth) in carried.iter_mut().zip(worth(displaced, core::slice::from_ref(camera))) {
@@ -89,27 +93,33 @@ impl Judge {
     }
 
     /// What is sent of the differences between a Gaussian and its partner in the target.
-    pub(crate) fn kept(&self, survivors: &Survivors<'_>, apart: &Apart, index: usize) -> Kept {
-        let Some(seen) = self.seen.get(index) else { return survivors.all_kept(apart) };
+    pub(crate) fn kept(
+        &self,
+        sequence: &SequenceParameters,
+        book: Option<&Codebook>,
+        apart: &Apart,
+        index: usize,
+    ) -> Kept {
+        let Some(seen) = self.seen.get(index) else { return apart.all_kept(book) };
         let shown = Shown::new(seen, &apart.pose);
-        let step = survivors.sequence.position_step();
+        let step = sequence.position_step();
         let widths = shown.widths(apart.position.map(|steps| steps * step));
         let calm = if widths <= STILL { CALM } else { 0.0 };
         let with_calm = |term: Term| Term { calm, ..term };
         let moves = apart.position.map(|steps| steps / apart.move_step);
         let moved = self.group(&spread(&moves, shown.moved(widths)).map(with_calm), 0.0);
-        let terms: Vec<Term> = terms(survivors, apart, &shown).into_iter().map(with_calm).collect();
-        let (coded, sh) = match survivors.book {
+        let terms: Vec<Term> = terms(sequence, apart, &shown).into_iter().map(with_calm).collect();
+        let (coded, sh) = match book {
             None => (terms.as_slice(), &[][..]),
             Some(_) => terms.split_at(terms.len() - apart.sh().len()),
         };
-        let (entry, gain) = survivors.book.map_or((0, 0.0), |book| self.entry(book, apart, sh));
+        let (entry, gain) = book.map_or((0, 0.0), |book| self.entry(book, apart, sh));
         let mut attributes = self.group(coded, gain);
         let alone = attributes.iter().all(|&steps| steps == 0);
         let entry = if alone && gain < self.price * NAMED_BITS { 0 } else { entry };
         attributes.resize(terms.len(), 0);
         let changes = (0..).zip(attributes).map(|(attribute, steps)| steps as f32 * apart.step_of(attribute));
-        let entry = survivors.book.map(|_| entry);
+        let entry = book.map(|_| entry);
         Kept { moves: moved.iter().any(|&steps| steps != 0), attributes: changes.collect(), entry }
     }
 
@@ -119,7 +129,7 @@ impl Judge {
         reason = "attributes and axes are constants; rows and entries are counted by what they index"
     )]
     fn entry(&self, book: &Codebook, apart: &Apart, terms: &[Term]) -> (i32, f32) {
-        let entry = Survivors::nearest_entry(book, apart);
+        let entry = apart.nearest_entry(book);
         let values = book.entries[entry as usize * terms.len()..].iter().map(|&value| f32::from(value));
         let gain: f32 = terms.iter().zip(values).map(|(term, value)| term.gain(value)).sum();
         let gain = gain - self.price * ENTRY_BITS;
@@ -170,8 +180,7 @@ fn spread(steps: &[f32; 3], error: f32) -> [Term; 3] {
     clippy::indexing_slicing,
     reason = "attributes and axes are constants; rows and entries are counted by what they index"
 )]
-fn terms(survivors: &Survivors<'_>, apart: &Apart, shown: &Shown) -> Vec<Term> {
-    let sequence = survivors.sequence;
+fn terms(sequence: &SequenceParameters, apart: &Apart, shown: &Shown) -> Vec<Term> {
     let changes = &apart.attributes;
     let square = |step: f32| step * step;
     let of = |attribute: usize, weight: f32| {
@@ -198,17 +207,4 @@ fn bits(steps: i32) -> f32 {
         0 => ZERO_BITS,
         size => FIRST_BITS + DOUBLING_BITS * libm::log2f(size as f32),
     }
-}
-
-/// The side of a pixel at the place of a Gaussian, scene units; the mean of the cameras.
-#[expect(
-    clippy::indexing_slicing,
-    reason = "attributes and axes are constants; rows and entries are counted by what they index"
-)]
-pub(crate) fn pixel(frame: &GaussianFrame, row: usize, cameras: &[Camera]) -> f32 {
-    let side = |camera: &Camera| {
-        let apart = [0, 1, 2].map(|axis: usize| frame.position()[axis][row] - camera.position[axis]);
-        apart.iter().map(|d| d * d).sum::<f32>().sqrt() / camera.focal[0].max(f32::MIN_POSITIVE)
-    };
-    cameras.iter().map(side).sum::<f32>() / cameras.len().max(1) as f32
 }

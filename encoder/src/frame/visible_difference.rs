@@ -3,10 +3,12 @@
 //! A Gaussian that is taken away changes the pictures by its [loss](splatstream_render::contribution::Worth::loss). One that moves, grows or turns a
 //! little changes them by a part of that: the part of its own square that the difference of two bells has. Its colour
 //! changes them by the square of the change times its [energy](splatstream_render::contribution::Worth::energy).
-#![expect(clippy::indexing_slicing, reason = "axes are 0, 1 and 2")]
+#![expect(clippy::indexing_slicing, reason = "axes are 0, 1 and 2; rows are those of the frame")]
 
 use super::axis_matching::Pose;
 use crate::canonical::product;
+use splatstream_gaussians::GaussianFrame;
+use splatstream_render::Camera;
 
 /// The square of a bell's derivative by its place in units of its width, and by the log of its width on one axis, as a
 /// part of its own square. Each axis is seen from two of three sides.
@@ -111,4 +113,13 @@ fn turned([w, x, y, z]: [f32; 4], d: [f32; 3]) -> [f32; 3] {
     let first = cross(axis, d).map(|part| 2.0 * part);
     let second = cross(axis, first);
     [0, 1, 2].map(|k: usize| d[k] + w * first[k] + second[k])
+}
+
+/// The side of a pixel at the place of a Gaussian, scene units; the mean of the cameras.
+pub(crate) fn pixel(frame: &GaussianFrame, row: usize, cameras: &[Camera]) -> f32 {
+    let side = |camera: &Camera| {
+        let apart = [0, 1, 2].map(|axis: usize| frame.position()[axis][row] - camera.position[axis]);
+        apart.iter().map(|d| d * d).sum::<f32>().sqrt() / camera.focal[0].max(f32::MIN_POSITIVE)
+    };
+    cameras.iter().map(side).sum::<f32>() / cameras.len().max(1) as f32
 }

@@ -1,8 +1,8 @@
 //! What contexts, refinements and tables of the refinement before are worth to an I frame.
 #![expect(clippy::arithmetic_side_effects, reason = "counts of bits and of what is in memory")]
 
-use super::intra::IntraTarget;
 use super::new_list::{NewList, deltas};
+use super::residuals::Wanted;
 use super::unit::{Draft, UnitCoder};
 use crate::entropy_cost::Histogram;
 use crate::error::Error;
@@ -13,23 +13,23 @@ use rayon::prelude::*;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::entropy::token::split;
 
-/// What contexts and refinements save the Gaussians that the lowest layer adds, estimated. `shifts`: low bits of positions that
+/// What contexts and refinements save the Gaussians that the lowest layer adds, estimated: those of `order` in `wanted`. `shifts`: low bits of positions that
 /// each list leaves out.
 pub(super) fn of_lists(
     coder: &UnitCoder<'_>,
-    target: &IntraTarget<'_>,
+    (wanted, order): (&Wanted, &[u32]),
     new: &[NewList],
     shifts: &[u8],
 ) -> Vec<Saving> {
     let worths: Vec<_> =
         new.par_iter().map(|list| list.coded.worth_of_contexts(&list.values, &coder.plan)).collect();
-    let count = target.order.len().max(1) as f64;
+    let count = order.len().max(1) as f64;
     let contexts: f64 = worths.iter().map(|worth| worth.plain - worth.own).sum();
     let mut savings = vec![Saving::estimated(Tool::Contexts, contexts / count)];
     if new.len() > 1 {
         let models = |worth: &crate::models::ContextWorth| worth.models;
         let tables = worths.iter().map(models).sum::<f64>() - worths.iter().map(models).fold(0.0, f64::max);
-        let positions = positions_in_lists(new, shifts) - positions_in_one(coder, target);
+        let positions = positions_in_lists(new, shifts) - positions_in_one(coder, wanted, order);
         savings.push(Saving::estimated(Tool::Refinements, -(tables + positions) / count));
     }
     savings
@@ -44,9 +44,8 @@ fn positions_in_lists(new: &[NewList], shifts: &[u8]) -> f64 {
 }
 
 /// Bits of positions if all Gaussians stood in one list.
-fn positions_in_one(coder: &UnitCoder<'_>, target: &IntraTarget<'_>) -> f64 {
-    let lowest = target.lowest.as_ref().unwrap_or(&target.wanted);
-    let mut codes: Vec<u64> = target.order.par_iter().map(|&row| lowest.code(row, 0)).collect();
+fn positions_in_one(coder: &UnitCoder<'_>, wanted: &Wanted, order: &[u32]) -> f64 {
+    let mut codes: Vec<u64> = order.par_iter().map(|&row| wanted.code(row, 0)).collect();
     codes.par_sort_unstable();
     position_bits(&deltas(&codes, coder.block()))
 }
@@ -79,7 +78,7 @@ pub(super) fn of_reuse(
         return Ok(0);
     }
     let plan = SectionPlan { tools: Tools { table_reuse: false, ..coder.plan.tools }, ..coder.plan };
-    let alone = UnitCoder { plan, ..*coder }.code(draft, new, &mut models.clone())?;
+    let alone = UnitCoder { plan, ..*coder }.code(draft, &new.coded, &mut models.clone())?;
     Ok(alone.len().saturating_sub(bytes))
 }
 

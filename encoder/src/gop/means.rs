@@ -2,16 +2,20 @@
 
 use super::{Gop, SpanCoder};
 use crate::colour;
+use crate::frame::axis_matching::Namings;
 use crate::frame::cells::ReferenceCloud;
+use crate::frame::grain::Grains;
 use crate::frame::predictors::Chooser;
 use crate::frame::rate_distortion::Goal;
 use crate::frame::steadiness::Steadiness;
 use crate::frame::survivors::{BitPrice, Survivors};
-use crate::frame::unit::{Grains, UnitCoder};
-use crate::frame::{CodedFrame, Namings, Reference, Target};
+use crate::frame::target::Target;
+use crate::frame::unit::UnitCoder;
+use crate::frame::{CodedFrame, Reference};
 use crate::matching::{Kind, Matching, Measure, shares_little, shares_much};
 use crate::section::SectionPlan;
 use crate::settings::{Fidelity, Predictors, ShChoice};
+use crate::spans::span::Common;
 use crate::vq;
 use splatstream_decoder::colour::Colour;
 use splatstream_decoder::layout::ShCoding;
@@ -120,7 +124,7 @@ impl SpanCoder<'_> {
         plan.codebooks.first()?;
         let rank = usize::from(transform.header.rank);
         let pairs = matching.target_of.iter().flatten().count();
-        let grains = Grains::new(self.common.settings, &self.common.sequence);
+        let grains = self.grains();
         let rule = |list: u8| StepRule::new(&self.common.sequence, grains.of(list).attribute_step);
         let rules: Vec<StepRule> = (0..self.common.sequence.refinement_count).map(rule).collect();
         let rows = survivors.sh_rows(&reference.lists, &rules, &matching.target_of, pairs / TRIAL);
@@ -134,6 +138,12 @@ impl SpanCoder<'_> {
         // Each temporal layer has a codebook of its own, which only its frames replace.
         book.header.codebook_id = 1 + temporal_layer;
         Some(book)
+    }
+
+    /// How finely refinements are coded.
+    fn grains(&self) -> Grains {
+        let Common { settings, sequence, .. } = &self.common;
+        Grains::new(&settings.laws, &settings.steps, sequence)
     }
 
     /// How new Gaussians are predicted.
@@ -181,7 +191,7 @@ impl SpanCoder<'_> {
                 preset: self.common.settings.preset,
                 tools: self.common.settings.tools,
             },
-            grains: Grains::new(self.common.settings, &self.common.sequence),
+            grains: self.grains(),
             has_differences: self.chooser().predictors != Predictors::NONE
                 || self.common.sequence.spatial_layer_count > 1,
             network: self.common.network,

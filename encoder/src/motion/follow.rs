@@ -1,9 +1,10 @@
 //! Matching where things move further than their own size.
 
+use super::pairs::{FEWEST, REACH_OF_SURE, largest, points};
 use super::registration::registered;
 use super::rigid::{Point, Vector};
 use super::tree::Tree;
-use crate::matching::{CLOSE, Cloud, LIMIT, Link, Matching, Measure, Reach, by_index, features, links};
+use crate::matching::{CLOSE, Cloud, LIMIT, Matching, Measure, Reach, by_index, features, links};
 
 /// A round of guessing: the share of Gaussians that it looks at, one in so many, and how far it looks, as a part of
 /// the scene's side. Few and large ones are hard to mistake for each other, even far from where they were.
@@ -14,12 +15,6 @@ const SURE: usize = 2;
 
 /// Pairs that a cell of a guess rests on, at least, on average.
 const PAIRS_IN_CELL: usize = 16;
-
-/// Below this many Gaussians on either side a guess rests on nothing.
-const FEWEST: usize = 256;
-
-/// How far from where it is expected a Gaussian may be: three times its size, or as far as rounding alone may put it.
-pub(super) const REACH_OF_SURE: Reach = Reach { scales: 3.0, least: 4.0 };
 
 /// Pairs by row, then by place and attributes about where a guess of the motion expects them.
 pub(crate) fn follow(
@@ -60,15 +55,6 @@ pub(crate) fn follow(
     matching
 }
 
-/// Where Gaussians were and where they are now.
-pub(super) fn points(reference: &Cloud<'_>, target: &Cloud<'_>, links: &[Link]) -> Vec<Point> {
-    let point = |link: &Link| Point {
-        from: reference.at(link.from).map(f64::from),
-        to: target.at(link.to).map(f64::from),
-    };
-    links.iter().map(point).collect()
-}
-
 /// Where the reference's Gaussians are if they move as the points about them.
 #[expect(clippy::indexing_slicing, reason = "rows are those of the cloud; ranges of nodes lie in the list")]
 #[expect(clippy::arithmetic_side_effects, reason = "counts of points; parts are constants")]
@@ -89,16 +75,6 @@ fn expected_places(reference: &Cloud<'_>, points: &[Point], position_bits: u8) -
         }
     }
     indices
-}
-
-/// One in `part` of these, those that cover most.
-#[expect(clippy::indexing_slicing, reason = "rows are those of the cloud; ranges of nodes lie in the list")]
-#[expect(clippy::arithmetic_side_effects, reason = "counts of points; parts are constants")]
-pub(super) fn largest(cloud: &Cloud<'_>, indices: &[u32], part: usize) -> Vec<u32> {
-    let mut ranked: Vec<(f32, u32)> = indices.iter().map(|&index| (-cloud.coverage(index), index)).collect();
-    ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let kept = (indices.len() / part).max(FEWEST).min(indices.len());
-    ranked[..kept].iter().map(|&(_, index)| index).collect()
 }
 
 /// The largest side of the box that holds the inner 90 % on each axis, grid steps.

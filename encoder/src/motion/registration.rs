@@ -4,7 +4,7 @@
 //! the target by these first; pairs that are hardly mistaken then correct the guess, as a similarity that few wrong
 //! pairs do not disturb.
 
-use super::follow::{REACH_OF_SURE, largest, points};
+use super::pairs::{REACH_OF_SURE, largest, points};
 use super::rigid::{Point, Rigid, Vector, minus, plus};
 use crate::matching::{CLOSE, Cloud, Measure, Reach, features, links};
 

@@ -1,6 +1,6 @@
 //! A span on its way through the threads of rayon.
 
-use super::{Common, Span};
+use super::span::{Common, Span};
 use crate::error::Error;
 use crate::gop::SpanCoder;
 use crate::importance::Ranking;

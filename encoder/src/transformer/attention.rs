@@ -4,11 +4,11 @@
     reason = "rows and neighbours are counted by the trace; tables have an entry for each index that is made"
 )]
 
-use super::backward::Gradient;
+use super::gradient::Gradient;
 use super::lane::{
     Arithmetic, Lane, ZERO, act, add_product, add_rows, clamp, join, round, row, row_mut, stop_act, unit,
 };
-use super::model::{Model, Trace, difference};
+use super::model::{Model, Trace};
 use splatstream_decoder::predictor::EXP;
 use splatstream_decoder::transformer::LANES;
 use splatstream_format::payload::Part;
@@ -60,7 +60,7 @@ impl Model<'_> {
         let mut sum = ZERO;
         if self.layout.header.fourier_count > 0 {
             for (axis, table) in self.position.iter().enumerate() {
-                let indices = indices(trace, (m, j), axis);
+                let indices = trace.apart((m, j), axis);
                 sum.iter_mut().zip(indices).for_each(|(sum, index)| *sum += table[index]);
             }
         }
@@ -153,18 +153,6 @@ impl Model<'_> {
             h.iter_mut().zip(&slope).for_each(|(h, slope)| join(h, slope, |a, b| a + b * part));
         }
     }
-}
-
-/// For each lane the index of what neighbour `j` is apart from row `m`.
-#[inline(always)]
-pub(super) fn indices(trace: &Trace<'_>, (m, j): (usize, usize), axis: usize) -> [usize; LANES] {
-    let mut out = [0; LANES];
-    // The row of the new Gaussian is at the origin.
-    let from = if trace.full { trace.batch.near(m)[axis] } else { [0; LANES] };
-    for (index, (&near, from)) in out.iter_mut().zip(trace.batch.near(j)[axis].iter().zip(from)) {
-        *index = difference(near, from);
-    }
-    out
 }
 
 /// Logits become shares, Q8.

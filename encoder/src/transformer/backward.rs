@@ -5,73 +5,11 @@
 #![expect(clippy::arithmetic_side_effects, reason = "products of counts that the trace was made with")]
 #![expect(clippy::indexing_slicing, reason = "ranges are those of the layout that the lanes were made with")]
 
-use super::attention::indices;
-use super::lane::{
-    Arithmetic, Lane, ZERO, add_product, add_rows, join, row, row_mut, stop, stop_act, total, unit,
-};
+use super::gradient::Gradient;
+use super::lane::{Arithmetic, Lane, ZERO, add_product, add_rows, join, row, row_mut, stop, stop_act, unit};
 use super::matrix::add_outer;
 use super::model::{Model, Trace};
-use super::parameters::{DIFFERENCES, Layout};
-use pulp::Arch;
 use splatstream_format::payload::Part;
-
-/// The slopes of all parameters, added over batches lane by lane.
-pub(super) struct Gradient<'l> {
-    layout: &'l Layout,
-    arch: Arch,
-    lanes: Vec<Lane>,
-    /// Of the relative-position bias, for each axis and difference.
-    differences: [Vec<f32>; 3],
-}
-
-impl<'l> Gradient<'l> {
-    pub(super) fn new(layout: &'l Layout) -> Self {
-        let differences = [(); 3].map(|()| vec![0.0; 2 * DIFFERENCES as usize + 1]);
-        Self { layout, arch: Arch::new(), lanes: vec![ZERO; layout.len()], differences }
-    }
-
-    #[inline(always)]
-    pub(super) fn weights(&mut self, part: Part) -> &mut [Lane] {
-        &mut self.lanes[self.layout.weights(part)]
-    }
-
-    #[inline(always)]
-    fn bias(&mut self, part: Part) -> &mut [Lane] {
-        &mut self.lanes[self.layout.bias(part)]
-    }
-
-    /// Adds those of a layer: `slopes` of what it gives for rows `x`.
-    #[inline(always)]
-    pub(super) fn add(&mut self, part: Part, slopes: &[Lane], x: &[Lane], rows: usize) {
-        let (outputs, inputs) = (slopes.len() / rows, x.len() / rows);
-        add_outer(self.arch, (slopes, outputs), (x, inputs), &mut self.lanes[self.layout.weights(part)]);
-        add_rows(slopes, self.bias(part));
-    }
-
-    /// Adds that of the relative-position bias of neighbour `j` for row `m`.
-    #[inline(always)]
-    pub(super) fn add_position(&mut self, trace: &Trace<'_>, pair: (usize, usize), slope: &Lane) {
-        for (axis, sums) in self.differences.iter_mut().enumerate() {
-            let indices = indices(trace, pair, axis);
-            slope.iter().zip(indices).for_each(|(slope, index)| sums[index] += slope);
-        }
-    }
-
-    /// The slopes parameter by parameter.
-    pub(super) fn totals(&self) -> Vec<f32> {
-        let mut out: Vec<f32> = self.lanes.iter().map(total).collect();
-        let fourier = &mut out[self.layout.weights(Part::Fourier)];
-        for (frequency, weights) in fourier.chunks_exact_mut(6).enumerate() {
-            for (pair, sums) in weights.chunks_exact_mut(2).zip(&self.differences) {
-                for (sum, sines) in sums.iter().zip(self.layout.sines()) {
-                    pair[0] += sum * sines[2 * frequency];
-                    pair[1] += sum * sines[2 * frequency + 1];
-                }
-            }
-        }
-        out
-    }
-}
 
 impl Model<'_> {
     /// Adds what the slopes of the outputs, before their shift, leave of slopes of parameters.

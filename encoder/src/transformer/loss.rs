@@ -1,7 +1,7 @@
 //! How far the outputs of a network are from those wanted.
 
 use super::Sample;
-use super::backward::Gradient;
+use super::gradient::Gradient;
 use super::lane::{Lane, Whole, ZERO};
 use super::model::Model;
 use pulp::{Arch, Simd, WithSimd};

@@ -87,6 +87,18 @@ impl<'b> Trace<'b> {
             out: zeros(header.outputs()),
         }
     }
+
+    /// For each lane the index of what neighbour `j` is apart from row `m`.
+    #[inline(always)]
+    pub(super) fn apart(&self, (m, j): (usize, usize), axis: usize) -> [usize; LANES] {
+        let mut out = [0; LANES];
+        // The row of the new Gaussian is at the origin.
+        let from = if self.full { self.batch.near(m)[axis] } else { [0; LANES] };
+        for (index, (&near, from)) in out.iter_mut().zip(self.batch.near(j)[axis].iter().zip(from)) {
+            *index = difference(near, from);
+        }
+        out
+    }
 }
 
 impl<'l> Model<'l> {

@@ -1,6 +1,6 @@
 //! Slopes against differences of the network without rounding.
 
-use super::super::backward::Gradient;
+use super::super::gradient::Gradient;
 use super::super::lane::{Lane, Real};
 use super::*;
 use splatstream_format::payload::Part;

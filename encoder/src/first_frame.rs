@@ -1,0 +1,48 @@
+//! The first frame of a sequence, which steps and views are made for.
+
+use crate::canonical::{canonicalise, visible};
+use crate::error::Error;
+use crate::importance::Ranking;
+use crate::isolated;
+use crate::settings::Settings;
+use crate::source::FrameSource;
+use splatstream_gaussians::GaussianFrame;
+
+/// The ranking of the first frame that steps are fitted with, which knows its order.
+///
+/// # Errors
+/// A frame that cannot be read.
+pub(crate) fn first_ranking(source: &mut dyn FrameSource, settings: &Settings) -> Result<Ranking, Error> {
+    let frame = first_frame(source, settings)?;
+    let mut ranking = Ranking::new(settings);
+    ranking.rank_first(&frame);
+    Ok(ranking)
+}
+
+/// The ranking with the views of the sequence, if they are to be made.
+///
+/// # Errors
+/// A frame that cannot be read.
+pub(crate) fn looking(
+    source: &mut dyn FrameSource,
+    mut ranking: Ranking,
+    settings: &Settings,
+) -> Result<Ranking, Error> {
+    if ranking.is_blind() {
+        ranking.look_at(&first_frame(source, settings)?);
+    }
+    Ok(ranking)
+}
+
+/// The first frame as it is coded.
+pub(crate) fn first_frame(source: &mut dyn FrameSource, settings: &Settings) -> Result<GaussianFrame, Error> {
+    let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
+    Ok(coded_form(first, settings))
+}
+
+/// A first frame as it is coded.
+pub(crate) fn coded_form(frame: GaussianFrame, settings: &Settings) -> GaussianFrame {
+    let shown = visible(&frame, settings.keep_invisible);
+    let frame = canonicalise(frame.into_selected(&shown), true);
+    isolated::colours(frame, &shown, 0).0
+}

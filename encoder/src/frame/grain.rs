@@ -1,0 +1,37 @@
+//! How finely units code.
+
+use crate::laws::Laws;
+use crate::steps::Steps;
+use splatstream_format::syntax::{MAX_REFINEMENTS, SequenceParameters};
+
+/// How finely a unit codes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Grain {
+    /// Low bits of positions that are left out.
+    pub(crate) position_shift: u8,
+    /// Exponents of the steps of log_scale, opacity, rotation, dc, sh.
+    pub(crate) attribute_step: [u8; 5],
+}
+
+/// How finely the refinements of a sequence are coded.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Grains([Grain; MAX_REFINEMENTS as usize]);
+
+impl Grains {
+    /// As laws and steps ask for.
+    pub(crate) fn new(laws: &Laws, steps: &Steps, sequence: &SequenceParameters) -> Self {
+        let mut grains = Self::default();
+        for (refinement, grain) in (0..).zip(&mut grains.0) {
+            *grain = Grain {
+                position_shift: laws.position_shift(sequence, refinement),
+                attribute_step: laws.attribute_step(steps, sequence, refinement),
+            };
+        }
+        grains
+    }
+
+    /// Of a refinement.
+    pub(crate) fn of(&self, refinement: u8) -> Grain {
+        self.0.get(usize::from(refinement)).copied().unwrap_or_default()
+    }
+}

@@ -1,0 +1,35 @@
+//! A frame to be coded, as its source has it.
+
+use crate::matching::Cloud;
+use splatstream_gaussians::GaussianFrame;
+
+/// A frame to be coded.
+#[derive(Clone)]
+pub(crate) struct Target {
+    /// Canonical, without what is never seen.
+    pub(crate) frame: GaussianFrame,
+    /// Positions in grid steps.
+    pub(crate) position: [Vec<f32>; 3],
+    /// Row of each Gaussian in its file, and rows of the file.
+    pub(crate) rows: Vec<u32>,
+    pub(crate) row_count: u32,
+}
+
+impl Target {
+    /// Lets the values go, and keeps which Gaussians they were of.
+    pub(crate) fn forget(&mut self) {
+        self.frame = GaussianFrame::default();
+        self.position = Default::default();
+    }
+
+    pub(crate) fn cloud(&self) -> Cloud<'_> {
+        Cloud {
+            position: self.position.each_ref().map(Vec::as_slice),
+            log_scale: self.frame.log_scale().each_ref().map(Vec::as_slice),
+            opacity: self.frame.opacity_logit(),
+            dc: self.frame.dc().each_ref().map(Vec::as_slice),
+            row: &self.rows,
+            row_count: self.row_count,
+        }
+    }
+}
