@@ -67,7 +67,7 @@ pub fn decode_block(
             reconstruction.take(block, plane, info, bias, buffers);
         })?;
     let reconstructed = reconstruction.finish(&block, buffers);
-    buffers.recycle(block);
+    block.leave(buffers);
     reconstructed
 }
 

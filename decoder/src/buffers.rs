@@ -1,6 +1,5 @@
 //! Memory that blocks leave to the blocks after them: fresh memory costs more than what is done with it.
 
-use crate::coded_block::CodedBlock;
 use crate::components::Pair;
 use crate::interrupt::Interrupt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -26,13 +25,6 @@ impl Buffers {
     /// Takes the memory of a plane.
     pub(crate) fn take(&mut self, plane: Vec<i32>) {
         self.planes.extend(Some(plane).filter(|plane| plane.capacity() > 0));
-    }
-
-    /// Takes the memory of a block.
-    pub(crate) fn recycle(&mut self, block: CodedBlock) {
-        let (deltas, planes) = block.into_planes();
-        self.deltas = deltas;
-        self.planes.extend(planes.filter(|plane| plane.capacity() > 0));
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::attribute;
 use crate::buffers::Buffers;
-use crate::context::spacings;
 use crate::layout::{Attribute, PlaneInfo, Section};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule};
@@ -45,6 +44,21 @@ struct Derived {
 #[inline(always)]
 fn limited(value: i64) -> i32 {
     value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+}
+
+/// 0 for 0, else one more than the index of the leading one.
+#[inline(always)]
+pub fn bit_length(value: u64) -> u32 {
+    u64::BITS.wrapping_sub(value.leading_zeros())
+}
+
+/// How far the deltas before and after each entry are, in bits.
+fn spacings(deltas: &[u64]) -> Vec<i32> {
+    let lengths = || deltas.iter().map(|&delta| bit_length(delta));
+    lengths()
+        .zip(lengths().skip(1).chain([0]))
+        .map(|(here, next)| here.wrapping_add(next).cast_signed())
+        .collect()
 }
 
 impl CodedBlock {
@@ -206,10 +220,12 @@ impl CodedBlock {
         self.derived.spacings.get_or_init(|| spacings(&self.deltas))
     }
 
-    /// Its memory: that of the deltas, and of its planes.
-    pub(crate) fn into_planes(self) -> (Vec<u64>, impl Iterator<Item = Vec<i32>>) {
+    /// Leaves its memory to the blocks after it.
+    pub(crate) fn leave(self, buffers: &mut Buffers) {
         let Self { deltas, coded, log_scale, opacity, magnitudes, .. } = self;
-        (deltas, coded.into_iter().chain(log_scale).chain([opacity]).chain(magnitudes))
+        buffers.deltas = deltas;
+        let planes = coded.into_iter().chain(log_scale).chain([opacity]).chain(magnitudes);
+        planes.for_each(|plane| buffers.take(plane));
     }
 
     /// Gaussians in the block.

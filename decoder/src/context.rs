@@ -1,6 +1,7 @@
 //! Clause 8.5: the values that choose the context of a symbol.
 
 use crate::coded_block::CodedBlock;
+pub use crate::coded_block::bit_length;
 use crate::stage::Stage;
 use crate::steps::Exponents;
 use splatstream_format::entropy::lanes::Segments;
@@ -32,12 +33,6 @@ impl DeltaNeighbours {
     pub fn value(&self) -> i32 {
         self.last.wrapping_mul(2).wrapping_add(self.before).cast_signed()
     }
-}
-
-/// 0 for 0, else one more than the index of the leading one.
-#[inline(always)]
-pub fn bit_length(value: u64) -> u32 {
-    u64::BITS.wrapping_sub(value.leading_zeros())
 }
 
 /// True if the source's values depend on values of the plane itself.
@@ -128,15 +123,6 @@ pub fn values(source: Source, plane: usize, info: PlaneInfo, block: &CodedBlock)
         SourceValues::Same(value) => vec![value; block.len()].into(),
         SourceValues::Exponents(exponents) => exponents.iter().map(|&exponent| exponent.into()).collect(),
     }
-}
-
-/// How far the deltas before and after each entry are, in bits.
-pub(crate) fn spacings(deltas: &[u64]) -> Vec<i32> {
-    let lengths = || deltas.iter().map(|&delta| bit_length(delta));
-    lengths()
-        .zip(lengths().skip(1).chain([0]))
-        .map(|(here, next)| here.wrapping_add(next).cast_signed())
-        .collect()
 }
 
 /// The contexts of one axis for every entry; empty if the axis has no or a serial source.

@@ -3,7 +3,7 @@
 use crate::carried::Carried;
 use crate::digest::ListDigest;
 use crate::list::GaussianList;
-use crate::process::Shift;
+use crate::shift::Shift;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use std::sync::Arc;
 

@@ -72,6 +72,7 @@ pub mod output;
 pub mod position;
 pub mod predictor;
 pub mod process;
+mod shift;
 pub mod stage;
 pub mod steps;
 pub mod stream;

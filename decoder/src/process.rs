@@ -33,13 +33,15 @@ mod decoded;
 mod decoding;
 mod frame;
 mod gops;
+mod lists;
 mod phase;
 mod references;
 mod report;
 mod spares;
 mod trailer;
 
-pub use decoded::{Compensation, DecodedFrame, Shift};
+pub use crate::shift::Shift;
+pub use decoded::{Compensation, DecodedFrame};
 
 /// How to decode.
 #[derive(Debug, Clone, Copy)]

@@ -3,8 +3,8 @@
 //! In an I frame the list of the layer below becomes that of the unit. In a P or B frame it is the list of the reference
 //! frame, displaced by the cells of the frame; where neither these nor the unit change anything, it is that list itself.
 
-use super::decoding::Head;
 use super::frame::{Context, FrameInProgress};
+use super::lists::Head;
 use crate::frame::QuantizedFrame;
 use crate::frame_state::{FrameState, span_log2};
 use crate::increment::{Applied, Situation, Temporal, Unit, apply, is_idle};

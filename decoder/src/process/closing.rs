@@ -1,8 +1,8 @@
 //! The end of a frame: what is shown, with which compensation, and what later frames refer to. Clauses 7.3.3 and 7.8.
 
-use super::decoded::{Compensation, DecodedFrame, Shift};
-use super::decoding::Lists;
+use super::decoded::{Compensation, DecodedFrame};
 use super::frame::{Context, FrameInProgress};
+use super::lists::Lists;
 use super::spares::Spares;
 use crate::carried::Carried;
 use crate::digest::lists_digest;
@@ -10,6 +10,7 @@ use crate::frame::QuantizedFrame;
 use crate::frame_state::{FrameState, span_log2};
 use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
+use crate::shift::Shift;
 use splatstream_format::{Error, ErrorKind};
 use std::sync::Arc;
 

@@ -3,6 +3,7 @@
 use crate::attribute::ATTRIBUTE_RANGE;
 use crate::entropy_state::UnitEntropy;
 use crate::frame::QuantizedFrame;
+use crate::shift::Shift;
 use splatstream_format::Error;
 use splatstream_format::syntax::FrameType;
 
@@ -44,15 +45,6 @@ pub struct DecodedFrame {
     pub error: Option<Error>,
 }
 
-/// What is added to log-scales and opacities, in steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Shift {
-    /// Added to each log-scale.
-    pub log_scale: i8,
-    /// Added to the opacity.
-    pub opacity: i8,
-}
-
 /// Clause 7.8.3: what fills the holes that missing Gaussians leave.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Compensation {
@@ -92,13 +84,6 @@ impl DecodedFrame {
         let exact = planes.len().saturating_sub(carried);
         compensation.apply(&mut planes, exact);
         planes
-    }
-}
-
-impl Shift {
-    /// True if nothing is added.
-    pub fn is_zero(self) -> bool {
-        self == Self::default()
     }
 }
 

@@ -7,25 +7,21 @@
 //! Where units only add Gaussians without predictors, steps 2 and 3 are one: see [`crate::direct`].
 
 use super::applying::{self, Outcome};
-use super::decoded::Shift;
 use super::frame::{Context, DividedUnit, FrameInProgress, Refused};
-use super::spares::Spares;
+use super::lists::{Head, put};
 use crate::cores;
-use crate::digest::{ListDigest, list_digest_unless, lists_digest};
+use crate::digest::{ListDigest, list_digest_unless};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
-use crate::frame::QuantizedFrame;
 use crate::increment::Unit;
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, SectionCoding, UnitValues};
-use crate::interrupt::Interrupt;
 use crate::layout::ShCoding;
-use crate::list::GaussianList;
+use crate::shift::Shift;
 use crate::steps::StepRule;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::syntax::IncrementHeader;
-use splatstream_format::{Error, ErrorKind, Result};
-use std::sync::Arc;
+use splatstream_format::{Error, Result};
 
 /// Tables that are expanded at the same time: all of those of an honest frame. A stream made to take memory gets one unit
 /// at a time.
@@ -34,45 +30,6 @@ const MAX_TABLES: usize = 1 << 12;
 /// of which changes all Gaussians, would take several times the memory of their frame otherwise.
 const MAX_VALUES: u64 = 1 << 24;
 
-/// The lists of a frame so far: list h at the highest spatial layer that has it.
-#[derive(Debug, Default)]
-pub(super) struct Lists {
-    /// The lists one after the other, as long as all were decoded straight into planes; `lists` is empty then.
-    pub(super) planes: QuantizedFrame,
-    pub(super) lists: Vec<Arc<GaussianList>>,
-    /// The unit of each list.
-    pub(super) heads: Vec<Head>,
-    pub(super) digests: Vec<ListDigest>,
-    pub(super) models: ModelsOfFrame,
-    /// In a P or B frame: the first lists of the reference frame displaced, as far as units predicted from them.
-    pub(super) displaced: Vec<Arc<GaussianList>>,
-    /// How many of them units that are still to be applied may need.
-    pub(super) displaced_needed: usize,
-    /// Which parents the unit of each list has kept; empty: all.
-    pub(super) kept: Vec<Vec<bool>>,
-    /// In a P or B frame: whether there is a space of the parents of the first units, from which moves were predicted.
-    pub(super) has_moves: bool,
-    /// Memory of frames before, and that space.
-    pub(super) spares: Spares,
-    /// The identities of the Gaussians of each list, if they are asked for.
-    pub(super) identities: Vec<Identities>,
-    /// The identity of the next new Gaussian.
-    pub(super) next_identity: u32,
-}
-
-/// The identities of the Gaussians of a list, in order.
-pub(crate) type Identities = Arc<Vec<u32>>;
-
-/// The last unit of a list.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Head {
-    pub(super) spatial_layer: u8,
-    pub(super) shift: Shift,
-    /// Gaussians of the list, and how many of them, the last ones, the unit added.
-    pub(super) size: usize,
-    pub(super) added: usize,
-}
-
 /// A pending unit with its models read.
 struct Prepared<'r, 'a> {
     unit: &'r DividedUnit<'a>,
@@ -80,95 +37,6 @@ struct Prepared<'r, 'a> {
     coding: AttributeCoding<'r>,
     /// The models in force after the unit.
     models: ModelsInForce,
-}
-
-impl Lists {
-    /// Of a frame with these models in force before its first unit, whose new Gaussians have identities from this one on.
-    pub(super) fn new(models: ModelsInForce, next_identity: u32, spares: Spares) -> Self {
-        Self { models: ModelsOfFrame::starting_with(models), next_identity, spares, ..Self::default() }
-    }
-
-    /// So many new identities.
-    pub(super) fn identify(&mut self, count: usize) -> impl Iterator<Item = u32> + use<> {
-        let first = self.next_identity;
-        self.next_identity = u32::try_from(count).unwrap_or(u32::MAX).wrapping_add(first);
-        (0..count).scan(first, |next, _| {
-            let identity = *next;
-            *next = next.wrapping_add(1);
-            Some(identity)
-        })
-    }
-
-    /// Takes note of what a unit made of the identities of its parents.
-    fn follow_identities(&mut self, r: usize, parents: Identities, keep: &[bool], added: usize) {
-        let mut identities = parents;
-        if added > 0 || !keep.iter().all(|&keep| keep) {
-            let changed = Arc::make_mut(&mut identities);
-            crate::frame::retain(changed, keep);
-            changed.extend(self.identify(added));
-        }
-        put(&mut self.identities, r, identities);
-    }
-
-    /// Makes lists of the planes; gives the Gaussians identities if `identifies` says so. Where an interrupt is requested,
-    /// the lists mean nothing.
-    pub(super) fn divide(&mut self, identifies: bool, interrupt: &Interrupt) {
-        if !self.lists.is_empty() {
-            return;
-        }
-        let mut start = 0_usize;
-        // The planes of one list are its own: nothing is copied.
-        let is_whole = self.heads.len() == 1;
-        let heads = core::mem::take(&mut self.heads).into_iter().enumerate();
-        for (r, head) in heads.take_while(|_| !interrupt.is_requested()) {
-            let end = start.saturating_add(head.size);
-            if identifies {
-                self.follow_identities(r, Arc::default(), &[], head.size);
-            }
-            self.heads.push(head);
-            let planes = match is_whole {
-                true => core::mem::take(&mut self.planes),
-                false => self.planes.part_unless(interrupt, start..end),
-            };
-            self.lists.push(Arc::new(GaussianList::of_planes_unless(interrupt, planes, true)));
-            start = end;
-        }
-        self.planes = QuantizedFrame::default();
-    }
-
-    /// Compares the digest of lists 0 to r, of which the last is new.
-    fn check_digest(&mut self, refinement: u8, digest: ListDigest, stored: u64, at: u64) -> Result<()> {
-        let r = usize::from(refinement);
-        let mut digests = self.digests.get(..r).unwrap_or_default().to_vec();
-        digests.push(digest.clone());
-        let computed = lists_digest(&digests);
-        if computed != stored {
-            return Err(Error::new(at, "7.9.2", ErrorKind::Digest { stored, computed }));
-        }
-        put(&mut self.digests, r, digest);
-        Ok(())
-    }
-
-    /// Takes note of what units will need that are to be applied.
-    fn expect(&mut self, units: &[DividedUnit<'_>]) {
-        let predicts = |unit: &&DividedUnit<'_>| applying::predicts(&unit.increment.header);
-        let last = units.iter().filter(predicts).map(|unit| unit.refinement).max();
-        self.displaced_needed = last.map_or(0, usize::from);
-    }
-
-    /// Takes the list that a unit leaves.
-    fn take(&mut self, refinement: u8, list: Arc<GaussianList>, head: Head) {
-        put(&mut self.lists, refinement.into(), list);
-        put(&mut self.heads, refinement.into(), head);
-    }
-}
-
-/// Sets the value at an index, which is at most the length.
-fn put<T>(values: &mut Vec<T>, index: usize, value: T) {
-    match values.get_mut(index) {
-        Some(slot) => *slot = value,
-        None => values.push(value),
-    }
 }
 
 impl FrameInProgress {
@@ -189,7 +57,7 @@ impl FrameInProgress {
         let is_direct = self.is_direct(pending, context);
         if !is_direct {
             self.lists.divide(context.options.identities, context.interrupt);
-            self.lists.expect(pending);
+            self.lists.displaced_needed = displaced_needed(pending);
         }
         let mut rest = prepared.as_slice();
         while !rest.is_empty() {
@@ -275,7 +143,7 @@ impl FrameInProgress {
                 let end = kept.saturating_add(added);
                 let digest = || list_digest_unless(context.interrupt, &planes, kept..end);
                 self.check_list(unit, context, digest)?;
-                put(&mut self.lists.heads, unit.refinement.into(), Head::new(unit, added, added));
+                put(&mut self.lists.heads, unit.refinement.into(), head(unit, added, added));
                 self.finish_unit(unit, added, prepared);
                 Ok(end)
             });
@@ -343,7 +211,7 @@ impl FrameInProgress {
             let payload_at = pending.payload_at;
             self.entropy.extend(state.map(|state| UnitEntropy { payload_at, state }));
         }
-        let (size, head) = (list.len(), Head::new(pending, list.len(), added));
+        let (size, head) = (list.len(), head(pending, list.len(), added));
         if context.options.identities {
             let r = usize::from(pending.refinement);
             let parents = match context.reference {
@@ -385,12 +253,18 @@ impl FrameInProgress {
     }
 }
 
-impl Head {
-    fn new(unit: &DividedUnit<'_>, size: usize, added: usize) -> Self {
-        let IncrementHeader { compensation_log_scale, compensation_opacity, .. } = unit.increment.header;
-        let shift = Shift { log_scale: compensation_log_scale, opacity: compensation_opacity };
-        Self { spatial_layer: unit.spatial_layer, shift, size, added }
-    }
+/// What is known of a list after a unit that leaves it with `size` Gaussians, of which it has added the last.
+fn head(unit: &DividedUnit<'_>, size: usize, added: usize) -> Head {
+    let IncrementHeader { compensation_log_scale, compensation_opacity, .. } = unit.increment.header;
+    let shift = Shift { log_scale: compensation_log_scale, opacity: compensation_opacity };
+    Head { spatial_layer: unit.spatial_layer, shift, size, added }
+}
+
+/// How many of the first lists units that are to be applied may need displaced.
+fn displaced_needed(units: &[DividedUnit<'_>]) -> usize {
+    let predicts = |unit: &&DividedUnit<'_>| applying::predicts(&unit.increment.header);
+    let last = units.iter().filter(predicts).map(|unit| unit.refinement).max();
+    last.map_or(0, usize::from)
 }
 
 /// A unit with its models, unless they are wrong.

@@ -6,7 +6,7 @@
 //! on it. Before an error is reported, the units before it are decoded, so that errors come in stream order.
 
 use super::Options;
-use super::decoding::Lists;
+use super::lists::Lists;
 use super::phase::{same, unexpected};
 use crate::buffers::{BufferPool, Workspace};
 use crate::displacement::CellField;

@@ -1,7 +1,7 @@
 //! The units that start GOPs and frames: sequence_parameters, gop_header and frame_header.
 
-use super::decoding::Lists;
 use super::frame::{FrameInProgress, Progress, unit_bytes};
+use super::lists::Lists;
 use super::phase::{mismatch, same, unexpected};
 use super::references::References;
 use super::{Context, Decoder};
