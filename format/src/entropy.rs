@@ -12,6 +12,7 @@ pub mod machine;
 pub mod model;
 pub mod parametric;
 pub mod reader;
+pub(crate) mod section;
 pub mod token;
 pub mod writer;
 

@@ -26,8 +26,8 @@ mod weights;
 pub use codebook::CodebookHeader;
 pub use end::EndOfStream;
 pub use file_header::{FileHeader, Profile, SIGNATURE, SPECIFICATION};
-pub use frame_header::{FrameHeader, FrameType, NO_TRANSFORM};
-pub use gop_header::{FrameRole, GopHeader};
+pub use frame_header::{FrameHeader, FrameRole, FrameType, NO_TRANSFORM};
+pub use gop_header::GopHeader;
 pub use increment::{IncrementHeader, ListSizes, MAX_ATTRIBUTE_STEP, MAX_NEIGHBOURS, NO_PREDICTOR};
 pub use index::{IndexEntry, IndexHeader};
 pub use operating_points::{OperatingPointEntry, OperatingPointsHeader};
@@ -248,6 +248,14 @@ pub(crate) fn decode<'a, T: FixedRecord>(table: &Table, bytes: &'a [u8], at: u64
     let mut rest = bytes;
     let record = T::take(&mut rest).ok_or_else(|| table.cut(bytes.len(), at))?;
     Ok((record, rest))
+}
+
+/// A record that does not end within the stream: the stream is cut, not malformed.
+fn cut_is_truncated(error: Error) -> Error {
+    match error.kind {
+        ErrorKind::ShortSection { element } => Error { kind: ErrorKind::Truncated { element }, ..error },
+        _ => error,
+    }
 }
 
 /// The bytes of a record whose values are not checked.

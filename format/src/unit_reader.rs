@@ -4,7 +4,7 @@
 //! whether more may come. What lies before the position is never needed again.
 
 use crate::syntax::{FileHeader, UnitHeader, UnitType, after};
-use crate::unit::{CLAUSE, Landmark, Unit};
+use crate::unit::delimited::{CLAUSE, Landmark, Unit};
 use crate::{Class, Error, ErrorKind, Limits, Result};
 
 /// What stands at the position of a reader.

@@ -2,7 +2,7 @@
 
 use super::section::{CodedSection, SectionBytes};
 use super::write_leb128;
-use crate::entropy::layout::Section;
+use crate::entropy::section::Section;
 use crate::syntax::reader::Reader;
 use crate::syntax::{FrameHeader, SequenceParameters, Spot};
 use crate::{Limits, Result};

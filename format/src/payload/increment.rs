@@ -1,7 +1,7 @@
 //! 5.14 increment: header, then the sections that are present.
 
 use super::section::{CodedSection, SectionBytes};
-use crate::entropy::layout::Section;
+use crate::entropy::section::Section;
 use crate::syntax::reader::Reader;
 use crate::syntax::{IncrementHeader, Profile, SequenceParameters};
 use crate::{Limits, Result};

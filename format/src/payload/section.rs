@@ -1,7 +1,7 @@
 //! 5.15 section: models and blocks of the planes of one kind.
 
 use super::{length, write_leb128};
-use crate::entropy::layout::Section;
+use crate::entropy::section::Section;
 use crate::syntax::SequenceParameters;
 use crate::syntax::reader::Reader;
 use crate::{Error, ErrorKind, Result};

@@ -1,6 +1,6 @@
 //! 5.2 file_header: the first bytes of a stream.
 
-use super::{decode, encode, table};
+use super::{cut_is_truncated, decode, encode, table};
 use crate::{ErrorKind, Result};
 
 /// The first eight bytes: line ends and the eighth bit show a transfer that took the file for text.
@@ -105,8 +105,7 @@ impl FileHeader {
             "signature",
             ErrorKind::Signature,
         )?;
-        let (header, rest): (Self, _) =
-            decode(&Self::TABLE, bytes, 0).map_err(crate::unit::cut_is_truncated)?;
+        let (header, rest): (Self, _) = decode(&Self::TABLE, bytes, 0).map_err(cut_is_truncated)?;
         header.validate(0)?;
         Ok((header, rest))
     }

@@ -1,6 +1,6 @@
 //! 5.6 frame_header: starts a frame.
 
-use super::{FrameRole, MAX_ID, SequenceParameters, record_io, table};
+use super::{MAX_ID, SequenceParameters, record_io, table};
 use crate::{Limits, Result};
 
 /// `sh_transform_id` of a frame without spherical harmonics of degree 1 and above.
@@ -64,6 +64,17 @@ table! {
 }
 
 record_io!(FrameHeader);
+
+/// What the structure of a GOP says about one of its frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameRole {
+    /// Intra, predicted, or temporal enhancement.
+    pub frame_type: FrameType,
+    /// 0 is the base layer.
+    pub temporal_layer: u8,
+    /// The frame it refers to, counted from the first of the GOP; none for an intra frame.
+    pub reference: Option<u32>,
+}
 
 impl FrameHeader {
     /// Bit 0 of `frame_flags`.

@@ -1,6 +1,6 @@
 //! 5.5 gop_header: a point where decoding can start.
 
-use super::{FrameType, MAX_LAYERS, Profile, record_io_in_profile, table};
+use super::{FrameRole, FrameType, MAX_LAYERS, Profile, record_io_in_profile, table};
 use crate::Result;
 
 /// Display indices are below this.
@@ -30,17 +30,6 @@ table! {
 }
 
 record_io_in_profile!(GopHeader);
-
-/// What the structure of a GOP says about one of its frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameRole {
-    /// Intra, predicted, or temporal enhancement.
-    pub frame_type: FrameType,
-    /// 0 is the base layer.
-    pub temporal_layer: u8,
-    /// The frame it refers to, counted from the first of the GOP; none for an intra frame.
-    pub reference: Option<u32>,
-}
 
 impl GopHeader {
     /// A GOP of intra frames.

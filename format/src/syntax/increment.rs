@@ -2,7 +2,7 @@
 
 use super::reader::{Reader, leb128_length, write_leb128};
 use super::{NO_CODEBOOK, Profile, SequenceParameters, ShHeader, ShMode, Spot, encode, table};
-use crate::entropy::layout::Section;
+use crate::entropy::section::Section;
 use crate::{ErrorKind, Limits, Result};
 
 /// `predictor_block_log2` of a unit whose new Gaussians are not predicted, and `move_block_log2` of one whose moves are

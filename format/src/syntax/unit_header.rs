@@ -1,6 +1,6 @@
 //! 5.3 unit_header: what a unit is, how long, and whether it arrived whole.
 
-use super::{Profile, SequenceParameters, decode, encode, table};
+use super::{Profile, SequenceParameters, cut_is_truncated, decode, encode, table};
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// Bit 0 of `unit_flags`: a decoder that does not know the unit cannot go on without it.
@@ -265,8 +265,7 @@ impl UnitHeader {
     /// # Errors
     /// Truncated: the header is not complete. Malformed: its checksum is wrong.
     pub fn delimit(bytes: &[u8], at: u64) -> Result<(Self, &[u8])> {
-        let (header, rest): (Self, _) =
-            decode(&Self::TABLE, bytes, at).map_err(crate::unit::cut_is_truncated)?;
+        let (header, rest): (Self, _) = decode(&Self::TABLE, bytes, at).map_err(cut_is_truncated)?;
         header.validate_check(at)?;
         Ok((header, rest))
     }
