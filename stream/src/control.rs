@@ -22,6 +22,7 @@
 
 mod baselines;
 mod driven;
+mod fetch;
 pub(crate) mod ladder;
 mod layered;
 mod live;
@@ -35,12 +36,13 @@ mod state;
 mod throughput;
 
 pub use baselines::{Bola, BufferRule, ThroughputRule};
+pub use fetch::Fetch;
 pub use ladder::{
     Description, Gop, Ladder, LadderError, Layer, Levels, OperatingPoint, Piece, Point, Representation,
 };
 pub use layered::{Layered, Weights};
 pub use options::{Choice, Limits, Range, choices, order, whole_ranges};
-pub use rule::{Decision, Fetch, Rule};
+pub use rule::{Decision, Rule};
 pub use session::Session;
 pub use single::{Pick, Rung, Single, SingleRule, Situation};
 pub use state::{Live, Playback, Request, Settings, Shown, State};

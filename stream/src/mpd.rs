@@ -3,7 +3,7 @@
 mod live;
 
 use crate::manifest::{ByteRange, Manifest, RepresentationInfo};
-use crate::package::Layout;
+use crate::package::layout::Layout;
 use std::fmt::Write;
 
 /// What an ordinary DASH client does not know, so that it passes over the AdaptationSet.

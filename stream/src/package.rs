@@ -2,6 +2,7 @@
 
 pub(crate) mod description;
 pub(crate) mod init;
+pub(crate) mod layout;
 pub(crate) mod segment;
 
 use crate::division::{Division, Gop};
@@ -11,30 +12,11 @@ use crate::representation::Representation;
 use core::ops::Range;
 use description::Describer;
 use init::Init;
+pub use layout::Layout;
 use segment::Subsegment;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_format::{Limits, Result};
 use std::io::{self, Write};
-
-/// What a subsegment is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Layout {
-    /// A GOP: any prefix of its refinements is one range of bytes.
-    #[default]
-    Gop,
-    /// A frame, for low latency.
-    Frame,
-}
-
-impl Layout {
-    /// The name in the manifest.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Gop => "gop",
-            Self::Frame => "frame",
-        }
-    }
-}
 
 /// How a stream is packaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,10 +1,11 @@
 //! The rule for layered streams.
 
+use super::fetch::Fetch;
 use super::ladder::{Gop, Levels};
 use super::number::{count, real, seconds};
 use super::options::{Choice, choices, gain};
 use super::plan::{Outlook, best};
-use super::rule::{Decision, Fetch, Rule};
+use super::rule::{Decision, Rule};
 use super::state::{Playback, Request, State};
 
 /// What the rule goes by. The defaults were tuned on one half of a set of traces and checked on the other.

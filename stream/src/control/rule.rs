@@ -1,7 +1,8 @@
 //! What a rule sees and answers.
 
+use super::fetch::Fetch;
 use super::ladder::Levels;
-use super::options::{Range, order, whole_ranges};
+use super::options::{order, whole_ranges};
 use super::state::State;
 
 /// What the caller of a session is asked to do.
@@ -23,40 +24,16 @@ pub enum Decision {
     },
 }
 
-/// Byte ranges of one GOP, in the order they are wanted: each piece after those it needs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fetch {
-    gop: usize,
-    ranges: Vec<Range>,
-}
-
 impl Fetch {
     /// What is missing of a set of pieces, so ordered that any part of it is worth as much as it can be; none if all are
     /// there or the GOP is not.
     pub fn towards(state: &State, gop: usize, wanted: &Levels) -> Option<Self> {
-        let ranges = order(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted);
-        (!ranges.is_empty()).then_some(Self { gop, ranges })
+        Self::new(gop, order(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted))
     }
 
     /// The same with one range for each Representation, for when there is time for all of it.
     pub fn at_leisure(state: &State, gop: usize, wanted: &Levels) -> Option<Self> {
-        let ranges = whole_ranges(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted);
-        (!ranges.is_empty()).then_some(Self { gop, ranges })
-    }
-
-    /// Index of the GOP.
-    pub fn gop(&self) -> usize {
-        self.gop
-    }
-
-    /// What is requested, in order.
-    pub fn ranges(&self) -> &[Range] {
-        &self.ranges
-    }
-
-    /// Bytes of all ranges.
-    pub fn bytes(&self) -> u64 {
-        self.ranges.iter().map(|range| range.bytes).fold(0, u64::saturating_add)
+        Self::new(gop, whole_ranges(state.ladder().gops().get(gop)?, state.arrived(gop)?, wanted))
     }
 }
 

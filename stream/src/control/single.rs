@@ -1,9 +1,10 @@
 //! Rules that know no layers: they pick one of some operating points for each GOP, as for a presentation of alternatives.
 
+use super::fetch::Fetch;
 use super::ladder::{Ladder, OperatingPoint, Point};
 use super::number::{real, seconds, size};
 use super::options::{Choice, Limits, hull};
-use super::rule::{Decision, Fetch, Rule};
+use super::rule::{Decision, Rule};
 use super::state::{Request, State};
 use super::throughput::Network;
 

@@ -1,8 +1,8 @@
 //! What a session knows at one time: what has arrived, what is playing, what is being fetched.
 
+use super::fetch::Fetch;
 use super::ladder::{Gop, Ladder, Levels, OperatingPoint, Point};
 use super::options::{Choice, Limits, available_choices};
-use super::rule::Fetch;
 use super::throughput::{Network, Transfer};
 
 /// How a session plays. The default is a stored presentation on a device without limits.

@@ -2,7 +2,7 @@
 
 use super::{Xml, longest, seconds};
 use crate::manifest::Manifest;
-use crate::package::Layout;
+use crate::package::layout::Layout;
 
 /// How far behind a client should be: the longest GOP, or a frame of it.
 pub(super) fn service(xml: &mut Xml, manifest: &Manifest) {

@@ -1,7 +1,8 @@
 //! C.5: the subsegments of a GOP in one Representation.
 
 use super::init::{put_index, track_id};
-use super::{Clock, Layout, Options};
+use super::layout::Layout;
+use super::{Clock, Options};
 use crate::boxes::flags::{
     DATA_OFFSET, DEFAULT_BASE_IS_MOOF, DURATION_IS_EMPTY, SAMPLE_DURATION, SAMPLE_SIZE,
 };
