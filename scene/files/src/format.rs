@@ -1,4 +1,4 @@
-//! Which format a file is in, and reading it without being told.
+//! Which format a file is in.
 
 use std::fs::{self, File};
 use std::io::{Read, Seek};
@@ -9,9 +9,6 @@ use zip::ZipArchive;
 
 use crate::error::{SceneError, SceneErrorKind};
 use crate::limits::{Budget, ReadLimits};
-use crate::reading::{checked, read_file};
-use crate::scene::Scene;
-use crate::sequence::{SPLAT4D, SPLATV, Sequence, SequenceOptions};
 use crate::{compressed_ply, gltf, ksplat, ply, sog, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 
@@ -19,11 +16,14 @@ use splatstream_gaussians::GaussianFrame;
 /// whether a header goes on.
 pub const HEAD: u64 = ply::MOST_HEADER as u64 + 1;
 
+/// What a `.splatv` file begins with.
+pub(crate) const SPLATV: [u8; 4] = [0x4b, 0x67, 0, 0];
+
+/// What a `.splat4d` file begins with.
+pub(crate) const SPLAT4D: [u8; 4] = *b"SP4D";
+
 /// Where a tar archive has its name, and that.
 const TAR: (usize, &[u8]) = (257, b"ustar");
-
-/// Extensions of files that hold one scene each.
-pub const EXTENSIONS: [&str; 7] = ["ply", "spz", "sog", "splat", "ksplat", "glb", "gltf"];
 
 /// What to give where a file is of no known format.
 const GIVE: &str = "give a .ply, .compressed.ply, .spz, .sog, .splat, .ksplat, .glb or .gltf file, a SOG directory, or a \
@@ -76,49 +76,6 @@ pub fn detect(path: &Path) -> Result<SceneFormat, SceneError> {
     find().map_err(|error| error.in_file(path))
 }
 
-/// Reads the scene at `path`: a file of any supported format, a SOG directory, or the `meta.json` in one. Of a sequence of
-/// one frame it reads that.
-///
-/// # Errors
-/// Those of [`detect`] and of the format's reader, with the path; a sequence of several frames.
-pub fn read_scene(path: &Path, limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    checked(read_scene_as_is(path, limits)?.frame).map_err(|error| error.in_file(path))
-}
-
-/// As [`read_scene`], with what the reader has noted, and with all values as they are, even those that no frame may hold: see
-/// [`GaussianFrame::defects`].
-///
-/// # Errors
-/// As [`read_scene`], without those of values.
-pub fn read_scene_as_is(path: &Path, limits: &ReadLimits) -> Result<Scene, SceneError> {
-    let mut budget = Budget::new(limits);
-    if let Some(directory) = sog_directory(path) {
-        let frame = sog::read_dir_as_is(&directory, &mut budget)?;
-        return Ok(Scene { frame, notes: budget.into_notes() });
-    }
-    if detect(path)?.is_sequence() {
-        return only_frame(path, limits);
-    }
-    let mut read = || {
-        let bytes = read_file(path, &mut budget)?;
-        read_whole(&bytes, path, path.parent(), &mut budget)
-    };
-    let frame = read().map_err(|error| error.in_file(path))?;
-    Ok(Scene { frame, notes: budget.into_notes() })
-}
-
-/// The frame of a sequence that has one.
-fn only_frame(path: &Path, limits: &ReadLimits) -> Result<Scene, SceneError> {
-    let mut sequence = Sequence::open(path, limits, &SequenceOptions::default())?;
-    match sequence.len() {
-        1 => sequence.frame(0),
-        frames => {
-            let what = format!("the file holds {frames} frames");
-            Err(SceneError::unsupported(what, "read it as a sequence").in_file(path))
-        }
-    }
-}
-
 /// Reads a scene that is in memory, of any format but sequences; values are not checked. Its name decides where content
 /// cannot, and files that it refers to are those of the directory.
 pub(crate) fn read_whole(
@@ -146,7 +103,7 @@ pub(crate) fn read_whole(
 }
 
 /// The directory of a SOG scene: `path` itself, or that of a `meta.json`.
-fn sog_directory(path: &Path) -> Option<PathBuf> {
+pub(crate) fn sog_directory(path: &Path) -> Option<PathBuf> {
     if path.file_name().is_some_and(|name| name == sog::META) {
         return Some(path.parent()?.to_path_buf());
     }

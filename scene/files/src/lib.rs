@@ -46,10 +46,12 @@ mod error;
 mod format;
 mod half;
 mod limits;
+mod members;
 mod morton;
 mod note;
 mod reading;
 mod scene;
+mod scene_file;
 mod sequence;
 mod smallest_three;
 #[expect(clippy::arithmetic_side_effects, reason = "vectors of floats, which do not overflow")]
@@ -57,8 +59,10 @@ mod sphere;
 
 pub use clamped::Clamped;
 pub use error::{SceneError, SceneErrorKind};
-pub use format::{EXTENSIONS, HEAD, SceneFormat, detect, read_scene, read_scene_as_is};
+pub use format::{HEAD, SceneFormat, detect};
 pub use limits::ReadLimits;
+pub use members::EXTENSIONS;
 pub use note::Note;
 pub use scene::Scene;
+pub use scene_file::{read_scene, read_scene_as_is};
 pub use sequence::{Sequence, SequenceOptions, natural_order};

@@ -16,10 +16,7 @@ use crate::limits::{Budget, ReadLimits};
 use crate::scene::Scene;
 use splatstream_gaussians::GaussianFrame;
 
-pub(crate) use archive::{is_frame, is_hidden, read_member};
 pub use names::natural_order;
-pub(crate) use splats4d::MAGIC as SPLAT4D;
-pub(crate) use splatv::MAGIC as SPLATV;
 
 /// How the frames of a sequence are chosen, where the file leaves that open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -26,8 +26,8 @@ use zip::ZipArchive;
 
 use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
+use crate::members::{is_frame, is_hidden, read_member};
 use crate::reading::{checked, read_file};
-use crate::sequence::{is_frame, is_hidden, read_member};
 use splatstream_gaussians::GaussianFrame;
 
 pub use write::write_zip;

@@ -13,6 +13,13 @@ use crate::limits::Budget;
 /// twice for a moment.
 const PARSED: u64 = 64;
 
+/// The extensions for compressed Gaussians that are read: the newest first.
+pub(super) const SPZ: [&str; 3] = [
+    "KHR_gaussian_splatting_compression_spz_2",
+    "KHR_gaussian_splatting_compression_spz",
+    "KHR_spz_gaussian_splats_compression",
+];
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Document {
@@ -174,7 +181,7 @@ const HARMLESS: [&str; 6] =
 
 /// Whether a file must not be read without an extension that is not known.
 fn is_unknown(name: &str) -> bool {
-    let is_known = name == super::EXTENSION || super::primitive::SPZ.contains(&name);
+    let is_known = name == super::EXTENSION || SPZ.contains(&name);
     !is_known && !HARMLESS.iter().any(|harmless| name.starts_with(harmless))
 }
 

@@ -3,7 +3,7 @@
 use super::EXTENSION;
 use super::accessor::Values;
 use super::buffers::Buffers;
-use super::document::{Compressed, Document, Primitive, broken};
+use super::document::{Compressed, Document, Primitive, SPZ, broken};
 use super::tree::Part;
 use crate::axes::Flip;
 use crate::byte_values::{log_scale_of, logit_within};
@@ -13,13 +13,6 @@ use crate::note::Note;
 use crate::reading::frame_of;
 use crate::{spz, srgb};
 use splatstream_gaussians::{GaussianFrame, MAX_SH_DEGREE, sh_coefficients};
-
-/// The extensions for compressed Gaussians that are read: the newest first.
-pub(super) const SPZ: [&str; 3] = [
-    "KHR_gaussian_splatting_compression_spz_2",
-    "KHR_gaussian_splatting_compression_spz",
-    "KHR_spz_gaussian_splats_compression",
-];
 
 /// What colours are encoded as sRGB, as in frames, and what they are called in drafts of the extension.
 const SRGB: [&str; 3] = ["srgb_rec709_display", "BT.709-sRGB", "BT.709-srgb"];

@@ -7,29 +7,18 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 use zip::ZipArchive;
-use zip::read::ZipFile;
 
 use super::names::natural_order;
-use super::{Frames, Source, tar_index};
+use super::tar_index::{self, Member};
+use super::{Frames, Source};
 use crate::error::SceneError;
-use crate::format::{EXTENSIONS, is_gzip, is_zip, read_whole};
+use crate::format::{is_gzip, is_zip, read_whole};
 use crate::limits::{Budget, refused};
+use crate::members::{DAMAGED, MEMBER, kind, read_member};
 use splatstream_gaussians::GaussianFrame;
-
-const MEMBER: &str = "a member of the archive";
-const DAMAGED: &str = "the archive is damaged; pack it again";
 
 /// Scenes are compressed to a tenth or so: what becomes more than this many times as long is no archive of scenes.
 const MOST_RATIO: u64 = 64;
-
-/// A file of a tar archive.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Member {
-    pub(super) name: String,
-    /// Where its content begins, and its bytes.
-    pub(super) at: u64,
-    pub(super) size: u64,
-}
 
 /// The frames of an archive, whose content says of what kind it is.
 pub(super) fn open(mut source: Box<dyn Source>, budget: &mut Budget) -> Result<Box<dyn Frames>, SceneError> {
@@ -73,44 +62,6 @@ fn frames<'a>(
             Err(SceneError::inconsistent(what, "pack files of one format"))
         }
     }
-}
-
-/// Whether the name of a member is that of a frame.
-pub(crate) fn is_frame(name: &str) -> bool {
-    kind(name).is_some()
-}
-
-/// Whether a member is what systems put beside files.
-pub(crate) fn is_hidden(name: &str) -> bool {
-    let file = Path::new(name).file_name();
-    file.is_some_and(|file| file.as_encoded_bytes().starts_with(b".")) || name.starts_with("__MACOSX/")
-}
-
-/// The format that the name of a member promises; none for folders and for what systems put beside files.
-fn kind(name: &str) -> Option<&'static str> {
-    let extension = Path::new(name).extension()?.to_str()?;
-    // The buffers of a .gltf would be other members.
-    let known =
-        EXTENSIONS.into_iter().find(|known| extension.eq_ignore_ascii_case(known) && *known != "gltf");
-    known.filter(|_| !is_hidden(name) && !name.ends_with('/'))
-}
-
-/// The bytes of a member of a ZIP archive, as many as it says.
-pub(crate) fn read_member<R: Read>(
-    mut member: ZipFile<'_, R>,
-    budget: &mut Budget,
-) -> Result<Vec<u8>, SceneError> {
-    let refuse = |what: String| SceneError::inconsistent(what, DAMAGED);
-    let name = member.name().map_or_else(|_| MEMBER.to_owned(), |name| name.escape_default().to_string());
-    let size = member.size();
-    let mut content = budget.room(size, MEMBER)?;
-    let read = (&mut member).take(size).read_to_end(&mut content);
-    // The checksum is compared when the member ends.
-    let over = read.and_then(|_| member.read(&mut [0]));
-    if over.map_err(|error| refuse(format!("{name}: {error}")))? > 0 || (content.len() as u64) < size {
-        return Err(refuse(format!("{name} is not as long as the archive says, {size} bytes")));
-    }
-    Ok(content)
 }
 
 struct Zip {

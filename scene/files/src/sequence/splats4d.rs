@@ -19,9 +19,6 @@ use splatstream_gaussians::GaussianFrame;
 use splatstream_gaussians::activation::dc_of_colour;
 use streams::{Chunk, Stream, unzigzag};
 
-/// The first bytes of a file.
-pub(crate) const MAGIC: [u8; 4] = *b"SP4D";
-
 const NOT_SPLAT4D: &str = "this is no .splat4d file, or it is damaged";
 
 /// Attributes in the order of their numbers: position, rotation, colour, opacity, scale; and the values that each has.

@@ -22,6 +22,7 @@ use super::{Frames, Source};
 use crate::byte_values::{log_scale_of, logit_within};
 use crate::cursor::Cursor;
 use crate::error::SceneError;
+use crate::format::SPLATV;
 use crate::half::float_of_half;
 use crate::limits::Budget;
 use crate::note::Note;
@@ -29,8 +30,6 @@ use crate::reading::frame_of;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_gaussians::activation::dc_of_colour;
 
-/// The first word of a file.
-pub(crate) const MAGIC: [u8; 4] = [0x4b, 0x67, 0, 0];
 /// Bytes of one Gaussian.
 const RECORD: usize = 64;
 /// Opacities are this far from 0 and 1 at least.
@@ -72,7 +71,7 @@ impl Splatv {
         let mut bytes: Vec<u8> = budget.room(length, "the file")?;
         source.take(length).read_to_end(&mut bytes)?;
         let mut cursor = Cursor::new(&bytes);
-        if cursor.array("the header")? != MAGIC {
+        if cursor.array("the header")? != SPLATV {
             return Err(SceneError::malformed(0, "the magic number is another", NOT_SPLATV));
         }
         let json = cursor.u32("the header")?;

@@ -4,14 +4,21 @@ use std::io::{Read, Seek};
 
 use tar::{Archive, EntryType, PaxExtensions};
 
-use super::archive::Member;
 use crate::error::SceneError;
 use crate::limits::Budget;
+use crate::members::DAMAGED;
 
 /// Names are no longer than this: what says more is no name.
 const LONGEST_NAME: u64 = 64 << 10;
 
-const DAMAGED: &str = "the archive is damaged; pack it again";
+/// A file of a tar archive.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Member {
+    pub(super) name: String,
+    /// Where its content begins, and its bytes.
+    pub(super) at: u64,
+    pub(super) size: u64,
+}
 
 /// The regular files of an archive, in its order. Records that only say how the next file is called are read here, as much of
 /// them as a name can be.

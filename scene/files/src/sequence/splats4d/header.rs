@@ -4,8 +4,9 @@ use std::io::{Read, Seek, SeekFrom};
 
 use serde::Deserialize;
 
-use super::{MAGIC, NOT_SPLAT4D, Source};
+use super::{NOT_SPLAT4D, Source};
 use crate::error::SceneError;
+use crate::format::SPLAT4D;
 use crate::limits::Budget;
 
 /// Bytes that a byte of JSON turns into, at most.
@@ -87,7 +88,7 @@ impl Header {
         let [[a, b, c, d], [version, _, _, _], length] = *head.as_chunks().0 else {
             return Err(SceneError::malformed(0, "no header", NOT_SPLAT4D));
         };
-        if [a, b, c, d] != MAGIC {
+        if [a, b, c, d] != SPLAT4D {
             return Err(SceneError::malformed(0, "the magic number is another", NOT_SPLAT4D));
         }
         if version != 1 {
