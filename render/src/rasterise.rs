@@ -6,6 +6,7 @@
 //! sigma), alpha is at most 0.99, and a pixel is done when less than 1/10,000 of the light would pass.
 
 mod block;
+mod lanes;
 mod project;
 mod reach;
 mod rows;
@@ -13,6 +14,7 @@ mod tile;
 
 use crate::camera::Camera;
 use crate::image::Image;
+pub(crate) use lanes::{Lanes, TILE};
 use project::project;
 pub(crate) use project::{LOW_PASS, Shapes, Splat, near, seen_slopes};
 use pulp::{Simd, WithSimd};
@@ -20,10 +22,7 @@ use rayon::prelude::*;
 use reach::reachable;
 use rows::TileRows;
 use splatstream_gaussians::GaussianFrame;
-pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, Lanes, MAX_ALPHA, Tile, blend_tile, exp2};
-
-/// Pixels on a side of a tile.
-pub(crate) const TILE: usize = 16;
+pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, MAX_ALPHA, Tile, blend_tile, exp2};
 
 /// A picture and how much of each pixel the Gaussians cover.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,8 +2,7 @@
 #![expect(clippy::arithmetic_side_effects, reason = "floats; counts of Gaussians in memory")]
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; lanes and axes are constants")]
 
-use super::TILE;
-use super::tile::Lanes;
+use super::lanes::{Lanes, TILE};
 use splatstream_gaussians::{GaussianFrame, SH_C0, sh_basis, sh_coefficients};
 use std::ops::Range;
 

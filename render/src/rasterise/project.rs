@@ -3,7 +3,8 @@
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
 
 use super::block::Block;
-use super::{Sight, Strips, TILE};
+use super::lanes::TILE;
+use super::{Sight, Strips};
 use crate::camera::Camera;
 use glam::{Mat3, Vec3};
 use pulp::{Simd, WithSimd};

@@ -2,10 +2,11 @@
 #![expect(clippy::arithmetic_side_effects, reason = "vectors of floats; counts of Gaussians in memory")]
 #![expect(clippy::indexing_slicing, reason = "rows are those of the frame; lanes and axes are constants")]
 
+use super::Sight;
 use super::block::Block;
+use super::lanes::{Lanes, TILE};
 use super::project::{LOW_PASS, seen_slopes};
-use super::tile::{Lanes, exp2};
-use super::{Sight, TILE};
+use super::tile::exp2;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;

@@ -4,8 +4,9 @@
     reason = "rows and tiles of a picture, and counts of what is in memory"
 )]
 
+use super::Sight;
+use super::lanes::TILE;
 use super::project::{LOG2_255, Splat};
-use super::{Sight, TILE};
 use rayon::prelude::*;
 
 /// The ellipses that touch each row of tiles, nearest first.

@@ -1,6 +1,6 @@
 //! Front-to-back blending of one tile, sixteen pixels at a time.
 
-use super::TILE;
+use super::lanes::{Lanes, TILE};
 use super::project::{LOG2_255, Splat};
 use std::f32::consts::LN_2;
 
@@ -15,9 +15,6 @@ const MIN_TRANSMITTANCE: f32 = 1e-4;
 
 /// Ellipses of a tile that are brought together at once; as many as a cache holds beside the tile.
 const AHEAD: usize = 4 * TILE;
-
-/// One value for each pixel of a line of a tile.
-pub(crate) type Lanes = [f32; TILE];
 
 /// Receives what a Gaussian adds to the picture.
 pub(crate) trait Blend {
