@@ -4,7 +4,7 @@
 //! no panic.
 
 use crate::failure::{Failure, FailureReport};
-use crate::output_file::is_standard;
+use crate::standard::is_standard;
 use serde::Serialize;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! `splatstream decode`: a stream to frames in files.
 
 mod clamped;
+mod format;
 mod loss;
 mod report;
 mod target;
@@ -14,6 +15,7 @@ use crate::progress::Progress;
 use crate::seek::{Seek, gop_of};
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
+use format::Format;
 use loss::Loss;
 use report::{Report, Shown};
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -24,7 +26,7 @@ use splatstream_format::syntax::SequenceParameters;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use target::{Format, Target, Wanted};
+use target::{Target, Wanted};
 
 /// Decode a stream to files of Gaussians.
 ///

@@ -1,5 +1,6 @@
 //! `splatstream encode`: frames in files to a stream.
 
+mod choice;
 mod choices;
 mod decided;
 mod each;
@@ -28,7 +29,8 @@ use crate::setting_names::{
     AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
 };
 use crate::up_guess::UpGuess;
-use choices::{Choice, choices};
+use choice::Choice;
+use choices::choices;
 use clap::{Args, ValueEnum};
 use decided::Decided;
 use effort::Budget;

@@ -1,7 +1,7 @@
 //! What went wrong, for people: file, byte, clause, cause, and what to do about it.
 
-use crate::output_file::is_standard;
 use crate::over_limit;
+use crate::standard::is_standard;
 use serde::Serialize;
 use splatstream_format::{Class, Error};
 use splatstream_gaussians::FrameError;

@@ -3,9 +3,9 @@
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::input_args::{InputArgs, size_of, with_advice};
-use crate::output_file::STANDARD;
 use crate::over_limit::of_encoding;
 use crate::read_notes::ReadNotes;
+use crate::standard::STANDARD;
 use crate::stream_file::is_stream;
 use crate::unfinished::Unfinished;
 use splatstream_encoder::{FrameSource, Settings};

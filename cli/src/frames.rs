@@ -4,7 +4,7 @@ use crate::encode::warnings::Warning;
 use crate::failure::{Failure, StreamFault};
 use crate::frame_files::{FrameFiles, STANDARD_INPUT, spool};
 use crate::input_args::InputArgs;
-use crate::output_file::STANDARD;
+use crate::standard::STANDARD;
 use crate::stream_file::{StreamFile, is_stream};
 use crate::unfinished::Unfinished;
 use splatstream_decoder::operating_point::OperatingPoint;

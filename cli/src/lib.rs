@@ -37,6 +37,7 @@ mod seek;
 mod serve;
 mod setting_names;
 mod simulate;
+mod standard;
 mod stream_file;
 mod structure;
 mod track;

@@ -2,13 +2,11 @@
 //! reads, a directory or a device; what is at the end of a symbolic link is replaced, not the link.
 
 use crate::failure::Failure;
+use crate::standard::is_standard;
 use crate::unfinished::Unfinished;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
-
-/// The name that stands for standard input and standard output.
-pub(crate) const STANDARD: &str = "-";
 
 /// The links that a name may go through.
 const MAX_LINKS: usize = 40;
@@ -81,11 +79,6 @@ impl Write for OutputFile {
     fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
     }
-}
-
-/// Whether a path stands for standard input or output. A file of that name is `./-`.
-pub(crate) fn is_standard(path: &Path) -> bool {
-    path == Path::new(STANDARD) || ["/dev/stdout", "/dev/fd/1"].iter().any(|name| path == Path::new(name))
 }
 
 /// Refuses standard output for a file whose command reports there.

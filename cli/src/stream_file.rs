@@ -3,7 +3,7 @@
 use crate::failure::{Failure, Instead};
 use crate::input_args::parse_size;
 use crate::machine;
-use crate::output_file::STANDARD;
+use crate::standard::STANDARD;
 use clap::Args;
 use splatstream_decoder::budget::Budget;
 use splatstream_decoder::operating_point::OperatingPoint;

@@ -4,6 +4,7 @@
 //! result is judged by its pictures from cameras around the inner scene, against what the same tool gives for the base itself.
 //! What is missed without a word of the tool is a silent failure.
 
+mod attempt;
 mod base;
 mod cases;
 mod dice;

@@ -1,6 +1,6 @@
 //! What the formats of files cannot keep of decoded frames.
 
-use super::target::Format;
+use super::format::Format;
 use crate::encode::warnings::Warning;
 use crate::numbers::counted;
 use splatstream_files::spz::WriteOptions;

@@ -1,35 +1,16 @@
 //! Where decoded frames go: a file or standard output for one frame, a directory for any number.
 
 use super::clamped::Losses;
+use super::format::Format;
 use crate::earlier::{Earlier, files_in};
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::frame_name::{frame_name, is_frame_name};
-use crate::output_file::{
-    OutputFile, STANDARD, ends_with_separator, is_standard, make_directory, refuse_terminal,
-};
-use clap::ValueEnum;
-use splatstream_files::{SceneError, compressed_ply, gltf, ply, sog, splat, spz};
+use crate::output_file::{OutputFile, ends_with_separator, make_directory, refuse_terminal};
+use crate::standard::{STANDARD, is_standard};
 use splatstream_gaussians::GaussianFrame;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
-
-/// The formats that can be written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Format {
-    /// Standard Gaussian splatting PLY: keeps everything.
-    Ply,
-    /// SPZ: quantises what it keeps.
-    Spz,
-    /// 32 bytes per Gaussian: no spherical harmonics.
-    Splat,
-    /// glTF 2.0 with KHR_gaussian_splatting: keeps everything, as floats.
-    Glb,
-    /// SOG version 2: images that GPUs take as they are; Gaussians come in another order.
-    Sog,
-    /// PLY of packed vertices: quantises; Gaussians come in another order.
-    CompressedPly,
-}
 
 /// Where frames go.
 pub(crate) struct Target {
@@ -154,37 +135,4 @@ fn is_frame(path: &Path) -> bool {
     let (Some(name), Some(format)) = (name, Format::of_name(path)) else { return false };
     let stem = name.get(..name.len().saturating_sub(format.extension().len() + 1));
     stem.is_some_and(is_frame_name)
-}
-
-impl Format {
-    /// The format that the end of a file's name stands for.
-    fn of_name(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
-        // Compressed PLY before PLY.
-        let known = [Self::CompressedPly, Self::Ply, Self::Spz, Self::Splat, Self::Glb, Self::Sog];
-        known.into_iter().find(|format| name.ends_with(&format!(".{}", format.extension())))
-    }
-
-    /// The end of a file's name.
-    pub(super) fn extension(self) -> &'static str {
-        match self {
-            Self::Ply => "ply",
-            Self::Spz => "spz",
-            Self::Splat => "splat",
-            Self::Glb => "glb",
-            Self::Sog => "sog",
-            Self::CompressedPly => "compressed.ply",
-        }
-    }
-
-    fn bytes(self, frame: &GaussianFrame) -> Result<Vec<u8>, SceneError> {
-        match self {
-            Self::Ply => Ok(ply::write(frame)),
-            Self::Spz => spz::write(frame),
-            Self::Splat => splat::write(frame),
-            Self::Glb => gltf::write(frame),
-            Self::Sog => sog::write_zip(frame),
-            Self::CompressedPly => compressed_ply::write(frame),
-        }
-    }
 }

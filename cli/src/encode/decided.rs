@@ -1,6 +1,7 @@
 //! What was decided for a user who left it open.
 
-use super::choices::{self, Choice};
+use super::choice::Choice;
+use super::choices;
 use super::effort::Budget;
 use super::warnings::Warning;
 use crate::up_guess::UpGuess;

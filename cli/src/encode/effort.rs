@@ -1,6 +1,6 @@
 //! How much is done for a stream: a preset and iterations of fitting to pictures, given or chosen for a time.
 
-use super::choices::Choice;
+use super::choice::Choice;
 use super::warnings::Warning;
 use crate::numbers::{counted, frames};
 use crate::setting_names::{PresetName, spelled};

@@ -1,6 +1,6 @@
 //! The option that leaves out what pictures hardly miss.
 
-use super::choices::Choice;
+use super::choice::Choice;
 use crate::failure::Failure;
 use clap::Args;
 use splatstream_chart::numbers::{grouped, percent};

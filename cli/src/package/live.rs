@@ -3,7 +3,8 @@
 use super::Report;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::{OutputFile, STANDARD};
+use crate::output_file::OutputFile;
+use crate::standard::STANDARD;
 use crate::stream_file::{fault, open_pieces};
 use splatstream_format::Limits;
 use splatstream_stream::live::{Change, Live, Settings};

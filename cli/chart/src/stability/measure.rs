@@ -1,12 +1,13 @@
 //! Every case on a base.
 
+use super::attempt::Attempt;
 use super::base::{Base, Size};
 use super::cases::{self, Case, Make};
 use super::loss;
 use super::rows::{BaseReport, CaseReport, Row, Verdict};
 use super::sample::{Quality, Sample, Views};
 use super::sequences;
-use super::tools::{Attempt, Tool};
+use super::tools::Tool;
 use super::{HEIGHT, Stability, Warnings};
 use crate::Progress;
 use crate::numbers::{bits_per_gaussian, counted};

@@ -1,7 +1,7 @@
 //! This codec on a sample: what it says, and what it falls back to.
 
+use super::attempt::Attempt;
 use super::sample::Sample;
-use super::tools::Attempt;
 use super::{Warning, Warnings};
 use crate::numbers::{counted, percent};
 use splatstream_decoder::output::to_gaussians;

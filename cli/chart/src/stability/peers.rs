@@ -1,8 +1,8 @@
 //! Other formats on a sample, frame by frame: what comes back of what they write.
 
+use super::attempt::Attempt;
 use super::sample::Sample;
 use super::sog::quantised;
-use super::tools::Attempt;
 use splatstream_files::{ReadLimits, SceneError, splat, spz};
 use splatstream_gaussians::GaussianFrame;
 

@@ -1,9 +1,9 @@
 //! The tools that are compared.
 
+use super::attempt::Attempt;
 use super::sample::Sample;
 use super::{Warnings, ours, peers};
 use splatstream_encoder::Report;
-use splatstream_gaussians::GaussianFrame;
 
 /// A codec and how it is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,19 +60,4 @@ impl Tool {
             Self::Splat => peers::attempt(sample, peers::splat),
         }
     }
-}
-
-/// What a tool made of a sample.
-#[derive(Default)]
-pub(super) struct Attempt {
-    /// The frames that come back, by their numbers.
-    pub(super) shown: Vec<Option<GaussianFrame>>,
-    /// Bytes; none if the tool refused, or packs nothing.
-    pub(super) bytes: Option<u64>,
-    /// Warnings and errors, each with who said it.
-    pub(super) detected: Vec<String>,
-    /// What was done otherwise than on the base.
-    pub(super) fallback: Vec<String>,
-    /// The stream and the encoder's report, if it was this encoder.
-    pub(super) coded: Option<(Vec<u8>, Report)>,
 }
