@@ -192,6 +192,16 @@ impl CaseResult {
         self.reason.map_or(self.outcome.name(), Reason::name)
     }
 
+    /// What was expected and what was found, if the verdict is wrong.
+    pub(crate) fn contrast(&self) -> String {
+        match &self.answer {
+            Some(answer) if *answer != self.expected => {
+                format!("; expected {}, found {answer}", self.expected)
+            }
+            _ => String::new(),
+        }
+    }
+
     /// Says in detail and warnings which prefix of the stream they are about.
     pub(crate) fn name_prefix(&mut self, prefix: &Case<'_>) {
         let Some(bytes) = prefix.cut else { return };

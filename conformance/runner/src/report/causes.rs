@@ -1,6 +1,5 @@
 //! Failures grouped by their cause, so that a list of them does not repeat one cause for many cases.
 
-use super::summary::contrast;
 use crate::result::CaseResult;
 
 /// Failed cases that look as if they had the same cause; the first is described for all of them.
@@ -30,7 +29,7 @@ fn key(case: &CaseResult) -> String {
         Some(difference) => format!("{} {:?}", difference.attribute, difference.read.first()),
         None => without_numbers(case.detail.as_deref().unwrap_or_default()),
     };
-    format!("{} {} {:?} {detail}", case.label(), contrast(case), case.symptom)
+    format!("{} {} {:?} {detail}", case.label(), case.contrast(), case.symptom)
 }
 
 fn without_numbers(text: &str) -> String {

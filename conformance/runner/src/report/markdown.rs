@@ -1,7 +1,7 @@
 //! A report as Markdown, to be published with a decoder.
 
 use super::causes::{Cause, causes};
-use super::summary::{contrast, explanation};
+use super::summary::explanation;
 use super::{Report, Tally};
 use crate::counted::counted;
 use crate::result::Outcome;
@@ -57,7 +57,7 @@ fn failures(report: &Report) -> String {
 
 fn entry(cause: &Cause<'_>) -> String {
     let case = cause.first;
-    let mut text = format!("- `{}`: {}{}\n", case.case_name(), case.label(), contrast(case));
+    let mut text = format!("- `{}`: {}{}\n", case.case_name(), case.label(), case.contrast());
     for line in explanation(case).into_iter().chain(cause.others()) {
         text += &format!("  - {line}\n");
     }

@@ -44,19 +44,11 @@ pub fn text(report: &Report) -> String {
 /// The lines about the failures of one cause.
 fn described(cause: &Cause<'_>) -> String {
     let case = cause.first;
-    let mut text = format!("FAIL {}: {}{}\n", case.case_name(), case.label(), contrast(case));
+    let mut text = format!("FAIL {}: {}{}\n", case.case_name(), case.label(), case.contrast());
     for line in explanation(case).into_iter().chain(cause.others()) {
         text += &format!("  {line}\n");
     }
     text
-}
-
-/// What was expected and what was found, if the verdict is wrong.
-pub(super) fn contrast(case: &CaseResult) -> String {
-    match &case.answer {
-        Some(answer) if *answer != case.expected => format!("; expected {}, found {answer}", case.expected),
-        _ => String::new(),
-    }
 }
 
 /// What is wrong with a case, in lines.
