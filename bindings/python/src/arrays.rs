@@ -3,12 +3,11 @@
 //! Rows of arrays are Gaussians. An array of several components holds them side by side, as renderers and trainers want it;
 //! planes are arrays of one component, in the memory of the frame.
 
-use crate::gaussians::Gaussians;
-use numpy::ndarray::{Array, ArrayView1, Dimension};
-use numpy::{Element, PyArray, PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::ndarray::{Array, Dimension};
+use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
 use splatstream::Planes;
 
 /// The values of planes of one length, those of a row side by side.
@@ -40,29 +39,6 @@ pub(crate) fn shared<T: Element, D: Dimension>(array: Bound<'_, PyArray<T, D>>) 
         drop(array.make_nonwriteable());
     }
     array
-}
-
-/// An array of values that stay in the memory of an owner, not to be written.
-#[expect(unsafe_code, reason = "NumPy keeps a pointer to memory of Rust")]
-pub(crate) fn borrowed<'py, T: Element>(
-    owner: &Bound<'py, Gaussians>,
-    values: impl FnOnce(&Gaussians) -> &[T],
-) -> Bound<'py, PyArray1<T>> {
-    let view = ArrayView1::from(values(owner.get()));
-    // SAFETY: the values belong to the owner, which is frozen and gives out no reference to change them, so that they stay
-    // where they are until it is dropped; the array keeps it alive.
-    let array = unsafe { PyArray1::borrow_from_array(&view, owner.clone().into_any()) };
-    shared(array)
-}
-
-/// An attribute as planes: as many arrays as it has components.
-pub(crate) fn planes_of<'py, T: Element>(
-    owner: &Bound<'py, Gaussians>,
-    count: usize,
-    plane: impl Fn(&Gaussians, usize) -> &[T],
-) -> PyResult<Bound<'py, PyTuple>> {
-    let arrays = (0..count).map(|component| borrowed(owner, |owner| plane(owner, component)));
-    PyTuple::new(owner.py(), arrays.collect::<Vec<_>>())
 }
 
 /// A dictionary of attributes.

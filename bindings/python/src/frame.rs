@@ -1,8 +1,8 @@
 //! A decoded frame.
 
-use crate::arrays::{borrowed, dictionary, planes_of};
+use crate::arrays::dictionary;
 use crate::errors::damage;
-use crate::gaussians::{Gaussians, Source};
+use crate::gaussians::{Gaussians, Source, borrowed, planes_of};
 use crate::operating_point;
 use numpy::PyArray1;
 use pyo3::exceptions::PyRuntimeError;

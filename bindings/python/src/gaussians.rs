@@ -1,13 +1,13 @@
 //! A frame of Gaussians in memory: made by Python, read from a file, or decoded.
 
-use crate::arrays::{Attributes, attribute, dictionary, interleaved, owned, planes_of, shared};
+use crate::arrays::{Attributes, attribute, dictionary, interleaved, owned, shared};
 use crate::errors::scene_error;
-use numpy::ndarray::Dim;
-use numpy::{PyArray1, PyArray2, PyArray3};
+use numpy::ndarray::{ArrayView1, Dim};
+use numpy::{Element, PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use splatstream::{GaussianFrame, Planes};
 use splatstream_files::{ReadLimits, ply, read_scene_as_is};
 use std::path::PathBuf;
@@ -290,4 +290,27 @@ impl Gaussians {
             ],
         )
     }
+}
+
+/// An array of values that stay in the memory of an owner, not to be written.
+#[expect(unsafe_code, reason = "NumPy keeps a pointer to memory of Rust")]
+pub(crate) fn borrowed<'py, T: Element>(
+    owner: &Bound<'py, Gaussians>,
+    values: impl FnOnce(&Gaussians) -> &[T],
+) -> Bound<'py, PyArray1<T>> {
+    let view = ArrayView1::from(values(owner.get()));
+    // SAFETY: the values belong to the owner, which is frozen and gives out no reference to change them, so that they stay
+    // where they are until it is dropped; the array keeps it alive.
+    let array = unsafe { PyArray1::borrow_from_array(&view, owner.clone().into_any()) };
+    shared(array)
+}
+
+/// An attribute as planes: as many arrays as it has components.
+pub(crate) fn planes_of<'py, T: Element>(
+    owner: &Bound<'py, Gaussians>,
+    count: usize,
+    plane: impl Fn(&Gaussians, usize) -> &[T],
+) -> PyResult<Bound<'py, PyTuple>> {
+    let arrays = (0..count).map(|component| borrowed(owner, |owner| plane(owner, component)));
+    PyTuple::new(owner.py(), arrays.collect::<Vec<_>>())
 }

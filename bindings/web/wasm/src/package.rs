@@ -1,7 +1,6 @@
 //! The package of a server: what to request, and frames of what has come.
 
 use crate::received::Received;
-use crate::session::decoder;
 use splatstream::{Class, Decoder, Error, Frame, OperatingPoint, Warning};
 use splatstream_stream::control::{self, Layered, State};
 use splatstream_stream::manifest::Manifest;
@@ -309,7 +308,7 @@ impl Package {
                 let (spatial, refinement) = (chosen.spatial, chosen.refinement);
                 let temporal = chosen.temporal.unwrap_or(0);
                 let point = OperatingPoint { spatial, temporal, refinement };
-                let opened = decoder(&received).starting_at(start as u64).with_operating_point(point);
+                let opened = received.decoder().starting_at(start as u64).with_operating_point(point);
                 self.gop.decoder = opened;
                 (self.gop.is_open, self.gop.is_still) = (true, chosen.temporal.is_none());
                 (self.gop.is_done, self.gop.temporal) = (false, temporal);

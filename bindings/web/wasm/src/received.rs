@@ -1,8 +1,11 @@
 //! The bytes that have come so far.
 
+use splatstream::{Decoder, Limits};
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+/// What a tab of a browser may take: bytes of memory for decoding, apart from those of the stream.
+const MAX_MEMORY: u64 = 1 << 30;
 /// A stream that arrives from its start on. Copies share the bytes. At the end of those that are there, a reader learns
 /// that more will come, until the [end](Received::end) is known.
 #[derive(Clone, Default)]
@@ -26,6 +29,15 @@ impl Received {
         let length = bytes.len();
         let shared = Shared { bytes, length, is_end: true };
         Self { shared: Arc::new(Mutex::new(shared)), at: 0 }
+    }
+
+    /// What decodes it.
+    pub(crate) fn decoder(&self) -> Decoder {
+        Decoder::from_reader(self.clone()).with_limits(Limits {
+            max_memory: MAX_MEMORY,
+            // A page plays a stream as often as somebody looks at it.
+            ..Limits::UNLIMITED
+        })
     }
 
     fn lock(&self) -> MutexGuard<'_, Shared> {

@@ -6,10 +6,8 @@ use crate::package::Package;
 use crate::received::Received;
 use crate::texels::{ROW, Texels};
 use splatstream::scene::SceneDescription;
-use splatstream::{Decoder, Error, Frame, Limits, OperatingPoint, Position, Slots};
+use splatstream::{Decoder, Error, Frame, OperatingPoint, Position, Slots};
 
-/// What a tab of a browser may take: bytes of memory for decoding, apart from those of the stream.
-const MAX_MEMORY: u64 = 1 << 30;
 /// Bytes of a stream that are kept at most, so that it can be sought in.
 pub const MAX_STREAM: usize = 1 << 30;
 
@@ -54,7 +52,7 @@ impl Default for Session {
         Self {
             #[cfg(feature = "packages")]
             package: None,
-            decoder: decoder(&received),
+            decoder: received.decoder(),
             received,
             frame: None,
             slots: Slots::new(0),
@@ -64,14 +62,6 @@ impl Default for Session {
             text: String::new(),
         }
     }
-}
-
-pub(crate) fn decoder(received: &Received) -> Decoder {
-    Decoder::from_reader(received.clone()).with_limits(Limits {
-        max_memory: MAX_MEMORY,
-        // A page plays a stream as often as somebody looks at it.
-        ..Limits::UNLIMITED
-    })
 }
 
 impl Session {
