@@ -112,7 +112,7 @@ impl PackageStream {
         let package = package(&stream, &options, &self.limits.options_to_draw(), self.quality)?;
         self.clear(stale)?;
         let sizes = write(&package, &self.out, slice::from_ref(&self.input))?;
-        let report = Report::new(&self.out, &package.manifest, sizes);
+        let report = Report::new(&self.out, &package.manifest, (stream.bytes.len() as u64, sizes));
         console.report(&report, || report.text())
     }
 
@@ -202,7 +202,7 @@ fn is_of_package(path: &Path) -> bool {
 }
 
 impl<'a> Report<'a> {
-    fn new(output: &'a Path, manifest: &'a Manifest, bytes: u64) -> Self {
+    fn new(output: &'a Path, manifest: &'a Manifest, (bytes_in, bytes): (u64, u64)) -> Self {
         let subsegments = |one: &RepresentationInfo| {
             let all = manifest.gops.iter().flat_map(|gop| &gop.subsegments);
             all.filter(|subsegment| subsegment.representation == one.id).count()
@@ -219,7 +219,7 @@ impl<'a> Report<'a> {
         Self {
             output,
             layout: &manifest.layout,
-            bytes_in: manifest.stream.bytes.unwrap_or(0),
+            bytes_in,
             bytes,
             frames: Some(manifest.stream.frames),
             gops: manifest.gops.len(),

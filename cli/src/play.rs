@@ -139,7 +139,7 @@ impl Play {
                     decoding.show(gop);
                 };
                 let outcome = client.play(self.rule.rule(), show).map_err(failed)?;
-                Report::of_playback(client.manifest(), &outcome, decoding.finish())
+                Report::of_playback(client.manifest(), &outcome, decoding.finish()?)
             }
         };
         let report = report.of(&self.location, self.rule.name());

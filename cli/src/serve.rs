@@ -174,7 +174,8 @@ fn write(format: Option<LogFormat>, entry: &Entry) {
     let line = match format {
         None => return,
         Some(LogFormat::Text) => entry.text(),
-        Some(LogFormat::Json) => serde_json::to_string(entry).unwrap_or_default(),
+        // An entry holds what JSON can say.
+        Some(LogFormat::Json) => serde_json::to_string(entry).unwrap_or_else(|_| entry.text()),
     };
     let _nobody_listens = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }

@@ -114,7 +114,7 @@ impl<'v> Blocks<'v> {
 
 /// The unsigned values of a plane of one block, as they are split in tokens.
 pub(crate) fn unsigned_values(info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u64> {
-    let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
+    let coded = &block.coded[plane];
     match info.alphabet {
         Alphabet::Position => block.deltas.clone(),
         Alphabet::Index => coded.iter().map(|&index| u64::from(index.unsigned_abs())).collect(),
@@ -122,13 +122,12 @@ pub(crate) fn unsigned_values(info: PlaneInfo, plane: usize, block: &CodedBlock)
     }
 }
 
-/// The contexts of a plane of one block under a model.
+/// The contexts of a plane of one block under a model; none where all of its values have context 0.
 pub(crate) fn contexts(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedBlock) -> Vec<u8> {
     if info.is_position() {
         return context::delta_contexts(&model.axes, &block.deltas, block.segments());
     }
-    let values = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-    context::plane_contexts(&model.axes, plane, info, block, values)
+    context::plane_contexts(&model.axes, plane, info, block, &block.coded[plane])
 }
 
 /// The first plane that is not of the position alphabet.

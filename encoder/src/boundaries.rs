@@ -51,23 +51,24 @@ pub fn refinements_by_slope(
     let frame = first_frame(&mut checked, settings).map_err(named)?;
     // Where a size is asked for, the PSNR is that of a usual stream.
     let whole = settings.psnr.unwrap_or(Quality::High.decibels());
-    Ok(best_boundaries(&psnr_of_prefixes(&frame, settings, whole.into()), count))
+    Ok(best_boundaries(&psnr_of_prefixes(&frame, settings, whole.into())?, count))
 }
 
 /// The PSNR, dB, of nothing at all and of the prefix that ends at each candidate, where the error of a whole frame is so many dB.
-fn psnr_of_prefixes(frame: &GaussianFrame, settings: &Settings, whole: f64) -> Vec<f64> {
+fn psnr_of_prefixes(frame: &GaussianFrame, settings: &Settings, whole: f64) -> Result<Vec<f64>, Error> {
     let mut ranking = Ranking::new(&Settings { refinements: CANDIDATES.to_vec(), ..settings.clone() });
     let mut order = ranking.order(frame);
     let cameras =
         ranking.cameras(frame).iter().map(|camera| camera.scaled_to_height(LINES.min(camera.height)));
     let pictures = ReferencePictures::new(frame, cameras.collect());
     let of_prefix = |percent: u8| {
-        let prefix = order.get_mut(..prefix_length(percent, frame.len() as u32) as usize).unwrap_or_default();
+        let prefix = order.get_mut(..prefix_length(percent, frame.len() as u32) as usize);
+        let prefix = prefix.ok_or(Error::Fault("a prefix ends beyond its frame"))?;
         // The order of the source decides between Gaussians that are equally far away. Longer prefixes have these too.
         prefix.sort_unstable();
         let errors: Vec<f64> = pictures.psnr(&frame.select(prefix)).map(mean_square).collect();
         let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
-        -10.0 * libm::log10(mean + mean_square(whole))
+        Ok(-10.0 * libm::log10(mean + mean_square(whole)))
     };
     [0].into_iter().chain(CANDIDATES).map(of_prefix).collect()
 }

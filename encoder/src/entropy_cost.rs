@@ -84,7 +84,7 @@ pub(crate) fn entropy_of(values: &[i32]) -> f64 {
     if places / 4 <= values.len() {
         let mut counts = vec![0_u32; places];
         for &value in values {
-            if let Some(count) = counts.get_mut(value.wrapping_sub(least) as usize) {
+            if let Some(count) = counts.get_mut(value.abs_diff(least) as usize) {
                 *count = count.saturating_add(1);
             }
         }

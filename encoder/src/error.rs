@@ -186,6 +186,9 @@ pub enum Error {
     /// Pictures that values are fitted to do not go together: the encoder is at fault.
     #[error("fitting to pictures failed: {0}; please report this, with the scene")]
     Finetune(#[from] GradientError),
+    /// What the encoder has counted itself does not hold: the encoder is at fault.
+    #[error("encoding failed: {0}; please report this, with the scene")]
+    Fault(&'static str),
     /// The syntax refuses what the encoder wants to write.
     #[error("the bitstream cannot carry this: {0}")]
     Syntax(#[from] splatstream_format::Error),

@@ -114,7 +114,7 @@ impl Laws {
         sequence: &SequenceParameters,
         refinement: u8,
     ) -> [u8; 5] {
-        let coarser = self.coarser.get(usize::from(refinement)).copied().unwrap_or(0);
+        let coarser = self.coarser[usize::from(refinement)];
         let of = [
             (steps.log_scale, sequence.log_scale_step()),
             (steps.opacity, sequence.opacity_step()),
@@ -136,7 +136,7 @@ impl Laws {
         reason = "counts in memory; exponents are at most 13 and positions have 1 bit or more"
     )]
     pub(crate) fn position_shift(&self, sequence: &SequenceParameters, refinement: u8) -> u8 {
-        let coarser = self.coarser.get(usize::from(refinement)).copied().unwrap_or(0);
+        let coarser = self.coarser[usize::from(refinement)];
         (coarser / 3).min(sequence.position_bits - 1)
     }
 }

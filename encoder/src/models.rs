@@ -67,10 +67,14 @@ fn source_values(source: Source, info: PlaneInfo, plane: usize, block: &CodedBlo
         return context::delta_values(&block.deltas, block.segments());
     }
     if is_serial(source) {
-        let coded = block.coded.get(plane).map(Vec::as_slice).unwrap_or_default();
-        return context::serial_values(source, coded, block.segments());
+        return context::serial_values(source, &block.coded[plane], block.segments());
     }
     context::values(source, plane, info, block).into_owned()
+}
+
+/// The context of a value; without [contexts] all have the first.
+fn context_at(contexts: &[u8], index: usize) -> usize {
+    if contexts.is_empty() { 0 } else { contexts[index].into() }
 }
 
 /// Thresholds that cut the values in parts of about equal size.
@@ -115,7 +119,7 @@ impl PlaneView<'_> {
         let count = first.contexts() * second.contexts();
         let mut histograms = vec![Histogram::default(); count];
         for (index, &token) in self.tokens.iter().enumerate() {
-            histograms[usize::from(contexts.get(index).copied().unwrap_or(0))].add(token);
+            histograms[context_at(contexts, index)].add(token);
         }
         let clustering = cluster(histograms, second.contexts());
         let bits = clustering.bits + axis_bits(first) + axis_bits(second);
@@ -204,7 +208,7 @@ fn count(
     for block in blocks {
         let contexts = contexts(model, info, plane, block);
         for (index, value) in unsigned_values(info, plane, block).into_iter().enumerate() {
-            let context = usize::from(contexts.get(index).copied().unwrap_or(0));
+            let context = context_at(&contexts, index);
             let table = usize::from(model.table_of_context[context]);
             histograms[table].add(split(value, model.direct_log2).token);
         }
@@ -305,7 +309,7 @@ fn symbol_bits(model: &PlaneModel, info: PlaneInfo, plane: usize, block: &CodedB
     let costs: Vec<Vec<f64>> = model.tables.iter().map(token_costs).collect();
     let mut bits = 0.0;
     for (index, value) in unsigned_values(info, plane, block).into_iter().enumerate() {
-        let context = usize::from(contexts.get(index).copied().unwrap_or(0));
+        let context = context_at(&contexts, index);
         let token = split(value, model.direct_log2);
         let costs = &costs[usize::from(model.table_of_context[context])];
         let cost = costs.get(usize::from(token.token)).copied().filter(|cost| cost.is_finite())?;
@@ -355,8 +359,7 @@ pub(crate) fn costs(models: &[PlaneModel], blocks: &Blocks<'_>) -> Vec<PlaneCost
     let of_plane = |(plane, model): (usize, &PlaneModel)| {
         let of_block = |block: &CodedBlock| -> Vec<u8> {
             let contexts = contexts(model, planes[plane], plane, block);
-            let context = |index: usize| usize::from(contexts.get(index).copied().unwrap_or(0));
-            (0..block.len()).map(|index| model.table_of_context[context(index)]).collect()
+            (0..block.len()).map(|index| model.table_of_context[context_at(&contexts, index)]).collect()
         };
         let bits = cut.iter().filter_map(|block| symbol_bits(model, planes[plane], plane, block)).sum();
         PlaneCosts {

@@ -34,12 +34,12 @@ pub(crate) fn encode_smaller(
         true => Some(&mut judge),
         false => None,
     };
-    if let Some(report) = plan.encode(source, (all.clone(), None), sink, progress, judge)? {
+    if let Some(report) = plan.encode_judged(source, (all.clone(), None), sink, progress, judge)? {
         return Ok(report);
     }
-    let Some(alone) = alone else { return Err(Error::NoFrames) };
-    let report = alone.encode(source, (all, None), sink, progress, None)?;
-    Ok(Report { stands_alone: true, ..report.unwrap_or_default() })
+    let alone = alone.ok_or(Error::Fault("a plan was refused, and there is no other"))?;
+    let report = alone.encode(source, (all, None), sink, progress)?;
+    Ok(Report { stands_alone: true, ..report })
 }
 
 /// Encodes with the steps and the layers of the settings.
@@ -52,6 +52,5 @@ pub(crate) fn encode_once(
 ) -> Result<Report, Error> {
     let plan = Plan::new(source, settings, settings.clone(), ranking)?;
     let all = 0..source.len();
-    let report = plan.encode(source, (all, None), sink, progress, None)?;
-    Ok(report.unwrap_or_default())
+    plan.encode(source, (all, None), sink, progress)
 }

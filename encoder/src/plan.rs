@@ -185,16 +185,27 @@ impl Plan {
         }
         let mut source =
             CheckedSource::new(source, &self.settings).expecting(&self.analysis.counts, &self.frame_digests);
-        let encoded = self.encode(&mut source, (frames, Some(shard)), sink, progress, None);
-        let mut report = encoded.map_err(named)?.unwrap_or_default();
+        let encoded = self.encode(&mut source, (frames, Some(shard)), sink, progress);
+        let mut report = encoded.map_err(named)?;
         (report.target, report.stands_alone) = (self.target, self.stands_alone);
         report.leave_out(source.into_dropped());
         Ok(report)
     }
 
-    /// Encodes frames of the sequence, all of them or those of a shard. Nothing is written and none is given where
-    /// `judge` refuses the first span.
+    /// Encodes frames of the sequence, all of them or those of a shard.
     pub(crate) fn encode(
+        &self,
+        source: &mut dyn FrameSource,
+        frames: (Range<u32>, Option<Shard>),
+        sink: &mut dyn Write,
+        progress: crate::Progress<'_>,
+    ) -> Result<Report, Error> {
+        let report = self.encode_judged(source, frames, sink, progress, None)?;
+        report.ok_or(Error::Fault("nothing was written, and nobody refused it"))
+    }
+
+    /// The same. Nothing is written and none is given where `judge` refuses the first span.
+    pub(crate) fn encode_judged(
         &self,
         source: &mut dyn FrameSource,
         (frames, shard): (Range<u32>, Option<Shard>),

@@ -210,11 +210,11 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
 
 /// The highest band of which some coefficient may not round to 0; steps of large Gaussians are finer than the usual one.
 #[expect(clippy::arithmetic_side_effects, reason = "a degree is 1 to 3; values on a grid are clamped")]
+#[expect(clippy::indexing_slicing, reason = "a frame has the planes of its degree")]
 fn needed_degree(frame: &GaussianFrame, step: f32) -> u8 {
     let needed = |degree: &u8| {
         let planes = 3 * sh_coefficients(degree - 1)..3 * sh_coefficients(*degree);
-        let bands = frame.sh().get(planes).unwrap_or_default();
-        bands.iter().flatten().any(|value| value.abs() > 0.25 * step)
+        frame.sh()[planes].iter().flatten().any(|value| value.abs() > 0.25 * step)
     };
     (1..=frame.sh_degree()).rev().find(needed).unwrap_or(0)
 }

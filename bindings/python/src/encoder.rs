@@ -4,7 +4,7 @@ use crate::errors::encode_error;
 use crate::gaussians::Gaussians;
 use crate::sink::{Sink, Written};
 use crate::work;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use splatstream::{Cancel, EncodeError, FrameSource, GaussianFrame, Report};
@@ -27,9 +27,10 @@ fn encoded<'py>(
     prepared: &Prepared,
     report: &Report,
     start: Instant,
-) -> Encoded<'py> {
+) -> PyResult<Encoded<'py>> {
     let bytes = written.map(|written| PyBytes::new(py, &written.take()));
-    (bytes, prepared.report(report, start.elapsed().as_secs_f64()))
+    let report = prepared.report(report, start.elapsed().as_secs_f64());
+    Ok((bytes, report.map_err(|error| PyRuntimeError::new_err(error.to_string()))?))
 }
 
 /// Tells Python how many frames are coded, each time that it is another number.
@@ -193,7 +194,7 @@ impl Encoder {
         let done = work::run(py, &self.cancel, &mut told, || self.end(before))?;
         let (report, prepared) = done.map_err(|failed| failed.raised(py))?;
         told(py)?;
-        Ok(encoded(py, self.written.clone(), &prepared, &report, self.start))
+        encoded(py, self.written.clone(), &prepared, &report, self.start)
     }
 }
 
@@ -262,5 +263,5 @@ pub(crate) fn encode_sequence<'py>(
     })?;
     let (report, prepared) = done.map_err(|failed| failed.raised(py))?;
     told(py)?;
-    Ok(encoded(py, written, &prepared, &report, start))
+    encoded(py, written, &prepared, &report, start)
 }

@@ -53,9 +53,10 @@ impl Decode {
 }
 
 fn verdict(exit_code: i32, diagnosis: &Diagnosis) -> Failure {
-    // A diagnosis of strings and numbers is always JSON.
-    let line = serde_json::to_string(diagnosis).unwrap_or_default();
-    Failure::Verdict { exit_code: u8::try_from(exit_code).unwrap_or(1), line }
+    match serde_json::to_string(diagnosis) {
+        Ok(line) => Failure::Verdict { exit_code: u8::try_from(exit_code).unwrap_or(1), line },
+        Err(error) => Failure::other(format!("cannot tell the verdict: {error}; please report this")),
+    }
 }
 
 fn failure(error: &io::Error) -> Failure {

@@ -97,12 +97,15 @@ impl EncodeOptions {
 impl Prepared {
     /// The JSON that `splatstream encode --json` prints of a stream that was written with these settings, without the name
     /// of a file: see `cli/json.md`.
-    pub fn report(&self, report: &Report, seconds: f64) -> String {
+    ///
+    /// # Errors
+    /// None that is known: a report holds what JSON can say.
+    pub fn report(&self, report: &Report, seconds: f64) -> serde_json::Result<String> {
         let name_of = |frame| format!("frame {frame}");
         let mut encoded = Encoded::new(Path::new(""), report, &self.settings, &name_of, seconds);
         encoded.chosen.extend(self.decided.choices());
         encoded.warnings.extend(self.decided.warnings());
-        serde_json::to_string(&encoded).unwrap_or_default()
+        serde_json::to_string(&encoded)
     }
 }
 

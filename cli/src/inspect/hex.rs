@@ -55,23 +55,29 @@ pub(super) fn show(stream: &StreamFile, number: usize, limits: &Limits, console:
         return Err(Failure::Usage(format!("{path}: there is no unit {number}, the stream has {count}")));
     };
     let elements = header.into_iter().chain(elements);
-    let elements = elements.map(|element| Bytes { hex: hex(stream, &element), element }).collect();
+    let elements = elements.map(|element| Ok(Bytes { hex: hex(stream, &element)?, element }));
+    let elements = elements.collect::<Result<_, Failure>>()?;
     let dump = Dump { unit, kind, at, bytes, elements };
     console.report(&dump, || dump.text())?;
     Ok(visited.error)
 }
 
 /// The bytes that an element touches, as the inspector found them within the stream.
-fn hex(stream: &StreamFile, row: &Element) -> String {
+fn hex(stream: &StreamFile, row: &Element) -> Result<String, Failure> {
     let start = usize::try_from(row.at_bit / 8).unwrap_or(usize::MAX);
     let end = usize::try_from((row.at_bit + row.bits).div_ceil(8)).unwrap_or(usize::MAX);
-    let bytes = stream.bytes.get(start..end).unwrap_or_default();
+    let Some(bytes) = stream.bytes.get(start..end) else {
+        let (path, name) = (stream.path.display(), &row.name);
+        return Err(Failure::other(format!(
+            "{path}: {name} is said to end beyond the stream; please report this"
+        )));
+    };
     let mut text = String::with_capacity(bytes.len() * 2);
     for byte in bytes {
         // Writing to a string cannot fail.
         let _infallible = write!(text, "{byte:02x}");
     }
-    text
+    Ok(text)
 }
 
 impl Dump {

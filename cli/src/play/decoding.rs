@@ -73,11 +73,12 @@ impl Decoding {
         let _gone = running.jobs.send(job);
     }
 
-    /// What became of all GOPs; none without a decoder.
-    pub(super) fn finish(self) -> Option<BTreeMap<usize, Decoded>> {
-        let Running { jobs, thread } = self.running?;
+    /// What became of all GOPs; nothing without a decoder.
+    pub(super) fn finish(self) -> Result<BTreeMap<usize, Decoded>, Failure> {
+        let Some(Running { jobs, thread }) = self.running else { return Ok(BTreeMap::new()) };
         drop(jobs);
-        thread.join().ok()
+        let stopped = |_| Failure::other("the decoder has stopped; please report this, with the package");
+        thread.join().map_err(stopped)
     }
 }
 

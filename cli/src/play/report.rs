@@ -84,9 +84,8 @@ impl Report {
     pub(super) fn of_playback(
         manifest: &Manifest,
         outcome: &Outcome,
-        decoded: Option<BTreeMap<usize, Decoded>>,
+        mut decoded: BTreeMap<usize, Decoded>,
     ) -> Self {
-        let mut decoded = decoded.unwrap_or_default();
         let rows = outcome.gops.iter();
         let gops = rows.map(|log| GopReport::new(log, decoded.remove(&log.number))).collect();
         let losses = outcome.losses.iter().map(LossReport::from).collect();

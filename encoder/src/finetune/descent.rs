@@ -290,7 +290,7 @@ impl<'a> Descent<'a> {
         drawing.backward(&slopes, &mut own)?;
         // Where nothing is missing there is nowhere to go.
         let scale = if mean > NOTHING { 1.0 / mean } else { 0.0 };
-        add(&own, scale as f32, &self.latent.seen(&sight.receiver), sum);
+        add(&own, scale as f32, &self.latent.seen(&sight.receiver), sum)?;
         if let Some(sight) = self.sights.get_mut(place) {
             sight.loss = Some(mean);
         }
@@ -299,15 +299,19 @@ impl<'a> Descent<'a> {
 }
 
 /// Adds multiples of the slopes of some rows.
-fn add(own: &Gradients, scale: f32, rows: &[Range<usize>], sum: &mut Gradients) {
+///
+/// # Errors
+/// Rows that the slopes do not have.
+fn add(own: &Gradients, scale: f32, rows: &[Range<usize>], sum: &mut Gradients) -> Result<(), Error> {
     let planes: Vec<_> = sum.planes_mut().iter_mut().zip(own.planes().iter()).collect();
-    planes.into_par_iter().for_each(|(sum, own)| {
+    planes.into_par_iter().try_for_each(|(sum, own)| {
         for rows in rows {
-            let own = own.get(rows.clone()).unwrap_or_default();
-            let sum = sum.get_mut(rows.clone()).unwrap_or_default();
+            let parts = sum.get_mut(rows.clone()).zip(own.get(rows.clone()));
+            let (sum, own) = parts.ok_or(Error::Fault("a receiver sees Gaussians without slopes"))?;
             sum.iter_mut().zip(own).for_each(|(sum, slope)| *sum += scale * slope);
         }
-    });
+        Ok(())
+    })
 }
 
 impl Finetune {

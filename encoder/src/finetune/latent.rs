@@ -305,8 +305,10 @@ fn refined(
     let moves = wanted.moves(parents, shift, last);
     let mut position = parents.planes.position.clone();
     for (plane, moves) in position.iter_mut().zip(&moves) {
-        let moved = |code: u32, steps: i32| code.wrapping_add_signed(steps << shift);
-        plane.iter_mut().zip(moves).for_each(|(code, &steps)| *code = moved(*code, steps));
+        for (code, &steps) in plane.iter_mut().zip(moves) {
+            let moved = code.checked_add_signed(steps << shift);
+            *code = moved.ok_or(Error::Fault("a position is moved beyond its grid"))?;
+        }
     }
     let rows: Vec<u32> = (0..parents.len() as u32).collect();
     let mut attributes = Attributes::of_list(parents, &rows);

@@ -69,17 +69,17 @@ impl Deviation {
     }
 
     /// Of what follows: of Gaussians that go on, and of new ones, which are not fitted.
-    pub(crate) fn followed(&self, parents: &[Option<u32>]) -> Self {
+    ///
+    /// # Errors
+    /// Planes that make no frame.
+    pub(crate) fn followed(&self, parents: &[Option<u32>]) -> Result<Self, Error> {
         let of = |plane: &[f32]| -> Vec<f32> {
             parents.iter().map(|parent| parent.map_or(0.0, |parent| plane[parent as usize])).collect()
         };
-        let rows: Vec<u32> = parents.iter().map(|parent| parent.unwrap_or(0)).collect();
-        let mut values = self.values.select(&rows);
-        let is_new: Vec<bool> = parents.iter().map(Option::is_none).collect();
-        for plane in values.planes_mut().iter_mut() {
-            plane.iter_mut().zip(&is_new).filter(|(_, is_new)| **is_new).for_each(|(value, _)| *value = 0.0);
-        }
-        Self { position: self.position.each_ref().map(|plane| of(plane)), values }
+        let mut planes = self.values.planes().clone();
+        planes.iter_mut().for_each(|plane| *plane = of(plane));
+        let values = GaussianFrame::from_planes(self.values.sh_degree(), planes)?;
+        Ok(Self { position: self.position.each_ref().map(|plane| of(plane)), values })
     }
 
     /// What a frame shall become where its Gaussians continue those of a reference, of which these are the lists: what its source has, and what each differed
@@ -158,5 +158,18 @@ fn unit([_, x, y, z]: [f32; 4]) -> [f32; 4] {
             let length = square.sqrt();
             [0.0, x / length, y / length, z / length]
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn new_gaussians_differ_by_nothing_where_there_were_none_before() {
+        let none = Deviation { position: Default::default(), values: GaussianFrame::default() };
+        let followed = none.followed(&[None, None]).unwrap();
+        assert_eq!(followed.position, [const { [0.0; 2] }; 3].map(Vec::from));
+        assert!(followed.values.planes().dc.iter().all(|plane| plane == &[0.0; 2]));
     }
 }

@@ -31,7 +31,8 @@ impl Grains {
     }
 
     /// Of a refinement.
+    #[expect(clippy::indexing_slicing, reason = "settings have at most MAX_REFINEMENTS refinements")]
     pub(crate) fn of(&self, refinement: u8) -> Grain {
-        self.0.get(usize::from(refinement)).copied().unwrap_or_default()
+        self.0[usize::from(refinement)]
     }
 }

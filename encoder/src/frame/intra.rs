@@ -111,7 +111,7 @@ impl Intra<'_> {
         let mut added = Vec::new();
         for refinement in 0..sequence.refinement_count {
             let after = if layer == 0 { sequence.prefix_length(refinement, total) as usize } else { 0 };
-            let rows = order.get(before..after).unwrap_or_default();
+            let rows = order.get(before..after).ok_or(Error::Fault("a list ends beyond its frame"))?;
             added.push((rows.to_vec(), self.grain(layer, refinement)));
             before = after;
         }

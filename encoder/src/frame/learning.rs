@@ -105,7 +105,8 @@ pub fn samples(
     recorded(source, settings, &analysis.parameters, architecture)
 }
 
-/// The architecture whose base leaves least, and its samples; of equal ones the first.
+/// The architecture whose base leaves least, and its samples; of equal ones the first, and of none the default, without
+/// samples.
 #[expect(clippy::arithmetic_side_effects, reason = "two counts of eight bits")]
 pub fn nearer(found: Vec<(Architecture, Vec<Sample>)>) -> (Architecture, Vec<Sample>) {
     let left = |(architecture, samples): &(Architecture, Vec<Sample>)| -> u64 {

@@ -147,7 +147,8 @@ impl<'a> Predicted<'a> {
         let Done { models, units, lists, .. } = done;
         let row_count = self.from.target.row_count;
         let span_log2 = self.from.span_log2;
-        let deviation = self.from.reference.deviation.as_ref().map(|deviation| deviation.followed(&parents));
+        let deviation = self.from.reference.deviation.as_ref();
+        let deviation = deviation.map(|deviation| deviation.followed(&parents)).transpose()?;
         let models = models.first;
         let reference = Reference { lists, span_log2, carried, models, rows, row_count, deviation };
         Ok(CodedFrame { cells: self.cells, carried_digest, units, reference, savings: Vec::new() })

@@ -104,7 +104,7 @@ fn whole(position: [f32; 3]) -> [u32; 3] {
 fn two_cells(index: u32, level: u32) -> [u32; 2] {
     let cell = index >> level;
     let upper = level > 0 && (index >> (level - 1)) & 1 == 1;
-    [cell, if upper { cell + 1 } else { cell.wrapping_sub(1).min(cell) }]
+    [cell, if upper { cell + 1 } else { cell.saturating_sub(1) }]
 }
 
 impl<'a> Grid<'a> {
