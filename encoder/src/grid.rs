@@ -8,9 +8,12 @@ use splatstream_gaussians::GaussianFrame;
 /// Parts of a step in which attributes are kept before they are coded, so that they are rounded once.
 pub(crate) const PARTS: f32 = 64.0;
 
-/// The largest magnitude of a log-scale, finest steps: the difference of two fits 16 bits.
-pub(crate) const MAX_LOG_SCALE: f32 = 16_000.0;
-/// The same of an opacity.
+/// The largest magnitude of a value, finest steps, for which steps are made finer than asked for: the difference of two, which is
+/// what is coded of a value that is predicted, fits 16 bits.
+pub(crate) const MAX_DIFFERING: f32 = 16_000.0;
+/// The largest magnitude of a log-scale, finest steps: the difference of two is coded where nothing is predicted, too.
+pub(crate) const MAX_LOG_SCALE: f32 = MAX_DIFFERING;
+/// The largest magnitude of an opacity, finest steps: it fits 16 bits itself.
 pub(crate) const MAX_OPACITY: f32 = 32_000.0;
 /// The largest magnitude of a position, scene units: sums of two of them are finite, and so are the squares of what
 /// they become in steps.

@@ -3,13 +3,12 @@
 use crate::canonical::{canonicalise, visible};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
-use crate::grid::{MAX_COLOUR, MAX_LOG_SCALE, MAX_OPACITY, check_reach, nearest_integer};
+use crate::grid::{MAX_COLOUR, MAX_DIFFERING, check_reach, nearest_integer};
 use crate::laws::{FEATURE_SHIFT, finest};
 use crate::reach::{Core, Extent, Reach};
 use crate::settings::{Settings, Size, Structure};
 use crate::source::FrameSource;
 use rayon::prelude::*;
-use splatstream_decoder::attribute::ROTATION_RANGE;
 use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_format::Limits;
 use splatstream_format::payload::SceneDescription;
@@ -310,6 +309,8 @@ impl Scene {
         refinement_percent.iter_mut().zip(&settings.refinements).for_each(|(to, &percent)| *to = percent);
         let steps = &settings.steps;
         let [scale, opacity, dc, sh] = self.reach;
+        // Parts of a rotation are at most 1; with finer steps those of two that are opposite could not be told apart.
+        let rotation = steps.rotation.max(1.0 / MAX_DIFFERING);
         // What lies beside the mean of colours adds a little.
         let colour = |step: f32, norm: f32| finest(step, 1.25 * norm, *COMPONENT_RANGE.end() as f32);
         let mut parameters = SequenceParameters {
@@ -325,10 +326,10 @@ impl Scene {
             ticks_per_second: settings.ticks.0,
             ticks_per_frame: settings.ticks.1,
             log_scale_offset: self.means[0].to_bits(),
-            log_scale_step: finest(steps.log_scale, scale, MAX_LOG_SCALE).to_bits(),
-            rotation_step: finest(steps.rotation, 1.0, *ROTATION_RANGE.end() as f32).to_bits(),
+            log_scale_step: finest(steps.log_scale, scale, MAX_DIFFERING).to_bits(),
+            rotation_step: finest(rotation, 1.0, MAX_DIFFERING).to_bits(),
             opacity_offset: self.means[1].to_bits(),
-            opacity_step: finest(steps.opacity, opacity, MAX_OPACITY).to_bits(),
+            opacity_step: finest(steps.opacity, opacity, MAX_DIFFERING).to_bits(),
             dc_step: colour(steps.dc, dc).to_bits(),
             sh_step: colour(steps.sh, sh).to_bits(),
             ..SequenceParameters::PLAIN

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
-use splatstream_encoder::{Error, Preset, Quality, Settings, Structure, encode};
+use splatstream_encoder::{Error, Preset, Quality, Settings, Steps, Structure, encode};
 use splatstream_gaussians::{GaussianFrame, Planes};
 use std::ops::ControlFlow;
 
@@ -81,4 +81,28 @@ fn the_largest_and_the_smallest_log_scale_stand_together() {
     values[3 * COUNT..6 * COUNT].iter_mut().step_by(2).for_each(|log| *log = 1e9);
     values[3 * COUNT + 1..6 * COUNT].iter_mut().step_by(2).for_each(|log| *log = -1e9);
     check(vec![frame_of(&values)], &settings());
+}
+
+/// What is coded of a value that is predicted is a difference, and may be twice as large as the value.
+#[test]
+fn opposite_rotations_and_opacities_are_coded_with_the_finest_steps() {
+    let frame = |sign: f32| {
+        let mut values: Vec<f32> = (0..PLANES * COUNT).map(|at| (at * 7 % 11) as f32 / 11.0).collect();
+        for row in 0..COUNT {
+            let sign = if row % 2 == 0 { sign } else { -sign };
+            values[6 * COUNT + row] = 40.0 * sign;
+            values[9 * COUNT + row] = 6.0 * sign;
+        }
+        frame_of(&values)
+    };
+    let steps = Quality::VisuallyLossless.steps();
+    for step in [0.0004, 0.00004, 1e-6] {
+        let steps = Steps { rotation: step, opacity: 25.0 * step.max(0.0001), ..steps };
+        let structure = Structure::Predicted { layers: 1 };
+        let settings = Settings { steps, structure, spatial_layers: 2, gop: 2, ..settings() };
+        let mut stream = Vec::new();
+        encode(&mut vec![frame(1.0), frame(-1.0)], &settings, &mut stream, &mut |_, _| {}).unwrap();
+        let summary = decode_stream(&stream, &Options::default(), |_, _| ControlFlow::Continue(()));
+        assert_eq!(summary.verdict(), None);
+    }
 }
