@@ -4,6 +4,7 @@
 //! upwards. Both are told apart by what scenes stand on: a floor, a pot, shoulders. More of a scene lies at its lower end
 //! than at its upper one.
 
+use splatstream_chart::quantile::ranked;
 use splatstream_format::payload::UpAxis;
 use splatstream_gaussians::GaussianFrame;
 
@@ -73,8 +74,7 @@ fn weighted(frame: &GaussianFrame) -> Vec<(f64, f64)> {
     weighted.retain(|(y, weight)| y.is_finite() && weight.is_finite());
     // Few huge Gaussians say nothing of where most are.
     let mut weights: Vec<f64> = weighted.iter().map(|(_, weight)| *weight).collect();
-    weights.sort_unstable_by(f64::total_cmp);
-    let most = weights.get(weights.len() * 99 / 100).copied().unwrap_or_default();
+    let most = ranked(&mut weights, 99, f64::total_cmp).unwrap_or_default();
     weighted.iter_mut().for_each(|(_, weight)| *weight = weight.min(most));
     weighted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     weighted

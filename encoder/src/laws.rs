@@ -11,6 +11,7 @@
     reason = "exponents are those of the tables; parts are cut from the order"
 )]
 
+use crate::quantile::ranked;
 use crate::refinements::parts;
 use crate::steps::Steps;
 use splatstream_decoder::steps::STEPS;
@@ -59,10 +60,6 @@ pub struct Laws {
 impl Laws {
     /// For a scene whose Gaussians have the order of importance `order`, of which pictures show so much, and
     /// refinements up to these percentages.
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "counts in memory; exponents are at most 13 and positions have 1 bit or more"
-    )]
     pub(crate) fn of(frame: &GaussianFrame, order: &[u32], shown: &[Worth], refinements: &[u8]) -> Self {
         if frame.is_empty() {
             return Self::default();
@@ -71,8 +68,7 @@ impl Laws {
         let count = shapes.len() as f64;
         let mean = shapes.iter().map(|(area, _)| f64::from(*area)).sum::<f64>() / count;
         let mut anisotropies: Vec<f32> = shapes.iter().map(|(_, anisotropy)| *anisotropy).collect();
-        let place = anisotropies.len() * 9 / 10;
-        let (_, &mut reference, _) = anisotropies.select_nth_unstable_by(place, f32::total_cmp);
+        let reference = ranked(&mut anisotropies, 90, f32::total_cmp).unwrap_or_default();
         Self {
             area: AREA_POWER,
             opacity: OPACITY_POWER,

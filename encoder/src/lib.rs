@@ -46,6 +46,7 @@ mod plan;
 mod progress;
 mod prune;
 mod push;
+mod quantile;
 mod quantised;
 mod reach;
 mod refinements;

@@ -9,6 +9,7 @@
 )]
 #![expect(clippy::indexing_slicing, reason = "axes are constants, and rows are those of the frame")]
 
+use crate::quantile::between_ends;
 use crate::steps::Steps;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
@@ -87,8 +88,7 @@ impl Core {
         }
         let of_axis = |plane: &Vec<f32>| {
             let mut values: Vec<f32> = rows.iter().map(|&row| plane[row]).collect();
-            let last = values.len().saturating_sub(1);
-            [3, 20, 80, 97].map(|percent: usize| selected(&mut values, last * percent / 100))
+            [3, 20, 80, 97].map(|percent| percentile(&mut values, percent))
         };
         let [x, y, z] = frame.position();
         let (x, (y, z)) = rayon::join(|| of_axis(x), || rayon::join(|| of_axis(y), || of_axis(z)));
@@ -104,17 +104,16 @@ impl Core {
 
     /// Around the middle of the usual frame: what nine of ten frames of a sequence need.
     pub(crate) fn of_all(cores: &[Self]) -> Self {
-        let quantile = |mut values: Vec<f32>, percent: usize| {
-            values.sort_unstable_by(f32::total_cmp);
-            values.get(values.len().saturating_sub(1) * percent / 100).copied().unwrap_or_default()
+        let of_cores = |part: &dyn Fn(&Self) -> f32, percent: usize| {
+            let mut values: Vec<f32> = cores.iter().map(part).collect();
+            percentile(&mut values, percent)
         };
-        let middle =
-            [0, 1, 2].map(|axis: usize| quantile(cores.iter().map(|core| core.middle[axis]).collect(), 50));
+        let middle = [0, 1, 2].map(|axis: usize| of_cores(&|core| core.middle[axis], 50));
         let half = |core: &Self| {
             let apart = (0..3).map(|axis| (core.middle[axis] - middle[axis]).abs()).fold(0.0, f32::max);
             core.half + apart
         };
-        Self { middle, half: quantile(cores.iter().map(half).collect(), 90) }
+        Self { middle, half: of_cores(&half, 90) }
     }
 }
 
@@ -308,12 +307,9 @@ fn coarser(apart: f64, linear: f64, of_segment: f64) -> i32 {
     if apart <= linear { 0 } else { exponent((apart - linear) * of_segment + 2.0) }
 }
 
-/// The value at a place of sorted values; 0 if there is none.
-fn selected(values: &mut [f32], place: usize) -> f32 {
-    if place >= values.len() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(place, f32::total_cmp).1
+/// 0 of nothing.
+fn percentile(values: &mut [f32], percent: usize) -> f32 {
+    between_ends(values, percent, f32::total_cmp).unwrap_or_default()
 }
 
 /// 2 to an integer of small magnitude, exactly.

@@ -3,7 +3,7 @@
 //! * [`charting`] measures scenes over a [`sweep`] of settings: rate and speed against quality, operating points, what
 //!   tools are worth. [`stability`] measures where codecs fail. Both give a page, tables and figures in memory: this
 //!   crate prints nothing and writes no file.
-//! * [`costs`] says where the bits of a stream go; [`table`] and [`numbers`] set reports for people.
+//! * [`costs`] says where the bits of a stream go; [`table`] and [`numbers`] set reports for people; [`quantile`] ranks values.
 //!
 //! The command line parses what is asked for, reads scenes, and writes what comes out.
 
@@ -12,6 +12,7 @@ pub mod costs;
 pub mod first_frame;
 pub mod numbers;
 pub mod peers;
+pub mod quantile;
 pub mod scenes;
 pub mod stability;
 pub mod statistics;

@@ -5,6 +5,7 @@ use super::errors::rotation_difference;
 use super::grid::{Grid, inner_box};
 use rayon::prelude::*;
 use serde::Serialize;
+use splatstream_chart::quantile::ranked;
 use splatstream_gaussians::GaussianFrame;
 
 /// How the Gaussians of a frame were matched.
@@ -95,12 +96,9 @@ fn position(frame: &GaussianFrame, row: usize) -> [f32; 3] {
     frame.position().each_ref().map(|plane| plane[row])
 }
 
+/// 0 of nothing.
 fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    ranked(values, 50, f32::total_cmp).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::registration::registered;
 use super::rigid::{Point, Vector};
 use super::tree::Tree;
 use crate::matching::{CLOSE, Cloud, LIMIT, Matching, Measure, Reach, by_index, features, links};
+use crate::quantile::between_ends;
 
 /// A round of guessing: the share of Gaussians that it looks at, one in so many, and how far it looks, as a part of
 /// the scene's side. Few and large ones are hard to mistake for each other, even far from where they were.
@@ -78,12 +79,10 @@ fn expected_places(reference: &Cloud<'_>, points: &[Point], position_bits: u8) -
 }
 
 /// The largest side of the box that holds the inner 90 % on each axis, grid steps.
-#[expect(clippy::arithmetic_side_effects, reason = "counts of points; parts are constants")]
 fn side(cloud: &Cloud<'_>) -> f32 {
     let of_axis = |plane: &[f32]| {
         let mut values = plane.to_vec();
-        let last = values.len().saturating_sub(1);
-        let mut at = |percent: usize| *values.select_nth_unstable_by(last * percent / 100, f32::total_cmp).1;
+        let mut at = |percent| between_ends(&mut values, percent, f32::total_cmp).unwrap_or_default();
         at(95) - at(5)
     };
     cloud.position.map(of_axis).into_iter().fold(0.0, f32::max)

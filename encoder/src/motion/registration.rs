@@ -5,7 +5,7 @@
 //! pairs do not disturb.
 
 use super::pairs::{REACH_OF_SURE, largest, points};
-use super::rigid::{Point, Rigid, Vector, minus, plus};
+use super::rigid::{Point, Rigid, Vector, median, minus, plus};
 use crate::matching::{CLOSE, Cloud, Measure, Reach, features, links};
 
 /// One in so many Gaussians is looked at.
@@ -60,9 +60,8 @@ pub(super) fn registered(
 fn overlaid(mut places: Places, target: &Cloud<'_>, (from, to): (&[u32], &[u32])) -> Places {
     let shape = |planes: [&[f32]; 3], indices: &[u32]| -> (Vector, f64) {
         let at = |index: u32| planes.map(|plane| f64::from(plane[index as usize]));
-        let middle =
-            [0, 1, 2].map(|axis: usize| median(indices.iter().map(|&index| at(index)[axis]).collect()));
-        (middle, median(indices.iter().map(|&index| length(minus(at(index), middle))).collect()))
+        let middle = [0, 1, 2].map(|axis: usize| median(indices.iter().map(|&index| at(index)[axis])));
+        (middle, median(indices.iter().map(|&index| length(minus(at(index), middle)))))
     };
     let (middle, spread) = shape(places.each_ref().map(Vec::as_slice), from);
     let (to_middle, to_spread) = shape(target.position, to);
@@ -76,14 +75,18 @@ fn overlaid(mut places: Places, target: &Cloud<'_>, (from, to): (&[u32], &[u32])
 #[expect(clippy::indexing_slicing, reason = "rows are those of the clouds; axes are constants")]
 fn correct(places: &mut Places, points: &[Point], side: f64) {
     let motion = Rigid::STILL.refined(points, side);
-    let middle = [0, 1, 2].map(|axis: usize| median(points.iter().map(|point| point.from[axis]).collect()));
+    let middle = [0, 1, 2].map(|axis: usize| median(points.iter().map(|point| point.from[axis])));
     let moved = motion.apply(middle);
     let ratio = |point: &Point| {
         let arm = length(minus(point.from, middle));
         (arm > ARM * side).then(|| length(minus(point.to, moved)) / arm)
     };
     let ratios: Vec<f64> = points.iter().filter_map(ratio).collect();
-    let scale = if ratios.is_empty() { 1.0 } else { median(ratios).clamp(*SCALES.start(), *SCALES.end()) };
+    let scale = if ratios.is_empty() {
+        1.0
+    } else {
+        median(ratios.into_iter()).clamp(*SCALES.start(), *SCALES.end())
+    };
     map(places, |place| plus(moved, minus(motion.apply(place), moved).map(|part| scale * part)));
 }
 
@@ -97,13 +100,4 @@ fn map(places: &mut Places, to: impl Fn(Vector) -> Vector) {
 
 fn length(d: Vector) -> f64 {
     d.iter().map(|part| part * part).sum::<f64>().sqrt()
-}
-
-/// 0 of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

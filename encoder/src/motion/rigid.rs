@@ -1,5 +1,7 @@
 //! Rigid motions, and those that bring points to their places best.
 
+use crate::quantile::ranked;
+
 /// Grid steps.
 pub(super) type Vector = [f64; 3];
 
@@ -134,10 +136,10 @@ fn weighted(left: &[(Vector, Vector)]) -> Vec<(f64, Vector, Vector)> {
     left.iter().map(|&(carried, rest)| (weight(rest), carried, rest)).collect()
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+/// 0 of nothing.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    ranked(&mut values, 50, f64::total_cmp).unwrap_or_default()
 }
 
 /// The rotation about `pivot` that leaves least, half its angle as the vector part of a quaternion.

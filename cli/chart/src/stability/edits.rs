@@ -1,6 +1,7 @@
 //! Changes of whole frames, from which cases are made.
 
 use super::dice::Dice;
+use crate::quantile::ranked;
 use splatstream_gaussians::{GaussianFrame, PlanesMut, sh_coefficients};
 
 /// Where the inner scene is.
@@ -14,21 +15,12 @@ pub(super) struct Place {
 impl Place {
     /// Of a frame.
     pub(super) fn of(frame: &GaussianFrame) -> Self {
-        let sorted = frame.position().each_ref().map(|plane| {
+        let of_axes = frame.position().each_ref().map(|plane| {
             let mut values = plane.clone();
-            values.sort_unstable_by(f32::total_cmp);
-            values
+            [1, 50, 99].map(|percent| ranked(&mut values, percent, f32::total_cmp).unwrap_or_default())
         });
-        let at = |values: &Vec<f32>, percent: usize| {
-            let row = (values.len() * percent / 100).min(values.len().saturating_sub(1));
-            values.get(row).copied().unwrap_or_default()
-        };
-        let sides = sorted.each_ref().map(|values| at(values, 99) - at(values, 1));
-        let width = sides.into_iter().fold(0.0, f32::max);
-        Self {
-            middle: sorted.each_ref().map(|values| at(values, 50)),
-            width: if width > 0.0 { width } else { 1.0 },
-        }
+        let width = of_axes.iter().map(|[low, _, high]| high - low).fold(0.0, f32::max);
+        Self { middle: of_axes.map(|[_, middle, _]| middle), width: if width > 0.0 { width } else { 1.0 } }
     }
 }
 
