@@ -3,10 +3,10 @@
 use super::refused;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_ending, refuse_standard};
 use clap::Args;
 use serde::Serialize;
-use splatstream_conformance::counted::counted;
 use splatstream_conformance::matrix;
 use splatstream_conformance::report::Report;
 use std::path::PathBuf;
@@ -46,6 +46,8 @@ impl Matrix {
         OutputFile::write_apart(&self.out, &self.reports, matrix::page(&reports).as_bytes())?;
         let decoders = reports.iter().map(|report| report.decoder.name.as_str()).collect();
         let written = Written { output: &self.out, decoders };
-        console.report(&written, || format!("{}: {}", self.out.display(), counted(reports.len(), "decoder")))
+        console.report(&written, || {
+            format!("{}: {}", self.out.display(), counted(reports.len() as u64, "decoder"))
+        })
     }
 }
