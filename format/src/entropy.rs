@@ -16,6 +16,9 @@ pub(crate) mod section;
 pub mod token;
 pub mod writer;
 
+mod axis;
+mod symbol;
+
 /// log2 of the sum of the frequencies of a table, clause 8.3.
 pub const FREQUENCY_BITS: u32 = 12;
 /// The sum of the frequencies of a table.

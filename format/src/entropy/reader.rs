@@ -7,12 +7,14 @@
 use super::lanes::Segments;
 use super::machine::{Machine, WIDE};
 use super::model::{AxisLookup, ContextAxis, PlaneModel};
-use super::token::{join, unzigzag};
+use super::token::join;
 use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
 use crate::bits::BitReader;
 use crate::payload::leb128;
 use crate::{Error, ErrorKind, Result};
 use core::ops::Range;
+
+pub use super::symbol::{Delta, Index, Signed, Symbol, signed, vector};
 
 /// Slots of a table.
 const SLOTS: usize = 4096;
@@ -150,111 +152,6 @@ impl<M: Machine, V> Contexts<M, V> for KnownContexts<'_> {
 
     #[inline(always)]
     fn follow<const GROUPS: usize>(&mut self, _: M, _: &[[V; WIDE]; GROUPS]) {}
-}
-
-/// What an unsigned value stands for.
-pub trait Symbol: Copy {
-    /// What is stored.
-    type Stored: Copy + Default;
-
-    /// Of values that are their own tokens.
-    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [Self::Stored; WIDE];
-
-    /// Of any value.
-    fn of_value(value: u64) -> Self::Stored;
-
-    /// Row i of the result has value i of every row.
-    fn transpose<M: Machine>(machine: M, rows: [[Self::Stored; WIDE]; WIDE]) -> [[Self::Stored; WIDE]; WIDE];
-}
-
-/// Signed values, 4.5.
-#[derive(Debug, Clone, Copy)]
-pub struct Signed;
-/// Indices into a codebook.
-#[derive(Debug, Clone, Copy)]
-pub struct Index;
-/// Morton deltas.
-#[derive(Debug, Clone, Copy)]
-pub struct Delta;
-
-impl Symbol for Signed {
-    type Stored = i32;
-
-    #[inline(always)]
-    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [i32; WIDE] {
-        let sign = machine.sub(machine.splat(0), machine.and(tokens, machine.splat(1)));
-        signed(machine, machine.xor(machine.shr::<1>(tokens), sign))
-    }
-
-    #[inline(always)]
-    fn of_value(value: u64) -> i32 {
-        unzigzag(low_half(value))
-    }
-
-    #[inline(always)]
-    fn transpose<M: Machine>(machine: M, rows: [[i32; WIDE]; WIDE]) -> [[i32; WIDE]; WIDE] {
-        // One by one: arrays that are filled in a loop would be emptied first.
-        let [a, b, c, d, e, f, g, h] = &rows;
-        let upper = [vector(machine, a), vector(machine, b), vector(machine, c), vector(machine, d)];
-        let lower = [vector(machine, e), vector(machine, f), vector(machine, g), vector(machine, h)];
-        let ([a, b, c, d], [e, f, g, h]) = (upper, lower);
-        let [a, b, c, d, e, f, g, h] = machine.transpose([a, b, c, d, e, f, g, h]);
-        let upper = [signed(machine, a), signed(machine, b), signed(machine, c), signed(machine, d)];
-        let lower = [signed(machine, e), signed(machine, f), signed(machine, g), signed(machine, h)];
-        let ([a, b, c, d], [e, f, g, h]) = (upper, lower);
-        [a, b, c, d, e, f, g, h]
-    }
-}
-
-impl Symbol for Index {
-    type Stored = i32;
-
-    #[inline(always)]
-    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [i32; WIDE] {
-        signed(machine, tokens)
-    }
-
-    #[inline(always)]
-    fn of_value(value: u64) -> i32 {
-        low_half(value).cast_signed()
-    }
-
-    #[inline(always)]
-    fn transpose<M: Machine>(machine: M, rows: [[i32; WIDE]; WIDE]) -> [[i32; WIDE]; WIDE] {
-        Signed::transpose(machine, rows)
-    }
-}
-
-impl Symbol for Delta {
-    type Stored = u64;
-
-    #[inline(always)]
-    fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [u64; WIDE] {
-        machine.store(tokens).map(u64::from)
-    }
-
-    #[inline(always)]
-    fn of_value(value: u64) -> u64 {
-        value
-    }
-
-    #[inline(always)]
-    fn transpose<M: Machine>(_: M, rows: [[u64; WIDE]; WIDE]) -> [[u64; WIDE]; WIDE] {
-        let column = |index: usize| rows.map(|row| row.get(index).copied().unwrap_or(0));
-        core::array::from_fn(column)
-    }
-}
-
-/// A vector of signed values.
-#[inline(always)]
-pub fn vector<M: Machine>(machine: M, values: &[i32; WIDE]) -> M::V {
-    machine.load(values.map(i32::cast_unsigned))
-}
-
-/// The values of a vector, signed.
-#[inline(always)]
-pub fn signed<M: Machine>(machine: M, values: M::V) -> [i32; WIDE] {
-    machine.store(values).map(u32::cast_signed)
 }
 
 /// Reads the symbols of one block, plane by plane.
@@ -498,11 +395,4 @@ impl<M> Plane<'_, M> {
 fn window(words: &Ahead, taken: usize) -> [u16; WIDE] {
     let rest = words.get(taken & (MAX_LANES - 1)..).unwrap_or_default();
     rest.first_chunk::<WIDE>().map_or([0; WIDE], |words| words.map(u16::from_le_bytes))
-}
-
-/// The low 32 bits.
-#[inline(always)]
-fn low_half(value: u64) -> u32 {
-    let [a, b, c, d, ..] = value.to_le_bytes();
-    u32::from_le_bytes([a, b, c, d])
 }
