@@ -5,7 +5,7 @@
 //! What an error costs follows from the unit alone: its list, the unit, or the rest of the GOP. After the last kind units
 //! are discarded up to a gop_header from which decoding can go on.
 
-use crate::budget::{Budget, Spent};
+use crate::budget::Spent;
 use crate::buffers::BufferPool;
 use crate::gop::Gop;
 use crate::interrupt::Interrupt;
@@ -19,10 +19,10 @@ use report::Report;
 use spares::Spares;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::syntax::{
-    ErrorScope, FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitId, UnitType,
+    ErrorScope, FileHeader, GopHeader, Profile, SequenceParameters, UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Landmark, Unit};
-use splatstream_format::{Class, Error, ErrorKind, Limits, Result};
+use splatstream_format::{Class, Error, Limits, Result};
 use std::collections::VecDeque;
 
 mod ahead;
@@ -31,9 +31,11 @@ mod closing;
 mod control;
 mod decoded;
 mod decoding;
+mod ending;
 mod frame;
 mod gops;
 mod lists;
+mod options;
 mod phase;
 mod references;
 mod report;
@@ -42,47 +44,7 @@ mod trailer;
 
 pub use crate::shift::Shift;
 pub use decoded::{Compensation, DecodedFrame};
-
-/// How to decode.
-#[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// What is accepted at most.
-    pub limits: Limits,
-    /// Compare every list with the digest in the stream.
-    pub verify: bool,
-    /// The units to take.
-    pub operating_point: OperatingPoint,
-    /// Stop at the first error of any kind, and do not output the frame in which it was found.
-    pub stop_at_first_error: bool,
-    /// Of P and B frames with exact lists show these only: the paper's subset.
-    pub subset: bool,
-    /// Give the entropy states of units in [`DecodedFrame::entropy`].
-    pub entropy: bool,
-    /// Give the identities of Gaussians in [`DecodedFrame::identities`].
-    pub identities: bool,
-    /// What decoding may take.
-    pub budget: Budget,
-    /// Decode a frame that no other one refers to beside the frame after it, if there is more than one thread and that frame
-    /// comes before [`Decoder::stop_waiting`] is called. This takes the memory of one frame more. Not where decoding stops at
-    /// the first error.
-    pub ahead: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            limits: Limits::default(),
-            verify: true,
-            operating_point: OperatingPoint::ALL,
-            stop_at_first_error: false,
-            subset: false,
-            entropy: false,
-            identities: false,
-            budget: Budget::UNLIMITED,
-            ahead: false,
-        }
-    }
-}
+pub use options::Options;
 
 /// What ends a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -427,77 +389,6 @@ impl Decoder {
         self.report.errors.push(error);
         let is_limit = error.class() == Class::OverLimit;
         self.has_stopped = self.options.stop_at_first_error || self.is_exhausted && is_limit;
-    }
-
-    /// Ends the frame in progress if it has all units that belong to the operating point, so that it need not wait for
-    /// the unit after it.
-    fn finish_complete(&mut self) -> Option<DecodedFrame> {
-        let (frame, (sequence, _)) = (self.frame.as_ref()?, self.sequence.as_ref()?);
-        let takes = |spatial_layer, refinement| {
-            let id = UnitId::of_increment(frame.index, refinement);
-            UnitHeader::new(id.on_layers(spatial_layer, frame.role.temporal_layer), &[])
-                .is_ok_and(|header| self.belongs(&header))
-        };
-        let is_complete = frame.is_complete(sequence, takes);
-        if is_complete && self.may_wait() {
-            self.wait();
-            return None;
-        }
-        is_complete.then(|| self.close_frame(FrameEnd::Complete)).flatten()
-    }
-
-    /// Ends the frame in progress. One that is complete stays: it tells why it takes no further increment.
-    fn close_frame(&mut self, end: FrameEnd) -> Option<DecodedFrame> {
-        self.settle();
-        self.close(end)
-    }
-
-    /// Ends the frame in progress, whose units have been decoded.
-    fn close(&mut self, end: FrameEnd) -> Option<DecodedFrame> {
-        if self.interrupt.is_requested() {
-            // The frame is freed with the decoder.
-            self.has_stopped = true;
-            return None;
-        }
-        let mut frame = self.frame.take().filter(|frame| !frame.has_ended)?;
-        if let (FrameEnd::Unit(at), true) = (end, frame.is_intra() && !frame.seen) {
-            let rule = "an I frame has an increment";
-            let error = Error::new(at, "7.1.5", ErrorKind::Constraint { rule });
-            self.add(error);
-            frame.error.get_or_insert(error);
-        }
-        let (layer, reference) = (frame.role.temporal_layer, frame.reference);
-        self.frame_point = frame.point;
-        let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };
-        let context = Context {
-            options: &self.options,
-            interrupt: &self.interrupt,
-            buffers: &self.buffers,
-            profile: self.profile,
-            sequence,
-            gop,
-            reference: None,
-        };
-        let is_kept = ahead::is_kept(gop, layer);
-        let reference = reference.and_then(|layer| self.references.get_mut(layer));
-        let closed = frame.close(&context, reference, end != FrameEnd::Cut);
-        self.next_identity = closed.next_identity;
-        self.has_stopped |= self.interrupt.is_requested();
-        let mut spares = closed.spares;
-        match is_kept {
-            true => self.references.store(layer, closed.state, |state| spares.take(state.into_lists())),
-            false => spares.take(closed.state.into_lists()),
-        }
-        self.spares.push(spares);
-        closed.fault.into_iter().for_each(|error| self.add(error));
-        if end == FrameEnd::Complete {
-            self.frame = Some(frame);
-        }
-        if self.has_stopped {
-            self.interrupt.leave(closed.decoded);
-            return None;
-        }
-        Some(closed.decoded)
     }
 
     /// Reports the error of a unit that is no increment, and takes what it costs; gives the frame that it ends, if it does.

@@ -5,8 +5,8 @@
 //! an error in a unit of refinement r makes the decoder discard units of refinements from r on, and no other unit depends
 //! on it. Before an error is reported, the units before it are decoded, so that errors come in stream order.
 
-use super::Options;
 use super::lists::Lists;
+use super::options::Options;
 use super::phase::{same, unexpected};
 use crate::buffers::{BufferPool, Workspace};
 use crate::displacement::CellField;
