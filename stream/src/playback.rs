@@ -43,59 +43,35 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod attempts;
 mod driven;
 mod error;
 mod fault;
 mod follow;
+mod options;
 pub(crate) mod parts;
 mod report;
+mod running;
 mod same;
 mod store;
 
 use crate::control::number::size;
-use crate::control::{Decision, Fetch, Gop, Ladder, OperatingPoint, Rule, Session, Settings, State};
+use crate::control::{Decision, Fetch, OperatingPoint, Rule, Session, Settings, State};
 use crate::manifest::{GopInfo, Manifest};
+use attempts::Attempts;
 use driven::Viewer;
 use follow::{Follow, leave_out_before};
 use parts::{Kind, Part, parts, requests};
+use running::Running;
 use same::check_same;
-use std::collections::{BTreeMap, BTreeSet};
 use std::mem;
 use store::Store;
 
 pub use error::PlaybackError;
 pub use fault::Fault;
-pub use follow::Following;
+pub use options::{Following, Options};
 pub use parts::ByteRequest;
 pub use report::{GopLog, Loss, PlayedGop};
-
-/// How a player plays, and how often it asks.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// Buffer and limits of the device. The buffer is made shorter where [`Options::memory`] needs it.
-    pub settings: Settings,
-    /// Requests for what improves a GOP before it is left out.
-    pub attempts: u32,
-    /// Requests for the base of a GOP before the GOP is left out.
-    pub base_attempts: u32,
-    /// Bytes of the package that are held at the same time.
-    pub memory: u64,
-    /// Of a presentation that grows.
-    pub following: Following,
-}
-
-impl Default for Options {
-    /// 3 attempts and 8 for the base, 1 GiB.
-    fn default() -> Self {
-        Self {
-            settings: Settings::default(),
-            attempts: 3,
-            base_attempts: 8,
-            memory: 1 << 30,
-            following: Following::default(),
-        }
-    }
-}
 
 /// What the caller of a player does next.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -123,20 +99,6 @@ const TICK_US: u64 = 100_000;
 /// A rule that never waits does not stop the clock: so many decisions are taken at one time.
 const DECISIONS: u32 = 16;
 
-/// Times that a level may arrive damaged.
-const DAMAGED: u32 = 2;
-
-/// A fetch that runs.
-#[derive(Debug)]
-struct Running {
-    parts: Vec<Part>,
-    /// The part that arrives, and what has arrived of it.
-    next: usize,
-    buffer: Vec<u8>,
-    /// Bytes of the levels before it.
-    before: u64,
-}
-
 /// The playback of a package under a rule: see the [module](self). Times are microseconds of the caller's clock and never go
 /// back. Ask for commands until one is [`Command::Wait`], then take what is to be [shown](Player::show).
 #[derive(Debug)]
@@ -152,11 +114,7 @@ pub struct Player<R> {
     follow: Option<Follow>,
     /// Whether the caller is to give its requests up.
     gives_up: bool,
-    /// Per GOP, Representation and piece: requests that were of no use, and those among them that brought damaged bytes.
-    faults: BTreeMap<(usize, usize, u8), (u32, u32)>,
-    /// Representations whose files the server refuses, and how often in a row it did so.
-    refused: BTreeSet<usize>,
-    refusals: BTreeMap<usize, u32>,
+    attempts: Attempts,
     /// The next GOP to show.
     presented: usize,
     /// Units of the GOP that was shown last.
@@ -211,7 +169,7 @@ impl<R: Rule> Player<R> {
     ) -> Result<Self, PlaybackError> {
         manifest.gops.truncate(manifest.complete_gops());
         let ladder = manifest.ladder().map_err(|_| PlaybackError::Changed(None))?;
-        let settings = settings(&options, &ladder)?;
+        let settings = options.fitted(&ladder)?;
         let live = settings.live;
         let numbered = manifest.gops.iter().zip(first_gop(&manifest)..);
         let logs = numbered.map(|(gop, number)| log(number, gop)).collect();
@@ -224,9 +182,7 @@ impl<R: Rule> Player<R> {
             renewal: Renewal::None,
             follow,
             gives_up: false,
-            faults: BTreeMap::new(),
-            refused: BTreeSet::new(),
-            refusals: BTreeMap::new(),
+            attempts: Attempts::default(),
             presented: 0,
             units: Vec::new(),
             logs,
@@ -324,7 +280,7 @@ impl<R: Rule> Player<R> {
     fn send(&mut self, now_us: u64, fetch: Fetch) -> Command {
         let mut parts = parts(&self.manifest, &fetch, |representation| !self.store.has_init(representation));
         let requests = requests(&mut parts);
-        self.running = Some(Running { parts, next: 0, buffer: Vec::new(), before: 0 });
+        self.running = Some(Running::new(parts));
         self.fetch = Some(fetch);
         if requests.is_empty() {
             self.received(now_us, &[]);
@@ -333,8 +289,7 @@ impl<R: Rule> Player<R> {
     }
 
     fn abandon(&mut self) {
-        if let Some(gop) = self.running.take().and_then(|running| running.parts.first().map(|part| part.gop))
-        {
+        if let Some(gop) = self.running.take().and_then(|running| running.gop()) {
             self.count(gop, |log| log.abandoned = log.abandoned.saturating_add(1));
         }
     }
@@ -352,7 +307,7 @@ impl<R: Rule> Player<R> {
 
     /// The GOP of the running fetch.
     fn fetched_gop(&self) -> usize {
-        self.running.as_ref().and_then(|running| running.parts.first()).map_or(0, |part| part.gop)
+        self.running.as_ref().and_then(Running::gop).unwrap_or(0)
     }
 
     /// A request of the fetch is sent.
@@ -365,14 +320,9 @@ impl<R: Rule> Player<R> {
         self.session.received(now_us, self.counted());
     }
 
-    /// Bytes of the running fetch that count: those of a level only with its last one, if its digest is right.
+    /// Bytes of the running fetch that count.
     fn counted(&self) -> u64 {
-        self.running.as_ref().map_or(0, |running| {
-            match running.parts.get(running.next).map(|part| part.kind) {
-                Some(Kind::Level { .. }) => running.before.saturating_add(size(running.buffer.len())),
-                _ => running.before,
-            }
-        })
+        self.running.as_ref().map_or(0, Running::counted)
     }
 
     /// More bytes have come, which follow those before. Bytes that are not those that were packaged fail the fetch.
@@ -380,34 +330,19 @@ impl<R: Rule> Player<R> {
         let arrived = size(bytes.len());
         self.count(self.fetched_gop(), |log| log.bytes = log.bytes.saturating_add(arrived));
         while let Some(running) = &mut self.running {
-            let Some(part) = running.parts.get_mut(running.next) else { break };
-            let between = size(bytes.len()).min(part.gap);
-            part.gap = part.gap.saturating_sub(between);
-            bytes = bytes.get(usize::try_from(between).unwrap_or(usize::MAX)..).unwrap_or_default();
-            let missing = part.range.size.saturating_sub(size(running.buffer.len()));
-            let (own, rest) = bytes
-                .split_at_checked(usize::try_from(missing).unwrap_or(usize::MAX))
-                .unwrap_or((bytes, &[]));
-            running.buffer.extend_from_slice(own);
-            bytes = rest;
-            if part.gap > 0 || size(running.buffer.len()) < part.range.size {
-                break;
-            }
-            let whole = mem::take(&mut running.buffer);
+            let Some(whole) = running.fill(&mut bytes) else { break };
+            let Some(part) = running.part() else { break };
             if !part.range.holds(&whole) {
                 return self.failed(now_us, &Fault::Digest);
             }
             if self.store.insert(part, whole).is_err() {
                 return self.failed(now_us, &Fault::Wrong("the file was packaged wrongly"));
             }
-            self.refusals.remove(&part.representation);
-            if matches!(part.kind, Kind::Level { .. }) {
-                running.before = running.before.saturating_add(part.range.size);
-            }
-            running.next = running.next.saturating_add(1);
+            self.attempts.arrived(part.representation);
+            running.advance();
         }
         let counted = self.counted();
-        if self.running.as_ref().is_some_and(|running| running.next >= running.parts.len()) {
+        if self.running.as_ref().is_some_and(|running| running.part().is_none()) {
             self.running = None;
         }
         self.session.received(now_us, counted);
@@ -418,38 +353,18 @@ impl<R: Rule> Player<R> {
     pub fn failed(&mut self, now_us: u64, fault: &Fault) {
         let Some(running) = self.running.take() else { return };
         self.session.failed(now_us);
-        let Some(part) = running.parts.get(running.next) else { return };
+        let Some(part) = running.part() else { return };
         self.count(part.gop, |log| log.failures = log.failures.saturating_add(1));
         if *fault == Fault::Changed {
             self.renewal = Renewal::Wanted;
         }
-        if self.is_too_often(part, fault) {
+        if self.attempts.are_spent(part, fault, &self.options) {
             self.leave_out(now_us, part, fault);
         }
     }
 
-    fn is_too_often(&mut self, part: &Part, fault: &Fault) -> bool {
-        let (all, damaged) = self.faults.entry((part.gop, part.representation, part.piece)).or_default();
-        *all = all.saturating_add(1);
-        if *fault == Fault::Digest {
-            *damaged = damaged.saturating_add(1);
-        }
-        let refusals = self.refusals.entry(part.representation).or_default();
-        *refusals = if fault.is_final() { refusals.saturating_add(1) } else { 0 };
-        let is_base = part.representation == 0 && part.piece == 0;
-        let is_gone = !is_base && *refusals >= self.options.attempts;
-        let most = match (is_base, self.refused.contains(&part.representation) && fault.is_final()) {
-            (_, true) => 1,
-            (true, false) => self.options.base_attempts,
-            (false, false) => self.options.attempts,
-        };
-        *all >= most || *damaged >= DAMAGED || is_gone
-    }
-
     fn leave_out(&mut self, now_us: u64, part: &Part, fault: &Fault) {
-        if fault.is_final() {
-            self.refused.insert(part.representation);
-        }
+        self.attempts.left_out(part, fault);
         self.session.unavailable(now_us, part.gop, part.representation, part.piece);
         let representation =
             self.manifest.representations.get(part.representation).map(|info| info.id.clone());
@@ -519,21 +434,6 @@ fn first_gop(manifest: &Manifest) -> usize {
 
 fn log(number: usize, gop: &GopInfo) -> GopLog {
     GopLog { number, first_frame: gop.first_frame, frame_count: gop.frame_count, ..GopLog::default() }
-}
-
-/// The settings with a buffer that fits into the memory.
-fn settings(options: &Options, ladder: &Ladder) -> Result<Settings, PlaybackError> {
-    let bytes = |gop: &Gop| gop.points().iter().map(|point| point.bytes).max().unwrap_or(0);
-    let largest = ladder.gops().iter().map(bytes).max().unwrap_or(0).max(1);
-    // One is shown and one arrives beside those that are buffered.
-    let fit = options.memory.checked_div(largest).unwrap_or(0).saturating_sub(2);
-    if fit == 0 {
-        return Err(PlaybackError::TooLarge(largest));
-    }
-    let shortest = ladder.gops().iter().map(Gop::duration_us).min().unwrap_or(1);
-    let buffer_us = options.settings.buffer_us.min(fit.saturating_mul(shortest));
-    let start_us = options.settings.start_us.min(buffer_us);
-    Ok(Settings { buffer_us, start_us, ..options.settings.clone() })
 }
 
 /// The point that a decoder is told: I frames that are fetched whole are shown whole where they are alone.

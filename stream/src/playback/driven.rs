@@ -62,7 +62,7 @@ impl<R: Rule> Player<R> {
     /// before was sought: what is being fetched is given up if it is in its way.
     pub fn go_to(&mut self, now_us: u64, gop: usize, is_sought: bool) {
         if is_sought {
-            self.faults.retain(|key, _| key.0 != gop);
+            self.attempts.forget(gop);
             self.session.retry(gop);
             let is_ready = self.session.state().is_ready(gop);
             let running = self.running.is_some().then(|| self.fetched_gop());

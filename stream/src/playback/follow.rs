@@ -1,31 +1,11 @@
 //! C.9.3: a presentation that grows is followed: when the manifest is read again, what is appended, and what is skipped.
 
-use super::{PlaybackError, Player, Renewal, check_same, first_gop, log, settings};
+use super::options::Following;
+use super::{PlaybackError, Player, Renewal, check_same, first_gop, log};
 use crate::control::{Live, Rule, Settings};
 use crate::manifest::{GopInfo, Manifest};
 use crate::playback::Loss;
 use core::ops::Range;
-
-/// How a presentation that grows is followed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Following {
-    /// Whether playback starts with the first GOP that is listed, and not near the last one.
-    pub from_start: bool,
-    /// Time from capture to display that is aimed at; none is what the manifest says. As GOPs are fetched when they are
-    /// complete, it is one and a half of the longest GOP at least.
-    pub target_us: Option<u64>,
-    /// Playback that comes later than the target by more than this goes on nearer to the last GOP.
-    pub drift_us: u64,
-    /// Playback ends with an error if the presentation has neither grown nor ended for so long.
-    pub patience_us: u64,
-}
-
-impl Default for Following {
-    /// From near the last GOP on; 15 s behind the target at most, and a minute of patience.
-    fn default() -> Self {
-        Self { from_start: false, target_us: None, drift_us: 15_000_000, patience_us: 60_000_000 }
-    }
-}
 
 /// What is known of a presentation while it grows. Times are those of the player.
 #[derive(Debug)]
@@ -310,7 +290,7 @@ impl<R: Rule> Player<R> {
     /// Tells the controller when GOPs were captured, and what fits into the memory.
     fn set(&mut self, now_us: u64) -> Result<(), PlaybackError> {
         let live = self.live().or(self.session.state().settings().live);
-        let settings = settings(&self.options, self.session.state().ladder())?;
+        let settings = self.options.fitted(self.session.state().ladder())?;
         self.session.set(now_us, Settings { live, ..settings });
         Ok(())
     }
