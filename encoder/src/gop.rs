@@ -5,22 +5,15 @@
 )]
 
 mod group;
+mod intra;
 mod means;
+mod predicted;
 mod worth;
 
 use crate::canonical::{canonicalise, visible};
 use crate::error::Error;
-use crate::finetune::Fit;
-use crate::finetune::report::FinetuneReport;
 use crate::frame::CodedFrame;
-use crate::frame::cells::CellPlan;
-use crate::frame::compensation::Compensator;
-use crate::frame::intra::{IntraTarget, code_intra};
-use crate::frame::predicted::{Predicted, PredictedTarget};
-use crate::frame::predictors::Chooser;
 use crate::frame::recorder::{Recorder, weights};
-use crate::frame::residuals::Wanted;
-use crate::frame::steadiness::Steadiness;
 use crate::frame::target::Target;
 use crate::gop_tools::GopTools;
 use crate::grid::PositionGrid;
@@ -29,7 +22,6 @@ use crate::isolated::{self, Isolated};
 use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
 use crate::report::{FrameReport, Report};
-use crate::settings::{Predictors, Preset};
 use crate::source::FrameSource;
 use crate::spans::span::{Common, Span};
 use crate::writer::GopSink;
@@ -38,11 +30,6 @@ use splatstream_format::payload::write_frame;
 use splatstream_format::syntax::{
     FrameHeader, FrameRole, FrameType, GopHeader, Profile, UnitHeader, UnitId, UnitType,
 };
-use worth::worth_of_reuse;
-
-/// A predicted frame that takes more than this part of what an I frame would is not worth it: it is no easier to decode,
-/// and an I frame is where decoding can start.
-const DEAR: f64 = 0.97;
 
 /// A GOP whose predicted frames take more than this part, on average, is tried as I frames too.
 const DOUBTFUL: f64 = 0.5;
@@ -311,162 +298,6 @@ impl<'a> SpanCoder<'a> {
         let position = [0, 1, 2]
             .map(|axis: usize| frame.position()[axis].iter().map(|&value| grid.steps(axis, value)).collect());
         Ok(Target { frame, position, rows, row_count })
-    }
-
-    fn intra_target(&mut self, number: u32) -> Result<Intra, Error> {
-        let target = self.target(number)?;
-        let order = self.ranking.order(&target.frame);
-        Ok(Intra { target, order })
-    }
-
-    /// Codes an I frame.
-    fn intra(&mut self, gop: &mut Gop, number: u32, intra: Intra) -> Result<(), Error> {
-        let Intra { mut target, order } = intra;
-        let known = gop.tools.take_components();
-        let coder = self.coder(gop, None);
-        let is_predicted = gop.header.is_predicted();
-        let is_fitted = self.recorder.is_none() && !target.frame.is_empty();
-        let finetune = self.common.settings.finetune.as_ref().filter(|_| is_fitted);
-        let compensator = self.compensator(&target, finetune.is_some());
-        let fit = |finetune| Fit {
-            frame: &target.frame,
-            order: &order,
-            coder: &coder,
-            layers: if gop.in_one_layer { 1 } else { self.common.sequence.spatial_layer_count },
-            settings: self.common.settings,
-            finetune,
-            compensator: compensator.as_ref(),
-        };
-        let fitted = finetune.map(|finetune| fit(finetune).run()).transpose()?;
-        let wanted = match &fitted {
-            Some(fitted) => Wanted::new(&fitted.highest, None, &coder),
-            None => Wanted::new(&target.frame, known, &coder),
-        };
-        let lowest = fitted.as_ref().and_then(|fitted| fitted.lowest.as_ref());
-        let lowest = lowest.map(|frame| Wanted::new(frame, None, &coder));
-        // Predictions would move the grids that values were fitted on.
-        let predictors = if fitted.is_some() { Predictors::NONE } else { self.chooser().predictors };
-        if !is_predicted {
-            target.forget();
-        }
-        let (mut coded, members) = code_intra(
-            &coder,
-            IntraTarget {
-                chooser: Chooser { predictors, ..self.chooser() },
-                lowest,
-                compensator: compensator.as_ref(),
-                shows_top_prefixes: !(is_predicted && self.common.sequence.whole_anchor()),
-                wanted,
-                order: &order,
-                rows: &target.rows,
-                row_count: target.row_count,
-                in_one_layer: gop.in_one_layer,
-                tells_savings: self.tells_savings(number),
-            },
-        )?;
-        if self.report.coded.is_empty() {
-            self.report.savings.extend(coded.savings.iter().chain(&worth_of_reuse(&coded)));
-        }
-        if is_predicted && fitted.as_ref().is_some_and(|fitted| fitted.is_changed) {
-            coded.reference.differs_from((&target, &members), &self.common.sequence)?;
-        }
-        let reports = fitted.into_iter().flat_map(|fitted| fitted.reports);
-        self.report.finetuned.extend(reports.map(|report| FinetuneReport { frame: number, ..report }));
-        let role = FrameRole { frame_type: FrameType::Intra, temporal_layer: 0, reference: None };
-        self.add(gop, number, &role, &target, &coded)?;
-        gop.intra_bytes = coded.bytes() / f64::from(coded.gaussians().max(1));
-        if is_predicted && self.recorder.is_none() && !target.frame.is_empty() {
-            let cameras = self.ranking.cameras(&target.frame);
-            gop.steadiness = Some(Steadiness::new(cameras, &target, &coded, &self.common.sequence)?);
-        }
-        if is_predicted {
-            gop.start_with(number, coded, self.common.sequence.whole_anchor());
-        } else if self.common.network.is_none() && !gop.in_one_layer {
-            self.write(gop)?;
-        }
-        Ok(())
-    }
-
-    /// Codes a frame that refers to another, if that is worth it.
-    fn predicted(
-        &mut self,
-        gop: &mut Gop,
-        number: u32,
-        role: &FrameRole,
-        reference: u32,
-        target: &Target,
-    ) -> Result<Verdict, Error> {
-        let found = gop.references.iter().flatten().find(|(number, _)| *number == reference);
-        let Some((earlier, reference)) = found else { return Ok(Verdict::Unlike) };
-        let span_log2 = (number - earlier).ilog2() as u8;
-        let measure = self.measure();
-        let Some(matching) = self.matching(reference, target, &measure) else { return Ok(Verdict::Unlike) };
-        let mut goal = self.goal(gop, &matching, target);
-        let source = target;
-        let fitted = reference.fitted(target, &matching, &self.coder(gop, None));
-        let target = fitted.as_ref().unwrap_or(source);
-        let mut survivors = self.survivors(gop, target);
-        let book = self.residual_book(gop, &survivors, reference, &matching, role.temporal_layer);
-        survivors.book = book.as_ref();
-        let cells = CellPlan {
-            measure: &measure,
-            marks_stale: self.common.sequence.whole_anchor(),
-            max_cells: self.common.limits.max_cells,
-        };
-        let from = PredictedTarget {
-            coder: self.coder(gop, Some(book.as_ref())),
-            chooser: self.chooser(),
-            reference,
-            span_log2,
-            anchor: &gop.anchor,
-            target,
-            survivors,
-            compensation: &gop.compensation,
-        };
-        let cells = Some(&cells).filter(|_| self.common.settings.tools.cell_motion);
-        let mut predicted = Predicted::new(from, cells, matching)?;
-        if let Some(goal) = &mut goal {
-            predicted.set_judge(goal)?;
-        }
-        let coded = predicted.code()?;
-        if !self.is_within_limits(&coded) {
-            return Ok(Verdict::Unlike);
-        }
-        if self.common.settings.tools.survivors
-            && coded.bytes() > DEAR * gop.intra_bytes * f64::from(coded.gaussians())
-        {
-            return Ok(Verdict::Dear);
-        }
-        if let Some(book) = &book {
-            let id = UnitId::of_frame(UnitType::Codebook, gop.first).on_layers(0, role.temporal_layer);
-            gop.units.push((id, book.to_bytes()?));
-        }
-        self.add(gop, number, role, target, &coded)?;
-        match goal {
-            Some(goal) => {
-                gop.price_level = goal.level;
-                self.report.coded.last_mut().into_iter().for_each(|frame| frame.by_pictures = true);
-            }
-            None => {
-                if let Some(steadiness) = &mut gop.steadiness {
-                    steadiness.follow(source, &coded, &self.common.sequence)?;
-                }
-            }
-        }
-        if role.temporal_layer + 1 < self.common.settings.temporal_layers().max(2) {
-            gop.keep(role.temporal_layer, number, coded.reference);
-        }
-        Ok(Verdict::Predicted)
-    }
-
-    /// Prefixes of I frames are compensated where time is no matter: not in streams of one frame, or of frames that
-    /// each stand for themselves, which are encoded quickly, unless they are fitted to pictures.
-    fn compensator(&self, target: &Target, is_fitted: bool) -> Option<Compensator> {
-        let settings = self.common.settings;
-        let takes_time =
-            is_fitted || settings.preset != Preset::Fast && settings.profile() == Profile::Dynamic;
-        let has_prefixes = self.common.sequence.refinement_count > 1 && !target.frame.is_empty();
-        (takes_time && has_prefixes).then(|| Compensator::new(&target.frame, self.common.settings.up()))
     }
 
     /// Adds the units of a coded frame to its GOP, and what they are to the report.

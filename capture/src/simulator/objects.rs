@@ -149,18 +149,7 @@ fn still(random: &mut SplitMix64) -> Vec<Object> {
             Material { gloss: 0.5, ..post },
         ),
     ];
-    // A fence of thin bars on one side.
-    for bar in 0..9 {
-        let place = [-2.3, -0.4, -1.4 + 0.35 * f64::from(bar)];
-        objects.push(Object::standing(Shape::Capsule { half: 0.4, radius: 0.025 }, place, post));
-    }
-    let rail = turn_about(DVec3::X, 0.5 * PI);
-    objects.push(Object::new(
-        Shape::Capsule { half: 1.5, radius: 0.035 },
-        DVec3::new(-2.3, -0.66, 0.0),
-        rail,
-        wood,
-    ));
+    objects.extend(fence(post, wood));
     for number in 0..14 {
         let place = around((f64::from(number) + any(random, 0.0, 0.7)) / 14.0 * TAU, any(random, 6.0, 11.0));
         let tall = any(random, 0.7, 1.6);
@@ -184,6 +173,24 @@ fn still(random: &mut SplitMix64) -> Vec<Object> {
             }
         });
     }
+    objects
+}
+
+/// A fence of thin bars on one side.
+fn fence(bars: Material, rail: Material) -> Vec<Object> {
+    let mut objects: Vec<Object> = (0..9)
+        .map(|bar| {
+            let place = [-2.3, -0.4, -1.4 + 0.35 * f64::from(bar)];
+            Object::standing(Shape::Capsule { half: 0.4, radius: 0.025 }, place, bars)
+        })
+        .collect();
+    let turn = turn_about(DVec3::X, 0.5 * PI);
+    objects.push(Object::new(
+        Shape::Capsule { half: 1.5, radius: 0.035 },
+        DVec3::new(-2.3, -0.66, 0.0),
+        turn,
+        rail,
+    ));
     objects
 }
 
