@@ -5,6 +5,7 @@ mod choices;
 mod decided;
 mod each;
 mod effort;
+mod encoded;
 mod failed;
 mod finetune;
 mod network_name;
@@ -22,38 +23,33 @@ use crate::failure::Failure;
 use crate::frame_files::{FrameFiles, unread};
 use crate::input_args::{InputArgs, parse_size};
 use crate::machine;
-use crate::numbers::{hex_digest, parse_frame_rate};
+use crate::numbers::parse_frame_rate;
 use crate::output_file::refuse_inputs;
 use crate::progress::Progress;
 use crate::setting_names::{
-    AnchorName, FidelityName, PredictorChoiceName, PredictorName, PresetName, QualityName, ShName, ToolName,
+    AnchorName, FidelityName, ImportanceName, PredictorChoiceName, PredictorName, PresetName, QualityName,
+    ShName, ToolName,
 };
 use crate::up_guess::UpGuess;
-use choice::Choice;
-use choices::choices;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use decided::Decided;
 use effort::Budget;
+use encoded::Encoded;
 use failed::failed;
-use finetune::{FinetuneArgs, Fitted, Taken, told_of_fitting};
+use finetune::{FinetuneArgs, Taken, told_of_fitting};
 use network_name::NetworkName;
 pub use options::{EncodeOptions, OptionsError, Prepared};
 use output::{Output, check_name};
-use pictures::{Goal, Pictures};
 use prune::PruneArgs;
 use refinements::Refinements;
-use serde::Serialize;
-use shards::{ShardArgs, ShardReport};
-use splatstream_chart::numbers::{bits_per_gaussian, grouped};
-use splatstream_encoder::{
-    FrameSource, Importance, Quality, Report, Settings, Size, Structure, Work, encode,
-};
+use shards::ShardArgs;
+use splatstream_encoder::{FrameSource, Quality, Settings, Size, Structure, Work, encode};
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use warnings::{Warning, unlike_frames, warnings};
+use warnings::unlike_frames;
 
 /// Encode frames of Gaussians to a stream.
 ///
@@ -201,18 +197,6 @@ pub(crate) struct Encode {
 /// Cameras that a stream can hold.
 const MAX_CAMERAS: usize = 64;
 
-#[derive(Clone, Copy, ValueEnum)]
-enum ImportanceName {
-    /// What pictures gain by a Gaussian and lose without it, weighed again at each refinement.
-    Removal,
-    /// Transmittance times alpha over the pixels of all views.
-    Contribution,
-    /// Opacity squared times the pixels covered, mean of all views, whatever hides it; needs no pictures.
-    Footprint,
-    /// Opacity times volume; needs no views.
-    Volume,
-}
-
 fn parse_psnr(text: &str) -> Result<f32, String> {
     let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
     decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
@@ -238,32 +222,6 @@ fn parse_title(text: &str) -> Result<String, String> {
 fn parse_metres(text: &str) -> Result<f32, String> {
     let metres = text.parse().ok().filter(|metres| (f32::MIN_POSITIVE..=1e12).contains(metres));
     metres.ok_or_else(|| format!("'{text}' is not a number of metres above 0"))
-}
-
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Encoded {
-    output: PathBuf,
-    /// Of the stream.
-    bytes: u64,
-    /// Of the page that holds it; none if a stream was written.
-    page_bytes: Option<u64>,
-    /// What it is a part of; none if it is a whole sequence.
-    shard: Option<ShardReport>,
-    frames: u32,
-    gaussians: u64,
-    bpg: f64,
-    seconds: f64,
-    invisible: u64,
-    /// Gaussians left out because of values that are not finite.
-    dropped: u64,
-    chosen: Vec<Choice>,
-    #[serde(flatten)]
-    pictures: Pictures,
-    /// What fitting frames to pictures has done; empty where it was not asked for.
-    finetuned: Vec<Fitted>,
-    warnings: Vec<Warning>,
-    digests: Vec<String>,
 }
 
 impl Encode {
@@ -349,6 +307,13 @@ impl Encode {
         }
     }
 
+    fn structure(&self, is_predicted: bool) -> Structure {
+        match is_predicted {
+            true => Structure::Predicted { layers: self.temporal_layers },
+            false => Structure::Intra,
+        }
+    }
+
     /// What the stream says about its scene, the cameras of the encoder, and what was taken to point up if nobody says it.
     fn scene(
         &self,
@@ -383,14 +348,7 @@ impl Encode {
         let budget = self.finetune.budget(self.preset.is_some())?.map(|seconds| Budget::of(seconds, work));
         let preset = self.preset.unwrap_or(PresetName::Balanced).into();
         let usual = budget.map_or_else(|| Settings::of(preset), |budget| budget.effort().settings());
-        let structure = match is_predicted {
-            true => Structure::Predicted { layers: self.temporal_layers },
-            false => Structure::Intra,
-        };
-        let psnr = match self.size() {
-            Some(_) => None,
-            None => Some(self.psnr.unwrap_or_else(|| Quality::from(self.quality).decibels())),
-        };
+        let psnr = self.goal();
         // With predicted frames values are fitted where that is asked for, not by a preset.
         let fitted = usual.finetune.as_ref().filter(|_| !is_predicted);
         let iterations = fitted.map_or(0, |finetune| finetune.iterations);
@@ -401,7 +359,7 @@ impl Encode {
             frames: source.len(),
         };
         let mut settings = Settings {
-            structure,
+            structure: self.structure(is_predicted),
             anchor: self.anchor.into(),
             spatial_layers: layers,
             predictors: self.predictor.into(),
@@ -451,6 +409,12 @@ impl Encode {
         matches!(self.finetune.budget(self.preset.is_some()), Ok(Some(_)))
     }
 
+    /// The PSNR that is aimed at, decibels; none where a size is.
+    fn goal(&self) -> Option<f32> {
+        let asked = || self.psnr.unwrap_or_else(|| Quality::from(self.quality).decibels());
+        self.size().is_none().then(asked)
+    }
+
     /// The size that was asked for.
     fn size(&self) -> Option<Size> {
         let bytes = self.target_mb.map(|megabytes| Size::Bytes((megabytes * 1e6) as u64));
@@ -466,64 +430,6 @@ impl Encode {
             background: self.background.background,
             title: self.title.clone(),
             ..SceneDescription::default()
-        }
-    }
-}
-
-impl Encoded {
-    fn new(
-        out: &Path,
-        report: &Report,
-        settings: &Settings,
-        name_of: &dyn Fn(u32) -> String,
-        seconds: f64,
-    ) -> Self {
-        Self {
-            output: out.to_path_buf(),
-            bytes: report.bytes,
-            page_bytes: None,
-            shard: None,
-            frames: report.frames,
-            gaussians: report.gaussians,
-            bpg: bits_per_gaussian(report.bytes, report.gaussians),
-            seconds,
-            invisible: report.invisible,
-            dropped: report.dropped.iter().map(|dropped| u64::from(dropped.gaussians)).sum(),
-            chosen: choices(report, settings),
-            pictures: Pictures::of(report, settings, Goal::of(settings)),
-            finetuned: Fitted::of(report),
-            warnings: warnings(report, settings, name_of),
-            digests: report.digests.iter().copied().map(hex_digest).collect(),
-        }
-    }
-
-    fn text(&self) -> String {
-        let chosen: String = self.chosen.iter().map(Choice::text).collect();
-        let page =
-            self.page_bytes.map(|bytes| format!(", in a page of {}", grouped(bytes))).unwrap_or_default();
-        let shard = self.shard.as_ref().map(ShardReport::text).unwrap_or_default();
-        format!(
-            "{}\n{shard}  frames             {}\n  Gaussians          {}\n  bytes              {}{page}\n  \
-             bits per Gaussian  {:.2}\n  seconds            {:.2}\n{}{}chosen\n{chosen}",
-            self.output.display(),
-            grouped(self.frames.into()),
-            grouped(self.gaussians),
-            grouped(self.bytes),
-            self.bpg,
-            self.seconds,
-            self.pictures.text(),
-            Fitted::text(&self.finetuned),
-        )
-    }
-}
-
-impl From<ImportanceName> for Importance {
-    fn from(name: ImportanceName) -> Self {
-        match name {
-            ImportanceName::Removal => Self::Removal,
-            ImportanceName::Contribution => Self::Contribution,
-            ImportanceName::Footprint => Self::Footprint,
-            ImportanceName::Volume => Self::Volume,
         }
     }
 }

@@ -104,6 +104,19 @@ pub(crate) enum AnchorName {
     Whole,
 }
 
+/// What puts Gaussians into the first refinements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ImportanceName {
+    /// What pictures gain by a Gaussian and lose without it, weighed again at each refinement.
+    Removal,
+    /// Transmittance times alpha over the pixels of all views.
+    Contribution,
+    /// Opacity squared times the pixels covered, mean of all views, whatever hides it; needs no pictures.
+    Footprint,
+    /// Opacity times volume; needs no views.
+    Volume,
+}
+
 /// A tool of the encoder that can be left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ToolName {
@@ -204,6 +217,17 @@ impl From<FidelityName> for Fidelity {
         match name {
             FidelityName::Pictures => Self::Pictures,
             FidelityName::Attributes => Self::Attributes,
+        }
+    }
+}
+
+impl From<ImportanceName> for Importance {
+    fn from(name: ImportanceName) -> Self {
+        match name {
+            ImportanceName::Removal => Self::Removal,
+            ImportanceName::Contribution => Self::Contribution,
+            ImportanceName::Footprint => Self::Footprint,
+            ImportanceName::Volume => Self::Volume,
         }
     }
 }

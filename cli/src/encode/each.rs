@@ -1,6 +1,7 @@
 //! `splatstream encode --each`: every input is a scene of its own, and becomes a stream of its own.
 
-use super::{Encode, Encoded};
+use super::Encode;
+use super::encoded::Encoded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output_file::{check_directory, make_directory};

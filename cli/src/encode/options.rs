@@ -1,6 +1,7 @@
 //! The options of `encode` for programs that have frames in memory.
 
-use super::{Decided, Encode, Encoded};
+use super::encoded::Encoded;
+use super::{Decided, Encode};
 use clap::Parser;
 use splatstream_encoder::{FrameSource, Report, Settings};
 use splatstream_gaussians::GaussianFrame;
