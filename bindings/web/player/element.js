@@ -5,9 +5,10 @@ import { framing } from './framing.js';
 import { icon } from './icons.js';
 import { listenToKeys } from './keys.js';
 import { Losses } from './losses.js';
-import { figures, pointPanel, pointText, trackFigures } from './panel.js';
+import { pointText } from './panel.js';
 import { Playback } from './playback.js';
 import { Scene } from './renderer.js';
+import { Side } from './side.js';
 import { Splitter } from './splitter.js';
 import { Stage } from './stage.js';
 import { TEMPLATE } from './template.js';
@@ -16,8 +17,6 @@ import { Track } from './track.js';
 
 /** Radians that an arrow key turns by. */
 const STEP = 0.07;
-/** Milliseconds between two updates of the figures. */
-const FIGURES = 250;
 const SPEEDS = [0.25, 0.5, 1, 2];
 const LOWEST = { spatial: 0, temporal: 0, refinement: 0 };
 
@@ -43,8 +42,7 @@ export class SplatPlayer extends HTMLElement {
   #losses = null;
   #timeline = null;
   #interval = null;
-  #openPanel = null;
-  #figuresAt = 0;
+  #side;
   #isReady = false;
   #drawn = null;
   #background = null;
@@ -55,6 +53,7 @@ export class SplatPlayer extends HTMLElement {
   constructor() {
     super();
     this.attachShadow({ mode: 'open' }).innerHTML = TEMPLATE;
+    this.#side = new Side(this.shadowRoot, () => this.#known(), (track, point) => this.#choose(track, point));
   }
 
   /** A page that nobody sees does not follow a presentation that grows; it goes on where that is when it is seen again. */
@@ -114,7 +113,7 @@ export class SplatPlayer extends HTMLElement {
 
   set operatingPoint(point) {
     this.#tracks[0]?.setPoint(point ?? {}, this.#playback.index);
-    if (this.#openPanel === 'quality') this.#fillSide();
+    if (this.#side.open === 'quality') this.#side.fill();
   }
 
   /** A camera { position, axes, field } in place of the viewer's; null gives it back. */
@@ -273,7 +272,7 @@ export class SplatPlayer extends HTMLElement {
     this.#framing = null;
     this.#isReady = false;
     this.#losses?.clear();
-    this.#showSide(null);
+    this.#side.show(null);
     this.splitter?.hide();
     this.#find('compare').setAttribute('aria-pressed', 'false');
   }
@@ -337,7 +336,7 @@ export class SplatPlayer extends HTMLElement {
     if (state.isLive) this.#showPlace();
     if (this.#isReady) this.#say('', state.isWaiting);
     const point = state.point && pointText(state.point);
-    if (this.#openPanel === 'quality' && track.isAutomatic && point !== this.#pointShown) this.#fillSide();
+    if (this.#side.open === 'quality' && track.isAutomatic && point !== this.#pointShown) this.#side.fill();
     this.#pointShown = point;
     this.#emit('package', state);
   }
@@ -398,11 +397,7 @@ export class SplatPlayer extends HTMLElement {
 
   #drewPicture(interval) {
     this.#interval = interval ?? this.#interval;
-    const now = performance.now();
-    if (this.#openPanel === 'info' && now - this.#figuresAt > FIGURES) {
-      this.#figuresAt = now;
-      this.#fillSide();
-    }
+    this.#side.refresh();
   }
 
   #showPlay() {
@@ -416,45 +411,18 @@ export class SplatPlayer extends HTMLElement {
     this.#timeline.show(this.#playback, this.frame);
   }
 
-  #showSide(name) {
-    this.#openPanel = name;
-    for (const id of ['quality', 'info']) this.#find(id).setAttribute('aria-expanded', String(id === name));
-    this.#fillSide();
-  }
-
-  #fillSide() {
-    const side = this.#find('side');
-    const panels = [];
-    const isCompared = this.#tracks.length > 1;
-    this.#tracks.forEach((track, place) => {
-      const where = isCompared ? [' on the left', ' on the right'][place] : '';
-      if (this.#openPanel === 'quality') panels.push(this.#pointPanel(track, `Operating point${where}`));
-      if (this.#openPanel === 'info') panels.push(this.#infoPanel(track, isCompared ? `Figures${where}` : 'Figures'));
-    });
-    side.replaceChildren(...panels.filter(Boolean));
-    side.hidden = panels.length === 0;
-  }
-
-  #pointPanel(track, title) {
-    const onchange = (point) => {
-      track.setPoint(point, this.#playback.index);
-      this.splitter.name(this.#tracks);
-      if (track.isAutomatic) this.#fillSide();
-    };
-    const point = { ...this.#description.highest, ...track.point };
-    return pointPanel(title, this.#description, point, onchange, track.package ? track.isAutomatic : null);
-  }
-
-  #infoPanel(track, title) {
-    const panel = document.createElement('section');
-    panel.className = 'panel';
-    const heading = document.createElement('h2');
-    heading.textContent = title;
+  /** What the panels at the side show. */
+  #known() {
     const canvas = this.#find('canvas');
     const { bytes, total } = this.#received;
     const shared = { interval: this.#interval, pixels: [canvas.width, canvas.height], received: bytes, total };
-    panel.append(heading, figures(trackFigures(track, shared)));
-    return panel;
+    return { tracks: this.#tracks, description: this.#description, shared };
+  }
+
+  #choose(track, point) {
+    track.setPoint(point, this.#playback.index);
+    this.splitter.name(this.#tracks);
+    if (track.isAutomatic) this.#side.fill();
   }
 
   #compare() {
@@ -468,8 +436,8 @@ export class SplatPlayer extends HTMLElement {
     }
     this.#find('compare').setAttribute('aria-pressed', String(!isOn));
     // On a telephone the panel would hide what is compared.
-    if (!isOn && this.#openPanel === null && this.clientWidth > 620) this.#showSide('quality');
-    else this.#fillSide();
+    if (!isOn && this.#side.open === null && this.clientWidth > 620) this.#side.show('quality');
+    else this.#side.fill();
     this.#playback.seek(this.#playback.index);
     this.#stage.invalidate();
   }
@@ -486,7 +454,7 @@ export class SplatPlayer extends HTMLElement {
     on('compare', 'click', () => this.#compare());
     on('home', 'click', () => this.#framing && this.#controls.place(this.#framing, this.#framing.cameras[0]));
     on('full', 'click', () => (document.fullscreenElement ? document.exitFullscreen() : this.requestFullscreen()));
-    for (const id of ['quality', 'info']) on(id, 'click', () => this.#showSide(this.#openPanel === id ? null : id));
+    for (const id of ['quality', 'info']) on(id, 'click', () => this.#side.toggle(id));
     on('open', 'click', () => this.#find('file').click());
     on('file', 'change', ({ target }) => this.#openFile(target.files[0]));
     this.#listenToDrops();

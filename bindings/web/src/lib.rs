@@ -47,6 +47,7 @@ const MODULES: &[Module<'static>] = modules![
     "player/playback.js",
     "player/renderer.js",
     "player/shaders.js",
+    "player/side.js",
     "player/splitter.js",
     "player/stage.js",
     "player/style.js",
