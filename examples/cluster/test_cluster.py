@@ -1,4 +1,5 @@
 """What can be said of this folder without a cluster: python3 -m unittest discover --start-directory examples/cluster"""
+import collections
 import os
 import pathlib
 import shutil
@@ -69,8 +70,21 @@ class Files(unittest.TestCase):
             subprocess.run([shell, "-n", "-c", script], check=True)
 
 
+# Stands for the command, and writes down what it was asked for. The first time that shard 3 is asked for, the worker that asked and
+# the encoder are killed while the encoder runs.
+FRAGILE = """#!/bin/bash
+echo "$*" >>"$LOG"
+if [[ "$*" == *"--shard 3/"* ]] && mkdir "$LOG.killed" 2>/dev/null; then
+    "$ENCODER" "$@" &
+    kill -9 $! $PPID
+    exit 1
+fi
+exec "$ENCODER" "$@"
+"""
+
+
 class Drivers(unittest.TestCase):
-    """A driver writes the stream of a single run."""
+    """A driver writes the stream of a single run, also if a worker is killed: only the shard that it had at hand is encoded again."""
 
     def drive(self, driver, module):
         try:
@@ -81,14 +95,33 @@ class Drivers(unittest.TestCase):
             self.skipTest("the command is not there: give it in SPLATSTREAM")
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
-            frames, whole, out = folder / "frames", folder / "whole.gss", folder / "out.gss"
+            frames, whole = folder / "frames", folder / "whole.gss"
             options = ["--gop", "2", "--preset", "fast", "--psnr", "40"]
             stream = HERE.parent / "talk.gss"
-            subprocess.run([SPLATSTREAM, "decode", stream, "-o", frames], check=True, stdout=subprocess.DEVNULL)
-            subprocess.run([SPLATSTREAM, "encode", frames, "-o", whole, *options], check=True, stdout=subprocess.DEVNULL)
-            how = ["-o", out, "--scratch", folder / "shards", "--splatstream", SPLATSTREAM]
-            subprocess.run([sys.executable, HERE / driver, frames, *how, "--", *options], check=True)
-            self.assertEqual(out.read_bytes(), whole.read_bytes())
+            encoder = str(pathlib.Path(SPLATSTREAM).resolve())
+            subprocess.run([encoder, "decode", stream, "-o", frames], check=True, stdout=subprocess.DEVNULL)
+            subprocess.run([encoder, "encode", frames, "-o", whole, *options], check=True, stdout=subprocess.DEVNULL)
+            fragile, log = folder / "fragile", folder / "log"
+            fragile.write_text(FRAGILE)
+            fragile.chmod(0o755)
+
+            def run(command):
+                """The stream, byte for byte, and how often each shard was encoded."""
+                log.write_text("")
+                out, scratch = folder / f"{command.name}.gss", folder / f"{command.name}-shards"
+                how = ["-o", out, "--scratch", scratch, "--splatstream", command, "--workers", "2"]
+                given = {**os.environ, "ENCODER": encoder, "LOG": str(log)}
+                subprocess.run([sys.executable, HERE / driver, frames, *how, "--", *options], check=True, env=given)
+                self.assertEqual(out.read_bytes(), whole.read_bytes())
+                words = [line.split() for line in log.read_text().splitlines()]
+                return collections.Counter(asked[asked.index("--shard") + 1] for asked in words if "--shard" in asked)
+
+            run(pathlib.Path(encoder))
+            asked = run(fragile)
+            self.assertTrue((folder / "log.killed").exists())
+            most = len(asked)
+            self.assertGreater(most, 3)
+            self.assertEqual(asked, {f"{shard}/{most}": 1 + (shard == 3) for shard in range(1, most + 1)})
 
     def test_dask(self):
         self.drive("dask_driver.py", "distributed")
