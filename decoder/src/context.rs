@@ -84,7 +84,12 @@ impl<'b> SourceValues<'b> {
             Self::Same(value) => vectors.fill(machine.splat(value.cast_unsigned())),
             Self::Plane(plane) => {
                 for (slot, first) in vectors.iter_mut().zip(first) {
-                    *slot = vector(machine, &eight(plane, first));
+                    // Each loads its own: an array that is either of two is copied by a call on WebAssembly.
+                    let rest = plane.get(first..).unwrap_or_default();
+                    *slot = match rest.first_chunk() {
+                        Some(values) => vector(machine, values),
+                        None => vector(machine, &last(rest)),
+                    };
                 }
             }
             Self::Exponents(exponents) => {
@@ -97,10 +102,10 @@ impl<'b> SourceValues<'b> {
     }
 }
 
-/// Eight values from `first` on; 0 where there are none.
+/// Eight exponents from `first` on; 0 where there are none.
 #[inline(always)]
-fn eight<T: Copy + Default>(plane: &[T], first: usize) -> [T; WIDE] {
-    let rest = plane.get(first..).unwrap_or_default();
+fn eight(exponents: &[u8], first: usize) -> [u8; WIDE] {
+    let rest = exponents.get(first..).unwrap_or_default();
     match rest.first_chunk() {
         Some(values) => *values,
         None => last(rest),

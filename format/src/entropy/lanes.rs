@@ -5,6 +5,7 @@
 //! another.
 
 use super::MAX_LANES;
+use super::machine::WIDE;
 use core::ops::Range;
 
 /// The segments of a block.
@@ -43,12 +44,40 @@ impl Segments {
         self.count.saturating_sub(step).div_ceil(self.length)
     }
 
+    /// Steps in which every lane has an entry: the first ones.
+    pub const fn whole(&self) -> usize {
+        self.count.saturating_sub(self.lanes.wrapping_sub(1).wrapping_mul(self.length))
+    }
+
     /// The entries of a lane in the steps from `start` on, `steps` of them or as many as there are.
     #[inline]
     pub fn entries(&self, lane: usize, start: usize, steps: usize) -> Range<usize> {
         let first = lane.wrapping_mul(self.length);
         let end = first.wrapping_add(self.length.min(start.wrapping_add(steps))).min(self.count);
         first.wrapping_add(start).min(end)..end
+    }
+}
+
+/// The entries of eight lanes of a plane, from a step on.
+#[derive(Debug)]
+pub struct LaneEntries<'l, T> {
+    lanes: &'l [Range<usize>; WIDE],
+    start: usize,
+    plane: &'l mut [T],
+}
+
+impl<'l, T> LaneEntries<'l, T> {
+    /// Of lanes with their entries in `plane`, from step `start` on.
+    #[inline(always)]
+    pub fn new(lanes: &'l [Range<usize>; WIDE], start: usize, plane: &'l mut [T]) -> Self {
+        Self { lanes, start, plane }
+    }
+
+    /// Those of one lane; none where there is no such lane.
+    #[inline(always)]
+    pub fn of_lane(&mut self, lane: usize) -> &mut [T] {
+        let entries = self.lanes.get(lane).map(|lane| lane.start.wrapping_add(self.start)..lane.end);
+        entries.and_then(|entries| self.plane.get_mut(entries)).unwrap_or_default()
     }
 }
 

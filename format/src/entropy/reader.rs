@@ -4,7 +4,7 @@
 //! independent chains. Some steps make a tile. Before a tile, what is known beforehand of its contexts is gathered lane
 //! by lane; after it, its values are handed on lane by lane: memory is only touched in runs.
 
-use super::lanes::Segments;
+use super::lanes::{LaneEntries, Segments};
 use super::machine::{Machine, WIDE};
 use super::model::{AxisLookup, ContextAxis, PlaneModel};
 use super::token::join;
@@ -247,7 +247,11 @@ impl<'a> BlockReader<'a> {
     }
 
     /// The tiles of a plane, one after the other.
-    #[inline(always)]
+    ///
+    /// Where vectors are enabled by function this is a part of what is compiled for the machine. On WebAssembly, where they
+    /// are enabled for all, it is a function of its own: engines give registers to very large functions with less care.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn tiles<S: Symbol, M: Machine, const GROUPS: usize>(
         &mut self,
         plane: &Plane<'_, M>,
@@ -269,43 +273,52 @@ impl<'a> BlockReader<'a> {
                 contexts.add_known(machine, first, &mut rows);
                 *known = machine.transpose(rows);
             }
-            for step in 0..WIDE.min(segments.length().wrapping_sub(start)) {
-                let mut of_step = [machine.splat(0); GROUPS];
-                for (of_step, known) in of_step.iter_mut().zip(&known) {
-                    known.get(step).into_iter().for_each(|&known| *of_step = known);
-                }
-                contexts.add_serial(machine, &mut of_step);
-                let active = segments.active(start.wrapping_add(step));
-                let decoded = self.step::<S, M, GROUPS>(plane, of_step, active);
-                contexts.follow(machine, &decoded);
-                for (values, decoded) in values.iter_mut().zip(decoded) {
-                    values.get_mut(step).into_iter().for_each(|slot| *slot = decoded);
-                }
+            let steps = start..segments.length().min(start.wrapping_add(WIDE));
+            let tile = Tile { plane, known: &known, steps, segments };
+            match tile.steps.end <= segments.whole() {
+                true => self.tile::<S, M, GROUPS, true>(tile, contexts, &mut values),
+                false => self.tile::<S, M, GROUPS, false>(tile, contexts, &mut values),
             }
             for (rows, lanes) in values.iter().zip(&lanes) {
-                for (lane, column) in lanes.iter().zip(&S::transpose(machine, *rows)) {
-                    let rest = lane.start.wrapping_add(start)..lane.end;
-                    let entries = out.get_mut(rest).unwrap_or_default();
-                    match entries.first_chunk_mut() {
-                        Some(entries) => *entries = *column,
-                        None => entries.iter_mut().zip(column).for_each(|(slot, &value)| *slot = value),
-                    }
-                }
+                S::hand_on(machine, rows, &mut LaneEntries::new(lanes, start, out));
             }
         }
     }
 
-    /// One symbol of each lane below `active`; the values of other lanes mean nothing. Each loop does a part of the work for
+    /// The steps of a tile, in all of which every lane has an entry if it is `WHOLE`.
+    #[inline(always)]
+    fn tile<S: Symbol, M: Machine, const GROUPS: usize, const WHOLE: bool>(
+        &mut self,
+        tile: Tile<'_, M, GROUPS>,
+        contexts: &mut impl Contexts<M, S::Stored>,
+        values: &mut [[[S::Stored; WIDE]; WIDE]; GROUPS],
+    ) {
+        let Tile { plane, known, steps, segments } = tile;
+        for (row, step) in steps.enumerate() {
+            let mut of_step = [plane.machine.splat(0); GROUPS];
+            for (of_step, known) in of_step.iter_mut().zip(known) {
+                known.get(row).into_iter().for_each(|&known| *of_step = known);
+            }
+            contexts.add_serial(plane.machine, &mut of_step);
+            let active = if WHOLE { segments.lanes() } else { segments.active(step) };
+            let decoded = self.step::<S, M, GROUPS, WHOLE>(plane, of_step, active);
+            contexts.follow(plane.machine, &decoded);
+            for (values, decoded) in values.iter_mut().zip(decoded) {
+                values.get_mut(row).into_iter().for_each(|slot| *slot = decoded);
+            }
+        }
+    }
+
+    /// One symbol of each lane below `active`, which are all lanes of the block if it is `WHOLE`; the values of other lanes mean nothing. Each loop does a part of the work for
     /// all lanes: loads that are slow wait together.
     #[inline(always)]
-    fn step<S: Symbol, M: Machine, const GROUPS: usize>(
+    fn step<S: Symbol, M: Machine, const GROUPS: usize, const WHOLE: bool>(
         &mut self,
         plane: &Plane<'_, M>,
         contexts: [M::V; GROUPS],
         active: usize,
     ) -> [[S::Stored; WIDE]; GROUPS] {
         let machine = plane.machine;
-        let mut symbols = [[0_u32; WIDE]; GROUPS];
         let mut values = [[S::Stored::default(); WIDE]; GROUPS];
         let mut lane_of_group = machine.load([0, 1, 2, 3, 4, 5, 6, 7]);
         let active_lanes = machine.splat(u32::try_from(active).unwrap_or(0));
@@ -314,8 +327,7 @@ impl<'a> BlockReader<'a> {
         let mut copy = [[0; 2]; MAX_LANES + WIDE];
         let words = self.words.ahead(&mut copy);
         let mut taken = 0_usize;
-        let parts = symbols.iter_mut().zip(&mut values).zip(&mut self.states).zip(contexts);
-        for (((symbols, values), states), contexts) in parts {
+        for ((values, states), contexts) in values.iter_mut().zip(&mut self.states).zip(contexts) {
             let state = machine.load(*states);
             let slots = machine.and(state, machine.splat(0xFFF));
             let entries = machine.load(plane.find(machine.store(slots), machine.store(contexts)));
@@ -324,13 +336,16 @@ impl<'a> BlockReader<'a> {
             let quotient = machine.shr::<{ FREQUENCY_BITS.cast_signed() }>(state);
             let length = machine.and(machine.shr::<12>(entries), machine.splat(0xFFF));
             let product = machine.add(machine.mul(length, quotient), quotient);
-            let mask = machine.greater(active_lanes, lane_of_group);
+            // Groups have lanes that are none where a block has fewer than eight.
+            let mask = match WHOLE && GROUPS > 1 {
+                true => machine.splat(u32::MAX),
+                false => machine.greater(active_lanes, lane_of_group),
+            };
             let (next, more) =
                 machine.advance(state, machine.add(product, rest), mask, &window(words, taken));
             *states = machine.store(next);
             taken = taken.wrapping_add(more);
             let tokens = machine.shr::<24>(entries);
-            *symbols = machine.store(tokens);
             let split = machine.greater(tokens, last_direct);
             is_split = machine.or(is_split, machine.and(split, mask));
             lane_of_group = machine.add(lane_of_group, machine.splat(8));
@@ -338,10 +353,12 @@ impl<'a> BlockReader<'a> {
         }
         self.words.next = self.words.next.wrapping_add(taken);
         if machine.any(is_split) {
-            let split = values.as_flattened_mut().iter_mut().zip(symbols.as_flattened()).take(active);
-            for (value, &token) in split.filter(|&(_, &token)| token >= plane.decoder.direct) {
-                let (least, raw_bits) = plane.decoder.value(token);
-                *value = S::of_value(least.wrapping_add(self.raw.bits(raw_bits)));
+            for value in values.as_flattened_mut().iter_mut().take(active) {
+                let token = S::token(*value);
+                if token >= plane.decoder.direct {
+                    let (least, raw_bits) = plane.decoder.value(token);
+                    *value = S::of_value(least.wrapping_add(self.raw.bits(raw_bits)));
+                }
             }
         }
         values
@@ -359,6 +376,14 @@ impl<'a> BlockReader<'a> {
         }
         self.raw.finish(self.raw_at, "raw_bits", "8.4")
     }
+}
+
+/// A tile to be read: the contexts that are known beforehand, and its steps.
+struct Tile<'t, M: Machine, const GROUPS: usize> {
+    plane: &'t Plane<'t, M>,
+    known: &'t [[M::V; WIDE]; GROUPS],
+    steps: Range<usize>,
+    segments: Segments,
 }
 
 /// A plane to be read.

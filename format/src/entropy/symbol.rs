@@ -1,7 +1,8 @@
 //! What the values of a block stand for: signed values (4.5), indices into a codebook, Morton deltas.
 
+use super::lanes::LaneEntries;
 use super::machine::{Machine, WIDE};
-use super::token::unzigzag;
+use super::token::{unzigzag, zigzag};
 
 /// What an unsigned value stands for.
 pub trait Symbol: Copy {
@@ -11,11 +12,18 @@ pub trait Symbol: Copy {
     /// Of values that are their own tokens.
     fn of_tokens<M: Machine>(machine: M, tokens: M::V) -> [Self::Stored; WIDE];
 
+    /// The token that [`Symbol::of_tokens`] made this of.
+    fn token(stored: Self::Stored) -> u32;
+
     /// Of any value.
     fn of_value(value: u64) -> Self::Stored;
 
-    /// Row i of the result has value i of every row.
-    fn transpose<M: Machine>(machine: M, rows: [[Self::Stored; WIDE]; WIDE]) -> [[Self::Stored; WIDE]; WIDE];
+    /// Hands value i of every row on to the entries of lane i, of which there may be fewer than rows.
+    fn hand_on<M: Machine>(
+        machine: M,
+        rows: &[[Self::Stored; WIDE]; WIDE],
+        entries: &mut LaneEntries<'_, Self::Stored>,
+    );
 }
 
 /// Signed values, 4.5.
@@ -38,22 +46,30 @@ impl Symbol for Signed {
     }
 
     #[inline(always)]
+    fn token(stored: i32) -> u32 {
+        zigzag(stored)
+    }
+
+    #[inline(always)]
     fn of_value(value: u64) -> i32 {
         unzigzag(low_half(value))
     }
 
     #[inline(always)]
-    fn transpose<M: Machine>(machine: M, rows: [[i32; WIDE]; WIDE]) -> [[i32; WIDE]; WIDE] {
+    fn hand_on<M: Machine>(machine: M, rows: &[[i32; WIDE]; WIDE], entries: &mut LaneEntries<'_, i32>) {
         // One by one: arrays that are filled in a loop would be emptied first.
-        let [a, b, c, d, e, f, g, h] = &rows;
+        let [a, b, c, d, e, f, g, h] = rows;
         let upper = [vector(machine, a), vector(machine, b), vector(machine, c), vector(machine, d)];
         let lower = [vector(machine, e), vector(machine, f), vector(machine, g), vector(machine, h)];
         let ([a, b, c, d], [e, f, g, h]) = (upper, lower);
-        let [a, b, c, d, e, f, g, h] = machine.transpose([a, b, c, d, e, f, g, h]);
-        let upper = [signed(machine, a), signed(machine, b), signed(machine, c), signed(machine, d)];
-        let lower = [signed(machine, e), signed(machine, f), signed(machine, g), signed(machine, h)];
-        let ([a, b, c, d], [e, f, g, h]) = (upper, lower);
-        [a, b, c, d, e, f, g, h]
+        let columns = machine.transpose([a, b, c, d, e, f, g, h]);
+        for (lane, column) in columns.into_iter().enumerate() {
+            let (values, slots) = (signed(machine, column), entries.of_lane(lane));
+            match slots.first_chunk_mut() {
+                Some(slots) => *slots = values,
+                None => slots.iter_mut().zip(values).for_each(|(slot, value)| *slot = value),
+            }
+        }
     }
 }
 
@@ -66,13 +82,18 @@ impl Symbol for Index {
     }
 
     #[inline(always)]
+    fn token(stored: i32) -> u32 {
+        stored.cast_unsigned()
+    }
+
+    #[inline(always)]
     fn of_value(value: u64) -> i32 {
         low_half(value).cast_signed()
     }
 
     #[inline(always)]
-    fn transpose<M: Machine>(machine: M, rows: [[i32; WIDE]; WIDE]) -> [[i32; WIDE]; WIDE] {
-        Signed::transpose(machine, rows)
+    fn hand_on<M: Machine>(machine: M, rows: &[[i32; WIDE]; WIDE], entries: &mut LaneEntries<'_, i32>) {
+        Signed::hand_on(machine, rows, entries);
     }
 }
 
@@ -85,14 +106,21 @@ impl Symbol for Delta {
     }
 
     #[inline(always)]
+    fn token(stored: u64) -> u32 {
+        low_half(stored)
+    }
+
+    #[inline(always)]
     fn of_value(value: u64) -> u64 {
         value
     }
 
     #[inline(always)]
-    fn transpose<M: Machine>(_: M, rows: [[u64; WIDE]; WIDE]) -> [[u64; WIDE]; WIDE] {
-        let column = |index: usize| rows.map(|row| row.get(index).copied().unwrap_or(0));
-        core::array::from_fn(column)
+    fn hand_on<M: Machine>(_: M, rows: &[[u64; WIDE]; WIDE], entries: &mut LaneEntries<'_, u64>) {
+        for lane in 0..WIDE {
+            let column = rows.iter().filter_map(|row| row.get(lane));
+            entries.of_lane(lane).iter_mut().zip(column).for_each(|(slot, &value)| *slot = value);
+        }
     }
 }
 
