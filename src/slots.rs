@@ -124,9 +124,13 @@ impl Slots {
         }
         let (slots, gone) = self.found(frame.identities());
         let kept = slots.iter().filter(|&&slot| slot != NONE).count();
-        gone.iter().for_each(|&slot| self.clear(slot));
-        self.free.sort_unstable_by(|a, b| b.cmp(a));
+        self.free.extend_from_slice(&gone);
+        // Two runs that are in order already, or nearly: what sorts stably merges them.
+        self.free.sort_by(|a, b| b.cmp(a));
         self.place(frame.identities(), slots);
+        // The lowest were taken again, and are written as a whole.
+        let lowest = self.free.last().copied().unwrap_or(NONE);
+        gone.iter().filter(|&&slot| slot >= lowest).for_each(|&slot| self.clear(slot));
         write(&mut self.planes, gaussians.planes(), &runs(&self.rows), &mut self.is_dirty);
         let (appeared, disappeared) = (frame.len() - kept, gone.len());
         Ok(Update { dirty: self.take_dirty(), kept, appeared, disappeared, has_new_planes })
@@ -137,6 +141,9 @@ impl Slots {
         let mut slots = core::mem::take(&mut self.spare);
         slots.clear();
         slots.resize(identities.len(), NONE);
+        if are_others(&self.identities, identities) {
+            return (slots, self.rows.clone());
+        }
         let (mut left, mut missing) = (Vec::new(), Vec::new());
         let (mut rest, mut rest_slots) = (self.identities.as_slice(), self.rows.as_slice());
         for (identities, slots) in identities.chunks(GROUP).zip(slots.chunks_mut(GROUP)) {
@@ -187,7 +194,6 @@ impl Slots {
     }
 
     fn clear(&mut self, slot: u32) {
-        self.free.push(slot);
         let slot = slot as usize;
         let set = |plane: &mut Vec<f32>, value| plane.get_mut(slot).into_iter().for_each(|to| *to = value);
         self.planes.iter_mut().for_each(|plane| set(plane, 0.0));
@@ -216,6 +222,13 @@ impl Slots {
         }
         ranges
     }
+}
+
+/// Whether no identity can be in both lists, as where a GOP begins: all of one are below all of the other.
+fn are_others(before: &[u32], after: &[u32]) -> bool {
+    let bounds = |identities: &[u32]| identities.iter().min().copied().zip(identities.iter().max().copied());
+    let apart = |((low, high), (other_low, other_high))| high < other_low || other_high < low;
+    bounds(before).zip(bounds(after)).is_some_and(apart)
 }
 
 /// Rows that follow each other in slots that do so too.
