@@ -7,10 +7,12 @@ use crate::compare::pictures::read_weights;
 use crate::console::Console;
 use crate::encode::warnings::warnings;
 use crate::failure::Failure;
-use crate::frame_files::{FrameFiles, inputs_of};
+use crate::frame_files::{FrameFiles, inputs_of, unread};
 use crate::input_args::InputArgs;
+use crate::memory_bound::{MemoryArgs, MemoryBound, bytes_of};
 use crate::numbers::parse_frame_rate;
 use crate::output_file::{OutputFile, check_directory, make_directory};
+use crate::over_limit::allow;
 use crate::progress::Progress;
 use crate::whole_file::read_text;
 use clap::Args;
@@ -78,6 +80,8 @@ pub(crate) struct Chart {
     #[arg(long, requires = "stability", conflicts_with = "quick")]
     full: bool,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     reading: InputArgs,
     #[command(flatten)]
     sweep: SweepArgs,
@@ -94,6 +98,10 @@ pub(crate) struct Chart {
 
 /// Rows of pictures of a quick chart.
 const QUICK_HEIGHT: u32 = 120;
+
+/// What takes memory, and how it takes less.
+const WHAT: &str = "measuring these scenes";
+const LESS: &str = "fewer scenes, fewer --frames, fewer --cameras and a smaller --height take less";
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -136,13 +144,14 @@ impl Chart {
 
     fn charts(&self) -> Result<Report<splatstream_chart::summary::Summary>, Failure> {
         let with_cameras = |scene: Scene| Ok(Subject { cameras: self.cameras(&scene)?, scene });
+        let mut bound = self.memory.bound();
         let subjects: Vec<Subject> =
-            self.scenes()?.into_iter().map(with_cameras).collect::<Result<_, Failure>>()?;
+            self.scenes(&mut bound)?.into_iter().map(with_cameras).collect::<Result<_, Failure>>()?;
         let open = |decoded: &Path| -> Result<Box<dyn FrameSource>, String> {
             let files = FrameFiles::find(&[decoded.to_path_buf()], self.reading);
             Ok(Box::new(files.map_err(|error| error.to_string())?))
         };
-        let charting = Charting {
+        let mut charting = Charting {
             sweep: self.sweep.sweep(self.fps),
             fps: f64::from(self.fps.0) / f64::from(self.fps.1),
             gop: self.gop,
@@ -151,6 +160,10 @@ impl Chart {
             peers: self.peers.as_deref().map(|path| read_peers(path, &open)).transpose()?,
             command: command_line(),
         };
+        let footprint = charting.footprint(&subjects);
+        bound.check(footprint.bytes(), WHAT, LESS)?;
+        bound.keep(footprint.beside);
+        charting.bound(bound.left());
         let progress = Progress::steps(charting.steps(&subjects));
         Ok(charting.run(subjects, &progress)?)
     }
@@ -159,9 +172,10 @@ impl Chart {
         let size = Size::of(self.sweep.quick, self.full);
         // The built-in scene, unless there are others; then only if it is asked for.
         let builtin = self.builtin || self.scenes.is_empty();
+        let mut bound = self.memory.bound();
         let mut scenes: Vec<Scene> = builtin.then(|| stability::builtin(size)).into_iter().collect();
         for path in &self.scenes {
-            scenes.push(read_scene(path, self.frames.unwrap_or(size.frames()), self.reading)?);
+            scenes.push(self.read_scene(path, self.frames.unwrap_or(size.frames()), &mut bound)?);
         }
         tell_apart(&mut scenes);
         let stability = Stability {
@@ -173,18 +187,22 @@ impl Chart {
             },
             command: command_line(),
         };
+        bound.check(stability.memory(&scenes), WHAT, LESS)?;
         Ok(stability.run(&scenes, Progress::steps)?)
     }
 
-    fn scenes(&self) -> Result<Vec<Scene>, Failure> {
+    /// The scenes, of which the bound takes note.
+    fn scenes(&self, bound: &mut MemoryBound) -> Result<Vec<Scene>, Failure> {
         let mut scenes = Vec::new();
         // Whoever asks for a long GOP wants it whole.
         let frames = self.frames.or((self.gop > FRAMES).then_some(self.gop));
         if self.builtin {
-            scenes.push(Scene::builtin(self.sweep.quick, frames));
+            let scene = Scene::builtin(self.sweep.quick, frames);
+            scene.frames.iter().for_each(|frame| bound.keep(bytes_of(frame)));
+            scenes.push(scene);
         }
         for path in &self.scenes {
-            scenes.push(read_scene(path, frames.unwrap_or(FRAMES), self.reading)?);
+            scenes.push(self.read_scene(path, frames.unwrap_or(FRAMES), bound)?);
         }
         tell_apart(&mut scenes);
         Ok(scenes)
@@ -202,6 +220,25 @@ impl Chart {
         )
     }
 
+    /// The first frames of a file or of a directory of frames, of which the bound takes note.
+    fn read_scene(&self, path: &Path, frames: u32, bound: &mut MemoryBound) -> Result<Scene, Failure> {
+        let mut files = FrameFiles::find(&[path.to_path_buf()], self.reading.within(bound.left()))?;
+        let count = files.len().min(frames);
+        let mut frames: Vec<GaussianFrame> = Vec::new();
+        for number in 0..count {
+            let frame = files.frame(number).map_err(|error| unread(error.as_ref()))?;
+            bound.keep(bytes_of(&frame));
+            let rest = bytes_of(&frame).saturating_mul((count - number - 1).into());
+            bound.check(rest, WHAT, LESS)?;
+            frames.push(frame);
+        }
+        if frames.iter().all(GaussianFrame::is_empty) {
+            return Err(Failure::other(format!("{}: there is no Gaussian in it", path.display())));
+        }
+        let path_of_scene = Some(path.to_path_buf());
+        Ok(Scene { name: name_of(path), path: path_of_scene, frames, frames_of_source: files.len() })
+    }
+
     /// Writes the files of a report, the page last; none replaces one of `inputs`.
     fn write<S>(&self, report: Report<S>, inputs: &[PathBuf]) -> Result<Written<S>, Failure> {
         for File { name, bytes } in report.files.iter().chain(&report.pictures) {
@@ -216,19 +253,6 @@ impl Chart {
     }
 }
 
-/// The first frames of a file or of a directory of frames.
-fn read_scene(path: &Path, frames: u32, reading: InputArgs) -> Result<Scene, Failure> {
-    let mut files = FrameFiles::find(&[path.to_path_buf()], reading)?;
-    let count = files.len().min(frames);
-    let frame = |number| files.frame(number).map_err(|error| Failure::other(error.to_string()));
-    let frames: Vec<GaussianFrame> = (0..count).map(frame).collect::<Result<_, _>>()?;
-    if frames.iter().all(GaussianFrame::is_empty) {
-        return Err(Failure::other(format!("{}: there is no Gaussian in it", path.display())));
-    }
-    let path_of_scene = Some(path.to_path_buf());
-    Ok(Scene { name: name_of(path), path: path_of_scene, frames, frames_of_source: files.len() })
-}
-
 /// Results of other codecs.
 fn read_peers<'a>(path: &Path, open: OpenFrames<'a>) -> Result<Peers<'a>, Failure> {
     let text = read_text(path)?;
@@ -241,6 +265,9 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         match error {
             Error::Stream(error) => Self::stream(Path::new("the stream just encoded"), error),
+            Error::Memory { message, asked } => {
+                Self::Memory(format!("{message}\n  {}; {LESS}", allow(asked)))
+            }
             Error::Other(message) => Self::other(message),
         }
     }

@@ -7,6 +7,8 @@ mod report;
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
 use crate::frame_name::frame_name;
+use crate::memory_bound::{MemoryArgs, MemoryBound, bytes_of_gaussians};
+use crate::numbers::{counted, frames as frames_in_words};
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::Args;
@@ -50,6 +52,8 @@ pub(crate) struct Demo {
     /// Make each frame as if it had been trained by itself: no Gaussian keeps its row from frame to frame.
     #[arg(long)]
     untracked: bool,
+    #[command(flatten)]
+    memory: MemoryArgs,
 }
 
 /// The stream's name in the directory of the demo.
@@ -60,11 +64,14 @@ const PAGE: &str = "demo.html";
 /// Frames of a GOP.
 const GOP: u32 = 8;
 
+/// Copies of the values of a frame that are there where it is decoded, compared, drawn and written, and bytes of pictures.
+const SHOWN: u64 = 12;
+const PICTURES: u64 = 64 << 20;
+
 impl Demo {
     /// Makes, encodes, decodes, verifies, reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "files of the demo")?;
-        make_directory(&self.out)?;
         let tracking = if self.untracked { Tracking::Untracked } else { Tracking::Tracked };
         let scene = BuiltinScene {
             gaussians: self.gaussians,
@@ -72,8 +79,10 @@ impl Demo {
             tracking,
             ..BuiltinScene::default()
         };
+        let settings = self.settings(scene.sh_degree)?;
+        make_directory(&self.out)?;
         let mut source = self.write_source(scene)?;
-        let (stream, encoding, digests) = self.encode(&mut source.frames)?;
+        let (stream, encoding, digests) = self.encode(&mut source.frames, &settings)?;
         let mut everything = Everything::start(self.out.join("decoded"), source.frames.first())?;
         let points = self.points(&stream, &source.frames, &mut everything)?;
         let errors = everything.verified(&digests)?;
@@ -93,6 +102,22 @@ impl Demo {
         console.report(&demonstration, || text)
     }
 
+    /// The settings of the stream, with the memory that the source leaves.
+    fn settings(&self, sh_degree: u8) -> Result<Settings, Failure> {
+        let settings = settings(self.frames);
+        let (gaussians, frames) = (u64::from(self.gaussians), u64::from(self.frames));
+        let mut bound: MemoryBound = self.memory.bound();
+        let all = bytes_of_gaussians(gaussians.saturating_mul(frames), sh_degree);
+        // The source; a stream takes no more than a fifth of it, and its page a third more than that.
+        bound.keep(all.saturating_add(all / 2));
+        let what =
+            format!("a demo of {} of {} each", frames_in_words(self.frames), counted(gaussians, "Gaussian"));
+        let shown = bytes_of_gaussians(gaussians, sh_degree).saturating_mul(SHOWN).saturating_add(PICTURES);
+        let asked = settings.memory(gaussians, sh_degree, self.frames).max(shown);
+        bound.check(asked, &what, "fewer --gaussians and fewer --frames take less")?;
+        Ok(Settings { max_memory: bound.left(), ..settings })
+    }
+
     /// Makes the frames and writes them as PLY.
     fn write_source(&self, scene: BuiltinScene) -> Result<Source, Failure> {
         let directory = self.out.join("source");
@@ -109,12 +134,16 @@ impl Demo {
         Ok(Source { frames, summary })
     }
 
-    fn encode(&self, frames: &mut Vec<GaussianFrame>) -> Result<(Vec<u8>, Encoding, Vec<u64>), Failure> {
+    fn encode(
+        &self,
+        frames: &mut Vec<GaussianFrame>,
+        settings: &Settings,
+    ) -> Result<(Vec<u8>, Encoding, Vec<u64>), Failure> {
         let progress = Progress::frames("encoding", self.frames);
         let start = Instant::now();
         let mut stream = Vec::new();
         let Report { bytes, gaussians, digests, .. } =
-            encode(frames, &settings(self.frames), &mut stream, &mut |done, _| progress.at(done))
+            encode(frames, settings, &mut stream, &mut |done, _| progress.at(done))
                 .map_err(|error| Failure::other(error.to_string()))?;
         let seconds = start.elapsed().as_secs_f64();
         OutputFile::write(&self.out.join(STREAM), &stream)?;

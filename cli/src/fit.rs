@@ -12,7 +12,8 @@ use crate::earlier::Earlier;
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
-use crate::numbers::{FrameRange, parse_share};
+use crate::memory_bound::{MemoryBound, bytes_of_gaussians};
+use crate::numbers::{FrameRange, counted, parse_share};
 use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs, refuse_standard};
 use crate::stream_file::LimitArgs;
 use captures::Captures;
@@ -21,9 +22,16 @@ use report::{Fitted, FittedFrame};
 use splatstream_files::ply;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::Camera;
+use splatstream_render::camera::{Capture, CapturedView};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use training::Training;
+
+/// What the bound on memory is of.
+const OF_MEMORY: &str = "Most memory that training and decoding a start may take, as in 512M or 4G; pictures and Gaussians that take \
+    more, and a stream that asks for more, are refused (exit code 13) [default: three quarters of what this machine has free, \
+    and a quarter of that for decoding]";
 
 /// Train a scene of Gaussians from pictures and their cameras.
 ///
@@ -34,7 +42,8 @@ use training::Training;
 #[command(
     after_help = "Examples:\n  splatstream simulate -o capture/ --height 360\n  splatstream fit capture/ -o scene.ply\n  \
     splatstream fit walk/ -o frames/ --warm                  # each frame starts from the one before, Gaussian by Gaussian\n  \
-    splatstream fit capture/ --start scene.gss --iterations 0  # only what a scene is worth beside the pictures"
+    splatstream fit capture/ --start scene.gss --iterations 0  # only what a scene is worth beside the pictures",
+    mut_arg("max_memory", |memory| memory.help(OF_MEMORY).long_help(OF_MEMORY))
 )]
 pub(crate) struct Fit {
     /// A capture, a camera file, or a directory of captures.
@@ -102,6 +111,18 @@ pub(crate) struct Fit {
     #[command(flatten)]
     reading: InputArgs,
 }
+
+/// A pixel of a photograph that is kept, bytes: three channels of eight bits, and those of half its size with which training
+/// starts; of a picture that is read, as a file has it and as floats; and of one that is drawn, judged and has slopes.
+const OF_PHOTOGRAPH: u64 = 4;
+const OF_PICTURE: u64 = 32;
+const OF_DRAWING: u64 = 256;
+
+/// Copies of the values of Gaussians: themselves, slopes, their means and those of their squares, a start that holds them, and what
+/// is made anew where their number changes. And bytes of each beside, for drawing and for density; and of a point.
+const COPIES: u64 = 8;
+const OF_GAUSSIAN: u64 = 512;
+const OF_POINT: u64 = 128;
 
 impl Fit {
     /// Reads, trains, writes, frame by frame.
@@ -206,6 +227,41 @@ impl Fit {
         Ok((frame, fitted))
     }
 
+    /// Refuses a capture whose training takes more memory than there is. `given`: what it starts from, if not from points.
+    fn check_memory(
+        &self,
+        capture: &Capture,
+        path: &Path,
+        given: Option<&GaussianFrame>,
+    ) -> Result<(), Failure> {
+        let most = if self.iterations > 0 { self.gaussians.into() } else { 0 };
+        let given = given.map_or((0, 0), |given| (given.len() as u64, given.sh_degree()));
+        let (gaussians, degree) = (given.0.max(most), given.1.max(self.sh_degree));
+        let sizes: Vec<[u64; 2]> = capture.views.iter().map(|view| self.pixels(view)).collect();
+        let most = |which: usize| sizes.iter().map(|size| size[which]).max().unwrap_or(0);
+        let kept: u64 = sizes.iter().map(|[_, small]| small.saturating_mul(OF_PHOTOGRAPH)).sum();
+        let read = most(0).saturating_mul(OF_PICTURE);
+        let drawn = most(1).saturating_mul(OF_DRAWING);
+        let values = bytes_of_gaussians(gaussians, degree).saturating_mul(COPIES);
+        let points = (capture.points.len() as u64).max(self.random_points.into()).saturating_mul(OF_POINT);
+        let others = values.saturating_add(gaussians.saturating_mul(OF_GAUSSIAN)).saturating_add(points);
+        let asked = kept.saturating_add(read.max(drawn.saturating_add(others)));
+        let name = path.display();
+        let (views, many) = (counted(sizes.len() as u64, "picture"), counted(gaussians, "Gaussian"));
+        MemoryBound::of(self.limits.memory()).check(
+            asked,
+            &format!("{name}: training {many} with {views}"),
+            "fewer --gaussians and a smaller --height take less",
+        )
+    }
+
+    /// Pixels of a picture, and of that which is made of it.
+    fn pixels(&self, CapturedView { camera, .. }: &CapturedView) -> [u64; 2] {
+        let of = |camera: &Camera| u64::from(camera.width).saturating_mul(camera.height.into());
+        let smaller = self.height.filter(|&height| height < camera.height);
+        [of(camera), smaller.map_or_else(|| of(camera), |height| of(&camera.scaled_to_height(height)))]
+    }
+
     /// Trains a frame, whose file replaces no file of the capture and none of `inputs`.
     fn fit(
         &self,
@@ -220,6 +276,7 @@ impl Fit {
         let files = files_of(captures.path(number), &capture, self.images.as_deref());
         // At once, and not after minutes of work.
         out.map_or(Ok(()), |out| refuse_inputs(out, &[inputs, &files].concat()))?;
+        self.check_memory(&capture, captures.path(number), start.as_ref().or(before.as_ref()))?;
         let training = Training::open(&capture, captures.path(number), self, background)?;
         training.run(start, before, self.time_budget.map(|seconds| Duration::from_secs(seconds.into())))
     }

@@ -25,6 +25,7 @@ mod input_args;
 mod inspect;
 mod machine;
 mod manual;
+mod memory_bound;
 mod numbers;
 mod output_file;
 mod over_limit;

@@ -47,10 +47,15 @@ pub(crate) fn advice(error: &Error, level: Option<u8>) -> String {
 /// The advice where encoding takes so many bytes and may not.
 pub(crate) fn of_encoding(asked: u64) -> String {
     format!(
-        "close other programs, or allow it with {MEMORY} {} where there is as much; a faster --preset and no --finetune take less, and \
+        "close other programs, or {} where there is as much; a faster --preset and no --finetune take less, and \
          of a sequence --all-intra, a smaller --gop, and a --shard instead of a --target-mb",
-        megabytes(asked)
+        allow(asked)
     )
+}
+
+/// How so many bytes are allowed.
+pub(crate) fn allow(bytes: u64) -> String {
+    format!("allow it with {MEMORY} {}", megabytes(bytes))
 }
 
 /// A size as the option reads it, rounded up.

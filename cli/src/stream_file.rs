@@ -45,6 +45,11 @@ impl LimitArgs {
         Limits { max_gaussians: self.max_gaussians, ..others }
     }
 
+    /// Bytes of memory that are asked for, or that there are.
+    pub(crate) fn memory(&self) -> u64 {
+        self.max_memory.unwrap_or_else(machine::memory)
+    }
+
     /// How to decode: all of a stream, within the limits and the memory asked for, or that there is.
     pub(crate) fn options(&self) -> Options {
         self.within(machine::memory())

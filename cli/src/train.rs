@@ -2,8 +2,9 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::frame_files::{FrameFiles, inputs_of};
+use crate::frame_files::{FrameFiles, inputs_of, unread};
 use crate::input_args::InputArgs;
+use crate::memory_bound::{MemoryArgs, MemoryBound, bytes_of};
 use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
@@ -15,7 +16,7 @@ use splatstream_chart::Progress as _;
 use splatstream_chart::numbers::grouped;
 use splatstream_encoder::transformer::{Architecture, Sample};
 use splatstream_encoder::{
-    FrameSource, Quality, Settings, ShChoice, Structure, nearer, samples, train_network,
+    FrameSource, Quality, Settings, ShChoice, Structure, bytes_of_samples, nearer, samples, train_network,
 };
 use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_gaussians::GaussianFrame;
@@ -45,8 +46,13 @@ pub(crate) struct Train {
     #[arg(long, value_enum, default_value_t = QualityName::High)]
     quality: QualityName,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     reading: InputArgs,
 }
+
+/// Gives a frame of a sequence by its number.
+type Frame<'a> = dyn FnMut(u32) -> Result<GaussianFrame, Failure> + 'a;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -71,9 +77,9 @@ impl Train {
         let inputs = inputs_of(&self.sequences)?;
         // At once, and not after minutes of work.
         refuse_inputs(&self.out, &inputs)?;
-        let mut found = Vec::new();
+        let (mut found, mut bound) = (Vec::new(), self.memory.bound());
         for architecture in Architecture::BASES {
-            found.push((architecture, self.samples(&architecture)?));
+            found.push((architecture, self.samples(&architecture, &mut bound)?));
         }
         let (architecture, all) = nearer(found);
         let count = all.len();
@@ -103,8 +109,8 @@ impl Train {
         console.report(&trained, || trained.text())
     }
 
-    /// What all sequences give.
-    fn samples(&self, architecture: &Architecture) -> Result<Vec<Sample>, Failure> {
+    /// What all sequences give. What is kept of each, the bound takes note of.
+    fn samples(&self, architecture: &Architecture, bound: &mut MemoryBound) -> Result<Vec<Sample>, Failure> {
         let settings = Settings {
             structure: Structure::Predicted { layers: 2 },
             spatial_layers: 3,
@@ -113,21 +119,44 @@ impl Train {
             sh: ShChoice::Coefficients,
             ..Settings::default()
         };
-        let mut all = Vec::new();
+        let (mut all, left) = (Vec::new(), bound.left());
         let progress = Progress::steps((self.sequences.len() + self.builtin.len()) as u32);
-        let mut add = |name: String, frames: &mut Vec<GaussianFrame>| {
+        let mut add = |name: String, count: u32, frame: &mut Frame<'_>| {
             progress.step(name.clone());
-            let found = samples(frames, &settings, architecture);
-            all.extend(found.map_err(|error| Failure::other(format!("{name}: {error}")))?);
+            let first = frame(0)?;
+            // Of a sequence whose frames are like the first.
+            let of_frames = bytes_of(&first).saturating_mul(count.into());
+            let (gaussians, degree) = (first.len() as u64, first.sh_degree());
+            let encoding = settings.memory(gaussians, degree, count).saturating_add(of_frames);
+            let failed = |error: splatstream_encoder::Error| Failure::other(format!("{name}: {error}"));
+            let of_samples = bytes_of_samples(&settings, architecture, gaussians, count).map_err(failed)?;
+            bound.check(encoding.saturating_add(of_samples), &name, "fewer --frames take less")?;
+            let (mut held, mut frames) = (bytes_of(&first), vec![first]);
+            for number in 1..count {
+                let next = frame(number)?;
+                held = held.saturating_add(bytes_of(&next));
+                bound.check(held.saturating_add(of_samples), &name, "fewer --frames take less")?;
+                frames.push(next);
+            }
+            let max_memory = bound.left().saturating_sub(held.saturating_add(of_samples));
+            let settings = Settings { max_memory, ..settings.clone() };
+            let found = match samples(&mut frames, &settings, architecture) {
+                Err(splatstream_encoder::Error::OverMemory { asked, .. }) => {
+                    let asked = asked.saturating_add(held).saturating_add(of_samples);
+                    return bound.check(asked, &name, "fewer --frames take less");
+                }
+                found => found.map_err(failed)?,
+            };
+            bound.keep(of_samples);
+            all.extend(found);
             progress.advance();
             Ok::<(), Failure>(())
         };
         for path in &self.sequences {
-            let mut files = FrameFiles::find(std::slice::from_ref(path), self.reading)?;
+            let mut files = FrameFiles::find(std::slice::from_ref(path), self.reading.within(left))?;
             let count = self.frames.min(files.len());
-            let read = |number| files.frame(number).map_err(|error| Failure::other(error.to_string()));
-            let mut frames: Vec<_> = (0..count).map(read).collect::<Result<_, _>>()?;
-            add(path.display().to_string(), &mut frames)?;
+            let mut frame = |number| files.frame(number).map_err(|error| unread(error.as_ref()));
+            add(path.display().to_string(), count, &mut frame)?;
         }
         for &seed in &self.builtin {
             let scene = BuiltinScene {
@@ -136,8 +165,7 @@ impl Train {
                 frames: self.frames,
                 ..Default::default()
             };
-            let mut frames: Vec<_> = (0..self.frames).map(|number| scene.frame(number)).collect();
-            add(format!("built-in scene {seed}"), &mut frames)?;
+            add(format!("built-in scene {seed}"), self.frames, &mut |number| Ok(scene.frame(number)))?;
         }
         Ok(all)
     }

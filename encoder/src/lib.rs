@@ -82,7 +82,7 @@ pub use finetune::{
     Finetune, FinetuneLoss, FinetuneProgress, FinetuneReport, FinetuneWatch, Photograph, PointReport,
     PointWeight,
 };
-pub use frame::learning::{nearer, samples, train_network};
+pub use frame::learning::{bytes_of_samples, nearer, samples, train_network};
 pub use isolated::Isolated;
 pub use laws::Laws;
 pub use plan::{Plan, PlanRecord, PlannedSteps, PlannedTarget, Single};

@@ -80,13 +80,13 @@ impl Charting<'_> {
     }
 
     /// Frames of each front: the first by itself, and the first GOP unless charts are to be quick.
-    fn fronts(&self, scene: &Scene) -> Vec<u32> {
+    pub(crate) fn fronts(&self, scene: &Scene) -> Vec<u32> {
         let is_sequence = self.sweep.choices && gop::is_sequence(scene, self.gop);
         let of_gop = is_sequence.then(|| self.gop.min(scene.frames.len() as u32));
         core::iter::once(1).chain(of_gop).collect()
     }
 
-    fn contenders(&self, scene: &Scene, frames: u32) -> Vec<Variant> {
+    pub(crate) fn contenders(&self, scene: &Scene, frames: u32) -> Vec<Variant> {
         front::contenders(&self.sweep, (frames, scene.sh_degree()))
     }
 

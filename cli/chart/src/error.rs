@@ -8,6 +8,13 @@ use std::fmt;
 pub enum Error {
     /// A stream that was encoded a moment ago cannot be read.
     Stream(splatstream_format::Error),
+    /// Encoding takes more memory than it may.
+    Memory {
+        /// What was to be encoded, and why not.
+        message: String,
+        /// Bytes that it takes at most.
+        asked: u64,
+    },
     /// Anything else, in words.
     Other(String),
 }
@@ -17,11 +24,30 @@ impl Error {
     pub(crate) fn other(message: impl Into<String>) -> Self {
         Self::Other(message.into())
     }
+
+    /// The same of a scene.
+    pub(crate) fn of_scene(self, name: &str) -> Self {
+        match self {
+            Self::Memory { message, asked } => Self::Memory { message: format!("{name}: {message}"), asked },
+            Self::Other(message) => Self::Other(format!("{name}: {message}")),
+            Self::Stream(_) => self,
+        }
+    }
 }
 
 impl From<splatstream_format::Error> for Error {
     fn from(error: splatstream_format::Error) -> Self {
         Self::Stream(error)
+    }
+}
+
+impl From<splatstream_encoder::Error> for Error {
+    fn from(error: splatstream_encoder::Error) -> Self {
+        let message = error.to_string();
+        match error {
+            splatstream_encoder::Error::OverMemory { asked, .. } => Self::Memory { message, asked },
+            _ => Self::Other(message),
+        }
     }
 }
 
@@ -35,7 +61,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Stream(error) => write!(f, "the stream just encoded: {error}"),
-            Self::Other(message) => f.write_str(message),
+            Self::Memory { message, .. } | Self::Other(message) => f.write_str(message),
         }
     }
 }

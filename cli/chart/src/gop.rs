@@ -94,8 +94,7 @@ pub(crate) fn measure(
 
 /// Settings with the steps that the GOP reaches its PSNR with: everything is measured with the same.
 fn fitted(frames: &mut Vec<GaussianFrame>, settings: &Settings) -> Result<Settings, Error> {
-    let report = encode(frames, settings, &mut io::sink(), &mut |_, _| {})
-        .map_err(|error| Error::other(error.to_string()))?;
+    let report = encode(frames, settings, &mut io::sink(), &mut |_, _| {})?;
     let steps = report.steps.unwrap_or(settings.steps);
     let laws = report.laws.unwrap_or(settings.laws);
     Ok(Settings { steps, laws, psnr: None, ..settings.clone() })
@@ -103,7 +102,7 @@ fn fitted(frames: &mut Vec<GaussianFrame>, settings: &Settings) -> Result<Settin
 
 fn encoded(frames: &mut Vec<GaussianFrame>, settings: &Settings) -> Result<Vec<u8>, Error> {
     let mut stream = Vec::new();
-    encode(frames, settings, &mut stream, &mut |_, _| {}).map_err(|error| Error::other(error.to_string()))?;
+    encode(frames, settings, &mut stream, &mut |_, _| {})?;
     Ok(stream)
 }
 

@@ -25,6 +25,7 @@ mod csv_files;
 mod decoding;
 mod error;
 mod figures;
+mod footprint;
 mod front;
 mod front_figures;
 mod gop;
@@ -42,5 +43,6 @@ mod timing;
 mod variant_comparison;
 
 pub use error::Error;
+pub use footprint::Footprint;
 pub use progress::Progress;
 pub use report::{File, Report};

@@ -105,8 +105,8 @@ fn run(
     progress.step(format!("{what}: encoding"));
     let settings = variant.at(quality);
     let repeat = sweep.repeats(quality);
-    let (stream, gaussians, encode) = encoded(&mut scene.frames, &settings, repeat)
-        .map_err(|error| Error::other(format!("{}: {error}", scene.name)))?;
+    let (stream, gaussians, encode) =
+        encoded(&mut scene.frames, &settings, repeat).map_err(|error| error.of_scene(&scene.name))?;
     progress.advance();
     let limits = Limits::default();
     let infos = operating_points(&stream, &limits)?;
@@ -148,7 +148,7 @@ pub(crate) fn encoded(
         let mut stream = Vec::new();
         let (report, once) = Spent::of(|| encode(frames, settings, &mut stream, &mut |_, _| {}));
         spent.push(once);
-        result = (stream, report.map_err(|error| Error::other(error.to_string()))?.gaussians);
+        result = (stream, report?.gaussians);
     }
     Ok((result.0, result.1, Timing::of(&spent)))
 }

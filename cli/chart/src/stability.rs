@@ -64,6 +64,11 @@ pub struct Stability<'a> {
 }
 
 impl Stability<'_> {
+    /// Bytes that [`Stability::run`] takes at most beside the frames of the scenes.
+    pub fn memory(&self, scenes: &[Scene]) -> u64 {
+        scenes.iter().map(|scene| self.size.memory(scene)).max().unwrap_or(0)
+    }
+
     /// Measures every case on every scene; `start` is told the steps of progress before the first.
     ///
     /// # Errors

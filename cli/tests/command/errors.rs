@@ -111,6 +111,9 @@ const CASES: &[&str] = &[
     "encode good.ply -o out.gss --max-input-memory 1K",
     "encode good.ply -o out.gss --max-memory 10K",
     "encode good.ply -o out.gss --max-memory 4M",
+    "demo --gaussians 1000000 -o first-look --max-memory 64M",
+    "chart good.ply --quick -o report --max-memory 1M",
+    "train --builtin 1 -o network.bin --max-memory 64M",
     // Values that no stream can have.
     "encode nan.ply -o out.gss",
     "encode loud.ply -o out.gss",

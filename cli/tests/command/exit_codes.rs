@@ -7,6 +7,8 @@ use crate::common::{
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+#[cfg(target_os = "linux")]
+use std::process::Command;
 use tempfile::TempDir;
 
 /// Bytes of file_header.
@@ -115,6 +117,42 @@ fn unsupported_is_12() {
         bytes[12..16].copy_from_slice(&crc.to_le_bytes());
     });
     assert_eq!((&said["outcome"], &said["code"]), (&"unsupported".into(), &"RESERVED".into()));
+}
+
+/// Commands that hold what they work on in memory say before what that takes, and are refused where there is less.
+#[test]
+fn what_takes_too_much_memory_is_13_before_anything_is_written() {
+    let directory = directory();
+    let (still, sequence) = (write_still(directory.path()), write_frames(directory.path()));
+    let out = directory.path().join("out");
+    let network = directory.path().join("network.bin");
+    let commands: [&[&str]; 5] = [
+        &["demo", "--gaussians", "1000000", "-o", text(&out)],
+        &["chart", text(&still), "--quick", "-o", text(&out)],
+        &["chart", text(&still), "--stability", "--quick", "-o", text(&out)],
+        &["train", text(&sequence), "-o", text(&network)],
+        &["train", "--builtin", "1", "-o", text(&network)],
+    ];
+    for command in commands {
+        let said = fail(13, &[command, &["--max-memory", "1M"]].concat());
+        assert!(said.contains("or allow it with --max-memory "), "{said}");
+    }
+    assert!(!network.exists() && !out.join("index.html").exists() && !out.join("demo.gss").exists());
+}
+
+/// Nor does a limit of the system end the program: what it leaves is the bound.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_address_space_bounds_what_is_held() {
+    let directory = directory();
+    let program = env!("CARGO_BIN_EXE_splatstream");
+    for command in ["demo --gaussians 1000000 -o out", "train --builtin 1 --frames 1000 -o network.bin"] {
+        let line = format!("cd {}; ulimit -v 524288; exec {program} {command}", text(directory.path()));
+        let ended = Command::new("sh").args(["-c", &line]).output().unwrap();
+        let said = String::from_utf8(ended.stderr).unwrap();
+        assert_eq!(ended.status.code(), Some(13), "{said}");
+        assert!(said.contains("or allow it with --max-memory "), "{said}");
+    }
 }
 
 #[test]

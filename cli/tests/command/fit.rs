@@ -56,6 +56,13 @@ fn what_cannot_be_trained_is_said() {
     let walk = simulated(at);
     let one = format!("{walk}/frame_0000");
     let out = at.join("scene.ply");
+    // What training takes follows from Gaussians and pictures, and is told before any of it is taken.
+    let many = ["fit", &one, "-o", text(&out), "--gaussians", "10000000"];
+    let said = fail(13, &[&many[..], &["--max-memory", "64M"]].concat());
+    assert!(
+        said.contains("5 pictures takes up to ") && said.contains("allow it with --max-memory "),
+        "{said}"
+    );
     assert!(fail(1, &["fit", text(at), "-o", text(&out)]).contains("transforms.json"));
     assert!(fail(1, &["fit", text(&at.join("none")), "-o", text(&out)]).contains("check the path"));
     assert!(fail(2, &["fit", &one, "-o", text(&at.join("scene.gss"))]).contains("ends in .ply"));

@@ -14,6 +14,7 @@ use crate::transformer::{Architecture, Loss, Progress, Sample, Schedule, Trainin
 use crate::writer::Coded;
 use core::ops::ControlFlow;
 use splatstream_decoder::predictor::Predictor;
+use splatstream_decoder::transformer::LANES;
 use splatstream_format::Limits;
 use splatstream_format::payload::{Layer, Network, Part, REGISTRY};
 use splatstream_format::syntax::{Profile, SequenceParameters};
@@ -103,6 +104,28 @@ pub fn samples(
 ) -> Result<Vec<Sample>, Error> {
     let analysis = analyse(source, settings)?;
     recorded(source, settings, &analysis.parameters, architecture)
+}
+
+/// Bytes that the [samples] of a sequence take at most, whose frames have so many Gaussians.
+///
+/// # Errors
+/// An architecture that 6.17.1 does not allow.
+pub fn bytes_of_samples(
+    settings: &Settings,
+    architecture: &Architecture,
+    gaussians: u64,
+    frames: u32,
+) -> Result<u64, Error> {
+    let header = architecture.header()?;
+    let of_gop = frames.min(settings.gop_length());
+    // Gaussians are new in one layer only.
+    let units = u64::from(of_gop).saturating_mul(settings.refinements.len() as u64);
+    let all = gaussians.saturating_mul(frames.into()).div_ceil(LANES as u64);
+    let batches = all.min(Recorder::most(units));
+    let rows = u64::from(settings.neighbours).saturating_mul((header.inputs() as u64).saturating_add(3));
+    let of_batch = rows.saturating_add((header.outputs() as u64).saturating_mul(size_of::<i32>() as u64));
+    let of_sample = of_batch.saturating_mul(LANES as u64).saturating_add(size_of::<Sample>() as u64);
+    Ok(batches.saturating_mul(of_sample))
 }
 
 /// The architecture whose base leaves least, and its samples; of equal ones the first, and of none the default, without

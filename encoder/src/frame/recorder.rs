@@ -35,6 +35,11 @@ impl Recorder {
             .extend(batches.into_iter().zip(outputs.chunks(LANES)).map(|(batch, rows)| sample(batch, rows)));
     }
 
+    /// Batches that are collected at most, where a GOP has so many units: none is begun once there is enough.
+    pub(crate) fn most(units: u64) -> u64 {
+        units.saturating_mul(OF_A_UNIT as u64).saturating_add(MOST as u64)
+    }
+
     /// Whether that is enough.
     pub(crate) fn is_full(&self) -> bool {
         self.samples.borrow().len() >= MOST

@@ -132,8 +132,7 @@ fn row(
     judge: &mut Judge<'_>,
 ) -> Result<AblationRow, Error> {
     let mut stream = Vec::new();
-    let report = encode(frames, settings, &mut stream, &mut |_, _| {})
-        .map_err(|error| Error::other(error.to_string()))?;
+    let report = encode(frames, settings, &mut stream, &mut |_, _| {})?;
     let statistics = stream_statistics(&stream, &Limits::default())?;
     let new: u64 = report.coded.iter().map(|frame| u64::from(frame.new)).sum();
     let learned: u64 = report.coded.iter().map(|frame| frame.predicted[3]).sum();

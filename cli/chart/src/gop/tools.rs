@@ -85,8 +85,7 @@ fn row(
     judge: &mut Judge<'_>,
 ) -> Result<ToolRow, Error> {
     let mut stream = Vec::new();
-    let report = encode(frames, settings, &mut stream, &mut |_, _| {})
-        .map_err(|error| Error::other(error.to_string()))?;
+    let report = encode(frames, settings, &mut stream, &mut |_, _| {})?;
     let inter = report.coded.iter().filter(|frame| frame.frame_type != FrameType::Intra);
     let figures = shown(&stream, OperatingPoint::ALL, judge)?.figures(|frame| !frame.is_intra())?;
     Ok(ToolRow {

@@ -2,8 +2,12 @@
 
 use super::edits::{another, thinned};
 use crate::scenes::Scene;
+use splatstream_encoder::{Settings, Structure};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_gaussians::GaussianFrame;
+
+/// Samples have no more than this times as many Gaussians and frames as bases.
+const LARGER: u64 = 4;
 
 /// How much is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,6 +36,17 @@ impl Size {
             Self::Standard => standard,
             Self::Full => full,
         }
+    }
+
+    /// Bytes that the cases of a scene take at most: bases and samples, each of which is coded by itself.
+    pub(super) fn memory(self, scene: &Scene) -> u64 {
+        let (degree, frames) = (scene.sh_degree(), self.frames());
+        let still = Settings::default().memory(LARGER * self.gaussians() as u64, degree, 1);
+        let structure = Structure::Predicted { layers: 2 };
+        let moving = Settings { structure, spatial_layers: 3, ..Settings::default() };
+        let moving =
+            moving.memory(LARGER * self.gaussians_in_motion() as u64, degree, LARGER as u32 * frames);
+        still.saturating_add(moving)
     }
 
     /// Gaussians of a scene that stands still, at most.
