@@ -1,4 +1,4 @@
-//! C.3: how the frames of a stream are divided into subsegments.
+//! C.5: how the frames of a stream are divided into subsegments.
 
 /// What a subsegment is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
