@@ -8,6 +8,7 @@
 //! what is taken.
 
 use crate::error::Error;
+use crate::frame::learning::bytes_of_training;
 use crate::settings::{Preset, Settings};
 use crate::strips::{FEW, MANY};
 use crate::verification::EVERY;
@@ -134,7 +135,9 @@ impl<'a> Footprint<'a> {
         };
         let once = self.in_strips().saturating_add(judged).saturating_add(stream);
         let each = self.coding().saturating_add(self.waiting()).saturating_add(once);
-        each.saturating_mul(self.gaussians).saturating_add(self.pictures()).saturating_add(FIXED)
+        let training = bytes_of_training(self.settings, self.gaussians, self.frames);
+        let other = self.pictures().saturating_add(training).saturating_add(FIXED);
+        each.saturating_mul(self.gaussians).saturating_add(other)
     }
 
     /// What a GOP takes more that is coded at the same time as others, bytes: its frames, and what coding them takes.

@@ -2,7 +2,10 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed test")]
 
 use peak_alloc::PeakAlloc;
-use splatstream_encoder::{Encoder, Error, Finetune, FrameSource, Preset, Settings, Size, Structure, encode};
+use splatstream_decoder::predictor::Predictor;
+use splatstream_encoder::{
+    Encoder, Error, Finetune, FrameSource, Predictors, Preset, Settings, Size, Structure, encode,
+};
 use splatstream_files::builtin::{BuiltinScene, Tracking};
 use splatstream_gaussians::GaussianFrame;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -96,6 +99,8 @@ fn no_more_memory_is_taken_than_is_said() {
         let structure = Structure::Predicted { layers };
         Settings { structure, spatial_layers: 3, ..settings.clone() }
     };
+    let with_network =
+        |settings: Settings| Settings { predictors: Predictors::always(Predictor::Transformer), ..settings };
     let sized = Settings { size: Some(Size::BitsPerGaussian(90.0)), ..fast.clone() };
     let plain = Settings { psnr: None, verify: false, ..balanced.clone() };
     let pruned = Settings { prune: Some(45.0), ..balanced.clone() };
@@ -120,6 +125,7 @@ fn no_more_memory_is_taken_than_is_said() {
         ("predicted, fast, degree 3", moving(8_000, 3, 3), predicted(&fast, 1)),
         ("predicted", moving(5_000, 2, 3), predicted(&balanced, 3)),
         ("predicted, untracked", retrained(6_000, 0, 3), predicted(&fast, 2)),
+        ("with a network", retrained(6_000, 1, 4), with_network(predicted(&fast, 2))),
     ];
     for (name, frames, settings) in cases {
         said_and_taken(name, frames, &settings);

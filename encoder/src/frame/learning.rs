@@ -35,18 +35,34 @@ pub(crate) fn network(
     analysis: &Analysis,
 ) -> Result<Option<Network>, Error> {
     let sequence = &analysis.parameters;
-    if settings.profile() == Profile::Intra || !settings.predictors.allows(Predictor::Transformer) {
-        return Ok(None);
-    }
-    // Among other predictors it seldom saves what it takes.
-    let sought = !settings.predictors.allows(Predictor::Bilateral);
-    match settings.network.clone().or(sought.then_some(NetworkSource::Fitted)) {
+    match used(settings) {
         None => Ok(None),
         Some(NetworkSource::Given(network)) => Ok(Some(*network)),
         Some(NetworkSource::Registered) => registered(),
         Some(NetworkSource::Fitted) => trained(source, settings, sequence, &Architecture::BASES),
         Some(NetworkSource::Trained(architecture)) => trained(source, settings, sequence, &[architecture]),
     }
+}
+
+/// Where the network comes from, if one is used.
+fn used(settings: &Settings) -> Option<NetworkSource> {
+    let may_be_used =
+        settings.profile() != Profile::Intra && settings.predictors.allows(Predictor::Transformer);
+    // Among other predictors it seldom saves what it takes.
+    let is_sought = !settings.predictors.allows(Predictor::Bilateral);
+    may_be_used.then(|| settings.network.clone().or(is_sought.then_some(NetworkSource::Fitted))).flatten()
+}
+
+/// Bytes of the samples that networks are trained with while a sequence is encoded, whose frames have so many Gaussians.
+pub(crate) fn bytes_of_training(settings: &Settings, gaussians: u64, frames: u32) -> u64 {
+    let architectures = match used(settings) {
+        None | Some(NetworkSource::Given(_) | NetworkSource::Registered) => return 0,
+        Some(NetworkSource::Fitted) => Architecture::BASES.to_vec(),
+        Some(NetworkSource::Trained(architecture)) => vec![architecture],
+    };
+    // An architecture that is not allowed is refused before anything is sampled.
+    let of_samples = |architecture| bytes_of_samples(settings, architecture, gaussians, frames).unwrap_or(0);
+    architectures.iter().map(of_samples).fold(0, u64::saturating_add)
 }
 
 /// A network trained on the sequence, of the architecture whose base is nearer.
