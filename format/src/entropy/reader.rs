@@ -275,7 +275,8 @@ impl<'a> BlockReader<'a> {
             }
             let steps = start..segments.length().min(start.wrapping_add(WIDE));
             let tile = Tile { plane, known: &known, steps, segments };
-            match tile.steps.end <= segments.whole() {
+            // Blocks of few lanes are rare: not worth code of their own.
+            match GROUPS == MAX_LANES / WIDE && tile.steps.end <= segments.whole() {
                 true => self.tile::<S, M, GROUPS, true>(tile, contexts, &mut values),
                 false => self.tile::<S, M, GROUPS, false>(tile, contexts, &mut values),
             }
@@ -336,8 +337,7 @@ impl<'a> BlockReader<'a> {
             let quotient = machine.shr::<{ FREQUENCY_BITS.cast_signed() }>(state);
             let length = machine.and(machine.shr::<12>(entries), machine.splat(0xFFF));
             let product = machine.add(machine.mul(length, quotient), quotient);
-            // Groups have lanes that are none where a block has fewer than eight.
-            let mask = match WHOLE && GROUPS > 1 {
+            let mask = match WHOLE {
                 true => machine.splat(u32::MAX),
                 false => machine.greater(active_lanes, lane_of_group),
             };
