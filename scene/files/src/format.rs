@@ -47,11 +47,11 @@ pub enum SceneFormat {
     Gltf,
     /// Sections of Gaussians at three levels of compression: [`ksplat`].
     Ksplat,
-    /// Gaussians in continuous time: a [`Sequence`].
+    /// Gaussians in continuous time: a [`Sequence`](crate::sequence::Sequence).
     Splatv,
-    /// Frames of one count: a [`Sequence`].
+    /// Frames of one count: a [`Sequence`](crate::sequence::Sequence).
     Splat4d,
-    /// A ZIP or tar archive of scene files: a [`Sequence`].
+    /// A ZIP or tar archive of scene files: a [`Sequence`](crate::sequence::Sequence).
     Archive,
 }
 
