@@ -13,6 +13,7 @@
 use crate::attribute::{ATTRIBUTES, Attribute};
 use crate::error::Error;
 use crate::frame::grain::Grains;
+use crate::grid::{MAX_LOG_SCALE, MAX_OPACITY};
 use crate::importance::Ranked;
 use crate::laws::Laws;
 use crate::pca::Components;
@@ -228,7 +229,7 @@ impl Fit {
         let mut best = (steps, None);
         let mut next = Some(decibels);
         while let Some(at) = next {
-            let scaled = finer(steps, at - decibels);
+            let scaled = self.no_finer(finer(steps, at - decibels));
             let psnr = self.psnr(&scaled)?;
             // Where nothing can be seen nothing is too bad.
             if secant.take(at, psnr.unwrap_or(decibels)) {
@@ -237,6 +238,15 @@ impl Fit {
             next = secant.next();
         }
         Ok(best)
+    }
+
+    /// The same steps, but no finer than a stream can have them, whose values have 16 bits: a PSNR that needs finer ones is
+    /// missed, and not refused.
+    pub(crate) fn no_finer(&self, mut steps: Steps) -> Steps {
+        let ([scale, opacity], [scale_reach, opacity_reach, ..]) = (self.scene.means, self.scene.reach);
+        steps.log_scale = steps.log_scale.max((scale.abs() + scale_reach) / MAX_LOG_SCALE);
+        steps.opacity = steps.opacity.max((opacity.abs() + opacity_reach) / MAX_OPACITY);
+        steps
     }
 
     /// PSNR of pictures with all attributes on their grids, dB.

@@ -189,7 +189,7 @@ impl<'a> Fitting<'a> {
         let apart = |known: &&(f64, Steps, Option<f64>)| (known.0 - decibels).abs();
         let nearest = self.known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
-            Some((from, steps, _)) => finer(*steps, decibels - from),
+            Some((from, steps, _)) => self.fit.no_finer(finer(*steps, decibels - from)),
             None => {
                 let (steps, psnr) = self.fit.at(decibels as f32)?;
                 self.known.push((decibels, steps, psnr));

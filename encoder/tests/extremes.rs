@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Error, Preset, Quality, Settings, Steps, Structure, encode};
+use splatstream_files::builtin::BuiltinScene;
 use splatstream_gaussians::{GaussianFrame, Planes};
 use std::ops::ControlFlow;
 
@@ -102,6 +103,21 @@ fn opposite_rotations_and_opacities_are_coded_with_the_finest_steps() {
         let settings = Settings { steps, structure, spatial_layers: 2, gop: 2, ..settings() };
         let mut stream = Vec::new();
         encode(&mut vec![frame(1.0), frame(-1.0)], &settings, &mut stream, &mut |_, _| {}).unwrap();
+        let summary = decode_stream(&stream, &Options::default(), |_, _| ControlFlow::Continue(()));
+        assert_eq!(summary.verdict(), None);
+    }
+}
+
+/// A PSNR that needs finer steps than values of 16 bits have is missed, and reported as it is.
+#[test]
+fn a_quality_out_of_reach_is_no_error() {
+    for (preset, gaussians) in [(Preset::Fast, 100), (Preset::Balanced, 100), (Preset::Fast, 5_000)] {
+        let scene = BuiltinScene { gaussians, frames: 1, ..BuiltinScene::default() };
+        let settings = Settings { psnr: Some(90.0), verify: true, ..Settings::of(preset) };
+        let mut stream = Vec::new();
+        let report = encode(&mut vec![scene.frame(0)], &settings, &mut stream, &mut |_, _| {}).unwrap();
+        let reached = report.pictures.and_then(|pictures| pictures.fitted_psnr()).unwrap();
+        assert!((60.0..92.0).contains(&reached), "{reached}");
         let summary = decode_stream(&stream, &Options::default(), |_, _| ControlFlow::Continue(()));
         assert_eq!(summary.verdict(), None);
     }
