@@ -56,6 +56,8 @@ const NEAR_GUESSED: f64 = 0.3;
 /// What pictures gain where steps are fitted for a decibel more: of most scenes, and where estimates alone are near.
 const SLOPE: f64 = 1.0;
 const SLOPE_GUESSED: f64 = 0.85;
+/// Magnitudes of log-scales and opacities beyond which they are mistakes, and not for steps to follow.
+const USUAL: [f32; 2] = [24.0, 100.0];
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// All steps finer by one factor: as if pictures gained so many decibels.
@@ -241,11 +243,12 @@ impl Fit {
     }
 
     /// The same steps, but no finer than a stream can have them, whose values have 16 bits: a PSNR that needs finer ones is
-    /// missed, and not refused.
+    /// missed, and not refused. For values that are mistakes steps stay as fine as they are: these values are refused.
     pub(crate) fn no_finer(&self, mut steps: Steps) -> Steps {
         let ([scale, opacity], [scale_reach, opacity_reach, ..]) = (self.scene.means, self.scene.reach);
-        steps.log_scale = steps.log_scale.max((scale.abs() + scale_reach) / MAX_LOG_SCALE);
-        steps.opacity = steps.opacity.max((opacity.abs() + opacity_reach) / MAX_OPACITY);
+        let least = |[usual, mean, reach]: [f32; 3], most: f32| usual.min(mean.abs() + reach) / most;
+        steps.log_scale = steps.log_scale.max(least([USUAL[0], scale, scale_reach], MAX_LOG_SCALE));
+        steps.opacity = steps.opacity.max(least([USUAL[1], opacity, opacity_reach], MAX_OPACITY));
         steps
     }
 
