@@ -114,6 +114,10 @@ impl StreamDecoder {
             return Ok(self.frame(frame));
         }
         loop {
+            // What is left of the stream may be long, and none of it is needed.
+            if self.interrupt.is_requested() {
+                return Ok(Step::End);
+            }
             let used = self.position().checked_sub(start).and_then(|used| usize::try_from(used).ok());
             let rest = match used.map(|used| bytes.get(used..)) {
                 Some(Some(rest)) => rest,

@@ -2,6 +2,8 @@
 
 use super::vectors;
 use splatstream::{Cancel, Decoder, Error, Limits};
+use splatstream_decoder::process::Options;
+use splatstream_decoder::stream::{Step, StreamDecoder};
 use std::sync::Arc;
 
 fn verdict(limits: Limits) -> Result<usize, Error> {
@@ -70,6 +72,20 @@ fn a_decoder_that_is_cancelled_says_so_and_can_seek() {
     decoder.set_cancel(Cancel::new());
     decoder.seek(splatstream::Position::Frame(3)).unwrap();
     assert_eq!(decoder.next_frame().unwrap().unwrap().index(), 3);
+}
+
+#[test]
+fn what_follows_an_interrupt_is_not_read() {
+    let (bytes, interrupt) = (vectors::talk(), Cancel::new());
+    let mut decoder = StreamDecoder::new(&Options::default());
+    decoder.set_interrupt(interrupt.clone());
+    let step = decoder.next_step(&bytes, true).unwrap();
+    assert!(matches!(step, Step::Frame(_)));
+    interrupt.request();
+    let position = decoder.position();
+    let rest = &bytes[usize::try_from(position).unwrap()..];
+    assert!(matches!(decoder.next_step(rest, true), Ok(Step::End)));
+    assert_eq!(decoder.position(), position);
 }
 
 #[test]

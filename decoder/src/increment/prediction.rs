@@ -154,7 +154,7 @@ impl<'s> Prediction<'s> {
         if stage == Stage::Dc
             && let Some(learned) = self.learned()
         {
-            learned.predict(&self.targets(), attributes);
+            learned.predict(self, attributes);
         }
     }
 
@@ -182,20 +182,27 @@ impl<'s> Prediction<'s> {
 
     /// The items that the network predicts, once all attributes before dc are known.
     pub fn targets(&self) -> Vec<Target<'_>> {
-        let gated = self.network.as_ref().is_some_and(|network| network.header().gated());
-        let target = |(index, item): (usize, &Item)| {
-            let weights = self.weights(index, item.predictor);
-            // No other network looks at them.
-            let affinities =
-                if gated { self.weights(index, Predictor::Bilateral) } else { [0; NEIGHBOURS_MAX] };
-            let neighbours = self.neighbours.get(self.range(index)).unwrap_or_default();
-            let indices = self.rows.indices(self.range(index));
-            let position = self.position.each_ref().map(|plane| plane.get(index).copied().unwrap_or(0));
-            Target { row: item.row, position, neighbours, indices, weights, affinities }
-        };
+        let items = self.learned_items();
+        cores::map(items.len().saturating_mul(self.count), items, |item| self.target(item))
+    }
+
+    /// The numbers of the items that the network predicts.
+    fn learned_items(&self) -> Vec<usize> {
         let items = self.items.iter().enumerate();
-        let items: Vec<_> = items.filter(|(_, item)| item.predictor == Predictor::Transformer).collect();
-        cores::map(items.len().saturating_mul(self.count), items, target)
+        items.filter(|(_, item)| item.predictor == Predictor::Transformer).map(|(number, _)| number).collect()
+    }
+
+    /// An item that the network predicts.
+    fn target(&self, number: usize) -> Target<'_> {
+        let gated = self.network.as_ref().is_some_and(|network| network.header().gated());
+        let weights = self.weights(number, Predictor::Transformer);
+        // No other network looks at them.
+        let affinities = if gated { self.weights(number, Predictor::Bilateral) } else { [0; NEIGHBOURS_MAX] };
+        let neighbours = self.neighbours.get(self.range(number)).unwrap_or_default();
+        let indices = self.rows.indices(self.range(number));
+        let position = self.position.each_ref().map(|plane| plane.get(number).copied().unwrap_or(0));
+        let row = self.items.get(number).map_or(0, |item| item.row);
+        Target { row, position, neighbours, indices, weights, affinities }
     }
 
     /// The indices of an item's neighbours.

@@ -2,7 +2,7 @@
 
 use super::projection::{COLOURS_MAX, Colour, Components, Projection};
 use super::rows::Rows;
-use super::{Attributes, RUN, at, set_row};
+use super::{Attributes, Prediction, RUN, at, set_row};
 use crate::cores;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
@@ -48,26 +48,35 @@ fn values_of(targets: &[Target<'_>]) -> usize {
 }
 
 impl Learned<'_> {
-    /// Overwrites the colours of the targets in `attributes` with those that the network predicts. Their
-    /// log-scales, opacities and rotations have been reconstructed.
-    pub fn predict(&self, targets: &[Target<'_>], attributes: &mut Attributes) {
-        let components = self.components(targets);
-        let of_run = |run: &[Target<'_>]| match self.interrupt.is_requested() {
-            true => Vec::new(),
-            false => self.colours(run, attributes, &components),
+    /// Overwrites the colours of the Gaussians that the network predicts. Their log-scales, opacities and rotations have been
+    /// reconstructed. Each run of [`LANES`] is looked at by itself, so that nothing is held for all of them but their colours.
+    pub(super) fn predict(&self, prediction: &Prediction<'_>, attributes: &mut Attributes) {
+        let items = prediction.learned_items();
+        let indices = items.iter().take_while(|_| !self.interrupt.is_requested());
+        let components =
+            self.components(indices.map(|&item| prediction.rows.indices(prediction.range(item))));
+        let of_run = |run: &[usize]| -> Vec<(u32, Colour)> {
+            if self.interrupt.is_requested() {
+                return Vec::new();
+            }
+            let targets: Vec<_> = run.iter().map(|&item| prediction.target(item)).collect();
+            let colours = self.colours(&targets, attributes, &components);
+            targets.iter().map(|target| target.row).zip(colours).collect()
         };
-        let predicted: Vec<Vec<Colour>> =
-            cores::map(values_of(targets), targets.chunks(LANES).collect(), of_run);
-        for (target, colour) in targets.iter().zip(predicted.into_iter().flatten()) {
+        let runs = items.chunks(LANES).collect();
+        let predicted = cores::map(items.len().saturating_mul(INPUTS_MAX), runs, of_run);
+        let runs = predicted.iter().take_while(|_| !self.interrupt.is_requested());
+        for (row, colour) in runs.flatten() {
             let (dc, sh) = colour.split_at(3);
-            set_row(&mut attributes.dc, target.row, dc.iter().copied());
-            set_row(&mut attributes.sh, target.row, sh.iter().copied());
+            set_row(&mut attributes.dc, *row, dc.iter().copied());
+            set_row(&mut attributes.sh, *row, sh.iter().copied());
         }
+        self.interrupt.leave((predicted, components));
     }
 
     /// What the network sees of targets, [`LANES`] of them in each batch. The encoder trains with it.
     pub fn batches(&self, targets: &[Target<'_>], attributes: &Attributes) -> Vec<Batch> {
-        let components = self.components(targets);
+        let components = self.components(targets.iter().map(|target| target.indices));
         let batch = |run: &[Target<'_>]| self.batch(run, &self.bases(run), attributes, &components);
         cores::map(values_of(targets), targets.chunks(LANES).collect(), batch)
     }
@@ -87,10 +96,10 @@ impl Learned<'_> {
         cores::map(values_of(targets), targets.iter().collect(), of_target)
     }
 
-    /// The components of every row that is a neighbour of a target; of the others 0.
-    fn components(&self, targets: &[Target<'_>]) -> Vec<Components> {
+    /// The components of every row that is a neighbour of a target, whose `indices` these are; of the others 0.
+    fn components<'i>(&self, indices: impl Iterator<Item = &'i [u32]>) -> Vec<Components> {
         let mut used = vec![false; self.rows.len()];
-        for &index in targets.iter().flat_map(|target| target.indices) {
+        for &index in indices.flatten() {
             if let Some(used) = used.get_mut(index as usize) {
                 *used = true;
             }
