@@ -311,8 +311,9 @@ impl Scene {
         let [scale, opacity, dc, sh] = self.reach;
         // Parts of a rotation are at most 1; with finer steps those of two that are opposite could not be told apart.
         let rotation = steps.rotation.max(1.0 / MAX_DIFFERING);
-        // What lies beside the mean of colours adds a little.
-        let colour = |step: f32, norm: f32| finest(step, 1.25 * norm, *COMPONENT_RANGE.end() as f32);
+        // What lies beside the mean of colours adds a little. Finer steps than components of colour can have would cut colours off.
+        let most = *COMPONENT_RANGE.end() as f32;
+        let colour = |step: f32, norm: f32| finest(step.max(1.25 * norm / most), 1.25 * norm, most);
         let mut parameters = SequenceParameters {
             sh_degree,
             spatial_layer_count: settings.spatial_layer_count(),

@@ -122,3 +122,19 @@ fn a_quality_out_of_reach_is_no_error() {
         assert_eq!(summary.verdict(), None);
     }
 }
+
+/// Components of colour have 14 bits: with steps that would need more they keep those that they have.
+#[test]
+fn colours_are_not_cut_off_by_steps_that_are_too_fine() {
+    let quality = |dc: f32, sh: f32| {
+        let scene = BuiltinScene { gaussians: 1_000, frames: 1, ..BuiltinScene::default() };
+        let fine = Steps { position_bits: 16.0, log_scale: 0.001, rotation: 0.001, opacity: 0.001, dc, sh };
+        let settings = Settings { steps: fine, verify: true, ..Settings::of(Preset::Fast) };
+        let mut stream = Vec::new();
+        let report = encode(&mut vec![scene.frame(0)], &settings, &mut stream, &mut |_, _| {}).unwrap();
+        report.pictures.unwrap().frames[0].psnr.unwrap()
+    };
+    let usual = quality(0.001, 0.002);
+    let finest = quality(1e-6, 1e-6);
+    assert!(usual > 60.0 && finest > usual - 1.0, "{usual} {finest}");
+}
