@@ -78,7 +78,7 @@ impl Share {
 const INTRA_FAST: Share = Share { copies: 27, bytes: 80 };
 const INTRA: Share = Share { copies: 33, bytes: 240 };
 /// Gaussians that are in the strips of the views in which steps are fitted, were they seven times as large as usual; where there are
-/// many, there are fewer strips.
+/// many, the balanced preset has as few strips as the fast one.
 const IN_STRIPS_FAST: Share = Share { copies: 20, bytes: 10 };
 const IN_STRIPS: Share = Share { copies: 40, bytes: 20 };
 /// Coding predicted frames: references, what pairs them with the frame, and what becomes of each Gaussian in two ways.
@@ -179,10 +179,10 @@ impl<'a> Footprint<'a> {
         let share = match (self.settings.has_target(), self.settings.preset) {
             (false, _) => return 0,
             (true, Preset::Fast) => IN_STRIPS_FAST,
+            (true, Preset::Balanced | Preset::Small) if self.gaussians > MANY as u64 => IN_STRIPS_FAST,
             (true, Preset::Balanced | Preset::Small) => IN_STRIPS,
         };
-        let fewer = self.gaussians.div_ceil(MANY as u64).max(1);
-        share.of(values(self.sh_degree)).div_ceil(fewer)
+        share.of(values(self.sh_degree))
     }
 
     /// What waits of the frames of a GOP once they are coded, bytes of a Gaussian.

@@ -12,9 +12,13 @@ use splatstream_render::{Camera, PreparedFrame, Rendering, Strips, draw_strips, 
 const BACKGROUND: [f32; 3] = [0.0; 3];
 
 /// Frames of fewer Gaussians than the first have more strips, for the errors of a few small Gaussians are in few places;
-/// those of more than the second have fewer.
+/// those of more than the second have fewer, if they have [enough](FEWEST).
 pub(crate) const FEW: usize = 1 << 15;
 pub(crate) const MANY: usize = 1 << 19;
+
+/// Of each view there are about so many strips at least: of a picture whose middle is full and whose edges are empty, one strip
+/// says either too much or too little.
+const FEWEST: u32 = 3;
 
 /// Strips that touch this part of what whole pictures show are enough, of however few Gaussians: these are large.
 const NEARLY_ALL: f64 = 0.99;
@@ -24,7 +28,9 @@ const NEARLY_ALL: f64 = 0.99;
 fn strip_of(every: u32, cameras: &[Camera], frame: &GaussianFrame) -> u32 {
     let gaussians = frame.len();
     if gaussians >= FEW {
-        return every * gaussians.div_ceil(MANY) as u32;
+        let lines = cameras.iter().map(|camera| camera.height).min().unwrap_or_default();
+        let farthest = lines.div_ceil(Strips::LINES).div_ceil(FEWEST).max(1);
+        return (every * gaussians.div_ceil(MANY) as u32).min(farthest);
     }
     let touched = |every: u32| -> usize {
         let views = cameras.iter().zip(0..);

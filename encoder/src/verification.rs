@@ -25,12 +25,12 @@ use splatstream_render::camera::held_out_twice;
 /// Views of each frame that decide nothing, as many as there are that decide, and their height: with other heights PSNR is
 /// another number.
 const VIEWS: u32 = 4;
-const HEIGHT: u32 = 540;
+pub(crate) const HEIGHT: u32 = 540;
 
 /// Of so many strips of a view one is drawn: of those that decide how fine steps are, and of those that decide nothing; and
-/// for the fast preset.
+/// for the fast preset of either.
 pub(crate) const EVERY: [u32; 2] = [6, 12];
-const EVERY_FAST: [u32; 2] = [12, 24];
+const EVERY_FAST: u32 = 12;
 
 /// Keeps units while they are written, and the frames that they decode to.
 pub(crate) struct Verifier {
@@ -207,11 +207,11 @@ impl Views {
     /// Of the views that a scene comes with, or all around it; each set lies between the other.
     pub(crate) fn of(frame: &GaussianFrame, settings: &Settings) -> Self {
         let [of_fit, of_report] = match settings.preset {
-            Preset::Fast => EVERY_FAST,
+            Preset::Fast => [EVERY_FAST; 2],
             Preset::Balanced | Preset::Small => EVERY,
         };
-        let strips = |cameras, every| StripViews::new(cameras, every, frame);
         let [cameras, other] = held_out_twice(frame, settings.up(), &settings.cameras, VIEWS, HEIGHT);
+        let strips = |cameras, every| StripViews::new(cameras, every, frame);
         Self { unseen: strips(other, of_report), of_fit: strips(cameras, of_fit) }
     }
 }
