@@ -60,6 +60,9 @@ const SLOPE_GUESSED: f64 = 0.85;
 const USUAL: [f32; 2] = [24.0, 100.0];
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
+/// The step of one attribute changes by no more than this factor at once: the model is local.
+const LARGEST_CHANGE: f64 = 8.0;
+
 /// All steps finer by one factor: as if pictures gained so many decibels.
 pub(crate) fn finer(mut steps: Steps, decibels: f64) -> Steps {
     let factor = libm::exp2(-decibels / DECIBELS_AN_OCTAVE);
@@ -302,7 +305,7 @@ impl Fit {
             // What costs nothing or cannot be seen keeps its step, and all do where errors are beyond numbers.
             let factor = (error * share / slope / own).sqrt();
             if own > 0.0 && share > 0.0 && factor.is_finite() {
-                attribute.scale(&mut steps, factor);
+                attribute.scale(&mut steps, factor.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE));
             }
         }
         steps

@@ -2,9 +2,6 @@
 
 use crate::steps::Steps;
 
-/// Steps change by no more than this factor at once: the model is local.
-const LARGEST_CHANGE: f64 = 8.0;
-
 /// What has a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Attribute {
@@ -35,7 +32,6 @@ pub(crate) const ATTRIBUTES: [Attribute; 6] = [
 impl Attribute {
     /// Makes a step coarser by `factor`, within what is sensible.
     pub(crate) fn scale(self, steps: &mut Steps, factor: f64) {
-        let factor = factor.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
         let scaled =
             |step: f32, most: f32| ((f64::from(step) * factor) as f32).clamp(2.0_f32.powi(-20), most);
         match self {

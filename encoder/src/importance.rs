@@ -2,12 +2,14 @@
 
 use crate::frame::visible_difference::pixel;
 use crate::settings::{Importance, Preset, Settings};
+use crate::verification::HEIGHT;
 use rayon::prelude::*;
 use splatstream_format::syntax::prefix_length;
 use splatstream_gaussians::{GaussianFrame, importance};
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::contribution::{SmallViews, Worth};
+use splatstream_render::rasterise::LOW_PASS;
 
 /// The Gaussians of a frame, most important first, and what pictures show of them.
 #[derive(Debug, Clone, Default)]
@@ -19,18 +21,9 @@ pub(crate) struct Ranked {
     pub(crate) level: f64,
 }
 
-/// Whether it is known what hides a Gaussian; see [`Ranked::level`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Hiding {
-    /// What others hide counts as shown.
-    Ignored,
-    /// What others hide does not show.
-    Known,
-}
-
-/// By how much pictures of real scenes near 50 dB are better than sums of estimated errors let expect, decibels: what is
-/// hidden makes no errors, and those of Gaussians that overlap add up.
-const BETTER_UNHIDDEN: f64 = 10.2;
+/// By how much pictures of real scenes near 50 dB are better than sums of estimated errors let expect, decibels, where it is not
+/// known what hides a Gaussian, and where it is: errors of Gaussians that overlap add up.
+const BETTER_UNHIDDEN: f64 = 5.2;
 const BETTER_HIDDEN: f64 = -4.0;
 
 /// Orders the frames of a sequence, most important Gaussian first.
@@ -111,8 +104,8 @@ impl Ranking {
         if ranked.shown.is_empty() {
             self.cameras(frame);
             (ranked.shown, ranked.level) = match self.preset {
-                Preset::Fast => (unhidden(frame, &self.cameras), self.level(Hiding::Ignored)),
-                Preset::Balanced | Preset::Small => (self.views(frame).worth(), self.level(Hiding::Known)),
+                Preset::Fast => self.unhidden(frame),
+                Preset::Balanced | Preset::Small => (self.views(frame).worth(), self.level()),
             };
         }
         self.known_order = Some(ranked.order.clone());
@@ -138,9 +131,8 @@ impl Ranking {
             ranked(&scores, &volume, &all(frame.len()))
         };
         if self.importance == Importance::Footprint {
-            let shown = unhidden(frame, &self.cameras);
-            let order = by(&shown, |worth| worth.energy);
-            return Ranked { order, shown, level: self.level(Hiding::Ignored) };
+            let (shown, level) = self.unhidden(frame);
+            return Ranked { order: by(&shown, |worth| worth.energy), shown, level };
         }
         let views = self.views(frame);
         let shown = views.worth();
@@ -148,25 +140,28 @@ impl Ranking {
             Importance::Removal => self.eliminate(views, &volume, &shown),
             _ => by(&shown, |worth| worth.contribution),
         };
-        Ranked { order, shown, level: self.level(Hiding::Known) }
+        Ranked { order, shown, level: self.level() }
     }
 
-    /// See [`Ranked::level`]; of the cameras in use.
-    fn level(&self, hiding: Hiding) -> f64 {
-        let all = |cameras: &[Camera]| -> f64 {
-            cameras.iter().map(|camera| f64::from(camera.width) * f64::from(camera.height)).sum()
-        };
-        let (better, pixels) = match hiding {
-            // What is shown is a mean of the cameras.
-            Hiding::Ignored => (BETTER_UNHIDDEN, all(&self.cameras) / self.cameras.len().max(1) as f64),
-            Hiding::Known => {
-                let (cameras, lines) = self.small();
-                let small = |camera: &Camera| camera.scaled_to_height(lines.min(camera.height));
-                (BETTER_HIDDEN, all(&cameras.iter().map(small).collect::<Vec<_>>()))
-            }
-        };
-        // Errors are squares of three channels.
-        better + 10.0 * libm::log10(3.0 * pixels.max(1.0))
+    /// What pictures would show of Gaussians if no other hid them, and its [level](Ranked::level).
+    ///
+    /// Behind Gaussians that cover a picture so many times, of which each passes on what it does not cover, about that much of the
+    /// squared light is left on the mean of the way.
+    fn unhidden(&self, frame: &GaussianFrame) -> (Vec<Worth>, f64) {
+        let shown = unhidden(frame, &self.cameras);
+        // What is shown is a mean of the cameras.
+        let pixels = pixels(&self.cameras) / self.cameras.len().max(1) as f64;
+        let covered: f64 = shown.iter().map(|worth| worth.contribution).sum();
+        let times = 2.0 * core::f64::consts::TAU * covered / pixels.max(1.0);
+        let left = if times > 0.0 { -libm::expm1(-times) / times } else { 1.0 };
+        (shown, BETTER_UNHIDDEN + of_pixels(pixels) - 10.0 * libm::log10(left))
+    }
+
+    /// See [`Ranked::level`]; of the views that orders go by.
+    fn level(&self) -> f64 {
+        let (cameras, lines) = self.small();
+        let small = |camera: &Camera| camera.scaled_to_height(lines.min(camera.height));
+        BETTER_HIDDEN + of_pixels(pixels(&cameras.iter().map(small).collect::<Vec<_>>()))
     }
 
     /// A GOP begins with a frame. Its views are those of the sequence, so that orders do not change from GOP to GOP, unless
@@ -269,15 +264,32 @@ fn middle(cameras: &[Camera]) -> [f32; 3] {
     sum.map(|axis: f32| axis / cameras.len().max(1) as f32)
 }
 
+/// Pixels of pictures.
+fn pixels(cameras: &[Camera]) -> f64 {
+    cameras.iter().map(|camera| f64::from(camera.width) * f64::from(camera.height)).sum()
+}
+
+/// The PSNR of so many pixels, decibels, whose squared errors sum up to 1: squares of three channels.
+fn of_pixels(pixels: f64) -> f64 {
+    10.0 * libm::log10(3.0 * pixels.max(1.0))
+}
+
 /// What pictures would show of each Gaussian if no other hid it: from its opacity, and from the pixels that it covers.
+///
+/// The low-pass filter of a renderer widens what is smaller than a pixel, and with antialiasing fades it by as much. It is that
+/// of pictures of as many lines as quality is measured in, whatever the cameras have.
 #[expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
 pub(crate) fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
+    let lines = cameras.iter().map(|camera| camera.height as f32).sum::<f32>() / cameras.len().max(1) as f32;
+    let filter = LOW_PASS * (lines / HEIGHT as f32).powi(2);
     let of_row = |row: usize| {
-        let scales = frame.log_scale().each_ref().map(|plane| plane[row]);
-        let least = scales.into_iter().fold(f32::INFINITY, f32::min);
+        let mut scales = frame.log_scale().each_ref().map(|plane| plane[row]);
+        scales.sort_unstable_by(f32::total_cmp);
         let pixel = pixel(frame, row, cameras).max(f32::MIN_POSITIVE);
-        let area = libm::expf(scales.iter().sum::<f32>() - least) / (pixel * pixel);
-        let opacity = 1.0 / (1.0 + libm::expf(-frame.opacity_logit()[row]));
+        let [across, along] = [scales[1], scales[2]].map(|scale| libm::expf(2.0 * scale) / (pixel * pixel));
+        let area = ((across + filter) * (along + filter)).sqrt();
+        let kept = if frame.antialiased() { (across * along).sqrt() / area } else { 1.0 };
+        let opacity = kept / (1.0 + libm::expf(-frame.opacity_logit()[row]));
         let [contribution, energy] = [opacity * area, opacity * opacity * area].map(f64::from);
         Worth { contribution, loss: energy, energy }
     };

@@ -15,8 +15,9 @@ mod tile;
 use crate::camera::Camera;
 use crate::image::Image;
 pub(crate) use lanes::{Lanes, TILE};
+pub use project::LOW_PASS;
 use project::project;
-pub(crate) use project::{LOW_PASS, Shapes, Splat, near, seen_slopes};
+pub(crate) use project::{Shapes, Splat, near, seen_slopes};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use reach::reachable;
@@ -123,6 +124,9 @@ pub struct Strips {
 impl Strips {
     /// The whole picture.
     pub const ALL: Self = Self { first: 0, every: 1 };
+
+    /// Lines of a strip.
+    pub const LINES: u32 = TILE as u32;
 
     /// As many of them, of a picture of so many strips.
     fn within(self, count: usize) -> Self {

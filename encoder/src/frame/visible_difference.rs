@@ -9,6 +9,7 @@ use super::axis_matching::Pose;
 use crate::canonical::product;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
+use splatstream_render::rasterise::LOW_PASS;
 
 /// The square of a bell's derivative by its place in units of its width, and by the log of its width on one axis, as a
 /// part of its own square. Each axis is seen from two of three sides.
@@ -46,8 +47,7 @@ impl Shown {
     /// Of a Gaussian with this pose.
     pub(crate) fn new(seen: &Seen, pose: &Pose) -> Self {
         let squares = pose.log_scale.map(|value| libm::expf(2.0 * value));
-        // The filter adds 0.3 of a squared pixel.
-        let filtered = squares.map(|square| square + 0.3 * seen.pixel * seen.pixel);
+        let filtered = squares.map(|square| square + LOW_PASS * seen.pixel * seen.pixel);
         let share = [0, 1, 2].map(|axis: usize| squares[axis] / filtered[axis]);
         Self {
             loss: seen.loss,

@@ -17,7 +17,7 @@ use std::ops::Range;
 const NEAR: f32 = 1.0 / 256.0;
 
 /// Variance that the low-pass filter adds on each axis, square pixels.
-pub(crate) const LOW_PASS: f32 = 0.3;
+pub const LOW_PASS: f32 = 0.3;
 
 /// -log2 of the least alpha drawn, 1/255.
 pub(crate) const LOG2_255: f32 = 7.994_353_4;
