@@ -114,7 +114,7 @@ impl Decode {
             return Err(failure);
         }
         let verdict = summary.verdict();
-        let loss = Loss::new(&stream, announced, &options, &summary, frames);
+        let loss = Loss::new(&stream, announced, &options, &summary, frames, &decoding.shown.indices());
         let report = Report { seek, ..self.report(decoding, loss, announced, total) };
         report.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         // Of a file that is no stream there is nothing to say but the error.

@@ -11,7 +11,6 @@ use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_format::Limits;
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::slice;
 
@@ -73,25 +72,12 @@ fn is_damaged(frame: &Frame) -> bool {
     frame.span.damaged || frame.increments.iter().any(|increment| increment.span.damaged)
 }
 
-/// What a stream lacks of the frames that it announces.
-fn lost(whole: &Structure, announced: u32) -> Vec<(u32, u32)> {
-    let there: BTreeSet<u32> = frames_of(whole).map(|frame| frame.index).collect();
-    let mut next = 0;
-    let mut lost = Vec::new();
-    for index in there.into_iter().chain([announced]) {
-        if index > next {
-            lost.push((next, index - 1));
-        }
-        next = index.saturating_add(1);
-    }
-    lost
-}
-
 impl Report {
     fn new(command: &Extract, stream: &StreamFile, extracted: &[u8], limits: &Limits) -> Self {
         let (whole, part) = (Structure::of(&stream.bytes, limits), Structure::of(extracted, limits));
         let announced = whole.sequence.map(|sequence| sequence.frame_count).filter(|&count| count > 0);
-        let lost = lost(&whole, announced.unwrap_or(0));
+        let there = frames_of(&whole).map(|frame| frame.index).collect();
+        let lost = whole.missing(&there, announced, OperatingPoint::ALL);
         let damaged: Vec<u32> =
             frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
         Self {

@@ -9,7 +9,7 @@ use splatstream_format::syntax::{
 };
 use splatstream_format::unit::{Landmark, Stream, Unit};
 use splatstream_format::{Error, Limits, Result};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What a stream is made of.
 #[derive(Default)]
@@ -20,8 +20,8 @@ pub(crate) struct Structure {
     pub(crate) sequence: Option<SequenceParameters>,
     /// The GOPs.
     pub(crate) gops: Vec<Gop>,
-    /// The operating points that it lists.
-    pub(crate) points: Vec<OperatingPoint>,
+    /// The operating points that it lists, and how many frames it has at each.
+    pub(crate) points: Vec<(OperatingPoint, u32)>,
     /// The first error of headers, checksums and lengths.
     pub(crate) error: Option<Error>,
     /// Whether units belong to the last GOP: not after a damaged gop_header.
@@ -163,6 +163,66 @@ impl Structure {
         self.sequence.map_or(0, |sequence| sequence.spatial_layer_count.saturating_sub(1))
     }
 
+    /// The listed points up to `point`, and how many frames the stream has at each.
+    pub(crate) fn points_up_to(&self, point: OperatingPoint) -> impl Iterator<Item = (OperatingPoint, u32)> {
+        self.points.iter().copied().filter(move |(listed, _)| {
+            listed.spatial <= point.spatial
+                && listed.temporal <= point.temporal
+                && listed.refinement <= point.refinement
+        })
+    }
+
+    /// First and last display index of each run of frames that the stream says it has at a point and that are not
+    /// `there`. Where it does not say how many it has (`announced`), none is missing after the last one.
+    pub(crate) fn missing(
+        &self,
+        there: &BTreeSet<u32>,
+        announced: Option<u32>,
+        point: OperatingPoint,
+    ) -> Vec<(u32, u32)> {
+        let end = announced.unwrap_or_else(|| there.last().map_or(0, |last| last.saturating_add(1)));
+        let layer = self.temporal_layer(point);
+        let mut missing = Vec::new();
+        // All indices from `next` on that are not there. Their number may be anything: only those that are there are visited.
+        let mut between = |next: u32, end: u32| {
+            let mut next = next;
+            for &index in there.range(next.min(end)..end).chain([&end]) {
+                if index > next {
+                    add_run(&mut missing, next, index - 1);
+                }
+                next = index.saturating_add(1);
+            }
+        };
+        let mut next = 0;
+        for gop in self.gops.iter().filter(|gop| gop.header.is_predicted()) {
+            between(next, gop.first_frame.min(end));
+            for index in next.max(gop.first_frame)..gop.end().min(end) {
+                let is_of_point = gop.header.role(index - gop.first_frame).temporal_layer <= layer;
+                if is_of_point && !there.contains(&index) {
+                    between(index, index + 1);
+                }
+            }
+            next = next.max(gop.end());
+        }
+        between(next, end);
+        missing
+    }
+
+    /// The highest temporal layer of which the stream has frames at a point. Points of an extracted stream are listed with
+    /// temporal layers that are no longer there, but not with their frames.
+    fn temporal_layer(&self, point: OperatingPoint) -> u8 {
+        match self.points_up_to(point).max() {
+            Some((_, frames)) => {
+                let as_many = self.points_up_to(point).filter(|&(_, count)| count == frames);
+                as_many.map(|(listed, _)| listed.temporal).min().unwrap_or(0)
+            }
+            None => {
+                let frames = self.gops.iter().flat_map(|gop| &gop.frames);
+                frames.map(|frame| frame.role.temporal_layer).max().unwrap_or(0).min(point.temporal)
+            }
+        }
+    }
+
     fn note(&mut self, checked: Result<()>) {
         self.error = self.error.or(checked.err());
     }
@@ -218,7 +278,7 @@ impl Structure {
             Content::OperatingPoints(points) => {
                 let point = |entry: &OperatingPointEntry| {
                     let (spatial, temporal, refinement) = entry.key();
-                    OperatingPoint { spatial, temporal, refinement }
+                    (OperatingPoint { spatial, temporal, refinement }, entry.frame_count)
                 };
                 self.points = points.entries.iter().map(point).collect();
             }
@@ -275,6 +335,14 @@ impl Structure {
         codebooks.dedup();
         let predicts = header.predictor_count() > 0;
         UsedTools { codebooks, weights: self.definitions.weights.filter(|_| predicts) }
+    }
+}
+
+/// Adds a run of indices to runs, of which those that touch are joined.
+pub(crate) fn add_run(runs: &mut Vec<(u32, u32)>, first: u32, last: u32) {
+    match runs.last_mut() {
+        Some((_, end)) if end.saturating_add(1) >= first => *end = last.max(*end),
+        _ => runs.push((first, last)),
     }
 }
 

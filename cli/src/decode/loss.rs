@@ -3,11 +3,12 @@
 use crate::failure::StreamFault;
 use crate::numbers::FrameRange;
 use crate::stream_file::StreamFile;
-use crate::structure::{Gop, Structure};
+use crate::structure::{Gop, Structure, add_run};
 use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::Summary;
+use std::collections::BTreeSet;
 
 /// Errors, and frames that were never output.
 #[derive(Serialize)]
@@ -22,34 +23,35 @@ pub(super) struct Loss {
 }
 
 impl Loss {
-    /// What decoding found of the frames that were asked for.
+    /// What decoding found of the frames that were asked for, of which those of `shown` were output.
     pub(super) fn new(
         stream: &StreamFile,
         announced: u32,
         options: &Options,
         summary: &Summary,
         frames: FrameRange,
+        shown: &BTreeSet<u32>,
     ) -> Self {
-        let mut lost: Vec<(u32, u32)> =
+        let mut found: Vec<(u32, u32)> =
             summary.lost.iter().map(|range| (*range.start(), *range.end())).collect();
         let mut listed = None;
         if !summary.errors.is_empty() {
-            let Structure { gops, points, .. } = Structure::of(&stream.bytes, &options.limits);
-            let asked = options.operating_point;
-            let is_asked = |point: &OperatingPoint| {
-                point.spatial <= asked.spatial
-                    && point.temporal <= asked.temporal
-                    && point.refinement <= asked.refinement
+            let structure = Structure::of(&stream.bytes, &options.limits);
+            let point = options.operating_point;
+            listed = structure.points_up_to(point).map(|(listed, _)| listed).max();
+            // Frames of which not even a header is left, and, where decoding did not go on after the first error, only those
+            // after the last GOP that there is.
+            let after = match options.stop_at_first_error {
+                true => structure.gops.iter().map(Gop::end).max().unwrap_or(0),
+                false => frames.first,
             };
-            listed = points.into_iter().filter(is_asked).max();
-            let end = gops.iter().map(Gop::end).max().unwrap_or(0);
-            // GOPs of which not even a header is left.
-            match lost.last_mut() {
-                Some((_, last)) if last.saturating_add(1) == end && end < announced => *last = announced - 1,
-                _ if end < announced => lost.push((end, announced - 1)),
-                _ => {}
-            }
+            let missing = structure.missing(shown, (announced > 0).then_some(announced), point);
+            let later = |(first, last): (u32, u32)| Some((first.max(after), last)).filter(|_| last >= after);
+            found.extend(missing.into_iter().filter_map(later));
+            found.sort_unstable();
         }
+        let mut lost = Vec::new();
+        found.into_iter().for_each(|(first, last)| add_run(&mut lost, first, last));
         let asked = |(first, last): (u32, u32)| {
             let last = frames.end.map_or(last, |end| last.min(end.saturating_sub(1)));
             Some((first.max(frames.first), last)).filter(|(first, last)| first <= last)

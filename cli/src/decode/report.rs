@@ -11,6 +11,7 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::DecodedFrame;
 use splatstream_format::Error;
 use splatstream_format::syntax::{FrameType, SequenceParameters};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// What `--json` prints.
@@ -94,6 +95,11 @@ impl Shown {
             error: frame.error,
             shows: shows(sequence, frame),
         });
+    }
+
+    /// Display indices of the frames.
+    pub(super) fn indices(&self) -> BTreeSet<u32> {
+        self.numbers.iter().copied().collect()
     }
 
     /// How many frames there are.

@@ -207,6 +207,36 @@ fn decoding_resumes_at_the_next_gop_and_lost_frames_are_named() {
     }
 }
 
+/// Frames inside of a GOP too: those of a temporal layer that was left out are not missed, all others are.
+#[test]
+fn a_frame_without_a_header_is_lost_and_one_that_was_left_out_is_not() {
+    let (at, length) = unit("frame_header", 3, 0, 0);
+    let (directory, path) = changed(|bytes| drop(bytes.drain(at..at + length)));
+    let report = decode_faulty(11, &path, &[]);
+    assert_eq!(numbers(&report, "numbers"), [0, 1, 2, 4, 5, 6, 7, 8, 9]);
+    assert_eq!((&report["lost"], &report["complete"]), (&serde_json::json!([[3, 3]]), &false.into()));
+    assert!(said_of(&path).contains("  lost         frame 3\n"));
+    let extracted =
+        json(&["extract", text(&path), "--op", "s1,t2,r2", "-o", text(&directory.path().join("all.gss"))]);
+    assert_eq!(extracted["lost"], report["lost"], "extraction says the same");
+    let lower = json(&["decode", text(&path), "--dry-run", "--op", "s1,t1,r2", "--frames", "0..5"]);
+    assert_eq!((numbers(&lower, "numbers"), &lower["complete"]), (vec![0, 2, 4], &true.into()));
+
+    let part = directory.path().join("part.gss");
+    json(&["extract", text(&dynamic()), "--op", "s1,t1,r2", "-o", text(&part)]);
+    let again =
+        json(&["extract", text(&part), "--op", "s1,t1,r0", "-o", text(&directory.path().join("again.gss"))]);
+    assert_eq!((&again["lost"], &again["complete"]), (&serde_json::json!([]), &true.into()));
+    let mut bytes = fs::read(&part).unwrap();
+    let listing = json(&["inspect", text(&part), "--units"]);
+    let units = listing["units"].as_array().unwrap();
+    let last = units.iter().rev().find(|unit| unit["type"] == "increment").unwrap();
+    bytes[last["at"].as_u64().unwrap() as usize + UNIT_HEADER] ^= 1;
+    fs::write(&part, bytes).unwrap();
+    let damaged = decode_faulty(10, &part, &[]);
+    assert_eq!(damaged["lost"], serde_json::json!([]), "{}", damaged["numbers"]);
+}
+
 #[test]
 fn of_a_cut_file_the_lost_frames_are_those_that_it_announces() {
     let (last, _) = unit("increment", 4, 1, 2);
