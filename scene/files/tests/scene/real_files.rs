@@ -10,7 +10,7 @@ use splatstream_gaussians::{GaussianFrame, importance};
 
 /// The data directory, which lies beside the repository, or nothing and a line that says so.
 fn data() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if !path.is_dir() {
         eprintln!("skipped: the real scenes are not here");
         return None;
