@@ -62,6 +62,9 @@ impl Failure {
     /// The file system refused; `what` is "read" or the like.
     pub(crate) fn file(what: &str, path: &Path, error: &io::Error) -> Self {
         let advice = match error.kind() {
+            io::ErrorKind::NotFound if is_standard(path) => {
+                "this command cannot read that from standard input; give a file"
+            }
             io::ErrorKind::NotFound => "check the path",
             io::ErrorKind::PermissionDenied => "check the permissions",
             io::ErrorKind::StorageFull => "make room, or choose another disk",

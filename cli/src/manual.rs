@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::{OutputFile, make_directory};
+use crate::output_file::{OutputFile, check_directory, make_directory};
 use clap::{Args, Command, CommandFactory};
 use clap_mangen::Man;
 use serde::Serialize;
@@ -27,6 +27,7 @@ struct Report {
 impl Manual {
     /// Makes the pages from the options themselves.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
+        check_directory(&self.out, "manual pages")?;
         make_directory(&self.out)?;
         let mut command = crate::Cli::command().disable_help_subcommand(true);
         command.build();

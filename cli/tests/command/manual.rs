@@ -33,5 +33,9 @@ fn every_command_has_a_manual_page() {
     assert!(page.contains("splatstream extract talk.gss"), "the example is missing: {page}");
     // Pages that are there are written again; a file in the place of the directory stays.
     succeed(&["manual", "-o", text(&out)]);
-    fail(1, &["manual", "-o", text(&out.join("splatstream.1"))]);
+    let file = out.join("splatstream.1");
+    for name in [text(&file), "-", "pages.1"] {
+        let said = fail(2, &["manual", "-o", name]);
+        assert!(said.contains("manual pages are written to a directory"), "{said}");
+    }
 }
