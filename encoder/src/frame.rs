@@ -23,6 +23,7 @@ pub(crate) mod residuals;
 pub(crate) mod steadiness;
 pub(crate) mod survivors;
 pub(crate) mod target;
+pub(crate) mod training_memory;
 pub(crate) mod unit;
 mod update_decision;
 pub(crate) mod visible_difference;

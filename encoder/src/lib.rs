@@ -82,7 +82,8 @@ pub use finetune::{
     Finetune, FinetuneLoss, FinetuneProgress, FinetuneReport, FinetuneWatch, Photograph, PointReport,
     PointWeight,
 };
-pub use frame::learning::{bytes_of_samples, nearer, samples, train_network};
+pub use frame::learning::{nearer, samples, train_network};
+pub use frame::training_memory::bytes_of_samples;
 pub use isolated::Isolated;
 pub use laws::Laws;
 pub use plan::{Plan, PlanRecord, PlannedSteps, PlannedTarget, Single};

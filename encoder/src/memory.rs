@@ -8,7 +8,7 @@
 //! what is taken.
 
 use crate::error::Error;
-use crate::frame::learning::bytes_of_training;
+use crate::frame::training_memory::bytes_of_training;
 use crate::settings::{Preset, Settings};
 use crate::strips::{FEW, MANY};
 use crate::verification::EVERY;
