@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use crate::error::SceneError;
-use crate::format::{detect, read_whole, sog_directory};
+use crate::format::{SceneFormat, detect, read_whole, sog_directory};
 use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, read_file};
 use crate::scene::Scene;
 use crate::sequence::{Sequence, SequenceOptions};
 use crate::sog;
+use crate::splat;
 use splatstream_gaussians::GaussianFrame;
 
 /// Reads the scene at `path`: a file of any supported format, a SOG directory, or the `meta.json` in one. Of a sequence of
@@ -31,10 +32,15 @@ pub fn read_scene_as_is(path: &Path, limits: &ReadLimits) -> Result<Scene, Scene
         let frame = sog::read_dir_as_is(&directory, &mut budget)?;
         return Ok(Scene { frame, notes: budget.into_notes() });
     }
-    if detect(path)?.is_sequence() {
+    let format = detect(path)?;
+    if format.is_sequence() {
         return only_frame(path, limits);
     }
     let mut read = || {
+        // There is no header that asks for memory: the size of the file does, before it is read.
+        if format == SceneFormat::Splat {
+            splat::check_size(path.metadata()?.len(), &mut budget)?;
+        }
         let bytes = read_file(path, &mut budget)?;
         read_whole(&bytes, path, path.parent(), &mut budget)
     };

@@ -12,7 +12,7 @@ use crate::byte_values::{
 };
 use crate::clamped::{Clamped, is_no_byte};
 use crate::error::SceneError;
-use crate::limits::{Budget, ReadLimits};
+use crate::limits::{Budget, ReadLimits, bytes_of_planes};
 use crate::reading::{checked, frame_of, row_of};
 use splatstream_gaussians::activation::{colour_of_dc, dc_of_colour};
 use splatstream_gaussians::rotation::normalised;
@@ -46,6 +46,18 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
         push(&mut planes, record);
     }
     frame_of(0, planes)
+}
+
+/// Whether the budget has room for a file of `size` bytes and its frame.
+///
+/// # Errors
+/// It has not.
+pub(crate) fn check_size(size: u64, budget: &mut Budget) -> Result<(), SceneError> {
+    const OF_RECORD: u64 = RECORD as u64;
+    let asked = size.saturating_add(bytes_of_planes(0, size / OF_RECORD));
+    budget.take(asked, "the frame")?;
+    budget.give_back(asked);
+    Ok(())
 }
 
 fn push(planes: &mut Planes, record: &[u8; RECORD]) {

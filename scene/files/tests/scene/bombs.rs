@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{Cursor, Write};
 
-use splatstream_files::{ReadLimits, SceneError, SceneErrorKind, ply, sog, splat, spz};
+use splatstream_files::{ReadLimits, SceneError, SceneErrorKind, ply, read_scene, sog, splat, spz};
 
 use super::samples::{LIMITS, small_frame};
 
@@ -120,4 +120,17 @@ fn all_that_a_plain_file_takes_counts() {
     let least =
         (0..1 << 16).step_by(64).find(|&max| ply::read(&ply, &ReadLimits { max_memory: max }).is_ok());
     assert!(least.unwrap() > planes, "{least:?}");
+}
+
+#[test]
+fn a_file_of_records_is_refused_by_its_size_and_not_read() {
+    let file = tempfile::Builder::new().suffix(".splat").tempfile().unwrap();
+    // Sparse, and with a byte too much, which would be said after reading.
+    file.as_file().set_len((32 << 20) + 1).unwrap();
+    let limits = ReadLimits { max_memory: 64 << 20 };
+    assert_eq!(asked(read_scene(file.path(), &limits).unwrap_err()), (88 << 20) + 1);
+    let enough = ReadLimits { max_memory: (88 << 20) + 1 };
+    let SceneErrorKind::Malformed { .. } = read_scene(file.path(), &enough).unwrap_err().kind else {
+        panic!("it is read where there is room");
+    };
 }
