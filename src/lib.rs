@@ -121,9 +121,9 @@ pub mod parts {
 #[cfg(feature = "encode")]
 pub mod settings {
     pub use splatstream_encoder::{
-        Anchor, Attribute, Fidelity, Finetune, FinetuneLoss, FinetuneProgress, FinetuneWatch, Importance,
-        Laws, NetworkSource, Photograph, PointWeight, PredictorChoice, Predictors, Preset, Quality, ShChoice,
-        Size, Steps, Structure, Tools,
+        Anchor, Attribute, Fidelity, Finetune, FinetuneLoss, FinetuneProgress, FinetuneState, FinetuneWatch,
+        Importance, Laws, NetworkSource, Photograph, PointWeight, PredictorChoice, Predictors, Preset,
+        Quality, ShChoice, Size, Steps, Structure, Tools,
     };
     pub use splatstream_format::payload::SceneDescription;
 }

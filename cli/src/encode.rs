@@ -249,6 +249,7 @@ impl Encode {
         // At once, and not after minutes of work.
         refuse_inputs(out, &read)?;
         let (mut settings, decided) = self.settings_for(&mut source, (out, memory))?;
+        let kept = self.finetune.keep(&mut settings)?;
         let mut file = Output::create(out, &read, self.title.as_deref())?;
         let start = Instant::now();
         let progress = Progress::frames("encoding", source.len());
@@ -265,6 +266,7 @@ impl Encode {
         let report = report.map_err(|error| failed(&source, (out, memory), &error))?;
         drop(progress);
         let page_bytes = file.finish()?;
+        kept.remove()?;
         let name_of = |frame| source.name(frame);
         // The size that was asked for is that of the whole stream.
         let settings = if shard.is_some() { Settings { size: None, ..settings } } else { settings };

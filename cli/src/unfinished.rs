@@ -12,12 +12,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What the handler of signals has to know. Whoever holds the lock makes, renames or removes files; the handler takes
 /// it for good, so that no file is made after it has looked.
-static STATE: Mutex<State> = Mutex::new(State { is_listening: false, files: Vec::new(), stop: None });
+static STATE: Mutex<State> =
+    Mutex::new(State { is_listening: false, files: Vec::new(), advice: None, stop: None });
 
 struct State {
     is_listening: bool,
     /// Files without their final names.
     files: Vec<PathBuf>,
+    /// What to do next.
+    advice: Option<String>,
     /// Ends a command that can stop by itself and tell how far it came.
     stop: Option<Box<dyn Fn() + Send>>,
 }
@@ -97,6 +100,11 @@ pub(crate) fn stop_by(stop: impl Fn() + Send + 'static) -> Result<(), Failure> {
     listen(&mut state).map_err(|error| Failure::other(format!("cannot listen to signals: {error}")))
 }
 
+/// From now on whoever ends the command is told what to do next.
+pub(crate) fn advise(advice: String) {
+    lock().advice = Some(advice);
+}
+
 fn lock() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -118,7 +126,8 @@ fn interrupted() {
     for path in &state.files {
         let _gone_already = std::fs::remove_file(path);
     }
-    let _nobody_listens = writeln!(io::stderr().lock(), "interrupted: unfinished files are removed");
+    let advice = state.advice.iter().map(|advice| format!("\n  {advice}")).collect::<String>();
+    let _nobody_listens = writeln!(io::stderr().lock(), "interrupted: unfinished files are removed{advice}");
     std::process::exit(i32::from(Failure::Interrupted(String::new()).exit_code()));
 }
 

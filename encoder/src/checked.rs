@@ -133,7 +133,7 @@ pub(crate) fn named(error: Error) -> Error {
 }
 
 /// A number that two frames have in common only if all of their values are the same.
-fn digest(frame: &GaussianFrame) -> u64 {
+pub(crate) fn digest(frame: &GaussianFrame) -> u64 {
     const VALUES: usize = 1 << 10;
     let mut hash = Xxh64::new(0);
     hash.update(&[frame.sh_degree(), frame.antialiased().into()]);

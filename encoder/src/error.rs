@@ -1,5 +1,6 @@
 //! What an encoder can be given that it cannot encode.
 
+use crate::finetune::StateError;
 use splatstream_gaussians::{Defect, FrameError};
 use splatstream_render::gradient::GradientError;
 
@@ -161,6 +162,9 @@ pub enum Error {
     /// A record is not one of a plan.
     #[error("the plan is damaged: {0}; make it again")]
     Plan(&'static str),
+    /// How far fitting to pictures has come cannot be kept or read.
+    #[error(transparent)]
+    FinetuneState(#[from] StateError),
     /// A frame could not be read.
     #[error("frame {frame}: {source}")]
     Source {

@@ -13,16 +13,19 @@ mod rate;
 mod receivers;
 pub(crate) mod report;
 pub(crate) mod request;
+mod state;
 mod watch;
 
+use crate::checked::digest;
 use crate::error::Error;
 use crate::frame::compensation::Compensator;
 use crate::frame::ladder::Ladder;
 use crate::frame::residuals::Wanted;
 use crate::frame::unit::UnitCoder;
+use crate::plan::digest_of;
 use crate::refinements::parts;
 use crate::settings::Settings;
-use descent::Descent;
+use descent::{Descent, Finished};
 use latent::{Latent, List};
 pub use loss::FinetuneLoss;
 use pictures::Pictures;
@@ -32,6 +35,8 @@ pub use request::{Finetune, Photograph, PointWeight};
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
 use splatstream_gaussians::GaussianFrame;
+use state::entry::{Entry, Stage};
+pub use state::{FinetuneState, StateError};
 pub use watch::{FinetuneProgress, FinetuneWatch};
 
 impl Finetune {
@@ -105,6 +110,8 @@ pub(crate) struct Fit<'a> {
     pub(crate) finetune: &'a Finetune,
     /// What prefixes will be compensated by.
     pub(crate) compensator: Option<&'a Compensator>,
+    /// The number of the frame, and a digest of it as it was read, where a state is kept.
+    pub(crate) read: (u32, Option<u64>),
 }
 
 /// The values of a layer.
@@ -129,13 +136,14 @@ impl Fit<'_> {
         let rows = coded_order(self.frame, self.order, self.coder, self.settings);
         let source = self.frame.select(&rows);
         let back = inverse(&rows);
-        let first = self.layer(&source, 0, None)?;
+        let entry = |layer| self.entry(layer, &rows);
+        let first = self.layer(&source, 0, None, entry(0)?)?;
         let Some(highest) = self.layers.checked_sub(1).filter(|&highest| highest > 0) else {
             let reports = first.report.into_iter().collect();
             let is_changed = first.is_changed;
             return Ok(Fitted { lowest: None, highest: first.frame.select(&back), is_changed, reports });
         };
-        let second = self.layer(&source, highest, Some(first.lists))?;
+        let second = self.layer(&source, highest, Some(first.lists), entry(highest)?)?;
         Ok(Fitted {
             lowest: Some(first.frame.select(&back)),
             highest: second.frame.select(&back),
@@ -144,12 +152,24 @@ impl Fit<'_> {
         })
     }
 
-    /// Fits the values of a layer. `parents`: what the lowest layer has, where this is another.
+    /// Where the state of a layer is kept. It belongs to this fit alone: to the settings and the frame, and to what is chosen from
+    /// trial to trial, of which the order of the Gaussians is a part.
+    fn entry(&self, layer: u8, rows: &[u32]) -> Result<Option<Entry>, Error> {
+        let (number, Some(source)) = self.read else { return Ok(None) };
+        let Settings { steps, laws, sh, structure, spatial_layers, .. } = self.settings;
+        let chosen = (steps, laws, sh, structure, spatial_layers, self.layers, self.compensator.is_some());
+        let of_coder = (self.coder.sequence, self.coder.colour, self.coder.grains);
+        let key = digest_of(&(chosen, of_coder, rows, digest(self.frame)));
+        Ok(self.finetune.state.entry((number, source), layer, key)?)
+    }
+
+    /// Fits the values of a layer. `parents`: what the lowest layer has, where this is another; `entry`: where its state is kept.
     fn layer(
         &self,
         source: &GaussianFrame,
         layer: u8,
         parents: Option<Vec<GaussianList>>,
+        entry: Option<Entry>,
     ) -> Result<Layer, Error> {
         let ladder = Ladder::new(self.layers, &self.settings.refinements);
         let receivers = Receiver::of_layer(layer, self.layers, &ladder, (self.settings, self.finetune));
@@ -158,10 +178,21 @@ impl Fit<'_> {
         let coded = source.clone().with_sh_degree(self.coder.sequence.sh_degree)?;
         let mut latent = Latent::new(self.coder, &coded, lists)?;
         let mut report = None;
-        if !receivers.is_empty() {
+        let finished = match &entry {
+            Some(entry) if !receivers.is_empty() => {
+                let mut done = FinetuneReport::of_points(layer, receivers.iter());
+                let was_finished =
+                    entry.read(Stage::Finished, &mut Finished { latent: &mut latent, report: &mut done })?;
+                was_finished.then_some(FinetuneReport { resumed: done.iterations, ..done })
+            }
+            _ => None,
+        };
+        if let Some(done) = finished {
+            report = Some(done);
+        } else if !receivers.is_empty() {
             let pictures = Pictures::new(source, self.finetune, self.settings, &receivers);
             let descent = Descent::new(latent, (receivers, pictures), self.compensator, self.finetune);
-            let (fitted, done) = descent.run(layer)?;
+            let (fitted, done) = descent.run(layer, entry)?;
             latent = fitted;
             report = Some(done);
         }

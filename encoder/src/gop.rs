@@ -11,6 +11,7 @@ mod predicted;
 mod worth;
 
 use crate::canonical::{canonicalise, visible};
+use crate::checked::digest;
 use crate::error::Error;
 use crate::frame::CodedFrame;
 use crate::frame::recorder::{Recorder, weights};
@@ -281,6 +282,9 @@ impl<'a> SpanCoder<'a> {
     #[expect(clippy::indexing_slicing, reason = "units are counted by what they index, axes are constants")]
     fn target(&mut self, number: u32) -> Result<Target, Error> {
         let frame = self.source.frame(number).map_err(|source| Error::Source { frame: number, source })?;
+        let keeps_state =
+            self.common.settings.finetune.as_ref().is_some_and(|finetune| finetune.state.is_kept());
+        let digest = keeps_state.then(|| digest(&frame));
         let rows = visible(&frame, self.common.settings.keep_invisible);
         let row_count = frame.len() as u32;
         // Where frames are predicted axes are named as in the reference, and what a frame starts with is sorted.
@@ -297,7 +301,7 @@ impl<'a> SpanCoder<'a> {
         }
         let position = [0, 1, 2]
             .map(|axis: usize| frame.position()[axis].iter().map(|&value| grid.steps(axis, value)).collect());
-        Ok(Target { frame, position, rows, row_count })
+        Ok(Target { frame, position, rows, row_count, digest })
     }
 
     /// Adds the units of a coded frame to its GOP, and what they are to the report.

@@ -79,8 +79,8 @@ pub use budget::{Effort, Work};
 pub use concat::{ConcatError, Concatenated, PartError, StreamPart, concat};
 pub use error::Error;
 pub use finetune::{
-    Finetune, FinetuneLoss, FinetuneProgress, FinetuneReport, FinetuneWatch, Photograph, PointReport,
-    PointWeight,
+    Finetune, FinetuneLoss, FinetuneProgress, FinetuneReport, FinetuneState, FinetuneWatch, Photograph,
+    PointReport, PointWeight, StateError,
 };
 pub use frame::learning::{nearer, samples, train_network};
 pub use frame::training_memory::bytes_of_samples;

@@ -3,6 +3,7 @@
 mod record;
 
 pub use record::{PlanRecord, PlannedSteps, PlannedTarget, Single};
+pub(crate) use record::{described, digest_of};
 
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;

@@ -82,7 +82,7 @@ impl<W: Write> Encoder<W> {
     }
 
     /// Lets another thread end the work: [`Encoder::push`] and [`Encoder::finish`] then give [`Error::Cancelled`], before
-    /// they turn to another frame.
+    /// they turn to another frame or, where values are [fitted to pictures](Settings::finetune), to the next iteration.
     ///
     /// ```
     /// use splatstream_decoder::interrupt::Interrupt;
@@ -98,6 +98,9 @@ impl<W: Write> Encoder<W> {
     /// # Ok::<(), Error>(())
     /// ```
     pub fn set_cancel(&mut self, cancel: Interrupt) {
+        if let Some(finetune) = &mut self.settings.finetune {
+            finetune.watch = finetune.watch.clone().with_cancel(cancel.clone());
+        }
         self.window.cancel = cancel;
     }
 

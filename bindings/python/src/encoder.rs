@@ -28,6 +28,7 @@ fn encoded<'py>(
     report: &Report,
     start: Instant,
 ) -> PyResult<Encoded<'py>> {
+    prepared.remove_state().map_err(wrong_options)?;
     let bytes = written.map(|written| PyBytes::new(py, &written.take()));
     let report = prepared.report(report, start.elapsed().as_secs_f64());
     Ok((bytes, report.map_err(|error| PyRuntimeError::new_err(error.to_string()))?))

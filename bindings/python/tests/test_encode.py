@@ -84,6 +84,18 @@ def test_values_are_fitted_to_pictures(frames: list[gss.Gaussians]) -> None:
     assert bytes(fitted) != bytes(gss.encode(frames[:2], **options))
 
 
+def test_a_state_of_fitting_goes_when_the_stream_is_written(frames: list[gss.Gaussians], tmp_path: Path) -> None:
+    state = tmp_path / "state"
+    options: dict[str, Any] = {"preset": "fast", "psnr": 40, "layers": [64], "finetune": 2}
+    kept = gss.encode(frames[0], finetune_state=state, resume=True, **options)
+    assert bytes(kept) == bytes(gss.encode(frames[0], **options))
+    assert not state.exists()
+    state.mkdir()
+    (state / "settings").touch()
+    with pytest.raises(ValueError, match="an earlier run has left its state"):
+        gss.encode(frames[0], finetune_state=state, **options)
+
+
 def test_a_time_needs_a_number_of_frames(frames: list[gss.Gaussians]) -> None:
     result = gss.encode(frames[:2], time_budget=30)
     assert "time budget" in {choice["tool"] for choice in result.report["chosen"]}

@@ -1,5 +1,6 @@
 //! Errors of the encoder in the words of the command line.
 
+use super::finetune::not_kept;
 use crate::failure::Failure;
 use crate::frame_files::{FrameFiles, unread};
 use crate::numbers::counted;
@@ -43,6 +44,7 @@ pub(super) fn failed(source: &FrameFiles, (out, memory): (&Path, u64), error: &E
         | Error::TooManyPerSecond { frame, .. }
         | Error::OtherFrame { frame, .. }
         | Error::ChangedFrame { frame } => Failure::other(format!("{}: {error}", source.name(*frame))),
+        Error::FinetuneState(error) => not_kept(error),
         Error::Output(cause) => Failure::file("write", out, cause),
         Error::Setting { .. } => Failure::Usage(error.to_string()),
         _ => Failure::other(error.to_string()),

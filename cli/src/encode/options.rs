@@ -1,6 +1,7 @@
 //! The options of `encode` for programs that have frames in memory.
 
 use super::encoded::Encoded;
+use super::finetune::Kept;
 use super::{Decided, Encode};
 use clap::Parser;
 use splatstream_encoder::{FrameSource, Report, Settings};
@@ -17,6 +18,7 @@ pub struct Prepared {
     /// For the encoder.
     pub settings: Settings,
     decided: Decided,
+    kept: Kept,
 }
 
 /// The options as they stand after `splatstream encode`.
@@ -91,11 +93,21 @@ impl EncodeOptions {
         let (mut settings, decided) = settings.map_err(|failure| OptionsError(failure.to_string()))?;
         let put = self.0.refinements.put(&mut start, &mut settings);
         put.map_err(|error| OptionsError(error.to_string()))?;
-        Ok(Prepared { settings, decided })
+        let kept = self.0.finetune.keep(&mut settings);
+        let kept = kept.map_err(|failure| OptionsError(failure.to_string()))?;
+        Ok(Prepared { settings, decided, kept })
     }
 }
 
 impl Prepared {
+    /// Removes what was kept of fitting, where that was asked for, once the stream is written.
+    ///
+    /// # Errors
+    /// A file that cannot be removed.
+    pub fn remove_state(&self) -> Result<(), OptionsError> {
+        self.kept.remove().map_err(|failure| OptionsError(failure.to_string()))
+    }
+
     /// The JSON that `splatstream encode --json` prints of a stream that was written with these settings, without the name
     /// of a file: see `cli/json.md`.
     ///

@@ -70,6 +70,13 @@ fn write_files(directory: &Path) {
         files.iter().for_each(|file| write(&format!("{folder}/{file}"), b""));
     }
     fs::create_dir(directory.join("taken.gss")).unwrap();
+    let of_other =
+        format!("splatstream-finetune-state-1\nencoder: {}\npreset: Small\n", env!("CARGO_PKG_VERSION"));
+    for (folder, settings) in [("of-other", of_other.as_str()), ("damaged", "splatstream-finetune-state-1\n")]
+    {
+        fs::create_dir(directory.join(folder)).unwrap();
+        write(&format!("{folder}/settings"), settings.as_bytes());
+    }
 }
 
 /// Each is a command line; files are in the directory of the test.
@@ -153,6 +160,14 @@ const CASES: &[&str] = &[
     "encode good.ply -o out.gss --cameras ring:0",
     "encode good.ply -o out.gss --network no-such.bin",
     "encode good.ply -o out.gss --psnr 40 --target-mb 1",
+    // States of fitting to pictures.
+    "encode good.ply -o out.gss --finetune-state of-other",
+    "encode good.ply -o out.gss --finetune 2 --resume",
+    "encode good.ply -o out.gss --finetune 0 --finetune-state new",
+    "encode good.ply -o out.gss --finetune 2 --finetune-state of-other",
+    "encode good.ply -o out.gss --finetune 2 --finetune-state of-other --resume",
+    "encode good.ply -o out.gss --finetune 2 --finetune-state damaged --resume",
+    "encode good.ply -o out.gss --finetune 2 --finetune-state good.ply",
     "compare good.ply good.gss --background white",
     "inspect good.gss --dot",
     "inspect good.gss --units --stats",

@@ -11,6 +11,7 @@ mod dynamic;
 mod errors;
 mod exit_codes;
 mod file_formats;
+mod finetune_state;
 mod fit;
 mod inspect;
 mod json_reports;

@@ -13,19 +13,24 @@
 //! of L1 and SSIM it is between ln 2 and 2 ln 2, by the share that each has of it.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of views")]
 
+mod kept;
+
 use super::latent::{Decoded, Latent};
 use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
 use super::pictures::{Pictures, Verdict, View};
 use super::rate::Rate;
 use super::receivers::Receiver;
-use super::report::{FinetuneReport, PointReport};
+use super::report::FinetuneReport;
 use super::request::Finetune;
+use super::state::entry::{Entry, Stage};
 use super::watch::FinetuneProgress;
 use crate::attribute::Attribute;
 use crate::error::Error;
 use crate::frame::compensation::{Compensator, compensated};
 use core::f64::consts::{LN_2, PI};
 use core::ops::Range;
+use core::time::Duration;
+pub(super) use kept::Finished;
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::PreparedFrame;
@@ -66,7 +71,11 @@ pub(super) struct Descent<'a> {
     finetune: &'a Finetune,
     adam: Adam,
     rate: f32,
+    /// Iterations that are done.
+    done: u32,
     start: Instant,
+    /// Time that earlier runs have taken.
+    earlier: Duration,
     best: Option<Best>,
 }
 
@@ -119,21 +128,30 @@ impl<'a> Descent<'a> {
             finetune,
             adam,
             rate: RATE,
+            done: 0,
             start: Instant::now(),
+            earlier: Duration::ZERO,
             best: None,
         }
     }
 
     /// Goes on as long as it may, with values of `spatial_layer`; gives the values that judges like most, and what has been done.
-    pub(super) fn run(mut self, spatial_layer: u8) -> Result<(Latent<'a>, FinetuneReport), Error> {
+    /// `entry`: where it is kept how far it has come, and where an earlier run may have left that.
+    pub(super) fn run(
+        mut self,
+        spatial_layer: u8,
+        mut entry: Option<Entry>,
+    ) -> Result<(Latent<'a>, FinetuneReport), Error> {
         let mut rate = Rate::new(&self.latent)?;
         let before = self.latent.decoded()?;
         self.compensate(&before)?;
         let before = self.witnessed(&before)?;
-        let mut done = 0;
-        while done < self.finetune.iterations && self.share(done) < 1.0 {
+        self.go_on(entry.as_ref())?;
+        let resumed = self.done;
+        while self.done < self.finetune.iterations && self.share() < 1.0 {
+            self.keep(entry.as_mut(), resumed)?;
             let mut decoded = self.latent.decoded()?;
-            if done % EVERY == 0 {
+            if self.done.is_multiple_of(EVERY) {
                 rate = Rate::new(&self.latent)?;
                 if !self.look(&decoded, &rate)? {
                     if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
@@ -143,30 +161,30 @@ impl<'a> Descent<'a> {
                     rate = Rate::new(&self.latent)?;
                 }
             }
-            self.step(&decoded, &rate, done)?;
-            done += 1;
-            let iterations = self.finetune.iterations;
+            self.step(&decoded, &rate)?;
+            self.done += 1;
+            let (done, iterations) = (self.done, self.finetune.iterations);
             self.finetune.watch.tell(FinetuneProgress { spatial_layer, done, iterations });
         }
         let last = self.latent.decoded()?;
         self.look(&last, &Rate::new(&self.latent)?)?;
+        let receivers = self.sights.iter().map(|sight| &sight.receiver);
         let mut report = FinetuneReport {
-            spatial_layer,
-            iterations: done,
-            seconds: self.start.elapsed().as_secs_f64(),
-            ..FinetuneReport::default()
+            iterations: self.done,
+            resumed,
+            seconds: self.elapsed().as_secs_f64(),
+            ..FinetuneReport::of_points(spatial_layer, receivers)
         };
         let kept = self.back()?;
         if let Some(Best { before, after, .. }) = &self.best {
             report.psnr = [before.psnr, after.psnr];
             report.bits = [before.bits, after.bits];
         }
-        let points = self.sights.iter().zip(before.into_iter().zip(self.witnessed(&kept)?));
-        let of_point = |(sight, (before, after)): (&Sight, (f64, f64))| {
-            let Receiver { point, given_weight: weight, .. } = sight.receiver;
-            PointReport { point, weight, psnr: [before, after] }
-        };
-        report.points = points.map(of_point).collect();
+        let seen = before.into_iter().zip(self.witnessed(&kept)?);
+        report.points.iter_mut().zip(seen).for_each(|(point, (before, after))| point.psnr = [before, after]);
+        if let Some(entry) = &mut entry {
+            entry.write(Stage::Finished, &mut Finished { latent: &mut self.latent, report: &mut report })?;
+        }
         Ok((self.latent, report))
     }
 
@@ -198,12 +216,16 @@ impl<'a> Descent<'a> {
         self.sights.iter().map(of_sight).collect()
     }
 
+    /// The time that all runs together have taken.
+    fn elapsed(&self) -> Duration {
+        self.earlier.saturating_add(self.start.elapsed())
+    }
+
     /// The share of the iterations, or of the time, that has gone.
-    fn share(&self, done: u32) -> f64 {
-        let of_time =
-            |budget: core::time::Duration| self.start.elapsed().as_secs_f64() / budget.as_secs_f64();
+    fn share(&self) -> f64 {
+        let of_time = |budget: Duration| self.elapsed().as_secs_f64() / budget.as_secs_f64();
         let of_time = self.finetune.time_budget.map_or(0.0, of_time);
-        (f64::from(done) / f64::from(self.finetune.iterations.max(1))).max(of_time)
+        (f64::from(self.done) / f64::from(self.finetune.iterations.max(1))).max(of_time)
     }
 
     /// Goes back to the best values, with shorter steps from there.
@@ -254,7 +276,7 @@ impl<'a> Descent<'a> {
     }
 
     /// One iteration.
-    fn step(&mut self, decoded: &Decoded, rate: &Rate, done: u32) -> Result<(), Error> {
+    fn step(&mut self, decoded: &Decoded, rate: &Rate) -> Result<(), Error> {
         let mut gradients = Gradients::zero(&decoded.frame);
         let mut halvings = 0.0;
         for (place, view) in (0..VIEWS).map_while(|_| self.pictures.next()).collect::<Vec<_>>() {
@@ -264,7 +286,7 @@ impl<'a> Descent<'a> {
         // Slopes are sums over the views.
         let price = PRICE * halvings * LN_2 / rate.bits_an_octave.max(1.0);
         rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
-        let slower = (0.5 + 0.5 * libm::cos(PI * self.share(done))) as f32;
+        let slower = (0.5 + 0.5 * libm::cos(PI * self.share())) as f32;
         self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate * slower))?;
         Ok(())
     }

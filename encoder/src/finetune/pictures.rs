@@ -70,6 +70,16 @@ pub(super) struct Verdict {
 /// A loss of a picture, a mean over its pixels, below which it shows what it should.
 const LEAST: f64 = 1e-9;
 
+/// A look of a receiver.
+struct Sight {
+    /// Which receiver.
+    place: usize,
+    /// Lines of its picture.
+    lines: u32,
+    /// Looks of all receivers before it.
+    number: usize,
+}
+
 /// When a receiver is the next to look.
 struct Turn {
     weight: f64,
@@ -174,6 +184,30 @@ impl<'a> Pictures<'a> {
 
     /// The next view, and which receiver looks: each as often as its weight says.
     pub(super) fn next(&mut self) -> Option<(usize, View)> {
+        let Sight { place, lines, number } = self.turn()?;
+        let view = match &mut self.supply {
+            Supply::Scattered(source, cameras) => {
+                cameras.next().map(|camera| drawn(source, camera.scaled_to_height(lines), self.background))
+            }
+            Supply::Photographs(photographs) => {
+                Some(photographs.get(number % photographs.len().max(1))?.view(lines))
+            }
+        };
+        view.map(|view| (place, view))
+    }
+
+    /// Passes over views that an earlier run has looked at, and draws none of them.
+    pub(super) fn skip(&mut self, views: usize) {
+        for _ in 0..views {
+            self.turn();
+            if let Supply::Scattered(_, cameras) = &mut self.supply {
+                cameras.next();
+            }
+        }
+    }
+
+    /// Who looks next, and at what.
+    fn turn(&mut self) -> Option<Sight> {
         self.turns.iter_mut().for_each(|turn| turn.due += turn.weight);
         let longest = |best: (usize, f64), (place, turn): (usize, &Turn)| {
             if turn.due > best.1 { (place, turn.due) } else { best }
@@ -185,15 +219,7 @@ impl<'a> Pictures<'a> {
         turn.taken = turn.taken.wrapping_add(1);
         let number = self.taken;
         self.taken = number.wrapping_add(1);
-        let view = match &mut self.supply {
-            Supply::Scattered(source, cameras) => {
-                cameras.next().map(|camera| drawn(source, camera.scaled_to_height(lines), self.background))
-            }
-            Supply::Photographs(photographs) => {
-                Some(photographs.get(number % photographs.len().max(1))?.view(lines))
-            }
-        };
-        view.map(|view| (place, view))
+        Some(Sight { place, lines, number })
     }
 }
 

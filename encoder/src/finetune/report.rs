@@ -1,5 +1,6 @@
 //! What fitting values to pictures has done.
 
+use super::receivers::Receiver;
 use splatstream_decoder::operating_point::OperatingPoint;
 
 /// What fitting an I frame has done.
@@ -12,7 +13,9 @@ pub struct FinetuneReport {
     pub spatial_layer: u8,
     /// Steps of descent that were taken.
     pub iterations: u32,
-    /// How long it took.
+    /// Those of them that an earlier run had taken, from whose [state](crate::FinetuneState) this one went on.
+    pub resumed: u32,
+    /// How long it took, in all runs together.
     pub seconds: f64,
     /// PSNR before and after, decibels, in views that no slope was taken of, but by which it was chosen what is kept: the mean of
     /// the operating points by their weights.
@@ -21,6 +24,18 @@ pub struct FinetuneReport {
     pub bits: [f64; 2],
     /// What receivers of each operating point that was optimised for see.
     pub points: Vec<PointReport>,
+}
+
+impl FinetuneReport {
+    /// Of the fit of a layer to what these receivers see, before anything is known of it.
+    pub(super) fn of_points<'r>(spatial_layer: u8, receivers: impl Iterator<Item = &'r Receiver>) -> Self {
+        let point = |receiver: &Receiver| PointReport {
+            point: receiver.point,
+            weight: receiver.given_weight,
+            psnr: [0.0; 2],
+        };
+        Self { spatial_layer, points: receivers.map(point).collect(), ..Self::default() }
+    }
 }
 
 /// What fitting has done at an operating point.

@@ -1,6 +1,7 @@
 //! What is asked for where values are fitted to pictures.
 
 use super::loss::FinetuneLoss;
+use super::state::FinetuneState;
 use super::watch::FinetuneWatch;
 use crate::attribute::Attribute;
 use core::time::Duration;
@@ -33,6 +34,8 @@ pub struct Finetune {
     pub held: Vec<Attribute>,
     /// Who is told how far it has come.
     pub watch: FinetuneWatch,
+    /// Where it is kept how far it has come, so that another run can go on; by default nowhere.
+    pub state: FinetuneState,
 }
 
 impl Default for Finetune {
@@ -48,6 +51,7 @@ impl Default for Finetune {
             optimise_for: Vec::new(),
             held: Vec::new(),
             watch: FinetuneWatch::default(),
+            state: FinetuneState::default(),
         }
     }
 }

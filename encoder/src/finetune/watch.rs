@@ -1,6 +1,7 @@
 //! How far fitting has come.
 
 use core::fmt;
+use splatstream_decoder::interrupt::Interrupt;
 use std::sync::Arc;
 
 /// How far fitting a layer of a frame has come.
@@ -15,21 +16,35 @@ pub struct FinetuneProgress {
     pub iterations: u32,
 }
 
-/// Someone who is told after each iteration, from whatever thread it is done in; by default nobody.
+/// Someone who is told after each iteration, from whatever thread it is done in, and who may end the work; by default nobody.
 ///
 /// Nothing that is encoded depends on it, so that any two are equal, and look the same.
 #[derive(Clone, Default)]
-pub struct FinetuneWatch(Option<Arc<dyn Fn(FinetuneProgress) + Send + Sync>>);
+pub struct FinetuneWatch {
+    told: Option<Arc<dyn Fn(FinetuneProgress) + Send + Sync>>,
+    cancel: Interrupt,
+}
 
 impl FinetuneWatch {
     /// Has `told` called.
     #[must_use]
     pub fn new(told: impl Fn(FinetuneProgress) + Send + Sync + 'static) -> Self {
-        Self(Some(Arc::new(told)))
+        Self { told: Some(Arc::new(told)), ..Self::default() }
+    }
+
+    /// The same who may end the work: with the request fitting gives [`Error::Cancelled`](crate::Error::Cancelled) before its
+    /// next iteration. What a [state](crate::FinetuneState) has by then is kept.
+    #[must_use]
+    pub fn with_cancel(self, cancel: Interrupt) -> Self {
+        Self { cancel, ..self }
+    }
+
+    pub(super) fn is_cancelled(&self) -> bool {
+        self.cancel.is_requested()
     }
 
     pub(super) fn tell(&self, progress: FinetuneProgress) {
-        if let Some(told) = &self.0 {
+        if let Some(told) = &self.told {
             told(progress);
         }
     }

@@ -13,6 +13,8 @@ pub(crate) struct Target {
     /// Row of each Gaussian in its file, and rows of the file.
     pub(crate) rows: Vec<u32>,
     pub(crate) row_count: u32,
+    /// A digest of the frame as it was read, where a state of fitting is kept.
+    pub(crate) digest: Option<u64>,
 }
 
 impl Target {

@@ -40,6 +40,7 @@ impl SpanCoder<'_> {
             settings: self.common.settings,
             finetune,
             compensator: compensator.as_ref(),
+            read: (number, target.digest),
         };
         let fitted = finetune.map(|finetune| fit(finetune).run()).transpose()?;
         let wanted = match &fitted {

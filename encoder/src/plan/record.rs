@@ -242,7 +242,7 @@ fn named(settings: &Settings) -> BTreeMap<String, String> {
 }
 
 /// XXH64 of how values are written for debugging, which has every bit of them.
-fn digest_of(values: &impl Debug) -> u64 {
+pub(crate) fn digest_of(values: &impl Debug) -> u64 {
     let mut digest = Digest(Xxh64::new(0));
     // Nothing can fail.
     let _written = write!(digest, "{values:?}");
@@ -260,7 +260,7 @@ impl Write for Digest {
 }
 
 /// Everything that the bytes of a stream follow from, beside its frames.
-fn described(settings: &Settings) -> Vec<(&'static str, String)> {
+pub(crate) fn described(settings: &Settings) -> Vec<(&'static str, String)> {
     let Settings { preset, steps, laws, psnr, size, verify, drop_invalid, gop, structure, anchor, .. } =
         settings;
     let Settings { spatial_layers, predictors, predictor_choice, neighbours, network, refinements, .. } =

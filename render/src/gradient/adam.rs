@@ -111,6 +111,28 @@ impl Adam {
         Self { sh_degree: frame.sh_degree(), first, second, bias: vec![[1.0; 2]; frame.len()] }
     }
 
+    /// All numbers that the next steps follow from beside the frame, plane by plane, for who writes them down: put back into a
+    /// [new](Adam::new) one for a frame of the same size and SH degree, they let it go on with the same bits.
+    ///
+    /// ```
+    /// use splatstream_files::builtin::BuiltinScene;
+    /// use splatstream_render::gradient::{Adam, Gradients, Rates};
+    ///
+    /// let mut frame = BuiltinScene { gaussians: 10, ..BuiltinScene::default() }.frame(0);
+    /// let mut slopes = Gradients::zero(&frame);
+    /// slopes.planes_mut().opacity_logit.fill(1.0);
+    /// let mut adam = Adam::new(&frame);
+    /// adam.step(&mut frame, &slopes, &Rates::default())?;
+    /// let mut other = Adam::new(&frame);
+    /// adam.memory_mut().zip(other.memory_mut()).for_each(|(from, to)| to.copy_from_slice(from));
+    /// assert_eq!(adam, other);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn memory_mut(&mut self) -> impl Iterator<Item = &mut [f32]> {
+        let means = self.first.iter_mut().chain(self.second.iter_mut()).map(Vec::as_mut_slice);
+        means.chain([self.bias.as_flattened_mut()])
+    }
+
     /// Takes one step. Quaternions do not keep their length: [`GaussianFrame::with_unit_rotations`] gives it back.
     ///
     /// # Errors

@@ -64,6 +64,8 @@ class EncodeOptions(TypedDict, total=False):
     neighbours: Neighbours of a prediction, 1 to 16.
     without: Tools to leave out, to see what each is worth.
     finetune: Choose values by pictures of what is decoded, in so many iterations at most; True is 200.
+    finetune_state: A directory that has how far that has come until the stream is written, for a run with `resume`.
+    resume: Go on with what a run that was killed has left there, of the same frames and options, or begin.
     finetune_only: Attributes to fit, as ("position", "log-scale", "rotation", "opacity", "dc", "sh"); all by default.
     finetune_lines: Lines of the pictures to fit to, in turn.
     finetune_loss: What pictures are fitted by: "squared" (the default) or "l1-ssim", the loss that scenes are trained with.
@@ -107,6 +109,8 @@ class EncodeOptions(TypedDict, total=False):
     neighbours: int
     without: Sequence[str]
     finetune: int | Literal[True]
+    finetune_state: str | os.PathLike[str]
+    resume: bool
     finetune_only: Sequence[str]
     finetune_lines: Sequence[int]
     finetune_loss: Literal["squared", "l1-ssim"]
