@@ -77,6 +77,7 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
             _ => body.skip(element)?,
         }
     }
+    body.end(core::iter::empty(), budget);
     let mut planes = unpack(&ranges, &words, budget)?;
     planes.sh = planes_of_rest(layout.sh_degree, rest);
     planes.sh.iter_mut().flatten().for_each(|value| *value = sh_of_byte(*value));

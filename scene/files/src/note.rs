@@ -37,11 +37,16 @@ pub enum Note {
     },
     /// Colours are in linear light, and were encoded as sRGB.
     LinearColours,
+    /// Something follows what the file says it has, and was left out.
+    TrailingBytes {
+        /// How many bytes.
+        count: u64,
+    },
 }
 
 impl Note {
     /// A word for programs, which does not change: `sh-reduced`, `flat`, `other-primitives`, `unusable`,
-    /// `exact-opacity`, `linear-colours`.
+    /// `exact-opacity`, `linear-colours`, `trailing-bytes`.
     pub fn code(&self) -> &'static str {
         match self {
             Self::ShDegree { .. } => "sh-reduced",
@@ -50,6 +55,7 @@ impl Note {
             Self::Unusable { .. } => "unusable",
             Self::ExactOpacity { .. } => "exact-opacity",
             Self::LinearColours => "linear-colours",
+            Self::TrailingBytes { .. } => "trailing-bytes",
         }
     }
 }
@@ -87,6 +93,11 @@ impl fmt::Display for Note {
             Self::LinearColours => f.write_str(
                 "colours are in linear light and were encoded as sRGB, each by itself; pictures differ where translucent \
                  Gaussians cover each other, since sRGB is blended otherwise",
+            ),
+            Self::TrailingBytes { count } => write!(
+                f,
+                "{} left out: they follow the last element of the header; where files were joined, give each by itself",
+                number(*count, "byte", "bytes")
             ),
         }
     }

@@ -48,6 +48,7 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
         body.skip(element)?;
     }
     let columns = body.columns(vertex, &names, budget)?;
+    body.end(header.elements.iter().skip_while(|element| element.name != "vertex").skip(1), budget);
     let mut planes = planes_of_columns(rest.sh_degree, is_flat(vertex), columns);
     if is_flat(vertex) {
         thicken(&mut planes, budget)?;

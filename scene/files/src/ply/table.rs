@@ -4,6 +4,7 @@ use super::header::{Element, Encoding, Header, Kind, Scalar};
 use crate::cursor::Cursor;
 use crate::error::SceneError;
 use crate::limits::Budget;
+use crate::note::Note;
 
 /// Rows read a column at a time, so that a block of them stays in the first-level caches.
 const BLOCK_ROWS: usize = 128;
@@ -67,6 +68,16 @@ impl<'a> Body<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Passes over the elements after those that were read, and notes what follows the last. One that is not whole is of no
+    /// interest.
+    pub(crate) fn end<'e>(mut self, after: impl Iterator<Item = &'e Element>, budget: &mut Budget) {
+        let is_whole = after.map(|element| self.skip(element)).all(|skipped| skipped.is_ok());
+        let left = self.cursor.remaining().trim_ascii().len();
+        if is_whole && left > 0 {
+            budget.note(Note::TrailingBytes { count: left as u64 });
+        }
     }
 
     fn skip_list(&mut self, count: Scalar, item: Scalar) -> Result<(), SceneError> {

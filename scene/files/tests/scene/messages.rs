@@ -3,8 +3,8 @@
 use std::fs;
 
 use splatstream_files::{
-    HEAD, Note, ReadLimits, Scene, SceneErrorKind, SceneFormat, detect, ply, read_scene, read_scene_as_is,
-    sog, splat,
+    HEAD, Note, ReadLimits, Scene, SceneErrorKind, SceneFormat, compressed_ply, detect, ply, read_scene,
+    read_scene_as_is, sog, splat,
 };
 use splatstream_gaussians::activation::sigmoid;
 
@@ -71,6 +71,21 @@ fn infinite_opacities_are_opacities_of_0_and_1() {
         let nearest = (255.0 * sigmoid(logit.into())).round() as u8;
         assert!(logit.is_finite() && nearest.abs_diff(opacity) <= 1, "{logit}");
         assert_eq!(notes, [Note::ExactOpacity { count: 1 }]);
+    }
+}
+
+#[test]
+fn what_follows_the_last_element_is_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.ply");
+    let notes = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        read_scene_as_is(&path, &LIMITS).unwrap().notes
+    };
+    for file in [ply::write(&small_frame()), compressed_ply::write(&small_frame()).unwrap()] {
+        assert_eq!(notes(&file), []);
+        assert_eq!(notes(&[&file[..], b"\n"].concat()), []);
+        assert_eq!(notes(&[&file[..], &file].concat()), [Note::TrailingBytes { count: file.len() as u64 }]);
     }
 }
 
