@@ -19,6 +19,13 @@ impl Area {
         self.0 < other.2 && other.0 < self.2 && self.1 < other.3 && other.1 < self.3
     }
 
+    /// How much they share.
+    fn shared(&self, other: &Self) -> f64 {
+        let (width, height) =
+            (self.2.min(other.2) - self.0.max(other.0), self.3.min(other.3) - self.1.max(other.1));
+        width.max(0.0) * height.max(0.0)
+    }
+
     fn holds(&self, other: &Self) -> bool {
         self.0 <= other.0 && self.1 <= other.1 && self.2 >= other.2 && self.3 >= other.3
     }
@@ -75,7 +82,12 @@ impl Placer {
                     && (!soft || self.soft.iter().all(clear))
             })
         };
-        let within = || candidates.iter().find(|(area, _)| self.bounds.holds(area));
+        // Where nothing is free, a point is covered rather than words, and of either as little as possible.
+        let covered = |area: &Area| self.hard.iter().map(|taken| area.shared(taken)).sum::<f64>();
+        let within = || {
+            let inside = candidates.iter().filter(|(area, _)| self.bounds.holds(area));
+            inside.min_by(|(a, _), (b, _)| covered(a).total_cmp(&covered(b)))
+        };
         let found = free(true).or_else(|| free(false)).or_else(within).or(candidates.first());
         let &(area, far) = found.unwrap_or(&(Area::around(at, 0.0), false));
         self.hard.push(area);
@@ -87,7 +99,7 @@ impl Placer {
 /// Places around a point, the best first, and whether they are far from it.
 fn candidates((x, y): (f64, f64), width: f64) -> Vec<(Area, bool)> {
     let mut all = Vec::new();
-    for (ring, gap) in [8.0, 20.0, 34.0, 50.0, 68.0, 88.0].into_iter().enumerate() {
+    for (ring, gap) in [8.0, 20.0, 34.0, 50.0, 68.0, 88.0, 110.0, 134.0].into_iter().enumerate() {
         let middle = y - HEIGHT / 2.0;
         let (left, right, centre) = (x - gap - width, x + gap, x - width / 2.0);
         let (above, below) = (y - gap - HEIGHT, y + gap);
@@ -123,6 +135,22 @@ mod tests {
         let words = &placer.hard[before..];
         for (place, a) in words.iter().enumerate() {
             assert!(placer.bounds.holds(a));
+            assert!(words[place + 1..].iter().all(|b| !a.meets(b)), "{words:?}");
+        }
+    }
+
+    #[test]
+    fn words_among_many_points_cover_points_and_not_each_other() {
+        let mut placer = Placer::new(Area(0.0, 0.0, 600.0, 400.0));
+        for place in 0..1500 {
+            placer.point((f64::from(place % 50) * 12.0, f64::from(place / 50) * 13.4));
+        }
+        let before = placer.hard.len();
+        for place in 0..8 {
+            placer.place((300.0 + f64::from(place), 200.0), "balanced, 5 iterations");
+        }
+        let words = &placer.hard[before..];
+        for (place, a) in words.iter().enumerate() {
             assert!(words[place + 1..].iter().all(|b| !a.meets(b)), "{words:?}");
         }
     }
