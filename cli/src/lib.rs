@@ -120,7 +120,9 @@ pub fn main(arguments: &[OsString]) -> u8 {
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let console = Console::new(cli.json, cli.quiet);
     progress::set_quiet(cli.quiet);
-    match in_threads(cli.threads, || cli.command.run(&console)) {
+    let ended = in_threads(cli.threads, || cli.command.run(&console));
+    unfinished::end(ended.is_ok());
+    match ended {
         Ok(()) => 0,
         Err(failure) => {
             console.fail(&failure);

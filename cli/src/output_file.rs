@@ -3,7 +3,7 @@
 
 use crate::failure::Failure;
 use crate::standard::is_standard;
-use crate::unfinished::Unfinished;
+use crate::unfinished::{self, Unfinished};
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -161,9 +161,9 @@ pub(crate) fn refuse_terminal(is_terminal: bool, path: &Path) -> Result<(), Fail
     Ok(())
 }
 
-/// Makes a directory and those above it.
+/// Makes a directory and those above it; what stays empty goes away where the command fails.
 pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(path).map_err(|error| Failure::file("make the directory", path, &error))
+    unfinished::make_directory(path).map_err(|error| Failure::file("make the directory", path, &error))
 }
 
 /// Devices and pipes are written to as they are.

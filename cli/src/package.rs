@@ -17,6 +17,7 @@ use splatstream_stream::Representation;
 use splatstream_stream::live::Settings;
 use splatstream_stream::manifest::{Manifest, RepresentationInfo};
 use splatstream_stream::package::{Layout, Options, Package};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::slice;
 
@@ -110,8 +111,11 @@ impl PackageStream {
         }
         let stream = StreamFile::read(&self.input)?;
         let package = package(&stream, &options, &self.limits.options_to_draw(), self.quality)?;
+        make_directory(&self.out)?;
+        let (files, sizes) = written(&package, &self.out, slice::from_ref(&self.input))?;
+        // Nothing of the earlier package is lost before all of this one is on the disk.
         self.clear(stale)?;
-        let sizes = write(&package, &self.out, slice::from_ref(&self.input))?;
+        files.into_iter().try_for_each(OutputFile::finish)?;
         let report = Report::new(&self.out, &package.manifest, (stream.bytes.len() as u64, sizes));
         console.report(&report, || report.text())
     }
@@ -167,22 +171,31 @@ pub(crate) fn package<'a>(
 
 /// Writes all files to a directory, those that name others last; how many bytes they have. No input is overwritten.
 pub(crate) fn write(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Result<u64, Failure> {
-    let mut bytes = 0;
-    for representation in &package.manifest.representations {
-        let path = out.join(&representation.file);
+    let (files, bytes) = written(package, out, inputs)?;
+    files.into_iter().try_for_each(OutputFile::finish)?;
+    Ok(bytes)
+}
+
+/// The same, but the files do not have their names yet: there is a whole package or none.
+fn written(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Result<(Vec<OutputFile>, u64), Failure> {
+    let (mut files, mut bytes) = (Vec::new(), 0);
+    let mut take = |name: &str, size: u64, write: &mut dyn FnMut(&mut OutputFile) -> io::Result<()>| {
+        let path = out.join(name);
         let mut file = OutputFile::create(&path, inputs)?;
-        package
-            .write(&representation.file, &mut file)
-            .map_err(|error| Failure::file("write", &path, &error))?;
-        file.finish()?;
-        bytes += representation.bytes;
+        let whole = write(&mut file).and_then(|()| file.flush());
+        whole.map_err(|error| Failure::file("write", &path, &error))?;
+        bytes += size;
+        files.push(file);
+        Ok::<(), Failure>(())
+    };
+    for RepresentationInfo { file: name, bytes: size, .. } in &package.manifest.representations {
+        take(name, *size, &mut |file| package.write(name, file))?;
     }
     let manifest = package.manifest.to_json();
     for (name, text) in [(Package::MANIFEST, &manifest), (Package::MPD, &package.mpd)] {
-        OutputFile::write_apart(&out.join(name), inputs, text.as_bytes())?;
-        bytes += text.len() as u64;
+        take(name, text.len() as u64, &mut |file| file.write_all(text.as_bytes()))?;
     }
-    Ok(bytes)
+    Ok((files, bytes))
 }
 
 /// From nothing to a day.

@@ -12,13 +12,20 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What the handler of signals has to know. Whoever holds the lock makes, renames or removes files; the handler takes
 /// it for good, so that no file is made after it has looked.
-static STATE: Mutex<State> =
-    Mutex::new(State { is_listening: false, files: Vec::new(), advice: None, stop: None });
+static STATE: Mutex<State> = Mutex::new(State {
+    is_listening: false,
+    files: Vec::new(),
+    directories: Vec::new(),
+    advice: None,
+    stop: None,
+});
 
 struct State {
     is_listening: bool,
     /// Files without their final names.
     files: Vec<PathBuf>,
+    /// Directories that the command has made, each after those above it.
+    directories: Vec<PathBuf>,
     /// What to do next.
     advice: Option<String>,
     /// Ends a command that can stop by itself and tell how far it came.
@@ -93,6 +100,26 @@ impl Drop for Unfinished {
     }
 }
 
+/// Makes a directory and those above it. Where nothing is in them when the command fails, they go away.
+pub(crate) fn make_directory(path: &Path) -> io::Result<()> {
+    let mut state = lock();
+    let _deaf = listen(&mut state);
+    let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
+    let mut missing: Vec<PathBuf> = path.ancestors().take_while(is_missing).map(PathBuf::from).collect();
+    missing.reverse();
+    state.directories.extend(missing);
+    std::fs::create_dir_all(path)
+}
+
+/// The command has ended, and does what it was told (`is_done`) or has failed.
+pub(crate) fn end(is_done: bool) {
+    let mut state = lock();
+    match is_done {
+        true => state.directories.clear(),
+        false => state.remove_empty_directories(),
+    }
+}
+
 /// From now on a signal calls `stop`, and the command ends when it is ready to.
 pub(crate) fn stop_by(stop: impl Fn() + Send + 'static) -> Result<(), Failure> {
     let mut state = lock();
@@ -103,6 +130,15 @@ pub(crate) fn stop_by(stop: impl Fn() + Send + 'static) -> Result<(), Failure> {
 /// From now on whoever ends the command is told what to do next.
 pub(crate) fn advise(advice: String) {
     lock().advice = Some(advice);
+}
+
+impl State {
+    /// Removes the directories that the command has made, where nothing is in them.
+    fn remove_empty_directories(&mut self) {
+        for path in self.directories.drain(..).rev() {
+            let _is_used = std::fs::remove_dir(path);
+        }
+    }
 }
 
 fn lock() -> MutexGuard<'static, State> {
@@ -119,13 +155,14 @@ fn listen(state: &mut State) -> Result<(), ctrlc::Error> {
 }
 
 fn interrupted() {
-    let state = lock();
+    let mut state = lock();
     if let Some(stop) = &state.stop {
         return stop();
     }
     for path in &state.files {
         let _gone_already = std::fs::remove_file(path);
     }
+    state.remove_empty_directories();
     let advice = state.advice.iter().map(|advice| format!("\n  {advice}")).collect::<String>();
     let _nobody_listens = writeln!(io::stderr().lock(), "interrupted: unfinished files are removed{advice}");
     std::process::exit(i32::from(Failure::Interrupted(String::new()).exit_code()));

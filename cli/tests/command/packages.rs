@@ -3,6 +3,7 @@
 use crate::common::{directory, fail, fixture, json, run_with, succeed, text, write_stream};
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 #[test]
 fn a_stream_comes_back_from_its_package() {
@@ -37,6 +38,38 @@ fn a_package_is_replaced_only_where_that_is_asked_for() {
     succeed(&["package", text(&fixture()), "-o", text(&out), "--force"]);
     assert!(!out.join("t3.mp4").exists() && out.join("notes.txt").exists());
     fail(2, &["package", text(&fixture()), "-o", text(&directory.path().join("out.mp4"))]);
+}
+
+/// There is no room for the largest file, which is not the first.
+#[cfg(unix)]
+#[test]
+fn a_package_is_whole_or_the_one_before_stays() {
+    let directory = directory();
+    let out = directory.path().join("new/out");
+    let package = |limit: &str, force: &[&str]| {
+        let line = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$@\"");
+        let mut command = Command::new("sh");
+        command.args(["-c", &line, "sh", env!("CARGO_BIN_EXE_splatstream"), "package", text(&fixture())]);
+        command.arg("-o").arg(&out).args(force).output().unwrap()
+    };
+    let whole = |out: &Path| -> Vec<_> {
+        let paths = fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
+        let mut files: Vec<_> = paths.map(|path| (path.clone(), fs::read(path).unwrap())).collect();
+        files.sort();
+        files
+    };
+    assert!(package("unlimited", &[]).status.success());
+    let before = whole(&out);
+    let sizes = before.iter().map(|(_, bytes)| bytes.len() / 512);
+    let (least, most) = (sizes.clone().min().unwrap(), sizes.max().unwrap());
+    assert!(least < most);
+    let few = (most - 1).to_string();
+    assert_eq!(package(&few, &["--force"]).status.code(), Some(1));
+    assert!(whole(&out) == before, "the one before is lost");
+    fs::remove_dir_all(directory.path().join("new")).unwrap();
+    assert_eq!(package(&few, &[]).status.code(), Some(1));
+    assert!(!directory.path().join("new").exists(), "empty directories are left");
+    assert!(package("unlimited", &[]).status.success());
 }
 
 #[test]
