@@ -170,10 +170,12 @@ fn no_sequence_is_larger_than_all_intra() {
     assert!(!intra.stands_alone);
     let (bytes, report) = encoded(strangers(4), &layered);
     assert!(report.stands_alone);
-    // Steps are fitted to the first frames, of which there are more here: a decibel takes about 5 % of the bytes.
-    let finer = psnr(&report) - psnr(&intra);
+    // Steps are fitted to the first frames, of which there are more here: a decibel takes about 5 % of the bytes. What they were
+    // fitted for says how fine they are; pictures of 500 Gaussians differ by half a decibel from views to views.
+    let fitted = |report: &Report| f64::from(report.target.as_ref().unwrap().fitted);
+    let finer = fitted(&report) - fitted(&intra);
     let most = 1.01 * alone.len() as f64 * (0.05 * finer.max(0.0)).exp();
-    assert!(bytes.len() as f64 <= most, "{} and {}, {finer} dB better", bytes.len(), alone.len());
+    assert!(bytes.len() as f64 <= most, "{} and {}, {finer} dB finer", bytes.len(), alone.len());
     let (_, report) = encoded(sequence(4), &layered);
     assert!(!report.stands_alone && report.coded.iter().any(|frame| frame.frame_type != FrameType::Intra));
 }
