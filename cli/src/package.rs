@@ -105,7 +105,8 @@ impl PackageStream {
         };
         let options = Options { layout, ..Options::default() };
         if self.live {
-            self.clear(stale)?;
+            make_directory(&self.out)?;
+            clear(&stale)?;
             let settings = self.live_settings(options);
             return live::run((&self.input, &self.out), &settings, &self.limits.limits(), console);
         }
@@ -114,7 +115,7 @@ impl PackageStream {
         make_directory(&self.out)?;
         let (files, sizes) = written(&package, &self.out, slice::from_ref(&self.input))?;
         // Nothing of the earlier package is lost before all of this one is on the disk.
-        self.clear(stale)?;
+        clear(&stale)?;
         files.into_iter().try_for_each(OutputFile::finish)?;
         let report = Report::new(&self.out, &package.manifest, (stream.bytes.len() as u64, sizes));
         console.report(&report, || report.text())
@@ -125,14 +126,6 @@ impl PackageStream {
         let default = Settings::new(package);
         let window_ms = self.window.map_or(default.window_ms, milliseconds);
         Settings { window_ms, target_latency_ms: self.target_latency.map(milliseconds), ..default }
-    }
-
-    /// Makes the directory, without an earlier package.
-    fn clear(&self, stale: Vec<PathBuf>) -> Result<(), Failure> {
-        make_directory(&self.out)?;
-        stale.iter().try_for_each(|path| {
-            std::fs::remove_file(path).map_err(|error| Failure::file("remove", path, &error))
-        })
     }
 
     /// The files of an earlier package, if they may be replaced.
@@ -147,6 +140,13 @@ impl PackageStream {
         stale.iter().try_for_each(|path| refuse_inputs(path, slice::from_ref(&self.input)))?;
         Ok(stale)
     }
+}
+
+/// Removes the files of an earlier package.
+fn clear(stale: &[PathBuf]) -> Result<(), Failure> {
+    stale.iter().try_for_each(|path| {
+        std::fs::remove_file(path).map_err(|error| Failure::file("remove", path, &error))
+    })
 }
 
 /// The files of a package in a directory, by name; none where there is no package.
