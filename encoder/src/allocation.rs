@@ -26,14 +26,14 @@ use crate::sequence::Scene;
 use crate::settings::{Preset, Settings};
 use crate::steps::Steps;
 use crate::strips::{StripView, StripViews, mean};
+use crate::verification::HEIGHT;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::camera::spiral;
 
-/// Views made for the scene, and their height, where none are given; of given ones no more are taken.
+/// Views made for the scene where none are given; of given ones no more are taken.
 const VIEWS: u32 = 4;
-const HEIGHT: u32 = 540;
 /// Of so many strips of a view one is drawn.
 const EVERY: u32 = 8;
 /// Views in which attributes are measured alone: shares need not be exact.

@@ -17,6 +17,7 @@ use crate::report::Pruned;
 use crate::settings::Settings;
 use crate::source::FrameSource;
 use crate::strips::StripViews;
+use crate::verification::HEIGHT;
 use rayon::prelude::*;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
@@ -27,9 +28,8 @@ use std::collections::BTreeMap;
 /// Views in which Gaussians are weighed, and their lines.
 const VIEWS: usize = 16;
 const LINES: u32 = 144;
-/// Views that say how many may go, their height, and of how many strips one is drawn.
+/// Views that say how many may go, and of how many strips one is drawn.
 const JUDGES: usize = 8;
-const HEIGHT: u32 = 540;
 const EVERY: u32 = 6;
 /// Seeds of both. Others fit values to pictures.
 const SEEDS: [u64; 2] = [3, 4];

@@ -313,7 +313,10 @@ impl Scene {
         let rotation = steps.rotation.max(1.0 / MAX_DIFFERING);
         // What lies beside the mean of colours adds a little. Finer steps than components of colour can have would cut colours off.
         let most = *COMPONENT_RANGE.end() as f32;
-        let colour = |step: f32, norm: f32| finest(step.max(1.25 * norm / most), 1.25 * norm, most);
+        let colour = |step: f32, norm: f32| {
+            let reach = 1.25 * norm;
+            finest(step.max(reach / most), reach, most)
+        };
         let mut parameters = SequenceParameters {
             sh_degree,
             spatial_layer_count: settings.spatial_layer_count(),
