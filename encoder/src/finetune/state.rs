@@ -41,7 +41,7 @@ pub enum StateError {
     /// A setting is not the one that the state was kept with.
     #[error(
         "{directory}: the state is that of a run whose {name} was {kept}, and it is {found} now; \
-         give the settings of that run, or remove the directory to begin anew"
+         give the settings of that run, or remove the directory to start again"
     )]
     OtherSetting {
         /// Where the state is.
@@ -56,7 +56,7 @@ pub enum StateError {
     /// A frame is not the one that the state was kept with.
     #[error(
         "{directory}: the state is that of a run whose frame {frame} had other values; \
-         give the frames of that run, or remove the directory to begin anew"
+         give the frames of that run, or remove the directory to start again"
     )]
     OtherFrame {
         /// Where the state is.
@@ -65,7 +65,7 @@ pub enum StateError {
         frame: u32,
     },
     /// A file of the state is not as it was written.
-    #[error("{path}: the state is damaged: {what}; remove it to begin anew with what it had")]
+    #[error("{path}: the state is damaged: {what}; remove it to start again with what it had")]
     Damaged {
         /// The file of a fit; the directory, where its settings are damaged.
         path: PathBuf,

@@ -1,6 +1,6 @@
 //! A descent that is ended and gone on with.
 //!
-//! It is kept before judges look: models are chosen anew then, and everything else that the next iterations follow from is a
+//! It is kept before judges look: models are chosen again then, and everything else that the next iterations follow from is a
 //! number that is named here, or follows from how many there have been, as views do.
 
 use super::super::state::entry::{Entry, Exchange, Keep, Stage};

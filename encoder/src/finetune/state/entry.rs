@@ -84,7 +84,7 @@ impl Entry {
         fit.exchange(&mut file).map_err(failed)?;
         match file.finish().map_err(failed)? {
             true => Ok(true),
-            false => Err(damaged(&self.path, "its check sum or its length is wrong")),
+            false => Err(damaged(&self.path, "its checksum or its length is wrong")),
         }
     }
 
