@@ -178,23 +178,15 @@ impl Fit<'_> {
         let coded = source.clone().with_sh_degree(self.coder.sequence.sh_degree)?;
         let mut latent = Latent::new(self.coder, &coded, lists)?;
         let mut report = None;
-        let finished = match &entry {
-            Some(entry) if !receivers.is_empty() => {
-                let mut done = FinetuneReport::of_points(layer, receivers.iter());
-                let was_finished =
-                    entry.read(Stage::Finished, &mut Finished { latent: &mut latent, report: &mut done })?;
-                was_finished.then_some(FinetuneReport { resumed: done.iterations, ..done })
+        if !receivers.is_empty() {
+            report = finished(entry.as_ref(), layer, &receivers, &mut latent)?;
+            if report.is_none() {
+                let pictures = Pictures::new(source, self.finetune, self.settings, &receivers);
+                let descent = Descent::new(latent, (receivers, pictures), self.compensator, self.finetune);
+                let (fitted, done) = descent.run(layer, entry)?;
+                latent = fitted;
+                report = Some(done);
             }
-            _ => None,
-        };
-        if let Some(done) = finished {
-            report = Some(done);
-        } else if !receivers.is_empty() {
-            let pictures = Pictures::new(source, self.finetune, self.settings, &receivers);
-            let descent = Descent::new(latent, (receivers, pictures), self.compensator, self.finetune);
-            let (fitted, done) = descent.run(layer, entry)?;
-            latent = fitted;
-            report = Some(done);
         }
         let is_changed = latent.offsets.planes().iter().flatten().any(|&offset| offset != 0.0);
         Ok(Layer { frame: latent.frame()?, lists: latent.lists()?, is_changed, report })
@@ -225,6 +217,19 @@ impl Fit<'_> {
         };
         (0..).zip(parts(&self.settings.refinements, self.order.len())).map(list).collect()
     }
+}
+
+/// What an earlier run has made of a layer, if it has finished it: its values go to `latent`.
+fn finished(
+    entry: Option<&Entry>,
+    layer: u8,
+    receivers: &[Receiver],
+    latent: &mut Latent<'_>,
+) -> Result<Option<FinetuneReport>, Error> {
+    let Some(entry) = entry else { return Ok(None) };
+    let mut report = FinetuneReport::of_points(layer, receivers.iter());
+    let is_there = entry.read(Stage::Finished, &mut Finished { latent, report: &mut report })?;
+    Ok(is_there.then_some(FinetuneReport { resumed: report.iterations, ..report }))
 }
 
 /// The Gaussians list after list, within each along the curve that they are coded along, nearly: moves may change that.
