@@ -92,6 +92,8 @@ pub(crate) struct Fit {
     views: Vec<StripView>,
     /// The source as those views show it in which attributes are measured alone.
     alone: Vec<StripView>,
+    /// Whether these views hold their Gaussians.
+    is_held: bool,
     /// Some of the Gaussians, and which these are.
     pub(crate) sample: (GaussianFrame, Vec<u32>),
     sensitivity: Sensitivity,
@@ -138,6 +140,7 @@ impl Fit {
                 None => views.of(frame, 0..views.len()),
             },
             alone: alone(frame, cameras, settings),
+            is_held: true,
             sample: (sample, rows),
         }
     }
@@ -202,9 +205,28 @@ impl Fit {
     /// The steps with which renderings have a PSNR of about `decibels`, and the PSNR that they were seen to have; none if
     /// nothing can be seen.
     ///
+    /// What the views show of the frame is let go after that: it would fill memory that coding needs. `again` gives the
+    /// canonical frame where it is wanted once more.
+    ///
     /// # Errors
-    /// Planes that make no frame.
-    pub(crate) fn at(&self, decibels: f32) -> Result<(Steps, Option<f64>), Error> {
+    /// Those of `again`, and planes that make no frame.
+    pub(crate) fn at(
+        &mut self,
+        decibels: f32,
+        again: impl FnOnce() -> Result<GaussianFrame, Error>,
+    ) -> Result<(Steps, Option<f64>), Error> {
+        if !self.is_held {
+            let frame = again()?;
+            self.views.iter_mut().chain(&mut self.alone).for_each(|view| view.hold(&frame));
+        }
+        let found = self.found(decibels);
+        self.views.iter_mut().chain(&mut self.alone).for_each(StripView::let_go);
+        self.is_held = false;
+        found
+    }
+
+    /// The same with what the views hold.
+    fn found(&self, decibels: f32) -> Result<(Steps, Option<f64>), Error> {
         let mut steps = Steps::about(decibels);
         for _ in 0..ROUNDS {
             let errors = self.estimated(&steps)?;

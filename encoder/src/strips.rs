@@ -56,9 +56,9 @@ pub(crate) struct StripView {
     camera: Camera,
     strips: Strips,
     picture: Rendering,
-    /// The Gaussians, and which they are.
-    pub(crate) frame: GaussianFrame,
+    /// Which Gaussians these are, and what they are unless that has been [let go](Self::let_go).
     pub(crate) rows: Vec<u32>,
+    pub(crate) frame: GaussianFrame,
 }
 
 impl StripView {
@@ -68,6 +68,16 @@ impl StripView {
         let frame = frame.select(&rows);
         let picture = PreparedFrame::new(&frame).strips(camera, BACKGROUND, strips);
         Self { camera: camera.clone(), strips, picture, frame, rows }
+    }
+
+    /// Forgets the Gaussians, which fill much memory, and knows only which they are.
+    pub(crate) fn let_go(&mut self) {
+        self.frame = GaussianFrame::default();
+    }
+
+    /// Takes the Gaussians again from the frame that it is of.
+    pub(crate) fn hold(&mut self, frame: &GaussianFrame) {
+        self.frame = frame.select(&self.rows);
     }
 
     /// PSNR of another version of the same Gaussians, dB; none if nothing can be seen.

@@ -22,6 +22,7 @@ use crate::strips::StripViews;
 use crate::verification::{Tried, Views};
 use crate::window::FirstFrames;
 use splatstream_format::syntax::FrameType;
+use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
 
 /// A PSNR is near enough within so many decibels of what is this much higher than the one that is asked for: a little too
@@ -78,7 +79,7 @@ pub(crate) fn reach(
         None => seeker.whole(fitted, sink)?,
     };
     report.target = Some(seeker.told(fitted));
-    report.savings.extend(seeker.fitting.worth_of_laws(fitted)?);
+    report.savings.extend(seeker.fitting.worth_of_laws(fitted, seeker.source)?);
     Ok(report)
 }
 
@@ -95,7 +96,11 @@ pub(crate) fn fit(
     let found = seeker.find()?;
     // The one that the plan is made for.
     seeker.encodings += u32::from(found.encoded.is_none());
-    Ok((seeker.fitting.at(found.fitted)?, seeker.fitting.ranking.clone(), seeker.told(found.fitted)))
+    Ok((
+        seeker.fitting.at(found.fitted, seeker.source)?,
+        seeker.fitting.ranking.clone(),
+        seeker.told(found.fitted),
+    ))
 }
 
 /// Settings that reach what is asked for on the frames of `source`, the order of the first frame, and how they were found.
@@ -114,7 +119,7 @@ pub(crate) fn settle(
         None => seeker.whole(fitted, &mut std::io::sink())?,
     };
     report.target = Some(seeker.told(fitted));
-    let mut settled = Settings { psnr: None, size: None, ..seeker.fitting.at(fitted)? };
+    let mut settled = Settings { psnr: None, size: None, ..seeker.fitting.at(fitted, seeker.source)? };
     if report.stands_alone {
         settled = settled.alone();
     }
@@ -139,9 +144,9 @@ struct Fitting<'a> {
 
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
-        let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
-        let Views { of_fit, unseen } = Views::of(&first, settings);
-        let frame = coded_form(first, settings);
+        let frame = first(source)?;
+        let Views { of_fit, unseen } = Views::of(&frame, settings);
+        let frame = coded_form(frame, settings);
         // What is left out of the source is in its pictures.
         let unseen = settings.prune.is_none().then_some(unseen);
         // What is left out counts as an error.
@@ -185,13 +190,14 @@ impl<'a> Fitting<'a> {
 
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
     /// ones.
-    fn at(&mut self, decibels: f64) -> Result<Settings, Error> {
+    fn at(&mut self, decibels: f64, source: &mut dyn FrameSource) -> Result<Settings, Error> {
         let apart = |known: &&(f64, Steps, Option<f64>)| (known.0 - decibels).abs();
         let nearest = self.known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
             Some((from, steps, _)) => self.fit.no_finer(finer(*steps, decibels - from)),
             None => {
-                let (steps, psnr) = self.fit.at(decibels as f32)?;
+                let again = || Ok(coded_form(first(source)?, self.settings));
+                let (steps, psnr) = self.fit.at(decibels as f32, again)?;
                 self.known.push((decibels, steps, psnr));
                 steps
             }
@@ -212,15 +218,24 @@ impl<'a> Fitting<'a> {
     }
 
     /// What laws save with the steps for a PSNR; not where time counts.
-    fn worth_of_laws(&mut self, decibels: f64) -> Result<Option<Saving>, Error> {
+    fn worth_of_laws(
+        &mut self,
+        decibels: f64,
+        source: &mut dyn FrameSource,
+    ) -> Result<Option<Saving>, Error> {
         match self.settings.preset {
             Preset::Fast => Ok(None),
             Preset::Balanced | Preset::Small => {
-                let steps = self.at(decibels)?.steps;
+                let steps = self.at(decibels, source)?.steps;
                 self.fit.worth_of_laws(&steps)
             }
         }
     }
+}
+
+/// The first frame of a source.
+fn first(source: &mut dyn FrameSource) -> Result<GaussianFrame, Error> {
+    source.frame(0).map_err(|source| Error::Source { frame: 0, source })
 }
 
 /// Looks for the PSNR to fit for.
@@ -395,7 +410,7 @@ impl<'a> Seeker<'a> {
     /// All frames, with the steps for a PSNR.
     fn whole(&mut self, fitted: f64, sink: &mut dyn Write) -> Result<Report, Error> {
         self.encodings += 1;
-        let (settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
+        let (settings, ranking) = (self.fitting.at(fitted, self.source)?, self.fitting.ranking.clone());
         let tried = self.fitting.tried(fitted);
         encode_smaller(self.source, &settings, (ranking, tried), sink, self.progress)
     }
@@ -410,7 +425,7 @@ impl<'a> Seeker<'a> {
     /// The first frames, not fitted to photographs.
     fn part(&mut self, fitted: f64, frames: u32) -> Result<Encoded, Error> {
         self.trials += 1;
-        let (mut settings, ranking) = (self.fitting.at(fitted)?, self.fitting.ranking.clone());
+        let (mut settings, ranking) = (self.fitting.at(fitted, self.source)?, self.fitting.ranking.clone());
         if self.fitting.leaves_source() {
             settings.finetune = None;
         }

@@ -17,7 +17,7 @@ use crate::image::Image;
 pub(crate) use lanes::{Lanes, TILE};
 pub use project::LOW_PASS;
 use project::project;
-pub(crate) use project::{Shapes, Splat, near, seen_slopes};
+pub(crate) use project::{Shapes, Splat, near, opacity, seen_slopes, semi_axes};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use reach::reachable;

@@ -237,10 +237,12 @@ fn rounded(components: &[Vec<f32>], rows: &[u32], exponents: &[u8]) -> Vec<Vec<i
 
 /// The components of some Gaussians in their own steps, Gaussian by Gaussian.
 fn scaled_rows(components: &[Vec<f32>], rows: &[u32], exponents: &[u8]) -> Vec<f32> {
-    let of_row = |(&row, &exponent): (&u32, &u8)| {
-        components.iter().map(move |plane| plane[row as usize] / step(exponent) as f32)
-    };
-    rows.iter().zip(exponents).flat_map(of_row).collect()
+    // Whole vectors of many rows fill much memory: no more is taken than they need.
+    let mut scaled = Vec::with_capacity(rows.len() * components.len());
+    for (&row, &exponent) in rows.iter().zip(exponents) {
+        scaled.extend(components.iter().map(|plane| plane[row as usize] / step(exponent) as f32));
+    }
+    scaled
 }
 
 /// A plane of colour in parts of a step.

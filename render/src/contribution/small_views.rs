@@ -1,23 +1,24 @@
 //! What each Gaussian is to a set of views, from small pictures of them.
 //!
 //! In a small picture most Gaussians show in one or two pixels, so that time goes into each Gaussian and not into its
-//! pixels: tiles, whose lines of sixteen pixels pay in large pictures, are left out. Ellipses are projected side by side,
-//! sorted by depth, and blended into the whole picture, which a core's cache holds. What each adds to a pixel is kept until
-//! all light is known, and gone through again from behind.
+//! pixels: tiles, whose lines of sixteen pixels pay in large pictures, are left out. Gaussians are sorted by depth,
+//! projected side by side, and blended into the whole picture, which a core's cache holds. What each adds to a pixel is
+//! kept until all light is known, and gone through again from behind.
 
-mod columns;
 mod ellipses;
+mod order;
+mod rows;
 mod trace;
 
 use super::{Share, Worth};
 use crate::camera::Camera;
 use crate::rasterise::near;
-use columns::Columns;
-use ellipses::Ellipses;
+use order::Order;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
+use rows::Rows;
 use splatstream_gaussians::GaussianFrame;
-use trace::Trace;
+use trace::{Scene, Trace};
 
 /// A frame as cameras see it in pictures smaller than theirs, which cost less and show nearly the same of each Gaussian.
 ///
@@ -46,7 +47,7 @@ use trace::Trace;
 /// ```
 pub struct SmallViews {
     /// The Gaussians that are left.
-    left: Columns,
+    left: Rows,
     views: Vec<SmallView>,
 }
 
@@ -59,7 +60,7 @@ struct SmallView {
     near: f32,
 }
 
-/// Gaussians of all views that are looked at side by side, at most: each takes some 60 bytes meanwhile.
+/// Gaussians of all views that are looked at side by side, at most: each takes some 30 bytes meanwhile.
 const AT_ONCE: usize = 1 << 23;
 
 impl SmallViews {
@@ -74,7 +75,7 @@ impl SmallViews {
             SmallView { camera: small, fine, near: near(frame, camera) }
         };
         let views = cameras.iter().map(small).collect();
-        Self { left: Columns::of(frame), views }
+        Self { left: Rows::of(frame), views }
     }
 
     /// Takes all Gaussians away but those of some rows of the frame, which rise. What was taken away before stays away.
@@ -109,14 +110,14 @@ impl SmallViews {
 /// What looking from one camera takes, and gives: kept from view to view, since fresh memory takes time.
 #[derive(Default)]
 struct Desk {
-    ellipses: Ellipses,
+    order: Order,
     trace: Trace,
     shares: Vec<Share>,
 }
 
 /// Looks at all Gaussians that are left from one camera.
 struct Look<'a> {
-    left: &'a Columns,
+    left: &'a Rows,
     view: &'a SmallView,
     /// What is kept of pixels, at most.
     most: usize,
@@ -128,13 +129,13 @@ impl WithSimd for Look<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self { left, view: SmallView { camera, fine, near }, most, desk } = self;
-        let Desk { ellipses, trace, shares } = desk;
-        ellipses.project(left, camera, *fine, *near);
+        let Self { left, view, most, desk } = self;
+        let Desk { order, trace, shares } = desk;
+        order.find(left, &view.camera, view.near);
         shares.clear();
         shares.resize(left.len(), Share::default());
-        trace.start(camera, most);
-        trace.blend(ellipses, shares);
+        trace.start(view, most);
+        trace.blend(&Scene { left, order, view }, shares);
     }
 }
 

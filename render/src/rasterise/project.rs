@@ -64,13 +64,8 @@ impl Shapes {
         let axes: Vec<[Vec3; 3]> = rows.map(|row| semi_axes(frame, row)).collect();
         let squared = |axes: &[Vec3; 3]| axes.map(Vec3::length_squared).into_iter().fold(0.0, f32::max);
         let longest = axes.par_iter().with_min_len(CHUNK).map(|axes| squared(axes).sqrt()).collect();
-        let logits = frame.opacity_logit().par_iter().with_min_len(CHUNK);
-        Self { axes, longest, opacity: logits.map(|logit| 1.0 / (1.0 + libm::expf(-logit))).collect() }
-    }
-
-    /// Opacity of each Gaussian.
-    pub(crate) fn opacity(&self) -> &[f32] {
-        &self.opacity
+        let rows = (0..frame.len()).into_par_iter().with_min_len(CHUNK);
+        Self { axes, longest, opacity: rows.map(|row| opacity(frame, row)).collect() }
     }
 
     /// The semi-axes of a Gaussian.
@@ -312,8 +307,13 @@ struct Covariance {
     determinant: f32,
 }
 
+/// Opacity of a Gaussian.
+pub(crate) fn opacity(frame: &GaussianFrame, row: usize) -> f32 {
+    1.0 / (1.0 + libm::expf(-frame.opacity_logit()[row]))
+}
+
 /// The semi-axes of a Gaussian as vectors in the world.
-fn semi_axes(frame: &GaussianFrame, row: usize) -> [Vec3; 3] {
+pub(crate) fn semi_axes(frame: &GaussianFrame, row: usize) -> [Vec3; 3] {
     let [w, x, y, z] = frame.rotation().each_ref().map(|plane| plane[row]);
     let scale = 1.0 / (w * w + x * x + y * y + z * z).sqrt();
     let [w, x, y, z] = [w, x, y, z].map(|part| part * scale);

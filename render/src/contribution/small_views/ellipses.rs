@@ -1,25 +1,19 @@
 //! Gaussians to ellipses in a small picture, sixteen at a time.
-#![expect(clippy::arithmetic_side_effects, reason = "floats; counts of Gaussians in memory")]
-#![expect(clippy::indexing_slicing, reason = "rows are those of the frame; lanes and axes are constants")]
+#![expect(clippy::indexing_slicing, reason = "lanes and axes are constants")]
 
-use super::columns::{Columns, VALUES};
+use super::rows::VALUES;
 use crate::camera::Camera;
 use crate::rasterise::{LOW_PASS, Lanes, TILE, seen_slopes};
-use core::ops::Range;
 
 /// The square of the distance from its centre, in its own widths, to which a Gaussian is blended: beyond are 5 % of it.
 pub(super) const REACH: f32 = 6.0;
 
 /// The least alpha in its middle with which a Gaussian is blended.
-const LEAST_ALPHA: f32 = 1.0 / 255.0;
-
-/// Bits of depth that are sorted by in a round.
-const DIGIT: u32 = 11;
-const BUCKETS: usize = 1 << DIGIT;
+pub(super) const LEAST_ALPHA: f32 = 1.0 / 255.0;
 
 /// An ellipse in the picture. Its alpha at an offset from the centre is
 /// `peak·exp(-(xx·(dx + skew·dy)² + yy·dy²) / 2)`.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Ellipse {
     /// Pixels.
     pub(super) centre: [f32; 2],
@@ -28,78 +22,14 @@ pub(super) struct Ellipse {
     pub(super) yy: f32,
     /// Alpha in the middle.
     pub(super) peak: f32,
-    /// Bits of the depth, which is positive: they order as it does.
-    depth: u32,
     /// Which of the Gaussians that are left.
     pub(super) place: u32,
     /// Red, green and blue without what depends on where it is seen from, at least 0.
     pub(super) colour: [f32; 3],
 }
 
-/// The ellipses of the Gaussians that touch a picture, by rising place.
-#[derive(Default)]
-pub(super) struct Ellipses {
-    pub(super) all: Vec<Ellipse>,
-    /// Places of the ellipses, nearest first; of those at one depth, nearly, the first in the frame.
-    order: Vec<(u32, u32)>,
-    /// The same while it is sorted.
-    sorted: Vec<(u32, u32)>,
-}
-
-impl Ellipses {
-    /// Of the Gaussians that are left. `fine`: the side of a pixel of the picture that this one stands for, pixels of
-    /// this one; `near`: the least depth that is drawn.
-    #[inline(always)]
-    pub(super) fn project(&mut self, left: &Columns, camera: &Camera, fine: f32, near: f32) {
-        let count = left.len();
-        let all = &mut self.all;
-        all.clear();
-        all.reserve(count);
-        for start in (0..count).step_by(TILE) {
-            let values = left.lanes(start / TILE);
-            let lanes = Projected::new(&values, left.is_antialiased(), camera, fine);
-            let [.., red, green, blue] = values;
-            for lane in (0..TILE.min(count - start)).filter(|&lane| lanes.is_seen(lane, camera, near)) {
-                let colour = [red[lane], green[lane], blue[lane]];
-                all.push(Ellipse { colour, place: (start + lane) as u32, ..lanes.ellipse(lane) });
-            }
-        }
-        self.sort();
-    }
-
-    /// The places of the ellipses from one on, nearest first.
-    #[inline(always)]
-    pub(super) fn nearest(&self, places: Range<usize>) -> &[(u32, u32)] {
-        &self.order[places]
-    }
-
-    /// Two rounds of sorting by counting, by the 22 highest bits in which depths differ.
-    #[inline(always)]
-    fn sort(&mut self) {
-        let Self { all, order, sorted } = self;
-        let depths = || all.iter().map(|ellipse| ellipse.depth);
-        let (least, most) = (depths().min().unwrap_or_default(), depths().max().unwrap_or_default());
-        let shift = (u32::BITS - (most - least).leading_zeros()).saturating_sub(2 * DIGIT);
-        order.clear();
-        order.extend(depths().map(|depth| (depth - least) >> shift).zip(0..));
-        sorted.resize(order.len(), (0, 0));
-        for digit in 0..2 {
-            let bucket = |key: u32| (key >> (digit * DIGIT)) as usize % BUCKETS;
-            let mut starts = [0; BUCKETS + 1];
-            order.iter().for_each(|&(key, _)| starts[bucket(key) + 1] += 1);
-            (0..BUCKETS).for_each(|bucket| starts[bucket + 1] += starts[bucket]);
-            for &(key, place) in order.iter() {
-                let slot = &mut starts[bucket(key)];
-                sorted[*slot] = (key, place);
-                *slot += 1;
-            }
-            core::mem::swap(order, sorted);
-        }
-    }
-}
-
 /// Sixteen Gaussians as a camera sees them.
-struct Projected {
+pub(super) struct Projected {
     depth: Lanes,
     centre: [Lanes; 2],
     xx: Lanes,
@@ -108,11 +38,14 @@ struct Projected {
     peak: Lanes,
     /// How far they are blended along x and y, pixels.
     extent: [Lanes; 2],
+    /// Red, green and blue.
+    colour: [Lanes; 3],
 }
 
 impl Projected {
+    /// `fine`: the side of a pixel of the picture that this one stands for, pixels of this one.
     #[inline(always)]
-    fn new(values: &[&Lanes; VALUES], is_compensated: bool, camera: &Camera, fine: f32) -> Self {
+    pub(super) fn new(values: &[Lanes; VALUES], is_compensated: bool, camera: &Camera, fine: f32) -> Self {
         let zero = [0.0; TILE];
         let mut all = Self {
             depth: zero,
@@ -122,8 +55,10 @@ impl Projected {
             yy: zero,
             peak: zero,
             extent: [zero; 2],
+            colour: [zero; 3],
         };
-        let [px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz, opacity, ..] = *values;
+        let [px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz, opacity, red, green, blue] = values;
+        all.colour = [*red, *green, *blue];
         let (position, axes) = ([px, py, pz], [[ax, ay, az], [bx, by, bz], [cx, cy, cz]]);
         let ([right, down, ahead], from) = (camera.rotation, camera.position);
         let [(least_x, most_x), (least_y, most_y)] = seen_slopes(camera);
@@ -167,7 +102,7 @@ impl Projected {
 
     /// Whether a lane shows in the picture. What is not finite does not.
     #[inline(always)]
-    fn is_seen(&self, lane: usize, camera: &Camera, near: f32) -> bool {
+    pub(super) fn is_seen(&self, lane: usize, camera: &Camera, near: f32) -> bool {
         let size = [camera.width, camera.height];
         let touches = |axis: usize| {
             let (centre, extent) = (self.centre[axis][lane], self.extent[axis][lane]);
@@ -177,22 +112,22 @@ impl Projected {
         depth >= near && depth < f32::INFINITY && self.peak[lane] >= LEAST_ALPHA && touches(0) && touches(1)
     }
 
-    /// The ellipse of a lane without its place and its colour.
+    /// The ellipse of a lane.
     #[inline(always)]
-    fn ellipse(&self, lane: usize) -> Ellipse {
+    pub(super) fn ellipse(&self, lane: usize, place: u32) -> Ellipse {
         Ellipse {
             centre: self.centre.each_ref().map(|lanes| lanes[lane]),
             xx: self.xx[lane],
             skew: self.skew[lane],
             yy: self.yy[lane],
             peak: self.peak[lane],
-            depth: self.depth[lane].to_bits(),
-            ..Ellipse::default()
+            place,
+            colour: self.colour.each_ref().map(|lanes| lanes[lane]),
         }
     }
 }
 
 #[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

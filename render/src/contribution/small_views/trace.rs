@@ -1,11 +1,16 @@
 //! Ellipses blended into a small picture, nearest first, and gone through again from behind.
 #![expect(clippy::arithmetic_side_effects, reason = "floats; places of pixels in memory")]
-#![expect(clippy::indexing_slicing, reason = "pixels are those of the picture, places those of the ellipses")]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "pixels are those of the picture, places those of the Gaussians"
+)]
 
-use super::ellipses::{Ellipse, Ellipses, REACH};
-use crate::camera::Camera;
+use super::SmallView;
+use super::ellipses::{Ellipse, Projected, REACH};
+use super::order::Order;
+use super::rows::{Row, Rows, lanes};
 use crate::contribution::Share;
-use crate::rasterise::{MAX_ALPHA, exp2};
+use crate::rasterise::{MAX_ALPHA, TILE, exp2};
 use core::ops::Range;
 use std::f32::consts::LOG2_E;
 
@@ -15,8 +20,8 @@ pub(super) const MOST: usize = 1 << 22;
 /// A pixel is done where less of the light would pass than this: the rest changes no order.
 const MIN_PASSING: f32 = 1e-3;
 
-/// Ellipses that are brought together at once, so that waits for memory overlap.
-const AHEAD: usize = 64;
+/// Gaussians that are brought together at once, so that waits for memory overlap.
+const AHEAD: usize = 4 * TILE;
 
 /// Pixels whose alphas are computed side by side, whether all are wanted or not.
 const LANES: usize = 8;
@@ -37,6 +42,13 @@ struct Shown {
     end: usize,
 }
 
+/// What is blended into a picture.
+pub(super) struct Scene<'a> {
+    pub(super) left: &'a Rows,
+    pub(super) order: &'a Order,
+    pub(super) view: &'a SmallView,
+}
+
 /// A picture, and what it was blended from.
 #[derive(Default)]
 pub(super) struct Trace {
@@ -52,8 +64,8 @@ pub(super) struct Trace {
 }
 
 impl Trace {
-    /// Begins a picture of a camera.
-    pub(super) fn start(&mut self, camera: &Camera, most: usize) {
+    /// Begins a picture of a view.
+    pub(super) fn start(&mut self, SmallView { camera, .. }: &SmallView, most: usize) {
         self.size = [camera.width as usize, camera.height as usize];
         self.most = most;
         let pixels = self.size[0] * self.size[1];
@@ -68,14 +80,14 @@ impl Trace {
     /// Where there are more touches than there is room for, the light that passes is kept instead, and what was blended
     /// before is blended again when all behind it is known.
     #[inline(always)]
-    pub(super) fn blend(&mut self, ellipses: &Ellipses, shares: &mut [Share]) {
-        let all = ellipses.all.len();
-        let mut end = self.forward(ellipses, 0..all);
+    pub(super) fn blend(&mut self, scene: &Scene<'_>, shares: &mut [Share]) {
+        let all = scene.order.len();
+        let mut end = self.forward(scene, 0..all);
         // Where each part ends, and what passes it.
         let mut parts = Vec::new();
         while end < all {
             parts.push((end, self.passing.clone()));
-            end = self.forward(ellipses, end..all);
+            end = self.forward(scene, end..all);
         }
         self.backward(shares);
         while let Some((end, _)) = parts.pop() {
@@ -89,34 +101,43 @@ impl Trace {
                     *start
                 }
             };
-            self.forward(ellipses, start..end);
+            self.forward(scene, start..end);
             self.backward(shares);
         }
     }
 
     /// Blends ellipses at some places of the order, until there is no room; gives the place after the last.
     #[inline(always)]
-    fn forward(&mut self, ellipses: &Ellipses, order: Range<usize>) -> usize {
+    fn forward(&mut self, scene: &Scene<'_>, order: Range<usize>) -> usize {
         self.touches.clear();
         self.shown.clear();
-        let mut near = [Ellipse::default(); AHEAD];
-        for (number, places) in ellipses.nearest(order.clone()).chunks(AHEAD).enumerate() {
+        for (number, some) in scene.order.nearest(order.clone()).chunks(AHEAD).enumerate() {
             if self.touches.len() >= self.most {
                 return order.start + number * AHEAD;
             }
-            for (ellipse, &(_, place)) in near.iter_mut().zip(places) {
-                *ellipse = ellipses.all[place as usize];
-            }
-            for ellipse in near.iter().take(places.len()) {
+            self.some(scene, some);
+        }
+        order.end
+    }
+
+    /// Blends up to [`AHEAD`] Gaussians at some places.
+    #[inline(always)]
+    fn some(&mut self, Scene { left, view, .. }: &Scene<'_>, some: &[(u32, u32)]) {
+        let mut rows = [[Row::default(); TILE]; AHEAD / TILE];
+        left.bring(some, rows.as_flattened_mut());
+        for (places, rows) in some.chunks(TILE).zip(&rows) {
+            let projected = Projected::new(&lanes(rows), left.is_antialiased(), &view.camera, view.fine);
+            let seen = (0..places.len()).filter(|&lane| projected.is_seen(lane, &view.camera, view.near));
+            for lane in seen {
+                let ellipse = projected.ellipse(lane, places[lane].1);
                 let before = self.touches.len();
-                self.ellipse(ellipse);
+                self.ellipse(&ellipse);
                 let end = self.touches.len();
                 if end > before {
                     self.shown.push(Shown { place: ellipse.place, colour: ellipse.colour, end });
                 }
             }
         }
-        order.end
     }
 
     /// Blends an ellipse.
