@@ -111,9 +111,7 @@ impl<'a> SpanCoder<'a> {
     /// a frame shares little with the one it would refer to.
     fn gop(&mut self, first: u32, span: Span) -> Result<u32, Error> {
         let (before, last) = ((self.report.clone(), self.looked_at), span.end);
-        let target = self.target(first)?;
-        self.ranking.start_gop(&target.frame);
-        let intra = Intra { order: self.ranking.order(&target.frame), target };
+        let intra = self.intra_target(first)?;
         let mut gop = self.start(first, last - first, &intra)?;
         let order = self.weighs_layers(first).then(|| intra.order.clone());
         self.intra(&mut gop, first, intra)?;

@@ -164,10 +164,10 @@ impl Ranking {
         BETTER_HIDDEN + of_pixels(pixels(&cameras.iter().map(small).collect::<Vec<_>>()))
     }
 
-    /// A GOP begins with a frame. Its views are those of the sequence, so that orders do not change from GOP to GOP, unless
-    /// there is something else to see, or from elsewhere: then they are made for the frame. Neither depends on other
-    /// GOPs. Views for which an order is known already stay.
-    pub(crate) fn start_gop(&mut self, frame: &GaussianFrame) {
+    /// A frame follows that is coded by itself. Its views are those of the sequence, so that orders do not change from I frame
+    /// to I frame, unless there is something else to see, or from elsewhere: then they are made for the frame. Neither
+    /// depends on other frames. Views for which an order is known already stay.
+    pub(crate) fn turn_to(&mut self, frame: &GaussianFrame) {
         if self.are_given || self.known_order.is_some() {
             return;
         }
