@@ -8,9 +8,9 @@ use crate::source::{Source, Window};
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::{Step, StreamDecoder};
-use splatstream_format::Class;
 use splatstream_format::payload::SceneDescription;
 use splatstream_format::seek::gop_of;
+use splatstream_format::{Class, Error as StreamError};
 use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -238,7 +238,7 @@ impl Decoder {
             // What has been taken need not be kept while the next bytes are awaited.
             self.source.go_to(self.stream.position());
             self.check_cancelled()?;
-            match step.map_err(Error::Stream)? {
+            match step? {
                 Step::Frame(frame) => {
                     if let Some(frame) = self.told(*frame)? {
                         return Ok(Some(frame));
@@ -295,11 +295,12 @@ impl Decoder {
     /// Takes what the decoder has found wrong since the last frame.
     ///
     /// # Errors
-    /// Something was over a limit.
+    /// Something was over a limit, or the decoder is at fault.
     fn collect(&mut self) -> Result<()> {
         let (errors, lost) = self.stream.take_report();
-        if let Some(&error) = errors.iter().find(|error| error.class() == Class::OverLimit) {
-            return Err(Error::Stream(error));
+        let ends = |error: &&StreamError| error.class() == Class::OverLimit || error.is_fault();
+        if let Some(&error) = errors.iter().find(ends) {
+            return Err(error.into());
         }
         self.warnings.extend(errors.into_iter().map(Warning::Damaged));
         self.warnings.extend(lost.into_iter().map(Warning::Lost));

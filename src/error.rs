@@ -2,7 +2,7 @@
 
 use core::fmt;
 use core::ops::RangeInclusive;
-use splatstream_format::{Class, Error as StreamError};
+use splatstream_format::{Class, Error as StreamError, ErrorKind};
 
 /// The result of a [`Decoder`](crate::Decoder) or of [`Slots`](crate::Slots).
 pub type Result<T> = core::result::Result<T, Error>;
@@ -20,7 +20,8 @@ pub enum Error {
     Incomplete(Vec<Warning>),
     /// A file cannot be opened or read.
     Io(std::io::Error),
-    /// The planes of a frame, or the identities of its Gaussians, do not fit together, in words: a defect of this library, which its authors want to hear of.
+    /// What has been decoded does not fit together, such as the planes of a frame or the identities of its Gaussians; in words: a
+    /// defect of this library, which its authors want to hear of. Nothing more comes.
     Broken(String),
     /// [`Cancel`](crate::Cancel) was requested. A [seek](crate::Decoder::seek) starts again.
     Cancelled,
@@ -79,6 +80,16 @@ impl std::error::Error for Error {
     }
 }
 
+/// A stream that cannot be decoded, or not by this library.
+impl From<StreamError> for Error {
+    fn from(error: StreamError) -> Self {
+        match error.kind {
+            ErrorKind::Fault { broken } => Self::Broken(format!("{broken} does not hold")),
+            _ => Self::Stream(error),
+        }
+    }
+}
+
 impl From<std::io::Error> for Error {
     fn from(error: std::io::Error) -> Self {
         Self::Io(error)
@@ -124,5 +135,19 @@ impl fmt::Display for Warning {
             }
             Self::Lost(frames) => write!(formatter, "frames {} to {} are lost", frames.start(), frames.end()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_of_the_decoder_is_none_of_the_stream() {
+        let broken = Error::from(StreamError::fault("one length"));
+        assert!(matches!(&broken, Error::Broken(what) if what == "one length does not hold"), "{broken}");
+        assert_eq!(broken.class(), None);
+        let signature = StreamError::new(0, "6.2", ErrorKind::Signature);
+        assert_eq!(Error::from(signature).class(), Some(Class::Malformed));
     }
 }

@@ -16,5 +16,5 @@ use splatstream_decoder::operating_point::{self, OperatingPoint};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn extract(bytes: &[u8], point: OperatingPoint, limits: &Limits) -> Result<Vec<u8>> {
-    operating_point::extract(bytes, point, &limits.of_format()).map_err(Error::Stream)
+    operating_point::extract(bytes, point, &limits.of_format()).map_err(Error::from)
 }

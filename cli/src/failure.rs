@@ -82,7 +82,7 @@ impl Failure {
         Self::Stream { path: path.to_path_buf(), error, instead: Instead::Nothing, level: None }
     }
 
-    /// 2 usage, 1 files and settings, 3 a decoder under test, 10 to 14 by the class of a stream's error, 13 too much memory, 130
+    /// 2 usage, 1 files, settings and defects of the decoder, 3 a decoder under test, 10 to 14 by the class of a stream's error, 13 too much memory, 130
     /// interrupted.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
@@ -92,6 +92,7 @@ impl Failure {
             Self::Decoder(_) => 3,
             Self::Interrupted(_) => 130,
             Self::Verdict { exit_code, .. } => *exit_code,
+            Self::Stream { error, .. } if error.is_fault() => 1,
             Self::Stream { error, .. } => error.class().exit_code(),
         }
     }

@@ -175,6 +175,12 @@ pub enum ErrorKind {
         /// What is allowed.
         allowed: u64,
     },
+    /// What a decoder has computed contradicts itself: a defect of the decoder, and nothing that the stream does wrong. It has no
+    /// row in clause 9, and its class is that of what this version cannot decode.
+    Fault {
+        /// What should always hold, in a few words.
+        broken: &'static str,
+    },
 }
 
 impl fmt::Display for ErrorKind {
@@ -209,6 +215,12 @@ impl fmt::Display for ErrorKind {
             Self::OverLimit { limit, asked, allowed } => {
                 write!(f, "the stream asks for {asked}, {limit} allows at most {allowed}")
             }
+            Self::Fault { broken } => {
+                write!(
+                    f,
+                    "a defect of the decoder, not of the stream: {broken} does not hold; please report this"
+                )
+            }
         }
     }
 }
@@ -227,7 +239,7 @@ impl ErrorKind {
             | Self::Number { .. }
             | Self::Padding { .. }
             | Self::EntropyFinalState => Class::Malformed,
-            Self::ReservedBits { .. } | Self::Reserved { .. } => Class::Unsupported,
+            Self::ReservedBits { .. } | Self::Reserved { .. } | Self::Fault { .. } => Class::Unsupported,
             Self::OutOfRange { .. }
             | Self::Mismatch { .. }
             | Self::Constraint { .. }
@@ -238,7 +250,7 @@ impl ErrorKind {
         }
     }
 
-    /// The stable code of the cause, as in the table of clause 9.2.
+    /// The stable code of the cause, as in the table of clause 9.2, which knows no defects of decoders.
     pub const fn code(&self) -> &'static str {
         match self {
             Self::Truncated { .. } => "TRUNCATED",
@@ -258,6 +270,7 @@ impl ErrorKind {
             Self::Undefined { .. } => "UNDEFINED",
             Self::Digest { .. } => "DIGEST",
             Self::OverLimit { .. } => "OVER_LIMIT",
+            Self::Fault { .. } => "FAULT",
         }
     }
 }
@@ -265,6 +278,9 @@ impl ErrorKind {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { at, clause, kind } = self;
+        if self.is_fault() {
+            return kind.fmt(f);
+        }
         write!(f, "byte {at:#x}: {kind} (clause {clause})")
     }
 }
@@ -275,6 +291,16 @@ impl Error {
     /// An error at an absolute byte offset.
     pub const fn new(at: u64, clause: &'static str, kind: ErrorKind) -> Self {
         Self { at, clause, kind }
+    }
+
+    /// A defect of the decoder: `broken` is what should always hold. It stands at no byte and breaks no clause.
+    pub const fn fault(broken: &'static str) -> Self {
+        Self::new(0, "", ErrorKind::Fault { broken })
+    }
+
+    /// Whether the decoder is at fault, and not the stream.
+    pub const fn is_fault(&self) -> bool {
+        matches!(self.kind, ErrorKind::Fault { .. })
     }
 
     /// The class a caller acts on.
