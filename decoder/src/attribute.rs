@@ -9,7 +9,7 @@ pub const ATTRIBUTE_RANGE: RangeInclusive<i32> = -32_768..=32_767;
 /// The values of rotation after its step.
 pub const ROTATION_RANGE: RangeInclusive<i32> = -32_767..=32_767;
 
-/// Adds the bias of a plane to its coded values.
+/// Adds the bias of a plane to its coded values. No sum wraps (annex F.2: `v`).
 pub fn unbias(values: &mut [i32], bias: i32) {
     values.iter_mut().for_each(|value| *value = value.wrapping_add(bias));
 }
@@ -26,16 +26,15 @@ pub fn in_range(
     at: u64,
 ) -> Result<()> {
     let (low, high) = (*range.start(), *range.end());
+    // All values at once take less time than a search, which is for the error alone.
     let outside = values.iter().fold(false, |any, &value| any | (value < low) | (value > high));
-    if outside {
-        let value = values.iter().find(|&value| !range.contains(value)).copied().unwrap_or(0);
-        let (value, min, max) = (i64::from(value), i64::from(low), i64::from(high));
-        return Err(Error::new(at, clause, ErrorKind::OutOfRange { element, value, min, max }));
-    }
-    Ok(())
+    let found = if outside { values.iter().find(|&value| !range.contains(value)) } else { None };
+    let Some(&value) = found else { return Ok(()) };
+    let (value, min, max) = (i64::from(value), i64::from(low), i64::from(high));
+    Err(Error::new(at, clause, ErrorKind::OutOfRange { element, value, min, max }))
 }
 
-/// Clause 7.6.2. The next log-scale in place of the difference to the one before.
+/// Clause 7.6.2. The next log-scale in place of the difference to the one before. None wraps (annex F.2: `cq`).
 pub fn next_log_scale(before: &[i32], differences: &mut [i32]) {
     for (&before, difference) in before.iter().zip(differences) {
         *difference = before.wrapping_sub(*difference);

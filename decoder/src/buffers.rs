@@ -4,6 +4,11 @@ use crate::components::Pair;
 use crate::interrupt::Interrupt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// What has been left last to be used again, or something new.
+pub(crate) fn left_or_new<T: Default>(left: &mut Vec<T>) -> T {
+    left.pop().unwrap_or_default()
+}
+
 /// Memory of the blocks of a task.
 #[derive(Debug, Default)]
 pub struct Buffers {
@@ -17,7 +22,7 @@ pub struct Buffers {
 impl Buffers {
     /// A plane of so many values, which mean nothing.
     pub(crate) fn plane(&mut self, count: usize) -> Vec<i32> {
-        let mut plane = self.planes.pop().unwrap_or_default();
+        let mut plane = left_or_new(&mut self.planes);
         plane.resize(count, 0);
         plane
     }
@@ -50,7 +55,7 @@ pub struct Workspace<'w> {
 impl Workspace<'_> {
     /// Runs a task with buffers of its own.
     pub(crate) fn run<R>(&self, task: impl FnOnce(&mut Buffers) -> R) -> R {
-        let mut buffers = self.buffers.idle().pop().unwrap_or_default();
+        let mut buffers: Buffers = left_or_new(&mut self.buffers.idle());
         buffers.interrupt = self.interrupt.clone();
         let result = task(&mut buffers);
         self.buffers.idle().push(buffers);

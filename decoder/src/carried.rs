@@ -4,7 +4,7 @@
 //! the motions that it has yet to make are kept with it. Once a list has been computed for a frame, the frames that refer
 //! to that frame go on from there; the motions that are kept are bounded by their cells.
 
-use crate::digest::{list_digest_unless, lists_digest};
+use crate::digest::{lists_digest, whole_digest_unless};
 use crate::displacement::CellField;
 use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
@@ -94,8 +94,7 @@ impl Carried {
 
     /// The digest of all lists.
     pub(crate) fn digest(&mut self, interrupt: &Interrupt) -> u64 {
-        let digest =
-            |(list, _): (&GaussianList, _)| list_digest_unless(interrupt, &list.planes, 0..list.len());
+        let digest = |(list, _): (&GaussianList, _)| whole_digest_unless(interrupt, &list.planes);
         let digests: Vec<_> = self.lists_from(0, interrupt).map(digest).collect();
         lists_digest(&digests)
     }

@@ -3,6 +3,7 @@
 use crate::cores;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
+use core::ops::Range;
 use std::borrow::Cow;
 use xxhash_rust::xxh64::xxh64;
 
@@ -10,8 +11,9 @@ use xxhash_rust::xxh64::xxh64;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListDigest(Vec<u64>);
 
-/// The digest of the list that the Gaussians `range` of some planes are; plane p is hashed with seed p.
-pub fn list_digest(frame: &QuantizedFrame, range: core::ops::Range<usize>) -> ListDigest {
+/// The digest of the list that the Gaussians `range` of some planes are; none if there are no such Gaussians. Plane p is
+/// hashed with seed p.
+pub fn list_digest(frame: &QuantizedFrame, range: Range<usize>) -> Option<ListDigest> {
     list_digest_unless(Interrupt::NEVER, frame, range)
 }
 
@@ -19,20 +21,29 @@ pub fn list_digest(frame: &QuantizedFrame, range: core::ops::Range<usize>) -> Li
 pub(crate) fn list_digest_unless(
     interrupt: &Interrupt,
     frame: &QuantizedFrame,
-    range: core::ops::Range<usize>,
-) -> ListDigest {
-    let positions = frame.position.iter().map(|plane| {
-        let part = plane.get(range.clone()).unwrap_or_default();
-        Plane::Unsigned(part)
-    });
-    let others =
-        frame.signed_planes().map(|plane| Plane::Signed(plane.get(range.clone()).unwrap_or_default()));
-    let planes: Vec<(u64, Plane<'_>)> = (0_u64..).zip(positions.chain(others)).collect();
+    range: Range<usize>,
+) -> Option<ListDigest> {
+    let positions = frame.position.iter().map(|plane| plane.get(range.clone()).map(Plane::Unsigned));
+    let others = frame.signed_planes().map(|plane| plane.get(range.clone()).map(Plane::Signed));
+    let planes: Option<Vec<Plane<'_>>> = positions.chain(others).collect();
+    planes.map(|planes| hashed(interrupt, range.len(), planes))
+}
+
+/// The digest of the list that all Gaussians of some planes are. Where an interrupt is requested, it means nothing.
+pub(crate) fn whole_digest_unless(interrupt: &Interrupt, frame: &QuantizedFrame) -> ListDigest {
+    let positions = frame.position.iter().map(|plane| Plane::Unsigned(plane));
+    let others = frame.signed_planes().map(|plane| Plane::Signed(plane));
+    hashed(interrupt, frame.len(), positions.chain(others).collect())
+}
+
+/// The digests of planes of so many values.
+fn hashed(interrupt: &Interrupt, count: usize, planes: Vec<Plane<'_>>) -> ListDigest {
     let digest = |(seed, plane): (u64, Plane<'_>)| match interrupt.is_requested() {
         true => 0,
         false => plane.digest(seed),
     };
-    ListDigest(cores::map(range.len().saturating_mul(planes.len()), planes, digest))
+    let values = count.saturating_mul(planes.len());
+    ListDigest(cores::map(values, (0_u64..).zip(planes).collect(), digest))
 }
 
 enum Plane<'a> {
@@ -84,7 +95,7 @@ mod tests {
     #[test]
     fn any_change_of_value_order_or_plane_changes_the_digest() {
         let original = frame();
-        let digest = |frame: &QuantizedFrame| lists_digest(&[list_digest(frame, 0..3000)]);
+        let digest = |frame: &QuantizedFrame| lists_digest(&[list_digest(frame, 0..3000).unwrap()]);
         let mut changed = original.clone();
         changed.dc[2][2999] ^= 1;
         assert_ne!(digest(&original), digest(&changed));
@@ -96,6 +107,13 @@ mod tests {
         let mut other = original.clone();
         other.dc[0][0] = 7;
         assert_ne!(digest(&planes), digest(&other));
+    }
+
+    #[test]
+    fn all_gaussians_are_the_list_of_their_range_and_others_are_none() {
+        let frame = frame();
+        assert_eq!(list_digest(&frame, 0..3000), Some(whole_digest_unless(Interrupt::NEVER, &frame)));
+        assert_eq!([2999..3001, 3001..3001].map(|range| list_digest(&frame, range)), [None, None]);
     }
 
     #[test]

@@ -10,12 +10,12 @@ use crate::cores;
 use crate::frame::{FrameSlice, QuantizedFrame};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, blocks_of};
-use splatstream_format::Result;
 use splatstream_format::entropy::in_force::SectionModels;
 use splatstream_format::entropy::layout::Section;
 use splatstream_format::entropy::reader::PlaneDecoder;
 use splatstream_format::payload::{CodedSection, Increment};
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
+use splatstream_format::{Error, Result};
 
 /// Values that take as long as the table of a plane.
 const VALUES_OF_TABLE: usize = 64;
@@ -47,11 +47,15 @@ struct Task<'t, 'f, 'a> {
 
 /// Decodes units one after the other. Gives the planes, and for each unit its Gaussians or its first error; the Gaussians
 /// of a unit with an error mean nothing.
+///
+/// # Errors
+/// A fault: the planes are not those of the blocks. So it is where an interrupt is requested.
 pub(crate) fn decode(
     units: &[DirectUnit<'_, '_>],
     sequence: &SequenceParameters,
     workspace: Workspace<'_>,
-) -> (QuantizedFrame, Vec<Result<usize>>) {
+) -> Result<(QuantizedFrame, Vec<Result<usize>>)> {
+    const APART: Error = Error::fault("a part of the planes for each block of a unit");
     let sections: Vec<Option<(&CodedSection<'_>, &SectionModels)>> =
         units.iter().map(|unit| unit.prepared.sections().next()).collect();
     // What a table is made of counts like values.
@@ -78,16 +82,16 @@ pub(crate) fn decode(
         let parameters = parameters(units.get(unit)?, coded, models, sequence);
         Some(Task { unit, parameters, decoders: decoders.get(unit)?, bytes, at, out })
     };
-    let tasks: Vec<Task<'_, '_, '_>> =
-        blocks.into_iter().zip(planes.slices(&lengths)).filter_map(task).collect();
+    let slices = planes.slices(&lengths).ok_or(APART)?;
+    let tasks: Option<Vec<Task<'_, '_, '_>>> = blocks.into_iter().zip(slices).map(task).collect();
     let decoded: Vec<(usize, Result<usize>)> =
-        cores::map(values, tasks, |task| workspace.run(|buffers| run(buffers, task)));
+        cores::map(values, tasks.ok_or(APART)?, |task| workspace.run(|buffers| run(buffers, task)));
     let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (unit, block) in decoded {
-        let Some(slot) = results.get_mut(unit) else { continue };
+        let slot = results.get_mut(unit).ok_or(APART)?;
         *slot = slot.and_then(|gaussians| block.map(|count| gaussians.saturating_add(count)));
     }
-    (planes, results)
+    Ok((planes, results))
 }
 
 fn run(buffers: &mut Buffers, task: Task<'_, '_, '_>) -> (usize, Result<usize>) {

@@ -46,11 +46,11 @@ impl FrameSlice<'_> {
     }
 }
 
-/// Splits the first `length` values off `rest`.
-fn take<'a, T>(rest: &mut &'a mut [T], length: usize) -> &'a mut [T] {
-    let (first, after) = core::mem::take(rest).split_at_mut_checked(length).unwrap_or_default();
+/// Splits the first `length` values off `rest`; none if there are fewer.
+fn take<'a, T>(rest: &mut &'a mut [T], length: usize) -> Option<&'a mut [T]> {
+    let (first, after) = core::mem::take(rest).split_at_mut_checked(length)?;
     *rest = after;
-    first
+    Some(first)
 }
 
 impl QuantizedFrame {
@@ -74,8 +74,9 @@ impl QuantizedFrame {
         }
     }
 
-    /// Divides the frame in runs of the given lengths, so that each can be written by itself.
-    pub fn slices(&mut self, lengths: &[usize]) -> Vec<FrameSlice<'_>> {
+    /// Divides the frame in runs of the given lengths, so that each can be written by itself; none if it is shorter than
+    /// these together.
+    pub fn slices(&mut self, lengths: &[usize]) -> Option<Vec<FrameSlice<'_>>> {
         let planes = 10_usize.saturating_add(self.sh.len());
         let mut slices: Vec<FrameSlice<'_>> = lengths
             .iter()
@@ -85,17 +86,17 @@ impl QuantizedFrame {
         for plane in position {
             let mut rest = plane.as_mut_slice();
             for (slice, &length) in slices.iter_mut().zip(lengths) {
-                slice.position.push(take(&mut rest, length));
+                slice.position.push(take(&mut rest, length)?);
             }
         }
         let others = log_scale.iter_mut().chain([opacity]).chain(rotation).chain(dc).chain(sh);
         for plane in others {
             let mut rest = plane.as_mut_slice();
             for (slice, &length) in slices.iter_mut().zip(lengths) {
-                slice.planes.push(take(&mut rest, length));
+                slice.planes.push(take(&mut rest, length)?);
             }
         }
-        slices
+        Some(slices)
     }
 
     /// Checks what clause 7.10 builds on: all planes have one length, and there are the SH planes of a degree.
@@ -141,25 +142,23 @@ impl QuantizedFrame {
         self.signed_planes_mut().for_each(|plane| plane.truncate(count));
     }
 
-    /// A copy of the Gaussians in a range.
+    /// A copy of the Gaussians in a range; none if there are no such Gaussians.
     #[must_use]
-    pub fn part(&self, range: core::ops::Range<usize>) -> Self {
+    pub fn part(&self, range: core::ops::Range<usize>) -> Option<Self> {
         self.part_unless(Interrupt::NEVER, range)
     }
 
     /// The same; where an interrupt is requested, planes are empty.
-    pub(crate) fn part_unless(&self, interrupt: &Interrupt, range: core::ops::Range<usize>) -> Self {
+    pub(crate) fn part_unless(&self, interrupt: &Interrupt, range: core::ops::Range<usize>) -> Option<Self> {
         let range = || if interrupt.is_requested() { 0..0 } else { range.clone() };
-        let unsigned = |plane: &Vec<u32>| plane.get(range()).unwrap_or_default().to_vec();
-        let signed = |plane: &Vec<i32>| plane.get(range()).unwrap_or_default().to_vec();
-        Self {
-            position: self.position.each_ref().map(unsigned),
-            log_scale: self.log_scale.each_ref().map(signed),
-            opacity: signed(&self.opacity),
-            rotation: self.rotation.each_ref().map(signed),
-            dc: self.dc.each_ref().map(signed),
-            sh: self.sh.iter().map(signed).collect(),
+        let mut part = Self::zeroed(0, self.sh.len());
+        for (own, plane) in part.position.iter_mut().zip(&self.position) {
+            own.extend_from_slice(plane.get(range())?);
         }
+        for (own, plane) in part.signed_planes_mut().zip(self.signed_planes()) {
+            own.extend_from_slice(plane.get(range())?);
+        }
+        Some(part)
     }
 
     /// Keeps the Gaussians whose flag is set.
@@ -234,6 +233,7 @@ const KEPT: usize = 32;
 pub(crate) fn retain<T: Copy>(values: &mut Vec<T>, keep: &[bool]) {
     let (mut end, count) = (0_usize, values.len());
     let mut start = 0_usize;
+    // Of more flags than values those beyond the last value say nothing.
     for flags in keep.get(..count).unwrap_or(keep).chunks(KEPT) {
         let next = start.saturating_add(flags.len());
         if flags == [true; KEPT] {

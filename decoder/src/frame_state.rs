@@ -5,6 +5,7 @@ use crate::digest::ListDigest;
 use crate::list::GaussianList;
 use crate::shift::Shift;
 use splatstream_format::entropy::in_force::ModelsInForce;
+use splatstream_format::{Error, Result};
 use std::sync::Arc;
 
 /// A frame that others may refer to.
@@ -39,6 +40,14 @@ impl FrameState {
     pub(crate) fn digest(&self, r: u8, list: &Arc<GaussianList>) -> Option<&ListDigest> {
         let own = self.lists.get(usize::from(r)).filter(|own| Arc::ptr_eq(own, list));
         own.and_then(|_| self.digests.get(usize::from(r)))
+    }
+
+    /// Its list r.
+    ///
+    /// # Errors
+    /// A fault: it has fewer lists, where r is below its level.
+    pub(crate) fn list(&self, r: usize) -> Result<&Arc<GaussianList>> {
+        self.lists.get(r).ok_or(Error::fault("a list for each refinement below the level of a frame"))
     }
 
     /// Its exact lists, once no frame refers to it.

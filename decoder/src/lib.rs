@@ -58,6 +58,7 @@ pub mod digest;
 mod direct;
 pub mod displacement;
 pub mod entropy_state;
+mod fault;
 pub mod frame;
 mod frame_state;
 pub mod gop;

@@ -2,9 +2,11 @@
 //!
 //! List h holds the Gaussians that the units of refinement h brought. Inside the prediction loop positions and rotations
 //! have six more bits than the canonical planes; [`GaussianList::settle`] derives the canonical planes from them.
+//!
+//! Positions and rotations have passed their checks before they get fractions, so that no fine one overflows (annex F.4).
 
 use crate::cores;
-use crate::digest::{ListDigest, list_digest};
+use crate::digest::{ListDigest, whole_digest_unless};
 use crate::displacement::CellField;
 use crate::frame::{QuantizedFrame, retain};
 use crate::interrupt::Interrupt;
@@ -265,7 +267,7 @@ impl GaussianList {
 
     /// The digest of the list (7.9.2).
     pub fn digest(&self) -> ListDigest {
-        list_digest(&self.planes, 0..self.len())
+        whole_digest_unless(Interrupt::NEVER, &self.planes)
     }
 }
 

@@ -37,6 +37,7 @@ pub fn to_gaussians(
     let convert = || cores::map(values, integers, |(plane, offset, step)| affine(plane, offset, step));
     let (position, planes) = cores::join(values, || scene_positions(position, sequence), convert);
     let mut planes = planes.into_iter();
+    // As many as were put in. One that was missing would be empty, and the frame refused for its lengths.
     let mut next = || planes.next().unwrap_or_default();
     let log_scale = [next(), next(), next()];
     let [x, y, z] = [next(), next(), next()];

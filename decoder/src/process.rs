@@ -191,7 +191,8 @@ impl Decoder {
         self.has_stopped || self.interrupt.is_requested() || self.phase == Phase::Ended
     }
 
-    /// Whether an error that ends decoding has been found: the first one of all if decoding stops there, or one of the budget.
+    /// Whether an error that ends decoding has been found: the first one of all if decoding stops there, one of the budget, or
+    /// a [fault](Error::is_fault) of the decoder, whose state is worth nothing then.
     pub const fn has_failed(&self) -> bool {
         self.has_stopped
     }
@@ -388,7 +389,8 @@ impl Decoder {
         }
         self.report.errors.push(error);
         let is_limit = error.class() == Class::OverLimit;
-        self.has_stopped = self.options.stop_at_first_error || self.is_exhausted && is_limit;
+        self.has_stopped =
+            self.options.stop_at_first_error || self.is_exhausted && is_limit || error.is_fault();
     }
 
     /// Reports the error of a unit that is no increment, and takes what it costs; gives the frame that it ends, if it does.
@@ -422,5 +424,21 @@ impl Decoder {
     fn is_acceptable(&self, unit: &Unit<'_>) -> bool {
         let gop_index = unit.payload.first_chunk().copied().map_or(0, u32::from_le_bytes);
         u64::from(gop_index) >= self.next_gop && u64::from(unit.header.frame) >= self.next_frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splatstream_format::ErrorKind;
+
+    #[test]
+    fn a_fault_of_the_decoder_ends_decoding_and_an_error_of_the_stream_does_not() {
+        let decoder = || Decoder::with(Profile::Dynamic, Options::default());
+        let (mut wrong, mut faulty) = (decoder(), decoder());
+        wrong.add(Error::new(0, "6.5", ErrorKind::Signature));
+        faulty.add(Error::fault("one length"));
+        assert_eq!((wrong.has_failed(), faulty.has_failed()), (false, true));
+        assert!(faulty.errors()[0].is_fault());
     }
 }

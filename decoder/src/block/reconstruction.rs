@@ -1,9 +1,12 @@
 //! Clause 7.6 for a block of new Gaussians without predictors: planes become attributes as they are decoded, while they
 //! are near, and give their memory to the planes after them.
+//!
+//! Planes are those of the layout and come in its order, so that what is asked of a block is there; a plane of a block has as many
+//! values as the part of the frame that it goes to.
 
 use super::UnitParameters;
 use crate::attribute::{self, ATTRIBUTE_RANGE, in_range};
-use crate::buffers::Buffers;
+use crate::buffers::{Buffers, left_or_new};
 use crate::coded_block::CodedBlock;
 use crate::colour::ShValues;
 use crate::components::Components;
@@ -79,7 +82,7 @@ impl<'u, 'o, 'f> Reconstruction<'u, 'o, 'f> {
         let components = components.get_or_insert_with(|| {
             let planes = self.unit.layout.planes().iter();
             let rank = planes.filter(|info| info.attribute == attribute).count();
-            let memory = buffers.components.pop().unwrap_or_default();
+            let memory = left_or_new(&mut buffers.components);
             Components::new(block.len(), rank, block.exponents(stage), memory)
         });
         components.add(block.coded.get(plane).map(Vec::as_slice).unwrap_or_default(), bias, self.at);

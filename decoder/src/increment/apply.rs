@@ -3,6 +3,9 @@
 //! 1. The modes say which parents are moved, updated, both, removed or skipped. Moves and updates are applied.
 //! 2. The predictors of the new Gaussians are read, and the reference set is collected if one of them needs it.
 //! 3. Removed parents go, and the new Gaussians, predicted and corrected by their residuals, are appended.
+//!
+//! Before the first step it is established that every section has a value for each Gaussian that it is of, and there is a
+//! mode for each parent. Sums do not wrap (annex F.4).
 
 use super::prediction::{Predicting, Prediction};
 use super::residual::{AttributeCoding, AttributeValues, Attributes};
@@ -11,6 +14,7 @@ use crate::attribute::{ATTRIBUTE_RANGE, in_range};
 use crate::cell::{Cell, rotation_unit};
 use crate::cores;
 use crate::displacement::CellField;
+use crate::fault;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
 use crate::list::{FINE, GaussianList};
@@ -90,7 +94,7 @@ pub struct Applied {
 /// Clause 7.5: the cells of a frame, from the values of the section of its header; `at` goes into errors.
 ///
 /// # Errors
-/// Invalid if cells are out of order, outside the grid, or move too far.
+/// Invalid if cells are out of order, outside the grid, or move too far. A fault: a plane lacks values of a cell.
 pub fn field(
     values: &SectionValues,
     cell_log2: u8,
@@ -100,13 +104,14 @@ pub fn field(
     let bits = sequence.position_bits.saturating_sub(cell_log2).max(1);
     let fault = |rule| Error::new(at, "7.5", ErrorKind::Constraint { rule });
     let value = |plane: usize, row: usize| {
-        values.planes.get(plane).and_then(|plane| plane.get(row)).copied().unwrap_or(0)
+        let value = values.planes.get(plane).and_then(|plane| plane.get(row));
+        value.copied().ok_or(Error::fault("as many values of each plane as there are cells"))
     };
     let mut cells: Vec<(u64, Cell)> = Vec::with_capacity(values.deltas.len());
     let (mut code, mut motion) = (0_u64, [0_i64; 6]);
     for (row, &delta) in values.deltas.iter().enumerate() {
-        // Every block starts again from 0.
-        if row.checked_rem(values.block).unwrap_or(0) == 0 {
+        // Every block starts again from 0, and so do values that are none of a block.
+        if values.block == 0 || row.is_multiple_of(values.block) {
             (code, motion) = (0, [0; 6]);
         }
         code = code.wrapping_add(delta);
@@ -117,14 +122,14 @@ pub fn field(
             return Err(fault("cells are listed once, in Morton order"));
         }
         for (plane, sum) in (1..).zip(&mut motion) {
-            *sum = sum.wrapping_add(value(plane, row).into());
+            *sum = sum.wrapping_add(value(plane, row)?.into());
         }
-        cells.push((code, cell(code, value(0, row), motion, at)?));
+        cells.push((code, cell(code, value(0, row)?, motion, at)?));
     }
     Ok(CellField::new(cell_log2, sequence.position_bits, rotation_unit(sequence.rotation_step), cells))
 }
 
-/// A cell, its values in range.
+/// A cell, its values in range. A sum that 32 bits do not hold is outside of every range, whatever takes its place.
 fn cell(code: u64, stale: i32, motion: [i64; 6], at: u64) -> Result<Cell> {
     let [tx, ty, tz, rx, ry, rz] = motion.map(|sum| i32::try_from(sum).unwrap_or(i32::MAX));
     let (translation, rotation) = ([tx, ty, tz], [rx, ry, rz]);
@@ -143,7 +148,7 @@ fn cell(code: u64, stale: i32, motion: [i64; 6], at: u64) -> Result<Cell> {
 /// Applies a unit to its parents, which have been displaced.
 ///
 /// # Errors
-/// Invalid by clauses 7.4 to 7.7.
+/// Invalid by clauses 7.4 to 7.7. A fault: values or parents are not as many as the header of the unit counts.
 pub fn apply(unit: &Unit<'_>, parents: GaussianList, situation: &Situation<'_>) -> Result<Applied> {
     let (mut list, mut set) = (parents, QuantizedFrame::default());
     match apply_to(&mut list, &mut set, unit, situation) {
@@ -163,6 +168,10 @@ fn apply_to(
     situation: &Situation<'_>,
 ) -> Result<(QuantizedFrame, Vec<bool>)> {
     let interrupt = unit.coding.interrupt;
+    unit.values.check(unit.header)?;
+    if unit.header.has_modes() && list.len() != unit.header.parent_count as usize {
+        return Err(Error::fault("as many parents as a unit counts"));
+    }
     let codes = unit.values.plane(Section::Predictors, 0);
     let is_predicted = codes.iter().any(|&code| code != Predictor::None.code());
     if situation.temporal.is_some() && is_predicted {
@@ -269,7 +278,7 @@ fn check_modes(unit: &Unit<'_>, modes: &[i32], intra: bool) -> Result<()> {
         ("remove_count", header.remove_count, counted(|mode| mode == REMOVED)),
     ];
     for (element, announced, found) in counts {
-        let (value, expected) = (announced.into(), u64::try_from(found).unwrap_or(u64::MAX));
+        let (value, expected) = (announced.into(), fault::count(found)?.into());
         if value != expected {
             return Err(Error::new(
                 header.at(unit.at, element),
@@ -286,7 +295,7 @@ fn move_parents(unit: &Unit<'_>, list: &mut GaussianList, moved: &[u32]) -> Resu
     let grid = MoveGrid::new(unit);
     for (axis, plane) in list.position_fine.iter_mut().enumerate() {
         for (&row, &value) in moved.iter().zip(unit.values.plane(Section::Moves, axis)) {
-            let Some(slot) = usize::try_from(row).ok().and_then(|row| plane.get_mut(row)) else { continue };
+            let slot = plane.get_mut(row as usize).ok_or(Error::fault("a position for each parent"))?;
             *slot = grid.moved(*slot, value)?;
         }
     }
@@ -314,11 +323,9 @@ impl MoveGrid {
     /// A fine coordinate after a move by so many steps.
     fn moved(&self, from: i32, steps: i32) -> Result<i32> {
         let sum = i64::from(from).wrapping_add(i64::from(steps).wrapping_mul(self.step));
-        if !(0..=self.last).contains(&sum) {
-            let rule = "a position lies outside the grid";
-            return Err(Error::new(self.at, "7.4", ErrorKind::Constraint { rule }));
-        }
-        Ok(i32::try_from(sum).unwrap_or(0))
+        let within = i32::try_from(sum).ok().filter(|_| (0..=self.last).contains(&sum));
+        let rule = "a position lies outside the grid";
+        within.ok_or(Error::new(self.at, "7.4", ErrorKind::Constraint { rule }))
     }
 }
 
@@ -327,11 +334,10 @@ fn move_predicted(unit: &Unit<'_>, list: &mut GaussianList, space: &MoveSpace, m
     let codes = unit.values.plane(Section::MovePredictors, 0);
     let predictors: Vec<MovePredictor> =
         codes.iter().map(|&code| MovePredictor::from_code(code, unit.at)).collect::<Result<_>>()?;
-    let run = 1_usize.wrapping_shl(unit.header.move_block_log2.into());
-    let predictor_of = |number: usize| {
-        let run = number.checked_div(run).unwrap_or(0);
-        predictors.get(run).copied().unwrap_or_default()
-    };
+    // There is a predictor for each run, and a value for each move.
+    let run_log2 = u32::from(unit.header.move_block_log2);
+    let predictor_of =
+        |number: usize| predictors.get(number.wrapping_shr(run_log2)).copied().unwrap_or_default();
     let mut moves: Moves<'_> = space.moves(modes, |number| predictor_of(number).has_neighbours());
     let planes = [0, 1, 2].map(|axis| unit.values.plane(Section::Moves, axis));
     let grid = MoveGrid::new(unit);
@@ -409,7 +415,7 @@ fn new_gaussians(
     predictors: &[Predictor],
     set: &QuantizedFrame,
 ) -> Result<GaussianList> {
-    let count = position.first().map_or(0, Vec::len);
+    let count = unit.header.new_count as usize;
     let sh_planes = usize::from(unit.sequence.sh_dimension());
     let values = &unit.values.section(Section::New).planes;
     let by = Predicting {
@@ -448,8 +454,9 @@ fn unpredicted(count: usize, sh_planes: usize, values: &[Vec<i32>], unit: &Unit<
     let run = |start: usize| {
         unit.coding.interrupt.check()?;
         let range = start..count.min(start.saturating_add(RUN));
-        let part: Vec<Vec<i32>> =
-            values.iter().map(|plane| plane.get(range.clone()).unwrap_or_default().to_vec()).collect();
+        let part: Option<Vec<Vec<i32>>> =
+            values.iter().map(|plane| plane.get(range.clone()).map(<[i32]>::to_vec)).collect();
+        let part = part.ok_or(Error::fault("a value of each plane for each new Gaussian"))?;
         let mut attributes = Attributes::unpredicted(range.len(), &unit.coding.colour, sh_planes);
         attributes.add(AttributeValues(&part), &unit.coding, unit.at)?;
         Ok(attributes)

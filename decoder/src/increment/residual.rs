@@ -1,4 +1,7 @@
 //! Clause 7.6: residuals on top of a prediction, attribute by attribute.
+//!
+//! Sums do not wrap (annex F.4): values that are not checked yet are below 2^17, their steps at most 6144. There are planes and values
+//! for each attribute and Gaussian, which has been established when a unit is [applied](super::apply).
 
 use crate::attribute::{ATTRIBUTE_RANGE, in_range, unsorted};
 use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
@@ -9,8 +12,8 @@ use crate::list::{FINE, FRACTION_BITS, GaussianList};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule, step};
 use core::ops::RangeInclusive;
-use splatstream_format::Result;
 use splatstream_format::payload::Transform;
+use splatstream_format::{Error, Result};
 
 /// The values of a fine rotation.
 const ROTATION_FINE_RANGE: RangeInclusive<i32> = -32_767 * FINE..=32_767 * FINE;
@@ -76,6 +79,7 @@ impl<'v> AttributeValues<'v> {
         }
     }
 
+    /// The planes in a range; those of colours may be fewer, as the sequence has them, or none.
     fn planes(self, from: usize, to: usize) -> &'v [Vec<i32>] {
         self.0.get(from..to.min(self.0.len())).unwrap_or_default()
     }
@@ -232,7 +236,9 @@ impl Attributes {
         coding: &AttributeCoding<'_>,
         at: u64,
     ) -> Result<()> {
-        let [first, second, third] = values.of_stage(Stage::LogScale, &coding.colour) else { return Ok(()) };
+        let [first, second, third] = values.of_stage(Stage::LogScale, &coding.colour) else {
+            return Err(Error::fault("a plane for each log-scale"));
+        };
         let of_largest = step(coding.steps.of_largest());
         let [largest, middle, smallest] = &mut self.log_scale;
         let (mut least, mut reach) = (0, 0..=0);
@@ -306,7 +312,7 @@ impl Attributes {
         {
             in_range(residual, &ATTRIBUTE_RANGE, "rotation", "7.6", at)?;
             for (row, (slot, &value)) in plane.iter_mut().zip(residual).enumerate() {
-                // At most 2^15 * 6144 * 2^6: the sum with a fine rotation stays below 2^31 only after a clamp.
+                // A sum that 32 bits do not hold is out of range, whatever takes its place.
                 let fine = i64::from(step(exponents.at(row))).wrapping_shl(FRACTION_BITS);
                 let change = i64::from(value).wrapping_mul(fine);
                 let sum = i64::from(*slot).wrapping_add(change);

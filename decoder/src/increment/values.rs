@@ -7,13 +7,13 @@ use crate::coded_block::CodedBlock;
 use crate::cores;
 use crate::interrupt::Interrupt;
 use crate::steps::StepRule;
-use splatstream_format::Result;
 use splatstream_format::entropy::in_force::{ModelsInForce, SectionModels};
 use splatstream_format::entropy::layout::{Layout, Section, ShCoding};
 use splatstream_format::entropy::model::{ModelTrace, read_models};
 use splatstream_format::entropy::reader::PlaneDecoder;
 use splatstream_format::payload::CodedSection;
-use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
+use splatstream_format::{Error, Result};
 
 /// The values of a section, bias added, the blocks one after the other.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -40,6 +40,25 @@ impl UnitValues {
         self.sections.get(section.index()).unwrap_or(ABSENT)
     }
 
+    /// Establishes that there are as many values of each section as the header of a unit counts, so that whoever takes
+    /// them in the order of Gaussians finds one for each. Of a section that is not counted nobody takes any.
+    ///
+    /// # Errors
+    /// A fault: decoding the sections has given others.
+    pub(crate) fn check(&self, header: &IncrementHeader) -> Result<()> {
+        let is_counted = |section: Section| {
+            let values = self.section(section);
+            let count = header.count(section) as usize;
+            let has_all = values.planes.iter().all(|plane| plane.len() == count);
+            count == 0 || has_all && !values.planes.is_empty()
+        };
+        let has_positions = self.section(Section::New).deltas.len() == header.new_count as usize;
+        match has_positions && Section::OF_INCREMENT.into_iter().all(is_counted) {
+            true => Ok(()),
+            false => Err(Error::fault("as many values of a section as its unit counts")),
+        }
+    }
+
     /// Sets the values of a section.
     pub fn set(&mut self, section: Section, values: SectionValues) {
         if let Some(slot) = self.sections.get_mut(section.index()) {
@@ -47,7 +66,8 @@ impl UnitValues {
         }
     }
 
-    /// The values of one plane of a section, counted without that of the position alphabet.
+    /// The values of one plane of a section, counted without that of the position alphabet; none of a section that is absent.
+    /// A section that a unit [counts](Self::check) has its planes.
     pub fn plane(&self, section: Section, plane: usize) -> &[i32] {
         self.section(section).planes.get(plane).map(Vec::as_slice).unwrap_or_default()
     }
@@ -156,7 +176,7 @@ pub(crate) fn blocks_of<'a>(
     coded: &CodedSection<'a>,
     sequence: &SequenceParameters,
 ) -> Vec<(&'a [u8], u64, usize)> {
-    let mut left = usize::try_from(coded.count).unwrap_or(usize::MAX);
+    let mut left = coded.count as usize;
     let size = block_size(sequence);
     let with_count = |&(bytes, at): &(&'a [u8], u64)| {
         let count = left.min(size);
@@ -166,7 +186,7 @@ pub(crate) fn blocks_of<'a>(
     coded.blocks.iter().map(with_count).collect()
 }
 
-/// Values of a plane in a whole block.
+/// Values of a plane in a whole block: at most 2^16 (6.4).
 fn block_size(sequence: &SequenceParameters) -> usize {
     1_usize.wrapping_shl(u32::from(sequence.block_log2))
 }

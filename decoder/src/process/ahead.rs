@@ -70,7 +70,7 @@ impl Decoder {
     fn settle_both(&mut self) {
         let (mut waiting, mut next) = (self.waiting.take(), self.frame.take());
         let decoded = |frame: &mut Option<FrameInProgress>| {
-            frame.as_mut().map(|frame| self.decoded(frame)).unwrap_or_default()
+            frame.as_mut().map_or_else(Vec::new, |frame| self.decoded(frame))
         };
         let (errors, next_errors) = rayon::join(|| decoded(&mut waiting), || decoded(&mut next));
         self.frame = waiting;

@@ -11,8 +11,8 @@ use crate::increment::{Applied, Situation, Temporal, Unit, apply, is_idle};
 use crate::interrupt::Interrupt;
 use crate::list::{Change, GaussianList};
 use crate::moves::{MoveSpace, SpanRatio};
-use splatstream_format::Result;
 use splatstream_format::syntax::IncrementHeader;
+use splatstream_format::{Error, Result};
 use std::sync::Arc;
 
 /// What a unit makes of its list.
@@ -45,8 +45,9 @@ impl FrameInProgress {
     ) -> Result<Outcome> {
         context.interrupt.check()?;
         let r = usize::from(refinement);
-        let empty = || Arc::new(GaussianList::empty(usize::from(context.sequence.sh_dimension())));
         let Some(reference) = context.reference else {
+            // The lowest spatial layer has no parents.
+            let empty = || Arc::new(GaussianList::empty(usize::from(context.sequence.sh_dimension())));
             let below = self.lists.lists.get(r).cloned().unwrap_or_else(empty);
             let parents = below.unchanged_in(self.lists.spares.list(&below), context.interrupt);
             context.interrupt.check()?;
@@ -55,7 +56,7 @@ impl FrameInProgress {
             let situation = Situation { around: [&lower, &[]], temporal: None };
             return apply(unit, parents, &situation).map(Outcome::from);
         };
-        let before = reference.lists.get(r).cloned().unwrap_or_else(empty);
+        let before = Arc::clone(reference.list(r)?);
         if self.field.is_empty() && is_idle(unit.header, &before) {
             let list = if before.change == Change::default() { before } else { Arc::new(before.unchanged()) };
             return Ok(Outcome { list, added: 0, keep: Vec::new() });
@@ -86,7 +87,7 @@ impl FrameInProgress {
             moves = Some(space);
         }
         let temporal = Temporal { reference: before, ratio, moves: moves.as_ref() };
-        let added = if unit.header.predictor_count() > 0 { self.added_before(r) } else { Vec::new() };
+        let added = if unit.header.predictor_count() > 0 { self.added_before(r)? } else { Vec::new() };
         let lower: Vec<&QuantizedFrame> =
             self.lists.displaced.iter().take(r).map(|list| &list.planes).collect();
         let anchor = reference.anchor.iter().flat_map(|lists| lists.iter().skip(r.saturating_add(1)));
@@ -164,9 +165,14 @@ impl FrameInProgress {
     }
 
     /// The Gaussians that the units before unit r added.
-    fn added_before(&self, r: usize) -> Vec<QuantizedFrame> {
+    ///
+    /// # Errors
+    /// A fault: a list has fewer Gaussians than its unit has left.
+    fn added_before(&self, r: usize) -> Result<Vec<QuantizedFrame>> {
         let added = |(list, head): (&Arc<GaussianList>, &Head)| {
-            list.planes.part(head.size.saturating_sub(head.added)..head.size)
+            let added =
+                head.size.checked_sub(head.added).and_then(|start| list.planes.part(start..head.size));
+            added.ok_or(Error::fault("the new Gaussians of a unit at the end of its list"))
         };
         self.lists.lists.iter().zip(&self.lists.heads).take(r).map(added).collect()
     }

@@ -6,12 +6,13 @@ use super::lists::Lists;
 use super::spares::Spares;
 use crate::carried::Carried;
 use crate::digest::lists_digest;
+use crate::fault;
 use crate::frame::QuantizedFrame;
 use crate::frame_state::{FrameState, span_log2};
 use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
 use crate::shift::Shift;
-use splatstream_format::{Error, ErrorKind};
+use splatstream_format::{Error, ErrorKind, Result};
 use std::sync::Arc;
 
 /// Identities that are given between two looks at the interrupt.
@@ -23,7 +24,7 @@ pub(super) struct Closed {
     /// For frames that refer to it.
     pub(super) state: FrameState,
     /// The carried lists are not those of their digest.
-    pub(super) fault: Option<Error>,
+    pub(super) difference: Option<Error>,
     /// The identity of the next new Gaussian.
     pub(super) next_identity: u32,
     /// For the frames after this one.
@@ -33,29 +34,35 @@ pub(super) struct Closed {
 impl FrameInProgress {
     /// Takes the content of the frame, all units of which have been decoded. The digest of carried lists is compared if the frame
     /// is not cut short.
+    ///
+    /// # Errors
+    /// A fault: what has been decoded does not fit together. So it is where an interrupt is requested.
     pub(super) fn close(
         &mut self,
         context: &Context<'_>,
         reference: Option<&mut FrameState>,
         is_whole: bool,
-    ) -> Closed {
+    ) -> Result<Closed> {
         self.has_ended = true;
         self.carried_digest = self.carried_digest.filter(|_| is_whole);
         let mut decoded = DecodedFrame::empty(self.index, self.role.frame_type);
-        decoded.level = u8::try_from(self.lists.heads.len()).unwrap_or(u8::MAX);
+        let level = u8::try_from(self.lists.heads.len());
+        decoded.level = level.map_err(|_| Error::fault("as many lists as there are refinements"))?;
         decoded.spatial_layer = self.lists.heads.last().map_or(0, |head| head.spatial_layer);
         decoded.bytes = self.bytes;
         decoded.entropy = core::mem::take(&mut self.entropy);
         decoded.error = self.error;
         let has_digest = context.options.verify && decoded.level > 0;
         decoded.digest = has_digest.then(|| lists_digest(&self.lists.digests));
-        match self.is_intra() {
+        let closed = match self.is_intra() {
             true => self.close_intra(context, decoded),
             false => self.close_predicted(context, decoded, reference),
-        }
+        }?;
+        closed.decoded.check(context.sequence.sh_degree, context.options.identities)?;
+        Ok(closed)
     }
 
-    fn close_intra(&mut self, context: &Context<'_>, mut decoded: DecodedFrame) -> Closed {
+    fn close_intra(&mut self, context: &Context<'_>, mut decoded: DecodedFrame) -> Result<Closed> {
         let sequence = context.sequence;
         let sh_planes = usize::from(sequence.sh_dimension());
         let refinements = sequence.refinement_count;
@@ -68,13 +75,13 @@ impl FrameInProgress {
             false => self.decoded.count(top),
         };
         let is_short = decoded.level < refinements;
-        let shift = self.lists.last_shift().filter(|_| is_short).unwrap_or_default();
+        let shift = self.lists.shift_if(is_short);
         decoded.compensation = Compensation { exact: shift, ..Compensation::default() };
         decoded.is_lost = decoded.level == 0;
         let mut state =
             FrameState { index: self.index, level, carried_shift: shift, ..FrameState::default() };
         if context.gop.header.is_predicted() {
-            self.lists.divide(context.options.identities, context.interrupt);
+            self.lists.divide(context.options.identities, context.interrupt)?;
             state.identities = self.lists.identities.clone();
             let lists = || self.lists.lists.iter().cloned();
             state.carried = (decoded.level > 0).then(|| Carried::new(lists(), &self.lists.identities));
@@ -83,13 +90,13 @@ impl FrameInProgress {
         }
         decoded.planes = self.lists.planes(sh_planes, context.interrupt);
         if context.options.identities {
-            decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt);
+            decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt)?;
         }
         let next_identity = self.next_identity();
         let Lists { lists, digests, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
         (state.lists, state.models, state.digests) = (lists, models.first, digests);
         spares.end_frame(displaced);
-        Closed { decoded, state, fault: None, next_identity, spares }
+        Ok(Closed { decoded, state, difference: None, next_identity, spares })
     }
 
     fn close_predicted(
@@ -97,14 +104,14 @@ impl FrameInProgress {
         context: &Context<'_>,
         mut decoded: DecodedFrame,
         reference: Option<&mut FrameState>,
-    ) -> Closed {
+    ) -> Result<Closed> {
         let mut state = FrameState { index: self.index, level: decoded.level, ..FrameState::default() };
         let level = usize::from(decoded.level);
         let shows_subset = context.options.subset && level > 0;
-        let mut fault = None;
+        let mut difference = None;
         decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()), context.interrupt);
         if context.options.identities {
-            decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt);
+            decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt)?;
             state.identities = self.lists.identities.clone();
         }
         if let Some(reference) = reference {
@@ -125,13 +132,13 @@ impl FrameInProgress {
                 let computed = carried.digest(context.interrupt);
                 decoded.carried_digest = Some(computed);
                 let kind = ErrorKind::Digest { stored, computed };
-                fault = (computed != stored).then_some(Error::new(at, "7.9.3", kind));
+                difference = (computed != stored).then_some(Error::new(at, "7.9.3", kind));
             }
             if let (Some(carried), false) = (&mut state.carried, shows_subset) {
                 show_carried(&mut decoded, carried, context.interrupt);
             }
         }
-        decoded.error = decoded.error.or(fault);
+        decoded.error = decoded.error.or(difference);
         decoded.is_lost = level == 0 && decoded.carried_lists == 0;
         let refinements = context.sequence.refinement_count;
         decoded.compensation = self.lists.compensation(&decoded, refinements, state.carried_shift);
@@ -139,7 +146,7 @@ impl FrameInProgress {
         let Lists { lists, digests, models, displaced, mut spares, .. } = core::mem::take(&mut self.lists);
         (state.lists, state.models, state.digests) = (lists, models.first, digests);
         spares.end_frame(displaced);
-        Closed { decoded, state, fault, next_identity, spares }
+        Ok(Closed { decoded, state, difference, next_identity, spares })
     }
 }
 
@@ -168,10 +175,10 @@ impl Lists {
     }
 
     /// The identities of the exact Gaussians, of which there are so many. Where an interrupt is requested, some are missing.
-    fn shown_identities(&mut self, count: usize, interrupt: &Interrupt) -> Vec<u32> {
+    fn shown_identities(&mut self, count: usize, interrupt: &Interrupt) -> Result<Vec<u32>> {
         let mut shown = Vec::with_capacity(count);
         if self.identities.is_empty() {
-            let mut identities = self.identify(count);
+            let mut identities = self.identify(fault::count(count)?);
             while shown.len() < count && !interrupt.is_requested() {
                 shown.extend(identities.by_ref().take(IDENTITIES));
             }
@@ -179,19 +186,19 @@ impl Lists {
         for identities in self.identities.iter().take_while(|_| !interrupt.is_requested()) {
             shown.extend_from_slice(identities);
         }
-        shown
+        Ok(shown)
     }
 
-    /// What the last unit says of a frame that ends with it.
-    fn last_shift(&self) -> Option<Shift> {
-        self.heads.last().map(|head| head.shift)
+    /// What the last unit says of a frame that ends with it, if that lacks refinements. Nothing is added to a whole one.
+    fn shift_if(&self, is_short: bool) -> Shift {
+        self.heads.last().filter(|_| is_short).map_or_else(Shift::default, |head| head.shift)
     }
 
     /// Clause 7.8.3, of a P or B frame. Where carried lists fill the frame, only Gaussians that are not of the I frame
     /// are compensated.
     fn compensation(&self, decoded: &DecodedFrame, refinements: u8, carried: Shift) -> Compensation {
         let is_short = decoded.level < refinements;
-        let exact = self.last_shift().filter(|_| is_short).unwrap_or_default();
+        let exact = self.shift_if(is_short);
         if decoded.carried_lists == 0 {
             return Compensation { exact, ..Compensation::default() };
         }

@@ -4,8 +4,8 @@ use crate::attribute::ATTRIBUTE_RANGE;
 use crate::entropy_state::UnitEntropy;
 use crate::frame::QuantizedFrame;
 use crate::shift::Shift;
-use splatstream_format::Error;
 use splatstream_format::syntax::FrameType;
+use splatstream_format::{Error, Result};
 
 /// One frame, as far as its units were decoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,6 +78,29 @@ impl DecodedFrame {
         }
     }
 
+    /// Establishes that everything of a frame fits together, so that nobody has to ask when it is shown.
+    ///
+    /// # Errors
+    /// A fault.
+    pub(super) fn check(&self, sh_degree: u8, has_identities: bool) -> Result<()> {
+        let gaussians = self.planes.len();
+        let exact =
+            gaussians.checked_sub(self.carried).ok_or(Error::fault("carried Gaussians in a frame"))?;
+        let only = self.compensation.only.len();
+        let rules = [
+            (
+                self.planes.check(sh_degree).is_ok(),
+                Error::fault("planes of one length, and those of the degree"),
+            ),
+            (only == 0 || only == exact, Error::fault("a flag for each exact Gaussian")),
+            (
+                !has_identities || self.identities.len() == gaussians,
+                Error::fault("an identity for each Gaussian"),
+            ),
+        ];
+        rules.into_iter().try_for_each(|(holds, error)| if holds { Ok(()) } else { Err(error) })
+    }
+
     /// The planes from which clause 7.10 computes the output: compensated.
     pub fn into_shown(self) -> QuantizedFrame {
         let Self { mut planes, compensation, carried, .. } = self;
@@ -90,12 +113,15 @@ impl DecodedFrame {
 impl Compensation {
     /// Compensates planes of which the first `exact` Gaussians are exact.
     fn apply(&self, planes: &mut QuantizedFrame, exact: usize) {
-        let applies = |index: usize| self.only.is_empty() || self.only.get(index).copied().unwrap_or(false);
         let shift = |plane: &mut [i32], of_exact: i8, of_carried: i8| {
-            let (exact, carried) = plane.split_at_mut_checked(exact).unwrap_or_default();
-            let compensated = exact.iter_mut().enumerate().filter(|(index, _)| applies(*index));
-            compensated.for_each(|(_, value)| add(value, of_exact));
-            carried.iter_mut().for_each(|value| add(value, of_carried));
+            match self.only.is_empty() {
+                true => plane.iter_mut().take(exact).for_each(|value| add(value, of_exact)),
+                false => {
+                    let flagged = plane.iter_mut().take(exact).zip(&self.only);
+                    flagged.filter(|(_, only)| **only).for_each(|(value, _)| add(value, of_exact));
+                }
+            }
+            plane.iter_mut().skip(exact).for_each(|value| add(value, of_carried));
         };
         if self.exact.is_zero() && self.carried.is_zero() {
             return;
@@ -108,7 +134,7 @@ impl Compensation {
 }
 
 fn add(value: &mut i32, by: i8) {
-    *value = value.wrapping_add(by.into()).clamp(*ATTRIBUTE_RANGE.start(), *ATTRIBUTE_RANGE.end());
+    *value = value.saturating_add(by.into()).clamp(*ATTRIBUTE_RANGE.start(), *ATTRIBUTE_RANGE.end());
 }
 
 #[cfg(test)]
@@ -132,5 +158,28 @@ mod tests {
         assert_eq!(shown.opacity, [1, 32_767, 8, -32_768]);
         assert_eq!(shown.log_scale, [const { [0, 2, 2, -1] }; 3].map(Vec::from));
         assert_eq!(all.into_shown().opacity, [6, 32_767, 8, -32_768]);
+    }
+
+    #[test]
+    fn a_frame_whose_parts_do_not_fit_is_a_fault() {
+        let mut frame = DecodedFrame::empty(0, FrameType::Predicted);
+        frame.planes = QuantizedFrame::zeroed(4, 0);
+        (frame.carried, frame.identities) = (1, vec![0; 4]);
+        frame.compensation.only = vec![true; 3];
+        assert_eq!(frame.check(0, true), Ok(()));
+        let changes: [fn(&mut DecodedFrame); 4] = [
+            |frame| frame.carried = 5,
+            |frame| frame.planes.dc[1].truncate(3),
+            |frame| frame.compensation.only.truncate(2),
+            |frame| frame.identities.truncate(3),
+        ];
+        for change in changes {
+            let mut changed = frame.clone();
+            change(&mut changed);
+            assert!(changed.check(0, true).is_err_and(|error| error.is_fault()));
+        }
+        assert!(frame.check(1, true).is_err(), "SH planes of another degree");
+        frame.identities.clear();
+        assert_eq!(frame.check(0, false), Ok(()), "nobody asked for identities");
     }
 }

@@ -8,11 +8,12 @@
 
 use super::applying::{self, Outcome};
 use super::frame::{Context, DividedUnit, FrameInProgress, Refused};
-use super::lists::{Head, put};
+use super::lists::{Head, Identities, put};
 use crate::cores;
-use crate::digest::{ListDigest, list_digest_unless};
+use crate::digest::{ListDigest, list_digest_unless, whole_digest_unless};
 use crate::direct::{self, DirectUnit};
 use crate::entropy_state::{UnitEntropy, of_sections};
+use crate::fault;
 use crate::increment::Unit;
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, SectionCoding, UnitValues};
@@ -22,6 +23,7 @@ use crate::steps::StepRule;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};
 use splatstream_format::syntax::IncrementHeader;
 use splatstream_format::{Error, Result};
+use std::sync::Arc;
 
 /// Tables that are expanded at the same time: all of those of an honest frame. A stream made to take memory gets one unit
 /// at a time.
@@ -56,12 +58,17 @@ impl FrameInProgress {
         let prepared = self.prepare(pending, context);
         let is_direct = self.is_direct(pending, context);
         if !is_direct {
-            self.lists.divide(context.options.identities, context.interrupt);
+            if let Err(error) = self.lists.divide(context.options.identities, context.interrupt) {
+                return vec![error];
+            }
             self.lists.displaced_needed = displaced_needed(pending);
         }
         let mut rest = prepared.as_slice();
         while !rest.is_empty() {
-            let (group, later) = rest.split_at_checked(group_length(rest, is_direct)).unwrap_or((rest, &[]));
+            let Some((group, later)) = rest.split_at_checked(group_length(rest, is_direct)) else {
+                errors.push(Error::fault("no more units in a group than there are"));
+                break;
+            };
             match is_direct {
                 true => self.decode_direct(group, context, &mut errors),
                 false => self.decode_group(group, context, &mut errors),
@@ -131,7 +138,10 @@ impl FrameInProgress {
                 coding: *coding,
             })
             .collect();
-        let (mut planes, results) = direct::decode(&units, context.sequence, context.workspace());
+        let (mut planes, results) = match direct::decode(&units, context.sequence, context.workspace()) {
+            Ok(decoded) => decoded,
+            Err(error) => return errors.push(error),
+        };
         let mut results = results.into_iter();
         let mut kept = 0_usize;
         for (unit, prepared) in group {
@@ -139,12 +149,15 @@ impl FrameInProgress {
                 break;
             }
             let taken = known(prepared).and_then(|prepared| {
-                let added = results.next().unwrap_or(Ok(0))?;
+                let added = results.next().ok_or(Error::fault("a result for each unit"))??;
                 let end = kept.saturating_add(added);
-                let digest = || list_digest_unless(context.interrupt, &planes, kept..end);
+                let digest = || {
+                    let digest = list_digest_unless(context.interrupt, &planes, kept..end);
+                    digest.ok_or(Error::fault("the Gaussians of all units in the planes"))
+                };
                 self.check_list(unit, context, digest)?;
-                put(&mut self.lists.heads, unit.refinement.into(), head(unit, added, added));
-                self.finish_unit(unit, added, prepared);
+                put(&mut self.lists.heads, unit.refinement.into(), head(unit, added, added))?;
+                self.finish_unit(unit, added, prepared)?;
                 Ok(end)
             });
             match taken {
@@ -170,6 +183,7 @@ impl FrameInProgress {
             prepared.as_ref().map_or(0, |p| p.sections.values())
         };
         let count = group.iter().map(of_unit).fold(0, u64::saturating_add);
+        // That many or more than can be counted: both are worth all cores.
         let count = usize::try_from(count).unwrap_or(usize::MAX);
         let values: Vec<Result<UnitValues>> = cores::map(count, group.iter().collect(), |(_, prepared)| {
             known(prepared)?.sections.decode(context.sequence, context.workspace())
@@ -204,10 +218,10 @@ impl FrameInProgress {
         };
         let Outcome { list, added, keep } = self.applied(&unit, pending.refinement, context)?;
         let known = context.reference.and_then(|reference| reference.digest(pending.refinement, &list));
-        let compute = || list_digest_unless(context.interrupt, &list.planes, 0..list.len());
-        self.check_list(pending, context, || known.cloned().unwrap_or_else(compute))?;
+        let compute = || whole_digest_unless(context.interrupt, &list.planes);
+        self.check_list(pending, context, || Ok(known.cloned().unwrap_or_else(compute)))?;
         if context.options.entropy {
-            let state = of_sections(&pending.increment.sections, values);
+            let state = of_sections(&pending.increment.sections, values)?;
             let payload_at = pending.payload_at;
             self.entropy.extend(state.map(|state| UnitEntropy { payload_at, state }));
         }
@@ -218,33 +232,39 @@ impl FrameInProgress {
                 Some(reference) => reference.identities.get(r),
                 None => self.lists.identities.get(r),
             };
-            self.lists.follow_identities(r, parents.cloned().unwrap_or_default(), &keep, added);
+            // The lowest spatial layer has no parents.
+            let parents = parents.map_or_else(Identities::default, Arc::clone);
+            self.lists.follow_identities(r, parents, &keep, added)?;
         }
-        self.lists.take(pending.refinement, list, head);
-        put(&mut self.lists.kept, pending.refinement.into(), keep);
-        self.finish_unit(pending, size, prepared);
-        Ok(())
+        self.lists.take(pending.refinement, list, head, keep)?;
+        self.finish_unit(pending, size, prepared)
     }
 
     fn check_list(
         &mut self,
         unit: &DividedUnit<'_>,
         context: &Context<'_>,
-        digest: impl FnOnce() -> ListDigest,
+        digest: impl FnOnce() -> Result<ListDigest>,
     ) -> Result<()> {
         if !context.options.verify {
             return Ok(());
         }
         let stored = unit.increment.header.refinement_digest;
         let at = unit.increment.header.at(unit.payload_at, "refinement_digest");
-        self.lists.check_digest(unit.refinement, digest(), stored, at)
+        self.lists.check_digest(unit.refinement, digest()?, stored, at)
     }
 
     /// Takes note of a unit that was decoded.
-    fn finish_unit(&mut self, unit: &DividedUnit<'_>, size: usize, prepared: &Prepared<'_, '_>) {
+    fn finish_unit(
+        &mut self,
+        unit: &DividedUnit<'_>,
+        size: usize,
+        prepared: &Prepared<'_, '_>,
+    ) -> Result<()> {
         self.bytes = self.bytes.saturating_add(unit.bytes);
         self.lists.models.follow(unit.refinement, prepared.models.clone());
-        self.decoded.take(unit.spatial_layer, unit.refinement, u32::try_from(size).unwrap_or(u32::MAX));
+        self.decoded.take(unit.spatial_layer, unit.refinement, fault::count(size)?);
+        Ok(())
     }
 
     fn refuse(&mut self, unit: &DividedUnit<'_>, error: Error, errors: &mut Vec<Error>) {

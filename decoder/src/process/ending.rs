@@ -58,7 +58,13 @@ impl Decoder {
         };
         let is_kept = ahead::is_kept(gop, layer);
         let reference = reference.and_then(|layer| self.references.get_mut(layer));
-        let closed = frame.close(&context, reference, end != FrameEnd::Cut);
+        let closed = match frame.close(&context, reference, end != FrameEnd::Cut) {
+            Ok(closed) => closed,
+            Err(error) => {
+                self.add(error);
+                return None;
+            }
+        };
         self.next_identity = closed.next_identity;
         self.has_stopped |= self.interrupt.is_requested();
         let mut spares = closed.spares;
@@ -67,7 +73,7 @@ impl Decoder {
             false => spares.take(closed.state.into_lists()),
         }
         self.spares.push(spares);
-        closed.fault.into_iter().for_each(|error| self.add(error));
+        closed.difference.into_iter().for_each(|error| self.add(error));
         if end == FrameEnd::Complete {
             self.frame = Some(frame);
         }

@@ -11,6 +11,7 @@ use super::phase::{same, unexpected};
 use crate::buffers::{BufferPool, Workspace};
 use crate::displacement::CellField;
 use crate::entropy_state::UnitEntropy;
+use crate::fault;
 use crate::frame_state::FrameState;
 use crate::gop::{Gop, element_at};
 use crate::interrupt::Interrupt;
@@ -122,12 +123,12 @@ impl Progress {
         Self { limit, ..Self::default() }
     }
 
-    /// Units of a spatial layer.
+    /// Units of a spatial layer; none of one that the sequence has not.
     pub(super) fn count(&self, layer: u8) -> u8 {
         self.counts.get(usize::from(layer)).copied().unwrap_or(0)
     }
 
-    /// Gaussians of list h.
+    /// Gaussians of list h; none before its first unit.
     fn size(&self, h: u8) -> u32 {
         self.sizes.get(usize::from(h)).copied().unwrap_or(0)
     }
@@ -231,14 +232,17 @@ impl FrameInProgress {
         let at = unit.payload_at;
         let (header, _) = IncrementHeader::parse(unit.payload, at, sequence, context.profile)?;
         header.within(at, unit.payload.len(), &options.limits)?;
-        header.validate_counts(at, &self.sizes(unit, context))?;
+        header.validate_counts(at, &self.sizes(unit, context)?)?;
         let transforms = gop.transforms(&self.header, self.payload_at)?;
         gop.colour(transforms, &header, unit.header.temporal_layer, at)?;
         Increment::parse(unit.payload, at, sequence, context.profile, &options.limits)
     }
 
     /// What the frame says about the list of a unit.
-    fn sizes(&self, unit: &Unit<'_>, context: &Context<'_>) -> ListSizes {
+    ///
+    /// # Errors
+    /// A fault: the reference frame lacks a list that this one can have.
+    fn sizes(&self, unit: &Unit<'_>, context: &Context<'_>) -> Result<ListSizes> {
         let (sequence, refinement) = (context.sequence, unit.header.refinement);
         let all = self.header.gaussian_count;
         let before = self.expected.size_before(refinement);
@@ -250,20 +254,18 @@ impl FrameInProgress {
             false => is_last.then_some(max_size),
         };
         let parents = match (context.reference, unit.header.spatial_layer) {
-            (Some(reference), _) => {
-                let list = reference.lists.get(usize::from(refinement));
-                list.map_or(0, |list| u32::try_from(list.len()).unwrap_or(u32::MAX))
-            }
+            (Some(reference), _) => fault::count(reference.list(refinement.into())?.len())?,
             (None, 0) => 0,
             (None, _) => self.expected.size(refinement),
         };
-        ListSizes { parents, intra: self.is_intra(), size, max_size }
+        Ok(ListSizes { parents, intra: self.is_intra(), size, max_size })
     }
 
     /// Puts an accepted unit with this payload to those that wait.
     pub(super) fn push(&mut self, unit: &DividedUnit<'_>, payload: &[u8]) {
         let &DividedUnit { spatial_layer, refinement, payload_at, bytes, .. } = unit;
         self.expected.take(spatial_layer, refinement, unit.increment.header.list_size());
+        // Modulo 2^32, as identities count.
         self.identities.1 = self.identities.1.wrapping_add(unit.increment.header.new_count);
         let payload = payload.to_vec();
         self.pending.push(PendingUnit { spatial_layer, refinement, payload, payload_at, bytes });

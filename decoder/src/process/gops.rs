@@ -6,6 +6,7 @@ use super::phase::{mismatch, same, unexpected};
 use super::references::References;
 use super::{Context, Decoder};
 use crate::budget::Shape;
+use crate::buffers::left_or_new;
 use crate::displacement::CellField;
 use crate::entropy_state::{UnitEntropy, of_sections};
 use crate::gop::{Gop, element_at};
@@ -146,7 +147,7 @@ impl Decoder {
             pending: Vec::new(),
             expected: Progress::new(limit),
             decoded: Progress::new(limit),
-            lists: Lists::new(moved.models, self.next_identity, self.spares.pop().unwrap_or_default()),
+            lists: Lists::new(moved.models, self.next_identity, left_or_new(&mut self.spares)),
             bytes: unit_bytes(unit),
             entropy: moved.entropy.into_iter().collect(),
             error: absent,
@@ -206,7 +207,8 @@ struct Moved {
 impl Context<'_> {
     /// Decodes the cells of a frame, if there is something that they move.
     fn moved(&self, cells: Option<&Cells<'_>>, at: u64) -> Result<Moved> {
-        let models = self.reference.map(|reference| reference.models.clone()).unwrap_or_default();
+        // An I frame starts without models (6.12).
+        let models = self.reference.map_or_else(ModelsInForce::default, |reference| reference.models.clone());
         let mut moved = Moved { field: CellField::default(), models, entropy: None };
         let is_available = self.reference.is_some_and(|reference| reference.carried.is_some());
         let Some(cells) = cells.filter(|_| is_available) else { return Ok(moved) };
@@ -217,7 +219,8 @@ impl Context<'_> {
         let values = prepared.decode(self.sequence, self.workspace())?;
         moved.field = field(values.section(Section::Cells), cells.cell_log2, self.sequence, at)?;
         if self.options.entropy {
-            moved.entropy = of_sections(sections, &values).map(|state| UnitEntropy { payload_at: at, state });
+            moved.entropy =
+                of_sections(sections, &values)?.map(|state| UnitEntropy { payload_at: at, state });
         }
         Ok(moved)
     }

@@ -2,6 +2,7 @@
 
 use super::spares::Spares;
 use crate::digest::{ListDigest, lists_digest};
+use crate::fault;
 use crate::frame::QuantizedFrame;
 use crate::interrupt::Interrupt;
 use crate::list::GaussianList;
@@ -55,33 +56,48 @@ impl Lists {
         Self { models: ModelsOfFrame::starting_with(models), next_identity, spares, ..Self::default() }
     }
 
-    /// So many new identities.
-    pub(super) fn identify(&mut self, count: usize) -> impl Iterator<Item = u32> + use<> {
+    /// So many new identities. They count modulo 2^32, so that those of a GOP differ, which has fewer.
+    pub(super) fn identify(&mut self, count: u32) -> impl Iterator<Item = u32> + use<> {
         let first = self.next_identity;
-        self.next_identity = u32::try_from(count).unwrap_or(u32::MAX).wrapping_add(first);
-        (0..count).scan(first, |next, _| {
-            let identity = *next;
-            *next = next.wrapping_add(1);
-            Some(identity)
-        })
+        self.next_identity = first.wrapping_add(count);
+        (0..count).map(move |number| first.wrapping_add(number))
     }
 
-    /// Takes note of what a unit made of the identities of its parents.
-    pub(super) fn follow_identities(&mut self, r: usize, parents: Identities, keep: &[bool], added: usize) {
+    /// Takes note of what a unit made of the identities of its parents; without flags in `keep` all have stayed.
+    ///
+    /// # Errors
+    /// A fault: there are no identities of the lists before, or others than parents.
+    pub(super) fn follow_identities(
+        &mut self,
+        r: usize,
+        parents: Identities,
+        keep: &[bool],
+        added: usize,
+    ) -> Result<()> {
         let mut identities = parents;
+        if !keep.is_empty() && keep.len() != identities.len() {
+            return Err(Error::fault("an identity for each parent"));
+        }
         if added > 0 || !keep.iter().all(|&keep| keep) {
             let changed = Arc::make_mut(&mut identities);
             crate::frame::retain(changed, keep);
-            changed.extend(self.identify(added));
+            changed.extend(self.identify(fault::count(added)?));
         }
-        put(&mut self.identities, r, identities);
+        put(&mut self.identities, r, identities)
     }
 
     /// Makes lists of the planes; gives the Gaussians identities if `identifies` says so. Where an interrupt is requested,
     /// the lists mean nothing.
-    pub(super) fn divide(&mut self, identifies: bool, interrupt: &Interrupt) {
+    ///
+    /// # Errors
+    /// A fault: the planes are not those of the lists.
+    pub(super) fn divide(&mut self, identifies: bool, interrupt: &Interrupt) -> Result<()> {
+        const APART: Error = Error::fault("the planes of all lists one after the other");
         if !self.lists.is_empty() {
-            return;
+            return Ok(());
+        }
+        if self.heads.iter().map(|head| head.size).fold(0, usize::saturating_add) != self.planes.len() {
+            return Err(APART);
         }
         let mut start = 0_usize;
         // The planes of one list are its own: nothing is copied.
@@ -90,20 +106,25 @@ impl Lists {
         for (r, head) in heads.take_while(|_| !interrupt.is_requested()) {
             let end = start.saturating_add(head.size);
             if identifies {
-                self.follow_identities(r, Arc::default(), &[], head.size);
+                self.follow_identities(r, Arc::default(), &[], head.size)?;
             }
             self.heads.push(head);
             let planes = match is_whole {
                 true => core::mem::take(&mut self.planes),
-                false => self.planes.part_unless(interrupt, start..end),
+                false => self.planes.part_unless(interrupt, start..end).ok_or(APART)?,
             };
             self.lists.push(Arc::new(GaussianList::of_planes_unless(interrupt, planes, true)));
+            self.kept.push(Vec::new());
             start = end;
         }
         self.planes = QuantizedFrame::default();
+        Ok(())
     }
 
     /// Compares the digest of lists 0 to r, of which the last is new.
+    ///
+    /// # Errors
+    /// Invalid: another digest. A fault: one of the lists before it has none.
     pub(super) fn check_digest(
         &mut self,
         refinement: u8,
@@ -112,27 +133,84 @@ impl Lists {
         at: u64,
     ) -> Result<()> {
         let r = usize::from(refinement);
-        let mut digests = self.digests.get(..r).unwrap_or_default().to_vec();
-        digests.push(digest.clone());
+        let before = self.digests.get(..r).ok_or(UNORDERED)?;
+        let digests = [before, core::slice::from_ref(&digest)].concat();
         let computed = lists_digest(&digests);
         if computed != stored {
             return Err(Error::new(at, "7.9.2", ErrorKind::Digest { stored, computed }));
         }
-        put(&mut self.digests, r, digest);
-        Ok(())
+        put(&mut self.digests, r, digest)
     }
 
-    /// Takes the list that a unit leaves.
-    pub(super) fn take(&mut self, refinement: u8, list: Arc<GaussianList>, head: Head) {
-        put(&mut self.lists, refinement.into(), list);
-        put(&mut self.heads, refinement.into(), head);
+    /// Takes the list that a unit leaves, and which parents the unit has kept.
+    ///
+    /// # Errors
+    /// A fault: the lists before it are not there.
+    pub(super) fn take(
+        &mut self,
+        refinement: u8,
+        list: Arc<GaussianList>,
+        head: Head,
+        keep: Vec<bool>,
+    ) -> Result<()> {
+        let r = usize::from(refinement);
+        put(&mut self.lists, r, list)?;
+        put(&mut self.heads, r, head)?;
+        put(&mut self.kept, r, keep)
     }
 }
 
-/// Sets the value at an index, which is at most the length.
-pub(super) fn put<T>(values: &mut Vec<T>, index: usize, value: T) {
+const UNORDERED: Error = Error::fault("each list after those before it");
+
+/// Sets the value at an index.
+///
+/// # Errors
+/// A fault: values before it are missing.
+pub(super) fn put<T>(values: &mut Vec<T>, index: usize, value: T) -> Result<()> {
+    let is_next = index == values.len();
     match values.get_mut(index) {
         Some(slot) => *slot = value,
-        None => values.push(value),
+        None if is_next => values.push(value),
+        None => return Err(UNORDERED),
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn head(size: usize) -> Head {
+        Head { spatial_layer: 0, shift: Shift::default(), size, added: size }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_a_fault_and_no_other_list() {
+        let of_planes = |gaussians: usize| Lists {
+            planes: QuantizedFrame::zeroed(gaussians, 0),
+            heads: vec![head(2), head(1)],
+            ..Lists::default()
+        };
+        let mut lists = of_planes(3);
+        assert_eq!(lists.divide(true, Interrupt::NEVER), Ok(()));
+        assert_eq!(lists.identities, [Arc::new(vec![0, 1]), Arc::new(vec![2])]);
+        assert!(of_planes(2).divide(false, Interrupt::NEVER).is_err_and(|error| error.is_fault()));
+
+        let list = || Arc::new(GaussianList::empty(0));
+        let mut late = Lists::default();
+        assert!(late.take(1, list(), head(0), Vec::new()).is_err_and(|error| error.is_fault()));
+        assert_eq!(late.take(0, list(), head(0), Vec::new()), Ok(()));
+        let digest = list().digest();
+        assert!(late.check_digest(1, digest.clone(), 0, 0).is_err_and(|error| error.is_fault()));
+        assert!(late.check_digest(0, digest, 0, 0).is_err_and(|error| !error.is_fault()), "a wrong one");
+    }
+
+    #[test]
+    fn identities_follow_the_parents_that_stay() {
+        let mut lists = Lists { next_identity: u32::MAX, ..Lists::default() };
+        let parents = Arc::new(vec![7, 8, 9]);
+        assert_eq!(lists.follow_identities(0, parents.clone(), &[true, false, true], 2), Ok(()));
+        assert_eq!(lists.identities, [Arc::new(vec![7, 9, u32::MAX, 0])]);
+        assert!(lists.follow_identities(0, parents, &[true], 0).is_err_and(|error| error.is_fault()));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Decoder;
 use super::phase::same;
+use crate::fault;
 use crate::gop::element_at;
 use splatstream_format::Result;
 use splatstream_format::payload::{Index, OperatingPoints};
@@ -29,7 +30,7 @@ impl Decoder {
         }
         let gops = &self.counted.gops;
         let (header, _) = IndexHeader::parse(unit.payload, unit.payload_at)?;
-        let expected = u32::try_from(gops.len()).unwrap_or(u32::MAX);
+        let expected = fault::count(gops.len())?;
         same(unit.payload_at, "6.10", "entry_count", header.entry_count, expected)?;
         let index = Index::parse(unit.payload, unit.payload_at)?;
         let mut at = element_at(&IndexHeader::TABLE, unit.payload_at, "");

@@ -27,7 +27,7 @@ pub(crate) fn heal(bytes: &mut [u8], limits: &Limits) {
             let mut digests: Vec<ListDigest> = Vec::new();
             for &(at, size) in sizes.get(&(frame.index, layer)).into_iter().flatten().take(frame.level.into())
             {
-                digests.push(list_digest(&frame.planes, start..start + size));
+                digests.extend(list_digest(&frame.planes, start..start + size));
                 start += size;
                 elements.push((at + DIGEST, lists_digest(&digests)));
             }

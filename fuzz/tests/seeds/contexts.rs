@@ -34,7 +34,7 @@ pub(crate) fn stream(sequence: &SequenceParameters) -> Vec<u8> {
     };
     let frame = QuantizedFrame::zeroed(GAUSSIANS as usize, sequence.sh_dimension().into());
     let header = IncrementHeader {
-        refinement_digest: lists_digest(&[list_digest(&frame, 0..GAUSSIANS as usize)]),
+        refinement_digest: lists_digest(&[list_digest(&frame, 0..GAUSSIANS as usize).unwrap()]),
         new_count: GAUSSIANS,
         sh_mode: ShMode::Coefficients.code(),
         ..IncrementHeader::PLAIN
