@@ -1,4 +1,6 @@
 //! Clause 7.5: a cell that moves, and the integers that its rotation is made of.
+//!
+//! A shift is at most 100, so that nothing leaves 128 bits.
 
 /// The largest integer of a rotation component, and of the unit of rotations. Clause 7.6.3.
 pub(crate) const UNIT_MAX: i64 = 32_767;

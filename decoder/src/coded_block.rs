@@ -1,4 +1,7 @@
 //! The values of a block as they are coded.
+//!
+//! Planes are pushed in the order of the layout, each of as many values as there are deltas, and nothing is asked of planes that are
+//! not there. Values are not checked yet and no sum overflows all the same (annex F.2).
 
 use crate::attribute;
 use crate::buffers::Buffers;

@@ -1,4 +1,7 @@
 //! Clause 7.6.5: colour components to colour, by an integer transform.
+//!
+//! No sum overflows (annex F.4). Indices into codebooks are checked against their entries before these are summed, and a plane
+//! has a value for each Gaussian of the run.
 
 use crate::attribute::in_range;
 pub use crate::components::COMPONENT_RANGE;

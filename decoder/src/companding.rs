@@ -2,6 +2,8 @@
 //!
 //! Near the middle of the grid a step of the code is a step of the grid. Outside, a step doubles from segment to
 //! segment, so that far Gaussians take few bits. Everything in the decoding process but its output works on codes.
+//!
+//! No point that a code stands for leaves its type (annex F.7).
 
 use splatstream_format::syntax::SequenceParameters;
 

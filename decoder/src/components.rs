@@ -2,6 +2,8 @@
 //!
 //! A plane is packed as soon as it is decoded, while it is near: with its bias, times its steps, its range checked, and in
 //! pairs with the plane after it, since machines multiply two pairs of 16 bits and add the products in one instruction.
+//!
+//! No product overflows (annex F.4). Runs end with the plane, and exponents are as many as values.
 
 use crate::attribute::in_range;
 use crate::steps::Exponents;

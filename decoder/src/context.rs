@@ -1,4 +1,6 @@
 //! Clause 8.5: the values that choose the context of a symbol.
+//!
+//! No sum overflows (annex F.2), and sources are known before they are asked for: the layout has been checked against them.
 
 use crate::coded_block::CodedBlock;
 pub use crate::coded_block::bit_length;

@@ -1,6 +1,8 @@
 //! Clause 7.5: cells that move, and the Gaussians that move with them.
 //!
 //! A fine position is in 64ths of a grid step, a fine rotation in 64ths of rotation_step.
+//!
+//! Sums stay below 2^31 (annex F.4). Runs are parts of planes of one length, which follows from the lists they are of.
 
 use crate::cell::Cell;
 use crate::cores;

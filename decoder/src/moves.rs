@@ -4,6 +4,9 @@
 //! Gaussians are ([`crate::neighbours`]): among the parents next to it along the Morton curve, of which those count
 //! whose motion is known when the parent's turn comes. Who counts follows from the modes alone, so that neighbours are
 //! found in parallel (`candidates`); the motions follow one after the other, in the order of the parents.
+//!
+//! No sum overflows (annex F.4), and lists, rows and motions are of one length each: the unit has as many modes and moves as
+//! its header counts before anything is predicted, and every place is one that was made for a list that is there.
 
 use crate::cores;
 use crate::curve;

@@ -4,6 +4,8 @@
 //! definition itself is bounded: the points are sorted along the Morton curve, and only [`WINDOW`] points on either
 //! side of the index at which the seeking point would stand are candidates. The nearest candidates, ties to the lower
 //! index, are the neighbours. Sorting takes a time that grows with n, a search 2 * `WINDOW` distances.
+//!
+//! Squares of distances stay below 2^42 (annex F.5); indices are those of points, and a run has room for its neighbours.
 
 use crate::cores;
 use crate::curve;

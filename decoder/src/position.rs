@@ -1,4 +1,6 @@
 //! Clause 7.6.4: Morton deltas to grid positions.
+//!
+//! A code that has passed and a delta are below 2^60 each, so that no sum leaves 64 bits (annex F.3).
 
 use splatstream_format::{Error, ErrorKind, Result};
 

@@ -1,4 +1,6 @@
 //! Clause 7.7: the predictors of new Gaussians, and what their neighbours weigh.
+//!
+//! No sum overflows (annex F.5), and a weight is at least 1, so that none is divided by 0.
 
 use crate::neighbours::Neighbour;
 use splatstream_format::{Error, ErrorKind, Result};

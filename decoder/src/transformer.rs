@@ -2,6 +2,8 @@
 //!
 //! A [`Batch`] holds what the network sees of [`LANES`] Gaussians, one a lane. [`scalar`] is the text line by line for
 //! one of them; [`lanes`] computes all at once and gives the same integers.
+//!
+//! No sum overflows (annex F.6).
 
 pub mod batch;
 pub mod lanes;

@@ -1,4 +1,6 @@
 //! Contexts while a plane is decoded, for all lanes of a block together.
+//!
+//! The oldest of a ring is counted modulo its length.
 
 use super::{DeltaNeighbours, SourceValues, is_serial};
 use crate::coded_block::CodedBlock;

@@ -2,6 +2,9 @@
 //!
 //! Attributes are predicted in coding order, each just before its residual is added, because the bilateral
 //! predictor compares what is known of a Gaussian with its neighbours.
+//!
+//! No sum overflows (annex F.5). There is a run of predictors for each new Gaussian and K neighbours for each item, as
+//! [`Prediction::new`] makes them; planes have a value for each row, so that nothing is taken in place of one.
 
 use super::residual::{AttributeCoding, AttributeValues, Attributes};
 use crate::colour::Colour;

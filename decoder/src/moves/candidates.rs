@@ -1,4 +1,7 @@
 //! The neighbours of moved parents: the nearest of those next to them along the Morton curve.
+//!
+//! Squares of distances stay below 2^42 (annex F.5). Planes have room for a window before the first parent and after the last, so that
+//! no index of a candidate lies outside.
 
 use super::{MOVE_NEIGHBOURS, MOVE_WINDOW, MoveSpace, Place, RUN, at};
 use crate::cores;

@@ -1,4 +1,6 @@
 //! SS-TR-001 and SS-TR-002: what the network sees of the neighbours of new Gaussians.
+//!
+//! No sum overflows (annex F.6). Neighbours and lanes are within what the batch was made for, and others change nothing.
 
 use super::{INPUTS_MAX, RANKS, act};
 use splatstream_format::syntax::NetworkHeader;

@@ -3,6 +3,9 @@
 //! Activations and weights have 8 bits. Two of them, of neighbouring rows, share an `i32` of each lane as 16-bit
 //! halves (`packed`): machines multiply such pairs and add both products in one instruction. No sum overflows (7.12),
 //! so the order of its terms means nothing.
+//!
+//! The rows of a batch have the widths of the header of its network,
+//! so that what is taken in place of an element that is not there never is.
 
 use super::{Batch, INPUTS_MAX, LANES, OUTPUTS_MAX, RANKS, act, round};
 use products::{Portable, Products};

@@ -1,4 +1,7 @@
 //! SS-TR-003 to SS-TR-008 for one Gaussian, as the text has them. The fast path is compared with this.
+//!
+//! No sum overflows (annex F.6), and the rows of a batch have the widths of the header of its network: what is taken in place of an
+//! element that is not there never is.
 
 use super::{Batch, RANKS, act, round, sine};
 use crate::predictor::EXP;

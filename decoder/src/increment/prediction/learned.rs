@@ -1,4 +1,6 @@
 //! Clause 7.7.6: from neighbours to what the network sees, and from its outputs to colour.
+//!
+//! No sum overflows (annex F.6). Neighbours are rows, and rows have the columns of the planes of the set.
 
 use super::projection::{COLOURS_MAX, Colour, Components, Projection};
 use super::rows::Rows;

@@ -1,4 +1,6 @@
 //! SS-TR-001 and SS-TR-008: from colours to the components that a network works with, and back.
+//!
+//! No sum overflows (annex F.6); outputs and weights that a network or a transform lacks are 0.
 
 use crate::transformer::lanes::{Columns, Lane, packed};
 use crate::transformer::{LANES, OUTPUTS_MAX};

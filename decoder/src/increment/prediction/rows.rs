@@ -1,4 +1,7 @@
 //! The neighbours of new Gaussians, gathered: each with all its attributes side by side.
+//!
+//! Indices are those of rows, below the number of neighbours, so that their products with a width fit; each is in the set that the
+//! neighbours were found in.
 
 use super::at;
 use crate::cores;

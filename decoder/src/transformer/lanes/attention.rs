@@ -1,4 +1,6 @@
 //! SS-TR-005: attention.
+//!
+//! No sum overflows (annex F.6); rows have the width of the network, and there is a share for each neighbour.
 
 use super::prepared::DIFFERENCE_MAX;
 use super::products::Products;

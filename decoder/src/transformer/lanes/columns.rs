@@ -1,4 +1,6 @@
 //! A matrix for one vector at a time: its rows are the lanes.
+//!
+//! Rows are padded with 0 to lanes and to pairs.
 
 #[cfg(target_arch = "x86_64")]
 use super::products;

@@ -1,4 +1,6 @@
 //! SS-TR-006 and SS-TR-007: normalisation and the feed-forward block.
+//!
+//! No sum overflows (annex F.6); rows have the width of the network.
 
 use super::products::Products;
 use super::{FEED_FORWARD, Lane, OneBatch, Sums, WIDTH, ZERO, act, add, high, low, pairs, round};

@@ -1,4 +1,6 @@
 //! A layer, four rows at a time, its columns in pairs.
+//!
+//! Rows are padded with 0 to fours and to pairs.
 
 use super::products::Products;
 use super::{Lane, packed};

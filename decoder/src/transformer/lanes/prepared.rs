@@ -1,4 +1,6 @@
 //! A network as batches want it.
+//!
+//! No sum overflows (annex F.6). Layers have the lengths that the header of the network gives (6.17); padding is 0.
 
 use super::Machine;
 use super::matrix::{Matrix, ROWS, blocks};

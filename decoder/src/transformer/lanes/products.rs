@@ -1,4 +1,6 @@
 //! Sums of products of 16 bits, with the instructions of a machine. All of them give the same integers.
+//!
+//! No sum overflows (annex F.6).
 
 use super::{Lane, high, low};
 #[cfg(target_arch = "x86_64")]
