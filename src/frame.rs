@@ -28,6 +28,7 @@ pub struct Frame {
     kind: FrameType,
     point: OperatingPoint,
     refinements: u8,
+    is_reduced: bool,
     carried: usize,
     sequence: SequenceParameters,
     digest: Option<u64>,
@@ -57,6 +58,7 @@ impl Frame {
             digest: decoded.digest,
             bytes: decoded.bytes,
             refinements: decoded.level,
+            is_reduced: decoded.is_reduced,
             carried: decoded.carried,
             sequence,
             identities: core::mem::take(&mut decoded.identities),
@@ -89,6 +91,13 @@ impl Frame {
     /// How many refinements it shows exactly. Fewer than the operating point asks for if some are missing.
     pub fn refinements(&self) -> u8 {
         self.refinements
+    }
+
+    /// Whether it shows less than the operating point asks for, or may, because units of it or of a frame that it refers to are
+    /// damaged, or did not come before the end of the bytes or an error that cost the rest of its GOP. Units that are missing
+    /// without a trace do not count: an extracted stream lacks those of higher points too.
+    pub fn is_reduced(&self) -> bool {
+        self.is_reduced
     }
 
     /// How many of its Gaussians, the last ones, are those of an earlier frame, moved: they stand in for refinements that

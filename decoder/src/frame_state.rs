@@ -27,6 +27,8 @@ pub(crate) struct FrameState {
     pub(crate) anchor: Option<Arc<[Arc<GaussianList>]>>,
     /// Whether the I frame is complete, and this frame and every P or B frame on the way from it has a level above 0.
     pub(crate) is_exact: bool,
+    /// Whether it shows less than its operating point asks for.
+    pub(crate) is_reduced: bool,
     /// The identities of the Gaussians of each exact list, if they are asked for.
     pub(crate) identities: Vec<Arc<Vec<u32>>>,
     /// What compensated the I frame of the GOP, and compensates carried lists.

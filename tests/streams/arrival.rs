@@ -6,6 +6,7 @@ use splatstream::{Decoder, Error, Frame, Limits, Position};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::Frames;
 use splatstream_format::Class;
+use std::collections::BTreeSet;
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -141,6 +142,39 @@ fn every_vector_gives_the_frames_and_the_errors_of_the_decoder_below() {
             assert!(is_said, "{}: {text}", path.display());
         }
     }
+}
+
+/// Display index, refinements and whether it is reduced, of each frame of a stream that is there as a whole, and of the
+/// same in pieces.
+fn told(bytes: &[u8]) -> [Vec<(u32, u8, bool)>; 2] {
+    let tell = |frame: Frame| (frame.index(), frame.refinements(), frame.is_reduced());
+    let opened = Decoder::from_bytes(bytes).map_while(Result::ok).map(tell).collect();
+    let (mut decoder, mut pushed) = (Decoder::new(), Vec::new());
+    for piece in bytes.chunks(997) {
+        decoder.push(piece).unwrap();
+        pushed.extend(decoder.by_ref().map_while(Result::ok).map(tell));
+    }
+    decoder.end();
+    pushed.extend(decoder.map_while(Result::ok).map(tell));
+    [opened, pushed]
+}
+
+#[test]
+fn a_frame_that_a_cut_has_reduced_says_so_however_its_bytes_come() {
+    let bytes = vectors::talk();
+    let [whole, _] = told(&bytes);
+    assert!(whole.iter().all(|&(.., is_reduced)| !is_reduced));
+    let mut reduced = BTreeSet::new();
+    for cut in (1..bytes.len()).step_by(bytes.len() / 150) {
+        let [opened, pushed] = told(&bytes[..cut]);
+        assert_eq!(opened, pushed, "{cut}");
+        for (cut, whole) in opened.iter().zip(&whole) {
+            assert_eq!(cut.2, cut.1 < whole.1, "{cut:?}");
+            reduced.extend(cut.2.then_some(cut.0));
+        }
+    }
+    // The I frame, before there was any other, and later ones.
+    assert!(reduced.contains(&0) && reduced.len() > 2, "{reduced:?}");
 }
 
 /// The moving scene with up to three bytes changed, whole or cut.

@@ -57,7 +57,7 @@ pub(super) struct Shown {
 /// Whether a frame is all there, and what it shows in words.
 struct State {
     is_intra: bool,
-    is_lost: bool,
+    is_reduced: bool,
     /// The highest spatial layer of the sequence.
     top: u8,
     error: Option<Error>,
@@ -90,7 +90,7 @@ impl Shown {
         self.carried.push(frame.carried as u64);
         self.states.push(State {
             is_intra: frame.frame_type == FrameType::Intra,
-            is_lost: frame.is_lost,
+            is_reduced: frame.is_reduced,
             top: sequence.spatial_layer_count.saturating_sub(1),
             error: frame.error,
             shows: shows(sequence, frame),
@@ -114,14 +114,14 @@ impl Shown {
         OperatingPoint { spatial: most(&self.spatial_layers), refinement, ..point }
     }
 
-    /// The frames of a stream with errors that are not all there: they have errors, or show less than an operating point
-    /// has. Predicted frames have refinements in the highest spatial layer alone.
+    /// The frames of a stream with errors that are not all there: the decoder knows of it, or they show less than an operating
+    /// point has. Predicted frames have refinements in the highest spatial layer alone.
     pub(super) fn reduced(&self, point: OperatingPoint) -> Vec<Reduced> {
         let is_reduced = |&frame: &usize| {
-            let State { is_intra, is_lost, top, error, .. } = self.states[frame];
+            let State { is_intra, is_reduced, top, .. } = self.states[frame];
             let is_less = self.levels[frame] <= point.refinement && (is_intra || point.spatial >= top)
                 || is_intra && self.spatial_layers[frame] < point.spatial;
-            is_lost || error.is_some() || is_less
+            is_reduced || is_less
         };
         let one = |frame: usize| Reduced {
             frame: self.numbers[frame],

@@ -249,3 +249,26 @@ fn a_cut_stream_gives_the_frames_that_are_there() {
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&report["frames"], &report["errors"][0]["class"]), (&2.into(), &"truncated".into()));
 }
+
+/// Of a single frame too, which there is no other one to compare with.
+#[test]
+fn a_frame_that_a_cut_has_reduced_is_listed() {
+    for (refinement, shown) in [(0, 0), (1, 1), (2, 2)] {
+        let (_directory, path) = changed(|bytes| {
+            let mut increment = unit(bytes, 6);
+            for _ in 0..refinement {
+                increment += UNIT_HEADER + payload_length(bytes, increment);
+            }
+            bytes.truncate(increment + UNIT_HEADER + 9);
+        });
+        let output = run(&["decode", text(&path), "--dry-run", "--json"]);
+        assert_eq!(output.status.code(), Some(14));
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let reduced = report["reduced"].as_array().unwrap();
+        assert_eq!(
+            (reduced.len(), &report["levels"], &report["complete"]),
+            (1, &serde_json::json!([shown]), &false.into())
+        );
+        assert_eq!((&reduced[0]["frame"], &reduced[0]["level"]), (&0.into(), &shown.into()));
+    }
+}

@@ -54,10 +54,18 @@ impl FrameInProgress {
         decoded.error = self.error;
         let has_digest = context.options.verify && decoded.level > 0;
         decoded.digest = has_digest.then(|| lists_digest(&self.lists.digests));
-        let closed = match self.is_intra() {
+        let refers_to_reduced = reference.as_ref().is_some_and(|reference| reference.is_reduced);
+        let mut closed = match self.is_intra() {
             true => self.close_intra(context, decoded),
             false => self.close_predicted(context, decoded, reference),
         }?;
+        let decoded = &mut closed.decoded;
+        let asked = context.sequence.refinement_count.min(self.point.refinement.saturating_add(1));
+        decoded.is_reduced = self.is_cut
+            || decoded.is_lost
+            || decoded.error.is_some()
+            || refers_to_reduced && decoded.level < asked;
+        closed.state.is_reduced = decoded.is_reduced;
         closed.decoded.check(context.sequence.sh_degree, context.options.identities)?;
         Ok(closed)
     }

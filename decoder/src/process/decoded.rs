@@ -26,8 +26,12 @@ pub struct DecodedFrame {
     pub carried_lists: u8,
     /// Gaussians of carried lists: the last ones of `planes`.
     pub carried: usize,
-    /// Whether nothing is known of the frame: it has no Gaussians and counts as lost (clause 7.8.1).
+    /// Whether nothing is known of the frame: it is an empty frame, which has no Gaussians (SS-CA-002).
     pub is_lost: bool,
+    /// Whether the frame shows less than its operating point asks for, or may: units of it, or of a frame that it refers to, are
+    /// damaged or did not come before the end of the bytes or an error that ends the GOP. Of units that are missing without a
+    /// trace nothing is known: an extracted stream lacks those of higher points too.
+    pub is_reduced: bool,
     /// Digest of the exact lists; none if digests are not verified or there is no exact list.
     pub digest: Option<u64>,
     /// Digest of all carried lists of the frame, where it was compared.
@@ -68,6 +72,7 @@ impl DecodedFrame {
             carried_lists: 0,
             carried: 0,
             is_lost: false,
+            is_reduced: false,
             digest: None,
             carried_digest: None,
             identities: Vec::new(),

@@ -1,7 +1,7 @@
 //! The end of the frame in progress: when it comes, what the decoder keeps of the frame, and what it hands out.
 
 use super::decoded::DecodedFrame;
-use super::frame::Context;
+use super::frame::{Context, FrameInProgress};
 use super::{Decoder, FrameEnd, ahead};
 use splatstream_format::syntax::{UnitHeader, UnitId};
 use splatstream_format::{Error, ErrorKind};
@@ -10,18 +10,23 @@ impl Decoder {
     /// Ends the frame in progress if it has all units that belong to the operating point, so that it need not wait for
     /// the unit after it.
     pub(super) fn finish_complete(&mut self) -> Option<DecodedFrame> {
-        let (frame, (sequence, _)) = (self.frame.as_ref()?, self.sequence.as_ref()?);
-        let takes = |spatial_layer, refinement| {
-            let id = UnitId::of_increment(frame.index, refinement);
-            UnitHeader::new(id.on_layers(spatial_layer, frame.role.temporal_layer), &[])
-                .is_ok_and(|header| self.belongs(&header))
-        };
-        let is_complete = frame.is_complete(sequence, takes);
+        let frame = self.frame.as_ref()?;
+        let is_complete = frame.seen && !frame.has_ended && self.has_all(frame);
         if is_complete && self.may_wait() {
             self.wait();
             return None;
         }
         is_complete.then(|| self.close_frame(FrameEnd::Complete)).flatten()
+    }
+
+    /// Whether a frame has all units that belong to the operating point.
+    fn has_all(&self, frame: &FrameInProgress) -> bool {
+        let takes = |spatial_layer, refinement| {
+            let id = UnitId::of_increment(frame.index, refinement);
+            UnitHeader::new(id.on_layers(spatial_layer, frame.role.temporal_layer), &[])
+                .is_ok_and(|header| self.belongs(&header))
+        };
+        self.sequence.as_ref().is_some_and(|(sequence, _)| frame.has_all(sequence, takes))
     }
 
     /// Ends the frame in progress. One that is complete stays: it tells why it takes no further increment.
@@ -44,6 +49,7 @@ impl Decoder {
             self.add(error);
             frame.error.get_or_insert(error);
         }
+        frame.is_cut = end == FrameEnd::Cut && !self.has_all(&frame);
         let (layer, reference) = (frame.role.temporal_layer, frame.reference);
         self.frame_point = frame.point;
         let (Some((sequence, _)), Some(gop)) = (&self.sequence, &self.gop) else { return None };

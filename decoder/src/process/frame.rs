@@ -76,6 +76,8 @@ pub(super) struct FrameInProgress {
     pub(super) error: Option<Error>,
     /// The identity of its first new Gaussian, and how many of these the units that were accepted announce.
     pub(super) identities: (u32, u32),
+    /// Whether the bytes or its GOP have ended before all of its units had come.
+    pub(super) is_cut: bool,
     /// Whether it has ended, and its content has been taken.
     pub(super) has_ended: bool,
 }
@@ -174,8 +176,8 @@ impl FrameInProgress {
     }
 
     /// Whether all of its units have been accepted that `takes` tells by spatial layer and refinement.
-    pub(super) fn is_complete(&self, sequence: &SequenceParameters, takes: impl Fn(u8, u8) -> bool) -> bool {
-        self.seen && !self.has_ended && self.expected.has_all(sequence, self.is_intra(), takes)
+    pub(super) fn has_all(&self, sequence: &SequenceParameters, takes: impl Fn(u8, u8) -> bool) -> bool {
+        self.expected.has_all(sequence, self.is_intra(), takes)
     }
 
     /// Accepts an increment that belongs to the operating point. `None` if it is discarded.

@@ -152,6 +152,7 @@ impl Decoder {
             entropy: moved.entropy.into_iter().collect(),
             error: absent,
             identities: (self.next_identity, 0),
+            is_cut: false,
             has_ended: false,
         });
         absent.into_iter().for_each(|error| self.report(error));

@@ -1,6 +1,7 @@
 //! Clauses 7.1.4 to 7.1.6: what errors cost, wherever they are. Single cases are vectors (`loss`, `order`).
 
 use crate::write::{Plan, Script, decoded};
+use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::Summary;
 use splatstream_format::Class;
@@ -24,6 +25,45 @@ fn damaged(script: &Script, part: usize) -> Vec<u8> {
     let mut bytes = script.bytes();
     bytes[script.offsets()[part] + UnitHeader::SIZE] ^= 1;
     bytes
+}
+
+/// A stream of one I frame too: there is no other frame to compare it with.
+#[test]
+fn what_a_cut_costs_a_frame_is_said_of_it() {
+    let percents = vec![10, 20, 50, 100];
+    let layered = Plan { percents: percents.clone(), ..Plan::predicted(1) };
+    let alone = Plan { percents, gops: vec![1], ..Plan::intra(1) };
+    for plan in [layered, alone] {
+        let script = plan.script();
+        let (bytes, starts) = (script.bytes(), script.offsets());
+        let (_, whole) = decode(&bytes);
+        assert!(whole.iter().all(|frame| !frame.is_reduced));
+        let mut reduced = 0;
+        for cut in starts.iter().flat_map(|&start| [start, start + UnitHeader::SIZE + 1]) {
+            let (summary, frames) = decode(&bytes[..cut]);
+            assert_eq!(codes(&summary), ["TRUNCATED"]);
+            for (frame, whole) in frames.iter().zip(&whole) {
+                assert_eq!(frame.is_reduced, frame.planes != whole.planes, "frame {} at {cut}", frame.index);
+                reduced += u32::from(frame.is_reduced && !frame.is_lost);
+            }
+        }
+        assert!(reduced > 5, "{reduced} frames shown in part");
+    }
+}
+
+/// A point below the cut is whole all the same.
+#[test]
+fn a_frame_that_has_what_its_point_asks_for_is_not_reduced() {
+    let script = Plan { gops: vec![1], ..Plan::intra(1) }.script();
+    let increments = script.indices(UnitType::Increment);
+    let bytes = script.bytes();
+    let cut = &bytes[..script.offsets()[increments[2]] + UnitHeader::SIZE + 1];
+    for (refinement, is_reduced) in [(0, false), (1, false), (2, true)] {
+        let operating_point = OperatingPoint { refinement, ..OperatingPoint::ALL };
+        let (_, frames) = decoded(cut, &Options { operating_point, ..Options::default() });
+        let found: Vec<_> = frames.iter().map(|frame| (frame.level, frame.is_reduced)).collect();
+        assert_eq!(found, [(refinement.min(1) + 1, is_reduced)]);
+    }
 }
 
 #[test]
@@ -52,7 +92,7 @@ fn a_damaged_increment_costs_its_list_and_those_after_it() {
             // Nothing has to be missing: carried lists stand in for exact ones, as far as the I frame has them.
             let kept = if is_anchor && id.spatial_layer == 0 && same_gop { id.refinement } else { 4 };
             assert_eq!(frame.level + frame.carried_lists, kept, "{id:?} {}", frame.index);
-            assert_eq!(frame.is_lost, kept == 0);
+            assert_eq!((frame.is_lost, frame.is_reduced), (kept == 0, depends), "{id:?} {}", frame.index);
             let exact = frame.planes.len() - frame.carried;
             if !shows_lower {
                 assert_eq!(frame.planes.part(0..exact), whole.planes.part(0..exact), "{id:?}");
