@@ -148,7 +148,10 @@ impl Decode {
         let has_errors = !loss.errors.is_empty();
         let point = self.op.unwrap_or(OperatingPoint::ALL);
         let reduced = match has_errors {
-            true => decoding.shown.reduced(loss.listed.unwrap_or_else(|| decoding.shown.most(point))),
+            true => {
+                let most = loss.listed.unwrap_or_else(|| decoding.shown.most(point));
+                decoding.shown.reduced(most, &loss.short)
+            }
             false => Vec::new(),
         };
         // Without the announced number nobody knows what stood after an error.

@@ -4,6 +4,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::frames;
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
+use crate::short_frames::short_frames;
 use crate::stream_file::{LimitArgs, StreamFile};
 use crate::structure::{Frame, Structure};
 use clap::Args;
@@ -11,6 +12,7 @@ use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_format::Limits;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::slice;
 
@@ -45,6 +47,8 @@ struct Report {
     lost: Vec<(u32, u32)>,
     /// Frames of which a unit that was written is damaged.
     damaged: Vec<u32>,
+    /// Frames that lack units of the point.
+    reduced: BTreeSet<u32>,
     complete: bool,
 }
 
@@ -80,6 +84,8 @@ impl Report {
         let lost = whole.missing(&there, announced, OperatingPoint::ALL);
         let damaged: Vec<u32> =
             frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
+        let reduced = short_frames(&stream.bytes, &whole, command.op, !lost.is_empty(), limits);
+        let is_there = lost.is_empty() && damaged.is_empty() && reduced.is_empty();
         Self {
             output: command.out.clone(),
             op: command.op.to_string(),
@@ -87,9 +93,10 @@ impl Report {
             bytes_in: stream.bytes.len() as u64,
             frames: frames_of(&part).count() as u32,
             frames_in_stream: announced,
-            complete: lost.is_empty() && damaged.is_empty() && part.error.is_none() && announced.is_some(),
+            complete: is_there && part.error.is_none() && announced.is_some(),
             lost,
             damaged,
+            reduced,
         }
     }
 
@@ -110,6 +117,9 @@ impl Report {
         }
         for frame in &self.damaged {
             text += &format!("  damaged      frame {frame}\n");
+        }
+        for frame in &self.reduced {
+            text += &format!("  frame {frame} lacks units that the stream says it has\n");
         }
         text
     }

@@ -37,6 +37,7 @@ mod render;
 mod seek;
 mod serve;
 mod setting_names;
+mod short_frames;
 mod simulate;
 mod standard;
 mod stream_file;

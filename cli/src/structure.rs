@@ -4,8 +4,8 @@
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::follower::{Content, Follower, Standing};
 use splatstream_format::syntax::{
-    FrameHeader, FrameRole, GopHeader, OperatingPointEntry, Profile, SequenceParameters, TransformKind,
-    UnitHeader, UnitType,
+    EndOfStream, FrameHeader, FrameRole, GopHeader, OperatingPointEntry, Profile, SequenceParameters,
+    TransformKind, UnitHeader, UnitType,
 };
 use splatstream_format::unit::{Landmark, Stream, Unit};
 use splatstream_format::{Error, Limits, Result};
@@ -20,13 +20,24 @@ pub(crate) struct Structure {
     pub(crate) sequence: Option<SequenceParameters>,
     /// The GOPs.
     pub(crate) gops: Vec<Gop>,
-    /// The operating points that it lists, and how many frames it has at each.
-    pub(crate) points: Vec<(OperatingPoint, u32)>,
+    /// The operating points that it lists.
+    pub(crate) points: Vec<Listed>,
+    /// How many units the end unit counts before it, and how many there are; none before the end unit.
+    units: Option<(u32, usize)>,
     /// The first error of headers, checksums and lengths.
     pub(crate) error: Option<Error>,
     /// Whether units belong to the last GOP: not after a damaged gop_header.
     in_gop: bool,
     definitions: Definitions,
+}
+
+/// An operating point as the stream lists it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Listed {
+    pub(crate) point: OperatingPoint,
+    /// Frames of the stream at the point, and bytes of their units and of those of their GOPs.
+    pub(crate) frames: u32,
+    pub(crate) bytes: u64,
 }
 
 /// Where a unit is.
@@ -163,9 +174,14 @@ impl Structure {
         self.sequence.map_or(0, |sequence| sequence.spatial_layer_count.saturating_sub(1))
     }
 
-    /// The listed points up to `point`, and how many frames the stream has at each.
-    pub(crate) fn points_up_to(&self, point: OperatingPoint) -> impl Iterator<Item = (OperatingPoint, u32)> {
-        self.points.iter().copied().filter(move |(listed, _)| {
+    /// Whether there are as many units as the end unit counts.
+    pub(crate) fn has_all_units(&self) -> bool {
+        self.units.is_some_and(|(counted, there)| counted as usize == there)
+    }
+
+    /// The listed points up to `point`.
+    pub(crate) fn points_up_to(&self, point: OperatingPoint) -> impl Iterator<Item = Listed> {
+        self.points.iter().copied().filter(move |Listed { point: listed, .. }| {
             listed.spatial <= point.spatial
                 && listed.temporal <= point.temporal
                 && listed.refinement <= point.refinement
@@ -211,10 +227,10 @@ impl Structure {
     /// The highest temporal layer of which the stream has frames at a point. Points of an extracted stream are listed with
     /// temporal layers that are no longer there, but not with their frames.
     fn temporal_layer(&self, point: OperatingPoint) -> u8 {
-        match self.points_up_to(point).max() {
-            Some((_, frames)) => {
-                let as_many = self.points_up_to(point).filter(|&(_, count)| count == frames);
-                as_many.map(|(listed, _)| listed.temporal).min().unwrap_or(0)
+        match self.points_up_to(point).max_by_key(|listed| listed.point) {
+            Some(Listed { frames, .. }) => {
+                let as_many = self.points_up_to(point).filter(|listed| listed.frames == frames);
+                as_many.map(|listed| listed.point.temporal).min().unwrap_or(0)
             }
             None => {
                 let frames = self.gops.iter().flat_map(|gop| &gop.frames);
@@ -264,6 +280,11 @@ impl Structure {
                 return Ok(());
             }
             UnitType::FrameHeader | UnitType::SequenceParameters | UnitType::OperatingPoints => {}
+            UnitType::End => {
+                let end = EndOfStream::parse_payload(unit.payload, unit.payload_at)?;
+                self.units = Some((end.unit_count, span.unit));
+                return Ok(());
+            }
             _ => return Ok(()),
         }
         match follower.content(unit)? {
@@ -278,7 +299,8 @@ impl Structure {
             Content::OperatingPoints(points) => {
                 let point = |entry: &OperatingPointEntry| {
                     let (spatial, temporal, refinement) = entry.key();
-                    (OperatingPoint { spatial, temporal, refinement }, entry.frame_count)
+                    let point = OperatingPoint { spatial, temporal, refinement };
+                    Listed { point, frames: entry.frame_count, bytes: entry.byte_count }
                 };
                 self.points = points.entries.iter().map(point).collect();
             }

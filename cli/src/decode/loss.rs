@@ -2,6 +2,7 @@
 
 use crate::failure::StreamFault;
 use crate::numbers::FrameRange;
+use crate::short_frames::short_frames;
 use crate::stream_file::StreamFile;
 use crate::structure::{Gop, Structure, add_run};
 use serde::Serialize;
@@ -20,6 +21,9 @@ pub(super) struct Loss {
     /// The highest point that the stream lists, of those up to the one asked for.
     #[serde(skip)]
     pub(super) listed: Option<OperatingPoint>,
+    /// Frames that lack increments of the point asked for.
+    #[serde(skip)]
+    pub(super) short: BTreeSet<u32>,
 }
 
 impl Loss {
@@ -34,11 +38,11 @@ impl Loss {
     ) -> Self {
         let mut found: Vec<(u32, u32)> =
             summary.lost.iter().map(|range| (*range.start(), *range.end())).collect();
-        let mut listed = None;
+        let (mut listed, mut short) = (None, BTreeSet::new());
         if !summary.errors.is_empty() {
             let structure = Structure::of(&stream.bytes, &options.limits);
             let point = options.operating_point;
-            listed = structure.points_up_to(point).map(|(listed, _)| listed).max();
+            listed = structure.points_up_to(point).map(|listed| listed.point).max();
             // Frames of which not even a header is left, and, where decoding did not go on after the first error, only those
             // after the last GOP that there is.
             let after = match options.stop_at_first_error {
@@ -49,6 +53,7 @@ impl Loss {
             let later = |(first, last): (u32, u32)| Some((first.max(after), last)).filter(|_| last >= after);
             found.extend(missing.into_iter().filter_map(later));
             found.sort_unstable();
+            short = short_frames(&stream.bytes, &structure, point, !found.is_empty(), &options.limits);
         }
         let mut lost = Vec::new();
         found.into_iter().for_each(|(first, last)| add_run(&mut lost, first, last));
@@ -60,6 +65,7 @@ impl Loss {
             errors: summary.errors.iter().copied().map(StreamFault::from).collect(),
             lost: lost.into_iter().filter_map(asked).collect(),
             listed,
+            short,
         }
     }
 

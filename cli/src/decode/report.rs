@@ -115,13 +115,13 @@ impl Shown {
     }
 
     /// The frames of a stream with errors that are not all there: the decoder knows of it, or they show less than an operating
-    /// point has. Predicted frames have refinements in the highest spatial layer alone.
-    pub(super) fn reduced(&self, point: OperatingPoint) -> Vec<Reduced> {
+    /// point has, or the stream lacks increments of them (`short`). Predicted frames have refinements in the highest spatial layer alone.
+    pub(super) fn reduced(&self, point: OperatingPoint, short: &BTreeSet<u32>) -> Vec<Reduced> {
         let is_reduced = |&frame: &usize| {
             let State { is_intra, is_reduced, top, .. } = self.states[frame];
             let is_less = self.levels[frame] <= point.refinement && (is_intra || point.spatial >= top)
                 || is_intra && self.spatial_layers[frame] < point.spatial;
-            is_reduced || is_less
+            is_reduced || is_less || short.contains(&self.numbers[frame])
         };
         let one = |frame: usize| Reduced {
             frame: self.numbers[frame],

@@ -19,6 +19,7 @@ mod json_reports;
 mod live;
 mod manual;
 mod messages;
+mod missing_units;
 mod outputs;
 mod packages;
 mod play;
