@@ -44,9 +44,9 @@ pub struct Target<'n> {
     pub(super) affinities: [i64; NEIGHBOURS_MAX],
 }
 
-/// Values that the network works on for targets, in each of its layers.
-fn values_of(targets: &[Target<'_>]) -> usize {
-    targets.len().saturating_mul(INPUTS_MAX)
+/// Values that the network works on for so many targets, in each of its layers.
+fn values_of(targets: usize) -> usize {
+    targets.saturating_mul(INPUTS_MAX)
 }
 
 impl Learned<'_> {
@@ -66,7 +66,7 @@ impl Learned<'_> {
             targets.iter().map(|target| target.row).zip(colours).collect()
         };
         let runs = items.chunks(LANES).collect();
-        let predicted = cores::map(items.len().saturating_mul(INPUTS_MAX), runs, of_run);
+        let predicted = cores::map(values_of(items.len()), runs, of_run);
         let runs = predicted.iter().take_while(|_| !self.interrupt.is_requested());
         for (row, colour) in runs.flatten() {
             let (dc, sh) = colour.split_at(3);
@@ -80,7 +80,7 @@ impl Learned<'_> {
     pub fn batches(&self, targets: &[Target<'_>], attributes: &Attributes) -> Vec<Batch> {
         let components = self.components(targets.iter().map(|target| target.indices));
         let batch = |run: &[Target<'_>]| self.batch(run, &self.bases(run), attributes, &components);
-        cores::map(values_of(targets), targets.chunks(LANES).collect(), batch)
+        cores::map(values_of(targets.len()), targets.chunks(LANES).collect(), batch)
     }
 
     /// What the outputs should be for each target, in step/64: the components of its colour in the planes `dc` and
@@ -95,7 +95,7 @@ impl Learned<'_> {
             let pairs = own.iter().zip(base).take(self.network.header().outputs());
             pairs.map(|(own, base)| round12(own.wrapping_sub(base)) as i32).collect()
         };
-        cores::map(values_of(targets), targets.iter().collect(), of_target)
+        cores::map(values_of(targets.len()), targets.iter().collect(), of_target)
     }
 
     /// The components of every row that is a neighbour of a target, whose `indices` these are; of the others 0.
