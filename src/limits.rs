@@ -1,6 +1,6 @@
 //! What a decoder may take.
 
-use splatstream_decoder::budget::Budget;
+use splatstream_decoder::process::Budget;
 use splatstream_format::Limits as FormatLimits;
 
 /// What a [`Decoder`](crate::Decoder) may take. It refuses a stream that asks for more before it allocates anything.

@@ -8,9 +8,7 @@
 use core::fmt;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use splatstream_decoder::block::{CodedPlanes, decode_coded};
-use splatstream_decoder::buffers::Buffers;
-use splatstream_decoder::coded_block::CodedBlock;
+use splatstream_decoder::block::{Buffers, CodedBlock, CodedPlanes, decode_coded};
 use splatstream_decoder::colour;
 use splatstream_decoder::context::plane_contexts;
 use splatstream_decoder::digest::{list_digest, lists_digest};

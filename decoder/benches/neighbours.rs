@@ -4,8 +4,7 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a panic is a failed benchmark")]
 
 use divan::{Bencher, black_box};
-use splatstream_decoder::cell::Cell;
-use splatstream_decoder::displacement::CellField;
+use splatstream_decoder::displacement::{Cell, CellField};
 use splatstream_decoder::neighbours::NeighbourSearch;
 use splatstream_decoder::position::morton;
 

@@ -13,7 +13,7 @@ use splatstream_decoder::increment::residual::Attributes;
 use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::predictor::Predictor;
-use splatstream_decoder::stage::Stage;
+use splatstream_decoder::steps::Stage;
 use splatstream_format::payload::{Network, REGISTRY, Transform};
 use splatstream_format::syntax::{IncrementHeader, TransformHeader};
 

@@ -10,9 +10,7 @@
 use core::fmt;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use splatstream_decoder::transformer::batch::Seen;
-use splatstream_decoder::transformer::lanes::Machine;
-use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, scalar};
+use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, Machine, Seen, scalar};
 use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::NetworkHeader;
 

@@ -7,10 +7,10 @@ use splatstream_format::{Error, ErrorKind, Result};
 /// The values of log-scales and opacity, and of rotation before its step.
 pub const ATTRIBUTE_RANGE: RangeInclusive<i32> = -32_768..=32_767;
 /// The values of rotation after its step.
-pub const ROTATION_RANGE: RangeInclusive<i32> = -32_767..=32_767;
+pub(crate) const ROTATION_RANGE: RangeInclusive<i32> = -32_767..=32_767;
 
 /// Adds the bias of a plane to its coded values. No sum wraps (annex F.2: `v`).
-pub fn unbias(values: &mut [i32], bias: i32) {
+pub(crate) fn unbias(values: &mut [i32], bias: i32) {
     values.iter_mut().for_each(|value| *value = value.wrapping_add(bias));
 }
 
@@ -18,7 +18,7 @@ pub fn unbias(values: &mut [i32], bias: i32) {
 ///
 /// # Errors
 /// Invalid, naming the first such value.
-pub fn in_range(
+pub(crate) fn in_range(
     values: &[i32],
     range: &RangeInclusive<i32>,
     element: &'static str,
@@ -35,7 +35,7 @@ pub fn in_range(
 }
 
 /// Clause 7.6.2. The next log-scale in place of the difference to the one before. None wraps (annex F.2: `cq`).
-pub fn next_log_scale(before: &[i32], differences: &mut [i32]) {
+pub(crate) fn next_log_scale(before: &[i32], differences: &mut [i32]) {
     for (&before, difference) in before.iter().zip(differences) {
         *difference = before.wrapping_sub(*difference);
     }
@@ -45,7 +45,7 @@ pub fn next_log_scale(before: &[i32], differences: &mut [i32]) {
 ///
 /// # Errors
 /// Invalid if one is out of range, or a difference of canonical axes is negative.
-pub fn check_log_scales(log_scale: [&[i32]; 3], canonical_axes: bool, at: u64) -> Result<()> {
+pub(crate) fn check_log_scales(log_scale: [&[i32]; 3], canonical_axes: bool, at: u64) -> Result<()> {
     for plane in log_scale {
         in_range(plane, &ATTRIBUTE_RANGE, "log_scale", "7.6.2", at)?;
     }
@@ -75,7 +75,7 @@ pub(crate) fn unsorted(at: u64) -> Error {
 ///
 /// # Errors
 /// Invalid if a value leaves the range.
-pub fn rotations(values: &mut [i32], bias: i32, exponents: &Exponents, at: u64) -> Result<()> {
+pub(crate) fn rotations(values: &mut [i32], bias: i32, exponents: &Exponents, at: u64) -> Result<()> {
     unbias(values, bias);
     in_range(values, &ATTRIBUTE_RANGE, "rotation", "7.6.3", at)?;
     if *exponents != Exponents::Same(0) {

@@ -1,7 +1,5 @@
 //! A block: coded planes in, integer attributes out. Blocks are independent, so all cores decode one frame.
 
-use crate::buffers::Buffers;
-use crate::coded_block::CodedBlock;
 use crate::colour::Colour;
 use crate::context::lanes::{DeltaContexts, PlaneContexts};
 use crate::frame::FrameSlice;
@@ -17,23 +15,26 @@ use splatstream_format::entropy::token::Alphabet;
 
 mod reconstruction;
 
+pub use crate::buffers::{BufferPool, Buffers, Workspace};
+pub use crate::coded_block::CodedBlock;
+
 /// What the elements of the sequence and of the unit say about every block of the unit.
 #[derive(Debug, Clone, Copy)]
-pub struct UnitParameters<'a> {
+pub(crate) struct UnitParameters<'a> {
     /// Bits of a coordinate.
-    pub position_bits: u8,
+    pub(crate) position_bits: u8,
     /// Low bits of coordinates that the unit leaves out.
-    pub position_shift: u8,
+    pub(crate) position_shift: u8,
     /// The steps of the attributes.
-    pub steps: StepRule,
+    pub(crate) steps: StepRule,
     /// Whether the axes are sorted.
-    pub canonical_axes: bool,
+    pub(crate) canonical_axes: bool,
     /// log2 of the number of rANS states.
-    pub lanes_log2: u8,
+    pub(crate) lanes_log2: u8,
     /// The coded planes.
-    pub layout: &'a Layout,
+    pub(crate) layout: &'a Layout,
     /// How colour components become colour.
-    pub colour: Colour<'a>,
+    pub(crate) colour: Colour<'a>,
 }
 
 /// How the planes of the blocks of a section are coded.
@@ -51,7 +52,7 @@ pub struct CodedPlanes<'a> {
 ///
 /// # Errors
 /// Malformed or invalid as the clauses say.
-pub fn decode_block(
+pub(crate) fn decode_block(
     bytes: &[u8],
     at: u64,
     unit: &UnitParameters<'_>,

@@ -193,7 +193,7 @@ impl CodedBlock {
     }
 
     /// The sums of the magnitudes of the attribute's planes before `plane`, which is not its first.
-    pub fn magnitudes_before(&self, plane: usize) -> &[i32] {
+    pub(crate) fn magnitudes_before(&self, plane: usize) -> &[i32] {
         let before = plane.checked_sub(1).and_then(|before| self.magnitudes.get(before));
         before.map(Vec::as_slice).unwrap_or_default()
     }

@@ -4,11 +4,12 @@
 //!
 //! Sums stay below 2^31 (annex F.4). Runs are parts of planes of one length, which follows from the lists they are of.
 
-use crate::cell::Cell;
 use crate::cores;
 use crate::interrupt::Interrupt;
 use crate::motion::{Bounds, Motion, Planes};
 use crate::position::morton;
+
+pub use crate::cell::{Cell, isqrt, rotation_unit};
 
 /// Gaussians displaced by one task.
 const RUN: usize = 4096;
@@ -29,7 +30,7 @@ impl CellField {
     /// A field of cells, each with the Morton code of its coordinates, codes strictly increasing.
     ///
     /// `cell_log2` is 0 to position_bits, `position_bits` at most 20, `unit` that of
-    /// [`rotation_unit`](crate::cell::rotation_unit).
+    /// [`rotation_unit`].
     pub fn new(cell_log2: u8, position_bits: u8, unit: i64, cells: Vec<(u64, Cell)>) -> Self {
         let (codes, cells): (Vec<u64>, Vec<Cell>) = cells.into_iter().unzip();
         let motions = cells.iter().map(|cell| Motion::of(cell, cell_log2)).collect();

@@ -28,16 +28,16 @@ pub struct QuantizedFrame {
 
 /// A run of Gaussians of a frame, to be written.
 #[derive(Debug)]
-pub struct FrameSlice<'a> {
+pub(crate) struct FrameSlice<'a> {
     /// Grid position x, y, z.
-    pub position: Vec<&'a mut [u32]>,
+    pub(crate) position: Vec<&'a mut [u32]>,
     /// The other planes in canonical order: log-scale, opacity, rotation, dc, sh.
-    pub planes: Vec<&'a mut [i32]>,
+    pub(crate) planes: Vec<&'a mut [i32]>,
 }
 
 impl FrameSlice<'_> {
     /// Copies values into one of `planes`.
-    pub fn write(&mut self, plane: usize, values: &[i32]) {
+    pub(crate) fn write(&mut self, plane: usize, values: &[i32]) {
         for (slot, &value) in
             self.planes.get_mut(plane).into_iter().flat_map(|plane| plane.iter_mut()).zip(values)
         {
@@ -76,7 +76,7 @@ impl QuantizedFrame {
 
     /// Divides the frame in runs of the given lengths, so that each can be written by itself; none if it is shorter than
     /// these together.
-    pub fn slices(&mut self, lengths: &[usize]) -> Option<Vec<FrameSlice<'_>>> {
+    pub(crate) fn slices(&mut self, lengths: &[usize]) -> Option<Vec<FrameSlice<'_>>> {
         let planes = 10_usize.saturating_add(self.sh.len());
         let mut slices: Vec<FrameSlice<'_>> = lengths
             .iter()

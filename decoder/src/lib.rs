@@ -2,20 +2,23 @@
 //!
 //! | clause | module |
 //! |---|---|
-//! | 7.1, 9 state, phases, errors and losses | [`process`] |
+//! | 7.1, 9 state, phases, errors and losses | [`process`], [`stream`] |
 //! | 7.2, 7.11 operating points, extraction | [`operating_point`] |
 //! | 7.3 frames of a GOP | [`process`] |
 //! | 7.4 lists, parents and modes | [`list`], [`increment`] |
 //! | 7.5 cells | [`displacement`] |
 //! | 7.4.3 moves | [`moves`] |
-//! | 7.6 values | [`steps`], [`attribute`], [`position`], [`colour`], [`increment::residual`] |
+//! | 7.6 values | [`steps`], [`position`], [`colour`], [`increment::residual`] |
 //! | 7.7 prediction | [`neighbours`], [`predictor`], [`transformer`], [`increment::prediction`] |
 //! | 7.8 what is shown | [`process::DecodedFrame`] |
 //! | 7.9 canonical planes and digests | [`frame`], [`digest`] |
-//! | 7.10 output | [`companding`], [`output`] |
+//! | 7.10 output | [`output`] |
+//! | 8.4 blocks | [`block`] |
 //! | 8.5 contexts | [`context`] |
 //!
-//! The encoder calls the same functions: what it reconstructs is what a decoder reconstructs.
+//! This crate is for the encoder and for tools that look into streams: the encoder calls the same functions, and what it
+//! reconstructs is what a decoder reconstructs. What they need is public and follows the text, so that it changes with it.
+//! Programs that show streams use the crate `splatstream`.
 //!
 //! ```
 //! use splatstream_decoder::{output::to_gaussians, process::Options, stream::Frames};
@@ -41,15 +44,15 @@
 
 pub use splatstream_format::entropy::layout;
 
-pub mod attribute;
+mod attribute;
 pub mod block;
-pub mod budget;
-pub mod buffers;
+mod budget;
+mod buffers;
 mod carried;
-pub mod cell;
-pub mod coded_block;
+mod cell;
+mod coded_block;
 pub mod colour;
-pub mod companding;
+mod companding;
 mod components;
 pub mod context;
 mod cores;
@@ -57,11 +60,11 @@ mod curve;
 pub mod digest;
 mod direct;
 pub mod displacement;
-pub mod entropy_state;
+mod entropy_state;
 mod fault;
 pub mod frame;
 mod frame_state;
-pub mod gop;
+mod gop;
 pub mod increment;
 pub mod interrupt;
 pub mod list;
@@ -74,7 +77,7 @@ pub mod position;
 pub mod predictor;
 pub mod process;
 mod shift;
-pub mod stage;
+mod stage;
 pub mod steps;
 pub mod stream;
 pub mod transformer;

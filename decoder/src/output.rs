@@ -4,11 +4,12 @@
 //! multiply-add, no reassociation. So the output is the same bits everywhere.
 #![expect(clippy::float_arithmetic, reason = "clause 7.10: attributes leave the integer domain here")]
 
-use crate::companding::Companding;
 use crate::cores;
 use crate::frame::QuantizedFrame;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::{FrameError, GaussianFrame, Planes};
+
+pub use crate::companding::Companding;
 
 /// dc and sh integers are on a grid 64 times finer than their step.
 const COLOUR_FRACTION: f32 = 1.0 / 64.0;

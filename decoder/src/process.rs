@@ -7,7 +7,6 @@
 
 use crate::budget::Spent;
 use crate::buffers::BufferPool;
-use crate::gop::Gop;
 use crate::interrupt::Interrupt;
 use crate::operating_point::{OperatingPoint, Tally};
 use ahead::Ready;
@@ -42,6 +41,9 @@ mod report;
 mod spares;
 mod trailer;
 
+pub use crate::budget::Budget;
+pub use crate::entropy_state::UnitEntropy;
+pub use crate::gop::{Gop, Transforms};
 pub use crate::shift::Shift;
 pub use decoded::{Compensation, DecodedFrame};
 pub use options::Options;

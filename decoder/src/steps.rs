@@ -6,10 +6,11 @@
 //!
 //! Nothing overflows: sizes are below 2^34, weights below 2^13, so that a sum of three products stays below 2^49.
 
-use crate::stage::Stage;
 use crate::vector::{Task, vectorized};
 use splatstream_format::entropy::machine::Machine;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, SequenceParameters};
+
+pub use crate::stage::Stage;
 
 /// Exponents of steps, one more than the largest.
 const EXPONENTS: usize = MAX_ATTRIBUTE_STEP as usize + 1;

@@ -1,16 +1,17 @@
 //! Clause 7.7.6: the learned predictor, a network over the neighbours of a new Gaussian.
 //!
 //! A [`Batch`] holds what the network sees of [`LANES`] Gaussians, one a lane. [`scalar`] is the text line by line for
-//! one of them; [`lanes`] computes all at once and gives the same integers.
+//! one of them; [`LaneNetwork`] computes all at once and gives the same integers.
 //!
 //! No sum overflows (annex F.6).
 
-pub mod batch;
-pub mod lanes;
+mod batch;
+mod lanes;
 pub mod scalar;
 
-pub use batch::{Batch, LANES};
-pub use lanes::LaneNetwork;
+pub use batch::{Batch, LANES, Seen};
+pub(crate) use lanes::{Columns, Lane, packed};
+pub use lanes::{LaneNetwork, Machine};
 
 /// Outputs of a network, at most: 3 components of dc and 16 of sh.
 pub const OUTPUTS_MAX: usize = 19;

@@ -8,7 +8,7 @@
 
 use crate::error::Error;
 use rayon::prelude::*;
-use splatstream_decoder::coded_block::CodedBlock;
+use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context;
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::{Layout, PlaneInfo};

@@ -187,7 +187,7 @@ pub(crate) fn check_reach(
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use splatstream_decoder::companding::Companding;
+    use splatstream_decoder::output::Companding;
 
     fn grid(position_bits: u8, linear_log2: u8, segment_log2: u8) -> (PositionGrid, Companding) {
         let sequence = SequenceParameters {

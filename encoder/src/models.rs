@@ -12,7 +12,7 @@ use crate::parametric_fit::fitted;
 use crate::settings::{Preset, Tools};
 use core::slice;
 use rayon::prelude::*;
-use splatstream_decoder::coded_block::CodedBlock;
+use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context::{self, is_serial};
 use splatstream_decoder::layout::{Attribute, PlaneInfo, Section, is_available};
 use splatstream_format::bits::BitWriter;

@@ -14,10 +14,9 @@ use crate::pca::Components;
 use crate::shape::{Shape, nearest_multiple};
 use pulp::Arch;
 use rayon::prelude::*;
-use splatstream_decoder::companding::Companding;
+use splatstream_decoder::output::Companding;
 use splatstream_decoder::position::refine;
-use splatstream_decoder::stage::Stage;
-use splatstream_decoder::steps::{StepRule, step};
+use splatstream_decoder::steps::{Stage, StepRule, step};
 use splatstream_format::syntax::{SequenceParameters, TransformKind};
 use splatstream_gaussians::{GaussianFrame, Planes};
 

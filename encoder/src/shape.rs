@@ -2,8 +2,7 @@
 //! attributes follow from that.
 #![expect(clippy::arithmetic_side_effects, reason = "values on the grid are below 2^26, units are 1 or more")]
 
-use splatstream_decoder::stage::Stage;
-use splatstream_decoder::steps::{StepRule, step};
+use splatstream_decoder::steps::{Stage, StepRule, step};
 
 /// Parts of a step in which attributes are kept, as an integer.
 pub(crate) const PARTS: i32 = crate::grid::PARTS as i32;

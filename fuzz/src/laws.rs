@@ -2,11 +2,10 @@
 
 use crate::LIMITS;
 use core::ops::{ControlFlow, RangeInclusive};
-use splatstream_decoder::budget::Budget;
 use splatstream_decoder::frame::QuantizedFrame;
 use splatstream_decoder::operating_point::{OperatingPoint, operating_points};
 use splatstream_decoder::output::to_gaussians;
-use splatstream_decoder::process::{DecodedFrame, Options};
+use splatstream_decoder::process::{Budget, DecodedFrame, Options};
 use splatstream_decoder::stream::{decode_stream, decode_stream_inside};
 use splatstream_format::Error;
 use splatstream_format::inspect::inspect;

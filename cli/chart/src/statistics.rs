@@ -6,8 +6,8 @@ mod symbols;
 
 use frames::FrameCosts;
 use models::Models;
-use splatstream_decoder::coded_block::CodedBlock;
-use splatstream_decoder::gop::Gop;
+use splatstream_decoder::block::CodedBlock;
+use splatstream_decoder::process::Gop;
 use splatstream_format::entropy::layout::{Attribute, Layout, Section};
 use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::follower::{Content, Follower, Standing};

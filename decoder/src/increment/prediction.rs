@@ -17,16 +17,17 @@ use crate::predictor::{NEIGHBOURS_MAX, Predictor, WeightedMean, bilateral_weight
 use crate::stage::Stage;
 use crate::transformer::LaneNetwork;
 use core::ops::Range;
-use learned::{Learned, Target};
 use projection::Projection;
 use rows::Rows;
 use splatstream_format::Result;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::IncrementHeader;
 
-pub mod learned;
+mod learned;
 mod projection;
 mod rows;
+
+pub use learned::{Learned, Target};
 
 /// What the predictors of a unit go by.
 #[derive(Debug, Clone, Copy)]

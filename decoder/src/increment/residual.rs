@@ -3,7 +3,7 @@
 //! Sums do not wrap (annex F.4): values that are not checked yet are below 2^17, their steps at most 6144. There are planes and values
 //! for each attribute and Gaussian, which has been established when a unit is [applied](super::apply).
 
-use crate::attribute::{ATTRIBUTE_RANGE, in_range, unsorted};
+use crate::attribute::{in_range, unsorted};
 use crate::colour::{COLOUR_RANGE, Colour, add_inverse};
 use crate::cores;
 use crate::interrupt::Interrupt;
@@ -14,6 +14,8 @@ use crate::steps::{Exponents, StepRule, step};
 use core::ops::RangeInclusive;
 use splatstream_format::payload::Transform;
 use splatstream_format::{Error, Result};
+
+pub use crate::attribute::ATTRIBUTE_RANGE;
 
 /// The values of a fine rotation.
 const ROTATION_FINE_RANGE: RangeInclusive<i32> = -32_767 * FINE..=32_767 * FINE;
@@ -116,7 +118,7 @@ impl Attributes {
     }
 
     /// The same, to be changed.
-    pub fn stage_mut(&mut self, stage: Stage) -> &mut [Vec<i32>] {
+    pub(crate) fn stage_mut(&mut self, stage: Stage) -> &mut [Vec<i32>] {
         match stage {
             Stage::LogScale => &mut self.log_scale,
             Stage::Opacity => core::slice::from_mut(&mut self.opacity),

@@ -67,7 +67,7 @@ impl UnitValues {
     }
 
     /// The values of one plane of a section, counted without that of the position alphabet; none of a section that is absent.
-    /// A section that a unit [counts](Self::check) has its planes.
+    /// A section that a unit counts has its planes.
     pub fn plane(&self, section: Section, plane: usize) -> &[i32] {
         self.section(section).planes.get(plane).map(Vec::as_slice).unwrap_or_default()
     }

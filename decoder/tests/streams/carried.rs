@@ -1,7 +1,7 @@
 //! Clause 7.8: what is carried, shown and compensated.
 
 use crate::write::{Plan, decoded};
-use splatstream_decoder::buffers::{BufferPool, Workspace};
+use splatstream_decoder::block::{BufferPool, Workspace};
 use splatstream_decoder::displacement::CellField;
 use splatstream_decoder::increment::field;
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};

@@ -2,9 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
 
 use proptest::prelude::*;
-use splatstream_decoder::transformer::batch::Seen;
-use splatstream_decoder::transformer::lanes::Machine;
-use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, scalar};
+use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, Machine, Seen, scalar};
 use splatstream_format::payload::{Layer, Network, Part};
 use splatstream_format::syntax::NetworkHeader;
 

@@ -17,8 +17,7 @@ use super::unit::UnitCoder;
 use crate::error::Error;
 use crate::matching::Matching;
 use splatstream_decoder::list::GaussianList;
-use splatstream_decoder::stage::Stage;
-use splatstream_decoder::steps::step;
+use splatstream_decoder::steps::{Stage, step};
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::{GaussianFrame, PlanesMut};
 

@@ -21,7 +21,7 @@ use splatstream_decoder::layout::{Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::position::refine;
 use splatstream_decoder::predictor::Predictor;
-use splatstream_decoder::stage::Stage;
+use splatstream_decoder::steps::Stage;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::entropy::token::zigzag;
 use splatstream_format::syntax::IncrementHeader;

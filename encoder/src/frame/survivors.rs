@@ -12,8 +12,7 @@ use crate::grid::nearest_integer;
 use rayon::prelude::*;
 use splatstream_decoder::colour::COMPONENT_RANGE;
 use splatstream_decoder::list::{FINE, GaussianList};
-use splatstream_decoder::stage::Stage;
-use splatstream_decoder::steps::{StepRule, step};
+use splatstream_decoder::steps::{Stage, StepRule, step};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::SequenceParameters;
 

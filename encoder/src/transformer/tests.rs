@@ -8,8 +8,7 @@ use super::lane::Whole;
 use super::model::Model;
 use super::parameters::Layout;
 use super::{Architecture, Sample};
-use splatstream_decoder::transformer::batch::Seen;
-use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, scalar};
+use splatstream_decoder::transformer::{Batch, LANES, LaneNetwork, Seen, scalar};
 use splatstream_format::syntax::NetworkHeader;
 use splatstream_gaussians::random::SplitMix64;
 

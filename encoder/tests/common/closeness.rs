@@ -1,7 +1,7 @@
 //! How far decoded Gaussians are from their sources, in quantiser steps.
 
-use splatstream_decoder::companding::Companding;
 use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::output::Companding;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
 

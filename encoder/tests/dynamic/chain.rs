@@ -2,8 +2,8 @@
 
 use crate::common::closeness::{Bounds, assert_close};
 use crate::common::dynamic::{Whole, coded, predicted, scene};
-use splatstream_decoder::companding::Companding;
 use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::output::Companding;
 use splatstream_encoder::{Settings, Tools};
 use splatstream_files::builtin::Tracking;
 use splatstream_format::syntax::SequenceParameters;

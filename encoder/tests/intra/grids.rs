@@ -2,12 +2,10 @@
 
 use crate::common::{Random, decoded, encoded, strict};
 use proptest::prelude::*;
-use splatstream_decoder::companding::Companding;
-use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::output::{Companding, to_gaussians};
 use splatstream_decoder::position::morton;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stage::Stage;
-use splatstream_decoder::steps::{StepRule, step};
+use splatstream_decoder::steps::{Stage, StepRule, step};
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::canonical::canonicalise;
 use splatstream_encoder::{Importance, Laws, Preset, Quality, Settings, ShChoice};

@@ -2,9 +2,8 @@
 
 use crate::common::{builtin, decoded, encoded, frame_of, planes, strict};
 use proptest::prelude::*;
-use splatstream_decoder::companding::Companding;
 use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_points};
-use splatstream_decoder::output::to_gaussians;
+use splatstream_decoder::output::{Companding, to_gaussians};
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::decode_stream;
 use splatstream_encoder::{Importance, Preset, Quality, Settings, ShChoice, Steps, Tools};

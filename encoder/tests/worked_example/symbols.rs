@@ -1,6 +1,6 @@
 //! Clause 8.4 step by step, written again: the table of D.4, and a check of the fast reader.
 
-use splatstream_decoder::buffers::{BufferPool, Workspace};
+use splatstream_decoder::block::{BufferPool, Workspace};
 use splatstream_decoder::context::{delta_contexts, plane_contexts};
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
 use splatstream_decoder::interrupt::Interrupt;
@@ -72,7 +72,7 @@ fn one(text: &mut String, section: &SectionModels, block: &[u8], count: usize, s
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
     let (mut deltas, mut planes) = (Vec::new(), vec![Vec::new()]);
-    let mut known = splatstream_decoder::coded_block::CodedBlock::new(vec![0; count], 0, steps);
+    let mut known = splatstream_decoder::block::CodedBlock::new(vec![0; count], 0, steps);
     for (plane, (&info, model)) in section.layout.planes().iter().zip(&section.models).enumerate() {
         for i in 0..count {
             let context = context(model, plane, info, &known, &deltas, &planes[plane]);
@@ -119,7 +119,7 @@ fn context(
     model: &PlaneModel,
     plane: usize,
     info: PlaneInfo,
-    known: &splatstream_decoder::coded_block::CodedBlock,
+    known: &splatstream_decoder::block::CodedBlock,
     deltas: &[u64],
     values: &[i32],
 ) -> usize {

@@ -2,10 +2,10 @@
 
 use super::symbols::BitsOfPlanes;
 use super::{Planes, Statistics};
-use splatstream_decoder::buffers::{BufferPool, Workspace};
-use splatstream_decoder::gop::{Gop, Transforms};
+use splatstream_decoder::block::{BufferPool, Workspace};
 use splatstream_decoder::increment::values::{PreparedSections, SectionCoding};
 use splatstream_decoder::interrupt::Interrupt;
+use splatstream_decoder::process::{Gop, Transforms};
 use splatstream_decoder::steps::StepRule;
 use splatstream_format::Result;
 use splatstream_format::entropy::in_force::{ModelsInForce, ModelsOfFrame};

@@ -1,6 +1,6 @@
 //! Bits of models and of symbols.
 
-use splatstream_decoder::coded_block::CodedBlock;
+use splatstream_decoder::block::CodedBlock;
 use splatstream_decoder::context::{delta_contexts, plane_contexts};
 use splatstream_format::entropy::layout::PlaneInfo;
 use splatstream_format::entropy::model::{ModelTrace, PlaneModel};

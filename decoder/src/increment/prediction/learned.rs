@@ -12,8 +12,7 @@ use crate::list::canonical;
 use crate::neighbours::Neighbour;
 use crate::predictor::{NEIGHBOURS_MAX, WeightedMean};
 use crate::stage::Stage;
-use crate::transformer::batch::Seen;
-use crate::transformer::{Batch, INPUTS_MAX, LANES, LaneNetwork, OUTPUTS_MAX};
+use crate::transformer::{Batch, INPUTS_MAX, LANES, LaneNetwork, OUTPUTS_MAX, Seen};
 
 /// The network of a GOP, what it works in, and the set it predicts from.
 #[derive(Debug)]

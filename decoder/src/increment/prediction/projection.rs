@@ -2,8 +2,7 @@
 //!
 //! No sum overflows (annex F.6); outputs and weights that a network or a transform lacks are 0.
 
-use crate::transformer::lanes::{Columns, Lane, packed};
-use crate::transformer::{LANES, OUTPUTS_MAX};
+use crate::transformer::{Columns, LANES, Lane, OUTPUTS_MAX, packed};
 use splatstream_format::payload::Transform;
 use splatstream_format::syntax::NetworkHeader;
 

@@ -10,7 +10,7 @@ mod writing;
 use crate::elements;
 use core::fmt::Display;
 use scene::sequence;
-use splatstream_decoder::cell::Cell;
+use splatstream_decoder::displacement::Cell;
 use splatstream_decoder::layout::{Layout, Section, ShCoding};
 use splatstream_decoder::list::GaussianList;
 use splatstream_decoder::position::collect;

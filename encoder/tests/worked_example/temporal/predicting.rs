@@ -10,7 +10,7 @@ use splatstream_decoder::layout::Section;
 use splatstream_decoder::list::{FINE, canonical};
 use splatstream_decoder::neighbours::{Neighbour, NeighbourSearch};
 use splatstream_decoder::predictor::{Predictor, WeightedMean, bilateral_weights, knn_weights};
-use splatstream_decoder::stage::Stage;
+use splatstream_decoder::steps::Stage;
 use std::fmt::Write as _;
 
 /// The new Gaussian and its neighbours.

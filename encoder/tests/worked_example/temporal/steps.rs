@@ -2,10 +2,9 @@
 
 use super::walk::{Common, Step, Walked};
 use super::{list, of};
-use splatstream_decoder::cell::{Cell, isqrt, rotation_unit};
+use splatstream_decoder::displacement::{Cell, isqrt, rotation_unit};
 use splatstream_decoder::layout::Section;
-use splatstream_decoder::stage::Stage;
-use splatstream_decoder::steps::{StepRule, step as size_of_step};
+use splatstream_decoder::steps::{Stage, StepRule, step as size_of_step};
 use std::fmt::Write as _;
 
 type Three = [i64; 3];
