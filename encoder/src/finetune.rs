@@ -13,7 +13,9 @@ mod rate;
 mod receivers;
 pub(crate) mod report;
 pub(crate) mod request;
+mod resumption;
 mod state;
+mod state_error;
 mod watch;
 
 use crate::checked::digest;
@@ -22,9 +24,9 @@ use crate::frame::compensation::Compensator;
 use crate::frame::ladder::Ladder;
 use crate::frame::residuals::Wanted;
 use crate::frame::unit::UnitCoder;
-use crate::plan::digest_of;
 use crate::refinements::parts;
 use crate::settings::Settings;
+use crate::value_digest::digest_of;
 use descent::{Descent, Finished};
 use latent::{Latent, List};
 pub use loss::FinetuneLoss;
@@ -35,8 +37,9 @@ pub use request::{Finetune, Photograph, PointWeight};
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::list::GaussianList;
 use splatstream_gaussians::GaussianFrame;
+pub use state::FinetuneState;
 use state::entry::{Entry, Stage};
-pub use state::{FinetuneState, StateError};
+pub use state_error::StateError;
 pub use watch::{FinetuneProgress, FinetuneWatch};
 
 impl Finetune {

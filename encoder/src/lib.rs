@@ -68,6 +68,7 @@ mod strips;
 mod target;
 pub mod transformer;
 mod upright;
+mod value_digest;
 mod verification;
 mod vq;
 mod window;

@@ -2,8 +2,8 @@
 
 mod record;
 
+pub(crate) use record::described;
 pub use record::{PlanRecord, PlannedSteps, PlannedTarget, Single};
-pub(crate) use record::{described, digest_of};
 
 use crate::checked::{CheckedSource, named};
 use crate::error::Error;

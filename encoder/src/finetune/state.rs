@@ -10,8 +10,8 @@
 pub(super) mod entry;
 mod exchange;
 
-use crate::plan::{described, digest_of};
-use crate::settings::Settings;
+use super::state_error::StateError;
+use crate::value_digest::digest_of;
 use core::fmt;
 use entry::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,61 +28,8 @@ const FORMAT: &str = "splatstream-finetune-state-1";
 const OF_FIT: &str = ".fit";
 const UNFINISHED: &str = ".new";
 
-/// Why a state cannot be kept, or not be gone on from.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StateError {
-    /// An earlier run has left its state.
-    #[error("{directory}: an earlier run has left its state there; go on with it, or remove the directory")]
-    Exists {
-        /// Where.
-        directory: PathBuf,
-    },
-    /// A setting is not the one that the state was kept with.
-    #[error(
-        "{directory}: the state is that of a run whose {name} was {kept}, and it is {found} now; \
-         give the settings of that run, or remove the directory to start again"
-    )]
-    OtherSetting {
-        /// Where the state is.
-        directory: PathBuf,
-        /// The setting.
-        name: String,
-        /// What it was.
-        kept: String,
-        /// What it is.
-        found: String,
-    },
-    /// A frame is not the one that the state was kept with.
-    #[error(
-        "{directory}: the state is that of a run whose frame {frame} had other values; \
-         give the frames of that run, or remove the directory to start again"
-    )]
-    OtherFrame {
-        /// Where the state is.
-        directory: PathBuf,
-        /// The frame.
-        frame: u32,
-    },
-    /// A file of the state is not as it was written.
-    #[error("{path}: the state is damaged: {what}; remove it to start again with what it had")]
-    Damaged {
-        /// The file of a fit; the directory, where its settings are damaged.
-        path: PathBuf,
-        /// What is wrong.
-        what: &'static str,
-    },
-    /// The file system refuses.
-    #[error("{path}: the state cannot be {what}: {source}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What was to be done.
-        what: &'static str,
-        /// Why it was not.
-        source: io::Error,
-    },
-}
+/// A setting that values follow from: its name, and what it is in a line.
+pub(super) type Named = (&'static str, String);
 
 /// Where it is kept how far [fitting to pictures](crate::Finetune) has come; by default nowhere.
 ///
@@ -124,11 +71,8 @@ struct Kept {
 }
 
 impl FinetuneState {
-    /// In a directory without one, which is made if it is not there.
-    ///
-    /// # Errors
-    /// A directory that has a state, or cannot be written.
-    pub fn create(directory: &Path, settings: &Settings) -> Result<Self, StateError> {
+    /// In a directory without one, for a run with these settings.
+    pub(super) fn create_for(directory: &Path, settings: &[Named]) -> Result<Self, StateError> {
         let state = Kept::open(directory, settings)?;
         if !state.found.is_empty() || directory.join(SETTINGS).exists() {
             return Err(StateError::Exists { directory: directory.to_path_buf() });
@@ -136,11 +80,8 @@ impl FinetuneState {
         state.begin(settings)
     }
 
-    /// As an earlier run has left it, or as [`create`](FinetuneState::create) makes it where none has left anything.
-    ///
-    /// # Errors
-    /// The state of a run with other settings, or of another version of the encoder; a directory that cannot be read or written.
-    pub fn resume(directory: &Path, settings: &Settings) -> Result<Self, StateError> {
+    /// As an earlier run with these settings has left it, or new.
+    pub(super) fn resume_for(directory: &Path, settings: &[Named]) -> Result<Self, StateError> {
         let state = Kept::open(directory, settings)?;
         let path = directory.join(SETTINGS);
         if !path.exists() {
@@ -203,27 +144,27 @@ impl FinetuneState {
 
 impl Kept {
     /// What is in a directory, which is made if it is not there.
-    fn open(directory: &Path, settings: &Settings) -> Result<Self, StateError> {
+    fn open(directory: &Path, settings: &[Named]) -> Result<Self, StateError> {
         let failed = |source| StateError::File { path: directory.to_path_buf(), what: "kept", source };
         fs::create_dir_all(directory).map_err(failed)?;
         Ok(Self {
             directory: directory.to_path_buf(),
-            settings: digest_of(&named(settings)),
+            settings: digest_of(&settings),
             found: fits_in(directory)?,
             own: Mutex::default(),
         })
     }
 
     /// Writes down what the state belongs to.
-    fn begin(self, settings: &Settings) -> Result<FinetuneState, StateError> {
+    fn begin(self, settings: &[Named]) -> Result<FinetuneState, StateError> {
         let mut text = format!("{FORMAT}\n");
-        named(settings).iter().for_each(|(name, value)| text += &format!("{name}: {value}\n"));
+        settings.iter().for_each(|(name, value)| text += &format!("{name}: {value}\n"));
         replace(&self.directory.join(SETTINGS), |file| file.write_all(text.as_bytes()))?;
         Ok(FinetuneState(Some(Arc::new(self))))
     }
 
     /// Whether the state belongs to these settings.
-    fn check(&self, path: &Path, settings: &Settings) -> Result<(), StateError> {
+    fn check(&self, path: &Path, settings: &[Named]) -> Result<(), StateError> {
         let failed = |source: io::Error| match source.kind() {
             io::ErrorKind::InvalidData => damaged(&self.directory, "its settings are not text"),
             _ => StateError::File { path: path.to_path_buf(), what: "read", source },
@@ -237,22 +178,16 @@ impl Kept {
             return Err(damaged(&self.directory, "its settings are none of this version"));
         }
         let lines: BTreeMap<&str, &str> = lines.filter_map(|line| line.split_once(": ")).collect();
-        for (name, found) in named(settings) {
+        for (name, found) in settings {
             let kept = *lines.get(name).ok_or_else(|| damaged(&self.directory, "its settings lack one"))?;
             if kept != found {
-                let (directory, name, kept) = (self.directory.clone(), name.to_owned(), kept.to_owned());
+                let (directory, name) = (self.directory.clone(), (*name).to_owned());
+                let (kept, found) = (kept.to_owned(), found.clone());
                 return Err(StateError::OtherSetting { directory, name, kept, found });
             }
         }
         Ok(())
     }
-}
-
-/// Each setting that values follow from, by its name, in a line.
-fn named(settings: &Settings) -> Vec<(&'static str, String)> {
-    let mut named = described(settings);
-    named.push(("prune", format!("{:?}", settings.prune)));
-    named
 }
 
 /// The names of the files of fits in a directory.

@@ -7,13 +7,12 @@ use crate::report::TargetReport;
 use crate::sequence::{Analysis, check};
 use crate::settings::{NetworkSource, Settings, ShChoice};
 use crate::steps::Steps;
+use crate::value_digest::digest_of;
 use serde::{Deserialize, Serialize};
 use splatstream_format::Limits;
 use splatstream_format::payload::Network;
 use splatstream_format::syntax::{MAX_REFINEMENTS, SequenceParameters};
 use std::collections::BTreeMap;
-use std::fmt::{self, Debug, Write};
-use xxhash_rust::xxh64::Xxh64;
 
 /// A [plan](Plan) as plain values, to be written with serde in any format. A plan that is read from it gives the same bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -239,24 +238,6 @@ fn same_settings(record: &PlanRecord, settings: &Settings) -> Result<(), Error> 
 
 fn named(settings: &Settings) -> BTreeMap<String, String> {
     described(settings).into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
-}
-
-/// XXH64 of how values are written for debugging, which has every bit of them.
-pub(crate) fn digest_of(values: &impl Debug) -> u64 {
-    let mut digest = Digest(Xxh64::new(0));
-    // Nothing can fail.
-    let _written = write!(digest, "{values:?}");
-    digest.0.digest()
-}
-
-/// Takes text as it comes: that of photographs is a hundred times as long as they are.
-struct Digest(Xxh64);
-
-impl Write for Digest {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.0.update(text.as_bytes());
-        Ok(())
-    }
 }
 
 /// Everything that the bytes of a stream follow from, beside its frames.

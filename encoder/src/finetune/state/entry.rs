@@ -1,8 +1,9 @@
 //! The file of one fit: under way, or finished.
 
+use super::super::state_error::StateError;
 pub(in crate::finetune) use super::exchange::{Exchange, Keep};
 use super::exchange::{Reading, Writing};
-use super::{StateError, damaged, replace};
+use super::{damaged, replace};
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::PathBuf;
