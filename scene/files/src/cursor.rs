@@ -26,8 +26,8 @@ impl<'a> Cursor<'a> {
     /// The next `count` bytes. `what` names them in the error when they are not there.
     pub(crate) fn take(&mut self, count: u64, what: &'static str) -> Result<&'a [u8], SceneError> {
         let split = usize::try_from(count).ok().and_then(|count| self.rest.split_at_checked(count));
-        let (taken, rest) =
-            split.ok_or_else(|| SceneError::truncated(self.at, what, count, self.rest.len()))?;
+        let (taken, rest) = split
+            .ok_or_else(|| SceneError::truncated(self.at as u64, what, count, self.rest.len() as u64))?;
         self.at = taken.len().saturating_add(self.at);
         self.rest = rest;
         Ok(taken)
@@ -45,17 +45,12 @@ impl<'a> Cursor<'a> {
 
     /// The next `N` bytes.
     pub(crate) fn array<const N: usize>(&mut self, what: &'static str) -> Result<[u8; N], SceneError> {
-        let short = SceneError::truncated(self.at, what, N as u64, self.rest.len());
+        let short = SceneError::truncated(self.at as u64, what, N as u64, self.rest.len() as u64);
         self.take(N as u64, what)?.first_chunk().copied().ok_or(short)
     }
 
     /// The next four bytes as a number, least significant first.
     pub(crate) fn u32(&mut self, what: &'static str) -> Result<u32, SceneError> {
         self.array(what).map(u32::from_le_bytes)
-    }
-
-    /// The next eight bytes as a number, least significant first.
-    pub(crate) fn u64(&mut self, what: &'static str) -> Result<u64, SceneError> {
-        self.array(what).map(u64::from_le_bytes)
     }
 }

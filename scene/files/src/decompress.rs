@@ -49,7 +49,7 @@ pub(crate) fn read_exactly(
     out.try_reserve_exact(room).map_err(|_| refused(size, what))?;
     read_into(source, size, at, what, &mut out)?;
     if (out.len() as u64) < size {
-        return Err(SceneError::truncated(at, what, size, out.len()));
+        return Err(SceneError::truncated(at as u64, what, size, out.len() as u64));
     }
     Ok(out)
 }

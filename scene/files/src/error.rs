@@ -127,7 +127,7 @@ impl SceneError {
         SceneErrorKind::Unsupported { what: what.into(), advice }.into()
     }
 
-    pub(crate) fn truncated(at: usize, what: &'static str, needed: u64, available: usize) -> Self {
-        SceneErrorKind::Truncated { at: at as u64, what, needed, available: available as u64 }.into()
+    pub(crate) fn truncated(at: u64, what: &'static str, needed: u64, available: u64) -> Self {
+        SceneErrorKind::Truncated { at, what, needed, available }.into()
     }
 }

@@ -92,7 +92,7 @@ pub(crate) fn read_whole(
         SceneFormat::CompressedPly => compressed_ply::read_as_is(bytes, budget),
         SceneFormat::Splat => splat::read_as_is(bytes, budget),
         SceneFormat::Spz => spz::read_as_is(bytes, budget),
-        SceneFormat::Sog => sog::read_zip_as_is(bytes, budget),
+        SceneFormat::Sog => sog::read_zip_as_is(std::io::Cursor::new(bytes), budget),
         SceneFormat::Gltf => gltf::read_as_is(bytes, directory, budget),
         SceneFormat::Ksplat => ksplat::read_as_is(bytes, budget),
         SceneFormat::Splatv | SceneFormat::Splat4d | SceneFormat::Archive => Err(SceneError::unsupported(

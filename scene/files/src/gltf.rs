@@ -33,6 +33,7 @@ use crate::error::SceneError;
 use crate::limits::{Budget, ReadLimits};
 use crate::note::Note;
 use crate::reading::{checked, frame_of, read_file};
+use crate::walk::Walk;
 use buffers::Buffers;
 use document::Document;
 use splatstream_gaussians::GaussianFrame;
@@ -84,6 +85,16 @@ pub(crate) fn read_as_is(
         frames.push(placement::placed(frame, &part.placement));
     }
     joined(frames, budget)
+}
+
+/// Checks what the start of a file announces: its version, that its chunks are there, and that there is room for it and its JSON.
+///
+/// # Errors
+/// As [`read`], as far as the start tells.
+pub(crate) fn check(walk: &mut impl Walk, budget: &mut Budget) -> Result<(), SceneError> {
+    let size = walk.left();
+    let json = container::json_bytes(walk)?;
+    budget.check(size.saturating_add(document::parsed_bytes(json)), "the JSON of the file")
 }
 
 /// Whether `bytes` begin as a `.glb` does.

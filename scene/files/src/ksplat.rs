@@ -17,14 +17,15 @@ mod section;
 use crate::byte_values::{log_scale_of, logit_of_byte};
 use crate::cursor::Cursor;
 use crate::error::SceneError;
-use crate::limits::{Budget, ReadLimits};
+use crate::limits::{Budget, ReadLimits, bytes_of_planes};
 use crate::reading::{checked, frame_of};
-use section::{Level, Section};
+use crate::walk::Walk;
+use section::{Layout, Level, Section};
 use splatstream_gaussians::activation::dc_of_colour;
 use splatstream_gaussians::{GaussianFrame, Planes};
 
 /// Bytes of the header of a file.
-const HEADER: u64 = 4096;
+const HEADER: usize = 4096;
 
 /// What spherical harmonics of level 2 span where a file says 0.
 const USUAL_SH: f32 = 1.5;
@@ -42,18 +43,50 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
 
 /// As [`read`], with values as they are: none is checked.
 pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
-    let mut cursor = Cursor::new(bytes);
-    let header = Header::read(&mut cursor)?;
-    let sections = section::all(&mut cursor, &header, budget)?;
-    let gaussians: u64 = sections.iter().map(|section| section.count).sum();
-    if gaussians != u64::from(header.gaussians) {
-        let what = format!("the header has {} Gaussians, the sections have {gaussians}", header.gaussians);
-        return Err(SceneError::malformed(16, what, NOT_KSPLAT));
+    let contents = Contents::read(&mut Cursor::new(bytes), budget)?;
+    let sh_degree = contents.sh_degree();
+    let mut planes = budget.planes(sh_degree, contents.header.gaussians.into())?;
+    for layout in &contents.sections {
+        unpack(&layout.section(bytes), &contents.header, &mut planes)?;
     }
-    let sh_degree = sections.iter().map(|section| section.sh_degree).max().unwrap_or(0);
-    let mut planes = budget.planes(sh_degree, gaussians)?;
-    sections.iter().try_for_each(|section| unpack(section, &header, &mut planes))?;
     frame_of(sh_degree, planes)
+}
+
+/// Checks what the headers of a file announce: its version, that its sections are there, and that there is room for it and its
+/// frame.
+///
+/// # Errors
+/// As [`read`], as far as the headers tell.
+pub(crate) fn check(walk: &mut impl Walk, budget: &mut Budget) -> Result<(), SceneError> {
+    let size = walk.left();
+    let contents = Contents::read(walk, budget)?;
+    let planes = bytes_of_planes(contents.sh_degree(), contents.header.gaussians.into());
+    budget.check(size.saturating_add(planes), "the frame")
+}
+
+/// What the headers of a file say.
+struct Contents {
+    header: Header,
+    sections: Vec<Layout>,
+}
+
+impl Contents {
+    fn read(walk: &mut impl Walk, budget: &mut Budget) -> Result<Self, SceneError> {
+        let header = Header::read(walk)?;
+        let sections = section::all(walk, &header, budget)?;
+        let gaussians: u64 = sections.iter().map(|section| section.count).sum();
+        if gaussians != u64::from(header.gaussians) {
+            let what =
+                format!("the header has {} Gaussians, the sections have {gaussians}", header.gaussians);
+            return Err(SceneError::malformed(16, what, NOT_KSPLAT));
+        }
+        Ok(Self { header, sections })
+    }
+
+    /// The highest of all sections.
+    fn sh_degree(&self) -> u8 {
+        self.sections.iter().map(|section| section.sh_degree).max().unwrap_or(0)
+    }
 }
 
 /// What the header says of all sections.
@@ -66,8 +99,9 @@ pub(crate) struct Header {
 }
 
 impl Header {
-    fn read(cursor: &mut Cursor<'_>) -> Result<Self, SceneError> {
-        let mut header = Cursor::new(cursor.take(HEADER, "the header")?);
+    fn read(walk: &mut impl Walk) -> Result<Self, SceneError> {
+        let header = walk.array::<HEADER>("the header")?;
+        let mut header = Cursor::new(&header);
         let [major, minor, _, _] = header.array("the header")?;
         if major != 0 || minor == 0 {
             let what = format!(".ksplat of version {major}.{minor}");
@@ -100,7 +134,7 @@ fn unpack(section: &Section<'_>, header: &Header, planes: &mut Planes) -> Result
     for row in section.rows() {
         let offset = buckets.next().ok_or_else(|| {
             let what = format!("Gaussian {} lies in no bucket", planes.opacity_logit.len());
-            SceneError::malformed(section.at, what, NOT_KSPLAT)
+            SceneError::malformed(section.layout.at, what, NOT_KSPLAT)
         })?;
         for (axis, plane) in planes.position.iter_mut().enumerate() {
             plane.push(row.centre(axis, section, offset));

@@ -37,6 +37,7 @@ pub mod splat;
 pub mod spz;
 pub mod srgb;
 
+mod announced;
 mod axes;
 mod byte_values;
 mod clamped;
@@ -56,6 +57,7 @@ mod sequence;
 mod smallest_three;
 #[expect(clippy::arithmetic_side_effects, reason = "vectors of floats, which do not overflow")]
 mod sphere;
+mod walk;
 
 pub use clamped::Clamped;
 pub use error::{SceneError, SceneErrorKind};

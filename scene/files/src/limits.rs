@@ -65,6 +65,13 @@ impl Budget {
         Ok(())
     }
 
+    /// Whether there is room for `bytes` for `what`, of which nothing is allocated yet.
+    pub(crate) fn check(&mut self, bytes: u64, what: &'static str) -> Result<(), SceneError> {
+        self.take(bytes, what)?;
+        self.give_back(bytes);
+        Ok(())
+    }
+
     /// `bytes` are no longer needed.
     pub(crate) fn give_back(&mut self, bytes: u64) {
         self.used = self.used.saturating_sub(bytes);

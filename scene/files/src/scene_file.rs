@@ -1,7 +1,10 @@
 //! Reading a scene without being told its format.
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
+use crate::announced;
 use crate::error::SceneError;
 use crate::format::{SceneFormat, detect, read_whole, sog_directory};
 use crate::limits::{Budget, ReadLimits};
@@ -9,7 +12,6 @@ use crate::reading::{checked, read_file};
 use crate::scene::Scene;
 use crate::sequence::{Sequence, SequenceOptions};
 use crate::sog;
-use crate::splat;
 use splatstream_gaussians::GaussianFrame;
 
 /// Reads the scene at `path`: a file of any supported format, a SOG directory, or the `meta.json` in one. Of a sequence of
@@ -37,9 +39,12 @@ pub fn read_scene_as_is(path: &Path, limits: &ReadLimits) -> Result<Scene, Scene
         return only_frame(path, limits);
     }
     let mut read = || {
-        // There is no header that asks for memory: the size of the file does, before it is read.
-        if format == SceneFormat::Splat {
-            splat::check_size(path.metadata()?.len(), &mut budget)?;
+        // Of what is no file, a pipe, nothing is known before it is read.
+        if path.metadata()?.is_file() {
+            if format == SceneFormat::Sog {
+                return sog::read_zip_as_is(BufReader::new(File::open(path)?), &mut budget);
+            }
+            announced::check(format, File::open(path)?, &mut budget)?;
         }
         let bytes = read_file(path, &mut budget)?;
         read_whole(&bytes, path, path.parent(), &mut budget)

@@ -81,14 +81,17 @@ pub(crate) fn folder_in<R: Read + Seek>(archive: &ZipArchive<R>) -> Option<Strin
 /// # Errors
 /// Those of [`read_dir`]; the message names the member at fault.
 pub fn read_zip(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneError> {
-    checked(read_zip_as_is(bytes, &mut Budget::new(limits))?)
+    checked(read_zip_as_is(Cursor::new(bytes), &mut Budget::new(limits))?)
 }
 
-/// As [`read_zip`], with values as they are: none is checked.
-pub(crate) fn read_zip_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
+/// As [`read_zip`], with values as they are: none is checked. Members are read one by one, `meta.json` first, and the archive is
+/// never in memory as a whole unless it is there already.
+pub(crate) fn read_zip_as_is(
+    archive: impl Read + Seek,
+    budget: &mut Budget,
+) -> Result<GaussianFrame, SceneError> {
     let refuse = |what: String| SceneError::inconsistent(what, "this is no SOG archive, or it is damaged");
-    let mut archive =
-        ZipArchive::new(Cursor::new(bytes)).map_err(|error| refuse(format!("cannot list it: {error}")))?;
+    let mut archive = ZipArchive::new(archive).map_err(|error| refuse(format!("cannot list it: {error}")))?;
     let folder = folder_in(&archive).unwrap_or_default();
     let fetch = |name: &str, budget: &mut Budget| {
         let name = format!("{folder}{name}");

@@ -11,7 +11,7 @@ use crate::byte_values::{
     byte_of_logit, is_beyond_scales, log_scale_of, logit_of_byte, scale_of_log, to_byte,
 };
 use crate::clamped::{Clamped, is_no_byte};
-use crate::error::SceneError;
+use crate::error::{SceneError, SceneErrorKind};
 use crate::limits::{Budget, ReadLimits, bytes_of_planes};
 use crate::reading::{checked, frame_of, row_of};
 use splatstream_gaussians::activation::{colour_of_dc, dc_of_colour};
@@ -20,6 +20,7 @@ use splatstream_gaussians::{GaussianFrame, Planes};
 
 /// Bytes of one Gaussian.
 pub const RECORD: usize = 32;
+const OF_RECORD: u64 = RECORD as u64;
 
 /// Reads `.splat` records. Opacity 0 and 255 become finite logits, half a step inside.
 ///
@@ -32,15 +33,7 @@ pub fn read(bytes: &[u8], limits: &ReadLimits) -> Result<GaussianFrame, SceneErr
 
 /// As [`read`], with values as they are: none is checked.
 pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFrame, SceneError> {
-    let over = bytes.len() % RECORD;
-    if over != 0 {
-        let what = format!("{over} bytes over the last whole 32-byte record");
-        return Err(SceneError::malformed(
-            bytes.len().saturating_sub(over),
-            what,
-            "this is not a .splat file, or it is incomplete",
-        ));
-    }
+    check_records(bytes.len() as u64)?;
     let mut planes = budget.planes(0, (bytes.len() / RECORD) as u64)?;
     for record in bytes.as_chunks::<RECORD>().0 {
         push(&mut planes, record);
@@ -48,16 +41,24 @@ pub(crate) fn read_as_is(bytes: &[u8], budget: &mut Budget) -> Result<GaussianFr
     frame_of(0, planes)
 }
 
-/// Whether the budget has room for a file of `size` bytes and its frame.
+/// Whether the budget has room for a file of `size` bytes and its frame, and the file is one of whole records.
 ///
 /// # Errors
-/// It has not.
+/// It has not, or the file is not.
 pub(crate) fn check_size(size: u64, budget: &mut Budget) -> Result<(), SceneError> {
-    const OF_RECORD: u64 = RECORD as u64;
-    let asked = size.saturating_add(bytes_of_planes(0, size / OF_RECORD));
-    budget.take(asked, "the frame")?;
-    budget.give_back(asked);
-    Ok(())
+    budget.check(size.saturating_add(bytes_of_planes(0, size / OF_RECORD)), "the frame")?;
+    check_records(size)
+}
+
+/// Refuses a size that is none of whole records.
+fn check_records(size: u64) -> Result<(), SceneError> {
+    let over = size % OF_RECORD;
+    if over == 0 {
+        return Ok(());
+    }
+    let what = format!("{over} bytes over the last whole 32-byte record");
+    let advice = "this is not a .splat file, or it is incomplete";
+    Err(SceneErrorKind::Malformed { at: size.saturating_sub(over), what, advice }.into())
 }
 
 fn push(planes: &mut Planes, record: &[u8; RECORD]) {

@@ -25,7 +25,7 @@ use crate::limits::{Budget, ReadLimits};
 use crate::reading::{checked, frame_of};
 use splatstream_gaussians::GaussianFrame;
 
-pub(crate) use container::is_spz;
+pub(crate) use container::{check, is_spz};
 
 /// How [`write_with`] quantises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

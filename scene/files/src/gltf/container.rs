@@ -1,8 +1,11 @@
 //! The two containers of glTF: a header and chunks (GLB), or JSON alone.
 
+use std::ops::Range;
+
 use super::{EXPORT, is_glb, is_json};
 use crate::cursor::Cursor;
 use crate::error::SceneError;
+use crate::walk::{Walk, part};
 
 /// The first bytes of a GLB file.
 pub(super) const MAGIC: [u8; 4] = *b"glTF";
@@ -15,7 +18,10 @@ pub(super) const BINARY: [u8; 4] = *b"BIN\0";
 /// The JSON of a file, and its binary chunk where it has one.
 pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), SceneError> {
     if is_glb(bytes) {
-        return chunks(bytes);
+        let mut cursor = Cursor::new(bytes);
+        cursor.take(MAGIC.len() as u64, "the GLB header")?;
+        let chunks = chunks(&mut cursor)?;
+        return Ok((part(bytes, &chunks.json), chunks.binary.map(|binary| part(bytes, &binary))));
     }
     if is_json(bytes) {
         return Ok((bytes, None));
@@ -23,33 +29,48 @@ pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), SceneError> 
     Err(SceneError::malformed(0, "neither a GLB header nor JSON", "this is no glTF file"))
 }
 
-fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), SceneError> {
+/// Bytes of JSON in a file, told by its start alone.
+pub(super) fn json_bytes(walk: &mut impl Walk) -> Result<u64, SceneError> {
+    let size = walk.left();
+    if size < 4 || walk.array("the GLB header")? != MAGIC {
+        return Ok(size);
+    }
+    let json = chunks(walk)?.json;
+    Ok(json.end.saturating_sub(json.start))
+}
+
+/// Where the chunks of a GLB file are that are read.
+struct Chunks {
+    json: Range<u64>,
+    binary: Option<Range<u64>>,
+}
+
+/// The chunks of a file whose magic number is behind.
+fn chunks(walk: &mut impl Walk) -> Result<Chunks, SceneError> {
     const WHAT: &str = "the GLB header";
-    let mut cursor = Cursor::new(bytes);
-    cursor.take(4, WHAT)?;
-    let [version, length] = [cursor.u32(WHAT)?, cursor.u32(WHAT)?];
+    let [version, length] = [walk.u32(WHAT)?, walk.u32(WHAT)?];
     if version != VERSION {
         let what = format!("GLB of version {version}");
         return Err(SceneError::unsupported(what, "version 2 is known; export the file as glTF 2.0"));
     }
-    let whole = cursor.remaining().len().saturating_add(cursor.at()) as u64;
+    let whole = walk.at().saturating_add(walk.left());
     if u64::from(length) > whole {
-        return Err(SceneError::truncated(0, "the GLB file", length.into(), bytes.len()));
+        return Err(SceneError::truncated(0, "the GLB file", length.into(), whole));
     }
-    let (kind, json) = chunk(&mut cursor)?;
+    let (kind, json) = chunk(walk)?;
     if kind != JSON {
         return Err(SceneError::malformed(12, "the first chunk is not JSON", EXPORT));
     }
-    if cursor.at() as u64 >= u64::from(length) {
-        return Ok((json, None));
+    if walk.at() >= u64::from(length) {
+        return Ok(Chunks { json, binary: None });
     }
-    let (kind, binary) = chunk(&mut cursor)?;
-    Ok((json, (kind == BINARY).then_some(binary)))
+    let (kind, binary) = chunk(walk)?;
+    Ok(Chunks { json, binary: (kind == BINARY).then_some(binary) })
 }
 
-/// The type and the content of the next chunk.
-fn chunk<'a>(cursor: &mut Cursor<'a>) -> Result<([u8; 4], &'a [u8]), SceneError> {
-    let length = cursor.u32("the header of a chunk")?;
-    let kind = cursor.array("the header of a chunk")?;
-    Ok((kind, cursor.take(length.into(), "a chunk")?))
+/// The type and the place of the next chunk.
+fn chunk(walk: &mut impl Walk) -> Result<([u8; 4], Range<u64>), SceneError> {
+    let length = walk.u32("the header of a chunk")?;
+    let kind = walk.array("the header of a chunk")?;
+    Ok((kind, walk.pass(length.into(), "a chunk")?))
 }

@@ -156,9 +156,14 @@ impl Primitive {
     }
 }
 
+/// Bytes of memory that so many bytes of JSON turn into, at most.
+pub(super) fn parsed_bytes(json: u64) -> u64 {
+    json.saturating_mul(PARSED)
+}
+
 impl Document {
     pub(super) fn parse(json: &[u8], budget: &mut Budget) -> Result<Self, SceneError> {
-        budget.take((json.len() as u64).saturating_mul(PARSED), "the JSON of the file")?;
+        budget.take(parsed_bytes(json.len() as u64), "the JSON of the file")?;
         let document: Self = serde_json::from_slice(json).map_err(|error| broken(error.to_string()))?;
         let version = &document.asset.version;
         if version.split('.').next() != Some("2") {

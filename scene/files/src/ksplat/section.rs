@@ -1,14 +1,17 @@
 //! Sections of a `.ksplat` file: their headers, buckets and rows.
 
+use std::ops::Range;
+
 use super::{Header, NOT_KSPLAT};
 use crate::cursor::Cursor;
 use crate::error::SceneError;
 use crate::half::float_of_half;
 use crate::limits::Budget;
+use crate::walk::{Walk, part};
 use splatstream_gaussians::{MAX_SH_DEGREE, sh_planes};
 
 /// Bytes of the header of a section.
-const HEADER: u64 = 1024;
+const HEADER: usize = 1024;
 
 /// Bytes of the centre of a bucket.
 const CENTRE: u64 = 12;
@@ -48,9 +51,9 @@ impl Level {
     }
 }
 
-/// A section: its layout, and its bytes, which are all there.
-pub(crate) struct Section<'a> {
-    /// Where its header is in the file.
+/// What the header of a section says, and where its parts are in the file, which has them all.
+pub(crate) struct Layout {
+    /// Where the header is in the file.
     pub(super) at: usize,
     pub(super) count: u64,
     pub(super) sh_degree: u8,
@@ -58,40 +61,56 @@ pub(crate) struct Section<'a> {
     /// Gaussians of each bucket that is full, and how many of these there are.
     full: (u64, u64),
     /// Lengths of the buckets that are not full.
-    partial: &'a [u8],
-    centres: &'a [u8],
+    partial: Range<u64>,
+    centres: Range<u64>,
     /// Bytes from one centre to the next.
     centre_stride: usize,
     /// What an offset of 0 stands for, in steps, and the step.
     range: f32,
     step: f32,
-    data: &'a [u8],
+    data: Range<u64>,
 }
 
-/// The sections whose headers are next, with the bytes that follow all headers.
-pub(super) fn all<'a>(
-    cursor: &mut Cursor<'a>,
+/// The part of a file that follows all headers, as far as no section has it yet.
+struct Body {
+    at: u64,
+    end: u64,
+}
+
+impl Body {
+    /// The next `rows` records of `stride` bytes each.
+    fn rows(&mut self, rows: u32, stride: u64, what: &'static str) -> Result<Range<u64>, SceneError> {
+        let (from, needed) = (self.at, u64::from(rows).saturating_mul(stride));
+        let left = self.end.saturating_sub(from);
+        if needed > left {
+            return Err(SceneError::truncated(from, what, needed, left));
+        }
+        self.at = from.saturating_add(needed);
+        Ok(from..self.at)
+    }
+}
+
+/// The sections whose headers are next, each with its share of what follows all headers.
+pub(super) fn all(
+    walk: &mut impl Walk,
     header: &Header,
     budget: &mut Budget,
-) -> Result<Vec<Section<'a>>, SceneError> {
-    let mut headers = *cursor;
-    cursor.take_rows(header.sections.into(), HEADER, "the headers of sections")?;
+) -> Result<Vec<Layout>, SceneError> {
+    let headers = u64::from(header.sections).saturating_mul(HEADER as u64);
+    walk.require(headers, "the headers of sections")?;
+    let at = walk.at().saturating_add(headers);
+    let mut body = Body { at, end: walk.at().saturating_add(walk.left()) };
     let mut sections = budget.room(header.sections.into(), "the sections")?;
     for _ in 0..header.sections {
-        let at = headers.at();
-        let mut fields = Cursor::new(headers.take(HEADER, "the header of a section")?);
-        sections.push(Section::read(at, &mut fields, cursor, header.level)?);
+        let at = walk.at() as usize;
+        let fields = walk.array::<HEADER>("the header of a section")?;
+        sections.push(Layout::read(at, &mut Cursor::new(&fields), &mut body, header.level)?);
     }
     Ok(sections)
 }
 
-impl<'a> Section<'a> {
-    fn read(
-        at: usize,
-        fields: &mut Cursor<'_>,
-        body: &mut Cursor<'a>,
-        level: Level,
-    ) -> Result<Self, SceneError> {
+impl Layout {
+    fn read(at: usize, fields: &mut Cursor<'_>, body: &mut Body, level: Level) -> Result<Self, SceneError> {
         const WHAT: &str = "the header of a section";
         let [count, capacity, bucket_size, buckets] =
             [fields.u32(WHAT)?, fields.u32(WHAT)?, fields.u32(WHAT)?, fields.u32(WHAT)?];
@@ -115,17 +134,16 @@ impl<'a> Section<'a> {
             return refuse(format!("the centre of a bucket has {centre_stride} bytes, 12 are needed"));
         }
         let range = if range == 0 { 32767.0 } else { range as f32 };
-        let lengths = body.take_rows(partial.into(), 4, "the lengths of buckets")?;
-        let centres = body.take_rows(buckets.into(), centre_stride.into(), "the centres of buckets")?;
-        let data =
-            body.take_rows(capacity.into(), stride(level, sh_degree) as u64, "the Gaussians of a section")?;
+        let partial = body.rows(partial, 4, "the lengths of buckets")?;
+        let centres = body.rows(buckets, centre_stride.into(), "the centres of buckets")?;
+        let data = body.rows(capacity, stride(level, sh_degree) as u64, "the Gaussians of a section")?;
         Ok(Self {
             at,
             count: count.into(),
             sh_degree,
             level,
             full: (bucket_size.into(), full.into()),
-            partial: lengths,
+            partial,
             centres,
             centre_stride: centre_stride.into(),
             range,
@@ -134,34 +152,49 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// The section, of the bytes of the whole file.
+    pub(super) fn section<'a>(&'a self, bytes: &'a [u8]) -> Section<'a> {
+        let [partial, centres, data] =
+            [&self.partial, &self.centres, &self.data].map(|range| part(bytes, range));
+        Section { layout: self, partial, centres, data }
+    }
+}
+
+/// A section: its layout, and its bytes, which are all there.
+pub(crate) struct Section<'a> {
+    pub(super) layout: &'a Layout,
+    partial: &'a [u8],
+    centres: &'a [u8],
+    data: &'a [u8],
+}
+
+impl<'a> Section<'a> {
     /// Coefficients of a Gaussian.
     pub(super) fn sh_values(&self) -> usize {
-        sh_planes(self.sh_degree)
+        sh_planes(self.layout.sh_degree)
     }
 
     /// The Gaussians.
     pub(super) fn rows(&self) -> impl Iterator<Item = Row<'a>> {
-        let (level, count) = (self.level, usize::try_from(self.count).unwrap_or(usize::MAX));
-        self.data
-            .chunks_exact(stride(level, self.sh_degree))
-            .take(count)
-            .map(move |bytes| Row { level, bytes })
+        let Layout { level, count, sh_degree, .. } = *self.layout;
+        let count = usize::try_from(count).unwrap_or(usize::MAX);
+        self.data.chunks_exact(stride(level, sh_degree)).take(count).map(move |bytes| Row { level, bytes })
     }
 
     /// The centre of the bucket of one Gaussian after another; no centre ends them, where there are too few.
     pub(super) fn buckets(&self) -> impl Iterator<Item = [f32; 3]> {
-        let (size, full) = self.full;
+        let Layout { full: (size, full), centre_stride, level, count, .. } = *self.layout;
         let partial = self.partial.as_chunks().0.iter().map(|&length| u64::from(u32::from_le_bytes(length)));
         let lengths = (0..full).map(move |_| size).chain(partial);
-        let centres = self.centres.chunks_exact(self.centre_stride.max(1)).map(|bytes| {
+        let centres = self.centres.chunks_exact(centre_stride.max(1)).map(|bytes| {
             let mut centre = [0.0; 3];
             let parts = bytes.as_chunks().0.iter().map(|&part| f32::from_le_bytes(part));
             centre.iter_mut().zip(parts).for_each(|(to, from)| *to = from);
             centre
         });
         let in_buckets = lengths.zip(centres).flat_map(|(length, centre)| (0..length).map(move |_| centre));
-        let has_none = self.level == Level::Floats;
-        let none = (0..if has_none { self.count } else { 0 }).map(|_| [0.0; 3]);
+        let has_none = level == Level::Floats;
+        let none = (0..if has_none { count } else { 0 }).map(|_| [0.0; 3]);
         in_buckets.take(if has_none { 0 } else { usize::MAX }).chain(none)
     }
 }
@@ -186,7 +219,7 @@ impl Row<'_> {
             return self.value(axis);
         }
         let steps = f32::from(u16::from_le_bytes(self.array(axis.saturating_mul(2))));
-        (steps - section.range) * section.step + bucket.get(axis).copied().unwrap_or(0.0)
+        (steps - section.layout.range) * section.layout.step + bucket.get(axis).copied().unwrap_or(0.0)
     }
 
     /// A semi-axis.

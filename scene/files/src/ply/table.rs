@@ -137,9 +137,9 @@ impl<'a> Body<'a> {
         // A value takes a digit and a separator, the very last only a digit.
         let least =
             element.count.saturating_mul(element.properties.len() as u64).saturating_mul(2).saturating_sub(1);
-        let left = self.cursor.remaining().len();
-        if least > left as u64 {
-            return Err(SceneError::truncated(self.cursor.at(), "the element's data", least, left));
+        let left = self.cursor.remaining().len() as u64;
+        if least > left {
+            return Err(SceneError::truncated(self.cursor.at() as u64, "the element's data", least, left));
         }
         let target: Vec<Option<usize>> = element
             .properties

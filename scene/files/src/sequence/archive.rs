@@ -126,7 +126,7 @@ impl Frames for Tar {
         let end = self.source.seek(SeekFrom::End(0))?;
         let there = end.saturating_sub(member.at);
         if member.size > there {
-            return Err(SceneError::truncated(member.at as usize, MEMBER, member.size, there as usize));
+            return Err(SceneError::truncated(member.at, MEMBER, member.size, there));
         }
         self.source.seek(SeekFrom::Start(member.at))?;
         let mut bytes = budget.room(member.size, MEMBER)?;

@@ -1,6 +1,7 @@
 //! The two containers of SPZ: one gzip stream, or a header with a zstd frame for each attribute.
 
-use std::io::Write;
+use std::io::{BufReader, Read, Seek, Write};
+use std::ops::Range;
 
 use flate2::Compression;
 use flate2::read::GzDecoder;
@@ -12,6 +13,7 @@ use crate::decompress;
 use crate::error::SceneError;
 use crate::limits::{Budget, bytes_of_planes};
 use crate::note::{MOST_SH_DEGREE, Note};
+use crate::walk::{FileWalk, Walk, part};
 use splatstream_gaussians::{MAX_SH_DEGREE, Planes, sh_planes};
 
 /// "NGSP" as the first four bytes.
@@ -26,6 +28,7 @@ const EXTENSIONS: u64 = 64 << 10;
 
 const CONTENTS: &str = "the table of contents";
 const HEADER: &str = "the header";
+const ALL: &str = "all its Gaussians";
 const NOT_SPZ: &str = "this is no SPZ file, or it is damaged";
 
 /// Header of versions 1 to 3, at the start of the decompressed stream; the first half of version 4's,
@@ -41,9 +44,9 @@ struct StreamHeader {
 }
 
 impl StreamHeader {
-    fn read(cursor: &mut Cursor<'_>) -> Result<Self, SceneError> {
-        let [magic, version, gaussians] = [cursor.u32(HEADER)?, cursor.u32(HEADER)?, cursor.u32(HEADER)?];
-        let [sh_degree, fractional_bits, flags, reserved] = cursor.array(HEADER)?;
+    fn read(walk: &mut impl Walk) -> Result<Self, SceneError> {
+        let [magic, version, gaussians] = [walk.u32(HEADER)?, walk.u32(HEADER)?, walk.u32(HEADER)?];
+        let [sh_degree, fractional_bits, flags, reserved] = walk.array(HEADER)?;
         Ok(Self { magic, version, gaussians, sh_degree, fractional_bits, flags, reserved })
     }
 
@@ -108,14 +111,18 @@ impl Shape {
 
     /// Counts all the attributes, and makes room for the planes they turn into: nothing is decompressed before.
     fn room(&self, budget: &mut Budget) -> Result<Planes, SceneError> {
-        let streams: u64 = self.strides().into_iter().map(|stride| self.size(stride)).sum();
-        let planes = bytes_of_planes(self.sh_degree, self.gaussians as u64);
-        budget.take(streams.saturating_add(planes), "all its Gaussians")?;
-        budget.give_back(planes);
+        budget.take(self.bytes(), ALL)?;
+        budget.give_back(bytes_of_planes(self.sh_degree, self.gaussians as u64));
         if self.stored_degree > self.sh_degree {
             budget.note(Note::ShDegree { found: self.stored_degree });
         }
         budget.planes(self.sh_degree, self.gaussians as u64)
+    }
+
+    /// Bytes of the attributes and of the planes.
+    fn bytes(&self) -> u64 {
+        let streams: u64 = self.strides().into_iter().map(|stride| self.size(stride)).sum();
+        streams.saturating_add(bytes_of_planes(self.sh_degree, self.gaussians as u64))
     }
 
     fn size(&self, stride: usize) -> u64 {
@@ -128,6 +135,22 @@ pub(crate) fn is_spz(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC.to_le_bytes()) || bytes.starts_with(&GZIP)
 }
 
+/// Checks what the header and the table of contents announce: the version, that the attributes are there, and that there is room
+/// for the file, its attributes and its frame.
+pub(crate) fn check<R: Read + Seek>(walk: &mut FileWalk<R>, budget: &mut Budget) -> Result<(), SceneError> {
+    let size = walk.left();
+    let is_gzip = size >= 2 && walk.array(HEADER)? == GZIP;
+    let source = walk.source()?;
+    let shape = match is_gzip {
+        true => {
+            source.rewind()?;
+            gzip_header(&mut GzDecoder::new(BufReader::new(source)))?.0
+        }
+        false => Contents::read(&mut FileWalk::new(source)?)?.shape,
+    };
+    budget.check(size.saturating_add(shape.bytes()), ALL)
+}
+
 /// The attributes of a file, and empty planes with room for what they hold.
 pub(crate) fn read(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Planes), SceneError> {
     if bytes.starts_with(&GZIP) { read_gzip(bytes, budget) } else { read_zstd(bytes, budget) }
@@ -135,13 +158,7 @@ pub(crate) fn read(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams,
 
 fn read_gzip(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Planes), SceneError> {
     let mut content = GzDecoder::new(bytes);
-    let header = decompress::read_exactly(&mut content, 16, 0, HEADER)?;
-    let header = StreamHeader::read(&mut Cursor::new(&header))?;
-    if !(1..=3).contains(&header.version) {
-        let what = format!("gzip SPZ of version {}", header.version);
-        return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
-    }
-    let mut shape = Shape::of_header(&header)?;
+    let (mut shape, flags) = gzip_header(&mut content)?;
     let planes = shape.room(budget)?;
     let mut streams = Streams::default();
     let mut at = 16;
@@ -151,65 +168,99 @@ fn read_gzip(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Plane
     }
     // Read in any case: gzip's checksum lies behind the last byte.
     let extensions = decompress::read_up_to(&mut content, EXTENSIONS, at, "what follows the attributes")?;
-    if header.flags & HAS_EXTENSIONS != 0 {
+    if flags & HAS_EXTENSIONS != 0 {
         shape.flip = flip_of(&extensions)?;
     }
     Ok((shape, streams, planes))
 }
 
-fn read_zstd(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Planes), SceneError> {
-    let mut cursor = Cursor::new(bytes);
-    let header = StreamHeader::read(&mut cursor)?;
-    if header.magic == MAGIC && header.version != 4 {
-        let what = format!("SPZ of version {} without gzip", header.version);
+/// The header at the start of what a file of versions 1 to 3 decompresses to, checked, and its flags.
+fn gzip_header(content: &mut impl Read) -> Result<(Shape, u8), SceneError> {
+    let header = decompress::read_exactly(content, 16, 0, HEADER)?;
+    let header = StreamHeader::read(&mut Cursor::new(&header))?;
+    if !(1..=3).contains(&header.version) {
+        let what = format!("gzip SPZ of version {}", header.version);
         return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
     }
-    let mut shape = Shape::of_header(&header)?;
+    Ok((Shape::of_header(&header)?, header.flags))
+}
+
+fn read_zstd(bytes: &[u8], budget: &mut Budget) -> Result<(Shape, Streams, Planes), SceneError> {
+    let Contents { mut shape, extensions, frames } = Contents::read(&mut Cursor::new(bytes))?;
     let planes = shape.room(budget)?;
-    let contents_at = cursor.u32(HEADER)?;
-    cursor.take(12, HEADER)?;
-    let extensions = u64::from(contents_at)
-        .checked_sub(32)
-        .ok_or_else(|| SceneError::malformed(16, "the table of contents lies inside the header", NOT_SPZ))?;
-    let extensions = cursor.take(extensions, "extensions")?;
-    if header.flags & HAS_EXTENSIONS != 0 {
-        shape.flip = flip_of(extensions)?;
+    if let Some(extensions) = extensions {
+        shape.flip = flip_of(part(bytes, &extensions))?;
     }
-    let streams = read_frames(&mut cursor, &shape, header.reserved, budget)?;
+    let mut streams = Streams::default();
+    let attributes = streams.iter_mut().zip(shape.strides()).zip(NAMES).zip(frames);
+    for (((stream, stride), name), frame) in attributes {
+        if let Some(frame) = frame {
+            let at = frame.start as usize;
+            *stream = decompress::zstd(part(bytes, &frame), shape.size(stride), budget.left(), at, name)?;
+        }
+    }
     Ok((shape, streams, planes))
 }
 
-/// The table of contents with its `count` rows, and the zstd frames that follow it.
-fn read_frames(
-    cursor: &mut Cursor<'_>,
-    shape: &Shape,
+/// What version 4 says before its first attribute, and where its parts are in the file, which has them all.
+struct Contents {
+    shape: Shape,
+    /// None where the header says that there are none.
+    extensions: Option<Range<u64>>,
+    /// The zstd frame of each attribute; one without bytes has none.
+    frames: [Option<Range<u64>>; 6],
+}
+
+impl Contents {
+    fn read(walk: &mut impl Walk) -> Result<Self, SceneError> {
+        let header = StreamHeader::read(walk)?;
+        if header.magic == MAGIC && header.version != 4 {
+            let what = format!("SPZ of version {} without gzip", header.version);
+            return Err(SceneError::unsupported(what, "versions 1 to 3 are known in gzip, 4 without"));
+        }
+        let shape = Shape::of_header(&header)?;
+        let contents_at = walk.u32(HEADER)?;
+        walk.pass(12, HEADER)?;
+        let extensions = u64::from(contents_at).checked_sub(32).ok_or_else(|| {
+            SceneError::malformed(16, "the table of contents lies inside the header", NOT_SPZ)
+        })?;
+        let extensions = walk.pass(extensions, "extensions")?;
+        let extensions = (header.flags & HAS_EXTENSIONS != 0).then_some(extensions);
+        let sizes = shape.strides().map(|stride| shape.size(stride));
+        let lengths = compressed_sizes(walk, &sizes, header.reserved)?;
+        let mut frames = [const { None }; 6];
+        for ((frame, length), name) in frames.iter_mut().zip(lengths).zip(NAMES) {
+            *frame = length.map(|length| walk.pass(length, name)).transpose()?;
+        }
+        Ok(Self { shape, extensions, frames })
+    }
+}
+
+/// The table of contents with its `count` rows: how long the zstd frame of each attribute is, whose own sizes are known.
+fn compressed_sizes(
+    walk: &mut impl Walk,
+    sizes: &[u64; 6],
     count: u8,
-    budget: &Budget,
-) -> Result<Streams, SceneError> {
-    let sizes = shape.strides().map(|stride| shape.size(stride));
+) -> Result<[Option<u64>; 6], SceneError> {
     // An attribute without bytes has no stream.
     let present = sizes.iter().filter(|&&size| size > 0).count();
     if usize::from(count) != present {
         let what = format!("{count} streams, these attributes are {present}");
         return Err(SceneError::malformed(15, what, NOT_SPZ));
     }
-    let mut contents = *cursor;
-    cursor.take_rows(u64::from(count), 16, CONTENTS)?;
-    let mut streams = Streams::default();
-    for (stream, (size, name)) in streams.iter_mut().zip(sizes.into_iter().zip(NAMES)) {
-        if size == 0 {
-            continue;
-        }
-        let (compressed, at) = (contents.u64(CONTENTS)?, contents.at());
-        let decompressed = contents.u64(CONTENTS)?;
+    let mut lengths = [None; 6];
+    for ((length, &size), name) in
+        lengths.iter_mut().zip(sizes).zip(NAMES).filter(|((_, size), _)| **size > 0)
+    {
+        *length = Some(walk.u64(CONTENTS)?);
+        let at = walk.at() as usize;
+        let decompressed = walk.u64(CONTENTS)?;
         if decompressed != size {
             let what = format!("{name} is {decompressed} bytes, its Gaussians have {size}");
             return Err(SceneError::malformed(at, what, NOT_SPZ));
         }
-        let at = cursor.at();
-        *stream = decompress::zstd(cursor.take(compressed, name)?, size, budget.left(), at, name)?;
     }
-    Ok(streams)
+    Ok(lengths)
 }
 
 /// The flip that extensions ask for. Each is a type, a length and that many bytes; unknown ones describe

@@ -82,9 +82,7 @@ impl Header {
         let size = source.seek(SeekFrom::End(0))?;
         source.rewind()?;
         let mut head = [0; 12];
-        source
-            .read_exact(&mut head)
-            .map_err(|_| SceneError::truncated(0, "the header", 12, size as usize))?;
+        source.read_exact(&mut head).map_err(|_| SceneError::truncated(0, "the header", 12, size))?;
         let [[a, b, c, d], [version, _, _, _], length] = *head.as_chunks().0 else {
             return Err(SceneError::malformed(0, "no header", NOT_SPLAT4D));
         };
@@ -100,7 +98,7 @@ impl Header {
         let length = u64::from(u32::from_le_bytes(length));
         let there = size.saturating_sub(12);
         if length > there {
-            return Err(SceneError::truncated(12, "the description", length, there as usize));
+            return Err(SceneError::truncated(12, "the description", length, there));
         }
         budget.take(length.saturating_mul(PARSED), "the description")?;
         let mut json = budget.room(length, "the description")?;
@@ -121,12 +119,7 @@ impl Header {
         let lies_inside =
             |offset: u64, length: u64| offset.checked_add(length).is_some_and(|end| end <= size);
         if !lies_inside(self.still.offset, self.still.length) {
-            return Err(SceneError::truncated(
-                self.still.offset as usize,
-                "the static section",
-                self.still.length,
-                0,
-            ));
+            return Err(SceneError::truncated(self.still.offset, "the static section", self.still.length, 0));
         }
         let mut next = 0_usize;
         for (index, group) in self.groups.iter().enumerate() {
@@ -134,12 +127,7 @@ impl Header {
                 return Err(broken(format!("group {index} has frames {} to {}", group.first, group.last)));
             }
             if !lies_inside(group.offset, group.length) {
-                return Err(SceneError::truncated(
-                    group.offset as usize,
-                    "a group of frames",
-                    group.length,
-                    0,
-                ));
+                return Err(SceneError::truncated(group.offset, "a group of frames", group.length, 0));
             }
             next = group.last.saturating_add(1);
         }
