@@ -89,8 +89,10 @@ class Runner(unittest.TestCase):
         self.assertEqual(self.labels("time.sleep(600)", "codebook-two-bytes", "--time", "2"), {"timeout"})
 
     def test_a_process_that_does_not_answer_fails_case_by_case(self):
-        for process in ("true", "%s -c 'input()'" % sys.executable):
-            code, _, report = run(["--stdio", process, "--filter", "codebook-two-*", "--jobs", "1"])
+        for process in ("true", "cat", "%s -c 'input()'" % sys.executable):
+            code, said, report = run(["--stdio", process, "--filter", "codebook-two-*", "--jobs", "1"])
+            self.assertEqual(said.count("FAIL"), 1, said)
+            self.assertGreater(len(report["cases"]), 1)
             labels = {row.get("reason", row["outcome"]) for row in report["cases"]}
             self.assertEqual((code, labels), (3, {"crash"}), process)
 

@@ -25,6 +25,8 @@ from judge import judge, not_claimed
 from report import FAILURES, report
 from suite import Suite, SuiteError
 
+NAMED = 6  # cases that fail likewise, of each kind of failure
+
 
 def size(text):
     """A number of bytes as people write it: 512M, 2G."""
@@ -102,11 +104,24 @@ def run(cases, settings, claim):
             sessions.get().close()
 
 
-def show(row):
-    print("FAIL %(vector)s@%(op)s/%(mode)s:" % row, row.get("reason", row["outcome"]))
+def kind(row):
+    """What failures of one kind have in common: the verdict, the classes that are right and the answer, without codes and texts."""
+    classes = {word for word in row["expected"].split() if word.islower() and word != "or"}
+    is_verdict = row["outcome"] not in ("crash", "timeout")
+    return row.get("reason", row["outcome"]), tuple(sorted(classes)) if is_verdict else (), row.get("answer")
+
+
+def show(rows):
+    """Says the first failure of a kind, and which cases fail likewise; the report has the texts of all."""
+    name = lambda row: "%(vector)s@%(op)s/%(mode)s" % row
+    first, others = rows[0], [name(row) for row in rows[1:]]
+    print("FAIL %s:" % name(first), first.get("reason", first["outcome"]))
     for key in ("expected", "answer", "detail"):
-        if key in row:
-            print("  %s: %s" % (key, row[key]))
+        if key in first:
+            print("  %s: %s" % (key, first[key]))
+    if others:
+        more = " and %d more" % (len(others) - NAMED) if len(others) > NAMED else ""
+        print("  likewise %d: %s%s" % (len(others), ", ".join(others[:NAMED]), more))
 
 
 def main(words=None):
@@ -128,8 +143,11 @@ def main(words=None):
             json.dump(found, f, indent=1)
             f.write("\n")
     failed = [row for row in rows if row["outcome"] in FAILURES]
+    kinds = {}
     for row in failed:
-        show(row)
+        kinds.setdefault(kind(row), []).append(row)
+    for rows in kinds.values():
+        show(rows)
     passed, idle = found["summary"]["pass"], found["summary"]["not-claimed"]
     print("%d passed, %d failed, %d not claimed, of %d cases" % (passed, len(failed), idle, len(rows)))
     return 3 if failed or not passed else 0

@@ -15,6 +15,7 @@ use splatstream_conformance::selection::Selection;
 use splatstream_conformance::session::Decoder;
 use splatstream_conformance::symptom::Symptom;
 use splatstream_conformance::vector::Mode;
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 #[test]
@@ -348,4 +349,30 @@ fn failures_of_one_cause_are_listed_once() {
     let text = summary::text(&report);
     assert_eq!(text.matches("FAIL").count(), 2, "{text}");
     assert!(text.contains("likewise 1 case: great@s3,t3,r9/full"), "{text}");
+}
+
+#[test]
+fn failures_are_grouped_by_their_kind_and_not_by_what_differs_in_their_texts() {
+    let vectors = Vectors::new();
+    for (name, code) in [("first", "CHECKSUM"), ("second", "NUMBER"), ("third", "NUMBER")] {
+        let expect = json!({"outcome": "reject", "class": "malformed", "code": code});
+        vectors.add("invalid", name, expect, |_| {});
+    }
+    let suite = vectors.suite();
+    let said = |settings: &Settings| {
+        let results = results(&suite, settings);
+        let texts: BTreeSet<_> = results.iter().map(|result| result.detail.clone()).collect();
+        (summary::text(&Report::new(&suite, settings, &Selection::default(), results, Vec::new())), texts)
+    };
+    // Every answer is another text that is none: the request itself.
+    let (text, texts) = said(&Settings { decoder: Decoder::Persistent(vec!["cat".into()]), ..settings("") });
+    assert_eq!(text.matches("FAIL").count(), 1, "{text}");
+    assert!(text.contains("does not start with an exit code") && texts.len() > 3, "{text}");
+    // Every crash has another last message.
+    let (text, texts) = said(&settings("echo cannot read $1 >&2; exit 1"));
+    assert_eq!(text.matches("FAIL").count(), 1, "{text}");
+    assert!(text.contains("last message: cannot read") && texts.len() > 3, "{text}");
+    // What is wrong is the class, not the code that is missed.
+    let (text, _) = said(&settings("exit 11"));
+    assert!(text.contains("expected of all: malformed NUMBER (2), malformed CHECKSUM (1)"), "{text}");
 }
