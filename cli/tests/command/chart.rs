@@ -176,11 +176,20 @@ fn the_operating_points_of_a_sequence_add_up() {
     assert!(["Low-frame-rate temporal", "without survivors"].iter().all(|words| report.contains(words)));
 }
 
+/// What a quick look at stability leaves: it is made once for all tests. Its directory, and the report.
+pub(crate) fn stability() -> &'static (PathBuf, serde_json::Value) {
+    static STABILITY: OnceLock<(PathBuf, serde_json::Value)> = OnceLock::new();
+    STABILITY.get_or_init(|| {
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("stability");
+        let _none_before = std::fs::remove_dir_all(&out);
+        let report = json(&["chart", "--stability", "--quick", "--height", "60", "-o", text(&out)]);
+        (out, report)
+    })
+}
+
 #[test]
 fn a_look_at_stability_has_every_case_and_says_what_is_silent() {
-    let directory = directory();
-    let out = directory.path().join("report");
-    let report = json(&["chart", "--stability", "--quick", "--height", "60", "-o", text(&out)]);
+    let (out, report) = stability();
     let table = rows(&out.join("stability.csv"));
     let cases: BTreeSet<&str> = table.iter().map(|row| row["case"].as_str()).collect();
     let tools: BTreeSet<&str> = table.iter().map(|row| row["tool"].as_str()).collect();

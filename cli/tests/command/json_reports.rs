@@ -152,6 +152,7 @@ fn reports_of_encoders_have_the_keys_they_had() {
         ("demo", "demo --out demo --gaussians 300 --frames 3"),
         ("encode", "encode frames -o talk.gss --preset fast --psnr 40 --gop 3"),
         ("view", "view talk.gss -o talk.html"),
+        ("encode_plan", "encode frames --write-plan -o plan.json --preset fast --psnr 40 --gop 2"),
         ("encode_size", "encode still.ply -o still.gss --preset fast --target-bpg 40"),
         ("encode_each", "encode still.ply other.ply no-such.ply --each -o streams --preset fast --psnr 40"),
         ("train", "train --builtin 1 --frames 2 --quality low -o network.bin"),
@@ -164,6 +165,7 @@ fn reports_of_encoders_have_the_keys_they_had() {
         insta::assert_json_snapshot!(name, shape(&report(at, line)));
     }
     insta::assert_json_snapshot!("chart", shape(&crate::chart::quick().report));
+    insta::assert_json_snapshot!("chart_stability", shape(&crate::chart::stability().1));
 }
 
 #[test]
