@@ -62,9 +62,7 @@ impl Failure {
     /// The file system refused; `what` is "read" or the like.
     pub(crate) fn file(what: &str, path: &Path, error: &io::Error) -> Self {
         let advice = match error.kind() {
-            io::ErrorKind::NotFound if is_standard(path) => {
-                "this command cannot read that from standard input; give a file"
-            }
+            io::ErrorKind::NotFound if is_standard(path) => return Self::not_from_standard(path),
             io::ErrorKind::NotFound => "check the path",
             io::ErrorKind::PermissionDenied => "check the permissions",
             io::ErrorKind::StorageFull => "make room, or choose another disk",
@@ -75,6 +73,14 @@ impl Failure {
             _ => "check the path and the disk",
         };
         Self::Other(format!("{}: cannot {what}: {error}\n  {advice}", path.display()))
+    }
+
+    /// Standard input is given for what this command reads in parts, several times or as a directory.
+    pub(crate) fn not_from_standard(path: &Path) -> Self {
+        let path = path.display();
+        Self::Other(format!(
+            "{path}: this command cannot read that from standard input; give a file or a directory"
+        ))
     }
 
     /// A stream that breaks the specification.

@@ -246,6 +246,36 @@ fn full_and_closed_outputs_are_said() {
     insta::assert_snapshot!(all);
 }
 
+/// Commands that read standard input only where they can: what they say otherwise.
+#[test]
+fn standard_input_that_is_not_read_is_refused_with_one_text() {
+    let directory = directory();
+    write_files(directory.path());
+    for case in [
+        "fit - -o out.ply",
+        "play -",
+        "serve -",
+        "unpackage - -o out.gss",
+        "concat - good.gss -o out.gss",
+        "track good.ply -o out --cameras -",
+        "compare good.ply good.ply --cameras -",
+        "compare good.ply good.ply --cameras ring:2 --st-lpips -",
+        "render good.ply -o out --camera -",
+        "play . --trace -",
+        "encode good.ply -o out.gss --network -",
+        "encode good.ply -o out.gss --plan - --shard 1/2",
+        "chart good.ply -o out --quick --peers -",
+        "conformance list --suite -",
+        "conformance matrix - -o out.md",
+        "conformance packages --packages -",
+        "conformance run --capabilities -",
+    ] {
+        let (code, stderr, _) = said(&case.split(' ').collect::<Vec<_>>(), directory.path());
+        let text = "-: this command cannot read that from standard input; give a file or a directory\n";
+        assert_eq!((code, stderr.as_str()), (1, text), "{case}");
+    }
+}
+
 #[test]
 fn bytes_on_standard_input_that_are_nothing_are_refused() {
     let mut all = String::new();

@@ -81,7 +81,7 @@ fn what_does_not_belong_together_is_refused_by_name() {
     let said = fail(1, &["concat", a, c, "-o", out]);
     assert!(said.contains("frames 2..=3 of 6 are in none of the shards"), "{said}");
     let said = fail(1, &["concat", a, "-", "-o", out]);
-    assert!(said.contains("cannot read that from standard input; give a file"), "{said}");
+    assert!(said.contains("cannot read that from standard input; give a file or a directory"), "{said}");
     let said = fail(1, &["concat", a, b, b, c, "-o", out]);
     assert!(said.contains("2of3.gss: is given twice") && said.contains("every shard once"), "{said}");
     let more = ["--tolerance", "0.4", "--shard", "3/3"];
