@@ -116,8 +116,8 @@ impl Console {
     }
 }
 
-/// A reader that has gone away is no failure.
-fn written(result: io::Result<()>) -> Result<(), Failure> {
+/// What became of writing to standard output. A reader that has gone away is no failure.
+pub(crate) fn written(result: io::Result<()>) -> Result<(), Failure> {
     match result {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(Failure::other(format!("cannot write to standard output: {error}")))

@@ -52,10 +52,11 @@ mod view;
 mod whole_file;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
-use console::Console;
+use console::{Console, written};
 use failure::{Failure, FailureReport};
 use splatstream_format::syntax::SPECIFICATION;
 use std::ffi::OsString;
+use std::io::{self, Write};
 use std::iter;
 
 pub use encode::{EncodeOptions, OptionsError, Prepared};
@@ -135,9 +136,20 @@ pub fn main(arguments: &[OsString]) -> u8 {
     }
 }
 
-/// Arguments that make no command: told as usual, and as JSON where that is among them. Help is no error.
+/// Arguments that make no command: told as usual, and as JSON where that is among them. Help is no error, unless it cannot be
+/// written.
 fn refuse(error: &clap::Error, arguments: &[OsString]) -> ! {
-    if error.use_stderr() && arguments.iter().any(|argument| argument == "--json") {
+    if !error.use_stderr() {
+        let shown = error.print().and_then(|()| io::stdout().flush());
+        std::process::exit(written(shown).map_or_else(
+            |failure| {
+                Console::new(false, false).fail(&failure);
+                failure.exit_code().into()
+            },
+            |()| 0,
+        ));
+    }
+    if arguments.iter().any(|argument| argument == "--json") {
         let failure = Failure::Usage(error.to_string().trim_end().to_owned());
         let _nobody_listens = Console::new(true, true).report(&FailureReport::from(&failure), String::new);
     }

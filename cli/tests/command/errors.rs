@@ -246,6 +246,54 @@ fn full_and_closed_outputs_are_said() {
     insta::assert_snapshot!(all);
 }
 
+/// What a program ends with, and says, that prints to a full disk.
+#[cfg(target_os = "linux")]
+fn printed_to_a_full_disk(arguments: &[&str], directory: &Path) -> (i32, String) {
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_splatstream"))
+        .args(arguments)
+        .current_dir(directory)
+        .stdout(full)
+        .output()
+        .unwrap();
+    (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_printed_is_a_failure() {
+    let directory = directory();
+    write_files(directory.path());
+    let commands = splatstream_commands();
+    let helps = commands.iter().flat_map(|command| {
+        [format!("{command} --help"), format!("{command} -h"), format!("help {command}")]
+    });
+    let others = ["--help", "-h", "help", "--version", "-V", "completions bash", "completions bash --json"]
+        .into_iter()
+        .chain(["manual -o pages", "manual -o pages --json", "validate good.gss", "inspect good.gss --units"])
+        .chain(["conformance run --help", "decode good.gss --dry-run"]);
+    for line in others.map(str::to_owned).chain(helps) {
+        let (code, said) = printed_to_a_full_disk(&line.split(' ').collect::<Vec<_>>(), directory.path());
+        assert_eq!(
+            (code, said.as_str()),
+            (1, "cannot write to standard output: No space left on device (os error 28)\n"),
+            "{line}"
+        );
+    }
+}
+
+/// The names of all commands, from the help.
+#[cfg(target_os = "linux")]
+fn splatstream_commands() -> Vec<String> {
+    let help = crate::common::succeed(&["--help"]);
+    let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let names = list.lines().filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
+    let names: Vec<String> =
+        names.filter(|name| !name.is_empty() && *name != "help").map(str::to_owned).collect();
+    assert!(names.len() > 20, "{names:?}");
+    names
+}
+
 /// Commands that read standard input only where they can: what they say otherwise.
 #[test]
 fn standard_input_that_is_not_read_is_refused_with_one_text() {
