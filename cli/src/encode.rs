@@ -275,9 +275,8 @@ impl Encode {
         encoded.page_bytes = page_bytes;
         encoded.chosen.extend(decided.choices());
         encoded.warnings.extend(decided.warnings());
-        if inputs.len() > 1 {
-            encoded.warnings.extend(unlike_frames(source.counts()));
-        }
+        let unlike = source.likeness().unlike(inputs.len() > 1);
+        encoded.warnings.extend(unlike.and_then(|unlike| unlike_frames(&unlike, self.all_intra)));
         encoded.warnings.extend(source.warnings());
         encoded.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         Ok(encoded)

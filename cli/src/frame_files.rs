@@ -3,6 +3,7 @@
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::input_args::{InputArgs, size_of, with_advice};
+use crate::likeness::Likeness;
 use crate::over_limit::of_encoding;
 use crate::read_notes::ReadNotes;
 use crate::standard::STANDARD;
@@ -37,8 +38,8 @@ pub(crate) struct FrameFiles {
     as_is: bool,
     /// What came by standard input, until it is read.
     spooled: Option<Arc<Unfinished>>,
-    /// The fewest and the most Gaussians of the frames read so far.
-    counts: Option<(usize, usize)>,
+    /// Whether the frames read so far look like frames of one sequence.
+    likeness: Likeness,
     /// What readers have noted.
     notes: ReadNotes,
 }
@@ -118,8 +119,9 @@ impl FrameFiles {
                 }
                 _ => None,
             };
-        let (last, keeps_last, as_is, counts, notes) = (None, true, false, None, ReadNotes::default());
-        Ok(Self { paths, sequence, reading, last, keeps_last, as_is, spooled, counts, notes })
+        let (last, keeps_last, as_is) = (None, true, false);
+        let (likeness, notes) = (Likeness::default(), ReadNotes::default());
+        Ok(Self { paths, sequence, reading, last, keeps_last, as_is, spooled, likeness, notes })
     }
 
     /// Values are not checked.
@@ -152,9 +154,9 @@ impl FrameFiles {
         self.paths.iter().flat_map(|path| files_of(path)).collect()
     }
 
-    /// The fewest and the most Gaussians of the frames that were read.
-    pub(crate) fn counts(&self) -> (usize, usize) {
-        self.counts.unwrap_or_default()
+    /// Whether the frames that were read look like frames of one sequence.
+    pub(crate) fn likeness(&self) -> &Likeness {
+        &self.likeness
     }
 
     /// What readers have changed on the way, in the frames that were read.
@@ -241,8 +243,7 @@ impl FrameSource for FrameFiles {
             frame.validate().map_err(|defect| format!("{}: {defect}", self.name(number)))?;
         }
         self.notes.add(number, notes);
-        let (fewest, most) = self.counts.unwrap_or((frame.len(), frame.len()));
-        self.counts = Some((fewest.min(frame.len()), most.max(frame.len())));
+        self.likeness.add(number, &frame);
         self.last = self.keeps_last.then(|| (number, frame.clone()));
         Ok(frame)
     }

@@ -23,6 +23,7 @@ mod frame_name;
 mod frames;
 mod input_args;
 mod inspect;
+mod likeness;
 mod machine;
 mod manual;
 mod memory_bound;

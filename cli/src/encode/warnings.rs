@@ -1,11 +1,13 @@
 //! What a user should know of a stream that was encoded without an error.
 
 use super::pictures::Goal;
+use crate::likeness::Unlike;
 use crate::numbers::counted;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
 use splatstream_encoder::{Dropped, FrameReport, Isolated, Report, Settings, Size, Structure, VerifiedFrame};
 use splatstream_format::syntax::FrameType;
+use std::fmt::Write as _;
 
 /// A PSNR is missed by more than this in the views that steps are fitted in, decibels.
 const MISSED: f64 = 0.5;
@@ -22,9 +24,6 @@ const OUTLIER: f64 = 2.0;
 
 /// A size is missed by more than this part of it.
 const MISSED_SIZE: f64 = 0.03;
-
-/// Files are unlike if one has more than so many times the Gaussians of another.
-const UNLIKE: usize = 2;
 
 /// A warning. Codes do not change, messages may.
 #[derive(Serialize)]
@@ -72,15 +71,26 @@ pub(crate) fn warnings(
     warnings
 }
 
-/// Frames of a sequence have about as many Gaussians; files that have not are hardly one.
-pub(super) fn unlike_frames((fewest, most): (usize, usize)) -> Option<Warning> {
-    let message = format!(
-        "the files were encoded as the frames of one sequence, and have from {} to {} each: \
-         if they are scenes of their own, encode them with --each -o DIR",
-        grouped(fewest as u64),
-        counted(most as u64, "Gaussian")
-    );
-    (most > fewest.saturating_mul(UNLIKE)).then(|| Warning::new("unlike-frames", message))
+/// What is said of files that are hardly frames of one sequence; nothing where frames that do not predict each other are coded by
+/// themselves already.
+pub(super) fn unlike_frames(unlike: &Unlike, is_intra: bool) -> Option<Warning> {
+    let (fewest, most) = unlike.gaussians;
+    let mut message = "the files were encoded as the frames of one sequence, and have ".to_owned();
+    if fewest < most {
+        let _infallible = write!(message, "from {} to ", grouped(fewest as u64));
+    }
+    message += &format!("{} each", counted(most as u64, "Gaussian"));
+    if let Some((least, most)) = unlike.extents {
+        let _infallible = write!(message, ", extents from {least:.3} to {most:.3}");
+    }
+    if unlike.are_apart {
+        message += ", and places that do not touch";
+    }
+    let apart = "--all-intra codes each by itself, and splatstream track makes one sequence of frames that were trained apart";
+    let each = "if they are scenes of their own, give the files with --each -o DIR";
+    let advice: Vec<&str> =
+        [(!is_intra).then_some(apart), unlike.is_unrelated.then_some(each)].into_iter().flatten().collect();
+    (!advice.is_empty()).then(|| Warning::new("unlike-frames", format!("{message}: {}", advice.join("; "))))
 }
 
 fn psnr(report: &Report, settings: &Settings, wanted: f64) -> Vec<Warning> {

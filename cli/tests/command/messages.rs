@@ -6,6 +6,7 @@ use crate::common::{
 use serde_json::Value;
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::ply;
+use splatstream_gaussians::GaussianFrame;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -258,6 +259,42 @@ fn scenes_of_their_own_become_streams_of_their_own() {
     let warnings = report["warnings"].as_array().unwrap();
     let unlike = warnings.iter().find(|warning| warning["code"] == "unlike-frames").unwrap();
     insta::assert_snapshot!(unlike["message"].as_str().unwrap());
+}
+
+#[test]
+fn files_of_a_directory_that_are_hardly_one_sequence_are_told_from_those_that_are() {
+    let directory = directory();
+    // Of each frame how many Gaussians it has, and how far it is moved.
+    let said = |name: &str, frames: &[(u32, f32)], more: &[&str]| {
+        let folder = directory.path().join(name);
+        fs::create_dir(&folder).unwrap();
+        for (number, &(gaussians, far)) in frames.iter().enumerate() {
+            let scene = BuiltinScene { gaussians, frames: 1, sh_degree: 0, ..scene() };
+            let mut planes = scene.frame(0).into_planes();
+            planes.position[0].iter_mut().for_each(|x| *x += far);
+            let frame = GaussianFrame::from_planes(0, planes).unwrap();
+            fs::write(folder.join(format!("f{number}.ply")), ply::write(&frame)).unwrap();
+        }
+        let out = folder.with_extension("gss");
+        let encode = ["encode", text(&folder), "-o", text(&out), "--preset", "fast", "--psnr", "30"];
+        let report = json(&[&encode[..], more].concat());
+        let warnings = report["warnings"].as_array().unwrap().clone();
+        let unlike = warnings.into_iter().find(|warning| warning["code"] == "unlike-frames");
+        unlike.map(|warning| warning["message"].as_str().unwrap().to_owned()).unwrap_or_default()
+    };
+    assert_eq!(said("alike", &[(90, 0.0), (100, 0.1), (110, 0.2)], &[]), "");
+    let cut = [(90, 0.0), (95, 0.0), (250, 0.0), (255, 0.0), (260, 0.0)];
+    assert_eq!(said("cut-intra", &cut, &["--all-intra"]), "");
+    let others = [(90, 0.0), (250, 1e3), (90, 5e3)];
+    insta::assert_snapshot!(
+        [
+            said("cut", &cut, &[]),
+            said("others", &others, &[]),
+            said("others-intra", &others, &["--all-intra"]),
+            said("elsewhere", &[(90, 0.0), (90, 1e3)], &[]),
+        ]
+        .join("\n")
+    );
 }
 
 #[test]
