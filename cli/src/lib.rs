@@ -70,7 +70,10 @@ pub use encode::{EncodeOptions, OptionsError, Prepared};
     about,
     after_help = "Example:\n  splatstream demo\n\n\
         Exit codes: 0 done, 1 files or settings, 2 usage, 3 a decoder that failed; of streams: 10 malformed, 11 invalid,\n\
-        12 unsupported, 13 over a limit, 14 truncated; 130 interrupted.\n\
+        12 unsupported, 13 over a limit, 14 truncated; 130 interrupted.\n\n\
+        Outputs: a file of the name given with -o is replaced, in one step when the new one is whole; a command that\n\
+        fails leaves it as it was. Refused are files that the command reads, disks, and directories with files of an\n\
+        earlier run, which --force removes.\n\n\
         The keys that --json prints are described in cli/json.md."
 )]
 struct Cli {

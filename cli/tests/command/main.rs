@@ -26,6 +26,7 @@ mod play;
 #[cfg(unix)]
 mod readme;
 mod registered_network;
+mod replaced;
 mod round_trip;
 #[cfg(unix)]
 mod serve;
