@@ -103,6 +103,13 @@ const QUICK_HEIGHT: u32 = 120;
 const WHAT: &str = "measuring these scenes";
 const LESS: &str = "fewer scenes, fewer --frames, fewer --cameras and a smaller --height take less";
 
+/// A frame that another codec decoded may take one in so many of the bytes that are left while it is read, and what is read is not
+/// more: drawing it takes the rest.
+const OF_PEER: u64 = 2;
+
+/// Bytes of memory that a byte of a peers file takes: its text, and its names and figures, of which a short one has some 200 bytes.
+const OF_PEERS_TEXT: u64 = 8;
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Written<S> {
@@ -147,23 +154,30 @@ impl Chart {
         let mut bound = self.memory.bound();
         let subjects: Vec<Subject> =
             self.scenes(&mut bound)?.into_iter().map(with_cameras).collect::<Result<_, Failure>>()?;
-        let open = |decoded: &Path| -> Result<Box<dyn FrameSource>, String> {
-            let files = FrameFiles::find(&[decoded.to_path_buf()], self.reading);
-            Ok(Box::new(files.map_err(|error| error.to_string())?))
-        };
+        let peers = self.peers.as_deref().map(|path| read_peers(path, &mut bound)).transpose()?;
         let mut charting = Charting {
             sweep: self.sweep.sweep(self.fps),
             fps: f64::from(self.fps.0) / f64::from(self.fps.1),
             gop: self.gop,
             ablation: self.ablation,
             learned: self.st_lpips.as_deref().map(read_weights).transpose()?,
-            peers: self.peers.as_deref().map(|path| read_peers(path, &open)).transpose()?,
+            peers: None,
             command: command_line(),
         };
         let footprint = charting.footprint(&subjects);
         bound.check(footprint.bytes(), WHAT, LESS)?;
         bound.keep(footprint.beside);
         charting.bound(bound.left());
+        // Beside the sources, their pictures and our streams. Nothing is encoded meanwhile.
+        let reading = self.reading.within(bound.left() / OF_PEER);
+        let open = move |decoded: &Path| -> Result<Box<dyn FrameSource>, String> {
+            let files = FrameFiles::find(&[decoded.to_path_buf()], reading);
+            Ok(Box::new(files.map_err(|error| error.to_string())?.once()))
+        };
+        charting.peers = match (&self.peers, &peers) {
+            (Some(path), Some(text)) => Some(peers_of(path, text, &open)?),
+            _ => None,
+        };
         let progress = Progress::steps(charting.steps(&subjects));
         Ok(charting.run(subjects, &progress)?)
     }
@@ -253,9 +267,17 @@ impl Chart {
     }
 }
 
-/// Results of other codecs.
-fn read_peers<'a>(path: &Path, open: OpenFrames<'a>) -> Result<Peers<'a>, Failure> {
+/// The text of a peers file, of which the bound takes note, and of what it becomes.
+fn read_peers(path: &Path, bound: &mut MemoryBound) -> Result<String, Failure> {
     let text = read_text(path)?;
+    let bytes = (text.len() as u64).saturating_mul(OF_PEERS_TEXT);
+    bound.check(bytes, "the peers file", "fewer results take less")?;
+    bound.keep(bytes);
+    Ok(text)
+}
+
+/// Results of other codecs.
+fn peers_of<'a>(path: &Path, text: &str, open: OpenFrames<'a>) -> Result<Peers<'a>, Failure> {
     let directory = path.parent().unwrap_or(Path::new("")).to_path_buf();
     Peers::new(text.as_bytes(), directory, open)
         .map_err(|error| Failure::other(format!("{}: {error}", path.display())))

@@ -129,6 +129,11 @@ impl FrameFiles {
         Self { as_is: true, ..self }
     }
 
+    /// Each frame is asked for once, and none is kept.
+    pub(crate) fn once(self) -> Self {
+        Self { keeps_last: false, ..self }
+    }
+
     /// What encoding with these settings may take of some memory: what is left beside the frame that is kept and the files that
     /// are read again. No frame is kept where that alone makes it enough.
     pub(crate) fn left_for(&mut self, settings: &Settings, memory: u64) -> u64 {

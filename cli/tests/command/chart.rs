@@ -3,6 +3,7 @@
 use crate::common::{directory, json, run, run_with, succeed, text, write_frames};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::ply;
+use splatstream_gaussians::GaussianFrame;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -126,6 +127,61 @@ fn the_numbers_of_a_sequence_and_of_a_peer_are_beside_the_page() {
     let peer = read(&out.join("peers.csv"));
     assert!(peer.contains("frames,Copy,1,300000,3,2,") && peer.contains(",100.000000,"), "{peer}");
     assert_eq!(read(&out.join("bandwidth.csv")).lines().count(), 1 + 4);
+}
+
+/// What another codec decoded is read beside the sources and our streams, and none beside another.
+#[test]
+fn frames_of_peers_are_bounded_with_all_that_is_held() {
+    let directory = directory();
+    let at = |name: &str| directory.path().join(name);
+    let write = |name: &str, times: usize| {
+        let scene = BuiltinScene { gaussians: 200, sh_degree: 0, frames: 1, ..BuiltinScene::default() };
+        let mut planes = scene.frame(0).into_planes();
+        planes.iter_mut().for_each(|plane| *plane = plane.repeat(times));
+        std::fs::write(at(name), ply::write(&GaussianFrame::from_planes(0, planes).unwrap())).unwrap();
+    };
+    write("small.ply", 1);
+    write("large.ply", 2500);
+    let of = |peer: &str, decoded: &str| {
+        format!(
+            r#"{{"scene": "small", "peer": "{peer}", "bytes": 9, "gaussians": 200, "frames": 1, "decoded": "{decoded}"}}"#
+        )
+    };
+    let results = [of("Small", "small.ply"), of("Large", "large.ply"), of("Again", "large.ply")].join(",");
+    let peers = format!(
+        r#"{{"version": 1, "scenes": [{{"scene": "small", "source": "small.ply"}}], "results": [{results}]}}"#
+    );
+    std::fs::write(at("peers.json"), peers).unwrap();
+    let (scene, out, peers) = (at("small.ply"), at("report"), at("peers.json"));
+    let chart = |more: &[&str]| {
+        let line =
+            ["chart", text(&scene), "-o", text(&out), "--quick", "--height", "20", "--cameras", "ring:1"];
+        run(&[&line[..], &["--qualities", "low", "--peers", text(&peers), "--json"], more].concat())
+    };
+    // What is asked for at least, from what is said where there is nothing.
+    let refused = chart(&["--max-memory", "1M"]);
+    assert_eq!(refused.status.code(), Some(13), "{refused:?}");
+    let said = String::from_utf8(refused.stderr).unwrap();
+    let asked: u64 = said.split(" takes up to ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let scene = |memory: u64| {
+        let charted = chart(&["--max-memory", &memory.to_string()]);
+        assert!(charted.status.success(), "{charted:?}");
+        let report: serde_json::Value = serde_json::from_slice(&charted.stdout).unwrap();
+        report["scenes"][0].clone()
+    };
+    // The file has 34 MB and the frame 28: twice that is needed beside what is held, and encoding 200 Gaussians takes less.
+    let little = scene(asked);
+    assert_eq!(little["peers"], serde_json::json!(["Small"]), "{asked}: {little}");
+    for missing in ["Large", "Again"] {
+        let missing = little["peers_missing"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|said| said.as_str().unwrap().starts_with(missing));
+        assert!(missing.unwrap().as_str().unwrap().contains("reading takes"), "{little}");
+    }
+    let enough = scene(asked + (80 << 20));
+    assert_eq!(enough["peers"], serde_json::json!(["Small", "Large", "Again"]), "{enough}");
 }
 
 /// The lines of a CSV file, each as its cells by name.
