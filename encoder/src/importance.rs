@@ -347,17 +347,17 @@ mod tests {
         let mut ranking = Ranking::new(&Settings::default());
         ranking.look_at(&scene.frame(0));
         let of_sequence = ranking.cameras.clone();
-        ranking.start_gop(&scene.frame(8));
+        ranking.turn_to(&scene.frame(8));
         assert_eq!(ranking.cameras, of_sequence);
         let mut far = scene.frame(8);
         far.planes_mut().position[0].iter_mut().for_each(|x| *x += 100.0);
-        ranking.start_gop(&far);
+        ranking.turn_to(&far);
         assert_eq!(ranking.cameras, ranking.made_for(&far));
-        ranking.start_gop(&scene.frame(4));
+        ranking.turn_to(&scene.frame(4));
         assert_eq!(ranking.cameras, of_sequence, "whatever was there in between");
         let mut large = scene.frame(8);
         large.planes_mut().position.into_iter().flatten().for_each(|axis| *axis *= 2.0);
-        ranking.start_gop(&large);
+        ranking.turn_to(&large);
         assert_ne!(ranking.cameras, of_sequence);
     }
 

@@ -179,3 +179,21 @@ fn no_sequence_is_larger_than_all_intra() {
     let (_, report) = encoded(sequence(4), &layered);
     assert!(!report.stands_alone && report.coded.iter().any(|frame| frame.frame_type != FrameType::Intra));
 }
+
+/// The same, moved along x.
+fn moved(frame: GaussianFrame, by: f32) -> GaussianFrame {
+    let degree = frame.sh_degree();
+    let mut planes = frame.into_planes();
+    planes.position[0].iter_mut().for_each(|value| *value += by);
+    GaussianFrame::from_planes(degree, planes).unwrap()
+}
+
+#[test]
+fn a_frame_by_itself_is_ranked_where_it_is() {
+    let scene = || builtin(3_000, 0);
+    let settings = Settings { psnr: Some(45.0), ..Settings::default() };
+    let of = |frames: Vec<GaussianFrame>| psnr(&encoded(frames, &settings).1);
+    // Out of all views of the first frame. What is measured of a GOP is its last I frame.
+    let (near, far) = (of(vec![scene(), scene()]), of(vec![scene(), moved(scene(), 64.0)]));
+    assert!((near - far).abs() < 0.5, "{near} {far}");
+}
