@@ -2,7 +2,6 @@
 
 use crate::capture_files::files_at;
 use crate::failure::Failure;
-use crate::standard::refuse_standard_input;
 use crate::up_guess::UpGuess;
 use clap::{Args, ValueEnum};
 use splatstream_encoder::up_of;
@@ -173,7 +172,7 @@ impl CameraArgs {
     }
 
     fn of_file(&self, path: &Path) -> Result<Vec<Camera>, Failure> {
-        refuse_standard_input(path)?;
+        Failure::refuse_standard_input(path)?;
         let cameras =
             read_cameras(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
         if cameras.is_empty() {

@@ -8,7 +8,6 @@ mod run;
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::standard::refuse_standard_input;
 use clap::{Args, Subcommand};
 use splatstream_conformance::case::Case;
 use splatstream_conformance::error::Error;
@@ -96,7 +95,7 @@ impl SuiteArgs {
     /// The folder of the vectors that was named, or the one of the repository.
     fn folder(named: Option<PathBuf>) -> Result<PathBuf, Failure> {
         let named = named.or_else(Suite::locate).ok_or_else(nowhere)?;
-        refuse_standard_input(&named)?;
+        Failure::refuse_standard_input(&named)?;
         let folder = std::path::absolute(&named).map_err(|error| Failure::file("find", &named, &error))?;
         if !folder.is_dir() {
             let path = named.display();

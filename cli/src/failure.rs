@@ -76,11 +76,22 @@ impl Failure {
     }
 
     /// Standard input is given for what this command reads in parts, several times or as a directory.
-    pub(crate) fn not_from_standard(path: &Path) -> Self {
+    fn not_from_standard(path: &Path) -> Self {
         let path = path.display();
         Self::Other(format!(
             "{path}: this command cannot read that from standard input; give a file or a directory"
         ))
+    }
+
+    /// Refuses standard input for what is not read from there. A file that is called so is no standard input.
+    ///
+    /// # Errors
+    /// Of a path that stands for standard input.
+    pub(crate) fn refuse_standard_input(path: &Path) -> Result<(), Self> {
+        match is_standard(path) && !path.exists() {
+            true => Err(Self::not_from_standard(path)),
+            false => Ok(()),
+        }
     }
 
     /// A stream that breaks the specification.

@@ -15,7 +15,6 @@ use crate::input_args::InputArgs;
 use crate::memory_bound::{MemoryBound, bytes_of_gaussians};
 use crate::numbers::{FrameRange, counted, parse_share};
 use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs, refuse_standard};
-use crate::standard::refuse_standard_input;
 use crate::stream_file::LimitArgs;
 use captures::Captures;
 use clap::Args;
@@ -129,7 +128,7 @@ impl Fit {
     /// Reads, trains, writes, frame by frame.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let begin = Instant::now();
-        refuse_standard_input(&self.input)?;
+        Failure::refuse_standard_input(&self.input)?;
         let captures = Captures::find(&self.input)?;
         self.check(&captures)?;
         let opened = self.start.as_ref().map(|path| Opened::open(path, self.reading)).transpose()?;

@@ -7,7 +7,6 @@ use crate::console::{Console, to_json};
 use crate::failure::Failure;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs};
 use crate::package::files_in;
-use crate::standard::refuse_standard_input;
 use crate::stream_file::LimitArgs;
 use crate::whole_file::read_text;
 use clap::{Args, ValueEnum};
@@ -112,7 +111,7 @@ impl Play {
     /// Plays, or simulates, and reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         console.claim(self.out.as_deref())?;
-        refuse_standard_input(Path::new(&self.location))?;
+        Failure::refuse_standard_input(Path::new(&self.location))?;
         let inputs = self.inputs();
         if let Some(out) = &self.out {
             refuse_inputs(out, &inputs)?;

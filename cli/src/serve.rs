@@ -6,7 +6,6 @@ mod network_args;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::counted;
-use crate::standard::refuse_standard_input;
 use crate::unfinished;
 use clap::{Args, ValueEnum};
 use network_args::NetworkArgs;
@@ -91,7 +90,7 @@ struct Report<'a> {
 impl Serve {
     /// Serves until a signal comes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
-        self.directory.as_deref().map_or(Ok(()), refuse_standard_input)?;
+        self.directory.as_deref().map_or(Ok(()), Failure::refuse_standard_input)?;
         let temporary = self.make()?;
         let directory = self.directory.as_deref().or(temporary.as_ref().map(TempDir::path));
         let directory = directory.unwrap_or(Path::new("."));

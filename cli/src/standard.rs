@@ -1,6 +1,5 @@
 //! The names that stand for standard input and standard output.
 
-use crate::failure::Failure;
 use std::path::Path;
 
 /// The name that stands for standard input and standard output.
@@ -9,12 +8,4 @@ pub(crate) const STANDARD: &str = "-";
 /// Whether a path stands for standard input or output. A file of that name is `./-`.
 pub(crate) fn is_standard(path: &Path) -> bool {
     path == Path::new(STANDARD) || ["/dev/stdout", "/dev/fd/1"].iter().any(|name| path == Path::new(name))
-}
-
-/// Refuses standard input for what is not read from there. A file that is called so is no standard input.
-pub(crate) fn refuse_standard_input(path: &Path) -> Result<(), Failure> {
-    match is_standard(path) && !path.exists() {
-        true => Err(Failure::not_from_standard(path)),
-        false => Ok(()),
-    }
 }

@@ -4,7 +4,6 @@ use super::flicker::{Flicker, FlickerSums};
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::failure::Failure;
 use crate::numbers::counted;
-use crate::standard::refuse_standard_input;
 use crate::whole_file::read_whole;
 use clap::Args;
 use serde::Serialize;
@@ -98,7 +97,7 @@ impl PictureArgs {
 
 /// The weights of the learned metric in a file.
 pub(crate) fn read_weights(path: &Path) -> Result<StLpips, Failure> {
-    refuse_standard_input(path)?;
+    Failure::refuse_standard_input(path)?;
     StLpips::read(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
 }
 

@@ -3,7 +3,6 @@
 use super::{SuiteArgs, refused, text_of};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::standard::refuse_standard_input;
 use clap::Args;
 use serde::Serialize;
 use splatstream_conformance::cancel::Cancel;
@@ -47,7 +46,7 @@ impl Packages {
             Some(folder) => folder.clone(),
             None => beside(&SuiteArgs::folder(None)?),
         };
-        refuse_standard_input(&folder)?;
+        Failure::refuse_standard_input(&folder)?;
         let folder = std::path::absolute(&folder).map_err(|error| Failure::file("find", &folder, &error))?;
         let unpackager = Template::parse(&self.command()?).map_err(refused)?;
         let (limits, cancel) = (Limits::default(), Cancel::default());

@@ -5,7 +5,6 @@ use crate::failure::Failure;
 use crate::numbers::counted;
 use crate::output_file::check_directory;
 use crate::progress::Progress;
-use crate::standard::refuse_standard_input;
 use crate::unfinished::advise;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -289,7 +288,7 @@ impl Taken<'_> {
                 self.frames
             )));
         }
-        refuse_standard_input(path)?;
+        Failure::refuse_standard_input(path)?;
         let capture =
             read_views(path).map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
         let photographs = load_photographs(&capture, Some(directory), self.height, self.background)
