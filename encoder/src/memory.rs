@@ -81,6 +81,10 @@ const INTRA: Share = Share { copies: 33, bytes: 240 };
 /// many, the balanced preset has as few strips as the fast one.
 const IN_STRIPS_FAST: Share = Share { copies: 20, bytes: 10 };
 const IN_STRIPS: Share = Share { copies: 40, bytes: 20 };
+/// The numbers of those Gaussians, in six views.
+const ROWS_IN_STRIPS: u64 = 24;
+/// The frame that steps are fitted to, and what they make of the Gaussians of a view.
+const TRIAL: Share = Share { copies: 20, bytes: 60 };
 /// Coding predicted frames: references, what pairs them with the frame, and what becomes of each Gaussian in two ways.
 const PREDICTED_FAST: Share = Share { copies: 87, bytes: 240 };
 const PREDICTED: Share = Share { copies: 108, bytes: 430 };
@@ -133,8 +137,9 @@ impl<'a> Footprint<'a> {
             Some(_) => OF_STREAM.saturating_mul(frames).saturating_mul(self.coded()),
             None => 0,
         };
-        let once = self.in_strips().saturating_add(judged).saturating_add(stream);
-        let each = self.coding().saturating_add(self.waiting()).saturating_add(once);
+        // What the views hold is let go before anything is coded, but for which Gaussians these are.
+        let coding = self.coding().saturating_add(self.waiting()).saturating_add(ROWS_IN_STRIPS);
+        let each = coding.max(self.fitting_steps()).saturating_add(judged).saturating_add(stream);
         let training = bytes_of_training(self.settings, self.gaussians, self.frames);
         let other = self.pictures().saturating_add(training).saturating_add(FIXED);
         each.saturating_mul(self.gaussians).saturating_add(other)
@@ -174,15 +179,16 @@ impl<'a> Footprint<'a> {
         coded.max(fitted).saturating_add(pruned)
     }
 
-    /// What the views hold in which steps are fitted, bytes of a Gaussian.
-    fn in_strips(&self) -> u64 {
+    /// What fitting steps takes, bytes of a Gaussian: what the views hold in which they are fitted, and what is made of it.
+    fn fitting_steps(&self) -> u64 {
         let share = match (self.settings.has_target(), self.settings.preset) {
             (false, _) => return 0,
             (true, Preset::Fast) => IN_STRIPS_FAST,
             (true, Preset::Balanced | Preset::Small) if self.gaussians > MANY as u64 => IN_STRIPS_FAST,
             (true, Preset::Balanced | Preset::Small) => IN_STRIPS,
         };
-        share.of(values(self.sh_degree))
+        let values = values(self.sh_degree);
+        share.of(values).saturating_add(TRIAL.of(values))
     }
 
     /// What waits of the frames of a GOP once they are coded, bytes of a Gaussian.
