@@ -100,13 +100,17 @@ pub(crate) fn compressed(apart: f64, linear: f64, segment: f64) -> f64 {
     linear + segment * (k - 1.0) + (scaled - step) * segment / step
 }
 
-/// The nearest integer, ties to even, of a value below 2^22 in magnitude.
+/// The nearest integer, ties to even, of a value of 2^22 in magnitude at most; what is beyond is taken for the limit.
 ///
-/// At 1.5 * 2^23 the spacing of f32 is 1: adding it rounds, on any machine and faster than a call.
-#[inline]
+/// At 1.5 * 2^23 the spacing of f32 is 1: adding it rounds, and the integer stands in the last bits of the sum. All machines do
+/// that alike and on whole vectors, where a cast has to look for what no integer is.
+#[inline(always)]
 pub(crate) fn nearest_integer(value: f32) -> i32 {
     const SHIFTER: f32 = 12_582_912.0;
-    ((value + SHIFTER) - SHIFTER) as i32
+    const MOST: f32 = 4_194_304.0;
+    let value = if value > -MOST { value } else { -MOST };
+    let value = if value < MOST { value } else { MOST };
+    (value + SHIFTER).to_bits().wrapping_sub(SHIFTER.to_bits()).cast_signed()
 }
 
 /// Rounds a canonical frame whose reach has been checked onto the grids.

@@ -14,6 +14,7 @@ use crate::gop_tools::{dc_planes, sh_planes};
 use crate::grid::{Geometry, geometry, nearest_integer};
 use crate::shape::{Shape, nearest_multiple, scale_residuals, scale_updates};
 use crate::vq;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_decoder::colour::{COMPONENT_RANGE, Colour};
 use splatstream_decoder::increment::residual::{AttributeValues, Attributes};
@@ -221,17 +222,48 @@ impl Wanted {
     }
 }
 
+/// Components that are fetched and rounded at a time: they stay in the first-level cache.
+const TILE: usize = 1 << 10;
+
 /// Components of some Gaussians to the nearest multiples of their steps.
 fn rounded(components: &[Vec<f32>], rows: &[u32], exponents: &[u8]) -> Vec<Vec<i32>> {
+    // The same for all planes: the step of each Gaussian, and how many of them a component may have.
+    let steps: Vec<f32> = exponents.iter().map(|&exponent| step(exponent) as f32).collect();
+    let most: Vec<f32> =
+        exponents.iter().map(|&exponent| (COMPONENT_RANGE.end() / step(exponent)) as f32).collect();
+    let arch = Arch::new();
     let plane = |plane: &Vec<f32>| {
-        let value = |(&row, &exponent): (&u32, &u8)| {
-            let step = step(exponent);
-            let most = COMPONENT_RANGE.end() / step;
-            nearest_integer(plane[row as usize] / step as f32).clamp(-most, most)
-        };
-        rows.iter().zip(exponents).map(value).collect()
+        let mut values = vec![0; rows.len()];
+        let mut fetched = [0.0; TILE];
+        let tiles = rows.chunks(TILE).zip(values.chunks_mut(TILE));
+        for ((rows, values), (steps, most)) in tiles.zip(steps.chunks(TILE).zip(most.chunks(TILE))) {
+            fetched.iter_mut().zip(rows).for_each(|(value, &row)| *value = plane[row as usize]);
+            arch.dispatch(Round { fetched: &fetched, steps, most, values });
+        }
+        values
     };
     components.par_iter().map(plane).collect()
+}
+
+/// Rounds values to multiples of steps, no more of them than there may be: with the vectors of the machine, on every one the
+/// same.
+struct Round<'a> {
+    fetched: &'a [f32],
+    steps: &'a [f32],
+    most: &'a [f32],
+    values: &'a mut [i32],
+}
+
+impl WithSimd for Round<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { fetched, steps, most, values } = self;
+        for (((value, &fetched), &step), &most) in values.iter_mut().zip(fetched).zip(steps).zip(most) {
+            *value = nearest_integer((fetched / step).clamp(-most, most));
+        }
+    }
 }
 
 /// The components of some Gaussians in their own steps, Gaussian by Gaussian.

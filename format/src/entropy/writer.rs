@@ -3,68 +3,75 @@
 use super::lanes::Segments;
 use super::model::PlaneModel;
 use super::token::split;
-use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
+use super::{FREQUENCY_BITS, FREQUENCY_SUM, MAX_LANES, STATE_LOW};
 use crate::bits::BitWriter;
 use crate::payload::write_leb128;
 use crate::{Error, ErrorKind, Result};
+
+/// Contexts of a plane, at most, for which a place is kept: all that a byte can name.
+const CONTEXTS: usize = 1 << 8;
+/// Tokens of a table.
+const TOKENS: usize = 1 << 8;
 
 /// A plane model arranged for coding. Built once a unit, shared by its blocks.
 #[derive(Debug, Clone)]
 pub struct PlaneEncoder {
     direct_log2: u8,
-    /// Frequency and first slot of each token, table by table, as many of each table as the longest has.
-    intervals: Vec<(u16, u16)>,
-    tokens: usize,
-    /// Where the intervals of the table of each context start.
-    start_of_context: Vec<usize>,
+    /// The symbol of each token, table by table; those of frequency 0 cannot be coded. The last table has no others.
+    symbols: Vec<[Symbol; TOKENS]>,
+    /// The table of each context.
+    table_of_context: [u8; CONTEXTS],
+}
+
+/// The slots of a token among all that its table has.
+#[derive(Debug, Clone, Copy, Default)]
+struct Symbol {
+    frequency: u16,
+    first: u16,
 }
 
 impl PlaneEncoder {
     /// Expands the tables of a model.
     pub fn new(model: &PlaneModel) -> Self {
-        let tokens = model.tables.iter().map(|table| table.of_token().len()).max().unwrap_or(0);
-        let mut intervals = Vec::with_capacity(tokens.wrapping_mul(model.tables.len()));
-        for table in &model.tables {
+        let expanded = |of_token: &[u16]| {
+            let mut symbols = [Symbol::default(); TOKENS];
             let mut first = 0_u16;
-            for token in 0..tokens {
-                let frequency = table.of_token().get(token).copied().unwrap_or(0);
-                intervals.push((frequency, first));
+            for (symbol, &frequency) in symbols.iter_mut().zip(of_token) {
+                *symbol = Symbol { frequency, first };
                 first = first.wrapping_add(frequency);
             }
-        }
-        let start = |&table: &u8| usize::from(table).wrapping_mul(tokens);
-        let start_of_context = model.table_of_context.iter().map(start).collect();
-        Self { direct_log2: model.direct_log2, intervals, tokens, start_of_context }
+            symbols
+        };
+        let of_tables = model.tables.iter().map(|table| table.of_token()).chain([&[] as &[u16]]);
+        let mut table_of_context = [u8::try_from(model.tables.len()).unwrap_or(u8::MAX); CONTEXTS];
+        table_of_context.iter_mut().zip(&model.table_of_context).for_each(|(to, &table)| *to = table);
+        Self { direct_log2: model.direct_log2, symbols: of_tables.map(expanded).collect(), table_of_context }
     }
 
-    /// Frequency and first slot of a token in a context; none if it has no frequency.
-    #[inline]
-    fn interval(&self, context: u8, token: u8) -> Option<(u16, u16)> {
-        let token = usize::from(token);
-        let start = self.start_of_context.get(usize::from(context)).filter(|_| token < self.tokens)?;
-        self.intervals.get(start.wrapping_add(token)).copied().filter(|&(frequency, _)| frequency > 0)
+    /// The slots of a token in a context; none of them if it cannot be coded there.
+    #[inline(always)]
+    fn symbol(&self, context: u8, token: u8) -> Symbol {
+        let table = self.table_of_context.get(usize::from(context)).copied().unwrap_or(u8::MAX);
+        let symbols = self.symbols.get(usize::from(table));
+        symbols.and_then(|symbols| symbols.get(usize::from(token))).copied().unwrap_or_default()
     }
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Symbol {
-    lane: u8,
-    frequency: u16,
-    first: u16,
-}
-
-/// Collects the symbols of one block in reading order; [`BlockWriter::finish`] codes them backwards.
+/// Collects the symbols of one block; [`BlockWriter::finish`] codes them backwards.
 #[derive(Debug)]
 pub struct BlockWriter {
     lanes_log2: u8,
+    /// Plane by plane, as the values stand there.
     symbols: Vec<Symbol>,
+    /// Values of each plane.
+    lengths: Vec<usize>,
     raw: BitWriter,
 }
 
 impl BlockWriter {
     /// An empty block with 2^`lanes_log2` states, at most 32.
     pub fn new(lanes_log2: u8) -> Self {
-        Self { lanes_log2: lanes_log2.min(5), symbols: Vec::new(), raw: BitWriter::new() }
+        Self { lanes_log2: lanes_log2.min(5), symbols: Vec::new(), lengths: Vec::new(), raw: BitWriter::new() }
     }
 
     /// Adds a plane: unsigned values and their contexts (empty: all 0).
@@ -78,55 +85,58 @@ impl BlockWriter {
         values: impl ExactSizeIterator<Item = u64>,
     ) -> Result<()> {
         let values: Vec<u64> = values.collect();
-        self.symbols.reserve(values.len());
-        let uncodable = Error::new(
-            0,
-            "8.3",
-            ErrorKind::Constraint { rule: "a coded token has a frequency of at least 1" },
-        );
+        let contexts = contexts.iter().copied().chain(core::iter::repeat(0));
+        let mut can_be_coded = true;
+        let mut has_raw_bits = false;
+        self.symbols.extend(values.iter().zip(contexts).map(|(&value, context)| {
+            let token = split(value, encoder.direct_log2);
+            let symbol = encoder.symbol(context, token.token);
+            can_be_coded &= symbol.frequency > 0;
+            has_raw_bits |= token.raw_bits > 0;
+            symbol
+        }));
+        if !can_be_coded {
+            let rule = "a coded token has a frequency of at least 1";
+            return Err(Error::new(0, "8.3", ErrorKind::Constraint { rule }));
+        }
+        if has_raw_bits {
+            self.raw_bits(encoder.direct_log2, &values);
+        }
+        self.lengths.push(values.len());
+        Ok(())
+    }
+
+    /// Writes what tokens do not say of values, in reading order.
+    fn raw_bits(&mut self, direct_log2: u8, values: &[u64]) {
         let segments = Segments::new(values.len(), self.lanes_log2);
+        let direct = 1_u64.wrapping_shl(direct_log2.into());
         for step in 0..segments.length() {
-            let mut index = step;
-            for lane in 0..u8::try_from(segments.active(step)).unwrap_or(u8::MAX) {
-                let value = values.get(index).copied().unwrap_or(0);
-                let context = contexts.get(index).copied().unwrap_or(0);
-                let token = split(value, encoder.direct_log2);
-                let (frequency, first) = encoder.interval(context, token.token).ok_or(uncodable)?;
-                self.symbols.push(Symbol { lane, frequency, first });
-                if token.raw_bits > 0 {
+            for &value in values.iter().skip(step).step_by(segments.length()) {
+                if value >= direct {
+                    let token = split(value, direct_log2);
                     self.raw.bits(token.raw, token.raw_bits);
                 }
-                index = index.wrapping_add(segments.length());
             }
         }
-        Ok(())
     }
 
     /// The bytes of the block, clause 5.13.
     pub fn finish(self) -> Vec<u8> {
-        let mut states = [STATE_LOW; MAX_LANES];
-        let mut words: Vec<u16> = Vec::with_capacity(self.symbols.len() / 2);
-        for symbol in self.symbols.iter().rev() {
-            let Some(state) = states.get_mut(usize::from(symbol.lane)) else { continue };
-            let frequency = u32::from(symbol.frequency);
-            if u64::from(*state) >= u64::from(frequency).wrapping_shl(20) {
-                let [low, high, ..] = state.to_le_bytes();
-                words.push(u16::from_le_bytes([low, high]));
-                *state = state.wrapping_shr(16);
-            }
-            let quotient = state.checked_div(frequency).unwrap_or(0);
-            let remainder = state.wrapping_sub(quotient.wrapping_mul(frequency));
-            *state = quotient
-                .wrapping_shl(FREQUENCY_BITS)
-                .wrapping_add(remainder)
-                .wrapping_add(u32::from(symbol.first));
+        let mut states = States::new(self.symbols.len());
+        let mut end = self.symbols.len();
+        for length in self.lengths.iter().rev() {
+            let start = end.wrapping_sub(*length);
+            let plane = self.symbols.get(start..end).unwrap_or_default();
+            states.code(plane, Segments::new(*length, self.lanes_log2));
+            end = start;
         }
         let lanes = 1_usize.wrapping_shl(u32::from(self.lanes_log2));
         let raw = self.raw.into_bytes();
+        let words = states.words.get(..states.written).unwrap_or_default();
         let mut bytes =
             Vec::with_capacity(words.len().wrapping_mul(2).wrapping_add(raw.len()).wrapping_add(133));
         write_leb128(u32::try_from(words.len()).unwrap_or(u32::MAX), &mut bytes);
-        for state in states.iter().take(lanes) {
+        for state in states.of_lanes.iter().take(lanes) {
             bytes.extend_from_slice(&state.to_le_bytes());
         }
         for word in words.iter().rev() {
@@ -134,5 +144,71 @@ impl BlockWriter {
         }
         bytes.extend_from_slice(&raw);
         bytes
+    }
+}
+
+/// 2^44 divided by each frequency, rounded up; frequency 0 codes nothing.
+static RECIPROCALS: [u64; FREQUENCY_SUM as usize + 1] = reciprocals();
+
+const fn reciprocals() -> [u64; FREQUENCY_SUM as usize + 1] {
+    let mut reciprocals = [0; FREQUENCY_SUM as usize + 1];
+    let mut frequency = 1_usize;
+    while frequency < reciprocals.len() {
+        reciprocals[frequency] = (1_u64 << 44).div_ceil(frequency as u64);
+        frequency += 1;
+    }
+    reciprocals
+}
+
+/// A state divided by a frequency, by multiplication, which takes a fraction of the time and is exact.
+///
+/// The reciprocal of f is larger than 2^44 / f by less than 1. So the product is larger than 2^44 x / f by less than x < 2^32, which
+/// is less than the 2^44 / f by which the next integer is above, since f is at most 2^12. And x < 2^20 f, so that the product is below
+/// 2^64.
+#[inline(always)]
+fn quotient(state: u32, frequency: u32) -> u32 {
+    let reciprocal = usize::try_from(frequency).ok().and_then(|at| RECIPROCALS.get(at)).copied().unwrap_or(0);
+    (u64::from(state).wrapping_mul(reciprocal) >> 44) as u32
+}
+
+/// The states of a block, and the words that left them.
+struct States {
+    of_lanes: [u32; MAX_LANES],
+    /// One for each symbol, more than ever leave.
+    words: Vec<u16>,
+    written: usize,
+}
+
+impl States {
+    fn new(symbols: usize) -> Self {
+        Self { of_lanes: [STATE_LOW; MAX_LANES], words: vec![0; symbols], written: 0 }
+    }
+
+    /// Codes the symbols of a plane, from the last that is read to the first.
+    fn code(&mut self, plane: &[Symbol], segments: Segments) {
+        for step in (0..segments.length()).rev() {
+            let active = segments.active(step);
+            let mut index = step.wrapping_add(active.wrapping_mul(segments.length()));
+            for state in self.of_lanes.iter_mut().take(active).rev() {
+                index = index.wrapping_sub(segments.length());
+                let Symbol { frequency, first } = plane.get(index).copied().unwrap_or_default();
+                let frequency = u32::from(frequency);
+                // A word leaves a state that would grow too large. It is written in any case, and counted if it leaves: what
+                // comes cannot be foreseen, and a branch would be taken wrongly as often as words leave.
+                let leaves = u64::from(*state) >= u64::from(frequency).wrapping_shl(20);
+                if let Some(word) = self.words.get_mut(self.written) {
+                    let [low, high, ..] = state.to_le_bytes();
+                    *word = u16::from_le_bytes([low, high]);
+                }
+                self.written = self.written.wrapping_add(leaves.into());
+                let rest = state.wrapping_shr(u32::from(leaves).wrapping_mul(16));
+                let quotient = quotient(rest, frequency);
+                let remainder = rest.wrapping_sub(quotient.wrapping_mul(frequency));
+                *state = quotient
+                    .wrapping_shl(FREQUENCY_BITS)
+                    .wrapping_add(remainder)
+                    .wrapping_add(u32::from(first));
+            }
+        }
     }
 }
